@@ -1,0 +1,43 @@
+"""Pushes: a force and a torque on a bone, at a point, from when, for how long."""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from . import faults
+from .faults import floats, set_fields
+from .ragdoll import Vector
+
+LARGEST = 1e7
+"""N and N m: beyond it a push is refused, as no body that this package is for meets it."""
+
+
+@dataclass(frozen=True)
+class Push:
+    """A steady ``force`` (N) and ``torque`` (N m) on one bone.
+
+    ``point`` (m) is where the force attacks, from the bone's centre of mass. With ``local``,
+    force, torque and point are given along the bone's own axes and turn with it; otherwise
+    force and torque are along the world's axes, and the point keeps to the bone all the same.
+    It acts for ``duration`` s of simulated time from ``start`` s (None: from the next instant).
+    """
+
+    bone: str
+    force: Vector = (0.0, 0.0, 0.0)
+    torque: Vector = (0.0, 0.0, 0.0)
+    point: Vector = (0.0, 0.0, 0.0)
+    duration: float = 0.1
+    start: float | None = None
+    local: bool = False
+
+    def __post_init__(self) -> None:
+        for key in ('force', 'torque', 'point'):
+            set_fields(self, **{key: floats(getattr(self, key))})
+            faults.check_finite(key, getattr(self, key))
+        for key in ('force', 'torque'):
+            if math.hypot(*getattr(self, key)) > LARGEST:
+                raise faults.OutOfRange(key, getattr(self, key), f'at most {LARGEST:g} long')
+        faults.check_positive('duration', self.duration)
+        faults.check_range('duration', self.duration, 0, 1e6)
+        if self.start is not None:
+            faults.check_range('start', self.start, 0, 1e9)

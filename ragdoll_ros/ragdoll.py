@@ -1,0 +1,383 @@
+"""What a doll is: bones with shapes and masses, joints between them, one tree.
+
+Frozen data, no behaviour but validation. SI units, radians, REP 103: x forward, y left, z up.
+All positions, axes and orientations are given in the doll's frame in the bind pose, the pose
+in which every joint angle is zero. Quaternions are x, y, z, w.
+"""
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from . import faults
+from .faults import floats, set_fields
+from .rotation import IDENTITY
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+Limits = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A solid ball of ``radius`` m."""
+
+    radius: float
+    kind: ClassVar[str] = 'sphere'
+
+    def __post_init__(self) -> None:
+        faults.check_positive('sphere', self.radius)
+
+    @property
+    def volume(self) -> float:
+        """Volume in m^3."""
+        return 4 / 3 * math.pi * self.radius ** 3
+
+    @property
+    def half_extents(self) -> Vector:
+        """Half the size of the bounding box along the shape's own axes, m."""
+        return (self.radius,) * 3
+
+    def reach(self, direction: np.ndarray) -> np.ndarray:
+        """How far the shape extends along unit directions (..., 3) of its own frame, m."""
+        return np.full(np.shape(direction)[:-1], self.radius)
+
+    def inertia(self, mass: float) -> Vector:
+        """Principal moments of the uniform solid about its centre, kg m^2."""
+        return (0.4 * mass * self.radius ** 2,) * 3
+
+
+@dataclass(frozen=True)
+class Box:
+    """A solid box with full edge lengths ``size`` m along its x, y and z."""
+
+    size: Vector
+    kind: ClassVar[str] = 'box'
+
+    def __post_init__(self) -> None:
+        set_fields(self, size=floats(self.size))
+        faults.check_positive('box', self.size)
+
+    @property
+    def volume(self) -> float:
+        """Volume in m^3."""
+        return math.prod(self.size)
+
+    @property
+    def half_extents(self) -> Vector:
+        """Half the edge lengths, m."""
+        return floats(edge / 2 for edge in self.size)
+
+    def reach(self, direction: np.ndarray) -> np.ndarray:
+        """How far the shape extends along unit directions (..., 3) of its own frame, m."""
+        return np.abs(direction) @ np.array(self.half_extents)
+
+    def inertia(self, mass: float) -> Vector:
+        """Principal moments of the uniform solid about its centre, kg m^2."""
+        xx, yy, zz = (edge * edge for edge in self.size)
+        return (mass * (yy + zz) / 12, mass * (xx + zz) / 12, mass * (xx + yy) / 12)
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """A solid cylinder along its own z: ``radius`` and full ``length``, m."""
+
+    radius: float
+    length: float
+    kind: ClassVar[str] = 'cylinder'
+
+    def __post_init__(self) -> None:
+        faults.check_positive('cylinder', (self.radius, self.length))
+
+    @property
+    def volume(self) -> float:
+        """Volume in m^3."""
+        return math.pi * self.radius ** 2 * self.length
+
+    @property
+    def half_extents(self) -> Vector:
+        """Half the size of the bounding box along the shape's own axes, m."""
+        return (self.radius, self.radius, self.length / 2)
+
+    def reach(self, direction: np.ndarray) -> np.ndarray:
+        """How far the shape extends along unit directions (..., 3) of its own frame, m."""
+        along = np.abs(np.asarray(direction)[..., 2])
+        return along * self.length / 2 + np.sqrt(np.maximum(0, 1 - along ** 2)) * self.radius
+
+    def inertia(self, mass: float) -> Vector:
+        """Principal moments of the uniform solid about its centre, kg m^2."""
+        across = mass * (3 * self.radius ** 2 + self.length ** 2) / 12
+        return (across, across, mass * self.radius ** 2 / 2)
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """A cylinder along its own z of ``length`` m between two half balls of ``radius`` m.
+
+    The whole is length + 2 radius long, as in MuJoCo, PyBullet and SDF.
+    """
+
+    radius: float
+    length: float
+    kind: ClassVar[str] = 'capsule'
+
+    def __post_init__(self) -> None:
+        faults.check_positive('capsule', (self.radius, self.length))
+
+    @property
+    def volume(self) -> float:
+        """Volume in m^3."""
+        return math.pi * self.radius ** 2 * (self.length + 4 / 3 * self.radius)
+
+    @property
+    def half_extents(self) -> Vector:
+        """Half the size of the bounding box along the shape's own axes, m."""
+        return (self.radius, self.radius, self.length / 2 + self.radius)
+
+    def reach(self, direction: np.ndarray) -> np.ndarray:
+        """How far the shape extends along unit directions (..., 3) of its own frame, m."""
+        return np.abs(np.asarray(direction)[..., 2]) * self.length / 2 + self.radius
+
+    def inertia(self, mass: float) -> Vector:
+        """Principal moments of the uniform solid about its centre, kg m^2.
+
+        The sum of a cylinder and two half balls, each half ball moved by Steiner's theorem
+        from the flat face to the end of the cylinder (centre of mass 3/8 r off the face).
+        """
+        r, length = self.radius, self.length
+        barrel = mass * length / (length + 4 / 3 * r)
+        balls = mass - barrel
+        along = barrel * r * r / 2 + balls * 0.4 * r * r
+        across = (barrel * (3 * r * r + length * length) / 12
+                  + balls * (0.4 * r * r + length * length / 4 + 3 / 8 * length * r))
+        return (across, across, along)
+
+
+Shape = Sphere | Box | Cylinder | Capsule
+SHAPES: dict[str, type] = {shape.kind: shape for shape in (Sphere, Box, Cylinder, Capsule)}
+
+
+@dataclass(frozen=True)
+class Bone:
+    """A rigid body: a uniform solid of ``mass`` kg with its centre of mass at ``position``.
+
+    ``orientation`` turns the shape's own axes into the doll's. ``friction``,
+    ``rolling_friction`` (m) and ``restitution`` override the scene's material; None keeps it.
+    ``color`` is red, green, blue, alpha from 0 to 1.
+    """
+
+    name: str
+    shape: Shape
+    mass: float
+    position: Vector
+    orientation: Quaternion = IDENTITY
+    friction: float | None = None
+    rolling_friction: float | None = None
+    restitution: float | None = None
+    color: tuple[float, float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        set_fields(self, mass=float(self.mass), position=floats(self.position),
+                   orientation=_unit('orientation', self.orientation))
+        faults.check_positive('mass', self.mass)
+        faults.check_finite('position', self.position)
+        if self.color is not None:
+            set_fields(self, color=floats(self.color))
+
+    @property
+    def inertia(self) -> Vector:
+        """Principal moments about the centre of mass along the shape's axes, kg m^2."""
+        return self.shape.inertia(self.mass)
+
+
+@dataclass(frozen=True)
+class JointKind:
+    """How many axes a kind of joint names and how many pairs of limits it takes."""
+
+    name: str
+    axes: int
+    limits: int
+    freedoms: int
+
+
+JOINT_KINDS = {kind.name: kind for kind in (
+    JointKind('ball', axes=1, limits=2, freedoms=3),
+    JointKind('hinge', axes=1, limits=1, freedoms=1),
+    JointKind('universal', axes=2, limits=2, freedoms=2),
+    JointKind('fixed', axes=0, limits=0, freedoms=0))}
+
+
+@dataclass(frozen=True)
+class Joint:
+    """What ties ``child`` to ``parent`` at ``anchor``.
+
+    An angle is that of the child relative to the parent, right-handed about its axis.
+
+    - hinge: one axis, one pair of limits.
+    - universal: the first axis is fixed in the parent, the second in the child; they turn in
+      that order and are perpendicular in the bind pose.
+    - ball: one axis, the twist axis; limits are the swing, (-s, s) with s the half angle of
+      the cone, and the twist, (-t, t).
+    - fixed: no axes.
+
+    ``limits`` in rad, None for a free axis; kept to 1e-9 degrees, so that files written in
+    degrees read back to the same bits. ``damping`` is in N m s/rad on each axis.
+    """
+
+    parent: str
+    child: str
+    kind: str
+    anchor: Vector
+    axes: tuple[Vector, ...] = ()
+    limits: tuple[Limits | None, ...] = ()
+    damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.kind not in JOINT_KINDS:
+            raise faults.WrongAxes('kind', self.kind, 'one of ' + ', '.join(JOINT_KINDS))
+        kind = JOINT_KINDS[self.kind]
+        set_fields(self, anchor=floats(self.anchor), damping=float(self.damping),
+                   axes=tuple(_unit('axes', axis) for axis in self.axes),
+                   limits=tuple(_angles(pair) for pair in self.limits or (None,) * kind.limits))
+        faults.check_finite('anchor', self.anchor)
+        if len(self.axes) != kind.axes:
+            raise faults.WrongAxes('axes', self.axes, f'{kind.axes} for a {self.kind} joint')
+        if len(self.limits) != kind.limits:
+            raise faults.WrongAxes('limits', self.limits, f'{kind.limits} for a {self.kind} joint')
+        if not 0 <= self.damping < math.inf:
+            raise faults.OutOfRange('damping', self.damping, 'zero or above, finite')
+        self._check_limits()
+        if self.kind == 'universal' and abs(np.dot(*self.axes)) > 1e-6:
+            raise faults.WrongAxes('axes', self.axes, 'two perpendicular axes')
+
+    def _check_limits(self) -> None:
+        for index, pair in enumerate(self.limits):
+            path = f'limits[{index}]'
+            if pair is None:
+                continue
+            faults.check_finite(path, pair)
+            if pair[0] > pair[1]:
+                raise faults.LimitsReversed(path, pair, 'lower <= upper')
+            if self.kind == 'ball' and (pair[0] != -pair[1] or pair[1] <= 0):
+                raise faults.WrongAxes(path, pair, 'a symmetric pair for a ball joint')
+            if max(map(abs, pair)) > 2 * math.pi:
+                raise faults.OutOfRange(path, pair, 'within one turn')
+
+    @property
+    def freedoms(self) -> int:
+        """Number of degrees of freedom."""
+        return JOINT_KINDS[self.kind].freedoms
+
+    @property
+    def angle_names(self) -> tuple[str, ...]:
+        """Name of each joint angle: the child's, with a suffix where there are several."""
+        suffixes = {'universal': ('_1', '_2'), 'ball': ('_x', '_y', '_z')}
+        count = self.freedoms
+        return tuple(self.child + s for s in suffixes.get(self.kind, ('',) * count))
+
+
+@dataclass(frozen=True)
+class Ragdoll:
+    """A tree of bones. ``bones`` fixes the order; one of them, the root, has no parent."""
+
+    name: str
+    bones: tuple[Bone, ...]
+    joints: tuple[Joint, ...] = ()
+
+    def __post_init__(self) -> None:
+        set_fields(self, bones=tuple(self.bones), joints=tuple(self.joints))
+        edges = [(joint.parent, joint.child) for joint in self.joints]
+        for fault in tree_faults([bone.name for bone in self.bones], edges):
+            raise fault
+
+    @property
+    def root(self) -> Bone:
+        """The bone without a parent."""
+        children = {joint.child for joint in self.joints}
+        return next(bone for bone in self.bones if bone.name not in children)
+
+    @property
+    def mass(self) -> float:
+        """Total mass, kg."""
+        return sum(bone.mass for bone in self.bones)
+
+    def bone(self, name: str) -> Bone:
+        """Find a bone by its name; UnknownBone if there is none."""
+        for bone in self.bones:
+            if bone.name == name:
+                return bone
+        raise faults.UnknownBone('', name, 'one of ' + ', '.join(b.name for b in self.bones))
+
+    def joints_from_root(self) -> tuple[Joint, ...]:
+        """Give all joints, each parent's before its children's."""
+        below: dict[str, list[Joint]] = {}
+        for joint in self.joints:
+            below.setdefault(joint.parent, []).append(joint)
+        ordered: list[Joint] = []
+        names = [self.root.name]
+        for name in names:
+            for joint in below.get(name, ()):
+                ordered.append(joint)
+                names.append(joint.child)
+        return tuple(ordered)
+
+    def replace_bone(self, name: str, **changes: object) -> Ragdoll:
+        """Give the same doll with one bone changed."""
+        self.bone(name)
+        bones = tuple(dataclasses.replace(bone, **changes) if bone.name == name else bone
+                      for bone in self.bones)
+        return dataclasses.replace(self, bones=bones)
+
+
+def tree_faults(names: list[str], edges: list[tuple[str, str]]) -> list[faults.Fault]:
+    """Find all that keeps (parent, child) edges from being one tree over the named bones."""
+    found: list[faults.Fault] = []
+    if not names:
+        found.append(faults.Detached('bones', names, 'at least one bone'))
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            found.append(faults.DuplicateName(f'bones[{index}].name', name, 'a name of its own'))
+    parent_of: dict[str, str] = {}
+    for index, (parent, child) in enumerate(edges):
+        for end, name in (('parent', parent), ('child', child)):
+            if name not in names:
+                expected = 'one of ' + ', '.join(names)
+                found.append(faults.UnknownBone(f'joints[{index}].{end}', name, expected))
+        if child in parent_of:
+            found.append(faults.ConnectedTwice(
+                f'joints[{index}].child', child, 'a bone that has no parent yet'))
+        elif _reaches(parent_of, parent, child):
+            found.append(faults.JointCycle(
+                f'joints[{index}]', f'{parent} -> {child}', 'joints that close no ring'))
+        else:
+            parent_of[child] = parent
+    roots = [name for name in dict.fromkeys(names) if name not in parent_of]
+    if len(roots) > 1 and not found:
+        found.append(faults.Detached('joints', roots, 'one bone alone without a parent'))
+    return found
+
+
+def _reaches(parent_of: dict[str, str], start: str, goal: str) -> bool:
+    """Tell whether ``goal`` is ``start`` itself or one of its ancestors."""
+    while start != goal and start in parent_of:
+        start = parent_of[start]
+    return start == goal
+
+
+def _unit(path: str, values: object) -> tuple[float, ...]:
+    values = floats(values)
+    faults.check_finite(path, values)
+    length = math.hypot(*values)
+    if length < 1e-9:
+        raise faults.NotUnit(path, values, 'a direction, not zero')
+    return values if abs(length - 1) < 1e-15 else floats(value / length for value in values)
+
+
+def _angles(pair: Limits | None) -> Limits | None:
+    if pair is None:
+        return None
+    return floats(math.radians(round(math.degrees(angle), 9)) for angle in pair)

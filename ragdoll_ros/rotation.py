@@ -1,0 +1,122 @@
+"""Rotations as this package writes them: unit quaternions in the order x, y, z, w (as in ROS).
+
+A rotation takes vectors of the body's frame to the frame the body is in: v_world = R v_body.
+All functions take stacked input: quaternions (..., 4), vectors (..., 3), matrices (..., 3, 3).
+"""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+IDENTITY = (0.0, 0.0, 0.0, 1.0)
+
+
+def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Hamilton product a * b: first b, then a."""
+    ax, ay, az, aw = np.moveaxis(np.asarray(a, float), -1, 0)
+    bx, by, bz, bw = np.moveaxis(np.asarray(b, float), -1, 0)
+    return np.stack([
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz], axis=-1)
+
+
+def inverse(q: np.ndarray) -> np.ndarray:
+    """Inverse of unit quaternions."""
+    return np.asarray(q, float) * (-1.0, -1.0, -1.0, 1.0)
+
+
+def normalized(q: np.ndarray) -> np.ndarray:
+    """Quaternions or vectors scaled to length one."""
+    q = np.asarray(q, float)
+    return q / np.linalg.norm(q, axis=-1, keepdims=True)
+
+
+def matrix(q: np.ndarray) -> np.ndarray:
+    """Rotation matrices (..., 3, 3) of unit quaternions."""
+    x, y, z, w = np.moveaxis(np.asarray(q, float), -1, 0)
+    xx, yy, zz = x * x, y * y, z * z
+    xy, xz, yz = x * y, x * z, y * z
+    xw, yw, zw = x * w, y * w, z * w
+    rows = [1 - 2 * (yy + zz), 2 * (xy - zw), 2 * (xz + yw),
+            2 * (xy + zw), 1 - 2 * (xx + zz), 2 * (yz - xw),
+            2 * (xz - yw), 2 * (yz + xw), 1 - 2 * (xx + yy)]
+    return np.stack(rows, axis=-1).reshape(*np.shape(x), 3, 3)
+
+
+def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Vectors v of the body's frame, in the outer frame."""
+    return np.einsum('...ij,...j->...i', matrix(q), np.asarray(v, float))
+
+
+def from_matrix(r: np.ndarray) -> np.ndarray:
+    """Unit quaternion (4,) of one rotation matrix (3, 3); w >= 0.
+
+    Takes the largest component first, so that no root is taken of a small number (Shepperd 1978).
+    """
+    r = np.asarray(r, float)
+    trace = np.trace(r)
+    squares = np.array([1 + 2 * r[0, 0] - trace, 1 + 2 * r[1, 1] - trace,
+                        1 + 2 * r[2, 2] - trace, 1 + trace])
+    largest = int(np.argmax(squares))
+    rows = np.array([
+        [squares[0], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0], r[2, 1] - r[1, 2]],
+        [r[0, 1] + r[1, 0], squares[1], r[1, 2] + r[2, 1], r[0, 2] - r[2, 0]],
+        [r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], squares[2], r[1, 0] - r[0, 1]],
+        [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], squares[3]]])
+    q = normalized(rows[largest])
+    return q if q[3] >= 0 else -q
+
+
+def from_axis_angle(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Unit quaternion (4,) of a turn by ``angle`` rad about ``axis``, right-handed."""
+    return np.append(normalized(axis) * math.sin(angle / 2), math.cos(angle / 2))
+
+
+def from_rotation_vector(vectors: np.ndarray) -> np.ndarray:
+    """Unit quaternions (..., 4) of rotation vectors (..., 3) in rad."""
+    vectors = np.asarray(vectors, float)
+    half = np.linalg.norm(vectors, axis=-1, keepdims=True) / 2
+    return np.concatenate([np.sinc(half / np.pi) / 2 * vectors, np.cos(half)], axis=-1)
+
+
+def from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
+    """Unit quaternion of URDF's and REP 103's fixed-axis roll, pitch, yaw in rad."""
+    turns = ((2, yaw), (1, pitch), (0, roll))
+    q = np.array(IDENTITY)
+    for axis, angle in turns:
+        q = multiply(q, from_axis_angle(np.eye(3)[axis], angle))
+    return q
+
+
+def to_rpy(q: np.ndarray) -> tuple[float, float, float]:
+    """Fixed-axis roll, pitch, yaw in rad of one quaternion, exact at pitch = 90 degrees too.
+
+    Roll is taken after yaw has been turned back, so that the two fit each other even where
+    each alone is undetermined.
+    """
+    r = matrix(q)
+    yaw = math.atan2(r[1, 0], r[0, 0])
+    pitch = math.atan2(-r[2, 0], math.hypot(r[0, 0], r[1, 0]))
+    sin, cos = math.sin(yaw), math.cos(yaw)
+    roll = math.atan2(sin * r[0, 2] - cos * r[1, 2], cos * r[1, 1] - sin * r[0, 1])
+    return roll, pitch, yaw
+
+
+def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Geodesic distance of unit quaternions in rad, 0 to pi; q and -q are the same turn."""
+    difference = multiply(inverse(a), b)
+    sin = np.linalg.norm(difference[..., :3], axis=-1)
+    return 2 * np.arctan2(sin, np.abs(difference[..., 3]))
+
+
+def shortest_arc(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Quaternion (4,) of the smallest turn that takes the direction of a to that of b."""
+    a, b = normalized(a), normalized(b)
+    q = np.append(np.cross(a, b), 1 + a @ b)
+    if np.linalg.norm(q) > 1e-8:
+        return normalized(q)
+    across = np.eye(3)[np.argmin(np.abs(a))]
+    return np.append(normalized(np.cross(a, across)), 0.0)

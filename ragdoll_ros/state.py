@@ -1,0 +1,24 @@
+"""What a simulation tells about its bones at one instant."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class State:
+    """Poses and velocities of n bones, world frame, float64, in the scene's bone order.
+
+    A bone's pose is that of its centre of mass and of its shape's own axes, which are its
+    principal axes of inertia.
+    """
+
+    positions: np.ndarray
+    """(n, 3) m."""
+    orientations: np.ndarray
+    """(n, 4) unit quaternions x, y, z, w."""
+    linear: np.ndarray
+    """(n, 3) m/s, of the centre of mass."""
+    angular: np.ndarray
+    """(n, 3) rad/s, world axes."""
