@@ -118,7 +118,8 @@ def _row(joint: Joint, row: list, place: tuple, dialect: str) -> list[str]:
         last = index == len(row)
         child = joint.child if last else f'{joint.child}/{index}'
         lines += [f'  <joint name={quoteattr(name)} type="{kind}">',
-                  f'    <parent link={quoteattr(parent)}/>', f'    <child link={quoteattr(child)}/>',
+                  f'    <parent link={quoteattr(parent)}/>',
+                  f'    <child link={quoteattr(child)}/>',
                   f'    {_origin(*place) if index == 1 else "<origin/>"}']
         if axis is not None:
             lines.append(f'    <axis xyz={_numbers(axis)}/>')
