@@ -34,16 +34,30 @@ def normalized(q: np.ndarray) -> np.ndarray:
     return q / np.linalg.norm(q, axis=-1, keepdims=True)
 
 
+def _products_to_matrix() -> np.ndarray:
+    """Matrix (16, 9) that takes all products q_i q_j to the entries of the rotation matrix."""
+    x, y, z, w = range(4)
+    terms = [((x, x, 1), (y, y, -1), (z, z, -1), (w, w, 1)), ((x, y, 2), (z, w, -2)),
+             ((x, z, 2), (y, w, 2)),
+             ((x, y, 2), (z, w, 2)), ((x, x, -1), (y, y, 1), (z, z, -1), (w, w, 1)),
+             ((y, z, 2), (x, w, -2)),
+             ((x, z, 2), (y, w, -2)), ((y, z, 2), (x, w, 2)),
+             ((x, x, -1), (y, y, -1), (z, z, 1), (w, w, 1))]
+    table = np.zeros((16, 9))
+    for entry, sums in enumerate(terms):
+        for i, j, factor in sums:
+            table[4 * i + j, entry] = factor
+    return table
+
+
+_PRODUCTS = _products_to_matrix()
+
+
 def matrix(q: np.ndarray) -> np.ndarray:
-    """Rotation matrices (..., 3, 3) of unit quaternions."""
-    x, y, z, w = np.moveaxis(np.asarray(q, float), -1, 0)
-    xx, yy, zz = x * x, y * y, z * z
-    xy, xz, yz = x * y, x * z, y * z
-    xw, yw, zw = x * w, y * w, z * w
-    rows = [1 - 2 * (yy + zz), 2 * (xy - zw), 2 * (xz + yw),
-            2 * (xy + zw), 1 - 2 * (xx + zz), 2 * (yz - xw),
-            2 * (xz - yw), 2 * (yz + xw), 1 - 2 * (xx + yy)]
-    return np.stack(rows, axis=-1).reshape(*np.shape(x), 3, 3)
+    """Rotation matrices (..., 3, 3) of unit quaternions; one product, as this runs every tick."""
+    q = np.asarray(q, float)
+    products = q[..., :, None] * q[..., None, :]
+    return (products.reshape(*q.shape[:-1], 16) @ _PRODUCTS).reshape(*q.shape[:-1], 3, 3)
 
 
 def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
