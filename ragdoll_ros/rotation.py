@@ -12,15 +12,31 @@ import numpy as np
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 
+def _hamilton() -> np.ndarray:
+    """Matrix (16, 4) that takes all products a_i b_j to the quaternion a * b."""
+    x, y, z, w = range(4)
+    terms = [((w, x, 1), (x, w, 1), (y, z, 1), (z, y, -1)),
+             ((w, y, 1), (x, z, -1), (y, w, 1), (z, x, 1)),
+             ((w, z, 1), (x, y, 1), (y, x, -1), (z, w, 1)),
+             ((w, w, 1), (x, x, -1), (y, y, -1), (z, z, -1))]
+    return _table(terms)
+
+
+def _table(terms: list[tuple[tuple[int, int, int], ...]]) -> np.ndarray:
+    table = np.zeros((16, len(terms)))
+    for entry, sums in enumerate(terms):
+        for i, j, factor in sums:
+            table[4 * i + j, entry] = factor
+    return table
+
+
+_HAMILTON = _hamilton()
+
+
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Hamilton product a * b: first b, then a."""
-    ax, ay, az, aw = np.moveaxis(np.asarray(a, float), -1, 0)
-    bx, by, bz, bw = np.moveaxis(np.asarray(b, float), -1, 0)
-    return np.stack([
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz], axis=-1)
+    products = np.asarray(a, float)[..., :, None] * np.asarray(b, float)[..., None, :]
+    return products.reshape(*products.shape[:-2], 16) @ _HAMILTON
 
 
 def inverse(q: np.ndarray) -> np.ndarray:
@@ -43,11 +59,7 @@ def _products_to_matrix() -> np.ndarray:
              ((y, z, 2), (x, w, -2)),
              ((x, z, 2), (y, w, -2)), ((y, z, 2), (x, w, 2)),
              ((x, x, -1), (y, y, -1), (z, z, 1), (w, w, 1))]
-    table = np.zeros((16, 9))
-    for entry, sums in enumerate(terms):
-        for i, j, factor in sums:
-            table[4 * i + j, entry] = factor
-    return table
+    return _table(terms)
 
 
 _PRODUCTS = _products_to_matrix()
