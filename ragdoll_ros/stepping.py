@@ -104,6 +104,8 @@ class Stepper:
         self._layout = self.engine.layout
         self._gravity = math.hypot(*scene.gravity)
         self._normal = np.array(scene.ground.normal if scene.ground else (0.0, 0.0, 1.0))
+        self._damped = any(joint.damping for placement in scene.dolls
+                           for joint in placement.doll.joints)
         self.effort = Effort()
         self.look()
 
@@ -202,8 +204,8 @@ class Stepper:
             self.effort.redone += 1
 
     def _run(self, duration: float, substeps: int, loads: Sequence[Load]) -> None:
-        """Let the engine go; loads along a bone's own axes turn with it at each substep."""
-        if any(load.local for load in loads):
+        """Let the engine go; what changes with the motion is looked at again each substep."""
+        if self._damped or any(load.local for load in loads):
             for _ in range(substeps):
                 self.engine.step(duration / substeps, 1, loads)
         else:
