@@ -11,6 +11,7 @@ from . import faults, rotation
 from .coordinates import Coordinates
 from .engine.bullet import BulletEngine
 from .engine.protocol import GROUND, Engine, Load
+from .gap import JointGap
 from .guard import Guard
 from .mechanics import Mechanics, Motion
 from .push import Push
@@ -59,6 +60,7 @@ class Simulation:
         self._stepper = Stepper(scene, engine, resolve_accuracy(accuracy))
         self._guard = Guard(scene, self.mechanics, self._stepper.engine.layout)
         self._start = (self._stepper.engine.save(), self._stepper.coordinates)
+        self._gap = JointGap(scene)
         self._sizes = np.array([max(bone.shape.half_extents) for bone in scene.bones])
         self._weightless = not any(scene.gravity)
         self._begin()
@@ -121,6 +123,7 @@ class Simulation:
         end = self.time + self.tick
         while self.time < end:
             self._go(min(end, self._next_change()))
+        self._redone += self.effort.redone
         self._queue = [active for active in self._queue if active.end > self.time]
         self._rest()
         return self._state
@@ -146,6 +149,23 @@ class Simulation:
         self._begin()
         return self._state
 
+    def measures(self) -> dict[str, float]:
+        """Tell what went wrong so far, and what the last tick took: names end in their units."""
+        stepper, guard = self._stepper, self._guard
+        sunk = -float(stepper.reach.heights(self._state).min())
+        return {
+            'energy_excess_J': float((self._motion.energy - guard.start - guard.worked).sum()),
+            'energy_projected_J': float(guard.account.taken),
+            'work_of_pushes_J': float(guard.worked.sum()),
+            'joint_gap_m': float(self._gap.gaps(self._state).max(initial=0.0)),
+            'limit_overshoot_rad': float(
+                stepper.engine.layout.past_limits(self.coordinates.q).max(initial=0.0)),
+            'sinking_m': max(0.0, sunk),
+            'flights': self.effort.flights,
+            'substeps': self.effort.substeps,
+            'redone_total': self._redone,
+            'asleep': float(self.asleep)}
+
     def close(self) -> None:
         """Give the engine back; a second time does nothing."""
         self._stepper.close()
@@ -158,6 +178,7 @@ class Simulation:
         self._motion = self.mechanics.motion(self._state)
         self._guard.open(self._state)
         self._still = 0
+        self._redone = 0
         self.asleep = False
         """Whether all is at rest and the engine stands."""
         self.effort = Effort()
