@@ -4,9 +4,8 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from setuptools import find_packages, setup
+from setuptools import Distribution, find_packages, setup
 from setuptools.command.build_py import build_py
-from setuptools.command.install_data import install_data
 
 NAME = 'ragdoll_ros'
 EXECUTABLES = {
@@ -39,7 +38,7 @@ class BuildWithConfig(build_py):
         return [(source, folder / Path(source).name) for source in CONFIG]
 
 
-class InstallDataWithLaunchers(install_data):
+class InstallDataWithLaunchers(Distribution().get_command_class('install_data')):
     """Puts the executables into lib/ragdoll_ros of a wheel; colcon does so by itself."""
 
     def run(self) -> None:
