@@ -8,9 +8,7 @@ from setuptools import Distribution, find_packages, setup
 from setuptools.command.build_py import build_py
 
 NAME = 'ragdoll_ros'
-EXECUTABLES = {
-    'ragdoll_node': 'ragdoll_ros.ros.node:main',
-    'ragdoll_teleop': 'ragdoll_ros.ros.teleop:main',
+EXECUTABLES: dict[str, str] = {
 }
 CONFIG = sorted(str(path) for path in Path('config').iterdir() if path.is_file())
 LAUNCHER = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'
@@ -57,7 +55,8 @@ class InstallDataWithLaunchers(Distribution().get_command_class('install_data'))
 setup(
     name=NAME,
     version='0.1.0',
-    description='A passive doll simulated in PyBullet: takes pushes, publishes every bone.',
+    description='A passive doll simulated in PyBullet: takes pushes, publishes the pose of every '
+                'bone.',
     license='Apache-2.0',
     maintainer='ragdoll_ros maintainers',
     maintainer_email='maintainers@users.noreply.github.com',
