@@ -52,10 +52,7 @@ class Simulation:
                  accuracy: str | Accuracy = 'normal',
                  engine: type[Engine] = BulletEngine) -> None:
         self.scene = scene
-        step = scene.step if step is None else step
-        faults.check_range('step', step, *STEP_RANGE)
-        self.tick = round(step * SECOND)
-        """Nanoseconds in a tick."""
+        self.step = scene.step if step is None else step
         self.mechanics = Mechanics(scene)
         self._stepper = Stepper(scene, engine, resolve_accuracy(accuracy))
         self._guard = Guard(scene, self.mechanics, self._stepper.engine.layout)
@@ -77,9 +74,24 @@ class Simulation:
         return self._state
 
     @property
+    def step(self) -> float:
+        """A tick in s; may be changed between ticks."""
+        return self.tick / SECOND
+
+    @step.setter
+    def step(self, step: float) -> None:
+        faults.check_range('step', step, *STEP_RANGE)
+        self.tick = round(step * SECOND)
+        """Nanoseconds in a tick."""
+
+    @property
     def accuracy(self) -> Accuracy:
         """How fine; may be changed between ticks."""
         return self._stepper.accuracy
+
+    @accuracy.setter
+    def accuracy(self, accuracy: str | Accuracy) -> None:
+        self._stepper.accuracy = resolve_accuracy(accuracy)
 
     @property
     def pushes(self) -> tuple[Push, ...]:
