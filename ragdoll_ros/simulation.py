@@ -111,7 +111,7 @@ class Simulation:
     @property
     def joint_angles(self) -> np.ndarray:
         """All joint angles, rad, in the order of Scene.angle_names."""
-        return self._stepper.engine.joint_angles()
+        return self._stepper.settle().joint_angles()
 
     def push(self, push: Push, channel: str | None = None) -> None:
         """Let a push act from its start on; on a ``channel`` it takes the place of the last.
@@ -254,9 +254,11 @@ class Simulation:
             impulse[doll] += force * duration
             moment[doll] += torque * duration
             steady = steady and not load.force.any()
-        self._correct(self._guard.momentum_kept(
-            self._stepper.coordinates, before, self._motion, self._state, duration, impulse,
-            moment if steady else None))
+        shift = self._guard.momentum_due(before, self._motion, self._state, duration, impulse,
+                                         moment if steady else None)
+        moved = self.mechanics.shifted(self._state, shift)
+        self._stepper.shift(shift, moved)
+        self._see(moved)
 
     def _keep_energy(self, start: Coordinates) -> None:
         guard, touching = self._guard, self._stepper.touching
