@@ -151,7 +151,7 @@ class Simulation:
         """
         self._stepper.place(coordinates)
         self._stepper.engine.let_overlaps_be()
-        self._stepper.look()
+        self._stepper.begin()
         self._start = (self._stepper.engine.save(), self._stepper.coordinates)
         self._begin()
         return self._state
@@ -161,7 +161,7 @@ class Simulation:
         snapshot, coordinates = self._start
         self._stepper.engine.restore(snapshot)
         self._stepper.place(coordinates)
-        self._stepper.touching = self._stepper.engine.touching()
+        self._stepper.begin()
         self._begin()
         return self._state
 
