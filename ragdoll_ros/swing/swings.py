@@ -1,0 +1,204 @@
+"""All swings of a scene: their masses over time, the same at every frame rate.
+
+The swings keep a time grid of their own, anchored at their start, and ask for the motion of
+the bones at its instants; what is wanted in between is one shorter step from the last instant,
+which is then forgotten. So an answer depends on the start, the time and the bones' motion
+alone, never on when or how often anyone looked.
+
+Chains are worked from root to tip: each link hangs from the mass before it and carries what
+hangs on it as if that were in line (links.py). It does not feel how the masses beyond it move
+otherwise. That is exact for single masses.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from .. import rotation
+from .frames import Frames
+from .links import Links, Seat, Step, accelerations
+from .mount import Mount, Roots, levels
+from .pose import Flight, Order, SwingState
+from .sphere import dot
+
+LONGEST = 0.01
+"""s, the coarsest grid: bones' motions up to about 15 Hz are followed."""
+PHASE = 0.1
+"""rad that the quickest pendulum may go in one interval of the grid: periods right to 0.05 %."""
+SHARPEST = 0.5
+"""rad of a pendulum's phase under the root's acceleration in one step; beyond, it is divided."""
+MOST_PARTS = 64
+_ROUNDING = 1e-9
+
+
+class Swings:
+    """Mounted swings under ``gravity`` (m/s^2), on bones that move as ``motion(t)`` says.
+
+    ``step`` (s) is the interval of the grid; None: as fine as the quickest pendulum needs, and
+    a whole part of ``tick`` (s) if that is given, so that ticks fall on the grid.
+    Cost: proportional to the time that passes, nothing for an instant asked for again.
+    """
+
+    def __init__(self, mounted: Sequence[Mount], gravity: Sequence[float],
+                 motion: Callable[[float], Frames], step: float | None = None,
+                 tick: float | None = None) -> None:
+        self.names = [name for mount in mounted for name in mount.names]
+        self.motion = motion
+        gravity = np.array(gravity, float)
+        chains = [mount for mount in mounted if mount.swing.mode != 'free']
+        chains.sort(key=lambda mount: -len(mount.swing.links))
+        self._roots = Roots.of(chains)
+        self._levels = levels(chains, gravity)
+        self._free = _Free([mount for mount in mounted if mount.swing.mode == 'free'], gravity)
+        self._order = Order.of(mounted, chains)
+        self.step = step or self._grid(tick)
+        self._steps: dict[float, list[Step]] = {}
+        self._begin: float | None = None
+
+    def evaluate(self, time: float) -> SwingState:
+        """Give all masses at ``time`` s.
+
+        The first call, and one for an earlier time than the last, starts from rest: every
+        link in its rest direction, still in its bone's frame.
+        """
+        if self._begin is None or time < self._time:
+            self.begin(time)
+        elif time == self._time:
+            return self._answer
+        whole = math.floor((time - self._begin) / self.step + _ROUNDING)
+        for index in range(self._count, whole):
+            self._now = self._advance(self._now, self._instant(index),
+                                      self._instant(index + 1), self.step)
+        self._count, self._time = whole, time
+        rest = time - self._instant(whole)
+        now = self._now
+        if rest > _ROUNDING * self.step:
+            now = self._advance(now, self._instant(whole), time, rest)
+        self._answer = self._give(now, time)
+        return self._answer
+
+    def begin(self, time: float, directions: np.ndarray | None = None,
+              rates: np.ndarray | None = None) -> None:
+        """Start at ``time`` s from rest, or from the given state.
+
+        ``directions`` (m, 3) are unit vectors and ``rates`` (m, 3) 1/s theirs, world frame,
+        one for each mass in the scene's order (those of free masses are ignored).
+        """
+        frames = self.motion(time)
+        self._begin = self._time = time
+        self._count = 0
+        self._now = []
+        seat = self._roots.seat(frames)
+        offset = 0
+        for level in self._levels:
+            count = len(level.length)
+            rows = self._order.chained[offset:offset + count]
+            seat = _first(seat, count)
+            pointing = (seat.outward(level.rest) if directions is None
+                        else rotation.normalized(np.asarray(directions)[rows]).T)
+            rate = None if rates is None else np.asarray(rates, float)[rows].T
+            self._now.append(Links.at(seat, level.rest, np.ascontiguousarray(pointing), rate))
+            seat = level.tips(self._now[-1])
+            offset += count
+        self._free.begin(time, frames)
+        self._answer = self._give(self._now, time)
+
+    def _grid(self, tick: float | None) -> float:
+        quickest = max((math.sqrt(np.max(np.linalg.norm(level.gravity, axis=0) / level.reach))
+                        for level in self._levels), default=0.0)
+        longest = min(LONGEST, PHASE / quickest) if quickest else LONGEST
+        return longest if tick is None else tick / math.ceil(tick / longest - _ROUNDING)
+
+    def _instant(self, index: int) -> float:
+        return self._begin + index * self.step
+
+    def _advance(self, now: list[Links], begin: float, end: float, h: float) -> list[Links]:
+        """Swing from one instant to the next, in parts where the roots are jerked."""
+        if not self._levels:
+            return now
+        seat = self._roots.seat(self.motion(end))
+        parts = self._parts(now[0].seat, seat, h)
+        for index in range(1, parts):
+            between = self._roots.seat(self.motion(begin + h * index / parts))
+            now = self._swing(now, between, h / parts)
+        return self._swing(now, seat, h / parts)
+
+    def _parts(self, before: Seat, after: Seat, h: float) -> int:
+        sharpest = 0.0
+        for a in accelerations(before, after, h):
+            sharpest = max(sharpest, float(np.max(dot(a, a) / self._levels[0].reach ** 2)))
+        wanted = h * sharpest ** 0.25 / SHARPEST
+        return min(max(math.ceil(wanted), 1), MOST_PARTS)
+
+    def _swing(self, now: list[Links], seat: Seat, h: float) -> list[Links]:
+        steps = self._steps.get(h)
+        if steps is None:
+            steps = [Step(level, h) for level in self._levels]
+            if len(self._steps) < 2 * MOST_PARTS:
+                self._steps[h] = steps
+        then: list[Links] = []
+        for level, links, step in zip(self._levels, now, steps, strict=True):
+            if then:
+                seat = _first(self._levels[len(then) - 1].tips(then[-1]), len(level.length))
+            swung = level.swing(links, seat, step)
+            then.append(_slowed(swung, math.pi / self.step) if then else swung)
+        return then
+
+    def _give(self, now: list[Links], time: float) -> SwingState:
+        return SwingState(time, self.motion(time), self._levels, now, self._free.at(time),
+                          self._order)
+
+
+class _Free:
+    """Masses that fall by themselves: closed form, from where the start had them."""
+
+    def __init__(self, mounted: Sequence[Mount], gravity: np.ndarray) -> None:
+        links = [(mount, index) for mount in mounted for index in range(len(mount.swing.links))]
+        self._bone = np.array([mount.bone for mount, _ in links], int)
+        self._root = np.array([mount.root for mount, _ in links]).reshape(-1, 3)
+        self._rod = np.array([_rods(mount)[index] for mount, index in links]).reshape(-1, 3)
+        self._gravity = np.array([mount.swing.gravity * gravity
+                                  for mount, _ in links]).reshape(-1, 3)
+        self._velocity = np.array([mount.swing.velocity for mount, _ in links]).reshape(-1, 3)
+
+    def begin(self, time: float, frames: Frames) -> None:
+        """Let go at ``time`` s, the masses where their rods at rest would hold them."""
+        self._begin = time
+        self._turn = frames.orientations[self._bone]
+        arm = rotation.rotate(self._turn, frames.scales[self._bone] * self._root)
+        rod = rotation.rotate(self._turn, self._rod)
+        self._from = frames.positions[self._bone] + arm + rod
+
+    def at(self, time: float) -> Flight:
+        """Give the masses at ``time`` s."""
+        t = time - self._begin
+        return Flight(self._from + self._velocity * t + self._gravity * (t * t / 2),
+                      self._velocity + self._gravity * t, self._turn)
+
+
+def _rods(mount: Mount) -> np.ndarray:
+    lengths = np.array([link.length for link in mount.swing.links])
+    return np.cumsum(mount.directions * lengths[:, None], axis=0)
+
+
+def _first(seat: Seat, count: int) -> Seat:
+    """Give the first so many of the seats."""
+    if seat.point.shape[1] == count:
+        return seat
+    return Seat(seat.point[:, :count], seat.velocity[:, :count], seat.axes[:, :, :count],
+                seat.spin[:, :count])
+
+
+def _slowed(links: Links, most: float) -> Links:
+    """Hold links below the first to ``most`` rad/s.
+
+    Half a turn in an interval of the grid is the most the next level can see; without the limit
+    an undamped chain would draw energy from its own aliases.
+    """
+    squares = dot(links.rate, links.rate)
+    if np.max(squares) <= most * most:
+        return links
+    factor = np.minimum(1, most / np.sqrt(np.maximum(squares, most * most)))
+    return Links(links.seat, links.direction, links.rate * factor, links.pull, links.drift)
