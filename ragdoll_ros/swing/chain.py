@@ -29,7 +29,7 @@ MODES = ('spring', 'pendulum', 'free')
 LENGTHS = (1e-3, 1e3)
 """Shortest and longest rod, m: the shortest still swings slowly enough to be resolved."""
 MASSES = (1e-9, 1e6)
-STIFFEST = 1e12
+STIFFEST = 1e15
 MOST_DAMPED = 1e4
 LARGEST_SHARE = 10.0
 

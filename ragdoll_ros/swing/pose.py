@@ -39,8 +39,15 @@ class Order:
         free = np.setdiff1d(np.arange(count), chained)
         return cls(np.array(chained, int), free, np.array(bone, int))
 
+    @cached_property
+    def plain(self) -> bool:
+        """Whether one level's columns are the masses in order."""
+        return np.array_equal(self.chained, np.arange(len(self.bone)))
+
     def gather(self, chained: Sequence[np.ndarray], free: np.ndarray) -> np.ndarray:
         """Give one row for each mass from the levels' columns and the free masses' rows."""
+        if len(chained) == 1 and self.plain:
+            return chained[0].T
         out = np.empty((len(self.bone), free.shape[1]))
         if chained:
             out[self.chained] = np.concatenate(chained, axis=1).T

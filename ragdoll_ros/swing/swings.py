@@ -18,7 +18,7 @@ import numpy as np
 
 from .. import rotation
 from .frames import Frames
-from .links import Links, Seat, Step, accelerations
+from .links import Links, Seat, Step
 from .mount import Mount, Roots, levels
 from .pose import Flight, Order, SwingState
 from .sphere import dot
@@ -119,32 +119,36 @@ class Swings:
         if not self._levels:
             return now
         seat = self._roots.seat(self.motion(end))
-        parts = self._parts(now[0].seat, seat, h)
+        forces = self._levels[0].forces(now[0].seat, seat, h)
+        sharpest = max(float(np.max(dot(force, force))) for force in forces)
+        parts = min(max(math.ceil(h * sharpest ** 0.25 / SHARPEST), 1), MOST_PARTS)
+        if parts == 1:
+            return self._swing(now, seat, h, forces)
         for index in range(1, parts):
             between = self._roots.seat(self.motion(begin + h * index / parts))
             now = self._swing(now, between, h / parts)
         return self._swing(now, seat, h / parts)
 
-    def _parts(self, before: Seat, after: Seat, h: float) -> int:
-        sharpest = 0.0
-        for a in accelerations(before, after, h):
-            sharpest = max(sharpest, float(np.max(dot(a, a) / self._levels[0].reach ** 2)))
-        wanted = h * sharpest ** 0.25 / SHARPEST
-        return min(max(math.ceil(wanted), 1), MOST_PARTS)
-
-    def _swing(self, now: list[Links], seat: Seat, h: float) -> list[Links]:
-        steps = self._steps.get(h)
-        if steps is None:
-            steps = [Step(level, h) for level in self._levels]
-            if len(self._steps) < 2 * MOST_PARTS:
-                self._steps[h] = steps
+    def _swing(self, now: list[Links], seat: Seat, h: float,
+               forces: tuple[np.ndarray, np.ndarray] | None = None) -> list[Links]:
+        """Swing all levels, root to tip, through one step."""
         then: list[Links] = []
-        for level, links, step in zip(self._levels, now, steps, strict=True):
+        for level, links, step in zip(self._levels, now, self._factors(h), strict=True):
             if then:
                 seat = _first(self._levels[len(then) - 1].tips(then[-1]), len(level.length))
-            swung = level.swing(links, seat, step)
+                forces = None
+            forces = forces or level.forces(links.seat, seat, h)
+            swung = level.swing(links, seat, step, forces)
             then.append(_slowed(swung, math.pi / self.step) if then else swung)
         return then
+
+    def _factors(self, h: float) -> list[Step]:
+        """Give each level's factors for a step; those in use are kept."""
+        if h not in self._steps:
+            if len(self._steps) >= MOST_PARTS:
+                self._steps.clear()
+            self._steps[h] = [Step(level, h) for level in self._levels]
+        return self._steps[h]
 
     def _give(self, now: list[Links], time: float) -> SwingState:
         return SwingState(time, self.motion(time), self._levels, now, self._free.at(time),
