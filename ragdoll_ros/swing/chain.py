@@ -22,8 +22,7 @@ from dataclasses import dataclass
 
 from .. import faults
 from ..faults import floats, set_fields
-from ..ragdoll import Vector
-from ..ragdoll import _unit as unit
+from ..ragdoll import Vector, unit
 
 MODES = ('spring', 'pendulum', 'free')
 LENGTHS = (1e-3, 1e3)

@@ -70,29 +70,12 @@ class Roots:
 
     def seat(self, frames: Frames) -> Seat:
         """Give what the roots do while the bones are at these frames."""
-        q = frames.orientations
-        axes = (q[:, :, None] * q[:, None]).reshape(-1, 16) @ _AXES
-        rows = np.concatenate([axes.T, frames.positions.T, frames.linear.T, frames.angular.T,
+        axes = rotation.matrix(frames.orientations).transpose(2, 1, 0).reshape(9, -1)
+        rows = np.concatenate([axes, frames.positions.T, frames.linear.T, frames.angular.T,
                                frames.scales.T]).take(self.bone, axis=1)
         axes, spin = rows[:9].reshape(3, 3, -1), rows[15:18]
         arm = np.einsum('jin,jn->in', axes, self.place * rows[18:])
         return Seat(rows[9:12] + arm, rows[12:15] + cross(spin, arm), axes, spin)
-
-
-def _quadratic() -> np.ndarray:
-    """(16, 9): what takes q_i q_j to the columns of q's matrix, which are quadratic in q."""
-    table = np.zeros((4, 4, 3, 3))
-    for a in range(4):
-        for b in range(4):
-            qa, qb = np.eye(4)[a], np.eye(4)[b]
-            for j in range(3):
-                v = np.append(np.eye(3)[j], 0.0)
-                turned = rotation.multiply(rotation.multiply(qa, v), rotation.inverse(qb))
-                table[a, b, j] = turned[:3]
-    return table.reshape(16, 9)
-
-
-_AXES = _quadratic()
 
 
 def levels(mounted: Sequence[Mount], gravity: np.ndarray) -> list[Level]:
