@@ -1,6 +1,7 @@
 """The motion of the bones that swings ride on: known at ticks, interpolated between them."""
 from __future__ import annotations
 
+import bisect
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,33 +43,40 @@ class Frames:
 
 
 class Track:
-    """Frames over time: told at ticks, asked between them.
+    """Frames over time: told at ticks, asked between them, as far back as ``memory`` s.
 
-    Called with a time it gives frames on the cubic Hermite path through the last two told: in
-    position by their velocities; in orientation by a cubic rotation vector whose rates at both
-    ends are the angular velocities there. Fourth order in the ticks' spacing; velocities too
-    are the path's. Of the turns that lead from one orientation to the next it takes the one
-    nearest to what the angular velocities say. Before and after the two told it stands still
-    where they are.
+    Called with a time it gives frames on the cubic Hermite path through the two told around it:
+    in position by their velocities; in orientation by a cubic rotation vector whose rates at
+    both ends are the angular velocities there. Fourth order in the ticks' spacing; velocities
+    too are the path's. Of the turns that lead from one orientation to the next it takes the one
+    nearest to what the angular velocities say. Outside of what was told it stands still.
     """
 
-    def __init__(self) -> None:
-        self._told: list[tuple[float, Frames]] = []
+    def __init__(self, memory: float = 0.02) -> None:
+        self._memory = memory
+        self._times: list[float] = []
+        self._told: list[Frames] = []
 
     def tell(self, time: float, frames: Frames) -> None:
         """Add the frames at ``time`` s; a time not later than the last begins a new track."""
-        if self._told and time <= self._told[-1][0]:
+        if self._times and time <= self._times[-1]:
+            self._times.clear()
             self._told.clear()
-        self._told = [*self._told[-1:], (time, frames)]
+        old = max(bisect.bisect_right(self._times, time - self._memory) - 1, 0)
+        del self._times[:old], self._told[:old]
+        self._times.append(time)
+        self._told.append(frames)
 
     def __call__(self, time: float) -> Frames:
         """Give the frames at ``time`` s."""
-        (begin, first), (end, last) = self._told[0], self._told[-1]
-        if time >= end:
-            return last
-        if time <= begin:
-            return first
-        return between(first, last, end - begin, (time - begin) / (end - begin))
+        index = bisect.bisect_left(self._times, time)
+        if index == len(self._times):
+            return self._told[-1]
+        if index == 0 or self._times[index] == time:
+            return self._told[index]
+        begin, end = self._times[index - 1], self._times[index]
+        return between(self._told[index - 1], self._told[index], end - begin,
+                       (time - begin) / (end - begin))
 
 
 def between(first: Frames, last: Frames, span: float, part: float) -> Frames:
@@ -97,14 +105,14 @@ def _hermite(a: np.ndarray, b: np.ndarray, a_rate: np.ndarray, b_rate: np.ndarra
 
 def _turn(first: Frames, last: Frames, span: float) -> np.ndarray:
     """Rotation vectors (n, 3) from the first orientations to the last, whole turns included."""
-    q = rotation.multiply(last.orientations, rotation.inverse(first.orientations))
-    q = np.where(q[:, 3:] < 0, -q, q)
-    sin = np.linalg.norm(q[:, :3], axis=1, keepdims=True)
-    angle = 2 * np.arctan2(sin, q[:, 3:])
+    turn = rotation.multiply(last.orientations, rotation.inverse(first.orientations))
+    vector = rotation.rotation_vector(turn)
+    angle = np.linalg.norm(vector, axis=1, keepdims=True)
     mean = (first.angular + last.angular) * (span / 2)
+    if not np.any(np.einsum('ij,ij->i', mean, mean) > 1):
+        return vector
     speed = np.linalg.norm(mean, axis=1, keepdims=True)
-    own = q[:, :3] / np.maximum(sin, 1e-300)
-    axis = np.where(sin > 1e-12, own, mean / np.maximum(speed, 1e-300))
+    axis = np.where(angle > 1e-12, vector, mean) / np.where(angle > 1e-12, angle, speed + 1e-300)
     wanted = np.sum(mean * axis, axis=1, keepdims=True)
     return axis * (angle + 2 * np.pi * np.round((wanted - angle) / (2 * np.pi)))
 

@@ -36,14 +36,14 @@ _ROUNDING = 1e-9
 class Swings:
     """Mounted swings under ``gravity`` (m/s^2), on bones that move as ``motion(t)`` says.
 
-    ``step`` (s) is the interval of the grid; None: as fine as the quickest pendulum needs, and
-    a whole part of ``tick`` (s) if that is given, so that ticks fall on the grid.
+    ``step`` (s) is the interval of the grid; None: 10 ms or so large a whole part of it as the
+    quickest pendulum needs. It does not follow the frame rate; frames that fall on the grid cost
+    least.
     Cost: proportional to the time that passes, nothing for an instant asked for again.
     """
 
     def __init__(self, mounted: Sequence[Mount], gravity: Sequence[float],
-                 motion: Callable[[float], Frames], step: float | None = None,
-                 tick: float | None = None) -> None:
+                 motion: Callable[[float], Frames], step: float | None = None) -> None:
         self.names = [name for mount in mounted for name in mount.names]
         self.motion = motion
         gravity = np.array(gravity, float)
@@ -53,7 +53,7 @@ class Swings:
         self._levels = levels(chains, gravity)
         self._free = _Free([mount for mount in mounted if mount.swing.mode == 'free'], gravity)
         self._order = Order.of(mounted, chains)
-        self.step = step or self._grid(tick)
+        self.step = step or self._grid()
         self._steps: dict[float, list[Step]] = {}
         self._begin: float | None = None
 
@@ -105,11 +105,10 @@ class Swings:
         self._free.begin(time, frames)
         self._answer = self._give(self._now, time)
 
-    def _grid(self, tick: float | None) -> float:
+    def _grid(self) -> float:
         quickest = max((math.sqrt(np.max(np.linalg.norm(level.gravity, axis=0) / level.reach))
                         for level in self._levels), default=0.0)
-        longest = min(LONGEST, PHASE / quickest) if quickest else LONGEST
-        return longest if tick is None else tick / math.ceil(tick / longest - _ROUNDING)
+        return LONGEST / max(1, math.ceil(LONGEST * quickest / PHASE))
 
     def _instant(self, index: int) -> float:
         return self._begin + index * self.step
