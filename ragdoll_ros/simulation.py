@@ -17,6 +17,8 @@ from .push import Push
 from .scene import SECOND, STEP_RANGE, Scene
 from .state import State
 from .stepping import ACCURACIES, Accuracy, Effort, Stepper
+from .swing.pose import SwingState
+from .swing.riding import riding
 
 MOST_PUSHES = 1000
 """Pushes that may wait at once; one more is refused."""
@@ -61,6 +63,7 @@ class Simulation:
         self._start = (self._stepper.engine.save(), self._stepper.coordinates)
         self._sizes = np.array([max(bone.shape.half_extents) for bone in scene.bones])
         self._weightless = not any(scene.gravity)
+        self._riding = riding(scene)
         self._begin()
 
     def __enter__(self) -> Simulation:
@@ -73,6 +76,16 @@ class Simulation:
     def state(self) -> State:
         """Poses and velocities of all bones now."""
         return self._state
+
+    @property
+    def swings(self) -> SwingState | None:
+        """All masses of the scene's swings now; None for a scene without swings."""
+        return self._riding and self._riding.state
+
+    @property
+    def swing_names(self) -> list[str]:
+        """Name of each mass of the swings, in their order."""
+        return self._riding.names if self._riding else []
 
     @property
     def accuracy(self) -> Accuracy:
@@ -123,6 +136,8 @@ class Simulation:
             self._go(min(end, self._next_change()))
         self._queue = [active for active in self._queue if active.end > self.time]
         self._rest()
+        if self._riding:
+            self._riding.follow(self.time, self._state)
         return self._state
 
     def place(self, coordinates: Coordinates) -> State:
@@ -162,6 +177,8 @@ class Simulation:
         """Whether all is at rest and the engine stands."""
         self.effort = Effort()
         """What the last tick took."""
+        if self._riding:
+            self._riding.begin(self.time, self._state)
 
     def _next_change(self) -> int:
         """Instant, ns, at which the next push begins or ends."""
