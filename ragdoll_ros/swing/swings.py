@@ -119,8 +119,7 @@ class Swings:
             return now
         seat = self._roots.seat(self.motion(end))
         forces = self._levels[0].forces(now[0].seat, seat, h)
-        sharpest = max(float(np.max(dot(force, force))) for force in forces)
-        parts = min(max(math.ceil(h * sharpest ** 0.25 / SHARPEST), 1), MOST_PARTS)
+        parts = _parts(forces, h)
         if parts == 1:
             return self._swing(now, seat, h, forces)
         for index in range(1, parts):
@@ -184,6 +183,16 @@ class _Free:
 def _rods(mount: Mount) -> np.ndarray:
     lengths = np.array([link.length for link in mount.swing.links])
     return np.cumsum(mount.directions * lengths[:, None], axis=0)
+
+
+def _parts(forces: tuple[np.ndarray, np.ndarray], h: float) -> int:
+    """How many steps a force that strong needs in place of one."""
+    most = (SHARPEST / h) ** 4
+    # The sum of all is quick to tell, and seldom more than one alone may have.
+    if all(np.vdot(force, force) <= most for force in forces):
+        return 1
+    sharpest = max(float(np.max(dot(force, force))) for force in forces)
+    return min(max(math.ceil((sharpest / most) ** 0.25), 1), MOST_PARTS)
 
 
 def _first(seat: Seat, count: int) -> Seat:
