@@ -44,6 +44,9 @@ from .sphere import along, arc, cross, dot
 _ROUNDING = 1e-12
 """Share of the energy that counts as rounding."""
 
+_LEAST = 1e-300
+"""1/s^2: keeps 0/0 away."""
+
 
 @dataclass(frozen=True)
 class Seat:
@@ -110,6 +113,11 @@ class Level:
     """(3, n) m/s^2, the share that acts."""
 
     @cached_property
+    def lightness(self) -> np.ndarray:
+        """(3, n) 1/m, one over the reach."""
+        return _rows(1 / self.reach)
+
+    @cached_property
     def springy(self) -> bool:
         """Whether any link has a spring."""
         return bool(np.any(self.stiffness))
@@ -122,8 +130,8 @@ class Level:
         double = 2 / h
         cubic = (after.point - before.point) * (6 / h ** 2)
         cubic -= (before.velocity + after.velocity) * double
-        return ((self.gravity - cubic + before.velocity * double) / self.reach,
-                (self.gravity + cubic - after.velocity * double) / self.reach)
+        return ((self.gravity - cubic + before.velocity * double) * self.lightness,
+                (self.gravity + cubic - after.velocity * double) * self.lightness)
 
     def swing(self, now: Links, seat: Seat, step: Step,
               forces: tuple[np.ndarray, np.ndarray]) -> Links:
@@ -156,13 +164,10 @@ class Level:
         relative = v - then.drift
         left = _twisted(left, then.direction, dot(then.seat.spin, then.direction) * (-step.h / 2))
         before = relative - step.end_pull * (then.pull - left)
-        rest, given = dot(before, before), self.stiffness * dot(left, left)
-        most = rest + given - self.stiffness * dot(then.pull, then.pull)
-        square = dot(relative, relative)
-        if not np.any(square > most + _ROUNDING * (rest + given)):
-            return v
-        factor = np.sqrt(np.maximum(most, 0) / np.maximum(square, 1e-300))
-        return then.drift + np.where(square > most, factor, 1) * relative
+        whole = dot(before, before) + self.stiffness * dot(left, left)
+        most = whole * (1 + _ROUNDING) - self.stiffness * dot(then.pull, then.pull)
+        share = np.maximum(most, 0) / (dot(relative, relative) + _LEAST)
+        return then.drift + np.minimum(np.sqrt(share), 1) * relative
 
     def tips(self, links: Links) -> Seat:
         """Give the masses' own motion and frames: the seats of the next level.

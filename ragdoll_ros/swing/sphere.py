@@ -44,15 +44,14 @@ def along(d: np.ndarray, x: np.ndarray, *tangents: np.ndarray) -> list[np.ndarra
     same angle to the great circle (the exponential map and the parallel transport of the sphere).
     """
     half = np.sqrt(dot(x, x)) / 2 + _TINY
-    # One tangent of a quarter costs less than a sine and a cosine of the half.
-    quarter = np.tan(half / 2)
-    square = quarter * quarter
-    cos = (1 - square) / (1 + square)
-    sin = (1 + cos) * quarter
-    ratio = sin / half
-    # sin(2 half)/(2 half) and (1 - cos(2 half))/(2 half)^2
-    slope = ratio * cos
-    end = (1 - 2 * sin * sin) * d + slope * x
+    # One tangent of the half angle costs less than a sine and a cosine of the whole.
+    tan = np.tan(half)
+    square = tan * tan
+    scale = 1 / (1 + square)
+    ratio = tan / half
+    slope = ratio * scale  # sin |x| / |x|
+    bend = slope * ratio / 2  # (1 - cos |x|) / |x|^2
+    end = ((1 - square) * scale) * d + slope * x
     end /= np.sqrt(dot(end, end))
-    lost = slope * d + (ratio * ratio / 2) * x
+    lost = slope * d + bend * x
     return [end, *(v - dot(x, v) * lost for v in tangents)]

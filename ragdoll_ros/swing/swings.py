@@ -7,7 +7,12 @@ alone, never on when or how often anyone looked.
 
 Chains are worked from root to tip: each link hangs from the mass before it and carries what
 hangs on it as if that were in line (links.py). It does not feel how the masses beyond it move
-otherwise. That is exact for single masses.
+otherwise: a simplification, exact only for single masses. What it costs, small angles, lowest
+frequency against that of the true chain of n equal links: under gravity 1.2 % (n = 2) and 1.8 %
+(n = 8) too high; with springs alone 8 % (n = 2), 27 % (4), 60 % (8), 110 % (16) too high, as a
+root that would give way to the bending beyond it does not. Nor is energy kept in a chain without
+damping: hair wants a damping of .3 or more, and a strand that is shaken hard with less is
+chaotic, its path then sensitive to anything. Frame rates agree because the grid is the same.
 """
 from __future__ import annotations
 
