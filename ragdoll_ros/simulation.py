@@ -18,6 +18,8 @@ from .push import Push
 from .scene import SECOND, STEP_RANGE, Scene
 from .state import State
 from .stepping import ACCURACIES, Accuracy, Effort, Stepper
+from .swing.pose import SwingState
+from .swing.riding import riding
 
 MOST_PUSHES = 1000
 """Pushes that may wait at once; one more is refused."""
@@ -64,6 +66,7 @@ class Simulation:
         self._gap = JointGap(scene)
         self._sizes = np.array([max(bone.shape.half_extents) for bone in scene.bones])
         self._weightless = not any(scene.gravity)
+        self._riding = riding(scene)
         self._begin()
 
     def __enter__(self) -> Simulation:
@@ -76,6 +79,16 @@ class Simulation:
     def state(self) -> State:
         """Poses and velocities of all bones now."""
         return self._state
+
+    @property
+    def swings(self) -> SwingState | None:
+        """All masses of the scene's swings now; None for a scene without swings."""
+        return self._riding and self._riding.state
+
+    @property
+    def swing_names(self) -> list[str]:
+        """Name of each mass of the swings, in their order."""
+        return self._riding.names if self._riding else []
 
     @property
     def step(self) -> float:
@@ -142,6 +155,8 @@ class Simulation:
         self._redone += self.effort.redone
         self._queue = [active for active in self._queue if active.end > self.time]
         self._rest()
+        if self._riding:
+            self._riding.follow(self.time, self._state)
         return self._state
 
     def place(self, coordinates: Coordinates) -> State:
@@ -199,6 +214,8 @@ class Simulation:
         """Whether all is at rest and the engine stands."""
         self.effort = Effort()
         """What the last tick took."""
+        if self._riding:
+            self._riding.begin(self.time, self._state)
 
     def _next_change(self) -> int:
         """Instant, ns, at which the next push begins or ends."""
