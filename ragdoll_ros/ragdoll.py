@@ -281,17 +281,45 @@ class Joint:
 
 
 @dataclass(frozen=True)
+class Rider:
+    """A bone of the skin's skeleton, fixed on the body that carries it.
+
+    ``bone`` names the carrying bone of the doll; ``position`` (m) and ``orientation`` are those
+    of the rider in that bone's own frame: its centre of mass and its shape's axes. Riders have
+    no mass and meet nothing; they are there so that a skin can follow (see riders.py). Their
+    names are their own: a rider may be called as the bone that carries it.
+    """
+
+    name: str
+    bone: str
+    position: Vector
+    orientation: Quaternion = IDENTITY
+
+    def __post_init__(self) -> None:
+        set_fields(self, position=floats(self.position),
+                   orientation=_unit('orientation', self.orientation))
+        faults.check_finite('position', self.position)
+
+
+@dataclass(frozen=True)
 class Ragdoll:
-    """A tree of bones. ``bones`` fixes the order; one of them, the root, has no parent."""
+    """A tree of bones. ``bones`` fixes the order; one of them, the root, has no parent.
+
+    ``riders`` are what else moves with the bones, in the order of the skeleton they are of.
+    """
 
     name: str
     bones: tuple[Bone, ...]
     joints: tuple[Joint, ...] = ()
+    riders: tuple[Rider, ...] = ()
 
     def __post_init__(self) -> None:
-        set_fields(self, bones=tuple(self.bones), joints=tuple(self.joints))
+        set_fields(self, bones=tuple(self.bones), joints=tuple(self.joints),
+                   riders=tuple(self.riders))
+        names = [bone.name for bone in self.bones]
         edges = [(joint.parent, joint.child) for joint in self.joints]
-        for fault in tree_faults([bone.name for bone in self.bones], edges):
+        carried = [(rider.name, rider.bone) for rider in self.riders]
+        for fault in tree_faults(names, edges) + rider_faults(names, carried):
             raise fault
 
     @property
@@ -358,6 +386,20 @@ def tree_faults(names: list[str], edges: list[tuple[str, str]]) -> list[faults.F
     roots = [name for name in dict.fromkeys(names) if name not in parent_of]
     if len(roots) > 1 and not found:
         found.append(faults.Detached('joints', roots, 'one bone alone without a parent'))
+    return found
+
+
+def rider_faults(names: list[str], carried: list[tuple[str, str]]) -> list[faults.Fault]:
+    """Find riders, (name, carrying bone), that ride on no bone or share a name."""
+    found: list[faults.Fault] = []
+    known, seen = set(names), set()
+    for index, (name, bone) in enumerate(carried):
+        if bone not in known:
+            expected = 'one of ' + ', '.join(names)
+            found.append(faults.UnknownBone(f'riders[{index}].bone', bone, expected))
+        if name in seen:
+            found.append(faults.DuplicateName(f'riders[{index}].name', name, 'a name of its own'))
+        seen.add(name)
     return found
 
 

@@ -16,7 +16,7 @@ import yaml
 
 from . import faults
 from .faults import Fault, Faults
-from .ragdoll import SHAPES, Bone, Joint, Ragdoll, Shape, tree_faults
+from .ragdoll import SHAPES, Bone, Joint, Ragdoll, Rider, Shape, rider_faults, tree_faults
 from .rotation import IDENTITY
 from .scene import Ground, Material, Placement, Scene, above_ground
 
@@ -122,19 +122,24 @@ def build_doll(data: object, name: str = 'doll') -> tuple[Ragdoll | None, list[F
         return None, found
     bones = _build_each(data, 'bones', _bone, found)
     joints = _build_each(data, 'joints', _joint, found)
+    riders = _build_each(data, 'riders', lambda entry: Rider(**entry), found)
     names = [entry.get('name') for entry in _entries(data, 'bones')]
     edges = [(entry.get('parent'), entry.get('child')) for entry in _entries(data, 'joints')]
-    if all(isinstance(text, str) for text in [*names, *sum(edges, ())]):
-        found += tree_faults(names, edges)
+    carried = [(entry.get('name'), entry.get('bone')) for entry in _entries(data, 'riders')]
+    if all(isinstance(text, str) for text in [*names, *sum(edges + carried, ())]):
+        found += tree_faults(names, edges) + rider_faults(names, carried)
     if found:
         return None, found
-    return Ragdoll(data.get('name', name), tuple(bones), tuple(joints)), found
+    return Ragdoll(data.get('name', name), tuple(bones), tuple(joints), tuple(riders)), found
 
 
 def doll_data(doll: Ragdoll) -> dict:
     """Give a doll as plain lists and numbers, the form of doll.schema.json."""
-    return {'name': doll.name, 'bones': [_bone_data(bone) for bone in doll.bones],
+    data = {'name': doll.name, 'bones': [_bone_data(bone) for bone in doll.bones],
             'joints': [_joint_data(joint) for joint in doll.joints]}
+    if doll.riders:
+        data['riders'] = [_rider_data(rider) for rider in doll.riders]
+    return data
 
 
 def scene_data(scene: Scene) -> dict:
@@ -305,6 +310,13 @@ def _bone_data(bone: Bone) -> dict:
             data[key] = getattr(bone, key)
     if bone.color is not None:
         data['color'] = list(bone.color)
+    return data
+
+
+def _rider_data(rider: Rider) -> dict:
+    data = {'name': rider.name, 'bone': rider.bone, 'position': list(rider.position)}
+    if rider.orientation != IDENTITY:
+        data['orientation'] = list(rider.orientation)
     return data
 
 
