@@ -106,7 +106,7 @@ def _direction(character: Character, groups: list[Group], index: int) -> np.ndar
     ways = [np.mean(children, axis=0)] if children else []
     if not points.size:
         ways += [character.positions[bone] - root for bone in group.bones[1:]]
-    least = 0.1 * float(np.ptp(points, axis=0).max()) if len(points) else 1e-6
+    least = 0.05 * float(np.ptp(points, axis=0).max()) if len(points) else 1e-6
     for way in [*ways, middle]:
         length = float(np.linalg.norm(way))
         if length > max(least, 1e-6):
