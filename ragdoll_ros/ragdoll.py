@@ -194,6 +194,10 @@ class Bone:
         return self.shape.inertia(self.mass)
 
 
+LARGEST_SWING = math.radians(85)
+"""Largest swing of a limited ball joint: at 90 degrees its three angles lose a freedom."""
+
+
 @dataclass(frozen=True)
 class JointKind:
     """How many axes a kind of joint names and how many pairs of limits it takes."""
@@ -220,8 +224,8 @@ class Joint:
     - hinge: one axis, one pair of limits.
     - universal: the first axis is fixed in the parent, the second in the child; they turn in
       that order and are perpendicular in the bind pose.
-    - ball: one axis, the twist axis; limits are the swing, (-s, s) with s the half angle of
-      the cone, and the twist, (-t, t).
+    - ball: one axis, the twist axis; either free, or limited by a swing (-s, s) about each of
+      two axes across it (a pyramid, as in PhysX; s at most 85 degrees) and a twist (-t, t).
     - fixed: no axes.
 
     ``limits`` in rad, None for a free axis; kept to 1e-9 degrees, so that files written in
@@ -262,10 +266,17 @@ class Joint:
             faults.check_finite(path, pair)
             if pair[0] > pair[1]:
                 raise faults.LimitsReversed(path, pair, 'lower <= upper')
-            if self.kind == 'ball' and (pair[0] != -pair[1] or pair[1] <= 0):
-                raise faults.WrongAxes(path, pair, 'a symmetric pair for a ball joint')
             if max(map(abs, pair)) > 2 * math.pi:
                 raise faults.OutOfRange(path, pair, 'within one turn')
+        if self.kind == 'ball' and any(self.limits):
+            self._check_ball(*self.limits)
+
+    def _check_ball(self, swing: Limits | None, twist: Limits | None) -> None:
+        if swing is None or not 0 < swing[1] <= LARGEST_SWING:
+            raise faults.OutOfRange('limits[0]', swing, 'a swing up to 85 degrees, or no limits')
+        for index, pair in enumerate((swing, twist)):
+            if pair and (pair[0] != -pair[1] or pair[1] <= 0):
+                raise faults.WrongAxes(f'limits[{index}]', pair, 'a symmetric pair, [-a, a]')
 
     @property
     def freedoms(self) -> int:
@@ -278,6 +289,14 @@ class Joint:
         suffixes = {'universal': ('_1', '_2'), 'ball': ('_x', '_y', '_z')}
         count = self.freedoms
         return tuple(self.child + s for s in suffixes.get(self.kind, ('',) * count))
+
+    @property
+    def angle_limits(self) -> tuple[Limits | None, ...]:
+        """Limits of each angle of angle_names, rad; None where it is free."""
+        if self.kind == 'ball':
+            swing, twist = self.limits
+            return (swing, swing, twist)
+        return self.limits
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,378 @@
+"""PyBullet behind the engine protocol, the one file that knows it.
+
+Built from what was measured: dolls are Featherstone multibodies read from URDF with explicit
+inertia; universal joints are two hinges with a link of no mass between; joint motors, link
+damping and velocity clamps, which are on by default, are off.
+"""
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pybullet
+
+from .. import rotation
+from ..coordinates import UNLIMITED, Coordinates, Layout
+from ..ragdoll import Ragdoll
+from ..scene import Placement, Scene
+from ..state import State
+from ..urdf import to_urdf
+from .protocol import GROUND, Contact, Load
+
+LARGEST_FRICTION = math.sqrt(10)
+"""PyBullet caps the product of two friction coefficients at 10 (84 degrees)."""
+
+BREAKING_DISTANCE = 2e-3
+"""m at which a contact point is let go. The default, 0.02 m, eats half of every small bounce."""
+
+REST_SPEED = 0.05
+"""m/s: lowest restitution threshold. Below it each substep's own gravity would bounce."""
+
+SOLVER_ITERATIONS = 20
+"""20 are as good as 50; 5 to 10 leave 1 to 5 mm of sinking."""
+
+LARGEST_RATE = 1e4
+"""rad/s and m/s at which PyBullet clamps; its default of 100 makes energy in a 50 m drop."""
+
+PROBE_STEP = 2.0 ** -10
+"""s: the step that measures accelerations; a power of two, so that dividing by it is exact."""
+
+_FLAGS = (pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_IMPLICIT_CYLINDER)
+
+
+@dataclass
+class _Doll:
+    """A doll in the engine: its body, and the links that are its bones and joints."""
+
+    body: int
+    links: list[int]
+    """Link of each bone in the doll's order; -1 for the root."""
+    children: list[int]
+    """Links of the bones but the root, in the doll's order."""
+    root: int
+    """Index of the root among the doll's bones."""
+    joints: list[int]
+    """Joints that move, in the engine's order, root to leaf."""
+    balls: list[bool]
+    angles: dict[str, int]
+    """Place of each joint in ``joints`` by the name of its angle."""
+
+
+class BulletEngine:
+    """A scene in PyBullet. Runs in a client of its own, so that many can live side by side."""
+
+    def __init__(self, scene: Scene, free: bool = False) -> None:
+        self.scene = scene
+        self._free = free
+        self._client = pybullet.connect(pybullet.DIRECT)
+        self._timing: tuple[float, int] | None = None
+        try:
+            self._build()
+        except BaseException:
+            self.close()
+            raise
+
+    def step(self, duration: float, substeps: int, loads: Sequence[Load] = ()) -> None:
+        """Go on by ``duration`` s in equal substeps, under ``loads`` that do not turn."""
+        timing = (duration, substeps)
+        if timing != self._timing:
+            pybullet.setPhysicsEngineParameter(
+                fixedTimeStep=duration, numSubSteps=substeps if substeps > 1 else 0,
+                physicsClientId=self._client)
+            self._timing = timing
+        for load in loads:
+            self._apply(load)
+        pybullet.stepSimulation(physicsClientId=self._client)
+
+    def acceleration(self, coordinates: Coordinates, loads: Sequence[Load] = ()) -> np.ndarray:
+        """Rates of change of ``coordinates.v``, from one small step.
+
+        PyBullet's step takes v to v + a h with a from where the step begins, so the quotient is
+        exact but for rounding. It holds where nothing touches and no limit is reached.
+        """
+        self.place(coordinates)
+        self.step(PROBE_STEP, 1, loads)
+        return (self._velocities() - coordinates.v) / PROBE_STEP
+
+    def read(self) -> State:
+        """Poses and velocities of all bones."""
+        rows = []
+        for doll in self._dolls:
+            bones = []
+            if doll.children:
+                links = pybullet.getLinkStates(
+                    doll.body, doll.children, computeLinkVelocity=1,
+                    computeForwardKinematics=1, physicsClientId=self._client)
+                bones = [link[0] + link[1] + link[6] + link[7] for link in links]
+            pose = pybullet.getBasePositionAndOrientation(doll.body, self._client)
+            motion = pybullet.getBaseVelocity(doll.body, self._client)
+            bones.insert(doll.root, pose[0] + pose[1] + motion[0] + motion[1])
+            rows += bones
+        table = np.array(rows)
+        return State(table[:, 0:3], table[:, 3:7], table[:, 7:10], table[:, 10:13])
+
+    def coordinates(self) -> Coordinates:
+        """Generalised coordinates of all dolls."""
+        q: list[float] = []
+        v: list[float] = []
+        for doll in self._dolls:
+            pose = pybullet.getBasePositionAndOrientation(doll.body, self._client)
+            motion = pybullet.getBaseVelocity(doll.body, self._client)
+            q += pose[0] + pose[1]
+            v += motion[0] + motion[1]
+            for joint in self._joints(doll):
+                q += joint[0]
+                v += joint[1]
+        return Coordinates(np.array(q), np.array(v))
+
+    def place(self, coordinates: Coordinates) -> None:
+        """Put all dolls where ``coordinates`` says."""
+        q, v = coordinates.q.tolist(), coordinates.v.tolist()
+        i = j = 0
+        for doll in self._dolls:
+            pybullet.resetBasePositionAndOrientation(
+                doll.body, q[i:i + 3], q[i + 3:i + 7], self._client)
+            pybullet.resetBaseVelocity(
+                doll.body, v[j:j + 3], v[j + 3:j + 6], physicsClientId=self._client)
+            i, j = i + 7, j + 6
+            values, rates = [], []
+            for ball in doll.balls:
+                wide = (4, 3) if ball else (1, 1)
+                values.append(q[i:i + wide[0]])
+                rates.append(v[j:j + wide[1]])
+                i, j = i + wide[0], j + wide[1]
+            if doll.joints:
+                pybullet.resetJointStatesMultiDof(
+                    doll.body, doll.joints, values, rates, physicsClientId=self._client)
+
+    def joint_angles(self) -> np.ndarray:
+        """All joint angles in rad, in the order of Scene.angle_names."""
+        values = []
+        for doll, placement in zip(self._dolls, self.scene.dolls, strict=True):
+            states = self._joints(doll)
+            for joint in placement.doll.joints:
+                if joint.angle_names and joint.angle_names[0] not in doll.angles:
+                    values += _euler_xyz(states[doll.angles[joint.child]][0])
+                else:
+                    values += [states[doll.angles[name]][0][0] for name in joint.angle_names]
+        return np.array(values)
+
+    def touching(self) -> set[tuple[int, int]]:
+        """Pairs of dolls within 2 mm of touching; GROUND stands for the ground."""
+        pybullet.performCollisionDetection(self._client)
+        points = pybullet.getContactPoints(physicsClientId=self._client)
+        return {(self._doll_of[point[1]], self._doll_of[point[2]]) for point in points}
+
+    def contacts(self) -> list[Contact]:
+        """What touches at the end of the last substep."""
+        found = []
+        for point in pybullet.getContactPoints(physicsClientId=self._client):
+            a, b = self._bone_of.get(point[1:4:2]), self._bone_of.get(point[2:5:2])
+            position, normal = np.array(point[5]), np.array(point[7])
+            if a is None:
+                a, b, position, normal = b, GROUND, np.array(point[6]), -normal
+            found.append(Contact(a, GROUND if b is None else b, position, normal,
+                                 -point[8], point[9]))
+        return found
+
+    def save(self) -> int:
+        """Give a snapshot that restore brings back to the bit."""
+        return pybullet.saveState(self._client)
+
+    def restore(self, snapshot: int) -> None:
+        """Go back to a snapshot."""
+        pybullet.restoreState(stateId=snapshot, physicsClientId=self._client)
+
+    def close(self) -> None:
+        """Give everything back to the system; a second time does nothing."""
+        if self._client >= 0:
+            pybullet.disconnect(self._client)
+            self._client = -1
+
+    def render(self, eye: np.ndarray, target: np.ndarray, width: int, height: int) -> np.ndarray:
+        """Draw the scene with PyBullet's TinyRenderer, seen from ``eye`` (m): (h, w, 3) uint8."""
+        view = pybullet.computeViewMatrix(_list(eye), _list(target), [0, 0, 1])
+        lens = pybullet.computeProjectionMatrixFOV(40, width / height, 0.1, 100)
+        image = pybullet.getCameraImage(
+            width, height, view, lens, shadow=1, lightDirection=[2, 1, 4],
+            renderer=pybullet.ER_TINY_RENDERER, physicsClientId=self._client)
+        return np.reshape(np.array(image[2], np.uint8), (height, width, 4))[:, :, :3]
+
+    def _joints(self, doll: _Doll) -> tuple:
+        """States of the joints that move: each (angles, rates, ...)."""
+        if not doll.joints:
+            return ()
+        return pybullet.getJointStatesMultiDof(doll.body, doll.joints,
+                                               physicsClientId=self._client)
+
+    def _velocities(self) -> np.ndarray:
+        v: list[float] = []
+        for doll in self._dolls:
+            motion = pybullet.getBaseVelocity(doll.body, self._client)
+            v += motion[0] + motion[1]
+            for joint in self._joints(doll):
+                v += joint[1]
+        return np.array(v)
+
+    def _apply(self, load: Load) -> None:
+        body, link = self._links[load.bone]
+        if link < 0:
+            position, orientation = pybullet.getBasePositionAndOrientation(body, self._client)
+        else:
+            position, orientation = pybullet.getLinkState(
+                body, link, computeForwardKinematics=1, physicsClientId=self._client)[:2]
+        turn = rotation.matrix(orientation)
+        force, torque, arm = load.force, load.torque, turn @ load.point
+        if load.local:
+            force, torque = turn @ force, turn @ torque
+        pybullet.applyExternalForce(body, link, _list(force), _list(position + arm),
+                                    pybullet.WORLD_FRAME, physicsClientId=self._client)
+        pybullet.applyExternalTorque(body, link, _list(torque), pybullet.WORLD_FRAME,
+                                     physicsClientId=self._client)
+
+    def _build(self) -> None:
+        pybullet.setPhysicsEngineParameter(
+            numSolverIterations=SOLVER_ITERATIONS, contactBreakingThreshold=BREAKING_DISTANCE,
+            restitutionVelocityThreshold=max(REST_SPEED, self.scene.material.restitution_speed),
+            deterministicOverlappingPairs=1, enableFileCaching=0, physicsClientId=self._client)
+        pybullet.setGravity(*self.scene.gravity, physicsClientId=self._client)
+        self._ground = self._add_ground()
+        self._dolls = [self._add_doll(placement) for placement in self.scene.dolls]
+        self._links = [(doll.body, link) for doll in self._dolls for link in doll.links]
+        self._doll_of = {doll.body: index for index, doll in enumerate(self._dolls)}
+        if self._ground is not None:
+            self._doll_of[self._ground] = GROUND
+        self._bone_of = {link: bone for bone, link in enumerate(self._links)}
+        self.layout = self._lay_out()
+        self._let_overlaps_be()
+        for index, placement in enumerate(self.scene.dolls):
+            self._set_in_motion(self._dolls[index].body, placement)
+
+    def _add_ground(self) -> int | None:
+        if self.scene.ground is None or self._free:
+            return None
+        ground = self.scene.ground
+        plane = pybullet.createCollisionShape(
+            pybullet.GEOM_PLANE, planeNormal=ground.normal, physicsClientId=self._client)
+        place = [n * ground.offset for n in ground.normal]
+        body = pybullet.createMultiBody(0, plane, -1, place, physicsClientId=self._client)
+        self._set_material(body, -1, None, None, None)
+        return body
+
+    def _add_doll(self, placement: Placement) -> _Doll:
+        doll = placement.doll
+        collide = self.scene.self_collision and not self._free
+        flags = _FLAGS | (pybullet.URDF_USE_SELF_COLLISION if collide else 0)
+        position, orientation = placement.bone_pose(doll.root)
+        orientation = np.array(placement.orientation)
+        with tempfile.TemporaryDirectory(prefix='ragdoll_ros_') as folder:
+            path = os.path.join(folder, 'doll.urdf')
+            with open(path, 'w', encoding='utf-8') as file:
+                file.write(to_urdf(doll, 'bullet', limited=not self._free))
+            body = pybullet.loadURDF(path, _list(position), _list(orientation), flags=flags,
+                                     physicsClientId=self._client)
+        return self._set_up(doll, body)
+
+    def _set_up(self, doll: Ragdoll, body: int) -> _Doll:
+        """Find links and joints by name, and switch off what PyBullet switches on."""
+        links, joints, balls, angles = {doll.root.name: -1}, [], [], {}
+        damping = {name: joint.damping for joint in doll.joints for name in joint.angle_names}
+        for index in range(pybullet.getNumJoints(body, self._client)):
+            info = pybullet.getJointInfo(body, index, self._client)
+            name, kind, link = info[1].decode(), info[2], info[12].decode()
+            links[link] = index
+            if kind == pybullet.JOINT_FIXED:
+                continue
+            angles[name] = len(joints)
+            joints.append(index)
+            balls.append(kind == pybullet.JOINT_SPHERICAL)
+            self._free_joint(body, index, balls[-1])
+            loss = damping.get(name, damping.get(f'{name}_x', 0.0))
+            pybullet.changeDynamics(body, index, jointDamping=loss, physicsClientId=self._client)
+        for link in range(-1, pybullet.getNumJoints(body, self._client)):
+            pybullet.changeDynamics(
+                body, link, linearDamping=0, angularDamping=0, maxJointVelocity=LARGEST_RATE,
+                physicsClientId=self._client)
+        order = [links[bone.name] for bone in doll.bones]
+        for bone, link in zip(doll.bones, order, strict=True):
+            self._set_material(body, link, bone.friction, bone.rolling_friction, bone.restitution)
+        if self._free:
+            for link in range(-1, pybullet.getNumJoints(body, self._client)):
+                pybullet.setCollisionFilterGroupMask(body, link, 0, 0, self._client)
+        self._let_neighbours_be(doll, body, links)
+        return _Doll(body, order, [link for link in order if link >= 0], order.index(-1),
+                     joints, balls, angles)
+
+    def _free_joint(self, body: int, joint: int, ball: bool) -> None:
+        """Take PyBullet's default motor off a joint."""
+        if ball:
+            pybullet.setJointMotorControlMultiDof(
+                body, joint, pybullet.POSITION_CONTROL, targetPosition=[0, 0, 0, 1],
+                positionGain=0, velocityGain=0, force=[0, 0, 0], physicsClientId=self._client)
+        else:
+            pybullet.setJointMotorControl2(body, joint, pybullet.VELOCITY_CONTROL, force=0,
+                                           physicsClientId=self._client)
+
+    def _set_material(self, body: int, link: int, friction: float | None,
+                      rolling: float | None, restitution: float | None) -> None:
+        """Set a link's part of a contact: PyBullet multiplies the two parts, so take roots."""
+        material = self.scene.material
+        friction = material.friction if friction is None else friction
+        rolling = material.rolling_friction if rolling is None else rolling
+        restitution = material.restitution if restitution is None else restitution
+        pybullet.changeDynamics(
+            body, link, lateralFriction=min(math.sqrt(friction), LARGEST_FRICTION),
+            rollingFriction=rolling, spinningFriction=0, restitution=math.sqrt(restitution),
+            physicsClientId=self._client)
+
+    def _let_neighbours_be(self, doll: Ragdoll, body: int, links: dict[str, int]) -> None:
+        """Bones that share a joint do not collide."""
+        for joint in doll.joints:
+            pybullet.setCollisionFilterPair(body, body, links[joint.parent], links[joint.child],
+                                            0, physicsClientId=self._client)
+
+    def _let_overlaps_be(self) -> None:
+        """Pairs of one doll that overlap at the start do not collide: they would burst."""
+        pybullet.performCollisionDetection(physicsClientId=self._client)
+        for point in pybullet.getContactPoints(physicsClientId=self._client):
+            if point[1] == point[2] and point[8] < 0:
+                pybullet.setCollisionFilterPair(*point[1:5], 0, physicsClientId=self._client)
+
+    def _lay_out(self) -> Layout:
+        """Say where in the coordinates which joint's angle and limit stands."""
+        dolls = []
+        for doll, placement in zip(self._dolls, self.scene.dolls, strict=True):
+            limits = {name: pair for joint in placement.doll.joints
+                      for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
+            names = list(doll.angles)
+            dolls.append([None if ball else limits[name] or UNLIMITED
+                          for name, ball in zip(names, doll.balls, strict=True)])
+        return Layout(dolls)
+
+    def _set_in_motion(self, body: int, placement: Placement) -> None:
+        """Give a doll its velocity at the start, as one rigid body about its centre of mass."""
+        if not any(placement.velocity + placement.spin):
+            return
+        doll = placement.doll
+        centre = sum(bone.mass * np.array(bone.position) for bone in doll.bones) / doll.mass
+        arm = rotation.rotate(placement.orientation, doll.root.position - centre)
+        velocity = placement.velocity + np.cross(placement.spin, arm)
+        pybullet.resetBaseVelocity(body, _list(velocity), placement.spin,
+                                   physicsClientId=self._client)
+
+
+def _list(values: np.ndarray) -> list[float]:
+    return [float(value) for value in values]
+
+
+def _euler_xyz(q: tuple[float, ...]) -> list[float]:
+    """Angles about x, then the new y, then the new z that make up a quaternion's turn."""
+    r = rotation.matrix(np.array(q))
+    return [math.atan2(-r[1, 2], r[2, 2]), math.asin(max(-1.0, min(1.0, r[0, 2]))),
+            math.atan2(-r[0, 1], r[0, 0])]
+
+

@@ -1,0 +1,144 @@
+"""Ragdoll to URDF text.
+
+Every link's frame has the doll's axes in the bind pose and its origin in the joint's anchor
+(the root's: in its centre of mass); a ball joint's link is turned so that z is the twist axis.
+URDF has no universal and no ball joint: they become hinges in a row with links between, which
+are named child/1, child/2. A joint bears the name of the angle it measures.
+
+Two dialects: 'ros' is what urdfdom reads; 'bullet' has capsules, links of no mass, and for a
+ball joint without limits its spherical joint (whose own limits hardly hold: measured, it passes
+0.5 rad by 2 rad). PyBullet counts that joint's turn in the frame of the child's inertia, so a
+link of no mass with the joint's frame takes it, and the child is fixed to that.
+"""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from . import rotation
+from .ragdoll import Bone, Box, Capsule, Joint, Ragdoll, Sphere
+
+UNLIMITED = 'continuous'
+
+
+def joint_frame(joint: Joint) -> np.ndarray:
+    """Orientation (4,) of a joint's frame in the doll's: of a ball joint, z is the twist axis."""
+    if joint.kind != 'ball':
+        return np.array(rotation.IDENTITY)
+    return rotation.shortest_arc(np.array([0.0, 0.0, 1.0]), np.array(joint.axes[0]))
+
+
+def to_urdf(doll: Ragdoll, dialect: str = 'ros', limited: bool = True) -> str:
+    """Write a doll as URDF; angles in rad, lengths in m, masses in kg.
+
+    Not ``limited``: the same joints, but every one of them free.
+    """
+    lines = ['<?xml version="1.0"?>', f'<robot name={quoteattr(doll.name)}>']
+    frames = {doll.root.name: (np.array(doll.root.position), np.array(rotation.IDENTITY))}
+    lines += _link(doll.root, frames[doll.root.name], dialect)
+    for joint in doll.joints_from_root():
+        frames[joint.child] = (np.array(joint.anchor), joint_frame(joint))
+        lines += _joint(joint, frames, dialect, limited)
+        lines += _link(doll.bone(joint.child), frames[joint.child], dialect)
+    return '\n'.join([*lines, '</robot>', ''])
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return '"' + ' '.join(repr(float(value)) for value in values) + '"'
+
+
+def _origin(position: Sequence[float], orientation: np.ndarray) -> str:
+    return f'<origin xyz={_numbers(position)} rpy={_numbers(rotation.to_rpy(orientation))}/>'
+
+
+def _link(bone: Bone, frame: tuple[np.ndarray, np.ndarray], dialect: str) -> list[str]:
+    back = rotation.inverse(frame[1])
+    centre = rotation.rotate(back, bone.position - frame[0])
+    turn = rotation.multiply(back, bone.orientation)
+    ixx, iyy, izz = bone.inertia
+    color = bone.color or (0.7, 0.7, 0.7, 1.0)
+    lines = [f'  <link name={quoteattr(bone.name)}>',
+             '    <inertial>', f'      {_origin(centre, turn)}',
+             f'      <mass value="{bone.mass!r}"/>',
+             f'      <inertia ixx="{ixx!r}" iyy="{iyy!r}" izz="{izz!r}" ixy="0" ixz="0" iyz="0"/>',
+             '    </inertial>']
+    for position, geometry in _geometries(bone, centre, turn, dialect):
+        origin = _origin(position, turn)
+        lines += ['    <visual>', f'      {origin}', f'      {geometry}',
+                  f'      <material name={quoteattr(bone.name)}>'
+                  f'<color rgba={_numbers(color)}/></material>', '    </visual>',
+                  '    <collision>', f'      {origin}', f'      {geometry}', '    </collision>']
+    return [*lines, '  </link>']
+
+
+def _geometries(bone: Bone, centre: np.ndarray, turn: np.ndarray,
+                dialect: str) -> list[tuple[np.ndarray, str]]:
+    """Places and XML of the primitives that make up a bone's shape."""
+    shape = bone.shape
+    if isinstance(shape, Box):
+        text = f'<box size={_numbers(shape.size)}/>'
+    elif isinstance(shape, Sphere):
+        text = f'<sphere radius="{shape.radius!r}"/>'
+    else:
+        name = 'capsule' if isinstance(shape, Capsule) and dialect == 'bullet' else 'cylinder'
+        text = f'<{name} radius="{shape.radius!r}" length="{shape.length!r}"/>'
+    parts = [(centre, text)]
+    if isinstance(shape, Capsule) and dialect == 'ros':
+        end = rotation.rotate(turn, np.array([0.0, 0.0, shape.length / 2]))
+        ball = f'<sphere radius="{shape.radius!r}"/>'
+        parts += [(centre + end, ball), (centre - end, ball)]
+    return [(position, f'<geometry>{text}</geometry>') for position, text in parts]
+
+
+def _joint(joint: Joint, frames: dict, dialect: str, limited: bool) -> list[str]:
+    """Write a joint and, where it has several axes, the links between."""
+    parent, turn = frames[joint.parent], rotation.inverse(frames[joint.parent][1])
+    place = (rotation.rotate(turn, joint.anchor - parent[0]),
+             rotation.multiply(turn, joint_frame(joint)))
+    if joint.kind == 'fixed':
+        return _row(joint, [(joint.child, 'fixed', None, None)], place, dialect)
+    if joint.kind == 'ball' and dialect == 'bullet' and not any(joint.limits):
+        row = [(joint.child, 'spherical', (0, 0, 1), None),
+               (f'{joint.child}/fixed', 'fixed', None, None)]
+        return _row(joint, row, place, dialect)
+    axes = np.eye(3) if joint.kind == 'ball' else joint.axes
+    row = []
+    for name, axis, pair in zip(joint.angle_names, axes, joint.angle_limits, strict=True):
+        pair = pair if limited else None
+        limit = pair and f'<limit lower="{pair[0]!r}" upper="{pair[1]!r}" effort="0" velocity="0"/>'
+        row.append((name, 'revolute' if pair else UNLIMITED, axis, limit))
+    return _row(joint, row, place, dialect)
+
+
+def _row(joint: Joint, row: list, place: tuple, dialect: str) -> list[str]:
+    """Write joints one behind the other; only the first one is displaced."""
+    lines, parent = [], joint.parent
+    for index, (name, kind, axis, limit) in enumerate(row, start=1):
+        last = index == len(row)
+        child = joint.child if last else f'{joint.child}/{index}'
+        lines += [f'  <joint name={quoteattr(name)} type="{kind}">',
+                  f'    <parent link={quoteattr(parent)}/>',
+                  f'    <child link={quoteattr(child)}/>',
+                  f'    {_origin(*place) if index == 1 else "<origin/>"}']
+        if axis is not None:
+            lines.append(f'    <axis xyz={_numbers(axis)}/>')
+        if limit:
+            lines.append(f'    {limit}')
+        if kind != 'fixed':
+            lines.append(f'    <dynamics damping="{joint.damping!r}"/>')
+        lines.append('  </joint>')
+        if not last:
+            lines += _massless(child, dialect)
+        parent = child
+    return lines
+
+
+def _massless(name: str, dialect: str) -> list[str]:
+    if dialect == 'ros':
+        return [f'  <link name={quoteattr(name)}/>']
+    return [f'  <link name={quoteattr(name)}>',
+            '    <inertial><mass value="0"/>'
+            '<inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial>',
+            '  </link>']
