@@ -59,7 +59,7 @@ def _parser() -> argparse.ArgumentParser:
                         '(default: for the one that moves it most)')
     parser.add_argument('--smallest', type=float, metavar='M',
                         help='bones with less skin than this are merged into their parents '
-                        '(default: 0.06 of the character)')
+                        '(default: 0.055 of the character)')
     return parser
 
 

@@ -10,7 +10,7 @@ from .axes import spread
 from .character import Character
 from .names import LIMBS
 
-SMALLEST = 0.06
+SMALLEST = 0.055
 """A cluster shorter than this share of the whole character gets no body of its own."""
 
 FEWEST = 4

@@ -1,11 +1,12 @@
 """Joint kinds and limits: from what the bone is called, else from how the skeleton is built."""
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
 
-from ..ragdoll import Joint
+from ..ragdoll import Bone, Joint
 
 FORWARD, LEFT, UP = np.eye(3)
 
@@ -19,6 +20,9 @@ BALLS = {'neck': (35, 40), 'head': (45, 55), 'spine': (25, 25), 'hips': (25, 25)
          'clavicle': (15, 10), 'upper_arm': (80, 50), 'thigh': (60, 30), 'tail': (45, 20),
          'soft': (30, 20), 'wing': (60, 20), 'finger': (30, 10)}
 """Swing and twist, degrees, by role."""
+
+LOSS_TIME, SHORTEST_LOSS = 0.7, 0.02
+"""Seconds: see ``damped``."""
 
 FIRST, LATER = (60, 30), (45, 30)
 """The same by topology: a limb's first joint, and the others."""
@@ -50,6 +54,21 @@ def make_joint(parent: str, child: str, role: str | None, side: int, anchor: np.
     if role in BALLS:
         return _ball(parent, child, anchor, along, *BALLS[role])
     return _by_topology(parent, child, anchor, above, along, chain)
+
+
+def damped(joint: Joint, child: Bone) -> Joint:
+    """Give the joint a body's own loss, N m s/rad, so that the doll comes to rest.
+
+    The child alone, swinging about the joint, loses its speed within LOSS_TIME; about its thin
+    axis it must not lose it within a step of the engine, which takes damping explicitly.
+    """
+    if joint.kind == 'fixed':
+        return joint
+    least = min(child.inertia)
+    about = max(child.inertia) + child.mass * float(
+        np.sum(np.subtract(child.position, joint.anchor) ** 2))
+    damping = min(about / LOSS_TIME, least / SHORTEST_LOSS)
+    return dataclasses.replace(joint, damping=float(f'{damping:.3g}'))
 
 
 def _by_topology(parent: str, child: str, anchor: np.ndarray, above: np.ndarray | None,

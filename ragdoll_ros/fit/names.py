@@ -61,9 +61,12 @@ def roles_of(names: tuple[str, ...], parents: tuple[int, ...]) -> tuple[str | No
             # Mixamo and VRM call the collar bone shoulder, SMPL the upper arm.
             role = 'clavicle' if {'?arm', 'upper_arm', '?shoulder'} & set(below) else 'upper_arm'
         elif role == '?arm':
-            role = _next(ARM, above)
+            role = _next(ARM, above) if sided else None
         elif role == '?leg':
-            role = _next(LEG, above)
+            role = _next(LEG, above) if sided else None
+        elif role == 'finger' and above not in ('hand', 'finger', 'forearm'):
+            # Index, middle and ring are words of their own.
+            role = None
         roles.append(role)
     return tuple(roles)
 

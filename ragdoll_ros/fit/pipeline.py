@@ -11,7 +11,7 @@ from . import masses
 from .axes import Axes, fit_axes
 from .character import Character
 from .groups import Group, group_bones, partner, vertices_by_bone
-from .joints import make_joint
+from .joints import damped, make_joint
 from .names import roles_of, side_of
 from .refine import refined
 from .shapes import TOLERANCE, Fitted, choose_kind, fit_shape, outside
@@ -76,7 +76,7 @@ def fit_character(character: Character, options: Options | None = None) -> Fit:
     weights = _masses(character, groups, roles, [fit.shape.volume for fit in fits], options)
     bodies = [_body(given, *parts, roles) for parts in zip(groups, fits, axes, weights,
                                                            strict=True)]
-    joints = [_joint(character, groups, index, roles, directions)
+    joints = [damped(_joint(character, groups, index, roles, directions), bodies[index].bone)
               for index, group in enumerate(groups) if group.parent >= 0]
     notes += [f'no bone joins {character.bone_names[group.bone]} to the rest: it is tied to '
               f'{character.bone_names[groups[group.parent].bone]}'
