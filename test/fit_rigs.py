@@ -337,3 +337,35 @@ def write(rig, folder):
     path = folder / f'{rig.name}.glb'
     path.write_bytes(document(rig).glb())
     return path
+
+
+def mannequin():
+    """Give the wooden body of mannequin-x (Apache-2.0) as a document; eight weights a vertex."""
+    from mannequin import Mannequin
+    body = Mannequin('wooden')
+    pose = body.rest_pose()
+    raw = body._weights
+    worlds = np.asarray(body.joint_transforms(pose), float)
+    made = Document()
+    names = [str(name) for name in raw.joint_names]
+    nodes = [{'name': 'Body', 'mesh': 0, 'skin': 0}]
+    for name, parent, world in zip(names, raw.parents, worlds):
+        local = np.linalg.inv(worlds[parent]) @ world if parent >= 0 else world
+        nodes.append({'name': name, 'matrix': local.T.ravel().tolist()})
+        if parent >= 0:
+            nodes[parent + 1].setdefault('children', []).append(len(nodes) - 1)
+    made.data['nodes'] = nodes
+    made.data['scenes'] = [{'nodes': [0, 1]}]
+    binds = made.accessor(np.linalg.inv(worlds).transpose(0, 2, 1).reshape(-1, 16), 'f4', 'MAT4')
+    made.data['skins'] = [{'joints': list(range(1, len(names) + 1)), 'inverseBindMatrices': binds}]
+    weights = np.round(raw.skin_weights * 65535)
+    attributes = {'POSITION': made.accessor(np.asarray(body.vertices(pose)), 'f4', 'VEC3')}
+    for part in range(2):
+        columns = slice(4 * part, 4 * part + 4)
+        attributes[f'JOINTS_{part}'] = made.accessor(
+            raw.skin_joint_indices[:, columns], 'u2', 'VEC4')
+        attributes[f'WEIGHTS_{part}'] = made.accessor(
+            weights[:, columns], 'u2', 'VEC4', normalized=True)
+    indices = made.accessor(raw.faces.reshape(-1, 1), 'u4', 'SCALAR')
+    made.data['meshes'] = [{'primitives': [{'attributes': attributes, 'indices': indices}]}]
+    return made

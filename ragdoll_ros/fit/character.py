@@ -1,6 +1,7 @@
 """A rigged, skinned character in this package's frame: x forward, y left, z up, metres."""
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,7 +46,7 @@ class Character:
     """Metres to one unit of the file."""
     notes: tuple[str, ...] = ()
 
-    @property
+    @functools.cached_property
     def extent(self) -> float:
         """Longest edge of the skin's bounding box, m."""
         return float(np.ptp(self.vertices, axis=0).max())

@@ -56,15 +56,15 @@ def make_joint(parent: str, child: str, role: str | None, side: int, anchor: np.
     return _by_topology(parent, child, anchor, above, along, chain)
 
 
-def damped(joint: Joint, child: Bone) -> Joint:
+def damped(joint: Joint, parent: Bone, child: Bone) -> Joint:
     """Give the joint a body's own loss, N m s/rad, so that the doll comes to rest.
 
-    The child alone, swinging about the joint, loses its speed within LOSS_TIME; about its thin
-    axis it must not lose it within a step of the engine, which takes damping explicitly.
+    The child alone, swinging about the joint, loses its speed within LOSS_TIME; about their
+    thin axes neither body must lose it within a step of the engine, where damping is explicit.
     """
     if joint.kind == 'fixed':
         return joint
-    least = min(child.inertia)
+    least = min(*parent.inertia, *child.inertia)
     about = max(child.inertia) + child.mass * float(
         np.sum(np.subtract(child.position, joint.anchor) ** 2))
     damping = min(about / LOSS_TIME, least / SHORTEST_LOSS)

@@ -76,7 +76,8 @@ def fit_character(character: Character, options: Options | None = None) -> Fit:
     weights = _masses(character, groups, roles, [fit.shape.volume for fit in fits], options)
     bodies = [_body(given, *parts, roles) for parts in zip(groups, fits, axes, weights,
                                                            strict=True)]
-    joints = [damped(_joint(character, groups, index, roles, directions), bodies[index].bone)
+    joints = [damped(_joint(character, groups, index, roles, directions),
+                     bodies[group.parent].bone, bodies[index].bone)
               for index, group in enumerate(groups) if group.parent >= 0]
     notes += [f'no bone joins {character.bone_names[group.bone]} to the rest: it is tied to '
               f'{character.bone_names[groups[group.parent].bone]}'
