@@ -21,7 +21,7 @@ BALLS = {'neck': (35, 40), 'head': (45, 55), 'spine': (25, 25), 'hips': (25, 25)
          'soft': (30, 20), 'wing': (60, 20), 'finger': (30, 10)}
 """Swing and twist, degrees, by role."""
 
-LOSS_TIME, SHORTEST_LOSS = 0.7, 0.02
+LOSS_TIME, SHORTEST_LOSS = 0.7, 0.1
 """Seconds: see ``damped``."""
 
 FIRST, LATER = (60, 30), (45, 30)
