@@ -35,7 +35,7 @@ class Rig:
 
 def limb(rig, parent, names, points, radii):
     """Append a chain of bones along points; gives the index of the last."""
-    for name, head, tail, radius in zip(names, points, points[1:], radii):
+    for name, head, tail, radius in zip(names, points[:-1], points[1:], radii, strict=True):
         rig.append(Bone(name, parent, tuple(head), tuple(tail), radius))
         parent = len(rig) - 1
     return parent
@@ -64,6 +64,8 @@ NAMES = {
                   ['upperleg01.{L}', 'lowerleg01.{L}', 'foot.{L}', 'toe1-1.{L}'],
                   'finger{k}-{n}.{L}')}
 
+LEFT, RIGHT = {'S': 'Left', 's': 'l', 'L': 'L'}, {'S': 'Right', 's': 'r', 'L': 'R'}
+
 FINGERS = ('Thumb', 'Index', 'Middle', 'Ring', 'Pinky')
 
 
@@ -73,7 +75,7 @@ def humanoid(style='mixamo', fingers=False):
     chest = limb(bones, -1, [hips, *spine], [(0, .95, 0), (0, 1.06, 0), (0, 1.18, 0),
                                              (0, 1.31, 0), (0, 1.46, 0)], [.13, .12, .13, .14])
     limb(bones, chest, [neck, head], [(0, 1.46, 0), (0, 1.55, 0), (0, 1.78, 0)], [.055, .1])
-    for side, mark in ((1, dict(S='Left', s='l', L='L')), (-1, dict(S='Right', s='r', L='R'))):
+    for side, mark in ((1, LEFT), (-1, RIGHT)):
         points = [(side * x, y, z) for x, y, z in (
             (.03, 1.42, 0), (.18, 1.42, 0), (.46, 1.42, 0), (.72, 1.42, .01), (.84, 1.42, .01))]
         hand = limb(bones, chest, [name.format(**mark) for name in arm], points,
@@ -114,7 +116,8 @@ def quadruped():
 
 def bird():
     bones = []
-    body = limb(bones, -1, ['body', 'chest'], [(0, .3, -.1), (0, .32, 0), (0, .34, .12)], [.07, .08])
+    body = limb(bones, -1, ['body', 'chest'], [(0, .3, -.1), (0, .32, 0), (0, .34, .12)],
+                [.07, .08])
     limb(bones, body, ['neck', 'head'], [(0, .36, .12), (0, .45, .18), (0, .48, .28)], [.03, .035])
     limb(bones, 0, ['tail'], [(0, .3, -.1), (0, .28, -.3)], [.03])
     for side, label in ((1, 'L'), (-1, 'R')):
@@ -349,7 +352,7 @@ def mannequin():
     made = Document()
     names = [str(name) for name in raw.joint_names]
     nodes = [{'name': 'Body', 'mesh': 0, 'skin': 0}]
-    for name, parent, world in zip(names, raw.parents, worlds):
+    for name, parent, world in zip(names, raw.parents, worlds, strict=True):
         local = np.linalg.inv(worlds[parent]) @ world if parent >= 0 else world
         nodes.append({'name': name, 'matrix': local.T.ravel().tolist()})
         if parent >= 0:
