@@ -124,7 +124,8 @@ def test_a_solid_is_recognised_by_its_skin(solid):
     from ragdoll_ros.fit.solid import surface
     corners, triangles = surface(solid)
     weights = np.random.default_rng(1).dirichlet((1, 1, 1), size=(len(triangles), 12))
-    points = np.einsum('tsk,tkd->tsd', weights, corners[triangles]).reshape(-1, 3) + (1, 2, 3)
+    points = np.einsum('tsk,tkd->tsd', weights, corners[triangles]).reshape(-1, 3)
+    points += (1, 2, 3)
     kind = choose_kind([points], 0.01, 0.001)
     fitted = fit_shape(points, kind, 0.01, 0.001)
     assert kind == solid.kind

@@ -82,8 +82,10 @@ def read_character(path: str | Path, scale: float | None = None) -> Character:
     """
     try:
         file = GltfFile(path)
-        nodes = read_nodes(file)
-        skins = read_skins(file, nodes)
+        # What overflows is found where it ends up.
+        with np.errstate(over='ignore', invalid='ignore'):
+            nodes = read_nodes(file)
+            skins = read_skins(file, nodes)
         if len(skins.vertices) == 0:
             raise faults.WrongForm('meshes', 0, 'a skin with vertices')
         return _character(file, nodes.parents, nodes.order, skins, scale)
@@ -98,6 +100,8 @@ def _character(file: GltfFile, parents: list[int], order: list[int], skins: Skin
     lookup = np.zeros(len(order), np.int32)
     lookup[joints] = range(len(joints))
     rests = np.stack([skins.rests[node] for node in joints])
+    if not np.isfinite(skins.vertices).all() or not np.isfinite(rests).all():
+        raise faults.NotFinite('meshes', 'vertices in the bind pose', 'finite numbers')
     names = _bone_names([file.document.nodes[node].name for node in joints])
     notes = list(skins.notes)
     turn = TO_ROS
@@ -110,8 +114,6 @@ def _character(file: GltfFile, parents: list[int], order: list[int], skins: Skin
         upright = np.round(rotation.matrix(rotation.from_axis_angle((0, 0, 1), np.radians(yaw))))
         positions, vertices, linear = positions @ upright.T, vertices @ upright.T, upright @ linear
     metres = _metres(vertices, scale, notes)
-    if not np.isfinite(vertices).all() or not np.isfinite(rests).all():
-        raise faults.NotFinite('meshes', 'vertices in the bind pose', 'finite numbers')
     stem = _bone_names([file.path.stem])[0]
     return Character(
         stem, names, tuple(_parent_bone(node, parents, place) for node in joints),

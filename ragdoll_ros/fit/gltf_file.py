@@ -15,6 +15,7 @@ import urllib.parse
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 from .. import faults
 
@@ -26,7 +27,9 @@ LARGEST_STRUCTURE = 500_000
 
 UNREADABLE_EXTENSIONS = {'KHR_draco_mesh_compression', 'EXT_meshopt_compression'}
 
-KEPT = ('scene', 'nodes', 'skins', 'meshes', 'accessors', 'bufferViews', 'buffers')
+TYPES = {'nodes': 'Node', 'skins': 'Skin', 'meshes': 'Mesh', 'accessors': 'Accessor',
+         'bufferViews': 'BufferView', 'buffers': 'Buffer'}
+"""The parts of a document that matter, and pygltflib's types for their entries."""
 
 
 @dataclass(frozen=True)
@@ -39,10 +42,7 @@ class Buffer:
     data: bytes = b''
 
     def read(self, offset: int, size: int, where: str) -> bytes:
-        """Give ``size`` bytes from ``offset`` on; OutOfRange where the buffer is shorter."""
-        if offset < 0 or size < 0 or offset + size > self.size:
-            raise faults.OutOfRange(where, f'bytes {offset} to {offset + size}',
-                                    f'within the {self.size} bytes of the buffer')
+        """Give ``size`` bytes from ``offset`` on; Unreadable where the file ends before."""
         if self.path is None:
             return self.data[offset:offset + size]
         with self.path.open('rb') as file:
@@ -78,7 +78,11 @@ class GltfFile:
         if offset < 0 or offset + size > length:
             raise faults.OutOfRange(where, f'bytes {offset} to {offset + size}',
                                     f'within the {length} bytes of {place}')
-        return self._buffer(view.buffer, place).read(start + offset, size, place)
+        buffer = self._buffer(view.buffer, place)
+        if start + length > buffer.size:
+            raise faults.OutOfRange(place, f'bytes {start} to {start + length}',
+                                    f'within the {buffer.size} bytes of the buffer')
+        return buffer.read(start + offset, size, place)
 
     def _buffer(self, index: object, where: str) -> Buffer:
         entry = item(self.document.buffers, index, where, 'buffers')
@@ -181,25 +185,32 @@ def _parse(text: bytes) -> dict:
     return data
 
 
-def _typed(data: dict) -> object:
-    """Give the parts that matter pygltflib's types."""
+def _typed(data: dict) -> SimpleNamespace:
+    """Give the parts that matter pygltflib's types; WrongForm with the place where they misfit."""
     try:
-        from pygltflib import GLTF2
+        import pygltflib
     except ImportError:
         raise faults.Unreadable(
             '', 'no pygltflib', "pip install 'ragdoll_ros[fit]' to read glTF") from None
-    for key in KEPT[1:]:
-        entries = data.get(key, [])
-        if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-            raise faults.WrongForm(key, entries, 'a list of objects')
-    kept = {key: data.get(key, []) for key in KEPT[1:]}
+    document = SimpleNamespace()
     with warnings.catch_warnings():
         # It warns of each missing key; what is missing is told here, where it matters.
         warnings.simplefilter('ignore')
-        try:
-            return GLTF2.from_dict({'asset': {}, 'scene': 0, **kept}, infer_missing=True)
-        except (TypeError, ValueError, KeyError, AttributeError, RecursionError) as error:
-            raise faults.WrongForm('JSON', str(error), 'objects as glTF 2.0 has them') from None
+        for key, kind in TYPES.items():
+            entries = data.get(key, [])
+            if not isinstance(entries, list):
+                raise faults.WrongForm(key, entries, 'a list of objects')
+            setattr(document, key, [_entry(getattr(pygltflib, kind), entry, f'{key}[{index}]')
+                                    for index, entry in enumerate(entries)])
+    return document
+
+
+def _entry(kind: type, entry: object, where: str) -> object:
+    try:
+        return kind.from_dict(entry, infer_missing=True)
+    except (TypeError, ValueError, KeyError, AttributeError, OverflowError, RecursionError):
+        name = kind.__name__
+        raise faults.WrongForm(where, entry, f'a {name} as glTF 2.0 has it') from None
 
 
 def _embedded(uri: str, where: str) -> Buffer:

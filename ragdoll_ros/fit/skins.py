@@ -125,6 +125,9 @@ def _mesh_to_world(skins: Skins, nodes: Nodes, joints: np.ndarray,
     said = nodes.worlds[joints] @ inverses
     top = min(range(len(joints)), key=lambda k: nodes.order.index(joints[k]))
     size = np.abs(said[top]).max()
+    if not np.isfinite(said[top]).all() or not np.abs(np.linalg.det(said[top])) > 1e-30:
+        raise faults.WrongForm('nodes', 'a scale of zero or without end',
+                               'nodes that leave the skin a size')
     if np.abs(said - said[top]).max() < 1e-3 * size:
         return said[top]
     skins.notes.append('the nodes stand in another pose than the one the skin was bound in; '
@@ -147,7 +150,8 @@ def _nearest_upright(turn: np.ndarray) -> np.ndarray:
 def _add_primitive(file: GltfFile, skins: Skins, primitive: object, joints: np.ndarray,
                    matrices: np.ndarray, where: str) -> None:
     attributes = primitive.attributes
-    attributes = attributes if isinstance(attributes, dict) else vars(attributes)
+    if not isinstance(attributes, dict):
+        attributes = getattr(attributes, '__dict__', {})
     if attributes.get('POSITION') is None:
         raise faults.WrongForm(f'{where}.attributes', sorted(attributes), 'POSITION')
     points = read_floats(file, attributes['POSITION'], 'VEC3', f'{where}.POSITION')
