@@ -89,6 +89,11 @@ def _doll(tree: UrdfTree) -> tuple[Ragdoll, list[str]]:
         bones.append(Bone(text, shape, masses[name], position, turn))
     joints = [_joint(tree, name, carriers, names, poses, angles, notes)
               for name in names if name != root]
+    above = root
+    while above in tree.joints:
+        joint, above = tree.joints[above], tree.joints[above].parent
+        if joint.kind not in ('fixed', 'floating'):
+            notes.append(f'{joint.name}: nothing with a shape above it: left out')
     riders = _riders(poses, carriers, names, bones)
     return Ragdoll(_plain(tree.name), tuple(bones), tuple(joints), riders), notes
 

@@ -21,6 +21,9 @@ A .urdf becomes a doll too: a robot that goes limp. A doll's own .yaml is checke
 Exit code 0: done; 2: a file or an option is wrong."""
 
 
+PICTURES = ('.png', '.jpg', '.svg', '.pdf')
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; gives the exit code."""
     options = _parser().parse_args(arguments)
@@ -42,6 +45,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('input', help='a .glb or .gltf with a skinned character, a .urdf, a .yaml')
     parser.add_argument('-o', '--output', metavar='DOLL.yaml', help='where the doll goes')
     parser.add_argument('--urdf', metavar='DOLL.urdf', help='write the doll as URDF too')
+    parser.add_argument('--dialect', choices=('ros', 'bullet'), default='ros',
+                        help='of that URDF: PyBullet has capsules, and takes links of no mass '
+                        'as such only where they say so')
     parser.add_argument('--picture', metavar='OUT.png', help='draw skin and bodies side by side')
     parser.add_argument('--mass', type=float, metavar='KG',
                         help='of the whole doll (default: as much water as the skin holds)')
@@ -80,7 +86,7 @@ def _run(options: argparse.Namespace) -> None:
         save_doll(doll, options.output, f'Fitted to {path.name}\n\n{report}')
     if options.urdf:
         from ..urdf import to_urdf
-        Path(options.urdf).write_text(to_urdf(doll), encoding='utf-8')
+        Path(options.urdf).write_text(to_urdf(doll, options.dialect), encoding='utf-8')
     if options.picture:
         from .picture import draw
         draw(doll, fit.character if fit else None, options.picture)
@@ -105,6 +111,9 @@ def _check(options: argparse.Namespace) -> None:
             faults.check_positive(f'--{key}', getattr(options, key))
     if options.weight is not None:
         faults.check_range('--weight', options.weight, 0, 1)
+    if options.picture and Path(options.picture).suffix.lower() not in PICTURES:
+        raise faults.WrongForm('--picture', options.picture,
+                               'a name that ends in ' + ', '.join(PICTURES))
 
 
 def _one_line(error: faults.RagdollError) -> str:

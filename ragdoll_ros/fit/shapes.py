@@ -18,6 +18,10 @@ MOST_POINTS = 2000
 """Points on which shapes are tried; of larger clusters every n-th is taken."""
 
 QUANTILES = (0.7, 0.8, 0.9, 0.95, 0.98, 1.0)
+"""Shares of the points that a tried radius leaves inside."""
+
+END_CUTS = np.array([0.0, 0.01, 0.02])
+"""Shares of the points that a tried length leaves out at each end."""
 
 
 @dataclass(frozen=True)
@@ -75,8 +79,8 @@ def outside(shape: Shape, points: np.ndarray) -> np.ndarray:
 
 
 def _boxes(points: np.ndarray, thinnest: float) -> Iterator[Fitted]:
-    for cut in (0.0, 0.005, 0.01, 0.02, 0.03, 0.045):
-        low, high = np.quantile(points, [cut, 1 - cut], axis=0)
+    cuts = np.array([0.0, 0.005, 0.01, 0.02, 0.03, 0.045])
+    for low, high in zip(*np.quantile(points, [cuts, 1 - cuts], axis=0), strict=True):
         yield Fitted(Box(tuple(np.maximum(high - low, thinnest))), (low + high) / 2)
 
 
@@ -88,11 +92,11 @@ def _spheres(points: np.ndarray, thinnest: float) -> Iterator[Fitted]:
 
 
 def _cylinders(points: np.ndarray, thinnest: float) -> Iterator[Fitted]:
+    ends = np.quantile(points[:, 2], [END_CUTS, 1 - END_CUTS])
     for centre in _centres(points):
         radial = np.linalg.norm((points - centre)[:, :2], axis=1)
         for radius in np.quantile(radial, QUANTILES):
-            for cut in (0.0, 0.01, 0.02):
-                low, high = np.quantile(points[:, 2], [cut, 1 - cut])
+            for low, high in ends.T:
                 middle = np.array([centre[0], centre[1], (low + high) / 2])
                 yield Fitted(Cylinder(max(radius, thinnest / 2), max(high - low, thinnest)), middle)
 
@@ -104,9 +108,9 @@ def _capsules(points: np.ndarray, thinnest: float) -> Iterator[Fitted]:
             radius = max(radius, thinnest / 2)
             # A point at this distance from the axis is inside so far into the end's half ball.
             dome = np.sqrt(np.maximum(radius ** 2 - radial ** 2, 0))
-            for cut in (0.0, 0.01, 0.02):
-                low = np.quantile(points[:, 2] + dome, cut)
-                high = np.quantile(points[:, 2] - dome, 1 - cut)
+            lows = np.quantile(points[:, 2] + dome, END_CUTS)
+            highs = np.quantile(points[:, 2] - dome, 1 - END_CUTS)
+            for low, high in zip(lows, highs, strict=True):
                 middle = np.array([centre[0], centre[1], (low + high) / 2])
                 yield Fitted(Capsule(radius, max(high - low, thinnest / 2)), middle)
 
