@@ -3,9 +3,12 @@
 Lengths in m, glTF's axes: y up, z forward, x left. The writer uses no glTF library, so that the
 reader is held against the specification and not against its own library.
 """
+import functools
 import json
 import struct
+import tempfile
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -340,6 +343,15 @@ def write(rig, folder):
     path = folder / f'{rig.name}.glb'
     path.write_bytes(document(rig).glb())
     return path
+
+
+@functools.cache
+def fitted(name):
+    """Fit a rig without options, once for all tests."""
+    from ragdoll_ros.fit.character import read_character
+    from ragdoll_ros.fit.pipeline import fit_character
+    with tempfile.TemporaryDirectory() as folder:
+        return fit_character(read_character(write(RIGS[name], Path(folder))))
 
 
 def mannequin():

@@ -86,8 +86,8 @@ def bent(doll, child, angle):
 
 
 @pytest.mark.parametrize('style', ['mixamo', 'unreal', 'vrm', 'cmu', 'makehuman'])
-def test_knees_and_elbows_of_fitted_humanoids(tmp_path, style):
-    fit = fit_character(read_character(fit_rigs.write(RIGS[style], tmp_path)))
+def test_knees_and_elbows_of_fitted_humanoids(style):
+    fit = fit_rigs.fitted(style)
     joints = {joint.child: joint for joint in fit.doll.joints}
     for body in fit.bodies:
         if body.role in ('shin', 'forearm'):
@@ -106,10 +106,9 @@ def test_knees_and_elbows_of_fitted_humanoids(tmp_path, style):
             assert abs(outward[0 if side < 0 else 1]) > abs(outward[1 if side < 0 else 0])
 
 
-def test_a_bent_leg_without_names_straightens_and_folds(tmp_path):
+def test_a_bent_leg_without_names_straightens_and_folds():
     """Fox or dog: what is bent in the bind pose is a hinge about the axis of that bend."""
-    rig = RIGS['four_legs_unnamed_centimetres']
-    fit = fit_character(read_character(fit_rigs.write(rig, tmp_path)))
+    fit = fit_rigs.fitted('four_legs_unnamed_centimetres')
     hinges = [joint for joint in fit.doll.joints if joint.kind == 'hinge']
     assert len(hinges) >= 4
     for joint in hinges:
@@ -118,8 +117,8 @@ def test_a_bent_leg_without_names_straightens_and_folds(tmp_path):
         assert joint.limits[0][0] < 0 < joint.limits[0][1]
 
 
-def test_left_and_right_mirror_in_their_limits(tmp_path):
-    fit = fit_character(read_character(fit_rigs.write(RIGS['unreal'], tmp_path)))
+def test_left_and_right_mirror_in_their_limits():
+    fit = fit_rigs.fitted('unreal')
     joints = {joint.child: joint for joint in fit.doll.joints}
     for name, joint in joints.items():
         if not name.endswith('_l'):

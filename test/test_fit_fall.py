@@ -2,7 +2,7 @@
 import fit_rigs
 import numpy as np
 import pytest
-from fit_rigs import RIGS
+from fit_rigs import RIGS, fitted
 
 from ragdoll_ros import rotation
 from ragdoll_ros.fit.character import read_character
@@ -11,10 +11,6 @@ from ragdoll_ros.scene import above_ground
 from ragdoll_ros.simulation import Simulation
 
 QUICK = ('mixamo', 'four_legs_unnamed_centimetres', 'snake', 'star', 'one_bone')
-
-
-def doll_of(name, folder):
-    return fit_character(read_character(fit_rigs.write(RIGS[name], folder))).doll
 
 
 def energy(doll, state, gravity):
@@ -49,14 +45,14 @@ def falls_and_settles(doll):
 
 
 @pytest.mark.parametrize('name', QUICK)
-def test_it_falls_without_energy_from_nothing_and_settles(tmp_path, name):
-    falls_and_settles(doll_of(name, tmp_path))
+def test_it_falls_without_energy_from_nothing_and_settles(name):
+    falls_and_settles(fitted(name).doll)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize('name', [name for name in RIGS if name not in QUICK])
-def test_all_others_fall_and_settle_too(tmp_path, name):
-    falls_and_settles(doll_of(name, tmp_path))
+def test_all_others_fall_and_settle_too(name):
+    falls_and_settles(fitted(name).doll)
 
 
 @pytest.mark.slow

@@ -7,8 +7,6 @@ import pytest
 from fit_rigs import RIGS
 
 from ragdoll_ros import faults, rotation
-from ragdoll_ros.fit.character import read_character
-from ragdoll_ros.fit.pipeline import fit_character
 from ragdoll_ros.ragdoll import Bone, Joint, Ragdoll, Rider, Sphere
 from ragdoll_ros.riders import Riders, rider_names
 from ragdoll_ros.scene import Placement, Scene, above_ground
@@ -16,10 +14,9 @@ from ragdoll_ros.scene_file import build_doll, doll_data, load_doll, save_doll
 from ragdoll_ros.simulation import Simulation
 
 
-@pytest.fixture(scope='module')
-def fit(tmp_path_factory):
-    folder = tmp_path_factory.mktemp('riders')
-    return fit_character(read_character(fit_rigs.write(RIGS['mixamo'], folder)))
+@pytest.fixture
+def fit():
+    return fit_rigs.fitted('mixamo')
 
 
 def test_the_bind_pose_is_the_skeletons(fit):
