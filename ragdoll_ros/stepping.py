@@ -41,7 +41,8 @@ class Accuracy:
     flight_turn: float
     """rad that the fastest bone may turn in one Runge-Kutta step."""
     redo: float = math.radians(1.0)
-    """rad past a limit from which a step is done again, four times as fine; infinity: never."""
+    """rad past a limit from which a step is done again, four times as fine, as it is when a bone
+    sinks deeper than ``sink``; infinity: never."""
     adaptive: bool = True
     """Substeps by need; otherwise always ``contact`` in 10 ms."""
     energy: bool = True
@@ -52,11 +53,11 @@ class Accuracy:
     """Stop the engine when all is at rest."""
 
 
-DRAFT = Accuracy(turn=0.15, limit=0.06, contact=4, settled=2, sink=0.015, most=16, order=2,
+DRAFT = Accuracy(turn=0.15, limit=0.06, contact=4, settled=2, sink=0.015, most=32, order=2,
                  flight_turn=0.8, redo=math.radians(4))
-NORMAL = Accuracy(turn=0.06, limit=0.025, contact=8, settled=4, sink=0.006, most=32, order=3,
+NORMAL = Accuracy(turn=0.06, limit=0.025, contact=8, settled=4, sink=0.006, most=64, order=3,
                   flight_turn=0.4, redo=math.radians(2))
-EXACT = Accuracy(turn=0.02, limit=0.01, contact=16, settled=8, sink=0.002, most=64, order=4,
+EXACT = Accuracy(turn=0.02, limit=0.01, contact=16, settled=8, sink=0.002, most=256, order=4,
                  flight_turn=0.2, redo=math.radians(1))
 ACCURACIES = {'draft': DRAFT, 'normal': NORMAL, 'exact': EXACT}
 
@@ -106,6 +107,8 @@ class Stepper:
         self._normal = np.array(scene.ground.normal if scene.ground else (0.0, 0.0, 1.0))
         self._damped = any(joint.damping for placement in scene.dolls
                            for joint in placement.doll.joints)
+        self._blocked = False
+        """Whether something that no flight can foresee comes next: bones that meet."""
         self.effort = Effort()
         self.look()
 
@@ -123,10 +126,11 @@ class Stepper:
 
     def go(self, duration: float, loads: Sequence[Load]) -> Piece:
         """Move on by ``duration`` s, or by less: up to the next touch or limit in a flight."""
-        if self._free is not None and not self.touching and not self._at_limit():
+        if self._may_fly():
             flown = self._fly(duration, loads)
             if flown > 0:
                 return Piece(flown, 0.0)
+        self._blocked = False
         return Piece(duration, self._step(duration, loads))
 
     def close(self) -> None:
@@ -135,13 +139,15 @@ class Stepper:
         if self._free is not None:
             self._free.close()
 
-    def _at_limit(self) -> bool:
-        """Tell whether a joint presses against its limit."""
+    def _may_fly(self) -> bool:
+        """Tell whether nothing touches and no joint presses against its limit."""
+        if self._free is None or self.touching or self._blocked:
+            return False
         past = self._layout.past_limits(self.coordinates.q)
         if not len(past) or past.max() < -AT_LIMIT:
-            return False
-        return bool(((past >= -AT_LIMIT) & (self._layout.limit_speeds(self.coordinates) > 0)
-                     | (past > AT_LIMIT)).any())
+            return True
+        pressing = (past >= -AT_LIMIT) & (self._layout.limit_speeds(self.coordinates) > 0)
+        return not (pressing | (past > AT_LIMIT)).any()
 
     def _fly(self, duration: float, loads: Sequence[Load]) -> float:
         """Fly up to ``duration`` s; give the time flown, 0 where something comes in between."""
@@ -159,7 +165,8 @@ class Stepper:
             early = piece * least / (least - room) if least > 0 > room else 0.0
             if early > SHORTEST and self._fly_early(start, early, loads):
                 return flown + early
-            self._back_to(start, state)
+            self._back_to(start, state, set())
+            self._blocked = True
             return flown
         return duration
 
@@ -173,15 +180,16 @@ class Stepper:
         self.place(end)
         self.touching = self.engine.touching()
 
-    def _back_to(self, start: Coordinates, state: State) -> None:
+    def _back_to(self, start: Coordinates, state: State,
+                 touching: set[tuple[int, int]]) -> None:
         self.engine.place(start)
-        self.coordinates, self.state, self.touching = start, state, set()
+        self.coordinates, self.state, self.touching = start, state, touching
 
     def _room(self) -> float:
         """Room (rad or m) to the nearest limit or the ground; below zero: past it."""
         past = self._layout.past_limits(self.coordinates.q)
         room = -float(past.max()) if len(past) else math.inf
-        return min(room, float(self.reach.heights(self.state).min()))
+        return min(room, self.reach.clearance(self.state))
 
     def _flight_steps(self, duration: float) -> int:
         spin = math.sqrt(np.einsum('ij,ij->i', self.state.angular, self.state.angular).max())
@@ -190,18 +198,23 @@ class Stepper:
 
     def _step(self, duration: float, loads: Sequence[Load]) -> float:
         """Take the engine's own step, finer if it overshoots a limit; give its substep, s."""
-        start, state = self.coordinates, self.state
-        past = self._layout.past_limits(start.q).max(initial=-math.inf)
+        start, state, touching = self.coordinates, self.state, self.touching
+        bound = max(1.0, self._too_far())
         substeps = self._substeps(duration, bool(loads))
         most = max(1, math.ceil(self.accuracy.most * duration / 0.01))
         while True:
             self._run(duration, substeps, loads)
-            over = self._layout.past_limits(self.coordinates.q).max(initial=-math.inf)
-            if over < max(self.accuracy.redo, past) or substeps >= most:
+            if substeps >= most or self._too_far() <= bound:
                 return duration / substeps
-            self._back_to(start, state)
+            self._back_to(start, state, touching)
             substeps = min(most, 4 * substeps)
             self.effort.redone += 1
+
+    def _too_far(self) -> float:
+        """Tell how far past a limit or in the ground, in units of what is put up with."""
+        past = float(self._layout.past_limits(self.coordinates.q).max(initial=0.0))
+        sunk = -self.reach.clearance(self.state)
+        return max(past / self.accuracy.redo, sunk / self.accuracy.sink)
 
     def _run(self, duration: float, substeps: int, loads: Sequence[Load]) -> None:
         """Let the engine go; what changes with the motion is looked at again each substep."""
@@ -226,10 +239,10 @@ class Stepper:
             past = self._layout.past_limits(self.coordinates.q)
             near = speeds[past + SOON * speeds > 0]
             need = max(need, near.max(initial=0.0) * duration / accuracy.limit)
-        if self.touching or not self.reach.in_air(state, SOON, self._gravity):
-            falling = max(0.0, -float((state.linear @ self._normal).min()))
-            fast = falling > 0.3 or spin > 1.0
-            need = max(need, (accuracy.contact if fast else accuracy.settled) * tens,
+        falling = self.reach.falling(state, SOON)
+        if self.touching or falling:
+            moving = falling > 0.3 or spin > 1.0
+            need = max(need, (accuracy.contact if moving else accuracy.settled) * tens,
                        falling * duration / accuracy.sink)
         most = max(1, math.ceil(accuracy.most * tens))
         return min(most, 2 ** math.ceil(math.log2(need)))

@@ -29,11 +29,17 @@ LARGEST_FRICTION = math.sqrt(10)
 BREAKING_DISTANCE = 2e-3
 """m at which a contact point is let go. The default, 0.02 m, eats half of every small bounce."""
 
-REST_SPEED = 0.05
-"""m/s: lowest restitution threshold. Below it each substep's own gravity would bounce."""
+LEAST_BOUNCE = 0.05
+"""m/s: approach speed below which nothing bounces, if the material and the substep don't ask for
+more. It must lie above the speed that gravity gives within a substep, or a resting bone
+chatters for ever; twice that is taken."""
 
 SOLVER_ITERATIONS = 20
 """20 are as good as 50; 5 to 10 leave 1 to 5 mm of sinking."""
+
+LIMIT_RETURN = 0.01
+"""s: time constant with which a joint past its limit comes back. Bullet's own erp of 0.2 a step
+returns it faster the finer the steps, a blow that makes energy; its split impulse never does."""
 
 LARGEST_RATE = 1e4
 """rad/s and m/s at which PyBullet clamps; its default of 100 makes energy in a 50 m drop."""
@@ -70,6 +76,8 @@ class BulletEngine:
         self._free = free
         self._client = pybullet.connect(pybullet.DIRECT)
         self._timing: tuple[float, int] | None = None
+        self._gravity = math.hypot(*scene.gravity)
+        self._least_bounce = max(LEAST_BOUNCE, scene.material.restitution_speed)
         try:
             self._build()
         except BaseException:
@@ -82,6 +90,9 @@ class BulletEngine:
         if timing != self._timing:
             pybullet.setPhysicsEngineParameter(
                 fixedTimeStep=duration, numSubSteps=substeps if substeps > 1 else 0,
+                erp=min(0.2, duration / substeps / LIMIT_RETURN),
+                restitutionVelocityThreshold=max(
+                    self._least_bounce, 2 * self._gravity * duration / substeps),
                 physicsClientId=self._client)
             self._timing = timing
         for load in loads:
@@ -167,6 +178,13 @@ class BulletEngine:
         points = pybullet.getContactPoints(physicsClientId=self._client)
         return {(self._doll_of[point[1]], self._doll_of[point[2]]) for point in points}
 
+    def let_overlaps_be(self) -> None:
+        """Pairs of one doll that overlap now do not collide: they would burst."""
+        pybullet.performCollisionDetection(physicsClientId=self._client)
+        for point in pybullet.getContactPoints(physicsClientId=self._client):
+            if point[1] == point[2] and point[8] < 0:
+                pybullet.setCollisionFilterPair(*point[1:5], 0, physicsClientId=self._client)
+
     def contacts(self) -> list[Contact]:
         """What touches at the end of the last substep."""
         found = []
@@ -237,8 +255,8 @@ class BulletEngine:
     def _build(self) -> None:
         pybullet.setPhysicsEngineParameter(
             numSolverIterations=SOLVER_ITERATIONS, contactBreakingThreshold=BREAKING_DISTANCE,
-            restitutionVelocityThreshold=max(REST_SPEED, self.scene.material.restitution_speed),
-            deterministicOverlappingPairs=1, enableFileCaching=0, physicsClientId=self._client)
+            deterministicOverlappingPairs=1, enableFileCaching=0, useSplitImpulse=0,
+            physicsClientId=self._client)
         pybullet.setGravity(*self.scene.gravity, physicsClientId=self._client)
         self._ground = self._add_ground()
         self._dolls = [self._add_doll(placement) for placement in self.scene.dolls]
@@ -248,7 +266,7 @@ class BulletEngine:
             self._doll_of[self._ground] = GROUND
         self._bone_of = {link: bone for bone, link in enumerate(self._links)}
         self.layout = self._lay_out()
-        self._let_overlaps_be()
+        self.let_overlaps_be()
         for index, placement in enumerate(self.scene.dolls):
             self._set_in_motion(self._dolls[index].body, placement)
 
@@ -334,13 +352,6 @@ class BulletEngine:
         for joint in doll.joints:
             pybullet.setCollisionFilterPair(body, body, links[joint.parent], links[joint.child],
                                             0, physicsClientId=self._client)
-
-    def _let_overlaps_be(self) -> None:
-        """Pairs of one doll that overlap at the start do not collide: they would burst."""
-        pybullet.performCollisionDetection(physicsClientId=self._client)
-        for point in pybullet.getContactPoints(physicsClientId=self._client):
-            if point[1] == point[2] and point[8] < 0:
-                pybullet.setCollisionFilterPair(*point[1:5], 0, physicsClientId=self._client)
 
     def _lay_out(self) -> Layout:
         """Say where in the coordinates which joint's angle and limit stands."""
