@@ -24,8 +24,8 @@ endif
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 22
 
-run: $(READY) ## the doll falls; arrow keys push it
-	@$(BIN)/python -m ragdoll_ros.ros.run
+run: $(READY) ## the doll falls, arrow keys push it; SCENE=crowd: another scene
+	@$(BIN)/python -m ragdoll_ros.ros.run $(SCENE)
 
 test: $(READY) ## the tests, at most 90 s
 	@$(BIN)/python -m pytest
@@ -57,7 +57,7 @@ colcon: $(VENV)/colcon ## build and test as in a ROS workspace
 	@$(COLCON) test-result --test-result-base $(WORKSPACE)/build --verbose
 
 users-versions: ## the tests with Ubuntu 24.04's versions; builds PyBullet from source, 6 to 9 min
-	@sh test/users_versions.sh
+	@sh test/users_versions.sh $(if $(filter python3,$(PYTHON)),python3.12,$(PYTHON))
 
 clean: ## remove all that was made, .venv included
 	rm -rf $(VENV) build install log dist *.egg-info .pytest_cache .ruff_cache
