@@ -14,7 +14,6 @@ ROS := $(or $(ROS_DISTRO),wheels)
 READY := $(VENV)/ready-$(VERSION)-$(ROS)
 
 ifeq ($(ROS),wheels)
-export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV)
 ROS_EXTRA := ,ros
 else
 VENV_FLAGS := --system-site-packages
@@ -51,7 +50,7 @@ FOLDERS := --build-base $(WORKSPACE)/build --install-base $(WORKSPACE)/install
 colcon: $(VENV)/colcon ## build and test as in a ROS workspace
 	@$(COLCON) list --base-paths . | grep -F '(ros.ament_python)' || { $(COLCON) list --base-paths .; \
 	  echo 'colcon takes ragdoll_ros for plain Python: package.xml has a fault' >&2; exit 1; }
-	@$(COLCON) build --base-paths . $(FOLDERS) --event-handlers console_cohesion+
+	@$(COLCON) build --base-paths . $(FOLDERS)
 	@$(COLCON) test --base-paths . $(FOLDERS) --event-handlers console_direct+ \
 	  --return-code-on-test-failure
 	@$(COLCON) test-result --test-result-base $(WORKSPACE)/build --verbose
