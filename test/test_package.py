@@ -28,7 +28,7 @@ ROSDEP_KEYS = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml', 'scipy': 'pytho
 NO_ROSDEP_KEY = {'mujoco', 'pygltflib', 'viser'}
 """Needed by extras only; said in the README."""
 
-COUNT_POSES = '''
+COUNT_POSES = """
 import rclpy
 from geometry_msgs.msg import PoseArray
 got = rclpy.task.Future()
@@ -37,7 +37,7 @@ node = rclpy.create_node('listener')
 node.create_subscription(PoseArray, '/ragdoll/poses', got.set_result, 10)
 rclpy.spin_until_future_complete(node, got, timeout_sec=20)
 print(len(got.result().poses))
-'''
+"""
 
 
 def source_copy(folder: Path) -> Path:
