@@ -49,7 +49,10 @@ class Guard:
         """Start the account anew from a state."""
         energy = self._mechanics.energy(state)
         self.account = Account(energy, np.zeros_like(energy))
+        self.start = energy.copy()
+        """(d,) J at the start."""
         self.worked = np.zeros_like(energy)
+        """(d,) J: work of pushes since."""
 
     def add_work(self, work: np.ndarray) -> None:
         """Enter work (d,) J that pushes did."""
@@ -90,7 +93,7 @@ class Guard:
         return groups
 
     def momentum_kept(self, coordinates: Coordinates, before: Motion, after: Motion,
-                      duration: float, impulse: np.ndarray,
+                      state: State, duration: float, impulse: np.ndarray,
                       moment: np.ndarray | None) -> Coordinates:
         """Give back to dolls in the air the momentum, and the way, that they must have.
 
@@ -106,36 +109,43 @@ class Guard:
         q[layout.root_positions] += before.centre + way - after.centre
         if moment is not None:
             missing = before.spin + moment - after.spin
-            spin = np.linalg.solve(after.locked_inertia, missing[:, :, None])[:, :, 0]
+            spin = np.array([
+                np.linalg.solve(self._mechanics.locked_inertia(state, centre, doll), lack)
+                for doll, (centre, lack) in enumerate(zip(after.centre, missing, strict=True))])
             linear += cross(spin, coordinates.q[layout.root_positions] - after.centre)
             v[layout.root_spins] += spin
         v[layout.root_velocities] += linear
         return Coordinates(q, v)
 
-    def without_surplus(self, coordinates: Coordinates, motion: Motion, surplus: np.ndarray,
-                        touching: bool) -> Coordinates:
+    def without_surplus(self, before: Coordinates, coordinates: Coordinates, motion: Motion,
+                        state: State, surplus: np.ndarray, touching: bool) -> Coordinates:
         """Take ``surplus`` (d,) J out of the dolls' motion.
 
         Each doll keeps its momentum and angular momentum: of its motion only what it does
         beside moving as one rigid body, with the angular velocity Ic^-1 L of the doll locked in
         its pose (Featherstone, Rigid Body Dynamics Algorithms, 9.6), is scaled down. Where that
-        holds less than the surplus and something outside touches the doll, all its motion is.
+        holds less than the surplus and something outside touches the doll, all its motion is;
+        and where that is not enough either, contacts have pushed the doll uphill, and it stands
+        where it was ``before``.
         """
-        v = coordinates.v.copy()
+        layout, q, v = self._layout, coordinates.q.copy(), coordinates.v.copy()
         for doll in np.flatnonzero(surplus > 0):
+            centre = motion.centre[doll]
             linear = motion.momentum[doll] / self._mechanics.doll_masses[doll]
-            spin = np.linalg.solve(motion.locked_inertia[doll], motion.spin[doll])
+            spin = np.linalg.solve(self._mechanics.locked_inertia(state, centre, doll),
+                                   motion.spin[doll])
             rigid = 0.5 * (motion.momentum[doll] @ linear + motion.spin[doll] @ spin)
             inner = max(0.0, motion.kinetic[doll] - rigid)
             scale = math.sqrt(max(0.0, 1 - surplus[doll] / inner)) if inner > 0 else 0.0
-            self._scale(v, doll, coordinates.q, motion.centre[doll], linear, spin, scale)
-            rest = surplus[doll] - inner
-            if rest > 0 and touching and rigid > 0:
-                own = slice(self._layout.root_velocities[doll, 0], self._layout.velocity_ends[doll])
-                v[own] *= math.sqrt(max(0.0, 1 - rest / rigid))
-                inner += min(rest, rigid)
+            self._scale(v, doll, coordinates.q, centre, linear, spin, scale)
             self.account.taken += min(surplus[doll], inner)
-        return Coordinates(coordinates.q, v)
+            rest = surplus[doll] - inner
+            if rest > 0 and touching:
+                v[layout.own_v[doll]] *= math.sqrt(max(0.0, 1 - rest / rigid)) if rigid > 0 else 0
+                self.account.taken += min(rest, rigid)
+                if rest > rigid:
+                    q[layout.own_q[doll]] = before.q[layout.own_q[doll]]
+        return Coordinates(q, v)
 
     def _scale(self, v: np.ndarray, doll: int, q: np.ndarray, centre: np.ndarray,
                linear: np.ndarray, spin: np.ndarray, scale: float) -> None:
@@ -145,7 +155,7 @@ class Guard:
         locked = linear + cross(spin, q[layout.root_positions[doll]] - centre)
         v[root] = locked + scale * (v[root] - locked)
         v[turn] = spin + scale * (v[turn] - spin)
-        v[turn[-1] + 1:layout.velocity_ends[doll]] *= scale
+        v[turn[-1] + 1:layout.own_v[doll].stop] *= scale
 
 
 def _size(doll: Ragdoll) -> float:

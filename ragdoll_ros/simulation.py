@@ -11,6 +11,7 @@ from . import faults, rotation
 from .coordinates import Coordinates
 from .engine.bullet import BulletEngine
 from .engine.protocol import GROUND, Engine, Load
+from .gap import JointGap
 from .guard import Guard
 from .mechanics import Mechanics, Motion
 from .push import Push
@@ -21,8 +22,12 @@ from .stepping import ACCURACIES, Accuracy, Effort, Stepper
 MOST_PUSHES = 1000
 """Pushes that may wait at once; one more is refused."""
 
-REST_SPEED = 0.02
-"""m/s, and rad/s times the bone's size, below which a bone counts as still."""
+REST_SPEED = 0.05
+"""m/s, and rad/s times the bone's size, below which a bone counts as still: more than the
+flutter of a joint that leans on its limit, less than any fall gives within 10 ms."""
+
+REST_WAY = 0.001
+"""m that a still bone may have moved in REST_TIME."""
 
 REST_TIME = SECOND // 2
 """ns that all bones must be still under gravity before the scene sleeps."""
@@ -56,6 +61,7 @@ class Simulation:
         self._stepper = Stepper(scene, engine, resolve_accuracy(accuracy))
         self._guard = Guard(scene, self.mechanics, self._stepper.engine.layout)
         self._start = (self._stepper.engine.save(), self._stepper.coordinates)
+        self._gap = JointGap(scene)
         self._sizes = np.array([max(bone.shape.half_extents) for bone in scene.bones])
         self._weightless = not any(scene.gravity)
         self._begin()
@@ -133,6 +139,7 @@ class Simulation:
         end = self.time + self.tick
         while self.time < end:
             self._go(min(end, self._next_change()))
+        self._redone += self.effort.redone
         self._queue = [active for active in self._queue if active.end > self.time]
         self._rest()
         return self._state
@@ -158,6 +165,23 @@ class Simulation:
         self._begin()
         return self._state
 
+    def measures(self) -> dict[str, float]:
+        """Tell what went wrong so far, and what the last tick took: names end in their units."""
+        stepper, guard = self._stepper, self._guard
+        sunk = -float(stepper.reach.heights(self._state).min())
+        return {
+            'energy_excess_J': float((self._motion.energy - guard.start - guard.worked).sum()),
+            'energy_projected_J': float(guard.account.taken),
+            'work_of_pushes_J': float(guard.worked.sum()),
+            'joint_gap_m': float(self._gap.gaps(self._state).max(initial=0.0)),
+            'limit_overshoot_rad': float(
+                stepper.engine.layout.past_limits(self.coordinates.q).max(initial=0.0)),
+            'sinking_m': max(0.0, sunk),
+            'flights': self.effort.flights,
+            'substeps': self.effort.substeps,
+            'redone_total': self._redone,
+            'asleep': float(self.asleep)}
+
     def close(self) -> None:
         """Give the engine back; a second time does nothing."""
         self._stepper.close()
@@ -170,6 +194,7 @@ class Simulation:
         self._motion = self.mechanics.motion(self._state)
         self._guard.open(self._state)
         self._still = 0
+        self._redone = 0
         self.asleep = False
         """Whether all is at rest and the engine stands."""
         self.effort = Effort()
@@ -194,6 +219,7 @@ class Simulation:
     def _piece(self, duration: float, loads: list[Load]) -> float:
         """Go through one stretch of motion and see to what must be kept; give its length, s."""
         stepper, before, motion = self._stepper, self._state, self._motion
+        start = stepper.coordinates
         pull = max((math.hypot(*load.force) for load in loads), default=0.0)
         lightest = float(self.mechanics.masses.min())
         gravity = math.hypot(*self.scene.gravity)
@@ -206,7 +232,7 @@ class Simulation:
         if in_air:
             self._keep_momentum(motion, piece.duration, loads, before)
         if stepper.accuracy.energy:
-            self._keep_energy()
+            self._keep_energy(start)
         return piece.duration
 
     def _see(self, state: State) -> None:
@@ -229,17 +255,17 @@ class Simulation:
             moment[doll] += torque * duration
             steady = steady and not load.force.any()
         self._correct(self._guard.momentum_kept(
-            self._stepper.coordinates, before, self._motion, duration, impulse,
+            self._stepper.coordinates, before, self._motion, self._state, duration, impulse,
             moment if steady else None))
 
-    def _keep_energy(self) -> None:
+    def _keep_energy(self, start: Coordinates) -> None:
         guard, touching = self._guard, self._stepper.touching
         groups = guard.groups(touching)
         surplus = guard.surplus(self._motion, groups)
         if (surplus > 0).any():
             outside = any(a != b for a, b in touching)
             self._correct(guard.without_surplus(
-                self._stepper.coordinates, self._motion, surplus, outside))
+                start, self._stepper.coordinates, self._motion, self._state, surplus, outside))
         guard.settle(self._motion.energy, groups)
 
     def _enter_work(self, loads: list[Load], before: State, substep: float) -> None:
@@ -290,10 +316,21 @@ class Simulation:
         if self.asleep or not self._stepper.accuracy.sleep or self._weightless:
             return
         state = self._state
-        speeds = np.abs(state.linear).max(axis=1), np.abs(state.angular).max(axis=1) * self._sizes
-        still = max(map(np.max, speeds)) < REST_SPEED and not self._queue
-        self._still = self._still + self.tick if still else 0
-        if self._still >= REST_TIME and any(GROUND in pair for pair in self._stepper.touching):
+        speed = max(np.abs(state.linear).max(),
+                    (np.abs(state.angular).max(axis=1) * self._sizes).max())
+        if speed > REST_SPEED or self._queue:
+            self._still = 0
+            return
+        if not self._still:
+            self._still_from = state
+        self._still += self.tick
+        if self._still < REST_TIME:
+            return
+        way = np.abs(state.positions - self._still_from.positions).max()
+        turn = rotation.angle_between(state.orientations, self._still_from.orientations)
+        self._still = 0
+        if (max(way, (turn * self._sizes).max()) < REST_WAY
+                and any(GROUND in pair for pair in self._stepper.touching)):
             coordinates = self._stepper.coordinates
             self._correct(dataclasses.replace(coordinates, v=np.zeros_like(coordinates.v)))
             self._guard.settle(self._motion.energy, self._guard.groups(self._stepper.touching))

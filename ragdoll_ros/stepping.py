@@ -107,6 +107,8 @@ class Stepper:
         self._normal = np.array(scene.ground.normal if scene.ground else (0.0, 0.0, 1.0))
         self._damped = any(joint.damping for placement in scene.dolls
                            for joint in placement.doll.joints)
+        self._blocked = False
+        """Whether something that no flight can foresee comes next: bones that meet."""
         self.effort = Effort()
         self.look()
 
@@ -124,10 +126,11 @@ class Stepper:
 
     def go(self, duration: float, loads: Sequence[Load]) -> Piece:
         """Move on by ``duration`` s, or by less: up to the next touch or limit in a flight."""
-        if self._free is not None and not self.touching and not self._at_limit():
+        if self._may_fly():
             flown = self._fly(duration, loads)
             if flown > 0:
                 return Piece(flown, 0.0)
+        self._blocked = False
         return Piece(duration, self._step(duration, loads))
 
     def close(self) -> None:
@@ -136,13 +139,15 @@ class Stepper:
         if self._free is not None:
             self._free.close()
 
-    def _at_limit(self) -> bool:
-        """Tell whether a joint presses against its limit."""
+    def _may_fly(self) -> bool:
+        """Tell whether nothing touches and no joint presses against its limit."""
+        if self._free is None or self.touching or self._blocked:
+            return False
         past = self._layout.past_limits(self.coordinates.q)
         if not len(past) or past.max() < -AT_LIMIT:
-            return False
-        return bool(((past >= -AT_LIMIT) & (self._layout.limit_speeds(self.coordinates) > 0)
-                     | (past > AT_LIMIT)).any())
+            return True
+        pressing = (past >= -AT_LIMIT) & (self._layout.limit_speeds(self.coordinates) > 0)
+        return not (pressing | (past > AT_LIMIT)).any()
 
     def _fly(self, duration: float, loads: Sequence[Load]) -> float:
         """Fly up to ``duration`` s; give the time flown, 0 where something comes in between."""
@@ -161,6 +166,7 @@ class Stepper:
             if early > SHORTEST and self._fly_early(start, early, loads):
                 return flown + early
             self._back_to(start, state, set())
+            self._blocked = True
             return flown
         return duration
 
@@ -183,7 +189,7 @@ class Stepper:
         """Room (rad or m) to the nearest limit or the ground; below zero: past it."""
         past = self._layout.past_limits(self.coordinates.q)
         room = -float(past.max()) if len(past) else math.inf
-        return min(room, float(self.reach.heights(self.state).min()))
+        return min(room, self.reach.clearance(self.state))
 
     def _flight_steps(self, duration: float) -> int:
         spin = math.sqrt(np.einsum('ij,ij->i', self.state.angular, self.state.angular).max())
@@ -207,7 +213,7 @@ class Stepper:
     def _too_far(self) -> float:
         """Tell how far past a limit or in the ground, in units of what is put up with."""
         past = float(self._layout.past_limits(self.coordinates.q).max(initial=0.0))
-        sunk = -float(self.reach.heights(self.state).min())
+        sunk = -self.reach.clearance(self.state)
         return max(past / self.accuracy.redo, sunk / self.accuracy.sink)
 
     def _run(self, duration: float, substeps: int, loads: Sequence[Load]) -> None:

@@ -29,8 +29,10 @@ LARGEST_FRICTION = math.sqrt(10)
 BREAKING_DISTANCE = 2e-3
 """m at which a contact point is let go. The default, 0.02 m, eats half of every small bounce."""
 
-REST_SPEED = 0.05
-"""m/s: lowest restitution threshold. Below it each substep's own gravity would bounce."""
+LEAST_BOUNCE = 0.05
+"""m/s: approach speed below which nothing bounces, if the material and the substep don't ask for
+more. It must lie above the speed that gravity gives within a substep, or a resting bone
+chatters for ever; twice that is taken."""
 
 SOLVER_ITERATIONS = 20
 """20 are as good as 50; 5 to 10 leave 1 to 5 mm of sinking."""
@@ -74,6 +76,8 @@ class BulletEngine:
         self._free = free
         self._client = pybullet.connect(pybullet.DIRECT)
         self._timing: tuple[float, int] | None = None
+        self._gravity = math.hypot(*scene.gravity)
+        self._least_bounce = max(LEAST_BOUNCE, scene.material.restitution_speed)
         try:
             self._build()
         except BaseException:
@@ -86,7 +90,10 @@ class BulletEngine:
         if timing != self._timing:
             pybullet.setPhysicsEngineParameter(
                 fixedTimeStep=duration, numSubSteps=substeps if substeps > 1 else 0,
-                erp=min(0.2, duration / substeps / LIMIT_RETURN), physicsClientId=self._client)
+                erp=min(0.2, duration / substeps / LIMIT_RETURN),
+                restitutionVelocityThreshold=max(
+                    self._least_bounce, 2 * self._gravity * duration / substeps),
+                physicsClientId=self._client)
             self._timing = timing
         for load in loads:
             self._apply(load)
@@ -248,7 +255,6 @@ class BulletEngine:
     def _build(self) -> None:
         pybullet.setPhysicsEngineParameter(
             numSolverIterations=SOLVER_ITERATIONS, contactBreakingThreshold=BREAKING_DISTANCE,
-            restitutionVelocityThreshold=max(REST_SPEED, self.scene.material.restitution_speed),
             deterministicOverlappingPairs=1, enableFileCaching=0, useSplitImpulse=0,
             physicsClientId=self._client)
         pybullet.setGravity(*self.scene.gravity, physicsClientId=self._client)
