@@ -10,6 +10,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.utilities import remove_ros_args
@@ -25,6 +26,8 @@ from .parameters import Parameters, Settings
 from .services import Services
 from .stamps import Stamps
 from .tally import Tally
+
+InvalidROSArguments = rclpy_implementation.RCLInvalidROSArgsError
 
 SHORTEST_PERIOD = 1_000_000
 """ns between two calls of the timer at the least; at a faster pace, it makes several ticks."""
@@ -199,13 +202,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         'ragdoll_node', description=__doc__, epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.parse_args(remove_ros_args(arguments)[1:])
     try:
+        parser.parse_args(remove_ros_args(arguments)[1:])
         rclpy.init(args=arguments)
         rclpy.spin(RagdollNode())
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
-    except (faults.RagdollError, ParameterException) as error:
+    except (faults.RagdollError, ParameterException, InvalidROSArguments) as error:
         print(error, file=sys.stderr)
         return 2
     finally:

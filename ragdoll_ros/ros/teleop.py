@@ -1,0 +1,141 @@
+"""Arrow keys push the doll: Up away from you, Down toward you, Left and Right as you see it.
+
+You look at the doll's face, from +x along -x. Held keys hold the push and add up, as far as the
+terminal can tell. Space pauses and goes on, r resets, q quits.
+"""
+from __future__ import annotations
+
+import argparse
+import select
+import shutil
+import sys
+import time
+from collections.abc import Callable, Sequence
+
+import rclpy
+from geometry_msgs.msg import Vector3, Wrench
+from rclpy.exceptions import InvalidHandle
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.utilities import remove_ros_args
+from std_srvs.srv import SetBool, Trigger
+
+from .keys import Held, Keyboard
+from .status import Status
+
+FORCES = {'up': (-2000.0, 0.0, 1.0), 'down': (2000.0, 0.0, 1.0),
+          'right': (0.0, 2000.0, 1.0), 'left': (0.0, -2000.0, 1.0)}
+"""N, world axes (the article's keys)."""
+
+PERIOD = 0.02
+"""s between two messages of a held push, well within the node's push_timeout."""
+
+LINE_PERIOD = 0.1
+"""s between two status lines."""
+
+HELP = 'arrows push, held keys add up | space pauses | r resets | q quits'
+
+EXAMPLE = """examples:
+  ragdoll_teleop
+  ragdoll_teleop --ros-args -r __ns:=/stage
+"""
+
+
+class Teleop(Node):
+    """Sends pushes and calls the services of the node ``ragdoll`` in its own namespace."""
+
+    def __init__(self) -> None:
+        super().__init__('ragdoll_teleop')
+        self.status = Status(self)
+        self.held = Held()
+        self._force = self.create_publisher(Wrench, 'ragdoll/force', 10)
+        self._reset = self.create_client(Trigger, 'ragdoll/reset')
+        self._pause = self.create_client(SetBool, 'ragdoll/pause')
+        self._paused: bool | None = None
+        self._pushing = False
+
+    def take(self, key: str, down: bool, now: float) -> bool:
+        """Do what a key says; False to quit."""
+        if key in FORCES:
+            self.held.take(key, down, now)
+        elif key == ' ':
+            self._paused = not (self.status.paused if self._paused is None else self._paused)
+            self._pause.call_async(SetBool.Request(data=self._paused))
+        elif key in 'rR':
+            self._reset.call_async(Trigger.Request())
+        return key not in 'qQ'
+
+    def send(self, now: float) -> str:
+        """Send the push of the keys that are held, once zero when none is; say which it is."""
+        keys = self.held.at(now)
+        force = total(keys)
+        if keys or self._pushing:
+            x, y, z = force
+            self._force.publish(Wrench(force=Vector3(x=x, y=y, z=z)))
+        self._pushing = bool(keys)
+        return f'({force[0]:g} {force[1]:g} {force[2]:g}) N' if keys else ''
+
+
+def total(keys: Sequence[str]) -> tuple[float, ...]:
+    """Sum of the forces of all these keys, N."""
+    return tuple(map(sum, zip(*(FORCES[key] for key in keys), strict=True))) or (0.0, 0.0, 0.0)
+
+
+def steer(teleop: Teleop, keyboard: Keyboard, executor: SingleThreadedExecutor,
+          attend: Callable[[], bool] = lambda: True) -> None:
+    """Go on until a key quits, ROS shuts down or ``attend``, called each time, says False."""
+    next_line = 0.0
+    while rclpy.ok() and attend():
+        ready, _, _ = select.select([keyboard.file], [], [], PERIOD)
+        now = time.monotonic()
+        keys = keyboard.read() if ready else []
+        if not all(teleop.take(key, down, now) for key, down in keys):
+            return
+        push = teleop.send(now)
+        if now >= next_line:
+            next_line = now + LINE_PERIOD
+            show(teleop.status.line(push))
+        spin_some(executor)
+
+
+def spin_some(executor: SingleThreadedExecutor, rounds: int = 4) -> None:
+    """Take what has come in, at most a few messages, without waiting."""
+    for _ in range(rounds):
+        executor.spin_once(timeout_sec=0)
+
+
+def show(line: str) -> None:
+    """Write a line over the last one, no longer than the terminal is wide."""
+    width = shutil.get_terminal_size().columns
+    sys.stdout.write(f'\r{line[:width - 1]}\x1b[K')
+    sys.stdout.flush()
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Steer a running node until q; 2 without a terminal."""
+    arguments = sys.argv if arguments is None else arguments
+    parser = argparse.ArgumentParser(
+        'ragdoll_teleop', description=__doc__, epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.parse_args(remove_ros_args(arguments)[1:])
+    if not sys.stdin.isatty():
+        print('ragdoll_teleop: standard input is no terminal; keys need one', file=sys.stderr)
+        return 2
+    try:
+        rclpy.init(args=arguments)
+        executor = SingleThreadedExecutor()
+        teleop = Teleop()
+        executor.add_node(teleop)
+        print(HELP)
+        with Keyboard() as keyboard:
+            steer(teleop, keyboard, executor)
+    except (KeyboardInterrupt, ExternalShutdownException, InvalidHandle):
+        pass
+    finally:
+        print()
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
