@@ -10,6 +10,7 @@ from setuptools.command.build_py import build_py
 NAME = 'ragdoll_ros'
 EXECUTABLES = {
     'ragdoll_node': 'ragdoll_ros.ros.node:main',
+    'ragdoll_teleop': 'ragdoll_ros.ros.teleop:main',
 }
 CONFIG = sorted(str(path) for path in Path('config').iterdir() if path.is_file())
 LAUNCHER = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'

@@ -94,11 +94,10 @@ def imported(path: Path) -> set[str]:
 
 def poses_published_by(python: Path, *command: object, **variables: str) -> int:
     """Start a node, count the poses in a message that another process hears, end the node."""
-    apart = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': '98'}
     with subprocess.Popen([str(part) for part in command], cwd='/',
-                          env={**without_paths(), **apart, **variables}) as node:
+                          env={**without_paths(), **variables}) as node:
         try:
-            heard = int(run(python, '-c', COUNT_POSES, **apart))
+            heard = int(run(python, '-c', COUNT_POSES))
         finally:
             node.send_signal(signal.SIGINT)
     assert node.returncode == 0
@@ -216,7 +215,7 @@ def environment(wheel, tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_plain_pip_install_runs_the_node(environment, tmp_path):
+def test_plain_pip_install_runs_the_node(ros, environment, tmp_path):
     """As `ros2 run` starts it, with and without a ROS prefix."""
     source = source_copy(tmp_path)
     run(environment / 'bin/pip', 'install', '.', cwd=source)
@@ -232,7 +231,7 @@ def test_plain_pip_install_runs_the_node(environment, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize('option', [(), ('--symlink-install',)], ids=['copied', 'symlinked'])
-def test_colcon_build_runs_the_node(environment, tmp_path, option):
+def test_colcon_build_runs_the_node(ros, environment, tmp_path, option):
     source_copy(tmp_path)
     path = f'{environment}/bin:{os.environ["PATH"]}'
     assert '(ros.ament_python)' in run('colcon', 'list', cwd=tmp_path, PATH=path)
