@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .coordinates import Coordinates, Layout
-from .mechanics import Mechanics, Motion, cross
+from .mechanics import Mechanics, Motion, Shift, cross
 from .ragdoll import Ragdoll
 from .scene import Scene
 from .state import State
@@ -92,30 +92,25 @@ class Guard:
             groups[groups == groups[b]] = groups[a]
         return groups
 
-    def momentum_kept(self, coordinates: Coordinates, before: Motion, after: Motion,
-                      state: State, duration: float, impulse: np.ndarray,
-                      moment: np.ndarray | None) -> Coordinates:
-        """Give back to dolls in the air the momentum, and the way, that they must have.
+    def momentum_due(self, before: Motion, after: Motion, state: State, duration: float,
+                     impulse: np.ndarray, moment: np.ndarray | None) -> Shift:
+        """Tell what dolls in the air lack of the momentum, and of the way, that they must have.
 
         ``impulse`` (d, 3) N s and ``moment`` (d, 3) N m s are what pushes gave; no moment: the
-        angular momentum is left as it is. A change of a root's velocities moves the whole doll
-        as one rigid body, so that it takes a spin Ic^-1 dL and no joint notices.
+        angular momentum is left as it is. The lack is made up by a motion of the whole doll as
+        one rigid body, with a spin Ic^-1 dL, so that no joint notices.
         """
         masses = self._mechanics.doll_masses[:, None]
         impulse = impulse + masses * self._gravity * duration
-        way = (before.momentum + impulse / 2) * duration / masses
+        way = before.centre + (before.momentum + impulse / 2) * duration / masses - after.centre
         linear = (before.momentum + impulse - after.momentum) / masses
-        layout, q, v = self._layout, coordinates.q.copy(), coordinates.v.copy()
-        q[layout.root_positions] += before.centre + way - after.centre
+        spin = np.zeros_like(linear)
         if moment is not None:
             missing = before.spin + moment - after.spin
-            spin = np.array([
-                np.linalg.solve(self._mechanics.locked_inertia(state, centre, doll), lack)
-                for doll, (centre, lack) in enumerate(zip(after.centre, missing, strict=True))])
-            linear += cross(spin, coordinates.q[layout.root_positions] - after.centre)
-            v[layout.root_spins] += spin
-        v[layout.root_velocities] += linear
-        return Coordinates(q, v)
+            for doll, lack in enumerate(missing):
+                inertia = self._mechanics.locked_inertia(state, after.centre[doll], doll)
+                spin[doll] = np.linalg.solve(inertia, lack)
+        return Shift(way, linear, spin, after.centre)
 
     def without_surplus(self, before: Coordinates, coordinates: Coordinates, motion: Motion,
                         state: State, surplus: np.ndarray, touching: bool) -> Coordinates:

@@ -29,6 +29,20 @@ class Motion:
     """(d, 3) N m s: angular momentum about the doll's own centre of mass."""
 
 
+@dataclass(frozen=True)
+class Shift:
+    """A displacement of d dolls and a motion of each as one rigid body, to be added."""
+
+    way: np.ndarray
+    """(d, 3) m."""
+    linear: np.ndarray
+    """(d, 3) m/s, of the centres of mass."""
+    spin: np.ndarray
+    """(d, 3) rad/s about the centres of mass."""
+    centre: np.ndarray
+    """(d, 3) m: the centres of mass before."""
+
+
 class Mechanics:
     """Masses and inertias of all n bones of a scene, and the sums over each of its d dolls."""
 
@@ -69,6 +83,14 @@ class Mechanics:
         own = np.matmul(turn, moments[:, :, None])[:, :, 0]
         return Motion(kinetic - weighted @ self.gravity, kinetic, centre,
                       self._members @ impulses, self._members @ (own + cross(arms, impulses)))
+
+    def shifted(self, state: State, shift: Shift) -> State:
+        """Give the state after each doll is moved on and set in motion as one rigid body."""
+        doll = self.doll_of
+        arms = state.positions - shift.centre[doll]
+        return State(state.positions + shift.way[doll], state.orientations,
+                     state.linear + shift.linear[doll] + cross(shift.spin[doll], arms),
+                     state.angular + shift.spin[doll])
 
     def locked_inertia(self, state: State, centre: np.ndarray, doll: int) -> np.ndarray:
         """Inertia (3, 3) kg m^2 about its ``centre`` (3,) of a doll as if its joints were locked.

@@ -18,6 +18,8 @@ from .push import Push
 from .scene import SECOND, STEP_RANGE, Scene
 from .state import State
 from .stepping import ACCURACIES, Accuracy, Effort, Stepper
+from .swing.pose import SwingState
+from .swing.riding import riding
 
 MOST_PUSHES = 1000
 """Pushes that may wait at once; one more is refused."""
@@ -64,6 +66,7 @@ class Simulation:
         self._gap = JointGap(scene)
         self._sizes = np.array([max(bone.shape.half_extents) for bone in scene.bones])
         self._weightless = not any(scene.gravity)
+        self._riding = riding(scene)
         self._begin()
 
     def __enter__(self) -> Simulation:
@@ -76,6 +79,16 @@ class Simulation:
     def state(self) -> State:
         """Poses and velocities of all bones now."""
         return self._state
+
+    @property
+    def swings(self) -> SwingState | None:
+        """All masses of the scene's swings now; None for a scene without swings."""
+        return self._riding and self._riding.state
+
+    @property
+    def swing_names(self) -> list[str]:
+        """Name of each mass of the swings, in their order."""
+        return self._riding.names if self._riding else []
 
     @property
     def step(self) -> float:
@@ -111,7 +124,7 @@ class Simulation:
     @property
     def joint_angles(self) -> np.ndarray:
         """All joint angles, rad, in the order of Scene.angle_names."""
-        return self._stepper.engine.joint_angles()
+        return self._stepper.settle().joint_angles()
 
     def push(self, push: Push, channel: str | None = None) -> None:
         """Let a push act from its start on; on a ``channel`` it takes the place of the last.
@@ -142,6 +155,8 @@ class Simulation:
         self._redone += self.effort.redone
         self._queue = [active for active in self._queue if active.end > self.time]
         self._rest()
+        if self._riding:
+            self._riding.follow(self.time, self._state)
         return self._state
 
     def place(self, coordinates: Coordinates) -> State:
@@ -151,7 +166,7 @@ class Simulation:
         """
         self._stepper.place(coordinates)
         self._stepper.engine.let_overlaps_be()
-        self._stepper.look()
+        self._stepper.begin()
         self._start = (self._stepper.engine.save(), self._stepper.coordinates)
         self._begin()
         return self._state
@@ -161,7 +176,7 @@ class Simulation:
         snapshot, coordinates = self._start
         self._stepper.engine.restore(snapshot)
         self._stepper.place(coordinates)
-        self._stepper.touching = self._stepper.engine.touching()
+        self._stepper.begin()
         self._begin()
         return self._state
 
@@ -199,6 +214,8 @@ class Simulation:
         """Whether all is at rest and the engine stands."""
         self.effort = Effort()
         """What the last tick took."""
+        if self._riding:
+            self._riding.begin(self.time, self._state)
 
     def _next_change(self) -> int:
         """Instant, ns, at which the next push begins or ends."""
@@ -254,9 +271,11 @@ class Simulation:
             impulse[doll] += force * duration
             moment[doll] += torque * duration
             steady = steady and not load.force.any()
-        self._correct(self._guard.momentum_kept(
-            self._stepper.coordinates, before, self._motion, self._state, duration, impulse,
-            moment if steady else None))
+        shift = self._guard.momentum_due(before, self._motion, self._state, duration, impulse,
+                                         moment if steady else None)
+        moved = self.mechanics.shifted(self._state, shift)
+        self._stepper.shift(shift, moved)
+        self._see(moved)
 
     def _keep_energy(self, start: Coordinates) -> None:
         guard, touching = self._guard, self._stepper.touching

@@ -15,6 +15,7 @@ import numpy as np
 from .coordinates import Coordinates
 from .engine.protocol import Engine, Load
 from .flight import fly
+from .mechanics import Shift, cross
 from .reach import Reach
 from .scene import Scene
 from .state import State
@@ -107,10 +108,14 @@ class Stepper:
         self._normal = np.array(scene.ground.normal if scene.ground else (0.0, 0.0, 1.0))
         self._damped = any(joint.damping for placement in scene.dolls
                            for joint in placement.doll.joints)
-        self._blocked = False
+        self._stale: bool
+        """Whether the engine has yet to hear of a shift."""
+        self._blocked: bool
         """Whether something that no flight can foresee comes next: bones that meet."""
+        self._held: np.ndarray
+        """(k,) whether a flight ended at this limit and the joint has leaned on it since."""
         self.effort = Effort()
-        self.look()
+        self.begin()
 
     def look(self) -> None:
         """Read where the engine is."""
@@ -118,11 +123,37 @@ class Stepper:
         self.coordinates: Coordinates = self.engine.coordinates()
         self.touching = self.engine.touching()
 
+    def begin(self) -> None:
+        """Start from where the engine is, and forget what was before."""
+        self._stale = self._blocked = False
+        self._held = np.zeros(len(self._layout.limits[0]), bool)
+        self.look()
+
     def place(self, coordinates: Coordinates) -> None:
         """Put the scene elsewhere; what touches stays as it was."""
         self.engine.place(coordinates)
+        self._stale = False
         self.coordinates = coordinates
         self.state = self.engine.read()
+
+    def shift(self, shift: Shift, state: State) -> None:
+        """Move dolls on as rigid bodies, to where they are in ``state``; the engine hears of it
+        when it is next needed.
+        """
+        layout = self._layout
+        q, v = self.coordinates.q.copy(), self.coordinates.v.copy()
+        arms = q[layout.root_positions] - shift.centre
+        q[layout.root_positions] += shift.way
+        v[layout.root_velocities] += shift.linear + cross(shift.spin, arms)
+        v[layout.root_spins] += shift.spin
+        self.coordinates, self.state, self._stale = Coordinates(q, v), state, True
+
+    def settle(self) -> Engine:
+        """Give the engine, with the dolls in it where they are."""
+        if self._stale:
+            self.engine.place(self.coordinates)
+            self._stale = False
+        return self.engine
 
     def go(self, duration: float, loads: Sequence[Load]) -> Piece:
         """Move on by ``duration`` s, or by less: up to the next touch or limit in a flight."""
@@ -146,8 +177,9 @@ class Stepper:
         past = self._layout.past_limits(self.coordinates.q)
         if not len(past) or past.max() < -AT_LIMIT:
             return True
+        self._held &= past > -AT_LIMIT
         pressing = (past >= -AT_LIMIT) & (self._layout.limit_speeds(self.coordinates) > 0)
-        return not (pressing | (past > AT_LIMIT)).any()
+        return not (self._held | pressing | (past > AT_LIMIT)).any()
 
     def _fly(self, duration: float, loads: Sequence[Load]) -> float:
         """Fly up to ``duration`` s; give the time flown, 0 where something comes in between."""
@@ -162,6 +194,7 @@ class Stepper:
             if room >= 0 and not self.touching:
                 flown += piece
                 continue
+            self._held |= self._layout.past_limits(self.coordinates.q) > 0
             early = piece * least / (least - room) if least > 0 > room else 0.0
             if early > SHORTEST and self._fly_early(start, early, loads):
                 return flown + early
@@ -183,6 +216,7 @@ class Stepper:
     def _back_to(self, start: Coordinates, state: State,
                  touching: set[tuple[int, int]]) -> None:
         self.engine.place(start)
+        self._stale = False
         self.coordinates, self.state, self.touching = start, state, touching
 
     def _room(self) -> float:
@@ -198,6 +232,7 @@ class Stepper:
 
     def _step(self, duration: float, loads: Sequence[Load]) -> float:
         """Take the engine's own step, finer if it overshoots a limit; give its substep, s."""
+        self.settle()
         start, state, touching = self.coordinates, self.state, self.touching
         bound = max(1.0, self._too_far())
         substeps = self._substeps(duration, bool(loads))

@@ -64,6 +64,8 @@ class _Doll:
     joints: list[int]
     """Joints that move, in the engine's order, root to leaf."""
     balls: list[bool]
+    widths: list[tuple[int, int]]
+    """Numbers in q and in v of each joint."""
     angles: dict[str, int]
     """Place of each joint in ``joints`` by the name of its angle."""
 
@@ -151,11 +153,10 @@ class BulletEngine:
                 doll.body, v[j:j + 3], v[j + 3:j + 6], physicsClientId=self._client)
             i, j = i + 7, j + 6
             values, rates = [], []
-            for ball in doll.balls:
-                wide = (4, 3) if ball else (1, 1)
-                values.append(q[i:i + wide[0]])
-                rates.append(v[j:j + wide[1]])
-                i, j = i + wide[0], j + wide[1]
+            for wide, deep in doll.widths:
+                values.append(q[i:i + wide])
+                rates.append(v[j:j + deep])
+                i, j = i + wide, j + deep
             if doll.joints:
                 pybullet.resetJointStatesMultiDof(
                     doll.body, doll.joints, values, rates, physicsClientId=self._client)
@@ -323,7 +324,7 @@ class BulletEngine:
                 pybullet.setCollisionFilterGroupMask(body, link, 0, 0, self._client)
         self._let_neighbours_be(doll, body, links)
         return _Doll(body, order, [link for link in order if link >= 0], order.index(-1),
-                     joints, balls, angles)
+                     joints, balls, [(4, 3) if ball else (1, 1) for ball in balls], angles)
 
     def _free_joint(self, body: int, joint: int, ball: bool) -> None:
         """Take PyBullet's default motor off a joint."""
