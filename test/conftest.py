@@ -59,3 +59,19 @@ def make_node(ros):
     yield make
     for node in nodes:
         node.destroy_node()
+
+
+@pytest.fixture
+def broken_scene(tmp_path):
+    """A scene's file with five faults, and a word for each that must be told."""
+    path = tmp_path / 'broken.yaml'
+    path.write_text("""name: broken
+gravity: [0, 0]
+step: -0.01
+pace: fast
+ground: {normal: [0, 0, 0]}
+dolls:
+  - {doll: nowhere.yaml}
+""")
+    return path, ['broken.yaml: 5 faults', 'gravity', 'step', 'pace', 'ground.normal',
+                  'dolls[0].doll']

@@ -1,10 +1,13 @@
 """The other side of a running node: listens, sends, calls and waits for conditions."""
 from __future__ import annotations
 
+import fcntl
 import os
 import pty
+import struct
 import subprocess
 import sys
+import termios
 import time
 
 from rclpy.executors import SingleThreadedExecutor
@@ -63,6 +66,7 @@ def start(module, *arguments, terminal=None):
 def start_on_terminal(module, *arguments):
     """Start a module on a terminal of its own; also give the side that types and reads."""
     ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack('4H', 24, 120, 0, 0))
     process = start(module, *arguments, terminal=theirs)
     os.close(theirs)
     os.set_blocking(ours, False)
@@ -73,5 +77,5 @@ def end(process, sign, timeout=10.0):
     """Send a signal; give the exit code and the seconds it took."""
     before = time.monotonic()
     process.send_signal(sign)
-    process.communicate(timeout=timeout)
+    _, process.stderr_text = process.communicate(timeout=timeout)
     return process.returncode, time.monotonic() - before

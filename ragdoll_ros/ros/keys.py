@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import select
 import sys
 import termios
 import tty
@@ -91,23 +92,25 @@ class Keyboard:
     """The terminal's keys one by one, without echo, until the context ends."""
 
     def __init__(self) -> None:
-        self.file = sys.stdin.fileno()
+        self._file = sys.stdin.fileno()
         self._decoder = Decoder()
 
     def __enter__(self) -> Keyboard:
-        self._before = termios.tcgetattr(self.file)
-        tty.setcbreak(self.file)
+        self._before = termios.tcgetattr(self._file)
+        tty.setcbreak(self._file, termios.TCSADRAIN)
         _say('\x1b[>2u')
         return self
 
     def __exit__(self, *_: object) -> None:
         _say('\x1b[<u')
-        termios.tcsetattr(self.file, termios.TCSADRAIN, self._before)
+        termios.tcsetattr(self._file, termios.TCSADRAIN, self._before)
 
-    def read(self) -> list[tuple[str, bool]]:
-        """Keys that have come in; call it when the file is readable. EOF quits."""
+    def keys(self, patience: float) -> list[tuple[str, bool]]:
+        """Keys that come in within ``patience`` s; a terminal that has gone quits."""
+        if not select.select([self._file], [], [], patience)[0]:
+            return []
         try:
-            data = os.read(self.file, 1024)
+            data = os.read(self._file, 1024)
         except OSError:
             data = b''
         return self._decoder.feed(data) if data else [('q', True)]

@@ -14,11 +14,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import rclpy
-from rclpy.exceptions import InvalidHandle
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.utilities import remove_ros_args
 
-from .keys import Keyboard
+from .session import ros_session
 from .teleop import HELP, Teleop, show, steer
 
 LOG_PERIOD = 1.0
@@ -47,17 +46,8 @@ def main(arguments: list[str] | None = None) -> int:
         own.remove(scene)
         own += ['--ros-args', '-p', f'scene:={scene}']
     terminal = sys.stdin.isatty() and sys.stdout.isatty()
-    rclpy.init(args=arguments)
-    try:
-        with node_process(own, quiet=terminal) as process:
-            executor = SingleThreadedExecutor()
-            teleop = Teleop()
-            executor.add_node(teleop)
-            (_steer if terminal else _log)(teleop, executor, process)
-    except (KeyboardInterrupt, ExternalShutdownException, InvalidHandle):
-        pass
-    finally:
-        rclpy.try_shutdown()
+    with node_process(own, quiet=terminal) as process, ros_session(arguments):
+        (_steer if terminal else _log)(Teleop(), process)
     return process.returncode
 
 
@@ -81,7 +71,7 @@ def node_process(arguments: list[str], quiet: bool) -> Iterator[subprocess.Popen
             _show_log(process)
 
 
-def _steer(teleop: Teleop, executor: SingleThreadedExecutor, process: subprocess.Popen) -> None:
+def _steer(teleop: Teleop, process: subprocess.Popen) -> None:
     os.set_blocking(process.stderr.fileno(), False)
 
     def attend() -> bool:
@@ -89,11 +79,12 @@ def _steer(teleop: Teleop, executor: SingleThreadedExecutor, process: subprocess
         return process.poll() is None
 
     print(HELP)
-    with Keyboard() as keyboard:
-        steer(teleop, keyboard, executor, attend)
+    steer(teleop, attend)
 
 
-def _log(teleop: Teleop, executor: SingleThreadedExecutor, process: subprocess.Popen) -> None:
+def _log(teleop: Teleop, process: subprocess.Popen) -> None:
+    executor = SingleThreadedExecutor()
+    executor.add_node(teleop)
     next_line = time.monotonic() + LOG_PERIOD
     while rclpy.ok() and process.poll() is None:
         executor.spin_once(timeout_sec=LOG_PERIOD)

@@ -25,14 +25,16 @@ class Status:
         return self._values.get('paused') == 'True'
 
     def line(self, push: str = '') -> str:
-        """Pace, simulated time, tick cost, the root's place and speed, the push that acts."""
+        """Pace, simulated time, the push that acts, tick cost, the root's place and speed.
+
+        A line fits 80 columns while no push acts, and with one most of it.
+        """
         if self._state is None or not self._values:
             return 'waiting for the node'
         values = self._values
         pace = 'paused' if self.paused else f'pace {float(values["pace"]):.2f}'
-        return ' | '.join((pace, f't {self._time():.2f} s',
-                           f'tick {float(values["tick_cost_ms"]):.2f} ms', self._root(),
-                           f'push {push or values["push"]}'))
+        return '  '.join((pace, f'{self._time():.1f} s', f'push {push or values["push"]}',
+                          f'tick {float(values["tick_cost_ms"]):.2f} ms', self._root()))
 
     def _time(self) -> float:
         """Simulated time, s: stamps count from that of time zero."""
@@ -43,7 +45,7 @@ class Status:
         name, place, motion = (self._state.joint_names[0], self._state.transforms[0].translation,
                                self._state.twist[0].linear)
         speed = math.hypot(motion.x, motion.y, motion.z)
-        return f'{name} ({place.x:.2f} {place.y:.2f} {place.z:.2f}) m {speed:.2f} m/s'
+        return f'{name} {place.x:.2f} {place.y:.2f} {place.z:.2f} m {speed:.1f} m/s'
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:

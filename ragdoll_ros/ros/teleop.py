@@ -6,7 +6,6 @@ terminal can tell. Space pauses and goes on, r resets, q quits.
 from __future__ import annotations
 
 import argparse
-import select
 import shutil
 import sys
 import time
@@ -14,13 +13,13 @@ from collections.abc import Callable, Sequence
 
 import rclpy
 from geometry_msgs.msg import Vector3, Wrench
-from rclpy.exceptions import InvalidHandle
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 from std_srvs.srv import SetBool, Trigger
 
 from .keys import Held, Keyboard
+from .session import ros_session
 from .status import Status
 
 FORCES = {'up': (-2000.0, 0.0, 1.0), 'down': (2000.0, 0.0, 1.0),
@@ -29,6 +28,9 @@ FORCES = {'up': (-2000.0, 0.0, 1.0), 'down': (2000.0, 0.0, 1.0),
 
 PERIOD = 0.02
 """s between two messages of a held push, well within the node's push_timeout."""
+
+MESSAGES = 4
+"""Messages that are taken in each PERIOD: two states and, now and then, a report."""
 
 LINE_PERIOD = 0.1
 """s between two status lines."""
@@ -81,27 +83,22 @@ def total(keys: Sequence[str]) -> tuple[float, ...]:
     return tuple(map(sum, zip(*(FORCES[key] for key in keys), strict=True))) or (0.0, 0.0, 0.0)
 
 
-def steer(teleop: Teleop, keyboard: Keyboard, executor: SingleThreadedExecutor,
-          attend: Callable[[], bool] = lambda: True) -> None:
+def steer(teleop: Teleop, attend: Callable[[], bool] = lambda: True) -> None:
     """Go on until a key quits, ROS shuts down or ``attend``, called each time, says False."""
-    next_line = 0.0
-    while rclpy.ok() and attend():
-        ready, _, _ = select.select([keyboard.file], [], [], PERIOD)
-        now = time.monotonic()
-        keys = keyboard.read() if ready else []
-        if not all(teleop.take(key, down, now) for key, down in keys):
-            return
-        push = teleop.send(now)
-        if now >= next_line:
-            next_line = now + LINE_PERIOD
-            show(teleop.status.line(push))
-        spin_some(executor)
-
-
-def spin_some(executor: SingleThreadedExecutor, rounds: int = 4) -> None:
-    """Take what has come in, at most a few messages, without waiting."""
-    for _ in range(rounds):
-        executor.spin_once(timeout_sec=0)
+    executor, next_line = SingleThreadedExecutor(), 0.0
+    executor.add_node(teleop)
+    with Keyboard() as keyboard:
+        while rclpy.ok() and attend():
+            now = time.monotonic()
+            if not all(teleop.take(key, down, now) for key, down in keyboard.keys(PERIOD)):
+                break
+            push = teleop.send(now)
+            if now >= next_line:
+                next_line = now + LINE_PERIOD
+                show(teleop.status.line(push))
+            for _ in range(MESSAGES):
+                executor.spin_once(timeout_sec=0)
+    print()
 
 
 def show(line: str) -> None:
@@ -121,19 +118,9 @@ def main(arguments: list[str] | None = None) -> int:
     if not sys.stdin.isatty():
         print('ragdoll_teleop: standard input is no terminal; keys need one', file=sys.stderr)
         return 2
-    try:
-        rclpy.init(args=arguments)
-        executor = SingleThreadedExecutor()
-        teleop = Teleop()
-        executor.add_node(teleop)
+    with ros_session(arguments):
         print(HELP)
-        with Keyboard() as keyboard:
-            steer(teleop, keyboard, executor)
-    except (KeyboardInterrupt, ExternalShutdownException, InvalidHandle):
-        pass
-    finally:
-        print()
-        rclpy.try_shutdown()
+        steer(Teleop())
     return 0
 
 
