@@ -290,6 +290,14 @@ class Joint:
         count = self.freedoms
         return tuple(self.child + s for s in suffixes.get(self.kind, ('',) * count))
 
+    @property
+    def angle_limits(self) -> tuple[Limits | None, ...]:
+        """Limits of each angle of angle_names, rad; None where it is free."""
+        if self.kind == 'ball':
+            swing, twist = self.limits
+            return (swing, swing, twist)
+        return self.limits
+
 
 @dataclass(frozen=True)
 class Ragdoll:

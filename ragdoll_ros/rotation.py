@@ -12,15 +12,31 @@ import numpy as np
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 
+def _hamilton() -> np.ndarray:
+    """Matrix (16, 4) that takes all products a_i b_j to the quaternion a * b."""
+    x, y, z, w = range(4)
+    terms = [((w, x, 1), (x, w, 1), (y, z, 1), (z, y, -1)),
+             ((w, y, 1), (x, z, -1), (y, w, 1), (z, x, 1)),
+             ((w, z, 1), (x, y, 1), (y, x, -1), (z, w, 1)),
+             ((w, w, 1), (x, x, -1), (y, y, -1), (z, z, -1))]
+    return _table(terms)
+
+
+def _table(terms: list[tuple[tuple[int, int, int], ...]]) -> np.ndarray:
+    table = np.zeros((16, len(terms)))
+    for entry, sums in enumerate(terms):
+        for i, j, factor in sums:
+            table[4 * i + j, entry] = factor
+    return table
+
+
+_HAMILTON = _hamilton()
+
+
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Hamilton product a * b: first b, then a."""
-    ax, ay, az, aw = np.moveaxis(np.asarray(a, float), -1, 0)
-    bx, by, bz, bw = np.moveaxis(np.asarray(b, float), -1, 0)
-    return np.stack([
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz], axis=-1)
+    products = np.asarray(a, float)[..., :, None] * np.asarray(b, float)[..., None, :]
+    return products.reshape(*products.shape[:-2], 16) @ _HAMILTON
 
 
 def inverse(q: np.ndarray) -> np.ndarray:
@@ -34,16 +50,26 @@ def normalized(q: np.ndarray) -> np.ndarray:
     return q / np.linalg.norm(q, axis=-1, keepdims=True)
 
 
+def _products_to_matrix() -> np.ndarray:
+    """Matrix (16, 9) that takes all products q_i q_j to the entries of the rotation matrix."""
+    x, y, z, w = range(4)
+    terms = [((x, x, 1), (y, y, -1), (z, z, -1), (w, w, 1)), ((x, y, 2), (z, w, -2)),
+             ((x, z, 2), (y, w, 2)),
+             ((x, y, 2), (z, w, 2)), ((x, x, -1), (y, y, 1), (z, z, -1), (w, w, 1)),
+             ((y, z, 2), (x, w, -2)),
+             ((x, z, 2), (y, w, -2)), ((y, z, 2), (x, w, 2)),
+             ((x, x, -1), (y, y, -1), (z, z, 1), (w, w, 1))]
+    return _table(terms)
+
+
+_PRODUCTS = _products_to_matrix()
+
+
 def matrix(q: np.ndarray) -> np.ndarray:
-    """Rotation matrices (..., 3, 3) of unit quaternions."""
-    x, y, z, w = np.moveaxis(np.asarray(q, float), -1, 0)
-    xx, yy, zz = x * x, y * y, z * z
-    xy, xz, yz = x * y, x * z, y * z
-    xw, yw, zw = x * w, y * w, z * w
-    rows = [1 - 2 * (yy + zz), 2 * (xy - zw), 2 * (xz + yw),
-            2 * (xy + zw), 1 - 2 * (xx + zz), 2 * (yz - xw),
-            2 * (xz - yw), 2 * (yz + xw), 1 - 2 * (xx + yy)]
-    return np.stack(rows, axis=-1).reshape(*np.shape(x), 3, 3)
+    """Rotation matrices (..., 3, 3) of unit quaternions; one product, as this runs every tick."""
+    q = np.asarray(q, float)
+    products = q[..., :, None] * q[..., None, :]
+    return (products.reshape(*q.shape[:-1], 16) @ _PRODUCTS).reshape(*q.shape[:-1], 3, 3)
 
 
 def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:

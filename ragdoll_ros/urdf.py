@@ -100,12 +100,9 @@ def _joint(joint: Joint, frames: dict, dialect: str) -> list[str]:
         row = [(joint.child, 'spherical', (0, 0, 1), None),
                (f'{joint.child}/fixed', 'fixed', None, None)]
         return _row(joint, row, place, dialect)
-    axes, pairs = joint.axes, joint.limits
-    if joint.kind == 'ball':
-        swing, twist = joint.limits
-        axes, pairs = np.eye(3), (swing, swing, twist)
+    axes = np.eye(3) if joint.kind == 'ball' else joint.axes
     row = []
-    for name, axis, pair in zip(joint.angle_names, axes, pairs, strict=True):
+    for name, axis, pair in zip(joint.angle_names, axes, joint.angle_limits, strict=True):
         limit = pair and f'<limit lower="{pair[0]!r}" upper="{pair[1]!r}" effort="0" velocity="0"/>'
         row.append((name, 'revolute' if pair else UNLIMITED, axis, limit))
     return _row(joint, row, place, dialect)

@@ -6,21 +6,22 @@ damping and velocity clamps, which are on by default, are off.
 """
 from __future__ import annotations
 
-import contextlib
 import math
 import os
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pybullet
 
 from .. import rotation
+from ..coordinates import UNLIMITED, Coordinates, Layout
 from ..ragdoll import Ragdoll
 from ..scene import Placement, Scene
 from ..state import State
 from ..urdf import to_urdf
-from .protocol import GROUND, Contact, Coordinates
+from .protocol import GROUND, Contact, Load
 
 LARGEST_FRICTION = math.sqrt(10)
 """PyBullet caps the product of two friction coefficients at 10 (84 degrees)."""
@@ -36,6 +37,9 @@ SOLVER_ITERATIONS = 20
 
 LARGEST_RATE = 1e4
 """rad/s and m/s at which PyBullet clamps; its default of 100 makes energy in a 50 m drop."""
+
+PROBE_STEP = 2.0 ** -10
+"""s: the step that measures accelerations; a power of two, so that dividing by it is exact."""
 
 _FLAGS = (pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_IMPLICIT_CYLINDER)
 
@@ -61,33 +65,37 @@ class _Doll:
 class BulletEngine:
     """A scene in PyBullet. Runs in a client of its own, so that many can live side by side."""
 
-    most_substeps = 256
-
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        with contextlib.redirect_stderr(None):
-            self._client = pybullet.connect(pybullet.DIRECT)
-        self._pushed: list[tuple] = []
+        self._client = pybullet.connect(pybullet.DIRECT)
+        self._timing: tuple[float, int] | None = None
         try:
             self._build()
         except BaseException:
             self.close()
             raise
 
-    def step(self, duration: float, substeps: int) -> None:
-        """Go on by ``duration`` s in equal substeps; pushes act on all of them and then end."""
-        pybullet.setPhysicsEngineParameter(
-            fixedTimeStep=duration, numSubSteps=substeps if substeps > 1 else 0,
-            physicsClientId=self._client)
+    def step(self, duration: float, substeps: int, loads: Sequence[Load] = ()) -> None:
+        """Go on by ``duration`` s in equal substeps, under ``loads`` that do not turn."""
+        timing = (duration, substeps)
+        if timing != self._timing:
+            pybullet.setPhysicsEngineParameter(
+                fixedTimeStep=duration, numSubSteps=substeps if substeps > 1 else 0,
+                physicsClientId=self._client)
+            self._timing = timing
+        for load in loads:
+            self._apply(load)
         pybullet.stepSimulation(physicsClientId=self._client)
 
-    def push(self, bone: int, force: np.ndarray, torque: np.ndarray, point: np.ndarray) -> None:
-        """Let a force (N) at a point (m) and a torque (N m) act in the next step."""
-        body, link = self._links[bone]
-        pybullet.applyExternalForce(body, link, _list(force), _list(point), pybullet.WORLD_FRAME,
-                                    physicsClientId=self._client)
-        pybullet.applyExternalTorque(body, link, _list(torque), pybullet.WORLD_FRAME,
-                                     physicsClientId=self._client)
+    def acceleration(self, coordinates: Coordinates, loads: Sequence[Load] = ()) -> np.ndarray:
+        """Rates of change of ``coordinates.v``, from one small step.
+
+        PyBullet's step takes v to v + a h with a from where the step begins, so the quotient is
+        exact but for rounding. It holds where nothing touches and no limit is reached.
+        """
+        self.place(coordinates)
+        self.step(PROBE_STEP, 1, loads)
+        return (self._velocities() - coordinates.v) / PROBE_STEP
 
     def read(self) -> State:
         """Poses and velocities of all bones."""
@@ -115,11 +123,9 @@ class BulletEngine:
             motion = pybullet.getBaseVelocity(doll.body, self._client)
             q += pose[0] + pose[1]
             v += motion[0] + motion[1]
-            if doll.joints:
-                for joint in pybullet.getJointStatesMultiDof(
-                        doll.body, doll.joints, physicsClientId=self._client):
-                    q += joint[0]
-                    v += joint[1]
+            for joint in self._joints(doll):
+                q += joint[0]
+                v += joint[1]
         return Coordinates(np.array(q), np.array(v))
 
     def place(self, coordinates: Coordinates) -> None:
@@ -142,25 +148,22 @@ class BulletEngine:
                 pybullet.resetJointStatesMultiDof(
                     doll.body, doll.joints, values, rates, physicsClientId=self._client)
 
-    def shift_velocity(self, doll: int, linear: np.ndarray, angular: np.ndarray) -> None:
-        """Add a velocity (m/s) and a spin (rad/s) to a doll's root: the whole doll gains both."""
-        body = self._dolls[doll].body
-        motion = pybullet.getBaseVelocity(body, self._client)
-        pybullet.resetBaseVelocity(body, _list(motion[0] + linear), _list(motion[1] + angular),
-                                   physicsClientId=self._client)
-
     def joint_angles(self) -> np.ndarray:
         """All joint angles in rad, in the order of Scene.angle_names."""
         values = []
         for doll, placement in zip(self._dolls, self.scene.dolls, strict=True):
-            states = pybullet.getJointStatesMultiDof(
-                doll.body, doll.joints, physicsClientId=self._client) if doll.joints else ()
+            states = self._joints(doll)
             for joint in placement.doll.joints:
                 if joint.angle_names and joint.angle_names[0] not in doll.angles:
                     values += _euler_xyz(states[doll.angles[joint.child]][0])
                 else:
                     values += [states[doll.angles[name]][0][0] for name in joint.angle_names]
         return np.array(values)
+
+    def touching(self) -> bool:
+        """Tell whether anything is within 2 mm of touching where the dolls are now."""
+        pybullet.performCollisionDetection(self._client)
+        return bool(pybullet.getContactPoints(physicsClientId=self._client))
 
     def contacts(self) -> list[Contact]:
         """What touches at the end of the last substep."""
@@ -197,6 +200,37 @@ class BulletEngine:
             renderer=pybullet.ER_TINY_RENDERER, physicsClientId=self._client)
         return np.reshape(np.array(image[2], np.uint8), (height, width, 4))[:, :, :3]
 
+    def _joints(self, doll: _Doll) -> tuple:
+        """States of the joints that move: each (angles, rates, ...)."""
+        if not doll.joints:
+            return ()
+        return pybullet.getJointStatesMultiDof(doll.body, doll.joints,
+                                               physicsClientId=self._client)
+
+    def _velocities(self) -> np.ndarray:
+        v: list[float] = []
+        for doll in self._dolls:
+            motion = pybullet.getBaseVelocity(doll.body, self._client)
+            v += motion[0] + motion[1]
+            for joint in self._joints(doll):
+                v += joint[1]
+        return np.array(v)
+
+    def _apply(self, load: Load) -> None:
+        body, link = self._links[load.bone]
+        if link < 0:
+            position, orientation = pybullet.getBasePositionAndOrientation(body, self._client)
+        else:
+            position, orientation = pybullet.getLinkState(
+                body, link, computeForwardKinematics=1, physicsClientId=self._client)[:2]
+        force, torque, arm = load.force, load.torque, load.point
+        if load.local:
+            force, torque, arm = np.array((force, torque, arm)) @ rotation.matrix(orientation).T
+        pybullet.applyExternalForce(body, link, _list(force), _list(position + arm),
+                                    pybullet.WORLD_FRAME, physicsClientId=self._client)
+        pybullet.applyExternalTorque(body, link, _list(torque), pybullet.WORLD_FRAME,
+                                     physicsClientId=self._client)
+
     def _build(self) -> None:
         pybullet.setPhysicsEngineParameter(
             numSolverIterations=SOLVER_ITERATIONS, contactBreakingThreshold=BREAKING_DISTANCE,
@@ -207,9 +241,10 @@ class BulletEngine:
         self._dolls = [self._add_doll(placement) for placement in self.scene.dolls]
         self._links = [(doll.body, link) for doll in self._dolls for link in doll.links]
         self._bone_of = {link: bone for bone, link in enumerate(self._links)}
+        self.layout = self._lay_out()
         self._let_overlaps_be()
         for index, placement in enumerate(self.scene.dolls):
-            self._set_in_motion(index, placement)
+            self._set_in_motion(self._dolls[index].body, placement)
 
     def _add_ground(self) -> None:
         if self.scene.ground is None:
@@ -296,15 +331,27 @@ class BulletEngine:
             if point[1] == point[2] and point[8] < 0:
                 pybullet.setCollisionFilterPair(*point[1:5], 0, physicsClientId=self._client)
 
-    def _set_in_motion(self, index: int, placement: Placement) -> None:
+    def _lay_out(self) -> Layout:
+        """Say where in the coordinates which joint's angle and limit stands."""
+        dolls = []
+        for doll, placement in zip(self._dolls, self.scene.dolls, strict=True):
+            limits = {name: pair for joint in placement.doll.joints
+                      for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
+            names = list(doll.angles)
+            dolls.append([None if ball else limits[name] or UNLIMITED
+                          for name, ball in zip(names, doll.balls, strict=True)])
+        return Layout(dolls)
+
+    def _set_in_motion(self, body: int, placement: Placement) -> None:
         """Give a doll its velocity at the start, as one rigid body about its centre of mass."""
         if not any(placement.velocity + placement.spin):
             return
         doll = placement.doll
         centre = sum(bone.mass * np.array(bone.position) for bone in doll.bones) / doll.mass
         arm = rotation.rotate(placement.orientation, doll.root.position - centre)
-        self.shift_velocity(index, placement.velocity + np.cross(placement.spin, arm),
-                            np.array(placement.spin))
+        velocity = placement.velocity + np.cross(placement.spin, arm)
+        pybullet.resetBaseVelocity(body, _list(velocity), placement.spin,
+                                   physicsClientId=self._client)
 
 
 def _list(values: np.ndarray) -> list[float]:

@@ -1,11 +1,13 @@
 """What an engine must be able to do. Everything is SI, world frame, quaternions x, y, z, w."""
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
+from ..coordinates import Coordinates, Layout
 from ..scene import Scene
 from ..state import State
 
@@ -30,31 +32,31 @@ class Contact:
 
 
 @dataclass(frozen=True)
-class Coordinates:
-    """Generalised coordinates of all dolls, one behind the other (Featherstone's q and q').
+class Load:
+    """A force (3,) N and a torque (3,) N m on a bone, for one step.
 
-    For each doll ``q`` holds the root's position (3) and orientation (4), then the joints' from
-    root to leaf: one angle (rad) an axis, a quaternion (4) for a free ball joint, which takes
-    the child's vectors to the joint's frame. ``v`` holds the root's linear (3) and angular (3)
-    velocity in the world frame, then the joints' rates (rad/s), a free ball joint's three along
-    the child's side of the joint's frame.
+    ``point`` (3,) m is where the force attacks, from the bone's centre of mass. ``local``: all
+    three are along the bone's own axes, else along the world's.
     """
 
-    q: np.ndarray
-    v: np.ndarray
+    bone: int
+    force: np.ndarray
+    torque: np.ndarray
+    point: np.ndarray
+    local: bool = False
 
 
 class Engine(Protocol):
     """A scene in motion."""
 
     scene: Scene
-    most_substeps: int
+    layout: Layout
 
-    def step(self, duration: float, substeps: int) -> None:
-        """Go on by ``duration`` s in equal substeps; pushes act on all of them and then end."""
+    def step(self, duration: float, substeps: int, loads: Sequence[Load] = ()) -> None:
+        """Go on by ``duration`` s in equal substeps, under ``loads`` that do not turn."""
 
-    def push(self, bone: int, force: np.ndarray, torque: np.ndarray, point: np.ndarray) -> None:
-        """Let a force (N) at a point (m) and a torque (N m) act in the next step."""
+    def acceleration(self, coordinates: Coordinates, loads: Sequence[Load] = ()) -> np.ndarray:
+        """Rates of change of ``coordinates.v``; leaves the engine in no state to go on from."""
 
     def read(self) -> State:
         """Poses and velocities of all bones."""
@@ -65,11 +67,11 @@ class Engine(Protocol):
     def place(self, coordinates: Coordinates) -> None:
         """Put all dolls where ``coordinates`` says."""
 
-    def shift_velocity(self, doll: int, linear: np.ndarray, angular: np.ndarray) -> None:
-        """Add a velocity (m/s) and a spin (rad/s) to a doll's root: the whole doll gains both."""
-
     def joint_angles(self) -> np.ndarray:
         """All joint angles in rad, in the order of Scene.angle_names."""
+
+    def touching(self) -> bool:
+        """Tell whether anything touches where the dolls are now."""
 
     def contacts(self) -> list[Contact]:
         """What touches at the end of the last substep."""

@@ -1,0 +1,113 @@
+"""Generalised coordinates of all dolls of a scene, and how they change in time."""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import rotation
+from .ragdoll import Limits
+
+UNLIMITED: Limits = (-math.inf, math.inf)
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """Coordinates and velocities of all dolls, one behind the other (Featherstone's q and q').
+
+    For each doll ``q`` holds the root's position (3) m and orientation (4), then the joints'
+    from root to leaf: one angle (rad) an axis, a quaternion (4) for a free ball joint, which
+    takes the child's vectors to the joint's frame. ``v`` holds the root's linear (3) m/s and
+    angular (3) rad/s velocity in the world frame, then the joints' rates (rad/s), a free ball
+    joint's three along the child's side of the joint's frame.
+    """
+
+    q: np.ndarray
+    v: np.ndarray
+
+
+class Layout:
+    """Where in q and v what stands.
+
+    ``dolls`` gives for each doll its joints in the engine's order: a pair of limits (rad) for
+    one axis, None for a free ball joint.
+    """
+
+    def __init__(self, dolls: Sequence[Sequence[Limits | None]]) -> None:
+        lower: list[float] = []
+        plain_q: list[int] = []
+        plain_v: list[int] = []
+        upper: list[float] = []
+        roots: list[tuple[int, int]] = []
+        balls: list[tuple[int, int]] = []
+        v = 0
+        for joints in dolls:
+            q = len(lower)
+            plain_q += range(q, q + 3)
+            plain_v += range(v, v + 3)
+            roots.append((q + 3, v + 3))
+            lower += [-math.inf] * 7
+            upper += [math.inf] * 7
+            v += 6
+            for limits in joints:
+                if limits is None:
+                    balls.append((len(lower), v))
+                else:
+                    plain_q.append(len(lower))
+                    plain_v.append(v)
+                wide = 4 if limits is None else 1
+                lower += [-math.inf if limits is None else limits[0]] * wide
+                upper += [math.inf if limits is None else limits[1]] * wide
+                v += 3 if limits is None else 1
+        self.lower = np.array(lower)
+        self.upper = np.array(upper)
+        self._plain = (np.array(plain_q), np.array(plain_v))
+        self._roots = self._indices(roots)
+        self._balls = self._indices(balls)
+        """Of every quaternion and its angular velocity: indices (k, 4) and (k, 3)."""
+        self.root_positions = self._roots[0][:, :1] - 3 + np.arange(3)
+        self.root_velocities = self._roots[1][:, :1] - 3 + np.arange(3)
+        self.root_spins = self._roots[1]
+        self.limited = np.isfinite(self.lower[plain_q]) | np.isfinite(self.upper[plain_q])
+        limited = np.flatnonzero(self.limited)
+        self.limited = (self._plain[0][limited], self._plain[1][limited])
+        """Indices of the limited angles in q and of their rates in v."""
+        self.limits = (self.lower[self.limited[0]], self.upper[self.limited[0]])
+
+    def derivative(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Rate of change of q: q' = w q / 2 for w in the outer frame, q w / 2 in the body's."""
+        rate = np.empty_like(q)
+        rate[self._plain[0]] = v[self._plain[1]]
+        at, spin = self._roots
+        rate[at] = 0.5 * rotation.multiply(_pure(v[spin]), q[at])
+        if len(self._balls[0]):
+            at, spin = self._balls
+            rate[at] = 0.5 * rotation.multiply(q[at], _pure(v[spin]))
+        return rate
+
+    def normalized(self, q: np.ndarray) -> np.ndarray:
+        """Give the same coordinates with every quaternion of length one."""
+        q = q.copy()
+        for at, _ in (self._roots, self._balls):
+            if len(at):
+                q[at] = rotation.normalized(q[at])
+        return q
+
+    def overshoot(self, q: np.ndarray) -> float:
+        """Angle in rad by which the worst joint is past its limit; negative inside."""
+        if not len(self.limited[0]):
+            return -math.inf
+        angles = q[self.limited[0]]
+        return float(np.maximum(angles - self.limits[1], self.limits[0] - angles).max())
+
+    @staticmethod
+    def _indices(starts: list[tuple[int, int]]) -> tuple[np.ndarray, np.ndarray]:
+        table = np.array(starts, int).reshape(-1, 2)
+        return table[:, :1] + np.arange(4), table[:, 1:] + np.arange(3)
+
+
+def _pure(w: np.ndarray) -> np.ndarray:
+    """Angular velocities (k, 3) as quaternions (k, 4) without a real part."""
+    return np.concatenate([w, np.zeros((len(w), 1))], axis=1)
