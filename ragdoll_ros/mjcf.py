@@ -116,13 +116,12 @@ def _joints(joint: Joint, child: Bone) -> Iterable[dict[str, str]]:
     back = rotation.inverse(child.orientation)
     place = {'pos': _text(rotation.rotate(back, np.subtract(joint.anchor, child.position))),
              'damping': repr(joint.damping)}
-    axes, limits = joint.axes, joint.limits
+    axes, limits = joint.axes, joint.angle_limits
     if joint.kind == 'ball' and not any(limits):
         yield {'name': joint.child, 'type': 'ball', **place}
         return
     if joint.kind == 'ball':
         axes = rotation.matrix(joint_frame(joint)).T
-        limits = (limits[0], limits[0], limits[1])
     for name, axis, pair in zip(joint.angle_names, axes, limits, strict=True):
         ranged = {'range': _text(pair)} if pair else {}
         yield {'name': name, 'type': 'hinge', **place, **ranged,

@@ -4,15 +4,18 @@ The package works without it: `pip install ragdoll_ros[report]` brings it.
 """
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 
 from .. import faults, rotation
+from ..coordinates import UNLIMITED, Coordinates, Layout
 from ..mjcf import to_mjcf
-from ..ragdoll import Joint
+from ..ragdoll import Joint, Limits, Ragdoll
 from ..scene import Placement, Scene
 from ..state import State
 from ..urdf import joint_frame
-from .protocol import GROUND, Contact, Coordinates
+from .protocol import GROUND, Contact, Load
 
 INTEGRATORS = ('euler', 'implicitfast', 'rk4')
 """Order 1 with implicit joint damping; order 1, implicit in all velocities; order 4."""
@@ -29,8 +32,6 @@ class MissingEngine(faults.RagdollError):
 class MujocoEngine:
     """A scene in MuJoCo."""
 
-    most_substeps = 10_000
-
     def __init__(self, scene: Scene, integrator: str = 'implicitfast') -> None:
         if integrator not in INTEGRATORS:
             raise faults.OutOfRange('integrator', integrator, 'one of ' + ', '.join(INTEGRATORS))
@@ -43,23 +44,26 @@ class MujocoEngine:
         self._build(self._overlaps())
         self._model.opt.integrator = getattr(
             mujoco.mjtIntegrator, 'mjINT_' + integrator.upper())
-        for index, placement in enumerate(scene.dolls):
-            self._set_in_motion(index, placement)
+        self._set_in_motion()
 
-    def step(self, duration: float, substeps: int) -> None:
-        """Go on by ``duration`` s in equal substeps; pushes act on all of them and then end."""
+    def step(self, duration: float, substeps: int, loads: Sequence[Load] = ()) -> None:
+        """Go on by ``duration`` s in equal substeps, under ``loads`` that do not turn."""
         self._model.opt.timestep = duration / substeps
+        self._apply(loads)
         self._mujoco.mj_step(self._model, self._data, substeps)
         self._data.xfrc_applied[:] = 0
         self._stale = True
 
-    def push(self, bone: int, force: np.ndarray, torque: np.ndarray, point: np.ndarray) -> None:
-        """Let a force (N) at a point (m) and a torque (N m) act in the next step."""
-        self._refresh()
-        body = self._bodies[bone]
-        arm = np.asarray(point, float) - self._data.xipos[body]
-        self._data.xfrc_applied[body, :3] += force
-        self._data.xfrc_applied[body, 3:] += torque + np.cross(arm, force)
+    def acceleration(self, coordinates: Coordinates, loads: Sequence[Load] = ()) -> np.ndarray:
+        """Rates of change of ``coordinates.v`` where nothing touches and no limit is reached."""
+        self.place(coordinates)
+        self._apply(loads)
+        disabled = self._model.opt.disableflags
+        self._model.opt.disableflags |= self._mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+        self._mujoco.mj_forward(self._model, self._data)
+        self._model.opt.disableflags = disabled
+        self._data.xfrc_applied[:] = 0
+        return self._outwards(self._data.qpos, self._data.qacc)
 
     def read(self) -> State:
         """Poses and velocities of all bones."""
@@ -73,15 +77,13 @@ class MujocoEngine:
 
     def coordinates(self) -> Coordinates:
         """Generalised coordinates of all dolls."""
-        q, v = self._data.qpos.copy(), self._data.qvel.copy()
-        for iq, iv in self._roots:
-            q[iq + 3:iq + 7] = self._data.qpos[iq + 3:iq + 7][XYZW]
-            v[iv + 3:iv + 6] = rotation.rotate(q[iq + 3:iq + 7], v[iv + 3:iv + 6])
-        for iq, iv, seat in self._balls:
-            turn = rotation.multiply(seat, self._data.qpos[iq:iq + 4][XYZW])
+        q = self._data.qpos.copy()
+        for iq, _ in self._roots:
+            q[iq + 3:iq + 7] = q[iq + 3:iq + 7][XYZW]
+        for iq, _, seat in self._balls:
+            turn = rotation.multiply(seat, q[iq:iq + 4][XYZW])
             q[iq:iq + 4] = rotation.multiply(turn, rotation.inverse(seat))
-            v[iv:iv + 3] = rotation.rotate(seat, v[iv:iv + 3])
-        return Coordinates(q, v)
+        return Coordinates(q, self._outwards(self._data.qpos, self._data.qvel))
 
     def place(self, coordinates: Coordinates) -> None:
         """Put all dolls where ``coordinates`` says."""
@@ -98,21 +100,19 @@ class MujocoEngine:
         self._data.qpos[:], self._data.qvel[:] = q, v
         self._stale = True
 
-    def shift_velocity(self, doll: int, linear: np.ndarray, angular: np.ndarray) -> None:
-        """Add a velocity (m/s) and a spin (rad/s) to a doll's root: the whole doll gains both."""
-        iq, iv = self._roots[doll]
-        turn = self._data.qpos[iq + 3:iq + 7][XYZW]
-        self._data.qvel[iv:iv + 3] += linear
-        self._data.qvel[iv + 3:iv + 6] += rotation.rotate(rotation.inverse(turn), angular)
-        self._stale = True
-
     def joint_angles(self) -> np.ndarray:
         """All joint angles in rad, in the order of Scene.angle_names."""
-        values = []
-        q = self.coordinates().q
-        for kind, adr in self._angles:
-            values += rotation.to_xyz(q[adr:adr + 4]) if kind == 'ball' else [q[adr]]
+        q, values = self.coordinates().q, []
+        for place in self._angles:
+            values += rotation.to_xyz(q[place:place + 4]) if isinstance(place, int) \
+                else [q[index] for index in place]
         return np.array(values)
+
+    def touching(self) -> bool:
+        """Tell whether anything touches where the dolls are now."""
+        self._refresh()
+        self._mujoco.mj_collision(self._model, self._data)
+        return self._data.ncon > 0
 
     def contacts(self) -> list[Contact]:
         """What touches now."""
@@ -167,35 +167,59 @@ class MujocoEngine:
         self._bone_of = {self._model.geom(name).id: bone
                          for bone, name in enumerate(self.scene.bone_names)}
         self._roots, self._balls, self._angles = [], [], []
+        dolls = []
         for placement in self.scene.dolls:
-            self._roots.append(self._address(placement, placement.doll.root.name + '/free'))
-            for joint in placement.doll.joints:
-                self._find(placement, joint)
+            doll = placement.doll
+            self._roots.append(self._address(placement, doll.root.name + '/free'))
+            self._angles += [self._place_of(placement, joint) for joint in doll.joints]
+            dolls.append(_limits(doll))
+        self.layout = Layout(dolls)
         self._stale = True
 
-    def _find(self, placement: Placement, joint: Joint) -> None:
-        """Note where a joint's coordinates stand."""
-        if joint.kind != 'ball' or any(joint.limits):
-            self._angles += [('angle', self._address(placement, name)[0])
-                             for name in joint.angle_names]
-            return
+    def _place_of(self, placement: Placement, joint: Joint) -> int | list[int]:
+        """Where a free ball joint's coordinates begin, or where a joint's angles stand."""
+        if not _is_free_ball(joint):
+            return [self._address(placement, name)[0] for name in joint.angle_names]
         iq, iv = self._address(placement, joint.child)
         child = placement.doll.bone(joint.child)
         seat = rotation.multiply(rotation.inverse(joint_frame(joint)), child.orientation)
         self._balls.append((iq, iv, seat))
-        self._angles.append(('ball', iq))
+        return iq
 
     def _address(self, placement: Placement, name: str) -> tuple[int, int]:
         joint = self._model.joint(self.scene.qualified(placement, name))
         return int(joint.qposadr[0]), int(joint.dofadr[0])
 
-    def _set_in_motion(self, index: int, placement: Placement) -> None:
-        """Give a doll its velocity at the start, as one rigid body about its centre of mass."""
-        doll = placement.doll
-        centre = sum(bone.mass * np.array(bone.position) for bone in doll.bones) / doll.mass
-        arm = rotation.rotate(placement.orientation, doll.root.position - centre)
-        spin = np.array(placement.spin)
-        self.shift_velocity(index, placement.velocity + np.cross(spin, arm), spin)
+    def _set_in_motion(self) -> None:
+        """Give each doll its velocity at the start, as one rigid body about its centre of mass."""
+        start = self.coordinates()
+        for placement, (_, iv) in zip(self.scene.dolls, self._roots, strict=True):
+            doll = placement.doll
+            centre = sum(bone.mass * np.array(bone.position) for bone in doll.bones) / doll.mass
+            arm = rotation.rotate(placement.orientation, doll.root.position - centre)
+            start.v[iv:iv + 3] = placement.velocity + np.cross(placement.spin, arm)
+            start.v[iv + 3:iv + 6] = placement.spin
+        self.place(start)
+
+    def _apply(self, loads: Sequence[Load]) -> None:
+        for load in loads:
+            self._refresh()
+            body = self._bodies[load.bone]
+            force, torque, arm = load.force, load.torque, load.point
+            if load.local:
+                turn = rotation.matrix(self._data.xquat[body][XYZW])
+                force, torque, arm = np.array((force, torque, arm)) @ turn.T
+            self._data.xfrc_applied[body, :3] += force
+            self._data.xfrc_applied[body, 3:] += torque + np.cross(arm, force)
+
+    def _outwards(self, qpos: np.ndarray, rates: np.ndarray) -> np.ndarray:
+        """Velocities or accelerations with each spin turned from MuJoCo's axes to ours."""
+        v = rates.copy()
+        for iq, iv in self._roots:
+            v[iv + 3:iv + 6] = rotation.rotate(qpos[iq + 3:iq + 7][XYZW], v[iv + 3:iv + 6])
+        for _, iv, seat in self._balls:
+            v[iv:iv + 3] = rotation.rotate(seat, v[iv:iv + 3])
+        return v
 
     def _refresh(self) -> None:
         """Bring poses and velocities of the bodies up to the coordinates, once."""
@@ -204,3 +228,19 @@ class MujocoEngine:
             self._mujoco.mj_comPos(self._model, self._data)
             self._mujoco.mj_comVel(self._model, self._data)
             self._stale = False
+
+
+def _is_free_ball(joint: Joint) -> bool:
+    return joint.kind == 'ball' and not any(joint.limits)
+
+
+def _limits(doll: Ragdoll) -> list[Limits | None]:
+    """Limits of all joint angles in the order of the coordinates; None for a free ball joint."""
+    def branch(name: str) -> Iterator[Limits | None]:
+        for joint in doll.joints:
+            if joint.parent == name:
+                free = [None] if _is_free_ball(joint) else \
+                    [pair or UNLIMITED for pair in joint.angle_limits]
+                yield from free
+                yield from branch(joint.child)
+    return list(branch(doll.root.name))

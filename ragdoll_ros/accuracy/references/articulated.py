@@ -9,7 +9,7 @@ vanishes (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 3):
 
 integrated by DOP853 (Hairer, Norsett, Wanner) at 1e-12. Limits and contacts are not in it.
 
-Coordinates are laid out as in engine.protocol.Coordinates, the joints depth first.
+Coordinates are laid out as in coordinates.py, the joints depth first.
 """
 from __future__ import annotations
 
