@@ -37,12 +37,13 @@ class Layout:
 
     def __init__(self, dolls: Sequence[Sequence[Limits | None]]) -> None:
         lower: list[float] = []
+        upper: list[float] = []
         plain_q: list[int] = []
         plain_v: list[int] = []
-        upper: list[float] = []
         roots: list[tuple[int, int]] = []
         balls: list[tuple[int, int]] = []
         v = 0
+        ends: list[int] = []
         for joints in dolls:
             q = len(lower)
             plain_q += range(q, q + 3)
@@ -61,20 +62,22 @@ class Layout:
                 lower += [-math.inf if limits is None else limits[0]] * wide
                 upper += [math.inf if limits is None else limits[1]] * wide
                 v += 3 if limits is None else 1
-        self.lower = np.array(lower)
-        self.upper = np.array(upper)
+            ends.append(v)
+        self.velocity_ends = ends
+        """Where in v each doll ends."""
         self._plain = (np.array(plain_q), np.array(plain_v))
         self._roots = self._indices(roots)
         self._balls = self._indices(balls)
-        """Of every quaternion and its angular velocity: indices (k, 4) and (k, 3)."""
         self.root_positions = self._roots[0][:, :1] - 3 + np.arange(3)
+        """(d, 3): where in q each doll's root position stands."""
         self.root_velocities = self._roots[1][:, :1] - 3 + np.arange(3)
         self.root_spins = self._roots[1]
-        self.limited = np.isfinite(self.lower[plain_q]) | np.isfinite(self.upper[plain_q])
-        limited = np.flatnonzero(self.limited)
-        self.limited = (self._plain[0][limited], self._plain[1][limited])
-        """Indices of the limited angles in q and of their rates in v."""
-        self.limits = (self.lower[self.limited[0]], self.upper[self.limited[0]])
+        """(d, 3) each: where in v each root's linear and angular velocity stand."""
+        low, high = np.array(lower)[plain_q], np.array(upper)[plain_q]
+        some = np.isfinite(low) | np.isfinite(high)
+        self.limited = (self._plain[0][some], self._plain[1][some])
+        """Where the limited angles stand in q and their rates in v."""
+        self.limits = (low[some], high[some])
 
     def derivative(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Rate of change of q: q' = w q / 2 for w in the outer frame, q w / 2 in the body's."""
@@ -95,12 +98,15 @@ class Layout:
                 q[at] = rotation.normalized(q[at])
         return q
 
-    def overshoot(self, q: np.ndarray) -> float:
-        """Angle in rad by which the worst joint is past its limit; negative inside."""
-        if not len(self.limited[0]):
-            return -math.inf
+    def past_limits(self, q: np.ndarray) -> np.ndarray:
+        """Angles (k,) rad by which the limited joints are past their limits; negative inside."""
         angles = q[self.limited[0]]
-        return float(np.maximum(angles - self.limits[1], self.limits[0] - angles).max())
+        return np.maximum(angles - self.limits[1], self.limits[0] - angles)
+
+    def limit_speeds(self, coordinates: Coordinates) -> np.ndarray:
+        """Rates (k,) rad/s at which the limited joints move toward their nearer limit."""
+        angles, rates = coordinates.q[self.limited[0]], coordinates.v[self.limited[1]]
+        return np.where(angles - self.limits[1] > self.limits[0] - angles, rates, -rates)
 
     @staticmethod
     def _indices(starts: list[tuple[int, int]]) -> tuple[np.ndarray, np.ndarray]:

@@ -108,6 +108,14 @@ def from_rotation_vector(vectors: np.ndarray) -> np.ndarray:
     return np.concatenate([np.sinc(half / np.pi) / 2 * vectors, np.cos(half)], axis=-1)
 
 
+def rotation_vector(q: np.ndarray) -> np.ndarray:
+    """Rotation vectors (..., 3) in rad, at most pi long, of unit quaternions (..., 4)."""
+    q = np.asarray(q, float)
+    q = np.where(q[..., 3:] < 0, -q, q)
+    sin = np.linalg.norm(q[..., :3], axis=-1, keepdims=True)
+    return q[..., :3] * 2 / np.sinc(np.arctan2(sin, q[..., 3:]) / np.pi)
+
+
 def from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
     """Unit quaternion of URDF's and REP 103's fixed-axis roll, pitch, yaw in rad."""
     turns = ((2, yaw), (1, pitch), (0, roll))

@@ -30,14 +30,17 @@ def joint_frame(joint: Joint) -> np.ndarray:
     return rotation.shortest_arc(np.array([0.0, 0.0, 1.0]), np.array(joint.axes[0]))
 
 
-def to_urdf(doll: Ragdoll, dialect: str = 'ros') -> str:
-    """Write a doll as URDF; angles in rad, lengths in m, masses in kg."""
+def to_urdf(doll: Ragdoll, dialect: str = 'ros', limited: bool = True) -> str:
+    """Write a doll as URDF; angles in rad, lengths in m, masses in kg.
+
+    Not ``limited``: the same joints, but every one of them free.
+    """
     lines = ['<?xml version="1.0"?>', f'<robot name={quoteattr(doll.name)}>']
     frames = {doll.root.name: (np.array(doll.root.position), np.array(rotation.IDENTITY))}
     lines += _link(doll.root, frames[doll.root.name], dialect)
     for joint in doll.joints_from_root():
         frames[joint.child] = (np.array(joint.anchor), joint_frame(joint))
-        lines += _joint(joint, frames, dialect)
+        lines += _joint(joint, frames, dialect, limited)
         lines += _link(doll.bone(joint.child), frames[joint.child], dialect)
     return '\n'.join([*lines, '</robot>', ''])
 
@@ -89,7 +92,7 @@ def _geometries(bone: Bone, centre: np.ndarray, turn: np.ndarray,
     return [(position, f'<geometry>{text}</geometry>') for position, text in parts]
 
 
-def _joint(joint: Joint, frames: dict, dialect: str) -> list[str]:
+def _joint(joint: Joint, frames: dict, dialect: str, limited: bool) -> list[str]:
     """Write a joint and, where it has several axes, the links between."""
     parent, turn = frames[joint.parent], rotation.inverse(frames[joint.parent][1])
     place = (rotation.rotate(turn, joint.anchor - parent[0]),
@@ -103,6 +106,7 @@ def _joint(joint: Joint, frames: dict, dialect: str) -> list[str]:
     axes = np.eye(3) if joint.kind == 'ball' else joint.axes
     row = []
     for name, axis, pair in zip(joint.angle_names, axes, joint.angle_limits, strict=True):
+        pair = pair if limited else None
         limit = pair and f'<limit lower="{pair[0]!r}" upper="{pair[1]!r}" effort="0" velocity="0"/>'
         row.append((name, 'revolute' if pair else UNLIMITED, axis, limit))
     return _row(joint, row, place, dialect)

@@ -65,8 +65,9 @@ class _Doll:
 class BulletEngine:
     """A scene in PyBullet. Runs in a client of its own, so that many can live side by side."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, free: bool = False) -> None:
         self.scene = scene
+        self._free = free
         self._client = pybullet.connect(pybullet.DIRECT)
         self._timing: tuple[float, int] | None = None
         try:
@@ -160,10 +161,11 @@ class BulletEngine:
                     values += [states[doll.angles[name]][0][0] for name in joint.angle_names]
         return np.array(values)
 
-    def touching(self) -> bool:
-        """Tell whether anything is within 2 mm of touching where the dolls are now."""
+    def touching(self) -> set[tuple[int, int]]:
+        """Pairs of dolls within 2 mm of touching; GROUND stands for the ground."""
         pybullet.performCollisionDetection(self._client)
-        return bool(pybullet.getContactPoints(physicsClientId=self._client))
+        points = pybullet.getContactPoints(physicsClientId=self._client)
+        return {(self._doll_of[point[1]], self._doll_of[point[2]]) for point in points}
 
     def contacts(self) -> list[Contact]:
         """What touches at the end of the last substep."""
@@ -223,9 +225,10 @@ class BulletEngine:
         else:
             position, orientation = pybullet.getLinkState(
                 body, link, computeForwardKinematics=1, physicsClientId=self._client)[:2]
-        force, torque, arm = load.force, load.torque, load.point
+        turn = rotation.matrix(orientation)
+        force, torque, arm = load.force, load.torque, turn @ load.point
         if load.local:
-            force, torque, arm = np.array((force, torque, arm)) @ rotation.matrix(orientation).T
+            force, torque = turn @ force, turn @ torque
         pybullet.applyExternalForce(body, link, _list(force), _list(position + arm),
                                     pybullet.WORLD_FRAME, physicsClientId=self._client)
         pybullet.applyExternalTorque(body, link, _list(torque), pybullet.WORLD_FRAME,
@@ -237,34 +240,39 @@ class BulletEngine:
             restitutionVelocityThreshold=max(REST_SPEED, self.scene.material.restitution_speed),
             deterministicOverlappingPairs=1, enableFileCaching=0, physicsClientId=self._client)
         pybullet.setGravity(*self.scene.gravity, physicsClientId=self._client)
-        self._add_ground()
+        self._ground = self._add_ground()
         self._dolls = [self._add_doll(placement) for placement in self.scene.dolls]
         self._links = [(doll.body, link) for doll in self._dolls for link in doll.links]
+        self._doll_of = {doll.body: index for index, doll in enumerate(self._dolls)}
+        if self._ground is not None:
+            self._doll_of[self._ground] = GROUND
         self._bone_of = {link: bone for bone, link in enumerate(self._links)}
         self.layout = self._lay_out()
         self._let_overlaps_be()
         for index, placement in enumerate(self.scene.dolls):
             self._set_in_motion(self._dolls[index].body, placement)
 
-    def _add_ground(self) -> None:
-        if self.scene.ground is None:
-            return
+    def _add_ground(self) -> int | None:
+        if self.scene.ground is None or self._free:
+            return None
         ground = self.scene.ground
         plane = pybullet.createCollisionShape(
             pybullet.GEOM_PLANE, planeNormal=ground.normal, physicsClientId=self._client)
         place = [n * ground.offset for n in ground.normal]
         body = pybullet.createMultiBody(0, plane, -1, place, physicsClientId=self._client)
         self._set_material(body, -1, None, None, None)
+        return body
 
     def _add_doll(self, placement: Placement) -> _Doll:
         doll = placement.doll
-        flags = _FLAGS | (pybullet.URDF_USE_SELF_COLLISION if self.scene.self_collision else 0)
+        collide = self.scene.self_collision and not self._free
+        flags = _FLAGS | (pybullet.URDF_USE_SELF_COLLISION if collide else 0)
         position, orientation = placement.bone_pose(doll.root)
         orientation = np.array(placement.orientation)
         with tempfile.TemporaryDirectory(prefix='ragdoll_ros_') as folder:
             path = os.path.join(folder, 'doll.urdf')
             with open(path, 'w', encoding='utf-8') as file:
-                file.write(to_urdf(doll, 'bullet'))
+                file.write(to_urdf(doll, 'bullet', limited=not self._free))
             body = pybullet.loadURDF(path, _list(position), _list(orientation), flags=flags,
                                      physicsClientId=self._client)
         return self._set_up(doll, body)
@@ -292,6 +300,9 @@ class BulletEngine:
         order = [links[bone.name] for bone in doll.bones]
         for bone, link in zip(doll.bones, order, strict=True):
             self._set_material(body, link, bone.friction, bone.rolling_friction, bone.restitution)
+        if self._free:
+            for link in range(-1, pybullet.getNumJoints(body, self._client)):
+                pybullet.setCollisionFilterGroupMask(body, link, 0, 0, self._client)
         self._let_neighbours_be(doll, body, links)
         return _Doll(body, order, [link for link in order if link >= 0], order.index(-1),
                      joints, balls, angles)

@@ -35,8 +35,8 @@ class Contact:
 class Load:
     """A force (3,) N and a torque (3,) N m on a bone, for one step.
 
-    ``point`` (3,) m is where the force attacks, from the bone's centre of mass. ``local``: all
-    three are along the bone's own axes, else along the world's.
+    ``point`` (3,) m is where the force attacks, from the bone's centre of mass along the bone's
+    own axes. ``local``: so are force and torque, else they are along the world's.
     """
 
     bone: int
@@ -47,10 +47,12 @@ class Load:
 
 
 class Engine(Protocol):
-    """A scene in motion."""
+    """A scene in motion. ``free``: nothing touches and no joint has a limit."""
 
     scene: Scene
     layout: Layout
+
+    def __init__(self, scene: Scene, free: bool = False) -> None: ...
 
     def step(self, duration: float, substeps: int, loads: Sequence[Load] = ()) -> None:
         """Go on by ``duration`` s in equal substeps, under ``loads`` that do not turn."""
@@ -70,8 +72,8 @@ class Engine(Protocol):
     def joint_angles(self) -> np.ndarray:
         """All joint angles in rad, in the order of Scene.angle_names."""
 
-    def touching(self) -> bool:
-        """Tell whether anything touches where the dolls are now."""
+    def touching(self) -> set[tuple[int, int]]:
+        """Pairs of dolls that touch where they are now; GROUND stands for the ground."""
 
     def contacts(self) -> list[Contact]:
         """What touches at the end of the last substep."""

@@ -1,0 +1,151 @@
+"""Conservation: energy never grows by itself, momentum never changes by itself.
+
+A discrete step errs in both. The guard knows what the dolls may have (their energy so far and
+the pushes' work; their momentum and the pushes' impulses) and takes what is too much out of the
+velocities, by the smallest change of motion that does it.
+"""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .coordinates import Coordinates, Layout
+from .mechanics import Mechanics, Motion, cross
+from .ragdoll import Ragdoll
+from .scene import Scene
+from .state import State
+
+TOLERANCE = 5e-4
+"""Energy above the account, as a share of the doll's energy, that is left alone: half of the
+0.1 % that is promised."""
+
+
+@dataclass
+class Account:
+    """What each of d dolls may have."""
+
+    energy: np.ndarray
+    """(d,) J: the lowest energy so far, plus work since."""
+    put_in: np.ndarray
+    """(d,) J: sum of the sizes of all work done by pushes."""
+    taken: float = 0.0
+    """J: energy that projections have taken out since the start."""
+
+
+class Guard:
+    """Keeps the account of all dolls of a scene."""
+
+    def __init__(self, scene: Scene, mechanics: Mechanics, layout: Layout) -> None:
+        self._mechanics = mechanics
+        self._layout = layout
+        self._gravity = np.array(scene.gravity)
+        heights = [_size(placement.doll) for placement in scene.dolls]
+        self._fall = mechanics.doll_masses * np.linalg.norm(scene.gravity) * heights
+        self._own_groups = np.arange(len(scene.dolls))
+
+    def open(self, state: State) -> None:
+        """Start the account anew from a state."""
+        energy = self._mechanics.energy(state)
+        self.account = Account(energy, np.zeros_like(energy))
+
+    def add_work(self, work: np.ndarray) -> None:
+        """Enter work (d,) J that pushes did."""
+        self.account.energy += work
+        self.account.put_in += np.abs(work)
+
+    def surplus(self, motion: Motion, groups: np.ndarray) -> np.ndarray:
+        """Energy (d,) J that each doll must lose; zero or below: none.
+
+        Dolls of one group (``groups`` (d,): a number for each doll) touch and so share their
+        energy; what is too much is taken from each in proportion to its kinetic energy.
+        """
+        account = self.account
+        allowed = account.energy + TOLERANCE * (motion.kinetic + self._fall + account.put_in)
+        if groups is self._own_groups:
+            return motion.energy - allowed
+        kinetic = np.bincount(groups, motion.kinetic)[groups]
+        share = motion.kinetic / np.where(kinetic > 0, kinetic, 1)
+        return np.bincount(groups, motion.energy - allowed)[groups] * share
+
+    def settle(self, energy: np.ndarray, groups: np.ndarray) -> None:
+        """Close a step: what a group has lost it has lost for good."""
+        account = self.account
+        if groups is not self._own_groups:
+            excess = np.maximum(0, np.bincount(groups, energy - account.energy))
+            account.energy = energy - (excess / np.maximum(1, np.bincount(groups)))[groups]
+        np.minimum(account.energy, energy, out=account.energy)
+
+    def groups(self, touching: set[tuple[int, int]]) -> np.ndarray:
+        """Number (d,) of the group that each doll is in, dolls that touch being in one."""
+        pairs = [(a, b) for a, b in touching if a != b and min(a, b) >= 0]
+        if not pairs:
+            return self._own_groups
+        groups = self._own_groups.copy()
+        for a, b in pairs:
+            groups[groups == groups[b]] = groups[a]
+        return groups
+
+    def momentum_kept(self, coordinates: Coordinates, before: Motion, after: Motion,
+                      duration: float, impulse: np.ndarray,
+                      moment: np.ndarray | None) -> Coordinates:
+        """Give back to dolls in the air the momentum that they must have.
+
+        ``impulse`` (d, 3) N s and ``moment`` (d, 3) N m s are what pushes gave; no moment: the
+        angular momentum is left as it is. A change of a root's velocities moves the whole doll
+        as one rigid body, so that it takes a spin Ic^-1 dL and no joint notices.
+        """
+        masses = self._mechanics.doll_masses[:, None]
+        weight = masses * self._gravity * duration
+        linear = (before.momentum + weight + impulse - after.momentum) / masses
+        layout, v = self._layout, coordinates.v.copy()
+        if moment is not None:
+            missing = before.spin + moment - after.spin
+            spin = np.linalg.solve(after.locked_inertia, missing[:, :, None])[:, :, 0]
+            linear += cross(spin, coordinates.q[layout.root_positions] - after.centre)
+            v[layout.root_spins] += spin
+        v[layout.root_velocities] += linear
+        return Coordinates(coordinates.q, v)
+
+    def without_surplus(self, coordinates: Coordinates, motion: Motion, surplus: np.ndarray,
+                        touching: bool) -> Coordinates:
+        """Take ``surplus`` (d,) J out of the dolls' motion.
+
+        Each doll keeps its momentum and angular momentum: of its motion only what it does
+        beside moving as one rigid body, with the angular velocity Ic^-1 L of the doll locked in
+        its pose (Featherstone, Rigid Body Dynamics Algorithms, 9.6), is scaled down. Where that
+        holds less than the surplus and something outside touches the doll, all its motion is.
+        """
+        v = coordinates.v.copy()
+        for doll in np.flatnonzero(surplus > 0):
+            linear = motion.momentum[doll] / self._mechanics.doll_masses[doll]
+            spin = np.linalg.solve(motion.locked_inertia[doll], motion.spin[doll])
+            rigid = 0.5 * (motion.momentum[doll] @ linear + motion.spin[doll] @ spin)
+            inner = max(0.0, motion.kinetic[doll] - rigid)
+            scale = math.sqrt(max(0.0, 1 - surplus[doll] / inner)) if inner > 0 else 0.0
+            self._scale(v, doll, coordinates.q, motion.centre[doll], linear, spin, scale)
+            rest = surplus[doll] - inner
+            if rest > 0 and touching and rigid > 0:
+                own = slice(self._layout.root_velocities[doll, 0], self._layout.velocity_ends[doll])
+                v[own] *= math.sqrt(max(0.0, 1 - rest / rigid))
+                inner += min(rest, rigid)
+            self.account.taken += min(surplus[doll], inner)
+        return Coordinates(coordinates.q, v)
+
+    def _scale(self, v: np.ndarray, doll: int, q: np.ndarray, centre: np.ndarray,
+               linear: np.ndarray, spin: np.ndarray, scale: float) -> None:
+        """Scale a doll's motion about that of the locked doll."""
+        layout = self._layout
+        root, turn = layout.root_velocities[doll], layout.root_spins[doll]
+        locked = linear + cross(spin, q[layout.root_positions[doll]] - centre)
+        v[root] = locked + scale * (v[root] - locked)
+        v[turn] = spin + scale * (v[turn] - spin)
+        v[turn[-1] + 1:layout.velocity_ends[doll]] *= scale
+
+
+def _size(doll: Ragdoll) -> float:
+    """A third of a doll's size, m: falling so far sets the scale of its energy."""
+    positions = np.array([bone.position for bone in doll.bones])
+    largest = max(max(bone.shape.half_extents) for bone in doll.bones)
+    return float(np.ptp(positions, axis=0).max() + 2 * largest) / 3

@@ -1,0 +1,77 @@
+"""What the bones of a scene can reach: the ground, and each other's doll, within a time."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from . import rotation
+from .ragdoll import Bone, Box, Sphere
+from .scene import Scene
+from .state import State
+
+MARGIN = 0.005
+"""m: as near as this counts as reached."""
+
+
+class Reach:
+    """Sizes of all bones of a scene as arrays, and what follows from them."""
+
+    def __init__(self, scene: Scene) -> None:
+        bones = scene.bones
+        self._sizes = np.array([_support(bone) for bone in bones])
+        self._radii = np.array([math.hypot(*bone.shape.half_extents) for bone in bones])
+        self._thinnest = min(min(bone.shape.half_extents) for bone in bones)
+        self._ground = scene.ground
+        self._normal = np.array(scene.ground.normal if scene.ground else (0, 0, 1))
+        counts = [len(placement.doll.bones) for placement in scene.dolls]
+        self._bounds = np.cumsum([0, *counts])
+
+    def heights(self, state: State) -> np.ndarray:
+        """Distances (n,) m of the bones' lowest points from the ground; infinity without one."""
+        if self._ground is None:
+            return np.full(len(self._radii), math.inf)
+        down = np.abs(self._normal @ rotation.matrix(state.orientations))
+        across = np.sqrt(np.maximum(0, 1 - down[:, 2] ** 2))
+        boxes, along, rounds, rims = self._sizes[:, :3], *self._sizes[:, 3:].T
+        reach = (boxes * down).sum(axis=1) + along * down[:, 2] + rounds + rims * across
+        return state.positions @ self._normal - self._ground.offset - reach
+
+    def in_air(self, state: State, duration: float, acceleration: float) -> bool:
+        """Tell whether no bone can reach the ground or another doll within ``duration`` s.
+
+        A bound: bounding spheres, at twice the speed they have and may gain by gravity and
+        pushes (``acceleration`` m/s^2).
+        """
+        speeds = np.sqrt(np.einsum('ij,ij->i', state.linear, state.linear))
+        far = 2 * duration * (speeds + acceleration * duration) + self._radii + MARGIN
+        heights = state.positions @ self._normal
+        if self._ground is not None and (heights - self._ground.offset < far).any():
+            return False
+        return len(self._bounds) == 2 or self._apart(state.positions, far)
+
+    def strides(self, state: State, duration: float) -> int:
+        """Parts of ``duration`` s in each of which no bone passes another's half thickness."""
+        middle = state.linear.mean(axis=0)
+        speed = np.abs(state.linear - middle).max()
+        return max(1, math.ceil(speed * duration / (2 * self._thinnest)))
+
+    def _apart(self, positions: np.ndarray, far: np.ndarray) -> bool:
+        """Tell whether the boxes around the dolls, ``far`` m wider, are clear of each other."""
+        starts = self._bounds[:-1]
+        low = np.minimum.reduceat(positions - far[:, None], starts)
+        high = np.maximum.reduceat(positions + far[:, None], starts)
+        overlap = ((low[:, None] <= high[None]) & (low[None] <= high[:, None])).all(axis=2)
+        return int(overlap.sum()) == len(starts)
+
+
+def _support(bone: Bone) -> tuple[float, ...]:
+    """Box half edges (3), half length along z, radius everywhere, radius across z."""
+    shape = bone.shape
+    if isinstance(shape, Box):
+        return (*shape.half_extents, 0.0, 0.0, 0.0)
+    if isinstance(shape, Sphere):
+        return (0.0, 0.0, 0.0, 0.0, shape.radius, 0.0)
+    if shape.kind == 'capsule':
+        return (0.0, 0.0, 0.0, shape.length / 2, shape.radius, 0.0)
+    return (0.0, 0.0, 0.0, shape.length / 2, 0.0, shape.radius)

@@ -1,0 +1,280 @@
+"""A scene, an engine, pushes and time: what turns the first three into states."""
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import faults, rotation
+from .coordinates import Coordinates
+from .engine.bullet import BulletEngine
+from .engine.protocol import GROUND, Engine, Load
+from .guard import Guard
+from .mechanics import Mechanics, Motion
+from .push import Push
+from .scene import SECOND, STEP_RANGE, Scene
+from .state import State
+from .stepping import ACCURACIES, Accuracy, Effort, Stepper
+
+MOST_PUSHES = 1000
+"""Pushes that may wait at once; one more is refused."""
+
+REST_SPEED = 0.02
+"""m/s, and rad/s times the bone's size, below which a bone counts as still."""
+
+REST_TIME = SECOND // 2
+"""ns that all bones must be still under gravity before the scene sleeps."""
+
+
+@dataclass
+class _Active:
+    """A push with its times in ns; its load once it has begun."""
+
+    push: Push
+    bone: int
+    start: int
+    end: int
+    channel: str | None
+    load: Load | None = None
+
+
+class Simulation:
+    """A scene that moves: push() it, advance() it by a tick, read its state.
+
+    ``step`` is the tick in s (None: the scene's), ``accuracy`` a name of ACCURACIES or an
+    Accuracy. The same pushes at the same ticks give the same states to the bit.
+    """
+
+    def __init__(self, scene: Scene, step: float | None = None,
+                 accuracy: str | Accuracy = 'normal',
+                 engine: type[Engine] = BulletEngine) -> None:
+        self.scene = scene
+        step = scene.step if step is None else step
+        faults.check_range('step', step, *STEP_RANGE)
+        self.tick = round(step * SECOND)
+        """Nanoseconds in a tick."""
+        self.mechanics = Mechanics(scene)
+        self._stepper = Stepper(scene, engine, resolve_accuracy(accuracy))
+        self._guard = Guard(scene, self.mechanics, self._stepper.engine.layout)
+        self._start = (self._stepper.engine.save(), self._stepper.coordinates)
+        self._sizes = np.array([max(bone.shape.half_extents) for bone in scene.bones])
+        self._weightless = not any(scene.gravity)
+        self._begin()
+
+    def __enter__(self) -> Simulation:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def state(self) -> State:
+        """Poses and velocities of all bones now."""
+        return self._state
+
+    @property
+    def accuracy(self) -> Accuracy:
+        """How fine; may be changed between ticks."""
+        return self._stepper.accuracy
+
+    @property
+    def pushes(self) -> tuple[Push, ...]:
+        """Pushes that act now."""
+        return tuple(active.push for active in self._queue
+                     if active.start <= self.time < active.end)
+
+    @property
+    def joint_angles(self) -> np.ndarray:
+        """All joint angles, rad, in the order of Scene.angle_names."""
+        return self._stepper.engine.joint_angles()
+
+    def push(self, push: Push, channel: str | None = None) -> None:
+        """Let a push act from its start on; on a ``channel`` it takes the place of the last.
+
+        Raises UnknownBone, or OutOfRange for a start in the past or a queue that is full.
+        """
+        bone = self.scene.bone_index(push.bone)
+        start = self.time if push.start is None else round(push.start * SECOND)
+        if start < self.time:
+            raise faults.OutOfRange('start', push.start, f'{self.time / SECOND:g} s or later')
+        if channel is not None:
+            self.release(channel)
+        if len(self._queue) >= MOST_PUSHES:
+            raise faults.OutOfRange('pushes', len(self._queue) + 1, f'at most {MOST_PUSHES}')
+        end = start + max(1, round(push.duration * SECOND))
+        self._queue.append(_Active(push, bone, start, end, channel))
+
+    def release(self, channel: str) -> None:
+        """End the push on a channel now."""
+        self._queue = [active for active in self._queue if active.channel != channel]
+
+    def advance(self) -> State:
+        """Go on by one tick."""
+        self.effort = self._stepper.effort = Effort()
+        end = self.time + self.tick
+        while self.time < end:
+            self._go(min(end, self._next_change()))
+        self._queue = [active for active in self._queue if active.end > self.time]
+        self._rest()
+        return self._state
+
+    def reset(self) -> State:
+        """Go back to the start, to the bit; pushes that wait are dropped."""
+        snapshot, coordinates = self._start
+        self._stepper.engine.restore(snapshot)
+        self._stepper.place(coordinates)
+        self._stepper.touching = self._stepper.engine.touching()
+        self._begin()
+        return self._state
+
+    def close(self) -> None:
+        """Give the engine back; a second time does nothing."""
+        self._stepper.close()
+
+    def _begin(self) -> None:
+        self.time = 0
+        """Nanoseconds simulated since the start."""
+        self._queue: list[_Active] = []
+        self._state = self._stepper.state
+        self._motion = self.mechanics.motion(self._state)
+        self._guard.open(self._state)
+        self._still = 0
+        self.asleep = False
+        """Whether all is at rest and the engine stands."""
+        self.effort = Effort()
+        """What the last tick took."""
+
+    def _next_change(self) -> int:
+        """Instant, ns, at which the next push begins or ends."""
+        times = [time for active in self._queue for time in (active.start, active.end)]
+        return min((time for time in times if time > self.time), default=self.time + self.tick)
+
+    def _go(self, end: int) -> None:
+        """Go on to an instant between which no push begins or ends."""
+        loads = [self._load(active) for active in self._queue
+                 if active.start <= self.time < active.end]
+        if loads:
+            self.asleep, self._still = False, 0
+        remaining = (end - self.time) / SECOND
+        while remaining > 1e-12 and not self.asleep:
+            remaining -= self._piece(remaining, loads)
+        self.time = end
+
+    def _piece(self, duration: float, loads: list[Load]) -> float:
+        """Go through one stretch of motion and see to what must be kept; give its length, s."""
+        stepper, before, motion = self._stepper, self._state, self._motion
+        pull = max((math.hypot(*load.force) for load in loads), default=0.0)
+        lightest = float(self.mechanics.masses.min())
+        gravity = math.hypot(*self.scene.gravity)
+        in_air = stepper.accuracy.momentum and stepper.reach.in_air(
+            before, duration, gravity + pull / lightest)
+        piece = stepper.go(duration, loads)
+        self._see(stepper.state)
+        if loads:
+            self._enter_work(loads, before, piece.substep)
+        if in_air:
+            self._keep_momentum(motion, piece.duration, loads, before)
+        if stepper.accuracy.energy:
+            self._keep_energy()
+        return piece.duration
+
+    def _see(self, state: State) -> None:
+        self._state = state
+        self._motion = self.mechanics.motion(state)
+
+    def _place(self, coordinates: Coordinates) -> None:
+        self._stepper.place(coordinates)
+        self._see(self._stepper.state)
+
+    def _keep_momentum(self, before: Motion, duration: float, loads: list[Load],
+                       state: State) -> None:
+        impulse = np.zeros_like(before.momentum)
+        moment = np.zeros_like(before.momentum)
+        steady = True
+        for load in loads:
+            doll = self.mechanics.doll_of[load.bone]
+            force, torque = self._mean_load(load, state)
+            impulse[doll] += force * duration
+            moment[doll] += torque * duration
+            steady = steady and not load.force.any()
+        self._place(self._guard.momentum_kept(
+            self._stepper.coordinates, before, self._motion, duration, impulse,
+            moment if steady else None))
+
+    def _keep_energy(self) -> None:
+        guard, touching = self._guard, self._stepper.touching
+        groups = guard.groups(touching)
+        surplus = guard.surplus(self._motion, groups)
+        if (surplus > 0).any():
+            outside = any(a != b for a, b in touching)
+            self._place(guard.without_surplus(
+                self._stepper.coordinates, self._motion, surplus, outside))
+        guard.settle(self._motion.energy, groups)
+
+    def _enter_work(self, loads: list[Load], before: State, substep: float) -> None:
+        """Work of forces along their points' ways, and of torques through their bones' turns.
+
+        A step that takes the velocity first (semi-implicit Euler, ``substep`` h) moves a point by
+        h v' where its energy grows by F (v + v') h / 2: the difference adds up to
+        F (v_end - v_start) h / 2 and is left out of the account.
+        """
+        work = np.zeros(len(self.scene.dolls))
+        after = self._state
+        for load in loads:
+            bone = load.bone
+            force, torque = self._mean_load(load, before)
+            ways = [state.positions[bone] + rotation.rotate(state.orientations[bone], load.point)
+                    for state in (before, after)]
+            turn = rotation.multiply(after.orientations[bone],
+                                     rotation.inverse(before.orientations[bone]))
+            lead = substep / 2 * (after.linear[bone] - before.linear[bone])
+            lead_turn = substep / 2 * (after.angular[bone] - before.angular[bone])
+            work[self.mechanics.doll_of[bone]] += (
+                force @ (ways[1] - ways[0] - lead)
+                + torque @ (rotation.rotation_vector(turn) - lead_turn))
+        self._guard.add_work(work)
+
+    def _mean_load(self, load: Load, before: State) -> tuple[np.ndarray, np.ndarray]:
+        """Force and torque in world axes, of a local load the mean of its start and end."""
+        if not load.local:
+            return load.force, load.torque
+        turns = (before.orientations[load.bone], self._state.orientations[load.bone])
+        mean = sum(rotation.matrix(turn) for turn in turns) / 2
+        return mean @ load.force, mean @ load.torque
+
+    def _load(self, active: _Active) -> Load:
+        """Give a push's load; its point is tied to the bone when the push begins."""
+        if active.load is None:
+            push = active.push
+            point = np.array(push.point)
+            if not push.local:
+                turn = self._state.orientations[active.bone]
+                point = rotation.rotate(rotation.inverse(turn), point)
+            active.load = Load(active.bone, np.array(push.force), np.array(push.torque), point,
+                               push.local)
+        return active.load
+
+    def _rest(self) -> None:
+        """Fall asleep when all has been still for a while with something to rest on."""
+        if self.asleep or not self._stepper.accuracy.sleep or self._weightless:
+            return
+        state = self._state
+        speeds = np.abs(state.linear).max(axis=1), np.abs(state.angular).max(axis=1) * self._sizes
+        still = max(map(np.max, speeds)) < REST_SPEED and not self._queue
+        self._still = self._still + self.tick if still else 0
+        if self._still >= REST_TIME and any(GROUND in pair for pair in self._stepper.touching):
+            coordinates = self._stepper.coordinates
+            self._place(dataclasses.replace(coordinates, v=np.zeros_like(coordinates.v)))
+            self._guard.settle(self._motion.energy, self._guard.groups(self._stepper.touching))
+            self.asleep = True
+
+
+def resolve_accuracy(accuracy: str | Accuracy) -> Accuracy:
+    """Give the settings that a name stands for; OutOfRange for a name that is none."""
+    if isinstance(accuracy, Accuracy):
+        return accuracy
+    if accuracy not in ACCURACIES:
+        raise faults.OutOfRange('accuracy', accuracy, 'one of ' + ', '.join(ACCURACIES))
+    return ACCURACIES[accuracy]

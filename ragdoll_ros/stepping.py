@@ -1,0 +1,234 @@
+"""Stepping by need: how finely to go through the next moment, and by which method.
+
+In the air, with no joint at its limit, Runge-Kutta flies (flight.py), up to the instant of the
+next touch or limit. Everything else is the engine's own step, cut as finely as speed, limits
+and contacts ask for.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .coordinates import Coordinates
+from .engine.protocol import Engine, Load
+from .flight import fly
+from .reach import Reach
+from .scene import Scene
+from .state import State
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """How fine. Each mechanism can be switched off, to see its price and its worth."""
+
+    turn: float
+    """rad that the fastest bone may turn in one of the engine's substeps."""
+    limit: float
+    """rad that a joint near its limit may turn in one substep."""
+    contact: int
+    """Least substeps in 10 ms while something touches and moves."""
+    settled: int
+    """Least substeps in 10 ms while something touches and hardly moves."""
+    sink: float
+    """m that a bone may fall in one substep onto the ground."""
+    most: int
+    """Most substeps in 10 ms."""
+    order: int
+    """Order of the flight's Runge-Kutta method; 0: the engine's own step in flight too."""
+    flight_turn: float
+    """rad that the fastest bone may turn in one Runge-Kutta step."""
+    redo: float = math.radians(1.0)
+    """rad past a limit from which a step is done again, four times as fine; infinity: never."""
+    adaptive: bool = True
+    """Substeps by need; otherwise always ``contact`` in 10 ms."""
+    energy: bool = True
+    """Take out energy that nothing put in."""
+    momentum: bool = True
+    """Keep the momentum of what is in the air."""
+    sleep: bool = True
+    """Stop the engine when all is at rest."""
+
+
+DRAFT = Accuracy(turn=0.15, limit=0.06, contact=4, settled=2, sink=0.015, most=16, order=2,
+                 flight_turn=0.8, redo=math.radians(4))
+NORMAL = Accuracy(turn=0.06, limit=0.025, contact=8, settled=4, sink=0.006, most=32, order=3,
+                  flight_turn=0.4, redo=math.radians(2))
+EXACT = Accuracy(turn=0.02, limit=0.01, contact=16, settled=8, sink=0.002, most=64, order=4,
+                 flight_turn=0.2, redo=math.radians(1))
+ACCURACIES = {'draft': DRAFT, 'normal': NORMAL, 'exact': EXACT}
+
+AT_LIMIT = 1e-3
+"""rad: a joint as near as this to its limit, and moving toward it, is at the limit."""
+
+SOON = 0.015
+"""s ahead that limits and ground are looked for."""
+
+SHORTEST = 1e-7
+"""s: a piece of flight shorter than this is not worth its stages."""
+
+
+@dataclass
+class Effort:
+    """What a tick took."""
+
+    flights: int = 0
+    """Runge-Kutta steps."""
+    substeps: int = 0
+    """Substeps of the engine."""
+    redone: int = 0
+    """Steps done again."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A stretch of motion that is done: how long, and how fine the engine's substeps were."""
+
+    duration: float
+    """s."""
+    substep: float
+    """s; 0 for a flight."""
+
+
+class Stepper:
+    """Moves a scene on. Holds where it is: ``coordinates``, ``state``, what is ``touching``."""
+
+    def __init__(self, scene: Scene, make_engine: type[Engine],
+                 accuracy: Accuracy) -> None:
+        self.accuracy = accuracy
+        self.engine = make_engine(scene)
+        self._free = make_engine(scene, free=True) if accuracy.order else None
+        self.reach = Reach(scene)
+        self._layout = self.engine.layout
+        self._gravity = math.hypot(*scene.gravity)
+        self._normal = np.array(scene.ground.normal if scene.ground else (0.0, 0.0, 1.0))
+        self.effort = Effort()
+        self.look()
+
+    def look(self) -> None:
+        """Read where the engine is."""
+        self.state: State = self.engine.read()
+        self.coordinates: Coordinates = self.engine.coordinates()
+        self.touching = self.engine.touching()
+
+    def place(self, coordinates: Coordinates) -> None:
+        """Put the scene elsewhere; what touches stays as it was."""
+        self.engine.place(coordinates)
+        self.coordinates = coordinates
+        self.state = self.engine.read()
+
+    def go(self, duration: float, loads: Sequence[Load]) -> Piece:
+        """Move on by ``duration`` s, or by less: up to the next touch or limit in a flight."""
+        if self._free is not None and not self.touching and not self._at_limit():
+            flown = self._fly(duration, loads)
+            if flown > 0:
+                return Piece(flown, 0.0)
+        return Piece(duration, self._step(duration, loads))
+
+    def close(self) -> None:
+        """Give both engines back."""
+        self.engine.close()
+        if self._free is not None:
+            self._free.close()
+
+    def _at_limit(self) -> bool:
+        """Tell whether a joint presses against its limit."""
+        past = self._layout.past_limits(self.coordinates.q)
+        if not len(past) or past.max() < -AT_LIMIT:
+            return False
+        return bool(((past >= -AT_LIMIT) & (self._layout.limit_speeds(self.coordinates) > 0)
+                     | (past > AT_LIMIT)).any())
+
+    def _fly(self, duration: float, loads: Sequence[Load]) -> float:
+        """Fly up to ``duration`` s; give the time flown, 0 where something comes in between."""
+        steps = self._flight_steps(duration)
+        piece = duration / max(steps, self.reach.strides(self.state, duration))
+        flown = 0.0
+        while flown < duration * (1 - 1e-9):
+            start, state, least = self.coordinates, self.state, self._room()
+            self._fly_to(fly(self._free, start, piece, self.accuracy.order, 1, loads))
+            self.effort.flights += 1
+            room = self._room()
+            if room >= 0 and not self.touching:
+                flown += piece
+                continue
+            early = piece * least / (least - room) if least > 0 > room else 0.0
+            if early > SHORTEST and self._fly_early(start, early, loads):
+                return flown + early
+            self._back_to(start, state)
+            return flown
+        return duration
+
+    def _fly_early(self, start: Coordinates, duration: float, loads: Sequence[Load]) -> bool:
+        """Fly to where a limit or the ground is just reached; tell whether that came out."""
+        self._fly_to(fly(self._free, start, duration, self.accuracy.order, 1, loads))
+        self.effort.flights += 1
+        return self._room() > -AT_LIMIT
+
+    def _fly_to(self, end: Coordinates) -> None:
+        self.place(end)
+        self.touching = self.engine.touching()
+
+    def _back_to(self, start: Coordinates, state: State) -> None:
+        self.engine.place(start)
+        self.coordinates, self.state, self.touching = start, state, set()
+
+    def _room(self) -> float:
+        """Room (rad or m) to the nearest limit or the ground; below zero: past it."""
+        past = self._layout.past_limits(self.coordinates.q)
+        room = -float(past.max()) if len(past) else math.inf
+        return min(room, float(self.reach.heights(self.state).min()))
+
+    def _flight_steps(self, duration: float) -> int:
+        spin = math.sqrt(np.einsum('ij,ij->i', self.state.angular, self.state.angular).max())
+        rate = max(spin, np.abs(self.coordinates.v[self._layout.limited[1]]).max(initial=0.0))
+        return max(1, math.ceil(rate * duration / self.accuracy.flight_turn))
+
+    def _step(self, duration: float, loads: Sequence[Load]) -> float:
+        """Take the engine's own step, finer if it overshoots a limit; give its substep, s."""
+        start, state = self.coordinates, self.state
+        past = self._layout.past_limits(start.q).max(initial=-math.inf)
+        substeps = self._substeps(duration, bool(loads))
+        most = max(1, math.ceil(self.accuracy.most * duration / 0.01))
+        while True:
+            self._run(duration, substeps, loads)
+            over = self._layout.past_limits(self.coordinates.q).max(initial=-math.inf)
+            if over < max(self.accuracy.redo, past) or substeps >= most:
+                return duration / substeps
+            self._back_to(start, state)
+            substeps = min(most, 4 * substeps)
+            self.effort.redone += 1
+
+    def _run(self, duration: float, substeps: int, loads: Sequence[Load]) -> None:
+        """Let the engine go; loads along a bone's own axes turn with it at each substep."""
+        if any(load.local for load in loads):
+            for _ in range(substeps):
+                self.engine.step(duration / substeps, 1, loads)
+        else:
+            self.engine.step(duration, substeps, loads)
+        self.effort.substeps += substeps
+        self.look()
+
+    def _substeps(self, duration: float, pushed: bool) -> int:
+        """Count the substeps that this state asks for, a power of two."""
+        accuracy, state = self.accuracy, self.state
+        tens = duration / 0.01
+        if not accuracy.adaptive:
+            return max(1, math.ceil(accuracy.contact * tens))
+        spin = math.sqrt(np.einsum('ij,ij->i', state.angular, state.angular).max())
+        need = max(1.0, spin * duration / accuracy.turn, 4.0 * tens if pushed else 0.0)
+        speeds = self._layout.limit_speeds(self.coordinates)
+        if len(speeds):
+            past = self._layout.past_limits(self.coordinates.q)
+            near = speeds[past + SOON * speeds > 0]
+            need = max(need, near.max(initial=0.0) * duration / accuracy.limit)
+        if self.touching or not self.reach.in_air(state, SOON, self._gravity):
+            falling = max(0.0, -float((state.linear @ self._normal).min()))
+            fast = falling > 0.3 or spin > 1.0
+            need = max(need, (accuracy.contact if fast else accuracy.settled) * tens,
+                       falling * duration / accuracy.sink)
+        most = max(1, math.ceil(accuracy.most * tens))
+        return min(most, 2 ** math.ceil(math.log2(need)))
+
