@@ -129,6 +129,16 @@ class Simulation:
         self._begin()
         return self._state
 
+    def place(self, coordinates: Coordinates) -> State:
+        """Put all dolls elsewhere and begin anew there, at time 0; pushes that wait are dropped.
+
+        reset() still goes back to where the scene itself starts.
+        """
+        self._stepper.place(coordinates)
+        self._stepper.touching = self._stepper.engine.touching()
+        self._begin()
+        return self._state
+
     def close(self) -> None:
         """Give the engine back; a second time does nothing."""
         self._stepper.close()

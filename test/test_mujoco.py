@@ -132,6 +132,7 @@ def test_a_ball_rests_on_a_tilted_ground_and_tells_of_it():
                   Material(restitution=0), gravity=-9.8 * normal)
     engine = MujocoEngine(scene)
     engine.step(1.0, 1000)
+    assert engine.touching() == {(GROUND, 0)}
     contact, = engine.contacts()
     assert (contact.a, contact.b) == (0, GROUND)
     assert contact.normal == pytest.approx(normal, abs=1e-9)
@@ -185,4 +186,4 @@ def _stepped(engine):
 
 def test_an_unknown_integrator_is_named():
     with pytest.raises(faults.OutOfRange, match='leapfrog'):
-        MujocoEngine(flying(load_doll('doll')), 'leapfrog')
+        MujocoEngine(flying(load_doll('doll')), integrator='leapfrog')

@@ -19,7 +19,7 @@ from .references.articulated import Articulated, depth_first
 class Trial:
     """``duration`` s of a scene, from ``start`` or from where the scene itself begins.
 
-    Pushes begin and end with a tick, have a start, and are given along the world's axes.
+    Pushes begin and end with a tick, have a start, act on centres of mass, along the world's axes.
     """
 
     scene: Scene

@@ -30,9 +30,10 @@ class MissingEngine(faults.RagdollError):
 
 
 class MujocoEngine:
-    """A scene in MuJoCo."""
+    """A scene in MuJoCo. ``free``: nothing touches and no joint has a limit."""
 
-    def __init__(self, scene: Scene, integrator: str = 'implicitfast') -> None:
+    def __init__(self, scene: Scene, free: bool = False,
+                 integrator: str = 'implicitfast') -> None:
         if integrator not in INTEGRATORS:
             raise faults.OutOfRange('integrator', integrator, 'one of ' + ', '.join(INTEGRATORS))
         try:
@@ -44,6 +45,10 @@ class MujocoEngine:
         self._build(self._overlaps())
         self._model.opt.integrator = getattr(
             mujoco.mjtIntegrator, 'mjINT_' + integrator.upper())
+        # a scene that explodes shall be seen to: MuJoCo would put it back to its start
+        self._model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        if free:
+            self._model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         self._set_in_motion()
 
     def step(self, duration: float, substeps: int, loads: Sequence[Load] = ()) -> None:
@@ -108,11 +113,13 @@ class MujocoEngine:
                 else [q[index] for index in place]
         return np.array(values)
 
-    def touching(self) -> bool:
-        """Tell whether anything touches where the dolls are now."""
+    def touching(self) -> set[tuple[int, int]]:
+        """Pairs of dolls that touch where they are now; GROUND stands for the ground."""
         self._refresh()
         self._mujoco.mj_collision(self._model, self._data)
-        return self._data.ncon > 0
+        if not self._data.ncon:
+            return set()
+        return {tuple(pair) for pair in self._doll_of[self._data.contact.geom].tolist()}
 
     def contacts(self) -> list[Contact]:
         """What touches now."""
@@ -166,6 +173,9 @@ class MujocoEngine:
         self._bodies = np.array([self._model.body(name).id for name in self.scene.bone_names])
         self._bone_of = {self._model.geom(name).id: bone
                          for bone, name in enumerate(self.scene.bone_names)}
+        self._doll_of = np.full(self._model.ngeom, GROUND)
+        counts = [len(placement.doll.bones) for placement in self.scene.dolls]
+        self._doll_of[list(self._bone_of)] = np.repeat(np.arange(len(counts)), counts)
         self._roots, self._balls, self._angles = [], [], []
         dolls = []
         for placement in self.scene.dolls:
@@ -205,10 +215,10 @@ class MujocoEngine:
         for load in loads:
             self._refresh()
             body = self._bodies[load.bone]
-            force, torque, arm = load.force, load.torque, load.point
+            turn = self._data.xmat[body].reshape(3, 3)
+            force, torque, arm = load.force, load.torque, turn @ load.point
             if load.local:
-                turn = rotation.matrix(self._data.xquat[body][XYZW])
-                force, torque, arm = np.array((force, torque, arm)) @ turn.T
+                force, torque = turn @ force, turn @ torque
             self._data.xfrc_applied[body, :3] += force
             self._data.xfrc_applied[body, 3:] += torque + np.cross(arm, force)
 

@@ -13,6 +13,7 @@ Coordinates are laid out as in coordinates.py, the joints depth first.
 """
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -24,9 +25,7 @@ from ...ragdoll import Joint, Ragdoll
 from ...state import State
 from ...urdf import joint_frame
 from ..trajectory import Trajectory
-
-TOLERANCE = 1e-12
-"""Relative and absolute error per step of the integrator."""
+from .integration import integrate
 
 Wrenches = Callable[[float, State], tuple[np.ndarray, np.ndarray]]
 """Forces (n, 3) N and torques (n, 3) N m on the centres of mass, world axes, by time and state."""
@@ -101,22 +100,18 @@ class Articulated:
     def trajectory(self, q: np.ndarray, v: np.ndarray, times: Sequence[float],
                    wrenches: Wrenches | None = None, breaks: Sequence[float] = ()) -> Trajectory:
         """Motion from times[0]; ``breaks`` are the instants at which the wrenches jump, s."""
-        from scipy.integrate import solve_ivp
         times = np.asarray(times, float)
         edges = [times[0], *sorted(t for t in breaks if times[0] < t < times[-1]), times[-1]]
         y = np.concatenate([q, v])
         states = {times[0]: self.state(q, v)}
         for begin, end in itertools.pairwise(edges):
-            inside = [t for t in times if begin < t <= end]
-            asked = inside if inside and inside[-1] == end else [*inside, end]
-            middle = (begin + end) / 2
-            solved = solve_ivp(self._derivative, (begin, end), y, 'DOP853', asked, rtol=TOLERANCE,
-                               atol=TOLERANCE, args=(middle, wrenches))
-            if not solved.success:
-                raise ArithmeticError(solved.message)
-            for t, row in zip(asked, solved.y.T, strict=True):
+            asked = np.unique([begin, *times[(begin < times) & (times <= end)], end])
+            derivative = functools.partial(self._derivative, middle=(begin + end) / 2,
+                                           wrenches=wrenches)
+            rows = integrate(derivative, y, asked)
+            for t, row in zip(asked, rows, strict=True):
                 states[t] = self.state(row[:self.nq], row[self.nq:])
-            y = solved.y[:, -1]
+            y = rows[-1]
         return Trajectory.of(times, [states[t] for t in times])
 
     def _derivative(self, t: float, y: np.ndarray, middle: float,

@@ -63,6 +63,15 @@ def ball_slide_then_roll(speed: float, friction: float, gravity: float,
     return speed * slid - friction * gravity * slid ** 2 / 2 + 5 / 7 * speed * rolled
 
 
+def ball_slide_then_roll_angle(speed: float, friction: float, gravity: float, radius: float,
+                               t: np.ndarray) -> np.ndarray:
+    """Angle in rad that the same ball has turned: 5/2 mu g / r until it rolls, then v / r."""
+    t = np.asarray(t, float)
+    grip = 2 * speed / (7 * friction * gravity)
+    slid, rolled = np.minimum(t, grip), np.maximum(t - grip, 0.0)
+    return 5 / 4 * friction * gravity / radius * slid ** 2 + 5 / 7 * speed / radius * rolled
+
+
 def ball_on_incline(slope: float, gravity: float, t: np.ndarray) -> np.ndarray:
     """Distance in m of a solid ball that rolls down from rest without slip: 5/7 g sin(slope)."""
     return 5 / 14 * gravity * math.sin(slope) * np.asarray(t, float) ** 2

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .integration import integrate
+
 
 @dataclass(frozen=True)
 class PlanarChain:
@@ -32,12 +34,11 @@ class PlanarChain:
         The first rod's centre starts at the origin, moving so that the chain's centre of mass
         is at rest. ``angles`` and ``rates`` are absolute, rad and rad/s.
         """
-        from scipy.integrate import solve_ivp
         angles, rates = np.array(angles, float), np.array(rates, float)
         start = np.concatenate([[0.0, 0.0], angles, self._at_rest(angles, rates), rates])
-        solved = solve_ivp(self._derivative, (times[0], times[-1]), start, 'DOP853', times,
-                           rtol=1e-12, atol=1e-12, args=(np.array(gravity, float),))
-        x, phi = solved.y[:2].T, solved.y[2:2 + self.links].T
+        load = np.array(gravity, float)
+        rows = integrate(lambda t, y: self._derivative(y, load), start, times)
+        x, phi = rows[:, :2], rows[:, 2:2 + self.links]
         arms = self._arms()
         rods = self.length * np.stack([np.cos(phi), np.sin(phi)], axis=-1)
         return x[:, None, :] + np.einsum('ik,tkd->tid', arms, rods), phi
@@ -52,7 +53,7 @@ class PlanarChain:
         normals = self.length * np.stack([-np.sin(angles), np.cos(angles)])
         return -(normals * rates) @ self._arms().T.sum(axis=1) / self.links
 
-    def _derivative(self, t: float, y: np.ndarray, gravity: np.ndarray) -> np.ndarray:
+    def _derivative(self, y: np.ndarray, gravity: np.ndarray) -> np.ndarray:
         n = self.links
         phi, rates = y[2:2 + n], y[4 + n:]
         arms = self._arms()

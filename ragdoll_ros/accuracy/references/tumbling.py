@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ... import rotation
+from .integration import integrate
 
 
 def tumble(inertia: Sequence[float], omega: Sequence[float],
@@ -15,7 +16,6 @@ def tumble(inertia: Sequence[float], omega: Sequence[float],
     ``inertia`` are the principal moments, ``omega`` the first angular velocity along the
     principal axes, which are the world's at the start. DOP853 at 1e-12.
     """
-    from scipy.integrate import solve_ivp
     moments = np.array(inertia, float)
 
     def derivative(t: float, y: np.ndarray) -> np.ndarray:
@@ -24,6 +24,5 @@ def tumble(inertia: Sequence[float], omega: Sequence[float],
         return np.concatenate([turn, np.cross(moments * w, w) / moments])
 
     start = np.concatenate([rotation.IDENTITY, omega])
-    solved = solve_ivp(derivative, (times[0], times[-1]), start, 'DOP853', times,
-                       rtol=1e-12, atol=1e-12)
-    return rotation.normalized(solved.y[:4].T), solved.y[4:].T
+    rows = integrate(derivative, start, times)
+    return rotation.normalized(rows[:, :4]), rows[:, 4:]
