@@ -1,8 +1,8 @@
 """One hinge under gravity: pendulums, small, large and damped.
 
-A doll's root is free, so a pendulum hangs on a root of a thousand million kg. Gravity is off, and
+A doll's root is free, so a pendulum hangs on a root of a million million kg. Gravity is off, and
 a steady push of the bob's own weight acts on its centre instead: for the bob the same, while the
-root, 100 m wide, stays where it is to 2e-8 m and does not turn.
+root, 100 m wide, stays where it is to 2e-11 m and does not turn.
 """
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..trajectory import Trajectory
 from ..trial import Trial, posed
 from .motion import Motion, alone, course, turned
 
-PIVOT = 1e9
+PIVOT = 1e12
 """kg"""
 
 LENGTH, MASS, GRAVITY = 0.5, 1.0, 9.8
@@ -36,7 +36,7 @@ OMEGA = math.sqrt(MASS * GRAVITY * LENGTH / MOMENT)
 def mechanism_motions() -> list[Motion]:
     """All pendulums."""
     return [swing('pendulum_small', 'Pendulum, 5°, 2 s', math.radians(5)),
-            swing('pendulum_large', 'Pendulum, 150°, 2 s', math.radians(150)),
+            swing('pendulum_large', 'Pendulum, 120°, 2 s', math.radians(120)),
             damped('damped_under', 'under-damped (ζ = 0.2)', 0.2),
             damped('damped_critical', 'critically damped (ζ = 1)', 1.0),
             damped('damped_over', 'over-damped (ζ = 3)', 3.0)]

@@ -15,8 +15,8 @@ from .precision import motions
 NAME = 'orders'
 TICKS = (0.02, 0.01, 0.005, 0.0025, 0.00125)
 MOTIONS = ('pendulum_large', 'flight_gentle', 'flight_long')
-FLOOR = {'pendulum_large': 1e-8, 'flight_gentle': 1e-11, 'flight_long': 1e-11}
-"""Errors below these are the reference's or rounding's (a pendulum's root gives way by 2e-8 m)."""
+FLOOR = 1e-11
+"""Errors below are the reference's or rounding's (a pendulum's root gives way by 2e-11 m)."""
 
 CEILING = 0.3
 """Errors above it are no longer small: theory says nothing about them."""
@@ -47,7 +47,7 @@ def measure_all(motion_name: str) -> list[Row]:
         rows.append({'motion': motion_name, 'title': motion.title, 'method': method.name,
                      'label': method.label.removesuffix(', N = 1'), 'theory': method.order,
                      'ticks_s': list(TICKS), 'errors': errors,
-                     **slope(TICKS, errors, FLOOR[motion_name])})
+                     **slope(TICKS, errors, FLOOR)})
     return rows
 
 
