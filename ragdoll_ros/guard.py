@@ -49,10 +49,12 @@ class Guard:
         """Start the account anew from a state."""
         energy = self._mechanics.energy(state)
         self.account = Account(energy, np.zeros_like(energy))
+        self.worked = np.zeros_like(energy)
 
     def add_work(self, work: np.ndarray) -> None:
         """Enter work (d,) J that pushes did."""
         self.account.energy += work
+        self.worked += work
         self.account.put_in += np.abs(work)
 
     def surplus(self, motion: Motion, groups: np.ndarray) -> np.ndarray:
@@ -90,23 +92,25 @@ class Guard:
     def momentum_kept(self, coordinates: Coordinates, before: Motion, after: Motion,
                       duration: float, impulse: np.ndarray,
                       moment: np.ndarray | None) -> Coordinates:
-        """Give back to dolls in the air the momentum that they must have.
+        """Give back to dolls in the air the momentum, and the way, that they must have.
 
         ``impulse`` (d, 3) N s and ``moment`` (d, 3) N m s are what pushes gave; no moment: the
         angular momentum is left as it is. A change of a root's velocities moves the whole doll
         as one rigid body, so that it takes a spin Ic^-1 dL and no joint notices.
         """
         masses = self._mechanics.doll_masses[:, None]
-        weight = masses * self._gravity * duration
-        linear = (before.momentum + weight + impulse - after.momentum) / masses
-        layout, v = self._layout, coordinates.v.copy()
+        impulse = impulse + masses * self._gravity * duration
+        way = (before.momentum + impulse / 2) * duration / masses
+        linear = (before.momentum + impulse - after.momentum) / masses
+        layout, q, v = self._layout, coordinates.q.copy(), coordinates.v.copy()
+        q[layout.root_positions] += before.centre + way - after.centre
         if moment is not None:
             missing = before.spin + moment - after.spin
             spin = np.linalg.solve(after.locked_inertia, missing[:, :, None])[:, :, 0]
             linear += cross(spin, coordinates.q[layout.root_positions] - after.centre)
             v[layout.root_spins] += spin
         v[layout.root_velocities] += linear
-        return Coordinates(coordinates.q, v)
+        return Coordinates(q, v)
 
     def without_surplus(self, coordinates: Coordinates, motion: Motion, surplus: np.ndarray,
                         touching: bool) -> Coordinates:

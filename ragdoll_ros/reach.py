@@ -37,6 +37,14 @@ class Reach:
         reach = (boxes * down).sum(axis=1) + along * down[:, 2] + rounds + rims * across
         return state.positions @ self._normal - self._ground.offset - reach
 
+    def falling(self, state: State, soon: float) -> float:
+        """Largest speed, m/s, at which any point of a bone that can reach the ground sinks."""
+        if self._ground is None:
+            return 0.0
+        spins = np.sqrt(np.einsum('ij,ij->i', state.angular, state.angular))
+        speeds = self._radii * spins - state.linear @ self._normal
+        return float(speeds[self.heights(state) < speeds * soon + MARGIN].max(initial=0.0))
+
     def in_air(self, state: State, duration: float, acceleration: float) -> bool:
         """Tell whether no bone can reach the ground or another doll within ``duration`` s.
 

@@ -86,6 +86,11 @@ class Simulation:
                      if active.start <= self.time < active.end)
 
     @property
+    def coordinates(self) -> Coordinates:
+        """Generalised coordinates of all dolls now."""
+        return self._stepper.coordinates
+
+    @property
     def joint_angles(self) -> np.ndarray:
         """All joint angles, rad, in the order of Scene.angle_names."""
         return self._stepper.engine.joint_angles()
@@ -118,6 +123,18 @@ class Simulation:
             self._go(min(end, self._next_change()))
         self._queue = [active for active in self._queue if active.end > self.time]
         self._rest()
+        return self._state
+
+    def place(self, coordinates: Coordinates) -> State:
+        """Put the dolls elsewhere, with other velocities, and take that as the start of all.
+
+        Bones that overlap there do not collide from then on.
+        """
+        self._stepper.place(coordinates)
+        self._stepper.engine.let_overlaps_be()
+        self._stepper.look()
+        self._start = (self._stepper.engine.save(), self._stepper.coordinates)
+        self._begin()
         return self._state
 
     def reset(self) -> State:
@@ -194,7 +211,7 @@ class Simulation:
         self._state = state
         self._motion = self.mechanics.motion(state)
 
-    def _place(self, coordinates: Coordinates) -> None:
+    def _correct(self, coordinates: Coordinates) -> None:
         self._stepper.place(coordinates)
         self._see(self._stepper.state)
 
@@ -209,7 +226,7 @@ class Simulation:
             impulse[doll] += force * duration
             moment[doll] += torque * duration
             steady = steady and not load.force.any()
-        self._place(self._guard.momentum_kept(
+        self._correct(self._guard.momentum_kept(
             self._stepper.coordinates, before, self._motion, duration, impulse,
             moment if steady else None))
 
@@ -219,7 +236,7 @@ class Simulation:
         surplus = guard.surplus(self._motion, groups)
         if (surplus > 0).any():
             outside = any(a != b for a, b in touching)
-            self._place(guard.without_surplus(
+            self._correct(guard.without_surplus(
                 self._stepper.coordinates, self._motion, surplus, outside))
         guard.settle(self._motion.energy, groups)
 
@@ -276,7 +293,7 @@ class Simulation:
         self._still = self._still + self.tick if still else 0
         if self._still >= REST_TIME and any(GROUND in pair for pair in self._stepper.touching):
             coordinates = self._stepper.coordinates
-            self._place(dataclasses.replace(coordinates, v=np.zeros_like(coordinates.v)))
+            self._correct(dataclasses.replace(coordinates, v=np.zeros_like(coordinates.v)))
             self._guard.settle(self._motion.energy, self._guard.groups(self._stepper.touching))
             self.asleep = True
 

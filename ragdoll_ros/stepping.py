@@ -41,7 +41,8 @@ class Accuracy:
     flight_turn: float
     """rad that the fastest bone may turn in one Runge-Kutta step."""
     redo: float = math.radians(1.0)
-    """rad past a limit from which a step is done again, four times as fine; infinity: never."""
+    """rad past a limit from which a step is done again, four times as fine, as it is when a bone
+    sinks deeper than ``sink``; infinity: never."""
     adaptive: bool = True
     """Substeps by need; otherwise always ``contact`` in 10 ms."""
     energy: bool = True
@@ -52,11 +53,11 @@ class Accuracy:
     """Stop the engine when all is at rest."""
 
 
-DRAFT = Accuracy(turn=0.15, limit=0.06, contact=4, settled=2, sink=0.015, most=16, order=2,
+DRAFT = Accuracy(turn=0.15, limit=0.06, contact=4, settled=2, sink=0.015, most=32, order=2,
                  flight_turn=0.8, redo=math.radians(4))
-NORMAL = Accuracy(turn=0.06, limit=0.025, contact=8, settled=4, sink=0.006, most=32, order=3,
+NORMAL = Accuracy(turn=0.06, limit=0.025, contact=8, settled=4, sink=0.006, most=64, order=3,
                   flight_turn=0.4, redo=math.radians(2))
-EXACT = Accuracy(turn=0.02, limit=0.01, contact=16, settled=8, sink=0.002, most=64, order=4,
+EXACT = Accuracy(turn=0.02, limit=0.01, contact=16, settled=8, sink=0.002, most=256, order=4,
                  flight_turn=0.2, redo=math.radians(1))
 ACCURACIES = {'draft': DRAFT, 'normal': NORMAL, 'exact': EXACT}
 
@@ -104,6 +105,8 @@ class Stepper:
         self._layout = self.engine.layout
         self._gravity = math.hypot(*scene.gravity)
         self._normal = np.array(scene.ground.normal if scene.ground else (0.0, 0.0, 1.0))
+        self._damped = any(joint.damping for placement in scene.dolls
+                           for joint in placement.doll.joints)
         self.effort = Effort()
         self.look()
 
@@ -157,7 +160,7 @@ class Stepper:
             early = piece * least / (least - room) if least > 0 > room else 0.0
             if early > SHORTEST and self._fly_early(start, early, loads):
                 return flown + early
-            self._back_to(start, state)
+            self._back_to(start, state, set())
             return flown
         return duration
 
@@ -171,9 +174,10 @@ class Stepper:
         self.place(end)
         self.touching = self.engine.touching()
 
-    def _back_to(self, start: Coordinates, state: State) -> None:
+    def _back_to(self, start: Coordinates, state: State,
+                 touching: set[tuple[int, int]]) -> None:
         self.engine.place(start)
-        self.coordinates, self.state, self.touching = start, state, set()
+        self.coordinates, self.state, self.touching = start, state, touching
 
     def _room(self) -> float:
         """Room (rad or m) to the nearest limit or the ground; below zero: past it."""
@@ -188,22 +192,27 @@ class Stepper:
 
     def _step(self, duration: float, loads: Sequence[Load]) -> float:
         """Take the engine's own step, finer if it overshoots a limit; give its substep, s."""
-        start, state = self.coordinates, self.state
-        past = self._layout.past_limits(start.q).max(initial=-math.inf)
+        start, state, touching = self.coordinates, self.state, self.touching
+        bound = max(1.0, self._too_far())
         substeps = self._substeps(duration, bool(loads))
         most = max(1, math.ceil(self.accuracy.most * duration / 0.01))
         while True:
             self._run(duration, substeps, loads)
-            over = self._layout.past_limits(self.coordinates.q).max(initial=-math.inf)
-            if over < max(self.accuracy.redo, past) or substeps >= most:
+            if substeps >= most or self._too_far() <= bound:
                 return duration / substeps
-            self._back_to(start, state)
+            self._back_to(start, state, touching)
             substeps = min(most, 4 * substeps)
             self.effort.redone += 1
 
+    def _too_far(self) -> float:
+        """Tell how far past a limit or in the ground, in units of what is put up with."""
+        past = float(self._layout.past_limits(self.coordinates.q).max(initial=0.0))
+        sunk = -float(self.reach.heights(self.state).min())
+        return max(past / self.accuracy.redo, sunk / self.accuracy.sink)
+
     def _run(self, duration: float, substeps: int, loads: Sequence[Load]) -> None:
-        """Let the engine go; loads along a bone's own axes turn with it at each substep."""
-        if any(load.local for load in loads):
+        """Let the engine go; what changes with the motion is looked at again each substep."""
+        if self._damped or any(load.local for load in loads):
             for _ in range(substeps):
                 self.engine.step(duration / substeps, 1, loads)
         else:
@@ -224,10 +233,10 @@ class Stepper:
             past = self._layout.past_limits(self.coordinates.q)
             near = speeds[past + SOON * speeds > 0]
             need = max(need, near.max(initial=0.0) * duration / accuracy.limit)
-        if self.touching or not self.reach.in_air(state, SOON, self._gravity):
-            falling = max(0.0, -float((state.linear @ self._normal).min()))
-            fast = falling > 0.3 or spin > 1.0
-            need = max(need, (accuracy.contact if fast else accuracy.settled) * tens,
+        falling = self.reach.falling(state, SOON)
+        if self.touching or falling:
+            moving = falling > 0.3 or spin > 1.0
+            need = max(need, (accuracy.contact if moving else accuracy.settled) * tens,
                        falling * duration / accuracy.sink)
         most = max(1, math.ceil(accuracy.most * tens))
         return min(most, 2 ** math.ceil(math.log2(need)))

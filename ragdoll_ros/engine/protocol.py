@@ -75,6 +75,9 @@ class Engine(Protocol):
     def touching(self) -> set[tuple[int, int]]:
         """Pairs of dolls that touch where they are now; GROUND stands for the ground."""
 
+    def let_overlaps_be(self) -> None:
+        """Let pairs of bones of one doll that overlap now collide no more: they would burst."""
+
     def contacts(self) -> list[Contact]:
         """What touches at the end of the last substep."""
 
