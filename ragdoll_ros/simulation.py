@@ -11,6 +11,7 @@ from . import faults, rotation
 from .coordinates import Coordinates
 from .engine.bullet import BulletEngine
 from .engine.protocol import GROUND, Engine, Load
+from .gap import JointGap
 from .guard import Guard
 from .mechanics import Mechanics, Motion
 from .push import Push
@@ -51,14 +52,12 @@ class Simulation:
                  accuracy: str | Accuracy = 'normal',
                  engine: type[Engine] = BulletEngine) -> None:
         self.scene = scene
-        step = scene.step if step is None else step
-        faults.check_range('step', step, *STEP_RANGE)
-        self.tick = round(step * SECOND)
-        """Nanoseconds in a tick."""
+        self.step = scene.step if step is None else step
         self.mechanics = Mechanics(scene)
         self._stepper = Stepper(scene, engine, resolve_accuracy(accuracy))
         self._guard = Guard(scene, self.mechanics, self._stepper.engine.layout)
         self._start = (self._stepper.engine.save(), self._stepper.coordinates)
+        self._gap = JointGap(scene)
         self._sizes = np.array([max(bone.shape.half_extents) for bone in scene.bones])
         self._weightless = not any(scene.gravity)
         self._begin()
@@ -75,9 +74,24 @@ class Simulation:
         return self._state
 
     @property
+    def step(self) -> float:
+        """A tick in s; may be changed between ticks."""
+        return self.tick / SECOND
+
+    @step.setter
+    def step(self, step: float) -> None:
+        faults.check_range('step', step, *STEP_RANGE)
+        self.tick = round(step * SECOND)
+        """Nanoseconds in a tick."""
+
+    @property
     def accuracy(self) -> Accuracy:
         """How fine; may be changed between ticks."""
         return self._stepper.accuracy
+
+    @accuracy.setter
+    def accuracy(self, accuracy: str | Accuracy) -> None:
+        self._stepper.accuracy = resolve_accuracy(accuracy)
 
     @property
     def pushes(self) -> tuple[Push, ...]:
@@ -121,6 +135,7 @@ class Simulation:
         end = self.time + self.tick
         while self.time < end:
             self._go(min(end, self._next_change()))
+        self._redone += self.effort.redone
         self._queue = [active for active in self._queue if active.end > self.time]
         self._rest()
         return self._state
@@ -146,15 +161,22 @@ class Simulation:
         self._begin()
         return self._state
 
-    def place(self, coordinates: Coordinates) -> State:
-        """Put all dolls elsewhere and begin anew there, at time 0; pushes that wait are dropped.
-
-        reset() still goes back to where the scene itself starts.
-        """
-        self._stepper.place(coordinates)
-        self._stepper.touching = self._stepper.engine.touching()
-        self._begin()
-        return self._state
+    def measures(self) -> dict[str, float]:
+        """Tell what went wrong so far, and what the last tick took: names end in their units."""
+        stepper, guard = self._stepper, self._guard
+        sunk = -float(stepper.reach.heights(self._state).min())
+        return {
+            'energy_excess_J': float((self._motion.energy - guard.start - guard.worked).sum()),
+            'energy_projected_J': float(guard.account.taken),
+            'work_of_pushes_J': float(guard.worked.sum()),
+            'joint_gap_m': float(self._gap.gaps(self._state).max(initial=0.0)),
+            'limit_overshoot_rad': float(
+                stepper.engine.layout.past_limits(self.coordinates.q).max(initial=0.0)),
+            'sinking_m': max(0.0, sunk),
+            'flights': self.effort.flights,
+            'substeps': self.effort.substeps,
+            'redone_total': self._redone,
+            'asleep': float(self.asleep)}
 
     def close(self) -> None:
         """Give the engine back; a second time does nothing."""
@@ -168,6 +190,7 @@ class Simulation:
         self._motion = self.mechanics.motion(self._state)
         self._guard.open(self._state)
         self._still = 0
+        self._redone = 0
         self.asleep = False
         """Whether all is at rest and the engine stands."""
         self.effort = Effort()

@@ -9,6 +9,7 @@ pytest.importorskip('scipy')
 
 from ragdoll_ros import rotation
 from ragdoll_ros.accuracy.measure import Measure, compare
+from ragdoll_ros.accuracy.motions.motion import without_damping
 from ragdoll_ros.accuracy.references.articulated import Articulated
 from ragdoll_ros.accuracy.trajectory import Trajectory
 from ragdoll_ros.accuracy.trial import Trial, angle_places, posed
@@ -18,7 +19,7 @@ from ragdoll_ros.ragdoll import Bone, Box, Joint, Ragdoll, Sphere
 from ragdoll_ros.scene import Ground, Placement, Scene
 from ragdoll_ros.scene_file import load_doll, load_scene
 
-DOLL = load_doll('doll')
+DOLL = without_damping(load_doll('doll'))
 
 
 def moving_doll(seed=0, gravity=(0, 0, -9.8), duration=.2):

@@ -70,7 +70,8 @@ def figures(case: HardCase, trial: Trial, moved: Trajectory) -> Row:
     return {'excess': float(((energy - energy[0] - work - lift) / own).max()),
             'gap_m': measure.gap(moved), 'overshoot_rad': measure.overshoot(moved),
             'sinking_m': measure.sinking(moved),
-            'end_sinking_m': measure.sinking(moved.part(slice(-1, None))), 'fastest_m_s': float(speeds.max()),
+            'end_sinking_m': measure.sinking(moved.part(slice(-1, None))),
+            'fastest_m_s': float(speeds.max()),
             'end_m_s': float(speeds[-10:].max()), 'settled_s': measure.settled(moved)}
 
 

@@ -42,14 +42,12 @@ class MujocoEngine:
             raise MissingEngine('MuJoCo is missing: pip install "ragdoll_ros[report]"') from error
         self.scene = scene
         self._mujoco = mujoco
-        self._build(self._overlaps())
-        self._model.opt.integrator = getattr(
-            mujoco.mjtIntegrator, 'mjINT_' + integrator.upper())
-        # a scene that explodes shall be seen to: MuJoCo would put it back to its start
-        self._model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-        if free:
-            self._model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+        self._integrator = getattr(mujoco.mjtIntegrator, 'mjINT_' + integrator.upper())
+        self._free = free
+        self._apart: set[frozenset[str]] = set()
+        self._build()
         self._set_in_motion()
+        self.let_overlaps_be()
 
     def step(self, duration: float, substeps: int, loads: Sequence[Load] = ()) -> None:
         """Go on by ``duration`` s in equal substeps, under ``loads`` that do not turn."""
@@ -121,6 +119,22 @@ class MujocoEngine:
             return set()
         return {tuple(pair) for pair in self._doll_of[self._data.contact.geom].tolist()}
 
+    def let_overlaps_be(self) -> None:
+        """Let pairs of bones of one doll that overlap now collide no more: they would burst."""
+        self._refresh()
+        self._mujoco.mj_collision(self._model, self._data)
+        bodies, roots = self._model.geom_bodyid, self._model.body_rootid
+        pairs = set()
+        for contact in self._data.contact:
+            a, b = bodies[contact.geom]
+            if contact.dist < 0 and a and b and roots[a] == roots[b]:
+                pairs.add(frozenset(self._model.body(int(body)).name for body in (a, b)))
+        if pairs:
+            here = self.coordinates()
+            self._apart |= pairs
+            self._build()
+            self.place(here)
+
     def contacts(self) -> list[Contact]:
         """What touches now."""
         self._mujoco.mj_forward(self._model, self._data)
@@ -154,22 +168,15 @@ class MujocoEngine:
     def close(self) -> None:
         """Nothing to give back: the memory goes with the object."""
 
-    def _overlaps(self) -> set[frozenset[str]]:
-        """Names of the pairs of one doll that overlap at the start; they would burst."""
-        model = self._mujoco.MjModel.from_xml_string(to_mjcf(self.scene))
-        data = self._mujoco.MjData(model)
-        self._mujoco.mj_forward(model, data)
-        pairs = set()
-        for contact in data.contact:
-            if contact.dist < 0:
-                bodies = model.geom_bodyid[contact.geom]
-                if bodies.all() and np.ptp(model.body_rootid[bodies]) == 0:
-                    pairs.add(frozenset(model.body(int(body)).name for body in bodies))
-        return pairs
-
-    def _build(self, apart: set[frozenset[str]]) -> None:
-        self._model = self._mujoco.MjModel.from_xml_string(to_mjcf(self.scene, apart))
-        self._data = self._mujoco.MjData(self._model)
+    def _build(self) -> None:
+        mujoco = self._mujoco
+        self._model = mujoco.MjModel.from_xml_string(to_mjcf(self.scene, self._apart))
+        self._data = mujoco.MjData(self._model)
+        self._model.opt.integrator = self._integrator
+        # a scene that explodes shall be seen to: MuJoCo would put it back to its start
+        self._model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        if self._free:
+            self._model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         self._bodies = np.array([self._model.body(name).id for name in self.scene.bone_names])
         self._bone_of = {self._model.geom(name).id: bone
                          for bone, name in enumerate(self.scene.bone_names)}

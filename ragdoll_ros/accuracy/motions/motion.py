@@ -53,6 +53,12 @@ def without_limits(doll: Ragdoll) -> Ragdoll:
         dataclasses.replace(joint, limits=()) for joint in doll.joints))
 
 
+def without_damping(doll: Ragdoll) -> Ragdoll:
+    """Give the same doll with joints that lose nothing: its energy is a constant of flight."""
+    return dataclasses.replace(doll, joints=tuple(
+        dataclasses.replace(joint, damping=0.0) for joint in doll.joints))
+
+
 def alone(doll: Ragdoll, gravity: tuple[float, float, float] = (0.0, 0.0, -9.8),
           **placed: object) -> Scene:
     """Give a scene of one doll in the air, whose bones pass through each other."""

@@ -11,7 +11,7 @@ from ...scene import Placement
 from ...scene_file import load_doll, load_scene
 from ..measure import Measure
 from ..methods import Method, bullet, mujoco, ours, quickstart, run
-from ..motions.motion import alone
+from ..motions.motion import alone, without_damping
 from ..runner import Job, Options, Row
 from ..trial import Trial, posed
 
@@ -42,9 +42,7 @@ def falling() -> Trial:
 def spinning() -> Trial:
     """A doll that nothing touches, spun at 10 rad/s, limits on: its energy cannot rise."""
     placed = {'spin': tuple(10 * rotation.normalized(np.array((1.0, 2.0, 2.0))))}
-    doll = load_doll('doll')
-    doll = dataclasses.replace(doll, joints=tuple(
-        dataclasses.replace(joint, damping=0.0) for joint in doll.joints))
+    doll = without_damping(load_doll('doll'))
     return Trial(alone(doll, (0.0, 0.0, 0.0), **placed), 3.0, posed(Placement(doll, **placed)))
 
 
