@@ -49,7 +49,10 @@ class Guard:
         """Start the account anew from a state."""
         energy = self._mechanics.energy(state)
         self.account = Account(energy, np.zeros_like(energy))
+        self.start = energy.copy()
+        """(d,) J at the start."""
         self.worked = np.zeros_like(energy)
+        """(d,) J: work of pushes since."""
 
     def add_work(self, work: np.ndarray) -> None:
         """Enter work (d,) J that pushes did."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -350,6 +351,13 @@ class Ragdoll:
         bones = tuple(dataclasses.replace(bone, **changes) if bone.name == name else bone
                       for bone in self.bones)
         return dataclasses.replace(self, bones=bones)
+
+    def renamed(self, rename: Callable[[str], str]) -> Ragdoll:
+        """Give the same doll with every bone named anew."""
+        bones = tuple(dataclasses.replace(bone, name=rename(bone.name)) for bone in self.bones)
+        joints = tuple(dataclasses.replace(joint, parent=rename(joint.parent),
+                                           child=rename(joint.child)) for joint in self.joints)
+        return dataclasses.replace(self, bones=bones, joints=joints)
 
 
 def tree_faults(names: list[str], edges: list[tuple[str, str]]) -> list[faults.Fault]:

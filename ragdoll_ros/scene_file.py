@@ -43,12 +43,12 @@ def scene_names() -> list[str]:
 
 def find(name: str, beside: Path | None = None) -> Path:
     """Path of a file given by its path (also from ``beside``) or by its name in config/."""
-    choices = [Path(name).expanduser()]
+    choices = [Path(os.path.expanduser(name))]
     if beside is not None:
         choices.insert(0, beside / name)
     choices += [config_folder() / name, config_folder() / f'{name}.yaml']
     for path in choices:
-        if path.is_file():
+        if os.path.isfile(path):
             return path
     raise faults.Unreadable('', name, f'a file, or one of {", ".join(scene_names())}')
 

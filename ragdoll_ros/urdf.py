@@ -12,6 +12,7 @@ link of no mass with the joint's frame takes it, and the child is fixed to that.
 """
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from xml.sax.saxutils import quoteattr
 
@@ -19,6 +20,7 @@ import numpy as np
 
 from . import rotation
 from .ragdoll import Bone, Box, Capsule, Joint, Ragdoll, Sphere
+from .scene import Scene
 
 UNLIMITED = 'continuous'
 
@@ -35,14 +37,41 @@ def to_urdf(doll: Ragdoll, dialect: str = 'ros', limited: bool = True) -> str:
 
     Not ``limited``: the same joints, but every one of them free.
     """
-    lines = ['<?xml version="1.0"?>', f'<robot name={quoteattr(doll.name)}>']
+    return _document(doll.name, _tree(doll, dialect, limited))
+
+
+def scene_to_urdf(scene: Scene) -> str:
+    """Write all dolls of a scene in ROS's dialect, under the bone names of the scene.
+
+    One doll stands for itself; several hang on a link ``world`` by floating joints, each where
+    its root is at the start, for URDF knows one tree only.
+    """
+    if len(scene.dolls) == 1:
+        return to_urdf(scene.dolls[0].doll)
+    lines = ['  <link name="world"/>']
+    for placement in scene.dolls:
+        doll = placement.doll.renamed(functools.partial(scene.qualified, placement))
+        position, _ = placement.bone_pose(doll.root)
+        lines += [f'  <joint name={quoteattr(doll.root.name)} type="floating">',
+                  '    <parent link="world"/>', f'    <child link={quoteattr(doll.root.name)}/>',
+                  f'    {_origin(position, np.array(placement.orientation))}', '  </joint>',
+                  *_tree(doll, 'ros', limited=True)]
+    return _document(scene.name, lines)
+
+
+def _document(name: str, lines: list[str]) -> str:
+    return '\n'.join(['<?xml version="1.0"?>', f'<robot name={quoteattr(name)}>', *lines,
+                      '</robot>', ''])
+
+
+def _tree(doll: Ragdoll, dialect: str, limited: bool) -> list[str]:
     frames = {doll.root.name: (np.array(doll.root.position), np.array(rotation.IDENTITY))}
-    lines += _link(doll.root, frames[doll.root.name], dialect)
+    lines = _link(doll.root, frames[doll.root.name], dialect)
     for joint in doll.joints_from_root():
         frames[joint.child] = (np.array(joint.anchor), joint_frame(joint))
         lines += _joint(joint, frames, dialect, limited)
         lines += _link(doll.bone(joint.child), frames[joint.child], dialect)
-    return '\n'.join([*lines, '</robot>', ''])
+    return lines
 
 
 def _numbers(values: Sequence[float]) -> str:

@@ -1,0 +1,97 @@
+# Wants GNU make and a python3 of 3.10 or newer with its venv module; sets up the rest in .venv,
+# with ROS 2 Jazzy from PyPI's wheels, or with the ROS that the shell has sourced.
+PYTHON ?= python3
+EXTRAS := test,report,fit
+VENV := .venv
+BIN := $(VENV)/bin
+PIP = $(BIN)/python -m pip --disable-pip-version-check
+BRIEF = $$(test -t 2 || echo --quiet)
+
+# 3.12, or old-3.8, or nothing; and the sourced ROS, or wheels.
+VERSION := $(shell $(PYTHON) -c 'import sys; v = sys.version_info; \
+	print(("" if v >= (3, 10) else "old-") + "%d.%d" % v[:2])' 2>/dev/null)
+ROS := $(or $(ROS_DISTRO),wheels)
+READY := $(VENV)/ready-$(VERSION)-$(ROS)
+
+ifeq ($(ROS),wheels)
+export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV)
+ROS_EXTRA := ,ros
+else
+VENV_FLAGS := --system-site-packages
+endif
+
+.PHONY: help run test lint slow bench hard report colcon users-versions clean
+help: ## this list
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 22
+
+run: $(READY) ## the doll falls; arrow keys push it
+	@$(BIN)/python -m ragdoll_ros.ros.run
+
+test: $(READY) ## the tests, at most 90 s
+	@$(BIN)/python -m pytest
+
+lint: $(READY) ## ruff
+	@$(BIN)/ruff check .
+
+slow: $(READY) ## the tests that take minutes
+	@$(BIN)/python -m pytest -m slow
+
+bench: $(READY) ## cost of a tick and of its parts
+	@$(BIN)/python -m ragdoll_ros.ros.bench
+
+report: $(READY) ## accuracy against independent references, into docs/
+	@$(BIN)/python -m ragdoll_ros.accuracy.command --out docs
+
+hard: $(READY) ## hard cases, each with its rule, as a table
+	@$(BIN)/python -m ragdoll_ros.accuracy.hard
+
+WORKSPACE := build/colcon
+COLCON = PATH="$(CURDIR)/$(BIN):$$PATH" colcon --log-base $(WORKSPACE)/log
+FOLDERS := --build-base $(WORKSPACE)/build --install-base $(WORKSPACE)/install
+colcon: $(VENV)/colcon ## build and test as in a ROS workspace
+	@$(COLCON) list --base-paths . | grep -F '(ros.ament_python)' || { $(COLCON) list --base-paths .; \
+	  echo 'colcon takes ragdoll_ros for plain Python: package.xml has a fault' >&2; exit 1; }
+	@$(COLCON) build --base-paths . $(FOLDERS) --event-handlers console_cohesion+
+	@$(COLCON) test --base-paths . $(FOLDERS) --event-handlers console_direct+ \
+	  --return-code-on-test-failure
+	@$(COLCON) test-result --test-result-base $(WORKSPACE)/build --verbose
+
+users-versions: ## the tests with Ubuntu 24.04's versions; builds PyBullet from source, 6 to 9 min
+	@sh test/users_versions.sh
+
+clean: ## remove all that was made, .venv included
+	rm -rf $(VENV) build install log dist *.egg-info .pytest_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(READY): setup.py pyproject.toml
+	$(if $(VERSION),,$(error no $(PYTHON): apt install python3 python3-venv, or name one: \
+	  make PYTHON=/path/to/python3))
+	$(if $(filter old-%,$(VERSION)),$(error $(PYTHON) is Python $(VERSION:old-%=%); 3.10 or newer \
+	  is needed: make PYTHON=/path/to/python3))
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+	  echo '$(PYTHON) lacks its venv module: apt install python3-venv make' >&2; exit 1; }
+	@test $(ROS) = wheels || $(PYTHON) -c 'import rclpy' || { \
+	  echo 'ROS $(ROS) is sourced, but $(PYTHON) ($(VERSION)) cannot import its rclpy:' >&2; \
+	  echo 'use the Python of that ROS, make PYTHON=/usr/bin/python3, or a shell without ROS' >&2; \
+	  exit 1; }
+	@echo "Setting up $(VENV) with Python $(VERSION) and ROS 2 from" \
+	  "$(if $(VENV_FLAGS),the sourced $(ROS),PyPI's Jazzy wheels); once, a few minutes at most"
+	@test -e $@ || $(PYTHON) -m venv --clear $(VENV_FLAGS) $(VENV)
+	@# A sourced rclpy is built against the numpy beside it: that one stays.
+	@$(if $(VENV_FLAGS),$(PIP) freeze,true) | grep '^numpy==' > $(VENV)/keep.txt || true
+	@$(PIP) install --quiet --only-binary :all: pybullet 2>/dev/null || $(MAKE) pybullet-from-source
+	@$(PIP) install $(BRIEF) --constraint $(VENV)/keep.txt --editable '.[$(EXTRAS)$(ROS_EXTRA)]'
+	@touch $@
+
+.PHONY: pybullet-from-source
+pybullet-from-source:
+	@echo 'No ready-made PyBullet for Python $(VERSION): building it takes 6 to 9 minutes, once'
+	@command -v c++ >/dev/null || { \
+	  echo 'which needs a C++ compiler: apt install g++ python3-dev' >&2; exit 1; }
+	@$(PYTHON) -c 'import os, sysconfig as s; open(os.path.join(s.get_path("include"), "Python.h"))' \
+	  2>/dev/null || { echo "which needs Python's headers: apt install python3-dev" >&2; exit 1; }
+	@$(PIP) install pybullet
+
+$(VENV)/colcon: $(READY)
+	@$(PIP) install $(BRIEF) --constraint $(VENV)/keep.txt --editable '.[colcon]'
+	@touch $@

@@ -1,0 +1,1 @@
+"""The ROS side: it converts, schedules and shows, and leaves the physics to the simulation."""

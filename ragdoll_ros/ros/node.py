@@ -1,0 +1,217 @@
+"""The node: makes a simulation go by the clock on the wall, and ties it to topics."""
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+
+import rclpy
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import ParameterException
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.utilities import remove_ros_args
+
+from .. import faults
+from ..pacing import Pacer
+from ..scene import STEP_RANGE, Scene
+from ..simulation import Simulation
+from .diagnostics import Diagnostics
+from .inputs import Inputs
+from .outputs import Outputs
+from .parameters import Parameters, Settings
+from .services import Services
+from .stamps import Stamps
+from .tally import Tally
+
+SHORTEST_PERIOD = 1_000_000
+"""ns between two calls of the timer at the least; at a faster pace, it makes several ticks."""
+
+LONGEST_BURST = 20_000_000
+"""ns that the timer may make ticks for before others have their turn."""
+
+EXAMPLE = """examples:
+  ragdoll_node
+  ragdoll_node --ros-args -p scene:=crowd -p real_time_factor:=0.5
+  ragdoll_node --ros-args -p scene:=/path/to/my_scene.yaml
+"""
+
+
+class RagdollNode(Node):
+    """The node ``ragdoll``. Options are those of rclpy's Node.
+
+    Raises a RagdollError with all that is wrong if its parameters or its scene can not be.
+    """
+
+    def __init__(self, **options: object) -> None:
+        super().__init__('ragdoll', **options)
+        try:
+            self._set_up()
+        except BaseException:
+            self.destroy_node()
+            raise
+
+    def _set_up(self) -> None:
+        self.tally = Tally(self.get_logger())
+        self._tuning = Parameters(self)
+        self.simulation = make_simulation(self._tuning.scene, self.settings)
+        self._prepared: Simulation | None = None
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._stamps = Stamps(self.get_clock().now().nanoseconds)
+        self._outputs = Outputs(self)
+        self._inputs = Inputs(self, self.tally)
+        self._diagnostics = Diagnostics(self, self._steady, self.tally, self._facts,
+                                        self._wanted_pace)
+        Services(self)
+        self.paused = False
+        self._use(self.simulation)
+        self._outputs.be_clock(self.settings.publish_clock)
+        self._pacer = Pacer(self._period(), self._now())
+        self._timer = self.create_timer(1.0, self._catch_up, clock=self._steady)
+        self._restart_timer()
+        self._tuning.watch(self._prepare, self._apply)
+
+    @property
+    def settings(self) -> Settings:
+        """Values of the parameters."""
+        return self._tuning.settings
+
+    def tick(self) -> None:
+        """Go on by one tick and publish; a state that is not finite is never shown."""
+        start = self._now()
+        state = self.simulation.advance()
+        if not math.isfinite(sum(float(part.sum()) for part in vars(state).values())):
+            self.tally.refuse('state', 'not finite; the simulation was built anew')
+            self._replace(make_simulation(self._tuning.scene, self.settings))
+        self._publish()
+        self._diagnostics.count(self._now() - start, self.simulation.tick)
+
+    def reset(self) -> None:
+        """Go back to the start, to the bit, and publish it."""
+        self._stamps.begin_again(self.simulation.time, self.simulation.tick)
+        self.simulation.reset()
+        self._publish()
+
+    def pause(self, wanted: bool) -> None:
+        """Hold the time, or let it go on from where it is."""
+        self.paused = wanted
+        self._restart_timer()
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Set parameters; a refusal is counted, also one by a range that rclpy checks."""
+        result = super().set_parameters_atomically(parameter_list)
+        if not result.successful:
+            self.tally.refuse('parameters', result.reason)
+        return result
+
+    def destroy_node(self) -> None:
+        """Give the engine back as well."""
+        for simulation in (getattr(self, 'simulation', None), getattr(self, '_prepared', None)):
+            if simulation is not None:
+                simulation.close()
+        super().destroy_node()
+
+    def _now(self) -> int:
+        return self._steady.now().nanoseconds
+
+    def _period(self) -> float:
+        """Give the ns on the wall from one tick to the next."""
+        return self.simulation.tick / self.settings.real_time_factor
+
+    def _catch_up(self) -> None:
+        """Make the ticks that are due, as far as there is time."""
+        end = self._now() + LONGEST_BURST
+        while self._pacer.due(self._now()):
+            self.tick()
+            if self._now() > end:
+                break
+
+    def _restart_timer(self) -> None:
+        if self.paused:
+            self._timer.cancel()
+            return
+        self._pacer.period = self._period()
+        self._pacer.start(self._now())
+        self._timer.timer_period_ns = max(SHORTEST_PERIOD, round(self._pacer.period))
+        self._timer.reset()
+
+    def _publish(self) -> None:
+        simulation = self.simulation
+        stamp = self._stamps.at(simulation.time, self.settings.publish_clock)
+        self._outputs.publish(simulation, stamp, self._now())
+
+    def _use(self, simulation: Simulation) -> None:
+        """Let all parts work with this simulation and the settings as they are."""
+        self.simulation = self._inputs.simulation = self._diagnostics.simulation = simulation
+        self._inputs.settings = self.settings
+        self._outputs.describe(simulation.scene, self.settings.frame_id)
+
+    def _replace(self, simulation: Simulation) -> None:
+        self._stamps.begin_again(self.simulation.time, self.simulation.tick)
+        self.simulation.close()
+        self._use(simulation)
+
+    def _prepare(self, changed: set[str], settings: Settings, scene: Scene) -> None:
+        """Build what may fail before the change is accepted."""
+        if self._prepared is not None:
+            self._prepared.close()
+        self._prepared = make_simulation(scene, settings) if 'scene' in changed else None
+
+    def _apply(self, changed: set[str]) -> None:
+        """Carry a change of the settings out."""
+        settings = self._inputs.settings = self.settings
+        self._outputs.be_clock(settings.publish_clock)
+        if self._prepared is not None:
+            simulation, self._prepared = self._prepared, None
+            self._replace(simulation)
+            self._publish()
+        elif 'frame_id' in changed:
+            self._outputs.describe(self.simulation.scene, settings.frame_id)
+        self.simulation.accuracy = settings.accuracy
+        if changed & {'scene', 'rate', 'real_time_factor'}:
+            self.simulation.step = step_of(settings)
+            self._restart_timer()
+
+    def _wanted_pace(self) -> float:
+        return 0.0 if self.paused else self.settings.real_time_factor
+
+    def _facts(self) -> dict:
+        return {'paused': self.paused, 'real_time_factor': self.settings.real_time_factor,
+                'lost_time': self._pacer.lost / 1e9, 'stamp_of_zero': self._stamps.at(
+                    0, self.settings.publish_clock)}
+
+
+def step_of(settings: Settings) -> float:
+    """Tick in s; a rate that is at its range's end but for rounding gives the step's end."""
+    return min(max(1 / settings.rate, STEP_RANGE[0]), STEP_RANGE[1])
+
+
+def make_simulation(scene: Scene, settings: Settings) -> Simulation:
+    """Build the simulation that the settings ask for."""
+    return Simulation(scene, step_of(settings), settings.accuracy)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the node until SIGINT or SIGTERM; 0, or 2 if it cannot start as it is asked to."""
+    arguments = sys.argv if arguments is None else arguments
+    parser = argparse.ArgumentParser(
+        'ragdoll_node', description=__doc__, epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.parse_args(remove_ros_args(arguments)[1:])
+    try:
+        rclpy.init(args=arguments)
+        rclpy.spin(RagdollNode())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except (faults.RagdollError, ParameterException) as error:
+        print(error, file=sys.stderr)
+        return 2
+    finally:
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,75 @@
+"""All that is published of the doll: poses each tick, the rest only while somebody listens."""
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+from geometry_msgs.msg import PoseArray
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState, MultiDOFJointState
+from std_msgs.msg import String
+from visualization_msgs.msg import MarkerArray
+
+from ..scene import Scene
+from ..simulation import Simulation
+from ..urdf import scene_to_urdf
+from .markers import Markers
+from .messages import poses_of, to_joint_state, to_multi_dof, to_pose_array, to_time, twists_of
+from .packed import Packed
+
+MARKER_PERIOD = 33_000_000
+"""ns of the steady clock between two MarkerArrays: as often as a screen can use."""
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Outputs:
+    """Publishers, and the messages that go out through them."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._poses = node.create_publisher(PoseArray, '~/poses', 10)
+        self._state = node.create_publisher(MultiDOFJointState, '~/state', 10)
+        self._joints = node.create_publisher(JointState, 'joint_states', 10)
+        self._markers = node.create_publisher(MarkerArray, '~/markers', 10)
+        self._description = node.create_publisher(String, 'robot_description', LATCHED)
+        self._clock: Publisher | None = None
+
+    def describe(self, scene: Scene, frame: str) -> None:
+        """Make ready for a scene, and publish its URDF."""
+        bones, angles = len(scene.bone_names), len(scene.angle_names)
+        self._packed_poses = Packed(functools.partial(to_pose_array, frame), (bones, 7))
+        self._packed_state = Packed(functools.partial(to_multi_dof, frame, scene.bone_names),
+                                    (bones, 7), (bones, 6))
+        self._packed_joints = Packed(functools.partial(to_joint_state, frame, scene.angle_names),
+                                     (angles,))
+        self._marker_array = Markers(scene, frame)
+        self._next_markers = 0
+        self._description.publish(String(data=scene_to_urdf(scene)))
+
+    def publish(self, simulation: Simulation, stamp: int, now: int) -> None:
+        """Publish where the simulation is; ``stamp`` and the steady clock's ``now`` in ns."""
+        state = simulation.state
+        poses = poses_of(state)
+        self._poses.publish(self._packed_poses.message(stamp, poses))
+        if self._clock is not None:
+            self._clock.publish(Clock(clock=to_time(stamp)))
+        if self._state.get_subscription_count():
+            self._state.publish(self._packed_state.message(stamp, poses, twists_of(state)))
+        if self._joints.get_subscription_count():
+            angles = np.asarray(simulation.joint_angles)
+            self._joints.publish(self._packed_joints.message(stamp, angles))
+        if now >= self._next_markers and self._markers.get_subscription_count():
+            self._next_markers = now + MARKER_PERIOD
+            self._markers.publish(self._marker_array.message(stamp, state, simulation.pushes))
+
+    def be_clock(self, wanted: bool) -> None:
+        """Begin or end to publish /clock."""
+        if wanted and self._clock is None:
+            self._clock = self._node.create_publisher(Clock, '/clock', 10)
+        elif not wanted and self._clock is not None:
+            self._node.destroy_publisher(self._clock)
+            self._clock = None

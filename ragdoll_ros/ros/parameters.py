@@ -1,0 +1,185 @@
+"""The node's parameters: declared with description and range, checked, changed live."""
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from .. import faults
+from ..faults import RagdollError
+from ..scene import STEP_RANGE, Scene
+from ..scene_file import load_scene
+from ..simulation import resolve_accuracy
+from ..stepping import ACCURACIES
+
+
+def _setting(default: object, description: str, span: tuple[float, float] | None = None,
+             constraints: str = '', brought: Callable | None = None) -> object:
+    """A parameter; ``brought`` gives the default that a scene brings along."""
+    return dataclasses.field(default=default, metadata={
+        'description': description, 'span': span, 'constraints': constraints,
+        'brought': brought})
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Values of all parameters that can be set."""
+
+    scene: str = _setting(
+        'drop', 'Scene to simulate: a name in config/ or a path; a doll stands above the ground',
+        constraints='a file, or the name of a shipped one; set again, it is read again')
+    rate: float = _setting(
+        100.0, 'Ticks, and messages, in a second of simulated time, Hz',
+        (1 / STEP_RANGE[1], 1 / STEP_RANGE[0]), brought=lambda scene: 1 / scene.step)
+    real_time_factor: float = _setting(
+        1.0, 'Seconds simulated in each second on the wall', (0.001, 100.0),
+        brought=lambda scene: min(max(scene.pace, 0.001), 100.0))
+    pushed_bone: str = _setting(
+        '', 'Bone that ~/force and cmd_vel push', constraints='one of bone_names',
+        brought=lambda scene: scene.qualified(scene.dolls[0], scene.dolls[0].doll.root.name))
+    push_timeout: float = _setting(
+        0.1, 'Simulated time that a push lasts unless the next one comes first, s', (0.001, 60.0))
+    cmd_vel_timeout: float = _setting(
+        0.6, 'Simulated time that a message on cmd_vel lasts, s', (0.001, 60.0))
+    force_per_speed: float = _setting(
+        1000.0, 'Force for each m/s on cmd_vel, N/(m/s)', (0.0, 1e5))
+    torque_per_speed: float = _setting(
+        30.0, 'Torque for each rad/s on cmd_vel, N m/(rad/s)', (0.0, 1e4))
+    max_force: float = _setting(
+        10000.0, 'Longest force, N, and ten times the longest torque, N m; longer is clamped',
+        (0.0, 1e5))
+    frame_id: str = _setting('world', 'Name of the world frame in all messages')
+    publish_clock: bool = _setting(False, 'Publish simulated time on /clock and stamp by it')
+    accuracy: str = _setting('normal', 'How finely to simulate',
+                             constraints='one of ' + ', '.join(ACCURACIES))
+
+
+SPECS = {field.name: field for field in fields(Settings)}
+BONE_NAMES = 'bone_names'
+
+
+class WrongParameters(RagdollError):
+    """Start values that cannot be."""
+
+
+class Parameters:
+    """Declares the parameters and keeps ``settings`` equal to them.
+
+    A change is first prepared by ``prepare(changed, settings, scene)``, which may raise a
+    RagdollError with the reason to refuse it, and then carried out by ``apply(changed)``. A new
+    scene brings its own rate, pace and pushed bone, except for those that were set otherwise.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self.settings = Settings()
+        found: list[str] = []
+        self._declare('scene', found)
+        self.scene = load_scene(self.settings.scene)
+        for name, default in brought(self.scene).items():
+            self.settings = dataclasses.replace(self.settings, **{name: default})
+        for name in SPECS:
+            if name != 'scene':
+                self._declare(name, found)
+        try:
+            check(self.settings, self.scene)
+        except RagdollError as error:
+            found.append(str(error))
+        if found:
+            raise WrongParameters('\n'.join(found))
+        self._bone_names = ParameterDescriptor(
+            description='Names of all bones, in the order of ~/poses', read_only=True)
+        node.declare_parameter(BONE_NAMES, list(self.scene.bone_names), self._bone_names)
+
+    def watch(self, prepare: Callable[[set[str], Settings, Scene], None],
+              apply: Callable[[set[str]], None]) -> None:
+        """From now on let changes through."""
+        self._prepare, self._apply = prepare, apply
+        self._node.add_on_set_parameters_callback(self._on_set)
+        self._node.add_post_set_parameters_callback(self._after_set)
+
+    def _declare(self, name: str, found: list[str]) -> None:
+        """Declare a parameter and take its start value; a wrong one is noted in ``found``."""
+        spec, value = SPECS[name], getattr(self.settings, name)
+        try:
+            value = self._node.declare_parameter(name, value, _descriptor(spec)).value
+        except (InvalidParameterTypeException, InvalidParameterValueException) as error:
+            found.append(f'parameter {error}')
+        self.settings = dataclasses.replace(self.settings, **{name: value})
+
+    def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
+        given = _given(parameters)
+        try:
+            scene = load_scene(given['scene']) if 'scene' in given else self.scene
+            settings = dataclasses.replace(self.settings, **{**self._brought_by(scene), **given})
+            check(settings, scene)
+            changed = self._changed(given, settings)
+            self._prepare(changed, settings, scene)
+        except RagdollError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        self._next = (changed, settings, scene)
+        return SetParametersResult(successful=True)
+
+    def _after_set(self, parameters: list[Parameter]) -> None:
+        changed, self.settings, self.scene = self._next
+        if not changed:
+            return
+        self._apply(changed)
+        followed = changed - set(_given(parameters))
+        self._node.set_parameters([Parameter(name, value=getattr(self.settings, name))
+                                   for name in followed])
+        if 'scene' in changed:
+            self._set_bone_names()
+
+    def _changed(self, given: dict, settings: Settings) -> set[str]:
+        """Names of what becomes different; a scene that is set again is read again."""
+        changed = {name for name in SPECS
+                   if getattr(settings, name) != getattr(self.settings, name)}
+        return changed | ({'scene'} & set(given))
+
+    def _brought_by(self, scene: Scene) -> dict:
+        """Values that change because they were those of the scene before."""
+        before = brought(self.scene)
+        return {name: value for name, value in brought(scene).items()
+                if getattr(self.settings, name) == before[name]}
+
+    def _set_bone_names(self) -> None:
+        """Change the read-only parameter, as only the node may."""
+        descriptor = self._node.describe_parameter(BONE_NAMES)
+        descriptor.read_only = False
+        self._node.set_parameters([Parameter(
+            BONE_NAMES, Parameter.Type.STRING_ARRAY, list(self.scene.bone_names))])
+        descriptor.read_only = True
+
+
+def brought(scene: Scene) -> dict:
+    """Defaults that a scene brings along."""
+    return {name: spec.metadata['brought'](scene) for name, spec in SPECS.items()
+            if spec.metadata['brought']}
+
+
+def check(settings: Settings, scene: Scene) -> None:
+    """Raise a RagdollError for what no range can tell."""
+    resolve_accuracy(settings.accuracy)
+    names = scene.bone_names
+    if settings.pushed_bone not in names:
+        raise faults.UnknownBone('pushed_bone', settings.pushed_bone, 'one of ' + ', '.join(names))
+
+
+def _given(parameters: list[Parameter]) -> dict:
+    return {parameter.name: parameter.value for parameter in parameters
+            if parameter.name in SPECS}
+
+
+def _descriptor(spec: dataclasses.Field) -> ParameterDescriptor:
+    descriptor = ParameterDescriptor(description=spec.metadata['description'],
+                                     additional_constraints=spec.metadata['constraints'])
+    if spec.metadata['span']:
+        lower, upper = map(float, spec.metadata['span'])
+        descriptor.floating_point_range = [FloatingPointRange(from_value=lower, to_value=upper)]
+    return descriptor

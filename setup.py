@@ -1,0 +1,83 @@
+"""Packaging for colcon (apt's Jazzy) and for pip (Jazzy's wheels, or no ROS at all)."""
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from setuptools import Distribution, find_packages, setup
+from setuptools.command.build_py import build_py
+
+NAME = 'ragdoll_ros'
+EXECUTABLES: dict[str, str] = {
+}
+CONFIG = sorted(str(path) for path in Path('config').iterdir() if path.is_file())
+LAUNCHER = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'
+"""What `ros2 run` finds in a wheel's lib/ragdoll_ros: the way to the script that pip put in bin."""
+
+
+class BuildWithConfig(build_py):
+    """Ships config/ inside the package too, for where no ROS prefix points to share/."""
+
+    def run(self) -> None:
+        """Build, then copy config/; an editable install reads the checkout's."""
+        super().run()
+        if not getattr(self, 'editable_mode', False):
+            for source, target in self._config():
+                self.mkpath(str(target.parent))
+                shutil.copyfile(source, target)
+
+    def get_outputs(self, include_bytecode: bool = True) -> list[str]:
+        """Name the copies as well, so that they can be uninstalled."""
+        outputs = super().get_outputs(include_bytecode)
+        return outputs + [str(target) for _, target in self._config()]
+
+    def _config(self) -> list[tuple[str, Path]]:
+        folder = Path(self.build_lib, NAME, 'config')
+        return [(source, folder / Path(source).name) for source in CONFIG]
+
+
+class InstallDataWithLaunchers(Distribution().get_command_class('install_data')):
+    """Puts the executables into lib/ragdoll_ros of a wheel; colcon does so by itself."""
+
+    def run(self) -> None:
+        """Install the data files and, into a wheel, the launchers."""
+        super().run()
+        if 'bdist_wheel' not in self.distribution.command_obj:
+            return
+        for name in EXECUTABLES:
+            path = Path(self.install_dir, 'lib', NAME, name)
+            self.mkpath(str(path.parent))
+            path.write_text(LAUNCHER)
+            path.chmod(0o755)
+            self.outfiles.append(str(path))
+
+
+setup(
+    name=NAME,
+    version='0.1.0',
+    description='A passive doll simulated in PyBullet: takes pushes, publishes the pose of every '
+                'bone.',
+    license='Apache-2.0',
+    maintainer='ragdoll_ros maintainers',
+    maintainer_email='maintainers@users.noreply.github.com',
+    python_requires='>=3.10',
+    packages=find_packages(include=[NAME, f'{NAME}.*']),
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
+        (f'share/{NAME}', ['package.xml']),
+        (f'share/{NAME}/config', CONFIG),
+    ],
+    cmdclass={'build_py': BuildWithConfig, 'install_data': InstallDataWithLaunchers},
+    entry_points={'console_scripts': [f'{name} = {place}' for name, place in EXECUTABLES.items()]},
+    install_requires=['numpy', 'pyyaml', 'jsonschema', 'pybullet'],
+    extras_require={
+        'ros': ['ros-jazzy-rclpy', 'ros-jazzy-rmw-fastrtps-cpp', 'ros-jazzy-common-interfaces'],
+        'report': ['scipy', 'matplotlib', 'mujoco'],
+        'fit': ['pygltflib', 'matplotlib'],
+        'viewer': ['viser'],
+        'test': ['pytest', 'ruff', 'setuptools', 'wheel'],
+        'colcon': ['colcon-core', 'colcon-ros', 'colcon-python-setup-py',
+                   'colcon-common-extensions', 'setuptools<80'],
+    },
+    zip_safe=True,
+)

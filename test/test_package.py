@@ -1,0 +1,163 @@
+"""The package as built: what lies where, and that it agrees with itself."""
+import ast
+import email
+import importlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+SETUP = (ROOT / 'setup.py').read_text()
+EXECUTABLES = dict(re.findall(r"'(ragdoll_\w+)': '([\w.]+:main)'", SETUP))
+SCENES = ('import pathlib, ragdoll_ros.scene_file as f; '
+          'f.load_scene("drop"); print(f.__file__); print(f.config_folder())')
+
+ROSDEP_KEYS = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml', 'scipy': 'python3-scipy',
+               'jsonschema': 'python3-jsonschema', 'matplotlib': 'python3-matplotlib',
+               'pybullet': 'python3-pybullet-pip'}
+NO_ROSDEP_KEY = {'mujoco', 'pygltflib', 'viser'}
+"""Needed by extras only; said in the README."""
+
+
+def source_copy(folder: Path) -> Path:
+    """Copy what is tracked or would be, so that no build leaves its traces in the checkout."""
+    skip = shutil.ignore_patterns('.*', 'build', 'install', 'log', 'dist', '*.egg-info',
+                                  '__pycache__')
+    return Path(shutil.copytree(ROOT, folder / 'source', ignore=skip))
+
+
+def run(*command: object, **variables: str) -> str:
+    """Run a command outside the checkout, without the variables that lead back to it."""
+    kept = {key: value for key, value in os.environ.items()
+            if key not in ('PYTHONPATH', 'AMENT_PREFIX_PATH', 'COLCON_PREFIX_PATH')}
+    done = subprocess.run([str(part) for part in command], env={**kept, **variables}, cwd='/',
+                          capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, f'{command}\n{done.stdout}\n{done.stderr}'
+    return done.stdout
+
+
+def with_ros(path: Path) -> str:
+    """Put a folder before what PYTHONPATH holds already: a sourced ROS comes that way."""
+    return os.pathsep.join(filter(None, [str(path), os.environ.get('PYTHONPATH')]))
+
+
+@pytest.fixture(scope='module')
+def wheel(tmp_path_factory):
+    """Build a wheel with the setuptools at hand: no network, no other versions."""
+    folder = tmp_path_factory.mktemp('wheel')
+    run(sys.executable, '-m', 'pip', '--quiet', 'wheel', '--no-deps', '--no-build-isolation',
+        '--wheel-dir', folder, source_copy(folder))
+    return next(folder.glob('*.whl'))
+
+
+@pytest.fixture(scope='module')
+def prefix(wheel, tmp_path_factory):
+    """Install that wheel into a prefix of its own, as `pip install .` does into an environment."""
+    folder = tmp_path_factory.mktemp('prefix')
+    run(sys.executable, '-m', 'pip', '--quiet', 'install', '--no-deps', '--prefix', folder, wheel,
+        PIP_IGNORE_INSTALLED='1')
+    return folder
+
+
+def imported(path: Path) -> set[str]:
+    """Top-level modules that a file imports, not counting its own package's."""
+    nodes = list(ast.walk(ast.parse(path.read_text())))
+    plain = {name.name for node in nodes if isinstance(node, ast.Import) for name in node.names}
+    froms = {node.module for node in nodes if isinstance(node, ast.ImportFrom) and not node.level}
+    return {name.split('.')[0] for name in plain | froms}
+
+
+def site_packages(prefix: Path) -> Path:
+    return next(prefix.glob('lib/python3*/site-packages'))
+
+
+def test_versions_and_words_agree(wheel):
+    """package.xml, setup.py as it reached the wheel, and the newest entry of CHANGELOG.rst."""
+    manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
+    with zipfile.ZipFile(wheel) as files:
+        name = next(name for name in files.namelist() if name.endswith('.dist-info/METADATA'))
+        built = email.message_from_bytes(files.read(name))
+    for tag, header in (('name', 'Name'), ('version', 'Version'), ('description', 'Summary')):
+        assert built[header].replace('-', '_') == manifest.findtext(tag).replace('-', '_')
+    assert (built['License'] or built['License-Expression']) == manifest.findtext('license')
+    newest = re.search(r'^(\d[.\d]*) \(.*\)\n-+$', (ROOT / 'CHANGELOG.rst').read_text(), re.M)
+    assert newest[1] == manifest.findtext('version')
+
+
+def test_manifest_names_what_the_package_imports():
+    """Every module of the distribution that the code imports has its line in package.xml."""
+    manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
+    assert manifest.findtext('export/build_type') == 'ament_python'
+    declared = {tag.text for tag in manifest.iter() if tag.tag.endswith('depend')}
+    used = {module for path in (ROOT / 'ragdoll_ros').rglob('*.py') for module in imported(path)}
+    used -= set(sys.stdlib_module_names) | NO_ROSDEP_KEY | {'ragdoll_ros'}
+    assert {ROSDEP_KEYS.get(module, module) for module in used} <= declared
+
+
+def test_every_program_is_an_executable():
+    """A node, a teleop or a command.py without its line in setup.py would never be installed."""
+    programs = {'.'.join(path.relative_to(ROOT).with_suffix('').parts)
+                for name in ('node', 'teleop', 'command')
+                for path in ROOT.glob(f'ragdoll_ros/*/{name}.py')}
+    assert {place.split(':')[0] for place in EXECUTABLES.values()} == programs
+
+
+@pytest.mark.parametrize('place', EXECUTABLES.values(), ids=EXECUTABLES)
+def test_an_executable_is_a_function_of_the_package(place):
+    module, function = place.split(':')
+    assert callable(getattr(importlib.import_module(module), function))
+
+
+def test_wheel_holds_config_twice_and_nothing_foreign(wheel):
+    names = zipfile.ZipFile(wheel).namelist()
+    shipped = {path.name for path in (ROOT / 'config').iterdir()}
+    for part in ('ragdoll_ros/config/', '.data/data/share/ragdoll_ros/config/'):
+        assert {Path(name).name for name in names if part in f'/{name}'} >= shipped, part
+    # Beside the package, its metadata and its data, a wheel's top level must hold nothing.
+    assert {name.split('/')[0].split('-')[0] for name in names} == {'ragdoll_ros'}
+    assert not any('test' in name for name in names)
+
+
+def test_pip_install_has_the_layout_of_a_ros_prefix(prefix):
+    assert (prefix / 'share/ament_index/resource_index/packages/ragdoll_ros').is_file()
+    assert (prefix / 'share/ragdoll_ros/package.xml').is_file()
+    for folder in ('lib/ragdoll_ros', 'bin'):
+        assert {path.name for path in prefix.glob(f'{folder}/*')} == set(EXECUTABLES), folder
+    assert all(os.access(prefix / 'lib/ragdoll_ros' / name, os.X_OK) for name in EXECUTABLES)
+
+
+def test_scenes_are_found_in_the_prefix_and_without_one(prefix):
+    """With AMENT_PREFIX_PATH those in share/, without it those in the package."""
+    site = site_packages(prefix)
+    path = with_ros(site)
+    alone = run(sys.executable, '-c', SCENES, PYTHONPATH=path).splitlines()
+    assert alone == [f'{site}/ragdoll_ros/scene_file.py', f'{site}/ragdoll_ros/config']
+    sourced = run(sys.executable, '-c', SCENES, PYTHONPATH=path, AMENT_PREFIX_PATH=str(prefix))
+    assert sourced.splitlines()[1] == f'{prefix}/share/ragdoll_ros/config'
+
+
+@pytest.mark.parametrize('name', EXECUTABLES)
+def test_launcher_in_lib_starts_the_script_in_bin(prefix, name):
+    """What `ros2 run` starts answers --help, from the prefix's own files."""
+    said = run(prefix / 'lib/ragdoll_ros' / name, '--help',
+               PYTHONPATH=with_ros(site_packages(prefix)))
+    assert name in said
+
+
+def test_uninstall_leaves_nothing(wheel, tmp_path):
+    """All that the build made by itself is on pip's record."""
+    target = tmp_path / 'prefix'
+    run(sys.executable, '-m', 'pip', '--quiet', 'install', '--no-deps', '--prefix', target, wheel,
+        PIP_IGNORE_INSTALLED='1')
+    record = next(target.glob('lib/python3*/site-packages/*.dist-info/RECORD'))
+    listed = {(record.parent.parent / line.split(',')[0]).resolve()
+              for line in record.read_text().splitlines()}
+    present = {path.resolve() for path in target.rglob('*') if path.is_file()}
+    assert present <= listed

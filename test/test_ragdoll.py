@@ -1,0 +1,84 @@
+"""What a doll may be, and the named error for all that it may not be."""
+import math
+
+import numpy as np
+import pytest
+
+from ragdoll_ros import faults
+from ragdoll_ros.ragdoll import Bone, Box, Capsule, Cylinder, Joint, Ragdoll, Sphere
+
+BALL = Sphere(0.1)
+
+
+def bone(name, **changes):
+    return Bone(name, **{'shape': BALL, 'mass': 1, 'position': (0, 0, 0), **changes})
+
+
+def hinge(parent, child, **changes):
+    return Joint(parent, child, **{'kind': 'hinge', 'anchor': (0, 0, 0), 'axes': ((0, 0, 1),),
+                                   **changes})
+
+
+@pytest.mark.parametrize('shape', [Sphere(0.3), Box((0.2, 0.5, 0.9)), Cylinder(0.2, 0.7),
+                                   Capsule(0.2, 0.5)])
+def test_volume_and_inertia_are_those_of_the_uniform_solid(shape):
+    """Against sums over a million random points of the bounding box: 1 % is four sigma."""
+    rng = np.random.default_rng(0)
+    half = np.array(shape.half_extents)
+    points = rng.uniform(-half, half, (1_000_000, 3))
+    x, y, z = points.T
+    if shape.kind == 'sphere':
+        inside = (points ** 2).sum(axis=1) < shape.radius ** 2
+    elif shape.kind == 'box':
+        inside = np.full(len(points), True)
+    else:
+        over = np.maximum(0, np.abs(z) - shape.length / 2) if shape.kind == 'capsule' else 0 * z
+        inside = x * x + y * y + over * over < shape.radius ** 2
+    assert shape.volume == pytest.approx(np.prod(2 * half) * inside.mean(), rel=0.01)
+    x, y, z = points[inside].T
+    moments = [(y * y + z * z).mean(), (x * x + z * z).mean(), (x * x + y * y).mean()]
+    assert shape.inertia(2.0) == pytest.approx(2 * np.array(moments), rel=0.01)
+    for axis in (*np.eye(3), np.array([1, 2, -3]) / math.sqrt(14)):
+        farthest = (points[inside] @ axis).max()
+        # Random points come within 2 % of the surface, and never beyond it.
+        assert farthest <= shape.reach(axis) + 1e-12
+        assert shape.reach(axis) == pytest.approx(farthest, rel=0.06)
+
+
+@pytest.mark.parametrize(('make', 'error'), [
+    (lambda: Sphere(0), faults.NotPositive),
+    (lambda: Box((1, -1, 1)), faults.NotPositive),
+    (lambda: Cylinder(math.nan, 1), faults.NotFinite),
+    (lambda: Capsule(1, math.inf), faults.NotFinite),
+    (lambda: bone('a', mass=0), faults.NotPositive),
+    (lambda: bone('a', position=(0, math.nan, 0)), faults.NotFinite),
+    (lambda: bone('a', orientation=(0, 0, 0, 0)), faults.NotUnit),
+    (lambda: hinge('a', 'b', limits=((1, -1),)), faults.LimitsReversed),
+    (lambda: hinge('a', 'b', limits=((0, math.inf),)), faults.NotFinite),
+    (lambda: hinge('a', 'b', axes=()), faults.WrongAxes),
+    (lambda: hinge('a', 'b', axes=((0, 0, 0),)), faults.NotUnit),
+    (lambda: hinge('a', 'b', kind='slider'), faults.WrongAxes),
+    (lambda: hinge('a', 'b', damping=-1), faults.OutOfRange),
+    (lambda: Joint('a', 'b', 'universal', (0, 0, 0), ((1, 0, 0), (1, 1, 0))), faults.WrongAxes),
+    (lambda: Joint('a', 'b', 'ball', (0, 0, 0), ((1, 0, 0),), ((-2, 2), None)), faults.OutOfRange),
+    (lambda: Ragdoll('d', ()), faults.Detached),
+    (lambda: Ragdoll('d', (bone('a'), bone('a'))), faults.DuplicateName),
+    (lambda: Ragdoll('d', (bone('a'), bone('b'))), faults.Detached),
+    (lambda: Ragdoll('d', (bone('a'),), (hinge('a', 'x'),)), faults.UnknownBone),
+    (lambda: Ragdoll('d', (bone('a'), bone('b'), bone('c')),
+                     (hinge('a', 'c'), hinge('b', 'c'))), faults.ConnectedTwice),
+    (lambda: Ragdoll('d', (bone('a'), bone('b')),
+                     (hinge('a', 'b'), hinge('b', 'a'))), faults.JointCycle),
+])
+def test_each_fault_has_a_name(make, error):
+    with pytest.raises(error) as caught:
+        make()
+    assert caught.value.path and caught.value.expected
+
+
+def test_limits_in_degrees_survive_radians_to_the_bit():
+    for degrees in (-126, 33.3, 0.1, 89.999999):
+        joint = hinge('a', 'b', limits=((math.radians(degrees), math.radians(100)),))
+        again = hinge('a', 'b', limits=joint.limits)
+        assert joint == again
+        assert round(math.degrees(joint.limits[0][0]), 9) == degrees

@@ -1,0 +1,103 @@
+"""Files: the shipped ones, a round trip, and all faults at once."""
+import dataclasses
+import math
+
+import pytest
+import yaml
+
+from ragdoll_ros import faults
+from ragdoll_ros.engine.bullet import BulletEngine
+from ragdoll_ros.ragdoll import Bone, Box, Capsule, Cylinder, Joint, Ragdoll, Sphere
+from ragdoll_ros.scene_file import load_doll, load_scene, save_doll, save_scene, scene_names
+
+FIVE = """
+gravity: [0, 0, -9.8]
+step: -1
+dolls:
+  - doll:
+      bones:
+        - {name: a, shape: {sphere: {radius: 0.1}}, mass: 0, position: [0, 0, 0]}
+        - {name: b, shape: {sphere: {radius: 0.1}}, mass: 1, position: [0, 0, .nan]}
+      joints:
+        - {parent: a, child: b, kind: hinge, anchor: [0, 0, 0], axes: [[0, 0, 1]],
+           limits_deg: [[30, 10]]}
+        - {parent: a, child: c, kind: fixed, anchor: [0, 0, 0]}
+"""
+
+
+def test_the_shipped_scenes_load():
+    assert {'drop', 'article', 'flight', 'crowd', 'doll', 'article_doll'} <= set(scene_names())
+    for name in scene_names():
+        load_scene(name)
+    assert load_scene('article').pace == 0.6
+    assert load_scene('flight').ground is None and not any(load_scene('flight').gravity)
+    assert len(load_scene('crowd').dolls) == 10
+
+
+def test_the_crowd_does_not_overlap():
+    engine = BulletEngine(load_scene('crowd'))
+    assert not engine.touching()
+    engine.close()
+
+
+def test_a_dolls_file_alone_is_that_doll_above_the_ground(tmp_path):
+    ball = Ragdoll('ball', (Bone('b', Sphere(0.1), 1, (0, 0, -5)),))
+    save_doll(ball, tmp_path / 'ball.yaml')
+    scene = load_scene(str(tmp_path / 'ball.yaml'))
+    position, _ = scene.dolls[0].bone_pose(ball.root)
+    assert scene.ground is not None
+    assert position[2] - 0.1 == pytest.approx(0.4, abs=1e-9)
+
+
+def test_what_is_saved_is_loaded(tmp_path):
+    doll = Ragdoll('all kinds', (
+        Bone('a', Box((0.1, 0.2, 1 / 3)), 1.1, (0.1, 0.2, 0.3), friction=math.inf),
+        Bone('b: x', Capsule(0.1, 0.2), 1e-3, (0, 0, 1e-9), (0.1, 0.2, 0.3, 0.4),
+             color=(1, 0, 0, 1)),
+        Bone('c', Cylinder(0.1, 0.2), 2, (1, 2, 3), restitution=0.25),
+        Bone('d', Sphere(0.1), 2, (1, 2, 4))), (
+        Joint('a', 'b: x', 'ball', (0, 0, 0), ((1, 2, 3),), ((-0.7, 0.7), (-0.123, 0.123)), 0.1),
+        Joint('a', 'c', 'universal', (1, 0, 0), ((1, 0, 0), (0, 1, 0)), ((-1, 0.3), None)),
+        Joint('c', 'd', 'fixed', (1, 1, 1))))
+    save_doll(doll, tmp_path / 'doll.yaml')
+    assert load_doll(str(tmp_path / 'doll.yaml')) == doll
+    scene = dataclasses.replace(load_scene('crowd'), step=1 / 240, self_collision=False)
+    save_scene(scene, tmp_path / 'scene.yaml')
+    assert load_scene(str(tmp_path / 'scene.yaml')) == scene
+
+
+def test_all_faults_come_at_once_with_their_places(tmp_path):
+    path = tmp_path / 'five.yaml'
+    path.write_text(FIVE)
+    with pytest.raises(faults.Faults) as caught:
+        load_scene(str(path))
+    found = {fault.path: type(fault) for fault in caught.value.faults}
+    assert found == {
+        'step': faults.OutOfRange,
+        'dolls[0].doll.bones[0].mass': faults.NotPositive,
+        'dolls[0].doll.bones[1].position': faults.NotFinite,
+        'dolls[0].doll.joints[0].limits_deg[0]': faults.LimitsReversed,
+        'dolls[0].doll.joints[1].child': faults.UnknownBone}
+    assert str(path) in str(caught.value) and '5 faults' in str(caught.value)
+
+
+@pytest.mark.parametrize('text', ['', '[1, 2', '\x00', '{a: &a [*a]}', '7', '- x', 'dolls: 3',
+                                  'dolls: [{doll: {bones: []}}]', 'dolls: [{doll: 5}]',
+                                  'bones: [{name: 3}]', 'dolls: [{doll: ../../etc/passwd}]'])
+def test_rubbish_is_refused_in_words(tmp_path, text):
+    path = tmp_path / 'rubbish.yaml'
+    path.write_text(text)
+    with pytest.raises(faults.Faults):
+        load_scene(str(path))
+
+
+def test_a_missing_file_names_the_ones_there_are():
+    with pytest.raises(faults.Faults, match='drop'):
+        load_scene('no such scene')
+
+
+def test_numbers_may_be_written_as_1e3(tmp_path):
+    data = {'dolls': [{'doll': 'doll.yaml'}]}
+    path = tmp_path / 'scene.yaml'
+    path.write_text(yaml.safe_dump(data) + 'ground: {offset: -1e3}\n')
+    assert load_scene(str(path)).ground.offset == -1000.0
