@@ -145,7 +145,8 @@ def draw_classes(figures: dict[str, list[Row]], plt: object) -> object:
         found = {row['class']: _number(row['worst_excess']) for row in rows
                  if row['method'] == method}
         heights = [min(high, max(low, found.get(name, 0.0))) for name in classes]
-        positions = [index + (place - len(shown) / 2 + 0.5) * width for index in range(len(classes))]
+        shift = (place - len(shown) / 2 + 0.5) * width
+        positions = [index + shift for index in range(len(classes))]
         axes.bar(positions, heights, width, color=colour, label=label)
     axes.axhline(1e-3, color='black', lw=1)
     axes.annotate('0.1 %: promised', (len(classes) - 0.55, 1.15e-3), ha='right', va='bottom',

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable
 from time import process_time
 
@@ -20,7 +21,8 @@ TICKS = 100
 def jobs(options: Options) -> list[Job]:
     """One timed job: the scenes are compared with each other."""
     repeats = 2 if options.quick else 7
-    return [Job(NAME, 'what a scene costs', lambda: measure_all(repeats), repeats, timed=True)]
+    return [Job(NAME, 'what a scene costs', functools.partial(
+        measure_all, repeats), repeats, timed=True)]
 
 
 def measure_all(repeats: int) -> list[Row]:
