@@ -43,9 +43,11 @@ class Layout:
         roots: list[tuple[int, int]] = []
         balls: list[tuple[int, int]] = []
         v = 0
-        ends: list[int] = []
+        self.own_q: list[slice] = []
+        self.own_v: list[slice] = []
+        """What of q and of v is each doll's."""
         for joints in dolls:
-            q = len(lower)
+            q, first_v = len(lower), v
             plain_q += range(q, q + 3)
             plain_v += range(v, v + 3)
             roots.append((q + 3, v + 3))
@@ -62,9 +64,8 @@ class Layout:
                 lower += [-math.inf if limits is None else limits[0]] * wide
                 upper += [math.inf if limits is None else limits[1]] * wide
                 v += 3 if limits is None else 1
-            ends.append(v)
-        self.velocity_ends = ends
-        """Where in v each doll ends."""
+            self.own_q.append(slice(q, len(lower)))
+            self.own_v.append(slice(first_v, v))
         self._plain = (np.array(plain_q), np.array(plain_v))
         self._roots = self._indices(roots)
         self._balls = self._indices(balls)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .coordinates import Coordinates, Layout
-from .mechanics import Mechanics, Motion, cross
+from .mechanics import Mechanics, Motion, Shift, cross
 from .ragdoll import Ragdoll
 from .scene import Scene
 from .state import State
@@ -92,53 +92,55 @@ class Guard:
             groups[groups == groups[b]] = groups[a]
         return groups
 
-    def momentum_kept(self, coordinates: Coordinates, before: Motion, after: Motion,
-                      duration: float, impulse: np.ndarray,
-                      moment: np.ndarray | None) -> Coordinates:
-        """Give back to dolls in the air the momentum, and the way, that they must have.
+    def momentum_due(self, before: Motion, after: Motion, state: State, duration: float,
+                     impulse: np.ndarray, moment: np.ndarray | None) -> Shift:
+        """Tell what dolls in the air lack of the momentum, and of the way, that they must have.
 
         ``impulse`` (d, 3) N s and ``moment`` (d, 3) N m s are what pushes gave; no moment: the
-        angular momentum is left as it is. A change of a root's velocities moves the whole doll
-        as one rigid body, so that it takes a spin Ic^-1 dL and no joint notices.
+        angular momentum is left as it is. The lack is made up by a motion of the whole doll as
+        one rigid body, with a spin Ic^-1 dL, so that no joint notices.
         """
         masses = self._mechanics.doll_masses[:, None]
         impulse = impulse + masses * self._gravity * duration
-        way = (before.momentum + impulse / 2) * duration / masses
+        way = before.centre + (before.momentum + impulse / 2) * duration / masses - after.centre
         linear = (before.momentum + impulse - after.momentum) / masses
-        layout, q, v = self._layout, coordinates.q.copy(), coordinates.v.copy()
-        q[layout.root_positions] += before.centre + way - after.centre
+        spin = np.zeros_like(linear)
         if moment is not None:
             missing = before.spin + moment - after.spin
-            spin = np.linalg.solve(after.locked_inertia, missing[:, :, None])[:, :, 0]
-            linear += cross(spin, coordinates.q[layout.root_positions] - after.centre)
-            v[layout.root_spins] += spin
-        v[layout.root_velocities] += linear
-        return Coordinates(q, v)
+            for doll, lack in enumerate(missing):
+                inertia = self._mechanics.locked_inertia(state, after.centre[doll], doll)
+                spin[doll] = np.linalg.solve(inertia, lack)
+        return Shift(way, linear, spin, after.centre)
 
-    def without_surplus(self, coordinates: Coordinates, motion: Motion, surplus: np.ndarray,
-                        touching: bool) -> Coordinates:
+    def without_surplus(self, before: Coordinates, coordinates: Coordinates, motion: Motion,
+                        state: State, surplus: np.ndarray, touching: bool) -> Coordinates:
         """Take ``surplus`` (d,) J out of the dolls' motion.
 
         Each doll keeps its momentum and angular momentum: of its motion only what it does
         beside moving as one rigid body, with the angular velocity Ic^-1 L of the doll locked in
         its pose (Featherstone, Rigid Body Dynamics Algorithms, 9.6), is scaled down. Where that
-        holds less than the surplus and something outside touches the doll, all its motion is.
+        holds less than the surplus and something outside touches the doll, all its motion is;
+        and where that is not enough either, contacts have pushed the doll uphill, and it stands
+        where it was ``before``.
         """
-        v = coordinates.v.copy()
+        layout, q, v = self._layout, coordinates.q.copy(), coordinates.v.copy()
         for doll in np.flatnonzero(surplus > 0):
+            centre = motion.centre[doll]
             linear = motion.momentum[doll] / self._mechanics.doll_masses[doll]
-            spin = np.linalg.solve(motion.locked_inertia[doll], motion.spin[doll])
+            spin = np.linalg.solve(self._mechanics.locked_inertia(state, centre, doll),
+                                   motion.spin[doll])
             rigid = 0.5 * (motion.momentum[doll] @ linear + motion.spin[doll] @ spin)
             inner = max(0.0, motion.kinetic[doll] - rigid)
             scale = math.sqrt(max(0.0, 1 - surplus[doll] / inner)) if inner > 0 else 0.0
-            self._scale(v, doll, coordinates.q, motion.centre[doll], linear, spin, scale)
-            rest = surplus[doll] - inner
-            if rest > 0 and touching and rigid > 0:
-                own = slice(self._layout.root_velocities[doll, 0], self._layout.velocity_ends[doll])
-                v[own] *= math.sqrt(max(0.0, 1 - rest / rigid))
-                inner += min(rest, rigid)
+            self._scale(v, doll, coordinates.q, centre, linear, spin, scale)
             self.account.taken += min(surplus[doll], inner)
-        return Coordinates(coordinates.q, v)
+            rest = surplus[doll] - inner
+            if rest > 0 and touching:
+                v[layout.own_v[doll]] *= math.sqrt(max(0.0, 1 - rest / rigid)) if rigid > 0 else 0
+                self.account.taken += min(rest, rigid)
+                if rest > rigid:
+                    q[layout.own_q[doll]] = before.q[layout.own_q[doll]]
+        return Coordinates(q, v)
 
     def _scale(self, v: np.ndarray, doll: int, q: np.ndarray, centre: np.ndarray,
                linear: np.ndarray, spin: np.ndarray, scale: float) -> None:
@@ -148,7 +150,7 @@ class Guard:
         locked = linear + cross(spin, q[layout.root_positions[doll]] - centre)
         v[root] = locked + scale * (v[root] - locked)
         v[turn] = spin + scale * (v[turn] - spin)
-        v[turn[-1] + 1:layout.velocity_ends[doll]] *= scale
+        v[turn[-1] + 1:layout.own_v[doll].stop] *= scale
 
 
 def _size(doll: Ragdoll) -> float:

@@ -27,8 +27,20 @@ class Motion:
     """(d, 3) N s."""
     spin: np.ndarray
     """(d, 3) N m s: angular momentum about the doll's own centre of mass."""
-    locked_inertia: np.ndarray
-    """(d, 3, 3) kg m^2 about the centre of mass, of the doll as if its joints were locked."""
+
+
+@dataclass(frozen=True)
+class Shift:
+    """A displacement of d dolls and a motion of each as one rigid body, to be added."""
+
+    way: np.ndarray
+    """(d, 3) m."""
+    linear: np.ndarray
+    """(d, 3) m/s, of the centres of mass."""
+    spin: np.ndarray
+    """(d, 3) rad/s about the centres of mass."""
+    centre: np.ndarray
+    """(d, 3) m: the centres of mass before."""
 
 
 class Mechanics:
@@ -42,7 +54,9 @@ class Mechanics:
         counts = [len(placement.doll.bones) for placement in scene.dolls]
         self.starts = np.cumsum([0, *counts[:-1]])
         self.doll_of = np.repeat(np.arange(len(counts)), counts)
-        self.doll_masses = np.add.reduceat(self.masses, self.starts)
+        self._members = (self.doll_of == np.arange(len(counts))[:, None]).astype(float)
+        self._weights = self._members * self.masses
+        self.doll_masses = self._weights.sum(axis=1)
 
     def kinetic(self, state: State) -> np.ndarray:
         """Kinetic energy of each bone, (n,) J."""
@@ -50,13 +64,10 @@ class Mechanics:
         return 0.5 * (self.masses * np.einsum('ij,ij->i', state.linear, state.linear)
                       + np.einsum('ij,ij,ij->i', self.inertias, body, body))
 
-    def potential(self, state: State) -> np.ndarray:
-        """Energy of height of each bone, (n,) J; zero at the world's origin."""
-        return -self.masses * (state.positions @ self.gravity)
-
     def energy(self, state: State) -> np.ndarray:
         """Kinetic energy plus that of height of each doll, (d,) J."""
-        return np.add.reduceat(self.kinetic(state) + self.potential(state), self.starts)
+        height = self._weights @ (state.positions @ self.gravity)
+        return self._members @ self.kinetic(state) - height
 
     def motion(self, state: State) -> Motion:
         """All sums at once."""
@@ -64,20 +75,34 @@ class Mechanics:
         body = np.matmul(state.angular[:, None, :], turn)[:, 0]
         impulses = self.masses[:, None] * state.linear
         moments = self.inertias * body
-        kinetic = 0.5 * (np.einsum('ij,ij->i', impulses, state.linear)
-                         + np.einsum('ij,ij->i', moments, body))
-        weights = self.masses[:, None] * state.positions
-        sums = np.add.reduceat(np.column_stack([kinetic, weights, impulses]), self.starts)
-        centre = sums[:, 1:4] / self.doll_masses[:, None]
+        kinetic = self._members @ (0.5 * (np.einsum('ij,ij->i', impulses, state.linear)
+                                          + np.einsum('ij,ij->i', moments, body)))
+        weighted = self._weights @ state.positions
+        centre = weighted / self.doll_masses[:, None]
         arms = state.positions - centre[self.doll_of]
         own = np.matmul(turn, moments[:, :, None])[:, :, 0]
-        spin = np.add.reduceat(own + cross(arms, impulses), self.starts)
-        turned = np.matmul(turn * self.inertias[:, None, :], turn.transpose(0, 2, 1))
-        steiner = np.einsum('i,ij,ik->ijk', self.masses, arms, arms)
-        steiner = np.trace(steiner, axis1=1, axis2=2)[:, None, None] * np.eye(3) - steiner
-        potential = -sums[:, 1:4] @ self.gravity
-        return Motion(sums[:, 0] + potential, sums[:, 0], centre, sums[:, 4:7], spin,
-                      np.add.reduceat(turned + steiner, self.starts))
+        return Motion(kinetic - weighted @ self.gravity, kinetic, centre,
+                      self._members @ impulses, self._members @ (own + cross(arms, impulses)))
+
+    def shifted(self, state: State, shift: Shift) -> State:
+        """Give the state after each doll is moved on and set in motion as one rigid body."""
+        doll = self.doll_of
+        arms = state.positions - shift.centre[doll]
+        return State(state.positions + shift.way[doll], state.orientations,
+                     state.linear + shift.linear[doll] + cross(shift.spin[doll], arms),
+                     state.angular + shift.spin[doll])
+
+    def locked_inertia(self, state: State, centre: np.ndarray, doll: int) -> np.ndarray:
+        """Inertia (3, 3) kg m^2 about its ``centre`` (3,) of a doll as if its joints were locked.
+
+        Steiner's theorem: the sum of R I R^T + m (r r 1 - r r^T) over its bones.
+        """
+        own = slice(self.starts[doll], self.starts[doll] + int(self._members[doll].sum()))
+        turn = rotation.matrix(state.orientations[own])
+        turned = np.matmul(turn * self.inertias[own, None, :], turn.transpose(0, 2, 1))
+        arms = state.positions[own] - centre
+        outer = arms.T @ (self.masses[own, None] * arms)
+        return turned.sum(axis=0) + np.trace(outer) * np.eye(3) - outer
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

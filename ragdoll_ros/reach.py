@@ -37,6 +37,13 @@ class Reach:
         reach = (boxes * down).sum(axis=1) + along * down[:, 2] + rounds + rims * across
         return state.positions @ self._normal - self._ground.offset - reach
 
+    def clearance(self, state: State) -> float:
+        """Distance, m, that all bones keep from the ground at the least: a lower bound if far."""
+        if self._ground is None:
+            return math.inf
+        bound = float((state.positions @ self._normal - self._radii).min()) - self._ground.offset
+        return bound if bound > MARGIN else float(self.heights(state).min())
+
     def falling(self, state: State, soon: float) -> float:
         """Largest speed, m/s, at which any point of a bone that can reach the ground sinks."""
         if self._ground is None:

@@ -22,8 +22,12 @@ from .stepping import ACCURACIES, Accuracy, Effort, Stepper
 MOST_PUSHES = 1000
 """Pushes that may wait at once; one more is refused."""
 
-REST_SPEED = 0.02
-"""m/s, and rad/s times the bone's size, below which a bone counts as still."""
+REST_SPEED = 0.05
+"""m/s, and rad/s times the bone's size, below which a bone counts as still: more than the
+flutter of a joint that leans on its limit, less than any fall gives within 10 ms."""
+
+REST_WAY = 0.001
+"""m that a still bone may have moved in REST_TIME."""
 
 REST_TIME = SECOND // 2
 """ns that all bones must be still under gravity before the scene sleeps."""
@@ -107,7 +111,7 @@ class Simulation:
     @property
     def joint_angles(self) -> np.ndarray:
         """All joint angles, rad, in the order of Scene.angle_names."""
-        return self._stepper.engine.joint_angles()
+        return self._stepper.settle().joint_angles()
 
     def push(self, push: Push, channel: str | None = None) -> None:
         """Let a push act from its start on; on a ``channel`` it takes the place of the last.
@@ -215,6 +219,7 @@ class Simulation:
     def _piece(self, duration: float, loads: list[Load]) -> float:
         """Go through one stretch of motion and see to what must be kept; give its length, s."""
         stepper, before, motion = self._stepper, self._state, self._motion
+        start = stepper.coordinates
         pull = max((math.hypot(*load.force) for load in loads), default=0.0)
         lightest = float(self.mechanics.masses.min())
         gravity = math.hypot(*self.scene.gravity)
@@ -227,7 +232,7 @@ class Simulation:
         if in_air:
             self._keep_momentum(motion, piece.duration, loads, before)
         if stepper.accuracy.energy:
-            self._keep_energy()
+            self._keep_energy(start)
         return piece.duration
 
     def _see(self, state: State) -> None:
@@ -249,18 +254,20 @@ class Simulation:
             impulse[doll] += force * duration
             moment[doll] += torque * duration
             steady = steady and not load.force.any()
-        self._correct(self._guard.momentum_kept(
-            self._stepper.coordinates, before, self._motion, duration, impulse,
-            moment if steady else None))
+        shift = self._guard.momentum_due(before, self._motion, self._state, duration, impulse,
+                                         moment if steady else None)
+        moved = self.mechanics.shifted(self._state, shift)
+        self._stepper.shift(shift, moved)
+        self._see(moved)
 
-    def _keep_energy(self) -> None:
+    def _keep_energy(self, start: Coordinates) -> None:
         guard, touching = self._guard, self._stepper.touching
         groups = guard.groups(touching)
         surplus = guard.surplus(self._motion, groups)
         if (surplus > 0).any():
             outside = any(a != b for a, b in touching)
             self._correct(guard.without_surplus(
-                self._stepper.coordinates, self._motion, surplus, outside))
+                start, self._stepper.coordinates, self._motion, self._state, surplus, outside))
         guard.settle(self._motion.energy, groups)
 
     def _enter_work(self, loads: list[Load], before: State, substep: float) -> None:
@@ -311,10 +318,21 @@ class Simulation:
         if self.asleep or not self._stepper.accuracy.sleep or self._weightless:
             return
         state = self._state
-        speeds = np.abs(state.linear).max(axis=1), np.abs(state.angular).max(axis=1) * self._sizes
-        still = max(map(np.max, speeds)) < REST_SPEED and not self._queue
-        self._still = self._still + self.tick if still else 0
-        if self._still >= REST_TIME and any(GROUND in pair for pair in self._stepper.touching):
+        speed = max(np.abs(state.linear).max(),
+                    (np.abs(state.angular).max(axis=1) * self._sizes).max())
+        if speed > REST_SPEED or self._queue:
+            self._still = 0
+            return
+        if not self._still:
+            self._still_from = state
+        self._still += self.tick
+        if self._still < REST_TIME:
+            return
+        way = np.abs(state.positions - self._still_from.positions).max()
+        turn = rotation.angle_between(state.orientations, self._still_from.orientations)
+        self._still = 0
+        if (max(way, (turn * self._sizes).max()) < REST_WAY
+                and any(GROUND in pair for pair in self._stepper.touching)):
             coordinates = self._stepper.coordinates
             self._correct(dataclasses.replace(coordinates, v=np.zeros_like(coordinates.v)))
             self._guard.settle(self._motion.energy, self._guard.groups(self._stepper.touching))

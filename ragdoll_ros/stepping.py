@@ -15,6 +15,7 @@ import numpy as np
 from .coordinates import Coordinates
 from .engine.protocol import Engine, Load
 from .flight import fly
+from .mechanics import Shift, cross
 from .reach import Reach
 from .scene import Scene
 from .state import State
@@ -107,6 +108,10 @@ class Stepper:
         self._normal = np.array(scene.ground.normal if scene.ground else (0.0, 0.0, 1.0))
         self._damped = any(joint.damping for placement in scene.dolls
                            for joint in placement.doll.joints)
+        self._stale = False
+        """Whether the engine has yet to hear of a shift."""
+        self._blocked = False
+        """Whether something that no flight can foresee comes next: bones that meet."""
         self.effort = Effort()
         self.look()
 
@@ -119,15 +124,36 @@ class Stepper:
     def place(self, coordinates: Coordinates) -> None:
         """Put the scene elsewhere; what touches stays as it was."""
         self.engine.place(coordinates)
+        self._stale = False
         self.coordinates = coordinates
         self.state = self.engine.read()
 
+    def shift(self, shift: Shift, state: State) -> None:
+        """Move dolls on as rigid bodies, to where they are in ``state``; the engine hears of it
+        when it is next needed.
+        """
+        layout = self._layout
+        q, v = self.coordinates.q.copy(), self.coordinates.v.copy()
+        arms = q[layout.root_positions] - shift.centre
+        q[layout.root_positions] += shift.way
+        v[layout.root_velocities] += shift.linear + cross(shift.spin, arms)
+        v[layout.root_spins] += shift.spin
+        self.coordinates, self.state, self._stale = Coordinates(q, v), state, True
+
+    def settle(self) -> Engine:
+        """Give the engine, with the dolls in it where they are."""
+        if self._stale:
+            self.engine.place(self.coordinates)
+            self._stale = False
+        return self.engine
+
     def go(self, duration: float, loads: Sequence[Load]) -> Piece:
         """Move on by ``duration`` s, or by less: up to the next touch or limit in a flight."""
-        if self._free is not None and not self.touching and not self._at_limit():
+        if self._may_fly():
             flown = self._fly(duration, loads)
             if flown > 0:
                 return Piece(flown, 0.0)
+        self._blocked = False
         return Piece(duration, self._step(duration, loads))
 
     def close(self) -> None:
@@ -136,13 +162,15 @@ class Stepper:
         if self._free is not None:
             self._free.close()
 
-    def _at_limit(self) -> bool:
-        """Tell whether a joint presses against its limit."""
+    def _may_fly(self) -> bool:
+        """Tell whether nothing touches and no joint presses against its limit."""
+        if self._free is None or self.touching or self._blocked:
+            return False
         past = self._layout.past_limits(self.coordinates.q)
         if not len(past) or past.max() < -AT_LIMIT:
-            return False
-        return bool(((past >= -AT_LIMIT) & (self._layout.limit_speeds(self.coordinates) > 0)
-                     | (past > AT_LIMIT)).any())
+            return True
+        pressing = (past >= -AT_LIMIT) & (self._layout.limit_speeds(self.coordinates) > 0)
+        return not (pressing | (past > AT_LIMIT)).any()
 
     def _fly(self, duration: float, loads: Sequence[Load]) -> float:
         """Fly up to ``duration`` s; give the time flown, 0 where something comes in between."""
@@ -161,6 +189,7 @@ class Stepper:
             if early > SHORTEST and self._fly_early(start, early, loads):
                 return flown + early
             self._back_to(start, state, set())
+            self._blocked = True
             return flown
         return duration
 
@@ -177,13 +206,14 @@ class Stepper:
     def _back_to(self, start: Coordinates, state: State,
                  touching: set[tuple[int, int]]) -> None:
         self.engine.place(start)
+        self._stale = False
         self.coordinates, self.state, self.touching = start, state, touching
 
     def _room(self) -> float:
         """Room (rad or m) to the nearest limit or the ground; below zero: past it."""
         past = self._layout.past_limits(self.coordinates.q)
         room = -float(past.max()) if len(past) else math.inf
-        return min(room, float(self.reach.heights(self.state).min()))
+        return min(room, self.reach.clearance(self.state))
 
     def _flight_steps(self, duration: float) -> int:
         spin = math.sqrt(np.einsum('ij,ij->i', self.state.angular, self.state.angular).max())
@@ -192,6 +222,7 @@ class Stepper:
 
     def _step(self, duration: float, loads: Sequence[Load]) -> float:
         """Take the engine's own step, finer if it overshoots a limit; give its substep, s."""
+        self.settle()
         start, state, touching = self.coordinates, self.state, self.touching
         bound = max(1.0, self._too_far())
         substeps = self._substeps(duration, bool(loads))
@@ -207,7 +238,7 @@ class Stepper:
     def _too_far(self) -> float:
         """Tell how far past a limit or in the ground, in units of what is put up with."""
         past = float(self._layout.past_limits(self.coordinates.q).max(initial=0.0))
-        sunk = -float(self.reach.heights(self.state).min())
+        sunk = -self.reach.clearance(self.state)
         return max(past / self.accuracy.redo, sunk / self.accuracy.sink)
 
     def _run(self, duration: float, substeps: int, loads: Sequence[Load]) -> None:

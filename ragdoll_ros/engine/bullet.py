@@ -29,8 +29,10 @@ LARGEST_FRICTION = math.sqrt(10)
 BREAKING_DISTANCE = 2e-3
 """m at which a contact point is let go. The default, 0.02 m, eats half of every small bounce."""
 
-REST_SPEED = 0.05
-"""m/s: lowest restitution threshold. Below it each substep's own gravity would bounce."""
+LEAST_BOUNCE = 0.05
+"""m/s: approach speed below which nothing bounces, if the material and the substep don't ask for
+more. It must lie above the speed that gravity gives within a substep, or a resting bone
+chatters for ever; twice that is taken."""
 
 SOLVER_ITERATIONS = 20
 """20 are as good as 50; 5 to 10 leave 1 to 5 mm of sinking."""
@@ -62,6 +64,8 @@ class _Doll:
     joints: list[int]
     """Joints that move, in the engine's order, root to leaf."""
     balls: list[bool]
+    widths: list[tuple[int, int]]
+    """Numbers in q and in v of each joint."""
     angles: dict[str, int]
     """Place of each joint in ``joints`` by the name of its angle."""
 
@@ -74,6 +78,8 @@ class BulletEngine:
         self._free = free
         self._client = pybullet.connect(pybullet.DIRECT)
         self._timing: tuple[float, int] | None = None
+        self._gravity = math.hypot(*scene.gravity)
+        self._least_bounce = max(LEAST_BOUNCE, scene.material.restitution_speed)
         try:
             self._build()
         except BaseException:
@@ -86,7 +92,10 @@ class BulletEngine:
         if timing != self._timing:
             pybullet.setPhysicsEngineParameter(
                 fixedTimeStep=duration, numSubSteps=substeps if substeps > 1 else 0,
-                erp=min(0.2, duration / substeps / LIMIT_RETURN), physicsClientId=self._client)
+                erp=min(0.2, duration / substeps / LIMIT_RETURN),
+                restitutionVelocityThreshold=max(
+                    self._least_bounce, 2 * self._gravity * duration / substeps),
+                physicsClientId=self._client)
             self._timing = timing
         for load in loads:
             self._apply(load)
@@ -144,11 +153,10 @@ class BulletEngine:
                 doll.body, v[j:j + 3], v[j + 3:j + 6], physicsClientId=self._client)
             i, j = i + 7, j + 6
             values, rates = [], []
-            for ball in doll.balls:
-                wide = (4, 3) if ball else (1, 1)
-                values.append(q[i:i + wide[0]])
-                rates.append(v[j:j + wide[1]])
-                i, j = i + wide[0], j + wide[1]
+            for wide, deep in doll.widths:
+                values.append(q[i:i + wide])
+                rates.append(v[j:j + deep])
+                i, j = i + wide, j + deep
             if doll.joints:
                 pybullet.resetJointStatesMultiDof(
                     doll.body, doll.joints, values, rates, physicsClientId=self._client)
@@ -248,7 +256,6 @@ class BulletEngine:
     def _build(self) -> None:
         pybullet.setPhysicsEngineParameter(
             numSolverIterations=SOLVER_ITERATIONS, contactBreakingThreshold=BREAKING_DISTANCE,
-            restitutionVelocityThreshold=max(REST_SPEED, self.scene.material.restitution_speed),
             deterministicOverlappingPairs=1, enableFileCaching=0, useSplitImpulse=0,
             physicsClientId=self._client)
         pybullet.setGravity(*self.scene.gravity, physicsClientId=self._client)
@@ -317,7 +324,7 @@ class BulletEngine:
                 pybullet.setCollisionFilterGroupMask(body, link, 0, 0, self._client)
         self._let_neighbours_be(doll, body, links)
         return _Doll(body, order, [link for link in order if link >= 0], order.index(-1),
-                     joints, balls, angles)
+                     joints, balls, [(4, 3) if ball else (1, 1) for ball in balls], angles)
 
     def _free_joint(self, body: int, joint: int, ball: bool) -> None:
         """Take PyBullet's default motor off a joint."""
