@@ -147,7 +147,7 @@ def _heavy_chain() -> Trial:
 def _pulled(force: float) -> Trial:
     scene = load_scene('drop')
     pull = Push('torso', (-force, 0.0, 1.0), start=0.2, duration=3.0)
-    return Trial(scene, 10.0, None, (pull,))
+    return Trial(scene, 30.0, None, (pull,))
 
 
 def _heap() -> Trial:

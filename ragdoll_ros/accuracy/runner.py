@@ -19,7 +19,7 @@ Row = dict[str, object]
 
 @dataclass(frozen=True)
 class Options:
-    """How much to run. ``starts`` of each class at each of our settings; quick: 10."""
+    """How much to run. ``starts`` of each class at each of our settings; quick: 2."""
 
     quick: bool = False
     starts: int = 100

@@ -11,7 +11,7 @@ from ...scene import Placement
 from ...scene_file import load_doll, load_scene
 from ..measure import Measure
 from ..methods import Method, bullet, mujoco, ours, quickstart, run
-from ..motions.motion import alone, without_damping
+from ..motions.motion import alone, without_damping, without_limits
 from ..runner import Job, Options, Row
 from ..trial import Trial, posed
 
@@ -28,7 +28,7 @@ def jobs(options: Options) -> list[Job]:
             for scene in ('drop', 'spin')]
     made.append(Job(COST, 'the default drop in real time', functools.partial(
         tick_costs, 1 if options.quick else 5), 2 if options.quick else 8, timed=True))
-    count = 5 if options.quick else 20
+    count = 3 if options.quick else 20
     made += [Job(SPREAD, f'spread, {method.name}', functools.partial(spread, index, count),
                  0.2 * count) for index, method in enumerate(spread_methods())]
     return made
@@ -40,9 +40,9 @@ def falling() -> Trial:
 
 
 def spinning() -> Trial:
-    """A doll that nothing touches, spun at 10 rad/s, limits on: its energy cannot rise."""
+    """A doll that nothing touches or brakes, spun at 10 rad/s: its energy cannot change."""
     placed = {'spin': tuple(10 * rotation.normalized(np.array((1.0, 2.0, 2.0))))}
-    doll = without_damping(load_doll('doll'))
+    doll = without_limits(without_damping(load_doll('doll')))
     return Trial(alone(doll, (0.0, 0.0, 0.0), **placed), 3.0, posed(Placement(doll, **placed)))
 
 
