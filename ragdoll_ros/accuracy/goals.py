@@ -37,9 +37,11 @@ def _ours(figures: Figures, part: str, accuracy: str) -> list[Row]:
     return [row for row in figures.get(part, ()) if row.get('method') == f'ours-{accuracy}']
 
 
-def _each(figures: Figures, part: str, judge: Callable[[str, list[Row]], Row]) -> list[Row]:
-    """Judge each setting on its rows of a part."""
-    found = {accuracy: _ours(figures, part, accuracy) for accuracy in RATIOS}
+def _each(figures: Figures, part: str, judge: Callable[[str, list[Row]], Row],
+          keep: Callable[[Row], bool] = lambda row: True) -> list[Row]:
+    """Judge each setting on those of its rows of a part that are to be kept, if there are any."""
+    found = {accuracy: [row for row in _ours(figures, part, accuracy) if keep(row)]
+             for accuracy in RATIOS}
     return [judge(accuracy, rows) for accuracy, rows in found.items() if rows]
 
 
@@ -66,45 +68,40 @@ def _cost(figures: Figures) -> list[Row]:
 
 def _overshoot(figures: Figures) -> list[Row]:
     def judge(accuracy: str, rows: list[Row]) -> Row:
-        worst = max(math.degrees(number(row['worst_overshoot_rad'])) for row in rows
-                    if row['class'] != 'start outside')
+        worst = max(math.degrees(number(row['worst_overshoot_rad'])) for row in rows)
         bound = OVERSHOOT_DEG[accuracy]
         return _row(f'worst limit overshoot, {accuracy}', f'at most {bound:g}°', f'{worst:.1f}°',
                     worst <= bound)
-    return _each(figures, 'classes', judge)
+    return _each(figures, 'classes', judge, lambda row: row['class'] != 'start outside')
 
 
 def _sinking(figures: Figures) -> list[Row]:
-    def judge(accuracy: str, rows: list[Row], pushed: bool) -> Row:
-        worst = max(1e3 * number(row['worst_sinking_m']) for row in rows
-                    if row['class'].startswith('push') == pushed)
+    def judge(accuracy: str, rows: list[Row]) -> Row:
+        worst = max(1e3 * number(row['worst_sinking_m']) for row in rows)
+        pushed = rows[0]['class'].startswith('push')
         bound = (SINKING_PUSHED_MM if pushed else SINKING_MM)[accuracy]
         where = 'in pushes' if pushed else 'elsewhere'
         return _row(f'worst sinking {where}, {accuracy}', f'at most {bound:g} mm',
                     f'{worst:.1f} mm', worst <= bound)
-    return (_each(figures, 'classes', lambda accuracy, rows: judge(accuracy, rows, True))
-            + _each(figures, 'classes', lambda accuracy, rows: judge(accuracy, rows, False)))
-
-
-def _of_motion(rows: list[Row], motion: str, key: str) -> float:
-    return max((number(row.get(key)) for row in rows if row['motion'] == motion), default=math.nan)
+    return (_each(figures, 'classes', judge, lambda row: row['class'].startswith('push'))
+            + _each(figures, 'classes', judge, lambda row: not row['class'].startswith('push')))
 
 
 def _flight(figures: Figures) -> list[Row]:
     def judge(accuracy: str, rows: list[Row]) -> Row:
-        error, bound = _of_motion(rows, 'flight_gentle', 'position_worst_m'), FLIGHT_M[accuracy]
+        error, bound = number(rows[0]['position_worst_m']), FLIGHT_M[accuracy]
         return _row(f'gentle flight of 0.28 s, {accuracy}', f'at most {bound:g} m',
                     f'{error:.1e} m', error <= bound)
-    return _each(figures, 'precision', judge)
+    return _each(figures, 'precision', judge, lambda row: row['motion'] == 'flight_gentle')
 
 
 def _fall(figures: Figures) -> list[Row]:
     def judge(accuracy: str, rows: list[Row]) -> Row:
-        error = max(_of_motion(rows, name, 'position_worst_m')
-                    for name in ('free_fall', 'projectile'))
+        error = max(number(row['position_worst_m']) for row in rows)
         return _row(f'free fall and throw, {accuracy}', 'at most 1e-9 m', f'{error:.1e} m',
                     error <= 1e-9)
-    return _each(figures, 'precision', judge)
+    return _each(figures, 'precision', judge,
+                 lambda row: row['motion'] in ('free_fall', 'projectile'))
 
 
 def _momentum(figures: Figures) -> list[Row]:
@@ -114,7 +111,7 @@ def _momentum(figures: Figures) -> list[Row]:
                     if row.get(key) is not None)
         return _row(f'momentum and angular momentum kept, {accuracy}', 'to 1e-9', f'{worst:.1e}',
                     worst <= 1e-9)
-    return _each(figures, 'precision', judge)
+    return _each(figures, 'precision', judge, lambda row: row.get('momentum_drift') is not None)
 
 
 def _hard(figures: Figures) -> list[Row]:

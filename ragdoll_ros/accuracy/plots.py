@@ -224,6 +224,11 @@ def _work_precision(axes: Axes, rows: Sequence[Row], yardstick: str) -> None:
             axes.plot(*zip(*own, strict=True), marker=MARKS[family], color=COLOURS[family],
                       ms=8 if big else 4, lw=1.5 if family == 'ours' else 1,
                       zorder=3 if big else 2, label=family)
+    for row in rows:
+        if row['family'] == 'ours':
+            place = (_number(row['cpu_s_per_s']), max(_number(row[yardstick]), SMALLEST))
+            axes.annotate(row['label'].removeprefix('ours '), place, xytext=(7, 0), va='center',
+                          textcoords='offset points', fontsize=7, color=BLUE)
     front = _front([(x, y) for _, x, y in points])
     axes.step(*zip(*front, strict=True), where='post', color='black', lw=0.7, ls='--', zorder=1,
               label='front')
