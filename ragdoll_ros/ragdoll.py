@@ -10,13 +10,16 @@ import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from . import faults
 from .faults import floats, set_fields
 from .rotation import IDENTITY
+
+if TYPE_CHECKING:
+    from .swing.chain import Swing
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -183,7 +186,7 @@ class Bone:
 
     def __post_init__(self) -> None:
         set_fields(self, mass=float(self.mass), position=floats(self.position),
-                   orientation=_unit('orientation', self.orientation))
+                   orientation=unit('orientation', self.orientation))
         faults.check_positive('mass', self.mass)
         faults.check_finite('position', self.position)
         if self.color is not None:
@@ -246,7 +249,7 @@ class Joint:
             raise faults.WrongAxes('kind', self.kind, 'one of ' + ', '.join(JOINT_KINDS))
         kind = JOINT_KINDS[self.kind]
         set_fields(self, anchor=floats(self.anchor), damping=float(self.damping),
-                   axes=tuple(_unit('axes', axis) for axis in self.axes),
+                   axes=tuple(unit('axes', axis) for axis in self.axes),
                    limits=tuple(_angles(pair) for pair in self.limits or (None,) * kind.limits))
         faults.check_finite('anchor', self.anchor)
         if len(self.axes) != kind.axes:
@@ -302,16 +305,23 @@ class Joint:
 
 @dataclass(frozen=True)
 class Ragdoll:
-    """A tree of bones. ``bones`` fixes the order; one of them, the root, has no parent."""
+    """A tree of bones. ``bones`` fixes the order; one of them, the root, has no parent.
+
+    ``swings`` ride on bones and do not act back on them.
+    """
 
     name: str
     bones: tuple[Bone, ...]
     joints: tuple[Joint, ...] = ()
+    swings: tuple[Swing, ...] = ()
 
     def __post_init__(self) -> None:
-        set_fields(self, bones=tuple(self.bones), joints=tuple(self.joints))
+        set_fields(self, bones=tuple(self.bones), joints=tuple(self.joints),
+                   swings=tuple(self.swings))
+        names = [bone.name for bone in self.bones]
         edges = [(joint.parent, joint.child) for joint in self.joints]
-        for fault in tree_faults([bone.name for bone in self.bones], edges):
+        rides = [(swing.name, swing.bone) for swing in self.swings]
+        for fault in tree_faults(names, edges) + swing_faults(names, rides):
             raise fault
 
     @property
@@ -388,6 +398,20 @@ def tree_faults(names: list[str], edges: list[tuple[str, str]]) -> list[faults.F
     return found
 
 
+def swing_faults(names: list[str], rides: list[tuple[str, str]]) -> list[faults.Fault]:
+    """Find what is wrong with (name, bone) of swings on the named bones."""
+    found: list[faults.Fault] = []
+    seen: set[str] = set()
+    for index, (name, bone) in enumerate(rides):
+        if name in seen:
+            found.append(faults.DuplicateName(f'swings[{index}].name', name, 'a name of its own'))
+        seen.add(name)
+        if bone not in names:
+            expected = 'one of ' + ', '.join(names)
+            found.append(faults.UnknownBone(f'swings[{index}].bone', bone, expected))
+    return found
+
+
 def _reaches(parent_of: dict[str, str], start: str, goal: str) -> bool:
     """Tell whether ``goal`` is ``start`` itself or one of its ancestors."""
     while start != goal and start in parent_of:
@@ -395,7 +419,8 @@ def _reaches(parent_of: dict[str, str], start: str, goal: str) -> bool:
     return start == goal
 
 
-def _unit(path: str, values: object) -> tuple[float, ...]:
+def unit(path: str, values: object) -> tuple[float, ...]:
+    """Scale to length one; NotUnit for zero."""
     values = floats(values)
     faults.check_finite(path, values)
     length = math.hypot(*values)

@@ -16,9 +16,10 @@ import yaml
 
 from . import faults
 from .faults import Fault, Faults
-from .ragdoll import SHAPES, Bone, Joint, Ragdoll, Shape, tree_faults
+from .ragdoll import SHAPES, Bone, Joint, Ragdoll, Shape, swing_faults, tree_faults
 from .rotation import IDENTITY
 from .scene import Ground, Material, Placement, Scene, above_ground
+from .swing.form import swing_data, swing_from
 
 LARGEST_FILE = 32_000_000
 """Bytes; a doll of 10 000 bones takes 3 MB."""
@@ -99,6 +100,9 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[Fault]]:
         doll, more = _placed_doll(entry['doll'], path)
         found += [fault.at(f'{where}.doll') for fault in more]
         if doll is not None and not _any_under(found, where):
+            doll, more = _with_swings(doll, entry)
+            found += [fault.at(where) for fault in more]
+        if doll is not None and not _any_under(found, where):
             fields = {'position', 'orientation', 'velocity', 'spin', 'name'} & set(entry)
             placements.append(_attempt(found, where, Placement, doll,
                                        **{key: entry[key] for key in fields}))
@@ -122,19 +126,26 @@ def build_doll(data: object, name: str = 'doll') -> tuple[Ragdoll | None, list[F
         return None, found
     bones = _build_each(data, 'bones', _bone, found)
     joints = _build_each(data, 'joints', _joint, found)
+    swings = _build_each(data, 'swings', swing_from, found)
     names = [entry.get('name') for entry in _entries(data, 'bones')]
     edges = [(entry.get('parent'), entry.get('child')) for entry in _entries(data, 'joints')]
     if all(isinstance(text, str) for text in [*names, *sum(edges, ())]):
         found += tree_faults(names, edges)
+        rides = [(entry.get('name'), entry.get('bone')) for entry in _entries(data, 'swings')]
+        if all(isinstance(text, str) for text in sum(rides, ())):
+            found += swing_faults(names, rides)
     if found:
         return None, found
-    return Ragdoll(data.get('name', name), tuple(bones), tuple(joints)), found
+    return Ragdoll(data.get('name', name), tuple(bones), tuple(joints), tuple(swings)), found
 
 
 def doll_data(doll: Ragdoll) -> dict:
     """Give a doll as plain lists and numbers, the form of doll.schema.json."""
-    return {'name': doll.name, 'bones': [_bone_data(bone) for bone in doll.bones],
+    data = {'name': doll.name, 'bones': [_bone_data(bone) for bone in doll.bones],
             'joints': [_joint_data(joint) for joint in doll.joints]}
+    if doll.swings:
+        data['swings'] = [swing_data(swing) for swing in doll.swings]
+    return data
 
 
 def scene_data(scene: Scene) -> dict:
@@ -234,6 +245,20 @@ def _placed_doll(source: object, path: Path) -> tuple[Ragdoll | None, list[Fault
     except Fault as fault:
         return None, [fault]
     return doll, [fault.at(f'({file.name})') for fault in found]
+
+
+def _with_swings(doll: Ragdoll, entry: dict) -> tuple[Ragdoll | None, list[Fault]]:
+    """Give the doll the swings that its place in the scene adds to its own."""
+    if not entry.get('swings'):
+        return doll, []
+    own = len(doll.swings)
+    data = doll_data(doll)
+    data['swings'] = data.get('swings', []) + entry['swings']
+    dressed, found = build_doll(data)
+    shift = re.compile(r'^swings\[(\d+)\]')
+    return dressed, [type(fault)(
+        shift.sub(lambda match: f'swings[{int(match[1]) - own}]', fault.path),
+        fault.value, fault.expected) for fault in found]
 
 
 def _raise_or_give(path: Path, made: object, found: list[Fault]) -> object:

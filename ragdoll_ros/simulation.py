@@ -18,6 +18,8 @@ from .push import Push
 from .scene import SECOND, STEP_RANGE, Scene
 from .state import State
 from .stepping import ACCURACIES, Accuracy, Effort, Stepper
+from .swing.pose import SwingState
+from .swing.riding import riding
 
 MOST_PUSHES = 1000
 """Pushes that may wait at once; one more is refused."""
@@ -64,6 +66,7 @@ class Simulation:
         self._gap = JointGap(scene)
         self._sizes = np.array([max(bone.shape.half_extents) for bone in scene.bones])
         self._weightless = not any(scene.gravity)
+        self._riding = riding(scene)
         self._begin()
 
     def __enter__(self) -> Simulation:
@@ -76,6 +79,16 @@ class Simulation:
     def state(self) -> State:
         """Poses and velocities of all bones now."""
         return self._state
+
+    @property
+    def swings(self) -> SwingState | None:
+        """All masses of the scene's swings now; None for a scene without swings."""
+        return self._riding and self._riding.state
+
+    @property
+    def swing_names(self) -> list[str]:
+        """Name of each mass of the swings, in their order."""
+        return self._riding.names if self._riding else []
 
     @property
     def step(self) -> float:
@@ -142,6 +155,8 @@ class Simulation:
         self._redone += self.effort.redone
         self._queue = [active for active in self._queue if active.end > self.time]
         self._rest()
+        if self._riding:
+            self._riding.follow(self.time, self._state)
         return self._state
 
     def place(self, coordinates: Coordinates) -> State:
@@ -151,7 +166,7 @@ class Simulation:
         """
         self._stepper.place(coordinates)
         self._stepper.engine.let_overlaps_be()
-        self._stepper.look()
+        self._stepper.begin()
         self._start = (self._stepper.engine.save(), self._stepper.coordinates)
         self._begin()
         return self._state
@@ -161,7 +176,7 @@ class Simulation:
         snapshot, coordinates = self._start
         self._stepper.engine.restore(snapshot)
         self._stepper.place(coordinates)
-        self._stepper.touching = self._stepper.engine.touching()
+        self._stepper.begin()
         self._begin()
         return self._state
 
@@ -172,6 +187,7 @@ class Simulation:
         return {
             'energy_excess_J': float((self._motion.energy - guard.start - guard.worked).sum()),
             'energy_projected_J': float(guard.account.taken),
+            'stopped_total': guard.account.stops,
             'work_of_pushes_J': float(guard.worked.sum()),
             'joint_gap_m': float(self._gap.gaps(self._state).max(initial=0.0)),
             'limit_overshoot_rad': float(
@@ -199,6 +215,8 @@ class Simulation:
         """Whether all is at rest and the engine stands."""
         self.effort = Effort()
         """What the last tick took."""
+        if self._riding:
+            self._riding.begin(self.time, self._state)
 
     def _next_change(self) -> int:
         """Instant, ns, at which the next push begins or ends."""
@@ -223,16 +241,15 @@ class Simulation:
         pull = max((math.hypot(*load.force) for load in loads), default=0.0)
         lightest = float(self.mechanics.masses.min())
         gravity = math.hypot(*self.scene.gravity)
-        in_air = stepper.accuracy.momentum and stepper.reach.in_air(
-            before, duration, gravity + pull / lightest)
+        in_air = stepper.reach.in_air(before, duration, gravity + pull / lightest)
         piece = stepper.go(duration, loads)
         self._see(stepper.state)
         if loads:
             self._enter_work(loads, before, piece.substep)
-        if in_air:
+        if in_air and stepper.accuracy.momentum:
             self._keep_momentum(motion, piece.duration, loads, before)
         if stepper.accuracy.energy:
-            self._keep_energy(start)
+            self._keep_energy(start, in_air)
         return piece.duration
 
     def _see(self, state: State) -> None:
@@ -260,14 +277,18 @@ class Simulation:
         self._stepper.shift(shift, moved)
         self._see(moved)
 
-    def _keep_energy(self, start: Coordinates) -> None:
-        guard, touching = self._guard, self._stepper.touching
-        groups = guard.groups(touching)
+    def _keep_energy(self, start: Coordinates, in_air: bool) -> None:
+        """Take out energy from nothing; what was in the air keeps its momentum for sure."""
+        guard = self._guard
+        groups = guard.groups(self._stepper.touching)
         surplus = guard.surplus(self._motion, groups)
         if (surplus > 0).any():
-            outside = any(a != b for a, b in touching)
+            stepper = self._stepper
             self._correct(guard.without_surplus(
-                start, self._stepper.coordinates, self._motion, self._state, surplus, outside))
+                start, stepper.coordinates, self._motion, self._state, surplus, not in_air))
+            burst = guard.burst(self._motion, groups)
+            if burst.any():
+                self._correct(guard.stopped(start, stepper.coordinates, burst))
         guard.settle(self._motion.energy, groups)
 
     def _enter_work(self, loads: list[Load], before: State, substep: float) -> None:

@@ -108,18 +108,26 @@ class Stepper:
         self._normal = np.array(scene.ground.normal if scene.ground else (0.0, 0.0, 1.0))
         self._damped = any(joint.damping for placement in scene.dolls
                            for joint in placement.doll.joints)
-        self._stale = False
+        self._stale: bool
         """Whether the engine has yet to hear of a shift."""
-        self._blocked = False
+        self._blocked: bool
         """Whether something that no flight can foresee comes next: bones that meet."""
+        self._held: np.ndarray
+        """(k,) whether a flight ended at this limit and the joint has leaned on it since."""
         self.effort = Effort()
-        self.look()
+        self.begin()
 
     def look(self) -> None:
         """Read where the engine is."""
         self.state: State = self.engine.read()
         self.coordinates: Coordinates = self.engine.coordinates()
         self.touching = self.engine.touching()
+
+    def begin(self) -> None:
+        """Start from where the engine is, and forget what was before."""
+        self._stale = self._blocked = False
+        self._held = np.zeros(len(self._layout.limits[0]), bool)
+        self.look()
 
     def place(self, coordinates: Coordinates) -> None:
         """Put the scene elsewhere; what touches stays as it was."""
@@ -169,8 +177,9 @@ class Stepper:
         past = self._layout.past_limits(self.coordinates.q)
         if not len(past) or past.max() < -AT_LIMIT:
             return True
+        self._held &= past > -AT_LIMIT
         pressing = (past >= -AT_LIMIT) & (self._layout.limit_speeds(self.coordinates) > 0)
-        return not (pressing | (past > AT_LIMIT)).any()
+        return not (self._held | pressing | (past > AT_LIMIT)).any()
 
     def _fly(self, duration: float, loads: Sequence[Load]) -> float:
         """Fly up to ``duration`` s; give the time flown, 0 where something comes in between."""
@@ -185,6 +194,7 @@ class Stepper:
             if room >= 0 and not self.touching:
                 flown += piece
                 continue
+            self._held |= self._layout.past_limits(self.coordinates.q) > 0
             early = piece * least / (least - room) if least > 0 > room else 0.0
             if early > SHORTEST and self._fly_early(start, early, loads):
                 return flown + early
