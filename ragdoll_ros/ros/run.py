@@ -83,14 +83,14 @@ def _steer(teleop: Teleop, process: subprocess.Popen) -> None:
 
 
 def _log(teleop: Teleop, process: subprocess.Popen) -> None:
-    executor = SingleThreadedExecutor()
-    executor.add_node(teleop)
     next_line = time.monotonic() + LOG_PERIOD
-    while rclpy.ok() and process.poll() is None:
-        executor.spin_once(timeout_sec=LOG_PERIOD)
-        if time.monotonic() >= next_line:
-            next_line += LOG_PERIOD
-            print(teleop.status.line(), flush=True)
+    with SingleThreadedExecutor() as executor:
+        executor.add_node(teleop)
+        while rclpy.ok() and process.poll() is None:
+            executor.spin_once(timeout_sec=LOG_PERIOD)
+            if time.monotonic() >= next_line:
+                next_line += LOG_PERIOD
+                print(teleop.status.line(), flush=True)
 
 
 def _show_log(process: subprocess.Popen) -> None:
