@@ -4,6 +4,7 @@ from __future__ import annotations
 import fcntl
 import os
 import pty
+import signal
 import struct
 import subprocess
 import sys
@@ -88,7 +89,8 @@ def start(module, *arguments, terminal=None):
     keys = subprocess.DEVNULL if terminal is None else terminal
     STARTED.append(subprocess.Popen(
         command, stdin=keys, stdout=subprocess.PIPE if terminal is None else terminal,
-        stderr=subprocess.PIPE, text=True, pass_fds=[lock.fileno() for lock in LOCKS]))
+        stderr=subprocess.PIPE, text=True, start_new_session=True,
+        pass_fds=[lock.fileno() for lock in LOCKS]))
     return STARTED[-1]
 
 
@@ -100,6 +102,13 @@ def start_on_terminal(module, *arguments):
     os.close(theirs)
     os.set_blocking(ours, False)
     return process, ours
+
+
+def kill(process):
+    """Kill a process and those that it has started, if it still runs."""
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
 
 
 def end(process, sign, timeout=10.0):

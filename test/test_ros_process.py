@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseArray, Twist, Vector3, Wrench, WrenchStamped
-from peer import PATIENCE, STARTED, Peer, end, start, start_on_terminal
+from peer import PATIENCE, STARTED, Peer, end, kill, start, start_on_terminal
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -40,9 +40,7 @@ def nothing_runs_on():
     before = len(STARTED)
     yield
     for process in STARTED[before:]:
-        if process.poll() is None:
-            process.kill()
-            process.wait()
+        kill(process)
 
 
 @pytest.fixture(scope='module')

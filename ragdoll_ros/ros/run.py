@@ -46,9 +46,12 @@ def main(arguments: list[str] | None = None) -> int:
         own.remove(scene)
         own += ['--ros-args', '-p', f'scene:={scene}']
     terminal = sys.stdin.isatty() and sys.stdout.isatty()
-    with node_process(own, quiet=terminal) as process, ros_session(arguments):
-        (_steer if terminal else _log)(Teleop(), process)
-    return process.returncode
+    code = 0
+    with ros_session(arguments):
+        with node_process(own, quiet=terminal) as process:
+            (_steer if terminal else _log)(Teleop(), process)
+        code = process.returncode
+    return code
 
 
 @contextmanager
