@@ -11,6 +11,8 @@ NAME = 'ragdoll_ros'
 EXECUTABLES = {
     'ragdoll_node': 'ragdoll_ros.ros.node:main',
     'ragdoll_teleop': 'ragdoll_ros.ros.teleop:main',
+    'ragdoll_fit': 'ragdoll_ros.fit.command:main',
+    'ragdoll_report': 'ragdoll_ros.accuracy.command:main',
 }
 CONFIG = sorted(str(path) for path in Path('config').iterdir() if path.is_file())
 LAUNCHER = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'
@@ -76,8 +78,7 @@ setup(
         'ros': ['ros-jazzy-rclpy', 'ros-jazzy-rmw-fastrtps-cpp', 'ros-jazzy-common-interfaces'],
         'report': ['scipy', 'matplotlib', 'mujoco'],
         'fit': ['pygltflib', 'matplotlib'],
-        'viewer': ['viser'],
-        'test': ['pytest', 'ruff', 'setuptools', 'wheel'],
+        'test': ['pytest', 'ruff', 'setuptools', 'wheel', 'mannequin-x', 'yourdfpy'],
         'colcon': ['colcon-core', 'colcon-ros', 'colcon-python-setup-py',
                    'colcon-common-extensions', 'setuptools<80'],
     },

@@ -110,13 +110,12 @@ class Guard:
         impulse = impulse + masses * self._gravity * duration
         way = before.centre + (before.momentum + impulse / 2) * duration / masses - after.centre
         linear = (before.momentum + impulse - after.momentum) / masses
-        spin = np.zeros_like(linear)
-        if moment is not None:
-            missing = before.spin + moment - after.spin
-            for doll, lack in enumerate(missing):
-                inertia = self._mechanics.locked_inertia(state, after.centre[doll], doll)
-                spin[doll] = np.linalg.solve(inertia, lack)
-        return Shift(way, linear, spin, after.centre)
+        spin, inertia = np.zeros_like(linear), np.zeros((len(linear), 3, 3))
+        missing = np.zeros_like(linear) if moment is None else before.spin + moment - after.spin
+        for doll in np.flatnonzero(missing.any(axis=1)):
+            inertia[doll] = self._mechanics.locked_inertia(state, after.centre[doll], doll)
+            spin[doll] = np.linalg.solve(inertia[doll], missing[doll])
+        return Shift(way, linear, spin, after.centre, inertia)
 
     def without_surplus(self, before: Coordinates, coordinates: Coordinates, motion: Motion,
                         state: State, surplus: np.ndarray, touched: bool) -> Coordinates:

@@ -41,6 +41,8 @@ class Shift:
     """(d, 3) rad/s about the centres of mass."""
     centre: np.ndarray
     """(d, 3) m: the centres of mass before."""
+    inertia: np.ndarray
+    """(d, 3, 3) kg m^2: the locked inertia about it; zero where there is no spin to add."""
 
 
 class Mechanics:
@@ -91,6 +93,19 @@ class Mechanics:
         return State(state.positions + shift.way[doll], state.orientations,
                      state.linear + shift.linear[doll] + cross(shift.spin[doll], arms),
                      state.angular + shift.spin[doll])
+
+    def shifted_motion(self, motion: Motion, shift: Shift) -> Motion:
+        """Give the sums after such a shift: a rigid motion adds P v + M v v / 2 to the kinetic
+        energy, and L w + w I w / 2 about the centre of mass.
+        """
+        masses = self.doll_masses[:, None]
+        gained = np.matmul(shift.inertia, shift.spin[:, :, None])[:, :, 0]
+        kinetic = motion.kinetic + (
+            (motion.momentum + masses * shift.linear / 2) * shift.linear
+            + (motion.spin + gained / 2) * shift.spin).sum(axis=1)
+        centre = motion.centre + shift.way
+        return Motion(kinetic - self.doll_masses * (centre @ self.gravity), kinetic, centre,
+                      motion.momentum + masses * shift.linear, motion.spin + gained)
 
     def locked_inertia(self, state: State, centre: np.ndarray, doll: int) -> np.ndarray:
         """Inertia (3, 3) kg m^2 about its ``centre`` (3,) of a doll as if its joints were locked.

@@ -50,6 +50,9 @@ class Reach:
             return 0.0
         spins = np.sqrt(np.einsum('ij,ij->i', state.angular, state.angular))
         speeds = self._radii * spins - state.linear @ self._normal
+        lowest = state.positions @ self._normal - self._ground.offset - self._radii
+        if (lowest > speeds * soon + MARGIN).all():
+            return 0.0
         return float(speeds[self.heights(state) < speeds * soon + MARGIN].max(initial=0.0))
 
     def in_air(self, state: State, duration: float, acceleration: float) -> bool:

@@ -273,9 +273,9 @@ class Simulation:
             steady = steady and not load.force.any()
         shift = self._guard.momentum_due(before, self._motion, self._state, duration, impulse,
                                          moment if steady else None)
-        moved = self.mechanics.shifted(self._state, shift)
-        self._stepper.shift(shift, moved)
-        self._see(moved)
+        self._state = self.mechanics.shifted(self._state, shift)
+        self._motion = self.mechanics.shifted_motion(self._motion, shift)
+        self._stepper.shift(shift, self._state)
 
     def _keep_energy(self, start: Coordinates, in_air: bool) -> None:
         """Take out energy from nothing; what was in the air keeps its momentum for sure."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -375,6 +375,25 @@ class BulletEngine:
         velocity = placement.velocity + np.cross(placement.spin, arm)
         pybullet.resetBaseVelocity(body, _list(velocity), placement.spin,
                                    physicsClientId=self._client)
+
+
+def bare_loop(scene: Scene, start: Coordinates,
+              substeps: int) -> tuple[Callable[[], None], Callable[[], None]]:
+    """Give the least that can be done in a tick, as a yardstick, and what ends it.
+
+    It steps at a fixed length and reads the links once, with no thought for energy or limits.
+    """
+    engine = BulletEngine(scene)
+    engine.place(start)
+    engine.step(scene.step, substeps)
+    client, doll = engine._client, engine._dolls[0]
+
+    def tick() -> None:
+        pybullet.stepSimulation(physicsClientId=client)
+        pybullet.getLinkStates(doll.body, doll.children, computeLinkVelocity=1,
+                               computeForwardKinematics=1, physicsClientId=client)
+
+    return tick, engine.close
 
 
 def _list(values: np.ndarray) -> list[float]:

@@ -11,10 +11,15 @@ from ..push import Push
 from ..ragdoll import Bone, Box, Capsule, Cylinder
 from ..scene import Scene
 from ..state import State
-from .messages import to_header, to_vector
+from ..swing.pose import SwingState
+from .messages import to_header, to_point, to_vector
 
 GRAY = (0.7, 0.7, 0.7, 1.0)
 RED = (0.9, 0.2, 0.1, 1.0)
+BROWN = (0.35, 0.2, 0.1, 1.0)
+ROD = 0.01
+"""m: thickness of the rods of swings."""
+
 ARROW = 0.5
 """m: length of the arrow of a push of 1 kN; longer and shorter ones go by the square root."""
 
@@ -33,7 +38,8 @@ class Markers:
         self._markers = [self._marker(number) for number in range(len(self._parts))]
         self._arrows = 0
 
-    def message(self, stamp: int, state: State, pushes: Sequence[Push]) -> MarkerArray:
+    def message(self, stamp: int, state: State, pushes: Sequence[Push],
+                swings: SwingState | None = None) -> MarkerArray:
         """Markers where the bones are; arrows of pushes that have ended are taken away."""
         header = to_header(stamp, self._frame)
         orientations = state.orientations[self._bones]
@@ -47,9 +53,10 @@ class Markers:
         gone = [Marker(ns='push', id=number, action=Marker.DELETE)
                 for number in range(len(arrows), self._arrows)]
         self._arrows = len(arrows)
-        for marker in arrows + gone:
+        rods = [] if swings is None else [_rods(swings)]
+        for marker in arrows + gone + rods:
             marker.header = header
-        return MarkerArray(markers=self._markers + arrows + gone)
+        return MarkerArray(markers=self._markers + arrows + gone + rods)
 
     def _marker(self, number: int) -> Marker:
         kind, size, _ = self._parts[number]
@@ -77,6 +84,17 @@ class Markers:
         _place(marker, tail.tolist(), rotation.shortest_arc(np.array([1.0, 0, 0]), force).tolist())
         _paint(marker, RED)
         return marker
+
+
+def _rods(swings: SwingState) -> Marker:
+    """All rods of the swings, from root to mass, as one list of lines."""
+    marker = Marker(ns='swings', id=0, type=Marker.LINE_LIST, action=Marker.ADD)
+    marker.scale.x = ROD
+    marker.pose.orientation.w = 1.0
+    ends = np.stack([swings.roots, swings.positions], axis=1).reshape(-1, 3)
+    marker.points = [to_point(end) for end in ends]
+    _paint(marker, BROWN)
+    return marker
 
 
 def _parts(bone: Bone) -> Iterator[tuple[str, tuple[float, ...], tuple[float, ...]]]:

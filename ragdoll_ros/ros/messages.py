@@ -11,10 +11,11 @@ from sensor_msgs.msg import JointState, MultiDOFJointState
 from std_msgs.msg import Header
 
 from ..state import State
+from ..swing.pose import SwingState
 
 
-def poses_of(state: State) -> np.ndarray:
-    """Poses (n, 7): position m, orientation x, y, z, w."""
+def poses_of(state: State | SwingState) -> np.ndarray:
+    """Poses (n, 7) of bones or of swings' masses: position m, orientation x, y, z, w."""
     return np.concatenate([state.positions, state.orientations], axis=1)
 
 

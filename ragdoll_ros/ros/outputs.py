@@ -15,6 +15,7 @@ from visualization_msgs.msg import MarkerArray
 
 from ..scene import Scene
 from ..simulation import Simulation
+from ..swing.mount import mounts
 from ..urdf import scene_to_urdf
 from .markers import Markers
 from .messages import poses_of, to_joint_state, to_multi_dof, to_pose_array, to_time, twists_of
@@ -34,6 +35,7 @@ class Outputs:
         self._poses = node.create_publisher(PoseArray, '~/poses', 10)
         self._state = node.create_publisher(MultiDOFJointState, '~/state', 10)
         self._joints = node.create_publisher(JointState, 'joint_states', 10)
+        self._swings: Publisher | None = None
         self._markers = node.create_publisher(MarkerArray, '~/markers', 10)
         self._description = node.create_publisher(String, 'robot_description', LATCHED)
         self._clock: Publisher | None = None
@@ -47,6 +49,7 @@ class Outputs:
         self._packed_joints = Packed(functools.partial(to_joint_state, frame, scene.angle_names),
                                      (angles,))
         self._marker_array = Markers(scene, frame)
+        self._describe_swings(scene, frame)
         self._next_markers = 0
         self._description.publish(String(data=scene_to_urdf(scene)))
 
@@ -62,9 +65,23 @@ class Outputs:
         if self._joints.get_subscription_count():
             angles = np.asarray(simulation.joint_angles)
             self._joints.publish(self._packed_joints.message(stamp, angles))
+        if self._swings is not None and self._swings.get_subscription_count():
+            self._swings.publish(self._packed_swings.message(stamp, poses_of(simulation.swings)))
         if now >= self._next_markers and self._markers.get_subscription_count():
             self._next_markers = now + MARKER_PERIOD
-            self._markers.publish(self._marker_array.message(stamp, state, simulation.pushes))
+            self._markers.publish(self._marker_array.message(stamp, state, simulation.pushes,
+                                                             simulation.swings))
+
+    def _describe_swings(self, scene: Scene, frame: str) -> None:
+        """Make ready for the masses of a scene's swings; a scene without any has no topic."""
+        masses = sum(len(mount.names) for mount in mounts(scene))
+        if masses and self._swings is None:
+            self._swings = self._node.create_publisher(PoseArray, '~/swings', 10)
+        elif not masses and self._swings is not None:
+            self._node.destroy_publisher(self._swings)
+            self._swings = None
+        if masses:
+            self._packed_swings = Packed(functools.partial(to_pose_array, frame), (masses, 7))
 
     def be_clock(self, wanted: bool) -> None:
         """Begin or end to publish /clock."""
