@@ -1,10 +1,8 @@
 """What all tests share: this tree on the path, and a ROS domain of their own."""
 from __future__ import annotations
 
-import fcntl
 import importlib.util
 import os
-import tempfile
 from pathlib import Path
 
 import pytest
@@ -15,23 +13,11 @@ if importlib.util.find_spec('rclpy') is None:
     collect_ignore_glob = ['test_ros_*.py']
 
 
-def free_domain() -> tuple[int, object]:
-    """Give a domain id that no other test session on this machine has, and its lock."""
-    for domain in range(1, 101):
-        lock = open(Path(tempfile.gettempdir()) / f'ragdoll_ros_test_domain_{domain}', 'w')  # noqa: SIM115
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            lock.close()
-            continue
-        return domain, lock
-    raise RuntimeError('no ROS domain from 1 to 100 is free')
-
-
 @pytest.fixture(scope='session')
 def ros():
     """ROS in this process, in a domain that it shares with the processes it starts alone."""
     import rclpy
+    from peer import free_domain
     domain, lock = free_domain()
     os.environ['ROS_DOMAIN_ID'] = str(domain)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'

@@ -4,17 +4,46 @@ from __future__ import annotations
 import fcntl
 import os
 import pty
+import signal
 import struct
 import subprocess
 import sys
+import tempfile
 import termios
 import time
+from pathlib import Path
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 PATIENCE = 15.0
 """s that a condition may take: discovery alone takes up to 3 s, up to 10 on a busy machine."""
+
+
+DOMAINS = 100
+"""Domain ids, from 1 on, that leave room for ports."""
+
+LOCKS: list = []
+"""The lock of this session's domain; processes inherit it, so that none outlives it unseen."""
+
+STARTED: list[subprocess.Popen] = []
+"""All processes that were started."""
+
+
+def free_domain():
+    """Give a domain id that no test session or process of one on this machine has, and its lock."""
+    for number in range(DOMAINS):
+        domain = 1 + (os.getpid() + number) % DOMAINS
+        path = Path(tempfile.gettempdir()) / f'ragdoll_ros_test_domain_{domain}'
+        lock = path.open('w')
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            lock.close()
+            continue
+        LOCKS.append(lock)
+        return domain, lock
+    raise RuntimeError(f'no ROS domain from 1 to {DOMAINS} is free')
 
 
 class Peer(Node):
@@ -25,7 +54,7 @@ class Peer(Node):
         self.executor_ = SingleThreadedExecutor()
         self.executor_.add_node(self)
 
-    def collect(self, kind, topic, qos=10):
+    def collect(self, kind, topic, qos=1000):
         """Subscribe; give the list that messages go to, each as (arrival s, message)."""
         got = []
         self.create_subscription(kind, topic, lambda m: got.append((time.monotonic(), m)), qos)
@@ -57,10 +86,12 @@ class Peer(Node):
 def start(module, *arguments, terminal=None):
     """Start a module of the ROS side as a process; ``terminal``: on that pty's end."""
     command = [sys.executable, '-m', f'ragdoll_ros.ros.{module}', *arguments]
-    if terminal is not None:
-        return subprocess.Popen(command, stdin=terminal, stdout=terminal, stderr=subprocess.PIPE)
-    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                            stderr=subprocess.PIPE, text=True)
+    keys = subprocess.DEVNULL if terminal is None else terminal
+    STARTED.append(subprocess.Popen(
+        command, stdin=keys, stdout=subprocess.PIPE if terminal is None else terminal,
+        stderr=subprocess.PIPE, text=True, start_new_session=True,
+        pass_fds=[lock.fileno() for lock in LOCKS]))
+    return STARTED[-1]
 
 
 def start_on_terminal(module, *arguments):
@@ -71,6 +102,13 @@ def start_on_terminal(module, *arguments):
     os.close(theirs)
     os.set_blocking(ours, False)
     return process, ours
+
+
+def kill(process):
+    """Kill a process and those that it has started, if it still runs."""
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
 
 
 def end(process, sign, timeout=10.0):

@@ -1,4 +1,4 @@
-"""How the simulation does, once a second on /diagnostics."""
+"""How the simulation does: on /diagnostics once a second, and at once when its time is handled."""
 from __future__ import annotations
 
 import math
@@ -33,9 +33,10 @@ class Diagnostics:
         self._facts, self._wanted_pace = facts, wanted_pace
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._told = 0
+        self._last: dict[str, float] | None = None
         self.simulation: Simulation
         self._begin()
-        node.create_timer(PERIOD, self.report, clock=steady)
+        node.create_timer(PERIOD, self._close, clock=steady)
 
     def count(self, cost: int, simulated: int) -> None:
         """Enter a tick: ns that it took, and ns that it went on."""
@@ -45,26 +46,35 @@ class Diagnostics:
         self._simulated += simulated
 
     def report(self) -> None:
-        """Publish, and begin to count anew."""
-        pace = self._simulated / max(1, self._steady.now().nanoseconds - self._since)
-        level, message = self._judge(pace)
-        values = {name: _text(value) for name, value in self._values(pace).items()}
+        """Publish how it is now; pace and cost are those of the last whole period."""
+        if self._last is None:
+            return
+        level, message = self._judge()
+        values = {name: _text(value) for name, value in self._values().items()}
         status = DiagnosticStatus(
-            level=level, name=f'{self._node.get_name()}: simulation', message=message,
-            hardware_id=self.simulation.scene.name,
+            level=level, name=status_name(self._node.get_namespace(), self._node.get_name()),
+            message=message, hardware_id=self.simulation.scene.name,
             values=[KeyValue(key=key, value=value) for key, value in values.items()])
         array = DiagnosticArray(status=[status])
         array.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(array)
+
+    def _close(self) -> None:
+        """Close a period: report it, and begin to count anew."""
+        elapsed = max(1, self._steady.now().nanoseconds - self._since)
+        self._last = {'pace': self._simulated / elapsed,
+                      'tick_cost_ms': self._cost / max(1, self._ticks) / 1e6,
+                      'tick_cost_max_ms': self._dearest / 1e6}
+        self.report()
         self._begin()
 
     def _begin(self) -> None:
         self._since = self._steady.now().nanoseconds
         self._ticks = self._cost = self._dearest = self._simulated = 0
 
-    def _judge(self, pace: float) -> tuple[bytes, str]:
+    def _judge(self) -> tuple[bytes, str]:
         """Level and message: what was refused since the last report, else how the pace is."""
-        tally, wanted = self._tally, self._wanted_pace()
+        tally, wanted, pace = self._tally, self._wanted_pace(), self._last['pace']
         counted = tally.refused.total() + tally.clamped.total()
         news, self._told = counted > self._told, counted
         if news:
@@ -73,23 +83,24 @@ class Diagnostics:
             return DiagnosticStatus.WARN, f'pace {pace:.3g} falls behind {wanted:.3g}'
         return DiagnosticStatus.OK, 'running' if wanted else 'paused'
 
-    def _values(self, pace: float) -> dict[str, object]:
+    def _values(self) -> dict[str, object]:
         simulation, tally = self.simulation, self._tally
-        ticks = max(1, self._ticks)
         return {
-            'pace': pace,
+            **self._last,
             'simulated_time': simulation.time / SECOND,
-            'tick_cost_ms': self._cost / ticks / 1e6,
-            'tick_cost_max_ms': self._dearest / 1e6,
-            'asleep': simulation.asleep,
             'push': pushes_text(simulation.pushes),
             **self._facts(),
-            **_measures(simulation),
+            **simulation.measures(),
             'refused': tally.refused.total(),
             'clamped': tally.clamped.total(),
             'last_reason': tally.reason,
             **{f'refused {source}': count for source, count in tally.refused.items()},
             **{f'clamped {source}': count for source, count in tally.clamped.items()}}
+
+
+def status_name(namespace: str, node: str) -> str:
+    """Name of a node's status: /diagnostics is one topic for all."""
+    return f'{namespace}/{node}: simulation'.lstrip('/')
 
 
 def pushes_text(pushes: Sequence[Push]) -> str:
@@ -101,12 +112,6 @@ def _push_text(push: Push) -> str:
     parts = [f'({" ".join(f"{value:.4g}" for value in vector)}) {unit}'
              for vector, unit in ((push.force, 'N'), (push.torque, 'N m')) if any(vector)]
     return f'{" ".join(parts)} on {push.bone}' + (' in its own axes' if push.local else '')
-
-
-def _measures(simulation: Simulation) -> dict[str, float]:
-    """Error measures of the simulation: name and number."""
-    measures = getattr(simulation, 'measures', None)
-    return measures() if measures else {}
 
 
 def _text(value: object) -> str:

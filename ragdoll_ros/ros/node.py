@@ -98,11 +98,13 @@ class RagdollNode(Node):
         self._stamps.begin_again(self.simulation.time, self.simulation.tick)
         self.simulation.reset()
         self._publish()
+        self._diagnostics.report()
 
     def pause(self, wanted: bool) -> None:
         """Hold the time, or let it go on from where it is."""
         self.paused = wanted
         self._restart_timer()
+        self._diagnostics.report()
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Set parameters; a refusal is counted, also one by a range that rclpy checks."""
@@ -181,6 +183,7 @@ class RagdollNode(Node):
             simulation, self._prepared = self._prepared, None
             self._replace(simulation)
             self._publish()
+            self._diagnostics.report()
         elif 'frame_id' in changed:
             self._outputs.describe(self.simulation.scene, settings.frame_id)
         self.simulation.accuracy = settings.accuracy

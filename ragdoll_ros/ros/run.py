@@ -46,9 +46,12 @@ def main(arguments: list[str] | None = None) -> int:
         own.remove(scene)
         own += ['--ros-args', '-p', f'scene:={scene}']
     terminal = sys.stdin.isatty() and sys.stdout.isatty()
-    with node_process(own, quiet=terminal) as process, ros_session(arguments):
-        (_steer if terminal else _log)(Teleop(), process)
-    return process.returncode
+    code = 0
+    with ros_session(arguments):
+        with node_process(own, quiet=terminal) as process:
+            (_steer if terminal else _log)(Teleop(), process)
+        code = process.returncode
+    return code
 
 
 @contextmanager
@@ -83,14 +86,14 @@ def _steer(teleop: Teleop, process: subprocess.Popen) -> None:
 
 
 def _log(teleop: Teleop, process: subprocess.Popen) -> None:
-    executor = SingleThreadedExecutor()
-    executor.add_node(teleop)
     next_line = time.monotonic() + LOG_PERIOD
-    while rclpy.ok() and process.poll() is None:
-        executor.spin_once(timeout_sec=LOG_PERIOD)
-        if time.monotonic() >= next_line:
-            next_line += LOG_PERIOD
-            print(teleop.status.line(), flush=True)
+    with SingleThreadedExecutor() as executor:
+        executor.add_node(teleop)
+        while rclpy.ok() and process.poll() is None:
+            executor.spin_once(timeout_sec=LOG_PERIOD)
+            if time.monotonic() >= next_line:
+                next_line += LOG_PERIOD
+                print(teleop.status.line(), flush=True)
 
 
 def _show_log(process: subprocess.Popen) -> None:

@@ -8,12 +8,14 @@ from rclpy.node import Node
 from sensor_msgs.msg import MultiDOFJointState
 
 from ..scene import SECOND
+from .diagnostics import status_name
 
 
 class Status:
     """Listens to a ragdoll's state and diagnostics."""
 
     def __init__(self, node: Node) -> None:
+        self._name = status_name(node.get_namespace(), 'ragdoll')
         self._values: dict[str, str] = {}
         self._state: MultiDOFJointState | None = None
         node.create_subscription(DiagnosticArray, '/diagnostics', self._take_diagnostics, 10)
@@ -49,7 +51,7 @@ class Status:
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            if status.name.endswith(': simulation'):
+            if status.name == self._name:
                 self._values = {pair.key: pair.value for pair in status.values}
 
     def _take_state(self, message: MultiDOFJointState) -> None:

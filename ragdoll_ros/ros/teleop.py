@@ -53,7 +53,6 @@ class Teleop(Node):
         self._force = self.create_publisher(Wrench, 'ragdoll/force', 10)
         self._reset = self.create_client(Trigger, 'ragdoll/reset')
         self._pause = self.create_client(SetBool, 'ragdoll/pause')
-        self._paused: bool | None = None
         self._pushing = False
 
     def take(self, key: str, down: bool, now: float) -> bool:
@@ -61,8 +60,7 @@ class Teleop(Node):
         if key in FORCES:
             self.held.take(key, down, now)
         elif key == ' ':
-            self._paused = not (self.status.paused if self._paused is None else self._paused)
-            self._pause.call_async(SetBool.Request(data=self._paused))
+            self._pause.call_async(SetBool.Request(data=not self.status.paused))
         elif key in 'rR':
             self._reset.call_async(Trigger.Request())
         return key not in 'qQ'
@@ -85,9 +83,9 @@ def total(keys: Sequence[str]) -> tuple[float, ...]:
 
 def steer(teleop: Teleop, attend: Callable[[], bool] = lambda: True) -> None:
     """Go on until a key quits, ROS shuts down or ``attend``, called each time, says False."""
-    executor, next_line = SingleThreadedExecutor(), 0.0
-    executor.add_node(teleop)
-    with Keyboard() as keyboard:
+    next_line = 0.0
+    with SingleThreadedExecutor() as executor, Keyboard() as keyboard:
+        executor.add_node(teleop)
         while rclpy.ok() and attend():
             now = time.monotonic()
             if not all(teleop.take(key, down, now) for key, down in keyboard.keys(PERIOD)):
