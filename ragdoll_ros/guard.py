@@ -21,6 +21,10 @@ TOLERANCE = 5e-4
 """Energy above the account, as a share of the doll's energy, that is left alone: half of the
 0.1 % that is promised."""
 
+BURST = 0.02
+"""Energy from nothing, as a share of the doll's, at which a step has failed beyond mending:
+bones jammed into each other that burst apart. The doll is stopped, which is counted."""
+
 
 @dataclass
 class Account:
@@ -32,6 +36,8 @@ class Account:
     """(d,) J: sum of the sizes of all work done by pushes."""
     taken: float = 0.0
     """J: energy that projections have taken out since the start."""
+    stops: int = 0
+    """Times that a doll was stopped where it stood, as no less would do."""
 
 
 class Guard:
@@ -113,15 +119,15 @@ class Guard:
         return Shift(way, linear, spin, after.centre)
 
     def without_surplus(self, before: Coordinates, coordinates: Coordinates, motion: Motion,
-                        state: State, surplus: np.ndarray, touching: bool) -> Coordinates:
+                        state: State, surplus: np.ndarray, touched: bool) -> Coordinates:
         """Take ``surplus`` (d,) J out of the dolls' motion.
 
         Each doll keeps its momentum and angular momentum: of its motion only what it does
         beside moving as one rigid body, with the angular velocity Ic^-1 L of the doll locked in
         its pose (Featherstone, Rigid Body Dynamics Algorithms, 9.6), is scaled down. Where that
-        holds less than the surplus and something outside touches the doll, all its motion is;
-        and where that is not enough either, contacts have pushed the doll uphill, and it stands
-        where it was ``before``.
+        holds less than the surplus and something outside may have ``touched`` the doll, all its
+        motion is; and where that is not enough either, contacts have pushed the doll uphill, and
+        it stands where it was ``before``.
         """
         layout, q, v = self._layout, coordinates.q.copy(), coordinates.v.copy()
         for doll in np.flatnonzero(surplus > 0):
@@ -135,11 +141,25 @@ class Guard:
             self._scale(v, doll, coordinates.q, centre, linear, spin, scale)
             self.account.taken += min(surplus[doll], inner)
             rest = surplus[doll] - inner
-            if rest > 0 and touching:
+            if rest > 0 and touched:
                 v[layout.own_v[doll]] *= math.sqrt(max(0.0, 1 - rest / rigid)) if rigid > 0 else 0
                 self.account.taken += min(rest, rigid)
                 if rest > rigid:
                     q[layout.own_q[doll]] = before.q[layout.own_q[doll]]
+        return Coordinates(q, v)
+
+    def burst(self, motion: Motion, groups: np.ndarray) -> np.ndarray:
+        """Tell which dolls (d,) have far more than they may even after a correction."""
+        scale = motion.kinetic + self._fall + self.account.put_in
+        return self.surplus(motion, groups) > BURST * scale
+
+    def stopped(self, start: Coordinates, end: Coordinates, burst: np.ndarray) -> Coordinates:
+        """Give ``end`` with the dolls that have ``burst`` (d,) at rest where they were."""
+        q, v = end.q.copy(), end.v.copy()
+        for doll in np.flatnonzero(burst):
+            q[self._layout.own_q[doll]] = start.q[self._layout.own_q[doll]]
+            v[self._layout.own_v[doll]] = 0.0
+            self.account.stops += 1
         return Coordinates(q, v)
 
     def _scale(self, v: np.ndarray, doll: int, q: np.ndarray, centre: np.ndarray,

@@ -139,6 +139,13 @@ def to_rpy(q: np.ndarray) -> tuple[float, float, float]:
     return roll, pitch, yaw
 
 
+def to_xyz(q: np.ndarray) -> tuple[float, float, float]:
+    """Angles in rad about x, then the new y, then the new z that make up one quaternion's turn."""
+    r = matrix(q)
+    return (math.atan2(-r[1, 2], r[2, 2]), math.asin(max(-1.0, min(1.0, r[0, 2]))),
+            math.atan2(-r[0, 1], r[0, 0]))
+
+
 def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Geodesic distance of unit quaternions in rad, 0 to pi; q and -q are the same turn."""
     difference = multiply(inverse(a), b)

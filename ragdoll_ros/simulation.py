@@ -187,6 +187,7 @@ class Simulation:
         return {
             'energy_excess_J': float((self._motion.energy - guard.start - guard.worked).sum()),
             'energy_projected_J': float(guard.account.taken),
+            'stopped_total': guard.account.stops,
             'work_of_pushes_J': float(guard.worked.sum()),
             'joint_gap_m': float(self._gap.gaps(self._state).max(initial=0.0)),
             'limit_overshoot_rad': float(
@@ -240,16 +241,15 @@ class Simulation:
         pull = max((math.hypot(*load.force) for load in loads), default=0.0)
         lightest = float(self.mechanics.masses.min())
         gravity = math.hypot(*self.scene.gravity)
-        in_air = stepper.accuracy.momentum and stepper.reach.in_air(
-            before, duration, gravity + pull / lightest)
+        in_air = stepper.reach.in_air(before, duration, gravity + pull / lightest)
         piece = stepper.go(duration, loads)
         self._see(stepper.state)
         if loads:
             self._enter_work(loads, before, piece.substep)
-        if in_air:
+        if in_air and stepper.accuracy.momentum:
             self._keep_momentum(motion, piece.duration, loads, before)
         if stepper.accuracy.energy:
-            self._keep_energy(start)
+            self._keep_energy(start, in_air)
         return piece.duration
 
     def _see(self, state: State) -> None:
@@ -277,14 +277,18 @@ class Simulation:
         self._stepper.shift(shift, moved)
         self._see(moved)
 
-    def _keep_energy(self, start: Coordinates) -> None:
-        guard, touching = self._guard, self._stepper.touching
-        groups = guard.groups(touching)
+    def _keep_energy(self, start: Coordinates, in_air: bool) -> None:
+        """Take out energy from nothing; what was in the air keeps its momentum for sure."""
+        guard = self._guard
+        groups = guard.groups(self._stepper.touching)
         surplus = guard.surplus(self._motion, groups)
         if (surplus > 0).any():
-            outside = any(a != b for a, b in touching)
+            stepper = self._stepper
             self._correct(guard.without_surplus(
-                start, self._stepper.coordinates, self._motion, self._state, surplus, outside))
+                start, stepper.coordinates, self._motion, self._state, surplus, not in_air))
+            burst = guard.burst(self._motion, groups)
+            if burst.any():
+                self._correct(guard.stopped(start, stepper.coordinates, burst))
         guard.settle(self._motion.energy, groups)
 
     def _enter_work(self, loads: list[Load], before: State, substep: float) -> None:

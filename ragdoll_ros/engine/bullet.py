@@ -168,7 +168,7 @@ class BulletEngine:
             states = self._joints(doll)
             for joint in placement.doll.joints:
                 if joint.angle_names and joint.angle_names[0] not in doll.angles:
-                    values += _euler_xyz(states[doll.angles[joint.child]][0])
+                    values += rotation.to_xyz(states[doll.angles[joint.child]][0])
                 else:
                     values += [states[doll.angles[name]][0][0] for name in joint.angle_names]
         return np.array(values)
@@ -379,12 +379,3 @@ class BulletEngine:
 
 def _list(values: np.ndarray) -> list[float]:
     return [float(value) for value in values]
-
-
-def _euler_xyz(q: tuple[float, ...]) -> list[float]:
-    """Angles about x, then the new y, then the new z that make up a quaternion's turn."""
-    r = rotation.matrix(np.array(q))
-    return [math.atan2(-r[1, 2], r[2, 2]), math.asin(max(-1.0, min(1.0, r[0, 2]))),
-            math.atan2(-r[0, 1], r[0, 0])]
-
-

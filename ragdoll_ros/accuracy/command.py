@@ -1,0 +1,141 @@
+"""`ragdoll_report`: runs every case by every method, writes JSON, Markdown and pictures."""
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+PARTS = ('precision', 'orders', 'pieces', 'drop', 'classes', 'projection', 'hard', 'costs',
+         'estimate')
+NEEDED = ('scipy', 'matplotlib', 'mujoco')
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; the exit code: 2 for a wrong call or a missing package."""
+    options = parser().parse_args(arguments)
+    missing = missing_packages()
+    if missing:
+        sys.stderr.write(f'ragdoll_report needs {", ".join(missing)}: '
+                         'pip install "ragdoll_ros[report]"\n')
+        return 2
+    try:
+        return report(options)
+    except WrongCall as error:
+        sys.stderr.write(f'ragdoll_report: {error}\n')
+        return 2
+
+
+class WrongCall(ValueError):
+    """An option whose value cannot be used."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """Options of the command."""
+    made = argparse.ArgumentParser(
+        prog='ragdoll_report', description='Measure how wrong and how fast the simulation is, '
+        'beside PyBullet and MuJoCo. Writes accuracy.json, accuracy.md and pictures.',
+        epilog='example: ragdoll_report --quick --out /tmp/report; '
+        'ragdoll_report --case classes --starts 10000')
+    made.add_argument('--quick', action='store_true',
+                      help='fewer motions, methods and starts: at most 90 s (else 20 min)')
+    made.add_argument('--case', action='append', metavar='NAME', default=[],
+                      help='only this part or motion; may be given again; "list" names them all')
+    made.add_argument('--starts', type=int, default=100, metavar='N',
+                      help='starts of each of the nine classes (100)')
+    made.add_argument('--out', type=Path, default=Path('docs'), metavar='DIR',
+                      help='folder to write into (docs)')
+    made.add_argument('--from-json', action='store_true',
+                      help='measure nothing, write page and pictures anew from DIR/accuracy.json')
+    return made
+
+
+def missing_packages() -> list[str]:
+    """Packages of the extra `report` that cannot be imported."""
+    missing = []
+    for name in NEEDED:
+        try:
+            importlib.import_module(name)
+        except ImportError:
+            missing.append(name)
+    return missing
+
+
+def report(options: argparse.Namespace) -> int:
+    """Do what the options say."""
+    from . import figures
+    if options.case == ['list']:
+        sys.stdout.write('\n'.join(labels()) + '\n')
+        return 0
+    folder = options.out.absolute()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise WrongCall(f'--out {options.out}: {error.strerror}') from None
+    if options.from_json:
+        if not (folder / figures.FILE).is_file():
+            raise WrongCall(f'--from-json: there is no {folder / figures.FILE}')
+    else:
+        figures.save(measured(options), folder)
+    write(folder)
+    return 0
+
+
+def measured(options: argparse.Namespace) -> dict:
+    """Run the jobs; give what the JSON holds."""
+    from . import figures
+    from .parts.classes import NAME, SWITCHES, merged
+    from .runner import Options, run_jobs
+    if options.starts < 1:
+        raise WrongCall(f'--starts {options.starts}: expected 1 or more')
+    began = time.monotonic()
+    jobs = chosen(options.case, Options(options.quick, options.starts))
+    rows = run_jobs(jobs)
+    for part in (NAME, SWITCHES):
+        if part in rows:
+            rows[part] = merged(rows[part])
+    words = ['ragdoll_report', *(['--quick'] if options.quick else []),
+             *(f'--case {name}' for name in options.case),
+             *([f'--starts {options.starts}'] if options.starts != 100 else [])]
+    return {'about': figures.about(' '.join(words), time.monotonic() - began, options.quick,
+                                   options.starts), 'figures': rows}
+
+
+def write(folder: Path) -> None:
+    """Write page and pictures from the JSON in a folder."""
+    from . import figures
+    from .plots import draw_all
+    from .report import markdown
+    data = figures.load(folder)
+    pictures = draw_all(data['figures'], folder)
+    page = folder / 'accuracy.md'
+    page.write_text(markdown(data, pictures), encoding='utf-8')
+    sys.stdout.write(f'{page} and {len(pictures)} pictures\n')
+
+
+def chosen(names: Sequence[str], options: object) -> list:
+    """All jobs, or those of the parts and motions named; WrongCall for a name that is none."""
+    jobs = [(part, job) for part in PARTS for job in _part(part).jobs(options)]
+    for name in names:
+        if not any(name in (part, job.part, job.label) for part, job in jobs):
+            raise WrongCall(f'--case {name}: expected one of {", ".join(labels())}')
+    return [job for part, job in jobs
+            if not names or {part, job.part, job.label}.intersection(names)]
+
+
+def labels() -> list[str]:
+    """Names that --case takes."""
+    from .parts.precision import motions
+    return [*PARTS, *motions()]
+
+
+def _part(name: str) -> object:
+    if name == 'hard':
+        return importlib.import_module('ragdoll_ros.accuracy.hard')
+    return importlib.import_module(f'ragdoll_ros.accuracy.parts.{name}')
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,65 @@
+"""The report's data: one JSON file that holds every figure, and about what they were taken."""
+from __future__ import annotations
+
+import datetime
+import importlib.metadata
+import json
+import math
+import os
+import platform
+from pathlib import Path
+
+FILE = 'accuracy.json'
+
+
+def about(command: str, seconds: float, quick: bool, starts: int) -> dict[str, object]:
+    """Versions, machine, date: what a reader needs to compare the figures with his own."""
+    return {'date': datetime.datetime.now(datetime.timezone.utc).strftime('%Y-%m-%d %H:%M UTC'),
+            'command': command, 'quick': quick, 'starts': starts, 'seconds': round(seconds, 1),
+            'machine': _processor(), 'cores': os.cpu_count(),
+            'system': f'{platform.system()} {platform.machine()}',
+            'python': platform.python_version(),
+            'versions': {name: _version(name) for name in
+                         ('ragdoll_ros', 'pybullet', 'mujoco', 'numpy', 'scipy')}}
+
+
+def save(data: dict, folder: Path) -> Path:
+    """Write the figures; infinity becomes the text 'inf', NaN null: JSON has neither."""
+    path = folder / FILE
+    path.write_text(json.dumps(_plain(data), indent=1, allow_nan=False) + '\n', encoding='utf-8')
+    return path
+
+
+def load(folder: Path) -> dict:
+    """Read the figures back as they were written."""
+    return json.loads((folder / FILE).read_text(encoding='utf-8'))
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, float):
+        if math.isnan(value):
+            return None
+        if math.isinf(value):
+            return 'inf'
+        return float(f'{value:.6g}')
+    return value
+
+
+def _version(name: str) -> str:
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return 'from the source tree'
+
+
+def _processor() -> str:
+    try:
+        lines = Path('/proc/cpuinfo').read_text(encoding='utf-8').splitlines()
+    except OSError:
+        return platform.processor() or 'unknown'
+    names = [line.split(':', 1)[1].strip() for line in lines if line.startswith('model name')]
+    return names[0] if names else platform.machine()

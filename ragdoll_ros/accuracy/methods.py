@@ -1,0 +1,184 @@
+"""The ways to simulate a trial that stand side by side in the report."""
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from time import process_time
+from typing import Protocol
+
+import numpy as np
+
+from .. import faults
+from ..engine.bullet import BulletEngine
+from ..engine.mujoco import MujocoEngine
+from ..engine.protocol import Engine
+from ..simulation import Simulation
+from ..state import State
+from ..stepping import ACCURACIES, Accuracy
+from .quickstart import STEP as QUICKSTART_STEP
+from .quickstart import Quickstart
+from .trajectory import Trajectory
+from .trial import Trial
+
+
+class Run(Protocol):
+    """A trial under way."""
+
+    def read(self) -> State:
+        """Poses and velocities of all bones now."""
+
+    def advance(self) -> State:
+        """Go on by one tick."""
+
+    def close(self) -> None:
+        """Give everything back."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to simulate. ``family`` groups points of one line; ``substeps`` a tick, 0 by need."""
+
+    name: str
+    label: str
+    family: str
+    begin: Callable[[Trial], Run]
+    substeps: int = 0
+    tick: float | None = None
+    """Its own tick in s; None: the trial's."""
+    order: int | None = None
+    """What theory says of the order in flight."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a method made of a trial, and the CPU seconds of each tick (t - 1,)."""
+
+    moved: Trajectory
+    costs: np.ndarray
+
+    @property
+    def rate(self) -> float:
+        """CPU seconds per simulated second."""
+        return float(self.costs.sum() / self.moved.times[-1])
+
+
+class _FixedSteps:
+    """An engine driven with the same number of substeps in each tick."""
+
+    def __init__(self, trial: Trial, substeps: int, make: Callable[..., Engine]) -> None:
+        self._trial, self._substeps = trial, substeps
+        self._engine = make(trial.scene)
+        self._tick, self._count = trial.scene.step, 0
+        if trial.start is not None:
+            self._engine.place(trial.start)
+
+    def read(self) -> State:
+        return self._engine.read()
+
+    def advance(self) -> State:
+        begin = self._count * self._tick
+        loads = self._trial.loads(begin, begin + self._tick) if self._trial.pushes else ()
+        self._engine.step(self._tick, self._substeps, loads)
+        self._count += 1
+        return self._engine.read()
+
+    def close(self) -> None:
+        self._engine.close()
+
+
+class Ours:
+    """The simulation as the node runs it."""
+
+    def __init__(self, trial: Trial, accuracy: str | Accuracy,
+                 engine: type[Engine] = BulletEngine) -> None:
+        self.simulation = Simulation(trial.scene, accuracy=accuracy, engine=engine)
+        if trial.start is not None:
+            self.simulation.place(trial.start)
+        for push in trial.pushes:
+            self.simulation.push(push)
+
+    def read(self) -> State:
+        """Poses and velocities of all bones now."""
+        return self.simulation.state
+
+    def advance(self) -> State:
+        """Go on by one tick."""
+        return self.simulation.advance()
+
+    def close(self) -> None:
+        """Give the engine back."""
+        self.simulation.close()
+
+
+def run(method: Method, trial: Trial) -> Result:
+    """Simulate a trial once, from the start to its end."""
+    tick = method.tick or trial.scene.step
+    times = trial.times(tick)
+    motion = method.begin(trial)
+    try:
+        states, costs = [motion.read()], np.empty(len(times) - 1)
+        for index in range(len(costs)):
+            before = process_time()
+            state = motion.advance()
+            costs[index] = process_time() - before
+            states.append(state)
+    finally:
+        motion.close()
+    return Result(Trajectory.of(times, states), costs)
+
+
+def median_run(method: Method, trial: Trial, repeats: int) -> Result:
+    """Simulate a trial several times; each tick's cost is its median."""
+    results = [run(method, trial) for _ in range(repeats)]
+    costs = np.median([result.costs for result in results], axis=0)
+    return dataclasses.replace(results[0], costs=costs)
+
+
+def ours(accuracy: str | Accuracy, name: str | None = None) -> Method:
+    """Our simulation at one of its settings, or with settings of one's own."""
+    name = name or f'ours-{accuracy}'
+    order = ACCURACIES[accuracy].order if isinstance(accuracy, str) else accuracy.order or 1
+    return Method(name, name.replace('-', ' '), 'ours', functools.partial(
+        Ours, accuracy=accuracy), order=order)
+
+
+def quickstart() -> Method:
+    """PyBullet by its quickstart."""
+    return Method('quickstart', 'PyBullet quickstart, 1/240 s', 'quickstart', Quickstart, 1,
+                  QUICKSTART_STEP)
+
+
+def bullet(substeps: int) -> Method:
+    """PyBullet, our scene, always as many substeps."""
+    return Method(f'bullet-{substeps}', f'PyBullet N = {substeps}', 'PyBullet', functools.partial(
+        _FixedSteps, substeps=substeps, make=BulletEngine), substeps, order=1)
+
+
+def mujoco(integrator: str, substeps: int) -> Method:
+    """MuJoCo, our scene, always as many substeps."""
+    make = functools.partial(MujocoEngine, integrator=integrator)
+    return Method(f'mujoco-{integrator}-{substeps}', f'MuJoCo {integrator} N = {substeps}',
+                  f'MuJoCo {integrator}', functools.partial(
+                      _FixedSteps, substeps=substeps, make=make), substeps,
+                  order={'rk4': 4}.get(integrator, 1))
+
+
+SUBSTEPS = (1, 2, 4, 8, 16, 32)
+
+
+def every_method(substeps: Iterable[int] = SUBSTEPS) -> list[Method]:
+    """Ours at three settings, the quickstart, PyBullet and MuJoCo at fixed substeps."""
+    counts = tuple(substeps)
+    return [*map(ours, ACCURACIES), quickstart(), *map(bullet, counts),
+            *(mujoco(integrator, count) for integrator in ('euler', 'implicitfast', 'rk4')
+              for count in counts)]
+
+
+def by_name(name: str) -> Method:
+    """Find a method; OutOfRange names all there are."""
+    methods = {method.name: method for method in every_method(range(1, 129))}
+    if name not in methods:
+        raise faults.OutOfRange('method', name, 'ours-*, quickstart, bullet-N, mujoco-*-N')
+    return methods[name]

@@ -1,0 +1,104 @@
+"""Contacts whose course has a formula: a bouncing ball, a block on a slope, a rolling ball."""
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+from ... import rotation
+from ...ragdoll import Bone, Box, Ragdoll, Sphere
+from ...scene import Ground, Material, Placement, Scene
+from ..references import closed_forms
+from ..trajectory import Trajectory
+from ..trial import Trial, posed
+from .motion import Motion, course, turned
+
+GRAVITY = 9.8
+RADIUS = 0.1
+
+
+def contact_motions() -> list[Motion]:
+    """All motions on the ground."""
+    return [bounce(), incline('incline_stick', 'Block that sticks', 0.6),
+            incline('incline_slip', 'Block that slips', 0.2), rolling_ball()]
+
+
+def _ball(material: Material, height: float, **placed: object) -> Scene:
+    doll = Ragdoll('ball', (Bone('ball', Sphere(RADIUS), 1.0, (0.0, 0.0, 0.0)),))
+    placement = Placement(doll, position=(0.0, 0.0, RADIUS + height), **placed)
+    return Scene('ball', (placement,), Ground(), material)
+
+
+def bounce(height: float = 1.0, restitution: float = 0.5, bounces: int = 3) -> Motion:
+    """A ball let fall from 1 m; the heights it comes back to are e^(2 n) of it."""
+    impacts = closed_forms.bounce_times(height, restitution, GRAVITY, bounces + 1)
+
+    def truth(times: np.ndarray) -> Trajectory:
+        heights = np.array([_flight_height(t, height, restitution, impacts) for t in times])
+        positions = np.zeros((len(times), 1, 3))
+        positions[:, 0, 2] = RADIUS + heights
+        return course(times, positions)
+
+    def apexes(moved: Trajectory) -> dict[str, float]:
+        heights = moved.positions[:, 0, 2] - RADIUS
+        errors = []
+        for n, (begin, end) in enumerate(itertools.pairwise(impacts), start=1):
+            inside = (moved.times > begin) & (moved.times < end)
+            exact = closed_forms.bounce_apex(height, restitution, n)
+            errors.append(abs(_apex(moved.times[inside], heights[inside]) / exact - 1))
+        return {f'apex_{n}_error': error for n, error in enumerate(errors, start=1)}
+    scene = _ball(Material(friction=0.0, restitution=restitution), height)
+    duration = round(impacts[bounces] - 0.01, 2)
+    return Motion('bounce', f'Ball that bounces {bounces} times, e = {restitution:g}',
+                  'parabolas, heights e²ⁿ h', Trial(scene, duration), truth, in_air=False,
+                  extra=apexes)
+
+
+def _apex(times: np.ndarray, heights: np.ndarray) -> float:
+    """Highest point of the parabola through the three highest samples, m."""
+    top = int(np.clip(np.argmax(heights), 1, len(heights) - 2))
+    a, b, c = np.polyfit(times[top - 1:top + 2] - times[top], heights[top - 1:top + 2], 2)
+    return float(c - b * b / (4 * a)) if a < 0 else float(heights.max())
+
+
+def _flight_height(t: float, height: float, restitution: float, impacts: list[float]) -> float:
+    if t <= impacts[0]:
+        return height - GRAVITY * t * t / 2
+    n = max(index for index, impact in enumerate(impacts) if impact <= t)
+    speed = restitution ** (n + 1) * math.sqrt(2 * GRAVITY * height)
+    since = t - impacts[n]
+    return max(0.0, speed * since - GRAVITY * since * since / 2)
+
+
+def incline(name: str, title: str, friction: float, slope: float = math.radians(20)) -> Motion:
+    """A flat block laid on a slope of 20 degrees."""
+    normal = (math.sin(slope), 0.0, math.cos(slope))
+    downhill = np.array((math.cos(slope), 0.0, -math.sin(slope)))
+    doll = Ragdoll('block', (Bone('block', Box((0.3, 0.3, 0.1)), 1.0, (0.0, 0.0, 0.0)),))
+    turn = tuple(rotation.from_axis_angle((0, 1, 0), slope))
+    start = 0.05 * np.array(normal)
+    scene = Scene('incline', (Placement(doll, position=start, orientation=turn),),
+                  Ground(normal), Material(friction=friction, restitution=0.0))
+
+    def truth(times: np.ndarray) -> Trajectory:
+        way = closed_forms.incline_slide(slope, friction, GRAVITY, times)
+        return course(times, (start + way[:, None] * downhill)[:, None],
+                      np.tile(turn, (len(times), 1, 1)))
+    return Motion(name, f'{title} on a slope of 20°, µ = {friction:g}, 1 s', "Coulomb's law",
+                  Trial(scene, 1.0), truth, in_air=False)
+
+
+def rolling_ball(speed: float = 2.0, friction: float = 0.3) -> Motion:
+    """A ball thrown flat without spin: it slides, then rolls."""
+    scene = _ball(Material(friction=friction, restitution=0.0), 0.0, velocity=(speed, 0.0, 0.0))
+
+    def truth(times: np.ndarray) -> Trajectory:
+        positions = np.zeros((len(times), 1, 3))
+        positions[:, 0, 0] = closed_forms.ball_slide_then_roll(speed, friction, GRAVITY, times)
+        positions[:, 0, 2] = RADIUS
+        angles = closed_forms.ball_slide_then_roll_angle(speed, friction, GRAVITY, RADIUS, times)
+        return course(times, positions, turned((0.0, 1.0, 0.0), angles[:, None]))
+    start = posed(scene.dolls[0])
+    return Motion('rolling_ball', f'Ball that slides, then rolls, µ = {friction:g}, 1.5 s',
+                  'v falls to 5/7, then stays', Trial(scene, 1.5, start), truth, in_air=False)

@@ -1,0 +1,172 @@
+"""Motions in the air: falls, throws, a tumbling box, chains, the doll itself."""
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from ... import rotation
+from ...coordinates import Coordinates
+from ...push import Push
+from ...ragdoll import Bone, Box, Joint, Ragdoll
+from ...scene import Placement, Scene
+from ...scene_file import load_doll, load_scene
+from ..references.articulated import Articulated
+from ..references.closed_forms import fall
+from ..references.planar_chain import PlanarChain
+from ..references.tumbling import tumble
+from ..trajectory import Trajectory
+from ..trial import Trial, angle_places, posed
+from .motion import Motion, alone, course, turned, without_limits
+
+EQUATIONS = 'equations of motion of the tree, DOP853 at 1e-12'
+
+
+def flight_motions() -> list[Motion]:
+    """All motions in the air."""
+    return [free_fall(), projectile(), first_touch(), tumbling_box(),
+            *map(chain, (2, 5, 10)), gentle_flight(), long_flight(), fast_flight(), pushed_flight()]
+
+
+def free_fall() -> Motion:
+    """Let the doll fall without a ground: as a whole, no joint moves."""
+    return _rigid_fall('free_fall', 'Free fall, 1 s', (0.0, 0.0, 0.0))
+
+
+def projectile() -> Motion:
+    """Throw the doll without spin."""
+    return _rigid_fall('projectile', 'Throw without spin, 1 s', (3.0, 1.0, 4.0))
+
+
+def _rigid_fall(name: str, title: str, velocity: tuple[float, float, float]) -> Motion:
+    placement = Placement(load_doll('doll'), velocity=velocity)
+    scene = Scene(name, (placement,))
+    start = np.array([placement.bone_pose(bone)[0] for bone in scene.bones])
+
+    def truth(times: np.ndarray) -> Trajectory:
+        way = fall(np.zeros(3), np.array(velocity), np.array(scene.gravity), times)
+        return course(times, start + way[:, None])
+    return Motion(name, title, 'x0 + v0 t + g t²/2', Trial(scene, 1.0), truth)
+
+
+def first_touch() -> Motion:
+    """The default scene up to just before the feet touch, at 0.2857 s."""
+    scene = load_scene('drop')
+    start = np.array([scene.dolls[0].bone_pose(bone)[0] for bone in scene.bones])
+
+    def truth(times: np.ndarray) -> Trajectory:
+        way = fall(np.zeros(3), np.zeros(3), np.array(scene.gravity), times)
+        return course(times, start + way[:, None])
+    return Motion('drop_to_touch', 'The default drop up to the first touch, 0.28 s',
+                  'x0 + g t²/2', Trial(scene, 0.28), truth)
+
+
+def tumbling_box() -> Motion:
+    """A box with moments 1 : 2 : 3 turning about its middle axis, which is unstable."""
+    bone = Bone('box', Box((0.2 * math.sqrt(2), 0.2, 0.002)), 1.0, (0.0, 0.0, 0.0))
+    omega = (0.05, 8.0, 0.05)
+    scene = alone(Ragdoll('box', (bone,)), (0.0, 0.0, 0.0), spin=omega)
+
+    def truth(times: np.ndarray) -> Trajectory:
+        turns, _ = tumble(bone.inertia, omega, times)
+        return course(times, np.zeros((len(times), 1, 3)), turns[:, None])
+    return Motion('tumbling_box', 'Tumbling box, moments 1 : 2 : 3, 8 rad/s, 5 s',
+                  "Euler's equations, DOP853 at 1e-12", Trial(scene, 5.0), truth,
+                  'angle_worst_rad')
+
+
+def chain(links: int, length: float = 0.2, mass: float = 1.0) -> Motion:
+    """A chain of rods thrown in a plane, coiling up; nothing holds it."""
+    rods = tuple(Bone(f'rod_{i}', Box((length, 0.04, 0.03)), mass, (i * length, 0.0, 0.0))
+                 for i in range(links))
+    joints = tuple(Joint(f'rod_{i - 1}', f'rod_{i}', 'hinge', ((i - 0.5) * length, 0.0, 0.0),
+                         ((0.0, 0.0, 1.0),)) for i in range(1, links))
+    doll = Ragdoll(f'chain_{links}', rods, joints)
+    angles, rates = np.linspace(0.0, 1.0, links), np.linspace(3.0, -3.0, links)
+    planar = PlanarChain(links, length, mass, rods[0].inertia[2])
+    names = [joint.angle_names[0] for joint in joints]
+    start = posed(Placement(doll), dict(zip(names, np.diff(angles), strict=True)),
+                  dict(zip(names, np.diff(rates), strict=True)))
+    start.v[5] = rates[0]
+    start.v[:3] = -Articulated(doll).state(start.q, start.v).linear.mean(axis=0)
+
+    def truth(times: np.ndarray) -> Trajectory:
+        centres, phi = planar.motion(angles, rates, times)
+        flat = np.concatenate([centres, np.zeros((*centres.shape[:2], 1))], axis=2)
+        return course(times, flat, turned((0.0, 0.0, 1.0), phi))
+    return Motion(f'chain_{links}', f'Thrown chain of {links} rods, 1 s',
+                  "Lagrange's equations in the plane, DOP853 at 1e-12",
+                  Trial(alone(doll, (0.0, 0.0, 0.0)), 1.0, start), truth)
+
+
+def gentle_flight() -> Motion:
+    """The default doll, limbs moving a little, for as long as the default drop flies."""
+    doll = load_doll('doll')
+    placement = Placement(doll, velocity=(1.0, 0.5, 2.0), spin=(0.5, -0.5, 1.0))
+    angles, rates = _inside_limits(doll, speed=1.0, seed=1)
+    trial = Trial(Scene('gentle', (placement,)), 0.28, posed(placement, angles, rates))
+    return Motion('flight_gentle', 'The doll in gentle flight, 0.28 s', EQUATIONS, trial,
+                  _articulated(trial))
+
+
+def long_flight() -> Motion:
+    """The same for 2 s, limits off."""
+    doll = without_limits(load_doll('doll'))
+    placed = {'velocity': (1.0, 0.5, 2.0), 'spin': (0.5, -0.5, 1.0)}
+    angles, rates = _inside_limits(load_doll('doll'), speed=1.0, seed=1)
+    trial = Trial(alone(doll, **placed), 2.0, posed(Placement(doll, **placed), angles, rates))
+    return Motion('flight_long', 'The doll in gentle flight, 2 s, limits off', EQUATIONS, trial,
+                  _articulated(trial))
+
+
+def fast_flight() -> Motion:
+    """Spun at 20 rad/s, limbs at some 5 rad/s, limits off."""
+    doll = without_limits(load_doll('doll'))
+    placed = {'spin': tuple(20 * rotation.normalized(np.array((1.0, 2.0, 2.0))))}
+    angles, rates = _inside_limits(load_doll('doll'), speed=5.0, seed=2)
+    trial = Trial(alone(doll, **placed), 0.28, posed(Placement(doll, **placed), angles, rates))
+    return Motion('flight_fast', 'The doll spun at 20 rad/s, 0.28 s, limits off', EQUATIONS, trial,
+                  _articulated(trial))
+
+
+def pushed_flight() -> Motion:
+    """2000 N on the torso for 0.1 s in the air, limits off."""
+    doll = without_limits(load_doll('doll'))
+    push = Push('torso', (-2000.0, 0.0, 1.0), start=0.05, duration=0.1)
+    trial = Trial(alone(doll), 0.3, posed(Placement(doll)), (push,))
+    return Motion('flight_pushed', '2000 N on the torso for 0.1 s in flight, limits off',
+                  EQUATIONS, trial, _articulated(trial))
+
+
+def _inside_limits(doll: Ragdoll, speed: float, seed: int) -> tuple[dict, dict]:
+    """Angles in the inner half of their ranges, and rates of up to ``speed`` rad/s."""
+    rng = np.random.default_rng(seed)
+    limits = {name: pair for joint in doll.joints
+              for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
+    angles = {name: lower + (upper - lower) * rng.uniform(0.3, 0.7)
+              for name, (lower, upper) in limits.items()}
+    return angles, {name: rng.uniform(-speed, speed) for name in angle_places(doll)}
+
+
+def _articulated(trial: Trial) -> object:
+    """Truth from the equations of motion, with the trial's pushes."""
+    start: Coordinates = trial.start
+    tree = Articulated(trial.scene.dolls[0].doll, trial.scene.gravity)
+    breaks = sorted({time for push in trial.pushes
+                     for time in (push.start, push.start + push.duration)})
+
+    def wrenches(time: float, _: object) -> tuple[np.ndarray, np.ndarray]:
+        forces = np.zeros((len(trial.scene.bones), 3))
+        for load in trial.loads(time, time):
+            forces[load.bone] += load.force
+        return forces, np.zeros_like(forces)
+
+    def truth(times: np.ndarray) -> Trajectory:
+        return tree.trajectory(start.q, start.v, times, wrenches if breaks else None, breaks)
+    return truth
+
+
+def slower(motion: Motion, tick: float) -> Motion:
+    """Give the same motion with ticks of another length, s."""
+    return dataclasses.replace(motion, trial=motion.trial.with_tick(tick))

@@ -1,0 +1,77 @@
+"""One hinge under gravity: pendulums, small, large and damped.
+
+A doll's root is free, so a pendulum hangs on a root of a million million kg. Gravity is off, and
+a steady push of the bob's own weight acts on its centre instead: for the bob the same, while the
+root, 100 m wide, stays where it is to 2e-11 m and does not turn.
+"""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...push import Push
+from ...ragdoll import Bone, Box, Joint, Ragdoll, Sphere
+from ...scene import Placement
+from ..references.closed_forms import pendulum_angle
+from ..references.integration import integrate
+from ..trajectory import Trajectory
+from ..trial import Trial, posed
+from .motion import Motion, alone, course, turned
+
+PIVOT = 1e12
+"""kg"""
+
+LENGTH, MASS, GRAVITY = 0.5, 1.0, 9.8
+"""m from the hinge to the bob's centre, kg, m/s^2"""
+
+ROD = Box((0.05, 0.05, 0.4))
+MOMENT = ROD.inertia(MASS)[1] + MASS * LENGTH ** 2
+"""kg m^2 about the hinge"""
+
+OMEGA = math.sqrt(MASS * GRAVITY * LENGTH / MOMENT)
+"""rad/s of small swings"""
+
+
+def mechanism_motions() -> list[Motion]:
+    """All pendulums."""
+    return [swing('pendulum_small', 'Pendulum, 5°, 2 s', math.radians(5)),
+            swing('pendulum_large', 'Pendulum, 120°, 2 s', math.radians(120)),
+            damped('damped_under', 'under-damped (ζ = 0.2)', 0.2),
+            damped('damped_critical', 'critically damped (ζ = 1)', 1.0),
+            damped('damped_over', 'over-damped (ζ = 3)', 3.0)]
+
+
+def swing(name: str, title: str, amplitude: float) -> Motion:
+    """A pendulum let go at ``amplitude`` rad."""
+    def angle(times: np.ndarray) -> np.ndarray:
+        return pendulum_angle(amplitude, OMEGA, times)
+    return _pendulum(name, title, 'elliptic functions', amplitude, 0.0, angle)
+
+
+def damped(name: str, title: str, ratio: float) -> Motion:
+    """A pendulum of 30 degrees whose hinge is damped: gravity is its spring."""
+    def angle(times: np.ndarray) -> np.ndarray:
+        def rate(t: float, y: np.ndarray) -> tuple[float, float]:
+            return y[1], -OMEGA ** 2 * math.sin(y[0]) - 2 * ratio * OMEGA * y[1]
+        return integrate(rate, (math.radians(30), 0.0), times)[:, 0]
+    return _pendulum(name, f'Damped hinge, {title}, 2 s', 'its equation, DOP853 at 1e-12',
+                     math.radians(30), 2 * ratio * OMEGA * MOMENT, angle)
+
+
+def _pendulum(name: str, title: str, reference: str, amplitude: float, damping: float,
+              angle: object) -> Motion:
+    bones = (Bone('pivot', Sphere(100.0), PIVOT, (0.0, 0.0, 0.0)),
+             Bone('bob', ROD, MASS, (0.0, 0.0, -LENGTH)))
+    hinge = Joint('pivot', 'bob', 'hinge', (0.0, 0.0, 0.0), ((0.0, 1.0, 0.0),), damping=damping)
+    doll = Ragdoll(name, bones, (hinge,))
+    weight = Push('bob', (0.0, 0.0, -MASS * GRAVITY), start=0.0, duration=2.0)
+    trial = Trial(alone(doll, (0.0, 0.0, 0.0)), 2.0,
+                  posed(Placement(doll), {'bob': amplitude}), (weight,))
+
+    def truth(times: np.ndarray) -> Trajectory:
+        phi = angle(times)
+        bob = LENGTH * np.stack([-np.sin(phi), 0 * phi, -np.cos(phi)], axis=-1)
+        positions = np.stack([0 * bob, bob], axis=1)
+        return course(times, positions, turned((0.0, 1.0, 0.0), np.stack([0 * phi, phi], axis=1)))
+    return Motion(name, title, reference, trial, truth, 'angle_worst_rad', in_air=False)

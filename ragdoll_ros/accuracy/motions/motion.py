@@ -1,0 +1,65 @@
+"""A trial together with the truth about it."""
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ... import rotation
+from ...ragdoll import Ragdoll
+from ...scene import Placement, Scene
+from ..trajectory import Trajectory
+from ..trial import Trial
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A trial whose exact course is known."""
+
+    name: str
+    title: str
+    reference: str
+    """Where the truth comes from, for the report."""
+    trial: Trial
+    truth: Callable[[np.ndarray], Trajectory]
+    """The exact course at given instants (t,) s."""
+    yardstick: str = 'position_worst_m'
+    """The error that is plotted."""
+    in_air: bool = True
+    """Whether nothing ever touches, so that momentum is kept."""
+    extra: Callable[[Trajectory], dict[str, float]] = lambda _: {}
+    """Further figures of this motion alone."""
+
+
+def course(times: np.ndarray, positions: np.ndarray,
+           orientations: np.ndarray | None = None) -> Trajectory:
+    """Make a truth out of poses (t, n, 3) m and (t, n, 4); its velocities are left NaN."""
+    if orientations is None:
+        orientations = np.tile(rotation.IDENTITY, (*positions.shape[:2], 1))
+    unknown = np.full(positions.shape, np.nan)
+    return Trajectory(np.asarray(times, float), positions, orientations, unknown, unknown)
+
+
+def turned(axis: tuple[float, float, float], angles: np.ndarray) -> np.ndarray:
+    """Orientations (t, n, 4) of bones that turned by ``angles`` (t, n) rad about one axis."""
+    return rotation.from_rotation_vector(np.asarray(angles)[..., None] * np.array(axis))
+
+
+def without_limits(doll: Ragdoll) -> Ragdoll:
+    """Give the same doll with all joints free: the reference knows no limits."""
+    return dataclasses.replace(doll, joints=tuple(
+        dataclasses.replace(joint, limits=()) for joint in doll.joints))
+
+
+def without_damping(doll: Ragdoll) -> Ragdoll:
+    """Give the same doll with joints that lose nothing: its energy is a constant of flight."""
+    return dataclasses.replace(doll, joints=tuple(
+        dataclasses.replace(joint, damping=0.0) for joint in doll.joints))
+
+
+def alone(doll: Ragdoll, gravity: tuple[float, float, float] = (0.0, 0.0, -9.8),
+          **placed: object) -> Scene:
+    """Give a scene of one doll in the air, whose bones pass through each other."""
+    return Scene(doll.name, (Placement(doll, **placed),), gravity=gravity, self_collision=False)

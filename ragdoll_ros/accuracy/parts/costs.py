@@ -1,0 +1,107 @@
+"""A scene that needs less costs less: ticks of ever simpler scenes."""
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable
+from time import process_time
+
+import numpy as np
+
+from ...ragdoll import Ragdoll
+from ...scene import Placement, Scene
+from ...scene_file import load_scene
+from ...simulation import Simulation
+from ..runner import Job, Options, Row
+
+NAME = 'costs'
+TICKS = 100
+
+
+def jobs(options: Options) -> list[Job]:
+    """One timed job: the scenes are compared with each other."""
+    repeats = 2 if options.quick else 7
+    return [Job(NAME, 'what a scene costs', functools.partial(
+        measure_all, repeats), repeats, timed=True)]
+
+
+def measure_all(repeats: int) -> list[Row]:
+    """Median cost of a tick of each scene, at the setting normal."""
+    rows = []
+    for text, make in SCENES:
+        costs = np.median([make() for _ in range(repeats)], axis=0)
+        rows.append({'scene': text, 'tick_s': float(np.median(costs)),
+                     'tick_p99_s': float(np.percentile(costs, 99))})
+    return rows
+
+
+def _ticks(simulation: Simulation, skipped: int = 0) -> np.ndarray:
+    """Costs of TICKS ticks, s, after some that are not counted."""
+    for _ in range(skipped):
+        simulation.advance()
+    costs = np.empty(TICKS)
+    for index in range(TICKS):
+        before = process_time()
+        simulation.advance()
+        costs[index] = process_time() - before
+    simulation.close()
+    return costs
+
+
+def _scene(**changes: object) -> Scene:
+    return dataclasses.replace(load_scene('drop'), **changes)
+
+
+def _high(scene: Scene) -> Scene:
+    placement = dataclasses.replace(scene.dolls[0], position=(0.0, 0.0, 100.0), spin=(0.3, 0, 0.5))
+    return dataclasses.replace(scene, dolls=(placement,))
+
+
+def _impact() -> np.ndarray:
+    """From the first touch on."""
+    return _ticks(Simulation(_scene()), skipped=29)
+
+
+def _lying() -> np.ndarray:
+    """At rest on the ground, sleep switched off."""
+    normal = Simulation(_scene())
+    awake = dataclasses.replace(normal.accuracy, sleep=False)
+    normal.close()
+    return _ticks(Simulation(_scene(), accuracy=awake), skipped=400)
+
+
+def _flight_over_ground() -> np.ndarray:
+    return _ticks(Simulation(_high(_scene())))
+
+
+def _flight() -> np.ndarray:
+    return _ticks(Simulation(_high(_scene(ground=None))))
+
+
+def _flight_without_self_collision() -> np.ndarray:
+    return _ticks(Simulation(_high(_scene(ground=None, self_collision=False))))
+
+
+def _one_bone() -> np.ndarray:
+    root = load_scene('drop').dolls[0].doll.root
+    doll = Ragdoll('one', (root,))
+    return _ticks(Simulation(_high(_scene(ground=None, dolls=(Placement(doll),)))))
+
+
+def _asleep() -> np.ndarray:
+    simulation = Simulation(_scene())
+    for _ in range(3000):
+        if simulation.asleep:
+            break
+        simulation.advance()
+    return _ticks(simulation)
+
+
+SCENES: tuple[tuple[str, Callable[[], np.ndarray]], ...] = (
+    ('falling onto the ground, the second after the first touch', _impact),
+    ('lying on the ground, kept awake', _lying),
+    ('in flight, 100 m over the ground', _flight_over_ground),
+    ('in flight, no ground', _flight),
+    ('in flight, no ground, no self-collision', _flight_without_self_collision),
+    ('one bone in flight, no ground', _one_bone),
+    ('asleep on the ground', _asleep))

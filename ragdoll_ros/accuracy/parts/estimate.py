@@ -1,0 +1,58 @@
+"""The live error estimate against the truth: the error that each single tick of a flight adds.
+
+The truth of a tick starts from where the simulation stood before it: the equations of motion,
+integrated at 1e-12 over that tick alone. Ticks count where the simulation trusts its estimate.
+"""
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from ..methods import Ours
+from ..references.articulated import Articulated
+from ..runner import Job, Options, Row
+from .precision import motions
+
+NAME = 'estimate'
+KEY, TRUST = 'error_estimate_m', 'error_trusted'
+MOTIONS = ('flight_gentle', 'flight_fast', 'flight_long')
+FACTOR = 3.0
+NOISE = 1e-14
+"""m: rounding of positions; below it neither error nor estimate means anything."""
+
+
+def jobs(options: Options) -> list[Job]:
+    """One job for each setting."""
+    names = MOTIONS[:2] if options.quick else MOTIONS
+    return [Job(NAME, f'live estimate, {accuracy}', functools.partial(measure, accuracy, names),
+                2.0 * len(names)) for accuracy in ('draft', 'normal', 'exact')]
+
+
+def measure(accuracy: str, names: tuple[str, ...]) -> list[Row]:
+    """True and estimated errors of all flight ticks of some motions."""
+    true, estimated, distrusted = [], [], 0
+    for name in names:
+        trial = motions()[name].trial
+        tree = Articulated(trial.scene.dolls[0].doll, trial.scene.gravity)
+        ours = Ours(trial, accuracy)
+        simulation, tick = ours.simulation, trial.scene.step
+        for _ in range(round(trial.duration / tick)):
+            before = simulation.coordinates
+            truth = tree.trajectory(before.q, before.v, (0.0, tick)).positions[-1]
+            state = ours.advance()
+            found = simulation.measures()
+            if KEY not in found:
+                ours.close()
+                return [{'label': accuracy, 'missing': True}]
+            if not found.get(TRUST, 1.0):
+                distrusted += 1
+                continue
+            true.append(float(np.linalg.norm(state.positions - truth, axis=-1).max()))
+            estimated.append(float(found[KEY]))
+        ours.close()
+    pairs = [(t, e) for t, e in zip(true, estimated, strict=True) if max(t, e) > NOISE]
+    within = [max(t, e) <= FACTOR * max(min(t, e), NOISE) for t, e in pairs]
+    return [{'label': accuracy, 'ticks': len(pairs), 'distrusted': distrusted,
+             'within_3': float(np.mean(within)) if within else None,
+             'true': [t for t, _ in pairs], 'estimated': [e for _, e in pairs]}]

@@ -1,0 +1,67 @@
+"""The order of each method: how fast its error goes to zero with the tick."""
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+
+import numpy as np
+
+from ..measure import compare
+from ..methods import Method, bullet, mujoco, ours, run
+from ..runner import Job, Options, Row
+from .precision import motions
+
+NAME = 'orders'
+TICKS = (0.02, 0.01, 0.005, 0.0025, 0.00125)
+MOTIONS = ('pendulum_large', 'flight_gentle', 'flight_long')
+FLOOR = 1e-11
+"""Errors below are the reference's or rounding's (a pendulum's root gives way by 2e-11 m)."""
+
+CEILING = 0.3
+"""Errors above it are no longer small: theory says nothing about them."""
+
+
+def methods() -> list[Method]:
+    """One method of each family, a single step to a tick where we have the choice."""
+    return [*map(ours, ('draft', 'normal', 'exact')), bullet(1),
+            *(mujoco(name, 1) for name in ('euler', 'implicitfast', 'rk4'))]
+
+
+def jobs(options: Options) -> list[Job]:
+    """One job for each motion."""
+    names = MOTIONS[:2] if options.quick else MOTIONS
+    return [Job(NAME, f'orders, {name}', functools.partial(measure_all, name), weight=3.0)
+            for name in names]
+
+
+def measure_all(motion_name: str) -> list[Row]:
+    """Errors at all ticks and the slope of their logarithms, for all methods."""
+    motion, rows = motions()[motion_name], []
+    truths = {tick: motion.truth(motion.trial.with_tick(tick).times()) for tick in TICKS}
+    for method in methods():
+        errors = []
+        for tick in TICKS:
+            result = run(method, motion.trial.with_tick(tick))
+            errors.append(compare(result.moved, truths[tick])[motion.yardstick])
+        rows.append({'motion': motion_name, 'title': motion.title, 'method': method.name,
+                     'label': method.label.removesuffix(', N = 1'), 'theory': method.order,
+                     'ticks_s': list(TICKS), 'errors': errors,
+                     **slope(TICKS, errors, FLOOR)})
+    return rows
+
+
+def slope(ticks: tuple[float, ...], errors: list[float], floor: float) -> dict[str, object]:
+    """Order by least squares on the logarithms of all errors that tell of the method.
+
+    Runs from the coarsest tick down to the first error at the floor; needs three points. Beside
+    it, the steepness between the two finest ticks.
+    """
+    usable = [(tick, error) for tick, error in zip(ticks, errors, strict=True)
+              if math.isfinite(error) and error < CEILING]
+    usable = list(itertools.takewhile(lambda pair: pair[1] > floor, usable))
+    if len(usable) < 3:
+        return {'order': None, 'points': len(usable)}
+    x, y = np.log(np.array(usable)).T
+    return {'order': float(np.polyfit(x, y, 1)[0]), 'points': len(usable),
+            'order_finest': float((y[-1] - y[-2]) / (x[-1] - x[-2]))}

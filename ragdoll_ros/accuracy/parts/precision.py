@@ -1,0 +1,69 @@
+"""Speed against error: every motion whose truth is known, by every method."""
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from ..measure import Measure, compare
+from ..methods import Method, Result, by_name, every_method, median_run
+from ..motions import Motion, every_motion
+from ..runner import Job, Options, Row
+from ..trajectory import Trajectory
+
+NAME = 'precision'
+QUICK_MOTIONS = ('free_fall', 'projectile', 'pendulum_large', 'tumbling_box', 'flight_gentle',
+                 'flight_fast', 'bounce')
+
+
+def jobs(options: Options) -> list[Job]:
+    """One timed job for each motion."""
+    names = [motion.name for motion in motions().values()
+             if not options.quick or motion.name in QUICK_MOTIONS]
+    methods = [method.name for method in every_method((1, 4, 16) if options.quick
+                                                      else (1, 2, 4, 8, 16, 32))]
+    repeats = 1 if options.quick else 5
+    return [Job(NAME, name, functools.partial(measure_all, name, methods, repeats),
+                weight=(0.15 if options.quick else 1.2) * motions()[name].trial.duration + 1,
+                timed=True) for name in names]
+
+
+@functools.cache
+def motions() -> dict[str, Motion]:
+    """All motions by name, built once in each process."""
+    return {motion.name: motion for motion in every_motion()}
+
+
+def measure_all(motion_name: str, method_names: list[str], repeats: int) -> list[Row]:
+    """Run a motion by all methods, the same number of times each."""
+    motion, truths, rows = motions()[motion_name], {}, []
+    for name in method_names:
+        method = by_name(name)
+        result = median_run(method, motion.trial, repeats)
+        times = result.moved.times
+        if len(times) not in truths:
+            truths[len(times)] = motion.truth(times)
+        rows.append(figures(motion, method, result, truths[len(times)]))
+    return rows
+
+
+def figures(motion: Motion, method: Method, result: Result, truth: Trajectory) -> Row:
+    """All figures of one motion by one method; None where one makes no sense."""
+    moved, trial = result.moved, motion.trial
+    measure = Measure(trial.scene)
+    row: Row = {'motion': motion.name, 'title': motion.title, 'reference': motion.reference,
+                'yardstick': motion.yardstick, 'method': method.name, 'label': method.label,
+                'family': method.family, 'substeps': method.substeps,
+                'cpu_s_per_s': result.rate,
+                'tick_p99_s': float(np.percentile(result.costs, 99)),
+                'finite': moved.finite, **compare(moved, truth)}
+    row['energy_excess'] = measure.excess(trial, moved)
+    row['joint_gap_m'] = measure.gap(moved)
+    row['limit_overshoot_rad'] = measure.overshoot(moved)
+    if trial.scene.ground is not None:
+        row['sinking_m'] = measure.sinking(moved)
+    if motion.in_air:
+        row['momentum_drift'] = measure.momentum_drift(trial, moved)
+        if not trial.pushes:
+            row['angular_momentum_drift'] = measure.spin_drift(moved)
+    return {**row, **motion.extra(moved)}

@@ -1,0 +1,220 @@
+"""The motion of a doll in flight, from the equations of motion, independent of any engine.
+
+Coordinates are those of the tree, so a joint cannot open. With J the Jacobians of all centres
+of mass, Jw of all angular velocities, and a0, alpha0 the accelerations that are left when dv/dt
+vanishes (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 3):
+
+    sum_i [m J'J + Jw' I Jw] dv/dt
+        = sum_i [J' (m g + f - m a0) + Jw' (tau - I alpha0 - w x I w)] - c v
+
+integrated by DOP853 (Hairer, Norsett, Wanner) at 1e-12. Limits and contacts are not in it.
+
+Coordinates are laid out as in coordinates.py, the joints depth first.
+"""
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ... import rotation
+from ...ragdoll import Joint, Ragdoll
+from ...state import State
+from ...urdf import joint_frame
+from ..trajectory import Trajectory
+from .integration import integrate
+
+Wrenches = Callable[[float, State], tuple[np.ndarray, np.ndarray]]
+"""Forces (n, 3) N and torques (n, 3) N m on the centres of mass, world axes, by time and state."""
+
+
+@dataclass(frozen=True)
+class _Kinematics:
+    centres: np.ndarray  # (n, 3)
+    turns: np.ndarray  # (n, 3, 3), from the bind pose
+    omegas: np.ndarray  # (n, 3)
+    jv: np.ndarray  # (n, 3, nv)
+    jw: np.ndarray  # (n, 3, nv)
+    drift: np.ndarray  # (n, 3) accelerations of the centres at dv/dt = 0
+    spin_drift: np.ndarray  # (n, 3) the same, angular
+
+
+class Articulated:
+    """Equations of motion of one doll in ``gravity`` m/s^2."""
+
+    def __init__(self, doll: Ragdoll, gravity: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
+        self.doll = doll
+        self.gravity = np.array(gravity, float)
+        self._index = {bone.name: i for i, bone in enumerate(doll.bones)}
+        self._masses = np.array([bone.mass for bone in doll.bones])
+        self._binds = np.array([rotation.matrix(bone.orientation) for bone in doll.bones])
+        self._inertias = np.array([bind @ np.diag(bone.inertia) @ bind.T for bone, bind
+                                   in zip(doll.bones, self._binds, strict=True)])
+        self._q_of, self._v_of, self.nq, self.nv = _layout(doll)
+        self._damping = np.zeros(self.nv)
+        for joint in doll.joints:
+            self._damping[self._v_of[joint.child]] = joint.damping
+        self._ordered = [self._prepared(joint) for joint in depth_first(doll)]
+
+    def bind(self, position: Sequence[float] = (0, 0, 0),
+             orientation: Sequence[float] = rotation.IDENTITY) -> np.ndarray:
+        """Coordinates q of the bind pose with the doll's frame at a place and turn."""
+        q = np.zeros(self.nq)
+        root = self.doll.root
+        q[:3] = position + rotation.rotate(np.array(orientation), root.position)
+        q[3:7] = rotation.multiply(orientation, root.orientation)
+        for joint in self.doll.joints:
+            if _is_free_ball(joint):
+                q[self._q_of[joint.child]] = rotation.IDENTITY
+        return q
+
+    def state(self, q: np.ndarray, v: np.ndarray) -> State:
+        """Poses and velocities of all bones."""
+        kin = self._kinematics(q, v)
+        turns = np.array([rotation.from_matrix(turn @ bind)
+                          for turn, bind in zip(kin.turns, self._binds, strict=True)])
+        return State(kin.centres, turns, kin.jv @ v, kin.omegas)
+
+    def acceleration(self, q: np.ndarray, v: np.ndarray, forces: np.ndarray | None = None,
+                     torques: np.ndarray | None = None) -> np.ndarray:
+        """dv/dt (nv,) under forces (n, 3) N and torques (n, 3) N m at the centres of mass."""
+        kin = self._kinematics(q, v)
+        inertias = kin.turns @ self._inertias @ kin.turns.transpose(0, 2, 1)
+        spin = (inertias @ kin.omegas[..., None])[..., 0]
+        push = self._masses[:, None] * (self.gravity - kin.drift)
+        twist = -(inertias @ kin.spin_drift[..., None])[..., 0] - np.cross(kin.omegas, spin)
+        if forces is not None:
+            push = push + forces
+        if torques is not None:
+            twist = twist + torques
+        nv = self.nv
+        flat_v, flat_w = kin.jv.reshape(-1, nv), kin.jw.reshape(-1, nv)
+        mass = (flat_v.T @ (self._masses[:, None, None] * kin.jv).reshape(-1, nv)
+                + flat_w.T @ (inertias @ kin.jw).reshape(-1, nv))
+        return np.linalg.solve(mass, flat_v.T @ push.ravel() + flat_w.T @ twist.ravel()
+                               - self._damping * v)
+
+    def trajectory(self, q: np.ndarray, v: np.ndarray, times: Sequence[float],
+                   wrenches: Wrenches | None = None, breaks: Sequence[float] = ()) -> Trajectory:
+        """Motion from times[0]; ``breaks`` are the instants at which the wrenches jump, s."""
+        times = np.asarray(times, float)
+        edges = [times[0], *sorted(t for t in breaks if times[0] < t < times[-1]), times[-1]]
+        y = np.concatenate([q, v])
+        states = {times[0]: self.state(q, v)}
+        for begin, end in itertools.pairwise(edges):
+            asked = np.unique([begin, *times[(begin < times) & (times <= end)], end])
+            derivative = functools.partial(self._derivative, middle=(begin + end) / 2,
+                                           wrenches=wrenches)
+            rows = integrate(derivative, y, asked)
+            for t, row in zip(asked, rows, strict=True):
+                states[t] = self.state(row[:self.nq], row[self.nq:])
+            y = rows[-1]
+        return Trajectory.of(times, [states[t] for t in times])
+
+    def _derivative(self, t: float, y: np.ndarray, middle: float,
+                    wrenches: Wrenches | None) -> np.ndarray:
+        """Wrenches are taken from the middle of the piece: they do not jump within it."""
+        q, v = y[:self.nq], y[self.nq:]
+        loads = wrenches(middle, self.state(q, v)) if wrenches else ()
+        rates = np.empty_like(q)
+        rates[:3] = v[:3]
+        rates[3:7] = _quaternion_rate(q[3:7], v[3:6], outer=True)
+        for joint, *_ in self._ordered:
+            into, out = self._q_of[joint.child], self._v_of[joint.child]
+            rates[into] = _quaternion_rate(q[into], v[out], outer=False) \
+                if _is_free_ball(joint) else v[out]
+        return np.concatenate([rates, self.acceleration(q, v, *loads)])
+
+    def _prepared(self, joint: Joint) -> tuple:
+        parent, child = self.doll.bone(joint.parent), self.doll.bone(joint.child)
+        axes = [np.array(axis) for axis in joint.axes]
+        if joint.kind == 'ball':
+            axes = list(rotation.matrix(joint_frame(joint)).T)
+        return (joint, self._index[joint.parent], self._index[joint.child],
+                np.subtract(joint.anchor, parent.position),
+                np.subtract(child.position, joint.anchor),
+                [(axis, _skew(axis), _skew(axis) @ _skew(axis)) for axis in axes])
+
+    def _kinematics(self, q: np.ndarray, v: np.ndarray) -> _Kinematics:
+        """Go from the root to the leaves, once."""
+        n, nv = len(self._masses), self.nv
+        centres, omegas = np.zeros((n, 3)), np.zeros((n, 3))
+        drift, spin_drift = np.zeros((n, 3)), np.zeros((n, 3))
+        turns, jv, jw = np.zeros((n, 3, 3)), np.zeros((n, 3, nv)), np.zeros((n, 3, nv))
+        root = self._index[self.doll.root.name]
+        centres[root], omegas[root] = q[:3], v[3:6]
+        turns[root] = rotation.matrix(rotation.normalized(q[3:7])) @ self._binds[root].T
+        jv[root, :, :3] = jw[root, :, 3:6] = np.eye(3)
+        for joint, parent, child, to_anchor, from_anchor, axes in self._ordered:
+            turn, axis_columns = self._turned(joint, turns[parent], axes, q)
+            rates = v[self._v_of[joint.child]]
+            omega, spin = omegas[parent], spin_drift[parent].copy()
+            jw[child] = jw[parent]
+            jw[child][:, self._v_of[joint.child]] = axis_columns
+            if _is_free_ball(joint):
+                spin += _skew(omega) @ (axis_columns @ rates)
+                omega = omega + axis_columns @ rates
+            else:
+                for axis, rate in zip(axis_columns.T, rates, strict=True):
+                    spin += _skew(omega) @ axis * rate
+                    omega = omega + axis * rate
+            before, after = turns[parent] @ to_anchor, turn @ from_anchor
+            old, new = _skew(omegas[parent]), _skew(omega)
+            centres[child] = centres[parent] + before + after
+            jv[child] = jv[parent] - _skew(before) @ jw[parent] - _skew(after) @ jw[child]
+            drift[child] = (drift[parent] - _skew(before) @ spin_drift[parent]
+                            + old @ (old @ before) - _skew(after) @ spin + new @ (new @ after))
+            turns[child], omegas[child], spin_drift[child] = turn, omega, spin
+        return _Kinematics(centres, turns, omegas, jv, jw, drift, spin_drift)
+
+    def _turned(self, joint: Joint, parent: np.ndarray, axes: list,
+                q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Child's turn from the bind pose, and the world axes (3, k) of the joint's rates."""
+        values = q[self._q_of[joint.child]]
+        if _is_free_ball(joint):
+            frame = np.column_stack([axis for axis, *_ in axes])
+            turn = parent @ frame @ rotation.matrix(rotation.normalized(values)) @ frame.T
+            return turn, turn @ frame
+        turn, columns = parent, np.empty((3, len(axes)))
+        for k, ((axis, cross, square), angle) in enumerate(zip(axes, values, strict=True)):
+            columns[:, k] = turn @ axis
+            turn = turn + turn @ (np.sin(angle) * cross + (1 - np.cos(angle)) * square)
+        return turn, columns
+
+
+def _is_free_ball(joint: Joint) -> bool:
+    return joint.kind == 'ball' and not any(joint.limits)
+
+
+def depth_first(doll: Ragdoll) -> tuple[Joint, ...]:
+    """Give all joints, each one's whole branch before the next, as engines count them."""
+    def branch(name: str) -> Iterator[Joint]:
+        for joint in doll.joints:
+            if joint.parent == name:
+                yield joint
+                yield from branch(joint.child)
+    return tuple(branch(doll.root.name))
+
+
+def _layout(doll: Ragdoll) -> tuple[dict[str, slice], dict[str, slice], int, int]:
+    q_of, v_of, nq, nv = {}, {}, 7, 6
+    for joint in depth_first(doll):
+        size = 4 if _is_free_ball(joint) else joint.freedoms
+        q_of[joint.child], v_of[joint.child] = slice(nq, nq + size), slice(nv, nv + joint.freedoms)
+        nq, nv = nq + size, nv + joint.freedoms
+    return q_of, v_of, nq, nv
+
+
+def _skew(a: np.ndarray) -> np.ndarray:
+    """Matrix of the cross product a x."""
+    x, y, z = a
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def _quaternion_rate(q: np.ndarray, omega: np.ndarray, outer: bool) -> np.ndarray:
+    """dq/dt of a body that turns with omega, given in the outer frame or in the body's."""
+    pure = np.append(omega, 0.0)
+    return (rotation.multiply(pure, q) if outer else rotation.multiply(q, pure)) / 2

@@ -1,0 +1,77 @@
+"""Motions that have a formula."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+
+def fall(start: np.ndarray, velocity: np.ndarray, gravity: np.ndarray,
+         t: np.ndarray) -> np.ndarray:
+    """Positions (t, 3) m of a body in free flight: x0 + v0 t + g t^2 / 2."""
+    t = np.asarray(t, float)[:, None]
+    return start + velocity * t + np.asarray(gravity) * t * t / 2
+
+
+def pendulum_angle(amplitude: float, omega: float, t: np.ndarray) -> np.ndarray:
+    """Angle in rad of a pendulum let go at ``amplitude``; omega^2 = m g L / I.
+
+    sin(phi/2) = k cd(omega t | k^2) with k = sin(amplitude/2) (Abramowitz, Stegun 16.1).
+    """
+    from scipy.special import ellipj
+    k = math.sin(amplitude / 2)
+    _, cn, dn, _ = ellipj(omega * np.asarray(t, float), k * k)
+    return 2 * np.arcsin(k * cn / dn)
+
+
+def pendulum_period(amplitude: float, omega: float) -> float:
+    """Period in s: 4 K(k^2) / omega, K the complete elliptic integral of the first kind."""
+    from scipy.special import ellipk
+    return 4 * float(ellipk(math.sin(amplitude / 2) ** 2)) / omega
+
+
+def bounce_apex(height: float, restitution: float, bounces: int) -> float:
+    """Height in m a ball comes back to: each bounce leaves e^2 of the energy."""
+    return height * restitution ** (2 * bounces)
+
+
+def bounce_times(height: float, restitution: float, gravity: float, bounces: int) -> list[float]:
+    """Instants in s of the first impacts of a ball let go at ``height``."""
+    times = [math.sqrt(2 * height / gravity)]
+    for n in range(1, bounces):
+        apex = bounce_apex(height, restitution, n)
+        times.append(times[-1] + 2 * math.sqrt(2 * apex / gravity))
+    return times
+
+
+def incline_slide(slope: float, friction: float, gravity: float, t: np.ndarray) -> np.ndarray:
+    """Distance in m that a block at rest has slid down: Coulomb's law, 0 while it sticks."""
+    pull = gravity * (math.sin(slope) - friction * math.cos(slope))
+    return max(0.0, pull) * np.asarray(t, float) ** 2 / 2
+
+
+def ball_slide_then_roll(speed: float, friction: float, gravity: float,
+                         t: np.ndarray) -> np.ndarray:
+    """Distance in m of a solid ball thrown flat without spin.
+
+    It slides with -mu g until 2 v0 / (7 mu g), then rolls on at 5/7 of its first speed.
+    """
+    t = np.asarray(t, float)
+    grip = 2 * speed / (7 * friction * gravity)
+    slid = np.minimum(t, grip)
+    rolled = np.maximum(t - grip, 0.0)
+    return speed * slid - friction * gravity * slid ** 2 / 2 + 5 / 7 * speed * rolled
+
+
+def ball_slide_then_roll_angle(speed: float, friction: float, gravity: float, radius: float,
+                               t: np.ndarray) -> np.ndarray:
+    """Angle in rad that the same ball has turned: 5/2 mu g / r until it rolls, then v / r."""
+    t = np.asarray(t, float)
+    grip = 2 * speed / (7 * friction * gravity)
+    slid, rolled = np.minimum(t, grip), np.maximum(t - grip, 0.0)
+    return 5 / 4 * friction * gravity / radius * slid ** 2 + 5 / 7 * speed / radius * rolled
+
+
+def ball_on_incline(slope: float, gravity: float, t: np.ndarray) -> np.ndarray:
+    """Distance in m of a solid ball that rolls down from rest without slip: 5/7 g sin(slope)."""
+    return 5 / 14 * gravity * math.sin(slope) * np.asarray(t, float) ** 2

@@ -1,0 +1,71 @@
+"""One motion that every method is to simulate: a scene, how it starts, what pushes it, how long."""
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import rotation
+from ..coordinates import Coordinates
+from ..engine.protocol import Load
+from ..push import Push
+from ..ragdoll import Ragdoll
+from ..scene import Placement, Scene
+from .references.articulated import Articulated, depth_first
+
+
+@dataclass(frozen=True)
+class Trial:
+    """``duration`` s of a scene, from ``start`` or from where the scene itself begins.
+
+    Pushes begin and end with a tick, have a start, act on centres of mass, along the world's axes.
+    """
+
+    scene: Scene
+    duration: float
+    start: Coordinates | None = None
+    pushes: tuple[Push, ...] = ()
+
+    def times(self, tick: float | None = None) -> np.ndarray:
+        """Instants 0, tick, 2 tick ... (t,) s; the scene's own tick if None."""
+        tick = tick or self.scene.step
+        return np.arange(round(self.duration / tick) + 1) * tick
+
+    def with_tick(self, tick: float) -> Trial:
+        """Give the same motion in ticks of another length, s."""
+        return dataclasses.replace(self, scene=dataclasses.replace(self.scene, step=tick))
+
+    def loads(self, begin: float, end: float) -> list[Load]:
+        """Give the loads of a tick: of all pushes that act in its middle."""
+        middle = (begin + end) / 2
+        return [Load(self.scene.bone_index(push.bone), np.array(push.force),
+                     np.array(push.torque), np.array(push.point))
+                for push in self.pushes if push.start <= middle < push.start + push.duration]
+
+
+def posed(placement: Placement, angles: dict[str, float] | None = None,
+          rates: dict[str, float] | None = None) -> Coordinates:
+    """Coordinates of one placed doll with some joint angles (rad) and rates (rad/s) set.
+
+    The names are those of Joint.angle_names; the root moves as ``placement`` says.
+    """
+    doll = placement.doll
+    tree = Articulated(doll)
+    q, v = tree.bind(placement.position, placement.orientation), np.zeros(tree.nv)
+    centre = sum(bone.mass * np.array(bone.position) for bone in doll.bones) / doll.mass
+    arm = rotation.rotate(placement.orientation, doll.root.position - centre)
+    v[:3] = placement.velocity + np.cross(placement.spin, arm)
+    v[3:6] = placement.spin
+    where = angle_places(doll)
+    for name, angle in (angles or {}).items():
+        q[7 + where[name]] = angle
+    for name, rate in (rates or {}).items():
+        v[6 + where[name]] = rate
+    return Coordinates(q, v)
+
+
+def angle_places(doll: Ragdoll) -> dict[str, int]:
+    """Place of each joint angle behind the root's coordinates, for dolls without free balls."""
+    names = [name for joint in depth_first(doll) for name in joint.angle_names]
+    return {name: place for place, name in enumerate(names)}

@@ -1,0 +1,189 @@
+"""MuJoCo's doll against equations of motion of our own, and against PyBullet's."""
+import dataclasses
+
+import numpy as np
+import pytest
+
+pytest.importorskip('mujoco')
+
+from ragdoll_ros import faults, rotation
+from ragdoll_ros.accuracy.references.articulated import Articulated, depth_first
+from ragdoll_ros.coordinates import Coordinates
+from ragdoll_ros.engine.bullet import BulletEngine
+from ragdoll_ros.engine.mujoco import MujocoEngine
+from ragdoll_ros.engine.protocol import GROUND, Load
+from ragdoll_ros.ragdoll import Bone, Box, Capsule, Cylinder, Joint, Ragdoll, Sphere
+from ragdoll_ros.scene import Ground, Material, Placement, Scene
+from ragdoll_ros.scene_file import load_doll
+
+GRAVITY = (0.3, -0.2, -9.8)
+ENGINES = [BulletEngine, MujocoEngine]
+
+
+def every_kind():
+    """All joint kinds and shapes, nothing aligned with anything, no limit near."""
+    turn = tuple(rotation.normalized((.1, .5, -.3, .8)))
+    bones = (Bone('root', Box((.1, .2, .4)), 4.0, (0, .1, 1), turn),
+             Bone('hinged', Capsule(.05, .2), 1.0, (.3, .1, 1.1), turn),
+             Bone('free_ball', Box((.1, .3, .05)), 2.0, (-.3, .2, .9), (.6, 0, 0, .8)),
+             Bone('double', Cylinder(.05, .3), 1.5, (.6, 0, 1.1), (0, .6, 0, .8)),
+             Bone('ball', Sphere(.07), .8, (-.3, .5, .9), turn),
+             Bone('glued', Sphere(.05), .5, (-.3, .7, .9)))
+    joints = (Joint('root', 'hinged', 'hinge', (.15, .1, 1.0), ((1, 1, 0),), damping=.3),
+              Joint('root', 'free_ball', 'ball', (-.15, .1, 1), ((0, 1, 1),), damping=.2),
+              Joint('hinged', 'double', 'universal', (.45, 0, 1.1), ((0, 0, 1), (1, -1, 0))),
+              Joint('free_ball', 'ball', 'ball', (-.3, .4, .9), ((0, 1, 0),), ((-1, 1), (-.5, .5))),
+              Joint('ball', 'glued', 'fixed', (-.3, .6, .9)))
+    return Ragdoll('every_kind', bones, joints)
+
+
+def default_doll():
+    """The default doll with all limits off: here they would take part in the motion."""
+    doll = load_doll('doll')
+    return dataclasses.replace(doll, joints=tuple(dataclasses.replace(joint, limits=())
+                                                  for joint in doll.joints))
+
+
+def flying(doll):
+    return Scene('flying', (Placement(doll),), gravity=GRAVITY, self_collision=False)
+
+
+def random_coordinates(doll, seed):
+    """A pose within .4 rad of the bind pose, moving at some 3 m/s and rad/s."""
+    rng = np.random.default_rng(seed)
+    tree = Articulated(doll)
+    q, v = tree.bind(), rng.normal(size=tree.nv) * 3
+    q[:3] = rng.normal(size=3)
+    q[3:7] = rotation.normalized(rng.normal(size=4))
+    q[7:] += rng.uniform(-.4, .4, size=q.size - 7)
+    at = 7
+    for joint in depth_first(doll):
+        if joint.kind == 'ball' and not any(joint.limits):
+            q[at:at + 4] = rotation.normalized(q[at:at + 4])
+            at += 4
+        else:
+            at += joint.freedoms
+    return Coordinates(q, v)
+
+
+DOLLS = [default_doll(), every_kind()]
+EVERY = [pytest.param(doll, seed, id=f'{doll.name}-{seed}') for doll in DOLLS for seed in range(3)]
+
+
+@pytest.mark.parametrize('engine', ENGINES)
+@pytest.mark.parametrize(('doll', 'seed'), EVERY)
+def test_poses_and_velocities_are_those_of_the_tree(engine, doll, seed):
+    """Forward kinematics of three independent programs; 1e-7 rad is the root of rounding."""
+    simulated = engine(flying(doll))
+    placed = random_coordinates(doll, seed)
+    simulated.place(placed)
+    back = simulated.coordinates()
+    sign = np.sign(back.q[3:7] @ placed.q[3:7])
+    back.q[3:7] *= sign
+    assert np.abs(back.q - placed.q).max() < 1e-12
+    assert np.abs(back.v - placed.v).max() < 1e-12
+    state, truth = simulated.read(), Articulated(doll).state(placed.q, placed.v)
+    assert np.abs(state.positions - truth.positions).max() < 1e-12
+    assert rotation.angle_between(state.orientations, truth.orientations).max() < 1e-7
+    assert np.abs(state.linear - truth.linear).max() < 1e-11
+    assert np.abs(state.angular - truth.angular).max() < 1e-11
+
+
+@pytest.mark.parametrize(('doll', 'seed'), EVERY)
+def test_both_engines_read_the_same_angles(doll, seed):
+    """Hinges, universals and both sorts of ball joints, in the order of Scene.angle_names."""
+    engines = [engine(flying(doll)) for engine in ENGINES]
+    for engine in engines:
+        engine.place(random_coordinates(doll, seed))
+    assert engines[0].joint_angles() == pytest.approx(engines[1].joint_angles(), abs=1e-12)
+
+
+@pytest.mark.parametrize('engine', ENGINES)
+@pytest.mark.parametrize(('doll', 'seed'), EVERY)
+def test_engines_accelerate_as_the_equations_of_motion_say(engine, doll, seed):
+    """Measured: 1e-10 of the largest for PyBullet, 1e-12 for MuJoCo."""
+    placed = random_coordinates(doll, seed)
+    truth = Articulated(doll, GRAVITY).acceleration(placed.q, placed.v)
+    found = engine(flying(doll)).acceleration(placed)
+    assert np.abs(found - truth).max() < 1e-8 * np.abs(truth).max()
+
+
+def test_a_push_acts_at_its_point_for_one_step():
+    """Impulse and moment of momentum about the centre, against F h and r x F h; then no more."""
+    doll = Ragdoll('box', (Bone('box', Box((.1, .2, .3)), 2.0, (0, 0, 0)),))
+    engine = MujocoEngine(dataclasses.replace(flying(doll), gravity=(0, 0, 0)))
+    force, point = np.array([0, 4.0, 0]), np.array([0, 0, .1])
+    load = Load(0, force, np.array([0, 0, .5]), point)
+    engine.step(1e-3, 1, [load])
+    state = engine.read()
+    assert state.linear[0] == pytest.approx(force * 1e-3 / 2, abs=1e-12)
+    moment = np.array([0, 0, .5]) + np.cross(point, force)
+    assert state.angular[0] * doll.bones[0].inertia == pytest.approx(moment * 1e-3, abs=1e-8)
+    engine.step(1e-3, 1)
+    assert engine.read().linear[0] == pytest.approx(state.linear[0], abs=1e-12)
+
+
+def test_a_ball_rests_on_a_tilted_ground_and_tells_of_it():
+    """Contact: normal out of the ground, index GROUND, weight as force, the point on the ball."""
+    ground = Ground(normal=(.6, 0, .8), offset=1.0)
+    ball = Ragdoll('ball', (Bone('ball', Sphere(.1), 2.0, (0, 0, 0)),))
+    normal = np.array(ground.normal)
+    scene = Scene('rest', (Placement(ball, position=normal * 1.1),), ground,
+                  Material(restitution=0), gravity=-9.8 * normal)
+    engine = MujocoEngine(scene)
+    engine.step(1.0, 1000)
+    assert engine.touching() == {(GROUND, 0)}
+    contact, = engine.contacts()
+    assert (contact.a, contact.b) == (0, GROUND)
+    assert contact.normal == pytest.approx(normal, abs=1e-9)
+    assert contact.force == pytest.approx(2 * 9.8, rel=1e-3)
+    assert contact.position == pytest.approx(normal * (1.1 - .1), abs=1e-3)
+
+
+def test_jointed_and_overlapping_pairs_do_not_collide():
+    """Three boxes in one another, two of them jointed: at rest they stay where they are."""
+    bones = tuple(Bone(name, Box((.2, .2, .2)), 1.0, (x, 0, 0))
+                  for name, x in (('a', 0), ('b', .15), ('c', .3)))
+    joints = (Joint('a', 'b', 'fixed', (.1, 0, 0)), Joint('b', 'c', 'hinge', (.2, 0, 0),
+                                                          ((0, 0, 1),)))
+    doll = Ragdoll('heap', (*bones, Bone('d', Box((.2, .2, .2)), 1.0, (.1, .1, 0))),
+                   (*joints, Joint('c', 'd', 'hinge', (.2, .05, 0), ((0, 0, 1),))))
+    engine = MujocoEngine(Scene('heap', (Placement(doll),), gravity=(0, 0, 0)))
+    engine.step(.5, 500)
+    assert not engine.contacts()
+    assert np.abs(engine.read().linear).max() == 0
+
+
+def test_a_snapshot_brings_back_every_bit():
+    engine = MujocoEngine(flying(load_doll('doll')))
+    engine.step(.1, 10)
+    snapshot = engine.save()
+    engine.step(.1, 10)
+    first = engine.read()
+    engine.restore(snapshot)
+    engine.step(.1, 10)
+    again = engine.read()
+    assert all((a == b).all() for a, b in zip(vars(first).values(), vars(again).values(),
+                                             strict=True))
+
+
+def test_a_limit_holds_a_swinging_bone():
+    """The forearm, flung at its limit, stays within MuJoCo's soft margin of some degrees."""
+    doll = load_doll('doll')
+    engine = MujocoEngine(Scene('slam', (Placement(doll),), gravity=(0, 0, 0)))
+    start = engine.coordinates()
+    elbow = Scene('slam', (Placement(doll),)).angle_names.index('left_forearm')
+    start.v[6 + elbow] = 5.0
+    engine.place(start)
+    worst = max(_stepped(engine).joint_angles()[elbow] for _ in range(200))
+    assert 0 < worst < np.radians(10)
+
+
+def _stepped(engine):
+    engine.step(1e-3, 1)
+    return engine
+
+
+def test_an_unknown_integrator_is_named():
+    with pytest.raises(faults.OutOfRange, match='leapfrog'):
+        MujocoEngine(flying(load_doll('doll')), integrator='leapfrog')

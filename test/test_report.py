@@ -1,0 +1,229 @@
+"""The report's own arithmetic, its page and its command line."""
+import json
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip('scipy')
+pytest.importorskip('mujoco')
+
+from ragdoll_ros.accuracy import command, figures, goals, hard, plots, starts, tables
+from ragdoll_ros.accuracy.measure import Measure
+from ragdoll_ros.accuracy.methods import bullet, by_name, median_run, ours, quickstart, run
+from ragdoll_ros.accuracy.motions.flight import free_fall, gentle_flight
+from ragdoll_ros.accuracy.motions.mechanisms import OMEGA, swing
+from ragdoll_ros.accuracy.parts import classes, orders
+from ragdoll_ros.accuracy.references.articulated import Articulated
+from ragdoll_ros.accuracy.report import markdown
+from ragdoll_ros.accuracy.runner import Job, attempt
+from ragdoll_ros.accuracy.trajectory import Trajectory
+
+
+def test_the_slope_of_a_power_is_its_order():
+    ticks = (.02, .01, .005, .0025)
+    found = orders.slope(ticks, [3 * tick ** 4 for tick in ticks], floor=1e-30)
+    assert found['order'] == pytest.approx(4)
+    assert found['order_finest'] == pytest.approx(4)
+
+
+def test_errors_at_the_floor_and_large_ones_do_not_count():
+    """From 7 (not small) and 1e-12 (rounding) only three points of order 2 are left."""
+    ticks = (.08, .04, .02, .01, .005)
+    errors = [7.0, .16e-2, .04e-2, .01e-2, 1e-12]
+    found = orders.slope(ticks, errors, floor=1e-11)
+    assert found['points'] == 3
+    assert found['order'] == pytest.approx(2)
+    assert orders.slope(ticks, [math.inf] * 5, 1e-11)['order'] is None
+
+
+def test_free_fall_by_fixed_steps_is_off_by_what_semi_implicit_euler_says():
+    """x_n = g h^2 n (n + 1) / 2, so after 1 s in steps of 2.5 ms it is g h / 2 too low."""
+    motion = free_fall()
+    result = run(bullet(4), motion.trial)
+    truth = motion.truth(result.moved.times)
+    low = truth.positions[-1, 0, 2] - result.moved.positions[-1, 0, 2]
+    assert low == pytest.approx(9.8 * .0025 / 2, rel=1e-9)
+
+
+def test_the_quickstart_brakes():
+    """PyBullet's own damping of 0.04 takes a falling body's speed, as its manual says."""
+    motion = free_fall()
+    result = run(quickstart(), motion.trial)
+    assert len(result.moved.times) == 241
+    assert np.abs(result.moved.linear[-1, 0, 2]) < .95 * 9.8
+
+
+def test_a_pendulum_hangs_still_at_its_root():
+    """The stand-in for a fixed root: the pivot's way stays below 1e-10 m in 2 s."""
+    motion = swing('pendulum', '', 1.0)
+    moved = run(bullet(8), motion.trial).moved
+    assert np.abs(moved.positions[:, 0]).max() < 1e-10
+    quarter = round(np.pi / 2 / OMEGA / .01 * 1.066)
+    assert abs(moved.positions[quarter, 1, 0]) < .05
+
+
+def test_costs_are_medians_over_runs():
+    result = median_run(bullet(1), free_fall().trial, 3)
+    assert result.costs.shape == (100,)
+    assert 0 < result.rate < 1
+
+
+def test_the_gentle_flight_touches_no_limit():
+    """The reference knows no limits, so it must not need them."""
+    motion = gentle_flight()
+    truth = motion.truth(motion.trial.times())
+    assert Measure(motion.trial.scene).overshoot(truth) == 0
+
+
+@pytest.mark.parametrize('name', list(starts.CLASSES))
+def test_starts_are_what_their_class_says(name):
+    """The same twice; let go with the lowest point at the height that the class names."""
+    first, again = starts.trial(name, 3), starts.trial(name, 3)
+    if first.start is None:
+        assert again.pushes == first.pushes
+        assert np.hypot(*first.pushes[0].force[:2]) == pytest.approx(2000)
+        return
+    assert (again.start.q == first.start.q).all()
+    scene = first.scene
+    tree = Articulated(scene.dolls[0].doll)
+    moved = Trajectory.of([0], [tree.state(first.start.q, first.start.v)])
+    lowest = min(starts.height(bone, *pose, scene.ground) for bone, pose in zip(
+        scene.bones, zip(moved.positions[0], moved.orientations[0], strict=True), strict=True))
+    height = {'limit slam': .4, 'start outside': .4}.get(
+        name, 2.0 if 'spin' in name else float(name.split()[1]) if 'drop' in name else None)
+    assert lowest == pytest.approx(height, abs=1e-9)
+    outside = Measure(scene).overshoot(moved)
+    assert (outside > math.radians(5)) if name == 'start outside' else outside == 0
+    if 'spin' in name:
+        assert np.linalg.norm(first.start.v[3:6]) == pytest.approx(float(name.split()[1]))
+
+
+def row(**changes):
+    base = {'number': 0, 'excess': 0.0, 'overshoot_rad': .1, 'sinking_m': 0.0, 'gap_m': 0.0,
+            'speed_m_s': 1.0, 'settled_s': 1.0, 'cpu_s': .5, 'simulated_s': 2.0}
+    return {**base, **changes}
+
+
+def test_many_starts_become_one_row_with_the_worst_of_each():
+    one = classes.gathered('drop', 'ours', [row(), row(number=1, excess=2e-3)])
+    two = classes.gathered('drop', 'ours', [row(number=2, excess=math.inf, settled_s=math.inf)])
+    merged, = classes.merged([one, two])
+    assert (merged['starts'], merged['bad'], merged['worst_start']) == (3, 2, 2)
+    assert merged['worst_excess'] == math.inf
+    assert merged['settled'] == 2
+    assert merged['cpu_s'] == pytest.approx(1.5)
+
+
+def test_a_promise_broken_is_shown_as_broken():
+    rows = [{**classes.gathered('spin', f'ours-{name}', [row(excess=excess)])}
+            for name, excess in (('draft', 1e-4), ('normal', 2e-3))]
+    held = {entry['goal']: entry['held'] for entry in goals.goals({'classes': rows})}
+    assert held['energy excess in every start, draft'] is True
+    assert held['energy excess in every start, normal'] is False
+
+
+def test_a_method_beaten_in_speed_and_error_is_not_on_the_front():
+    def point(method, family, cpu, error):
+        return {'motion': 'm', 'method': method, 'label': method, 'family': family,
+                'cpu_s_per_s': cpu, 'yardstick': 'position_worst_m', 'position_worst_m': error}
+    rows = [point('ours-draft', 'ours', 1.0, 1e-3), point('ours-exact', 'ours', 2.0, 1e-6),
+            point('other', 'PyBullet', .5, 1e-4)]
+    held = {entry['goal'].split()[-1]: entry['held'] for entry in goals._front({'precision': rows})}
+    assert held == {'ours-draft': False, 'ours-exact': True}
+
+
+def test_json_has_neither_nan_nor_infinity(tmp_path):
+    figures.save({'a': [math.nan, math.inf, 1 / 3, True]}, tmp_path)
+    text = (tmp_path / figures.FILE).read_text()
+    assert json.loads(text, parse_constant=pytest.fail)['a'] == [None, 'inf', .333333, True]
+
+
+def test_tables_write_what_exploded_and_what_failed():
+    text = tables.table([{'a': 'inf', 'b': True}, {'failed': 'x', 'job': 'j', 'at': 'f:1'}],
+                        (('a', 'A', '{:.1f}'), ('b', 'B', '{}'), ('c', 'C', '{}')))
+    assert '| ∞ | yes |  |' in text
+    assert '**failed**: x (f:1)' in text
+
+
+def test_a_job_that_fails_says_where():
+    found, = attempt(Job('part', 'label', lambda: 1 / 0))
+    assert 'ZeroDivisionError' in found['failed']
+    assert found['at'].startswith('test_report.py')
+
+
+def test_page_and_pictures_come_from_the_json_alone(tmp_path):
+    pytest.importorskip('matplotlib')
+    from ragdoll_ros.accuracy.parts import drop, precision
+    rows = precision.measure_all('free_fall', ['ours-normal', 'bullet-1', 'mujoco-rk4-1'], 1)
+    about = figures.about('ragdoll_report', 1.0, True, 2)
+    figures.save({'about': about, 'figures': {'precision': rows, 'energy': drop.energies('drop')}},
+                 tmp_path)
+    assert command.main(['--from-json', '--out', str(tmp_path)]) == 0
+    page = (tmp_path / 'accuracy.md').read_text()
+    assert 'free fall and throw' not in page or 'Free fall' in page
+    assert '4.9e-02' in page
+    for picture in ('accuracy_precision.png', 'accuracy_drop.png'):
+        assert picture in page
+        assert (tmp_path / picture).stat().st_size > 5000
+
+
+def test_an_empty_run_still_has_a_head():
+    about = figures.about('ragdoll_report', 1.0, False, 100)
+    assert markdown({'about': about, 'figures': {}}, {}).startswith('# Speed against error')
+    assert plots.draw_all({}, None) == {}
+
+
+@pytest.mark.parametrize(('arguments', 'text'), [
+    (['--case', 'nonsense'], 'precision'), (['--starts', '0'], '1 or more'),
+    (['--out', '/proc/nowhere'], '/proc/nowhere'), (['--from-json', '--out', '/tmp'], 'no /tmp')])
+def test_a_wrong_call_is_told_and_ends_with_2(arguments, text, capsys):
+    assert command.main(arguments) == 2
+    assert text in capsys.readouterr().err
+
+
+def test_help_has_an_example(capsys):
+    for main in (command.main, hard.main):
+        with pytest.raises(SystemExit) as left:
+            main(['--help'])
+        assert left.value.code == 0
+        assert 'example' in capsys.readouterr().out
+
+
+def test_an_unknown_hard_case_or_method_is_named(capsys):
+    assert hard.main(['--case', 'nonsense']) == 2
+    assert 'limits of 2°' in capsys.readouterr().err
+    with pytest.raises(ValueError, match='leapfrog'):
+        by_name('leapfrog')
+
+
+def test_a_hard_case_is_held_against_its_rule():
+    """A limit passed by 7 degrees, at rest, whole: one fault."""
+    case = hard.hard_cases()[0]
+    good = {'excess': 0.0, 'gap_m': 0.0, 'overshoot_rad': 0.0, 'sinking_m': 0.0,
+            'end_sinking_m': 0.0, 'fastest_m_s': 5.0, 'end_m_s': 0.0}
+    assert hard.faults(case, good) == []
+    assert hard.faults(case, {**good, 'overshoot_rad': math.radians(7)}) == ['overshoot']
+    assert 'energy from nothing' in hard.faults(case, {**good, 'excess': math.nan})
+
+
+@pytest.mark.slow
+def test_the_quick_report_runs(tmp_path):
+    """Nothing in it fails; figures for every part are there."""
+    assert command.main(['--quick', '--out', str(tmp_path)]) == 0
+    data = json.loads((tmp_path / 'accuracy.json').read_text())
+    failed = [entry for rows in data['figures'].values() for entry in rows if 'failed' in entry]
+    assert not failed
+    assert data['about']['seconds'] < 90
+
+
+def test_ours_is_the_simulation_of_the_node():
+    """The method's states are those of a Simulation driven by hand."""
+    from ragdoll_ros.simulation import Simulation
+    trial = gentle_flight().trial
+    moved = run(ours('normal'), trial).moved
+    with Simulation(trial.scene) as simulation:
+        simulation.place(trial.start)
+        for _ in range(len(moved.times) - 1):
+            state = simulation.advance()
+    assert (state.positions == moved.positions[-1]).all()
