@@ -11,6 +11,8 @@ NAME = 'ragdoll_ros'
 EXECUTABLES = {
     'ragdoll_node': 'ragdoll_ros.ros.node:main',
     'ragdoll_teleop': 'ragdoll_ros.ros.teleop:main',
+    'ragdoll_fit': 'ragdoll_ros.fit.command:main',
+    'ragdoll_report': 'ragdoll_ros.accuracy.command:main',
 }
 CONFIG = sorted(str(path) for path in Path('config').iterdir() if path.is_file())
 LAUNCHER = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'

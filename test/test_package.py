@@ -24,7 +24,7 @@ SCENES = ('import pathlib, ragdoll_ros.scene_file as f; '
 
 ROSDEP_KEYS = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml', 'scipy': 'python3-scipy',
                'jsonschema': 'python3-jsonschema', 'matplotlib': 'python3-matplotlib',
-               'pybullet': 'python3-pybullet-pip'}
+               'mpl_toolkits': 'python3-matplotlib', 'pybullet': 'python3-pybullet-pip'}
 NO_ROSDEP_KEY = {'mujoco', 'pygltflib', 'viser'}
 """Needed by extras only; said in the README."""
 
@@ -219,6 +219,8 @@ def test_plain_pip_install_runs_the_node(ros, environment, tmp_path):
     run(environment / 'bin/pip', 'install', '.', cwd=source)
     shutil.rmtree(source)
     try:
+        for name in EXECUTABLES:  # also without what the extras bring
+            assert name in run(environment / 'lib/ragdoll_ros' / name, '--help')
         command = (environment / 'lib/ragdoll_ros/ragdoll_node', '--ros-args', '-p', 'scene:=crowd')
         python = environment / 'bin/python'
         assert poses_published_by(python, *command) == 100
