@@ -38,7 +38,7 @@ slow: $(READY) ## the tests that take minutes
 bench: $(READY) ## cost of a tick and of its parts
 	@$(BIN)/python -m ragdoll_ros.ros.bench
 
-report: $(READY) ## accuracy against independent references, into docs/
+report: $(READY) ## accuracy against independent references, into docs/, 20 min
 	@$(BIN)/python -m ragdoll_ros.accuracy.command --out docs
 
 hard: $(READY) ## hard cases, each with its rule, as a table
