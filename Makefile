@@ -14,7 +14,6 @@ ROS := $(or $(ROS_DISTRO),wheels)
 READY := $(VENV)/ready-$(VERSION)-$(ROS)
 
 ifeq ($(ROS),wheels)
-export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV)
 ROS_EXTRA := ,ros
 else
 VENV_FLAGS := --system-site-packages
@@ -24,8 +23,8 @@ endif
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 22
 
-run: $(READY) ## the doll falls; arrow keys push it
-	@$(BIN)/python -m ragdoll_ros.ros.run
+run: $(READY) ## the doll falls, arrow keys push it; SCENE=crowd: another scene
+	@$(BIN)/python -m ragdoll_ros.ros.run $(SCENE)
 
 test: $(READY) ## the tests, at most 90 s
 	@$(BIN)/python -m pytest
@@ -51,13 +50,13 @@ FOLDERS := --build-base $(WORKSPACE)/build --install-base $(WORKSPACE)/install
 colcon: $(VENV)/colcon ## build and test as in a ROS workspace
 	@$(COLCON) list --base-paths . | grep -F '(ros.ament_python)' || { $(COLCON) list --base-paths .; \
 	  echo 'colcon takes ragdoll_ros for plain Python: package.xml has a fault' >&2; exit 1; }
-	@$(COLCON) build --base-paths . $(FOLDERS) --event-handlers console_cohesion+
+	@$(COLCON) build --base-paths . $(FOLDERS)
 	@$(COLCON) test --base-paths . $(FOLDERS) --event-handlers console_direct+ \
 	  --return-code-on-test-failure
 	@$(COLCON) test-result --test-result-base $(WORKSPACE)/build --verbose
 
 users-versions: ## the tests with Ubuntu 24.04's versions; builds PyBullet from source, 6 to 9 min
-	@sh test/users_versions.sh
+	@sh test/users_versions.sh $(if $(filter python3,$(PYTHON)),python3.12,$(PYTHON))
 
 clean: ## remove all that was made, .venv included
 	rm -rf $(VENV) build install log dist *.egg-info .pytest_cache .ruff_cache

@@ -8,7 +8,9 @@ from setuptools import Distribution, find_packages, setup
 from setuptools.command.build_py import build_py
 
 NAME = 'ragdoll_ros'
-EXECUTABLES: dict[str, str] = {
+EXECUTABLES = {
+    'ragdoll_node': 'ragdoll_ros.ros.node:main',
+    'ragdoll_teleop': 'ragdoll_ros.ros.teleop:main',
 }
 CONFIG = sorted(str(path) for path in Path('config').iterdir() if path.is_file())
 LAUNCHER = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'

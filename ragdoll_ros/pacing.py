@@ -1,7 +1,7 @@
 """Pace: when the next tick is due on a steady clock."""
 from __future__ import annotations
 
-MOST_LAG = 100_000_000
+MOST_LAG = 500_000_000
 """ns of the steady clock that may be caught up after a stall; what is more is given up."""
 
 

@@ -304,24 +304,50 @@ class Joint:
 
 
 @dataclass(frozen=True)
+class Rider:
+    """A bone of the skin's skeleton, fixed on the body that carries it.
+
+    ``bone`` names the carrying bone of the doll; ``position`` (m) and ``orientation`` are those
+    of the rider in that bone's own frame: its centre of mass and its shape's axes. Riders have
+    no mass and meet nothing; they are there so that a skin can follow (see riders.py). Their
+    names are their own: a rider may be called as the bone that carries it.
+    """
+
+    name: str
+    bone: str
+    position: Vector
+    orientation: Quaternion = IDENTITY
+
+    def __post_init__(self) -> None:
+        set_fields(self, position=floats(self.position),
+                   orientation=unit('orientation', self.orientation))
+        faults.check_finite('position', self.position)
+
+
+@dataclass(frozen=True)
 class Ragdoll:
     """A tree of bones. ``bones`` fixes the order; one of them, the root, has no parent.
 
-    ``swings`` ride on bones and do not act back on them.
+    ``swings`` ride on bones and do not act back on them; ``riders`` are what else moves with the
+    bones, in the order of the skeleton they are of.
     """
 
     name: str
     bones: tuple[Bone, ...]
     joints: tuple[Joint, ...] = ()
     swings: tuple[Swing, ...] = ()
+    riders: tuple[Rider, ...] = ()
 
     def __post_init__(self) -> None:
         set_fields(self, bones=tuple(self.bones), joints=tuple(self.joints),
-                   swings=tuple(self.swings))
+                   swings=tuple(self.swings), riders=tuple(self.riders))
         names = [bone.name for bone in self.bones]
         edges = [(joint.parent, joint.child) for joint in self.joints]
-        rides = [(swing.name, swing.bone) for swing in self.swings]
-        for fault in tree_faults(names, edges) + swing_faults(names, rides):
+        found = tree_faults(names, edges)
+        for key in ('swings', 'riders'):
+            carried = [(each.name, each.bone) for each in getattr(self, key)]
+            found += carried_faults(key, names, carried)
+        for fault in found:
             raise fault
 
     @property
@@ -398,17 +424,18 @@ def tree_faults(names: list[str], edges: list[tuple[str, str]]) -> list[faults.F
     return found
 
 
-def swing_faults(names: list[str], rides: list[tuple[str, str]]) -> list[faults.Fault]:
-    """Find what is wrong with (name, bone) of swings on the named bones."""
+def carried_faults(key: str, names: list[str],
+                   carried: list[tuple[str, str]]) -> list[faults.Fault]:
+    """Find what of (name, carrying bone) rides on no bone or shares a name."""
     found: list[faults.Fault] = []
-    seen: set[str] = set()
-    for index, (name, bone) in enumerate(rides):
-        if name in seen:
-            found.append(faults.DuplicateName(f'swings[{index}].name', name, 'a name of its own'))
-        seen.add(name)
-        if bone not in names:
+    known, seen = set(names), set()
+    for index, (name, bone) in enumerate(carried):
+        if bone not in known:
             expected = 'one of ' + ', '.join(names)
-            found.append(faults.UnknownBone(f'swings[{index}].bone', bone, expected))
+            found.append(faults.UnknownBone(f'{key}[{index}].bone', bone, expected))
+        if name in seen:
+            found.append(faults.DuplicateName(f'{key}[{index}].name', name, 'a name of its own'))
+        seen.add(name)
     return found
 
 

@@ -16,7 +16,7 @@ import yaml
 
 from . import faults
 from .faults import Fault, Faults
-from .ragdoll import SHAPES, Bone, Joint, Ragdoll, Shape, swing_faults, tree_faults
+from .ragdoll import SHAPES, Bone, Joint, Ragdoll, Rider, Shape, carried_faults, tree_faults
 from .rotation import IDENTITY
 from .scene import Ground, Material, Placement, Scene, above_ground
 from .swing.form import swing_data, swing_from
@@ -127,16 +127,19 @@ def build_doll(data: object, name: str = 'doll') -> tuple[Ragdoll | None, list[F
     bones = _build_each(data, 'bones', _bone, found)
     joints = _build_each(data, 'joints', _joint, found)
     swings = _build_each(data, 'swings', swing_from, found)
+    riders = _build_each(data, 'riders', lambda entry: Rider(**entry), found)
     names = [entry.get('name') for entry in _entries(data, 'bones')]
     edges = [(entry.get('parent'), entry.get('child')) for entry in _entries(data, 'joints')]
     if all(isinstance(text, str) for text in [*names, *sum(edges, ())]):
         found += tree_faults(names, edges)
-        rides = [(entry.get('name'), entry.get('bone')) for entry in _entries(data, 'swings')]
-        if all(isinstance(text, str) for text in sum(rides, ())):
-            found += swing_faults(names, rides)
+        for key in ('swings', 'riders'):
+            carried = [(entry.get('name'), entry.get('bone')) for entry in _entries(data, key)]
+            if all(isinstance(text, str) for text in sum(carried, ())):
+                found += carried_faults(key, names, carried)
     if found:
         return None, found
-    return Ragdoll(data.get('name', name), tuple(bones), tuple(joints), tuple(swings)), found
+    return Ragdoll(data.get('name', name), tuple(bones), tuple(joints), tuple(swings),
+                   tuple(riders)), found
 
 
 def doll_data(doll: Ragdoll) -> dict:
@@ -145,6 +148,8 @@ def doll_data(doll: Ragdoll) -> dict:
             'joints': [_joint_data(joint) for joint in doll.joints]}
     if doll.swings:
         data['swings'] = [swing_data(swing) for swing in doll.swings]
+    if doll.riders:
+        data['riders'] = [_rider_data(rider) for rider in doll.riders]
     return data
 
 
@@ -330,6 +335,13 @@ def _bone_data(bone: Bone) -> dict:
             data[key] = getattr(bone, key)
     if bone.color is not None:
         data['color'] = list(bone.color)
+    return data
+
+
+def _rider_data(rider: Rider) -> dict:
+    data = {'name': rider.name, 'bone': rider.bone, 'position': list(rider.position)}
+    if rider.orientation != IDENTITY:
+        data['orientation'] = list(rider.orientation)
     return data
 
 

@@ -5,6 +5,7 @@ import importlib
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import zipfile
@@ -12,10 +13,12 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).resolve().parent.parent
 SETUP = (ROOT / 'setup.py').read_text()
 EXECUTABLES = dict(re.findall(r"'(ragdoll_\w+)': '([\w.]+:main)'", SETUP))
+DEFAULTS_OF_A_SCENE = {'rate', 'real_time_factor', 'pushed_bone'}
 SCENES = ('import pathlib, ragdoll_ros.scene_file as f; '
           'f.load_scene("drop"); print(f.__file__); print(f.config_folder())')
 
@@ -25,6 +28,17 @@ ROSDEP_KEYS = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml', 'scipy': 'pytho
 NO_ROSDEP_KEY = {'mujoco', 'pygltflib', 'viser'}
 """Needed by extras only; said in the README."""
 
+COUNT_POSES = """
+import rclpy
+from geometry_msgs.msg import PoseArray
+got = rclpy.task.Future()
+rclpy.init()
+node = rclpy.create_node('listener')
+node.create_subscription(PoseArray, '/ragdoll/poses', got.set_result, 10)
+rclpy.spin_until_future_complete(node, got, timeout_sec=20)
+print(len(got.result().poses))
+"""
+
 
 def source_copy(folder: Path) -> Path:
     """Copy what is tracked or would be, so that no build leaves its traces in the checkout."""
@@ -33,12 +47,16 @@ def source_copy(folder: Path) -> Path:
     return Path(shutil.copytree(ROOT, folder / 'source', ignore=skip))
 
 
-def run(*command: object, **variables: str) -> str:
-    """Run a command outside the checkout, without the variables that lead back to it."""
-    kept = {key: value for key, value in os.environ.items()
+def without_paths() -> dict[str, str]:
+    """Give the environment without what leads back to the checkout."""
+    return {key: value for key, value in os.environ.items()
             if key not in ('PYTHONPATH', 'AMENT_PREFIX_PATH', 'COLCON_PREFIX_PATH')}
-    done = subprocess.run([str(part) for part in command], env={**kept, **variables}, cwd='/',
-                          capture_output=True, text=True, timeout=300)
+
+
+def run(*command: object, cwd: Path = Path('/'), **variables: str) -> str:
+    """Run a command outside the checkout to its good end; give what it prints."""
+    done = subprocess.run([str(part) for part in command], env={**without_paths(), **variables},
+                          cwd=cwd, capture_output=True, text=True, timeout=900)
     assert done.returncode == 0, f'{command}\n{done.stdout}\n{done.stderr}'
     return done.stdout
 
@@ -72,6 +90,18 @@ def imported(path: Path) -> set[str]:
     plain = {name.name for node in nodes if isinstance(node, ast.Import) for name in node.names}
     froms = {node.module for node in nodes if isinstance(node, ast.ImportFrom) and not node.level}
     return {name.split('.')[0] for name in plain | froms}
+
+
+def poses_published_by(python: Path, *command: object, **variables: str) -> int:
+    """Start a node, count the poses in a message that another process hears, end the node."""
+    with subprocess.Popen([str(part) for part in command], cwd='/',
+                          env={**without_paths(), **variables}) as node:
+        try:
+            heard = int(run(python, '-c', COUNT_POSES))
+        finally:
+            node.send_signal(signal.SIGINT)
+    assert node.returncode == 0
+    return heard
 
 
 def site_packages(prefix: Path) -> Path:
@@ -161,3 +191,59 @@ def test_uninstall_leaves_nothing(wheel, tmp_path):
               for line in record.read_text().splitlines()}
     present = {path.resolve() for path in target.rglob('*') if path.is_file()}
     assert present <= listed
+
+
+def test_parameter_file_holds_the_defaults():
+    """All of them but those that the scene brings along."""
+    from ragdoll_ros.ros.parameters import Settings
+    given = yaml.safe_load((ROOT / 'config/node.yaml').read_text())['/ragdoll']['ros__parameters']
+    defaults = {key: value for key, value in vars(Settings()).items()
+                if key not in DEFAULTS_OF_A_SCENE}
+    assert given == defaults
+    assert {key: type(value) for key, value in given.items()} == {
+        key: type(value) for key, value in defaults.items()}
+
+
+@pytest.fixture(scope='module')
+def environment(wheel, tmp_path_factory):
+    """Make a fresh environment with all that the package needs and colcon, without the package."""
+    folder = tmp_path_factory.mktemp('environment')
+    run(sys.executable, '-m', 'venv', folder)
+    run(folder / 'bin/pip', 'install', f'{wheel}[ros,colcon]')
+    run(folder / 'bin/pip', 'uninstall', '--yes', 'ragdoll_ros')
+    return folder
+
+
+@pytest.mark.slow
+def test_plain_pip_install_runs_the_node(ros, environment, tmp_path):
+    """As `ros2 run` starts it, with and without a ROS prefix."""
+    source = source_copy(tmp_path)
+    run(environment / 'bin/pip', 'install', '.', cwd=source)
+    shutil.rmtree(source)
+    try:
+        command = (environment / 'lib/ragdoll_ros/ragdoll_node', '--ros-args', '-p', 'scene:=crowd')
+        python = environment / 'bin/python'
+        assert poses_published_by(python, *command) == 100
+        assert poses_published_by(python, *command, AMENT_PREFIX_PATH=str(environment)) == 100
+    finally:
+        run(environment / 'bin/pip', 'uninstall', '--yes', 'ragdoll_ros')
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('option', [(), ('--symlink-install',)], ids=['copied', 'symlinked'])
+def test_colcon_build_runs_the_node(ros, environment, tmp_path, option):
+    source_copy(tmp_path)
+    path = f'{environment}/bin:{os.environ["PATH"]}'
+    assert '(ros.ament_python)' in run('colcon', 'list', cwd=tmp_path, PATH=path)
+    # Twice: the second build meets what the first one left.
+    for _ in range(2):
+        run('colcon', 'build', *option, cwd=tmp_path, PATH=path)
+    prefix = tmp_path / 'install/ragdoll_ros'
+    assert (prefix / 'share/ament_index/resource_index/packages/ragdoll_ros').is_file()
+    shipped = {file.name for file in (ROOT / 'config').iterdir()}
+    assert {file.name for file in (prefix / 'share/ragdoll_ros/config').iterdir()} == shipped
+    assert {file.name for file in (prefix / 'lib/ragdoll_ros').iterdir()} == set(EXECUTABLES)
+    assert not (prefix / 'bin').exists()
+    sourced = f'. {tmp_path}/install/setup.sh && exec {prefix}/lib/ragdoll_ros/ragdoll_node "$@"'
+    assert poses_published_by(environment / 'bin/python', 'sh', '-c', sourced, 'sh', '--ros-args',
+                              '-p', 'scene:=crowd') == 100

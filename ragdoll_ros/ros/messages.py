@@ -62,7 +62,7 @@ def to_multi_dof(frame: str, names: tuple[str, ...], stamp: int, poses: np.ndarr
                  twists: np.ndarray) -> MultiDOFJointState:
     """Poses (n, 7) and twists (n, 6) with the bones' names."""
     return MultiDOFJointState(
-        header=to_header(stamp, frame), joint_names=names,
+        header=to_header(stamp, frame), joint_names=list(names),
         transforms=[Transform(translation=to_vector(row[:3]), rotation=to_quaternion(row[3:]))
                     for row in poses],
         twist=[Twist(linear=to_vector(row[:3]), angular=to_vector(row[3:])) for row in twists])
@@ -71,4 +71,4 @@ def to_multi_dof(frame: str, names: tuple[str, ...], stamp: int, poses: np.ndarr
 def to_joint_state(frame: str, names: tuple[str, ...], stamp: int,
                    angles: np.ndarray) -> JointState:
     """Joint angles (k,) rad with their names."""
-    return JointState(header=to_header(stamp, frame), name=names, position=angles.tolist())
+    return JointState(header=to_header(stamp, frame), name=list(names), position=angles.tolist())

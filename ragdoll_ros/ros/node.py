@@ -9,7 +9,7 @@ import rclpy
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.utilities import remove_ros_args
@@ -23,14 +23,20 @@ from .inputs import Inputs
 from .outputs import Outputs
 from .parameters import Parameters, Settings
 from .services import Services
+from .session import ros_session
 from .stamps import Stamps
 from .tally import Tally
+
+InvalidROSArguments = rclpy_implementation.RCLInvalidROSArgsError
 
 SHORTEST_PERIOD = 1_000_000
 """ns between two calls of the timer at the least; at a faster pace, it makes several ticks."""
 
 LONGEST_BURST = 20_000_000
 """ns that the timer may make ticks for before others have their turn."""
+
+CATCH_UP = 2
+"""Times the wanted pace at which a stall is caught up: listeners' queues are ten messages long."""
 
 EXAMPLE = """examples:
   ragdoll_node
@@ -61,7 +67,7 @@ class RagdollNode(Node):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._stamps = Stamps(self.get_clock().now().nanoseconds)
         self._outputs = Outputs(self)
-        self._inputs = Inputs(self, self.tally)
+        self.inputs = Inputs(self, self.tally)
         self._diagnostics = Diagnostics(self, self._steady, self.tally, self._facts,
                                         self._wanted_pace)
         Services(self)
@@ -81,8 +87,7 @@ class RagdollNode(Node):
     def tick(self) -> None:
         """Go on by one tick and publish; a state that is not finite is never shown."""
         start = self._now()
-        state = self.simulation.advance()
-        if not math.isfinite(sum(float(part.sum()) for part in vars(state).values())):
+        if not self._advance():
             self.tally.refuse('state', 'not finite; the simulation was built anew')
             self._replace(make_simulation(self._tuning.scene, self.settings))
         self._publish()
@@ -113,6 +118,14 @@ class RagdollNode(Node):
                 simulation.close()
         super().destroy_node()
 
+    def _advance(self) -> bool:
+        """Go on; tell whether all numbers stay finite. What runs away may fail within a tick."""
+        try:
+            state = self.simulation.advance()
+        except (ArithmeticError, ValueError):
+            return False
+        return math.isfinite(sum(float(part.sum()) for part in vars(state).values()))
+
     def _now(self) -> int:
         return self._steady.now().nanoseconds
 
@@ -123,10 +136,10 @@ class RagdollNode(Node):
     def _catch_up(self) -> None:
         """Make the ticks that are due, as far as there is time."""
         end = self._now() + LONGEST_BURST
-        while self._pacer.due(self._now()):
-            self.tick()
-            if self._now() > end:
+        for _ in range(self._most_ticks):
+            if self._now() > end or not self._pacer.due(self._now()):
                 break
+            self.tick()
 
     def _restart_timer(self) -> None:
         if self.paused:
@@ -135,6 +148,7 @@ class RagdollNode(Node):
         self._pacer.period = self._period()
         self._pacer.start(self._now())
         self._timer.timer_period_ns = max(SHORTEST_PERIOD, round(self._pacer.period))
+        self._most_ticks = math.ceil(CATCH_UP * self._timer.timer_period_ns / self._pacer.period)
         self._timer.reset()
 
     def _publish(self) -> None:
@@ -144,8 +158,8 @@ class RagdollNode(Node):
 
     def _use(self, simulation: Simulation) -> None:
         """Let all parts work with this simulation and the settings as they are."""
-        self.simulation = self._inputs.simulation = self._diagnostics.simulation = simulation
-        self._inputs.settings = self.settings
+        self.simulation = self.inputs.simulation = self._diagnostics.simulation = simulation
+        self.inputs.settings = self.settings
         self._outputs.describe(simulation.scene, self.settings.frame_id)
 
     def _replace(self, simulation: Simulation) -> None:
@@ -161,7 +175,7 @@ class RagdollNode(Node):
 
     def _apply(self, changed: set[str]) -> None:
         """Carry a change of the settings out."""
-        settings = self._inputs.settings = self.settings
+        settings = self.inputs.settings = self.settings
         self._outputs.be_clock(settings.publish_clock)
         if self._prepared is not None:
             simulation, self._prepared = self._prepared, None
@@ -199,17 +213,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         'ragdoll_node', description=__doc__, epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.parse_args(remove_ros_args(arguments)[1:])
     try:
-        rclpy.init(args=arguments)
-        rclpy.spin(RagdollNode())
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except (faults.RagdollError, ParameterException) as error:
+        parser.parse_args(remove_ros_args(arguments)[1:])
+        with ros_session(arguments):
+            rclpy.spin(RagdollNode())
+    except (faults.RagdollError, ParameterException, InvalidROSArguments) as error:
         print(error, file=sys.stderr)
         return 2
-    finally:
-        rclpy.try_shutdown()
     return 0
 
 

@@ -109,7 +109,7 @@ class Parameters:
         try:
             value = self._node.declare_parameter(name, value, _descriptor(spec)).value
         except (InvalidParameterTypeException, InvalidParameterValueException) as error:
-            found.append(f'parameter {error}')
+            found.append(f'{name}: {error}')
         self.settings = dataclasses.replace(self.settings, **{name: value})
 
     def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:

@@ -1,0 +1,1 @@
+"""From a rigged, skinned character to a doll: read, group, fit, joint, weigh, report."""

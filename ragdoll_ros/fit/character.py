@@ -1,0 +1,188 @@
+"""A rigged, skinned character in this package's frame: x forward, y left, z up, metres."""
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .. import faults, rotation
+from .gltf_file import GltfFile
+from .names import side_of
+from .nodes import read_nodes
+from .skins import Skins, read_skins
+
+TO_ROS = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
+"""glTF is Y up and faces +Z, its left is +X: (x, y, z) here is (z, x, y) there."""
+
+LARGEST_METRES, SMALLEST_METRES = 20.0, 0.05
+"""A character longer or shorter than this is taken for one in other units, m."""
+
+
+@dataclass(frozen=True)
+class Character:
+    """Bones (n) and skin (v vertices, t triangles) in the bind pose.
+
+    Bones are ordered parents first; ``parents`` has -1 for a bone without one.
+    """
+
+    name: str
+    bone_names: tuple[str, ...]
+    parents: tuple[int, ...]
+    positions: np.ndarray
+    """(n, 3) m, the root of each bone."""
+    orientations: np.ndarray
+    """(n, 4) x, y, z, w."""
+    vertices: np.ndarray
+    """(v, 3) m."""
+    triangles: np.ndarray
+    """(t, 3) vertex indices."""
+    bones: np.ndarray
+    """(v, k) the bones that move each vertex."""
+    weights: np.ndarray
+    """(v, k) by how much; a row adds up to 1, or to 0 where no bone moves the vertex."""
+    scale: float = 1.0
+    """Metres to one unit of the file."""
+    notes: tuple[str, ...] = ()
+
+    @functools.cached_property
+    def extent(self) -> float:
+        """Longest edge of the skin's bounding box, m."""
+        return float(np.ptp(self.vertices, axis=0).max())
+
+    @property
+    def children(self) -> list[list[int]]:
+        """Children of each bone."""
+        below: list[list[int]] = [[] for _ in self.parents]
+        for bone, parent in enumerate(self.parents):
+            if parent >= 0:
+                below[parent].append(bone)
+        return below
+
+    def vertex_areas(self) -> np.ndarray:
+        """Area (v,) m^2 that each vertex stands for: a third of its triangles'."""
+        corners = self.vertices[self.triangles]
+        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0],
+                                        corners[:, 2] - corners[:, 0]), axis=1) / 6
+        return np.bincount(self.triangles.ravel(), np.repeat(areas, 3), len(self.vertices))
+
+    def volume(self) -> float:
+        """Volume inside the skin, m^3, by the divergence theorem; right if the skin is closed."""
+        corners = self.vertices[self.triangles] - self.vertices.mean(axis=0)
+        return float(abs(np.einsum('ti,ti->', corners[:, 0],
+                                   np.cross(corners[:, 1], corners[:, 2])) / 6))
+
+
+def read_character(path: str | Path, scale: float | None = None) -> Character:
+    """Read a .glb or .gltf file; Faults with what keeps it from being a character.
+
+    ``scale``: metres to one unit of the file; None takes 1, or what brings a size that cannot
+    be metres back to one that can, with a note.
+    """
+    try:
+        file = GltfFile(path)
+        # What overflows is found where it ends up.
+        with np.errstate(over='ignore', invalid='ignore'):
+            nodes = read_nodes(file)
+            skins = read_skins(file, nodes)
+        if len(skins.vertices) == 0:
+            raise faults.WrongForm('meshes', 0, 'a skin with vertices')
+        return _character(file, nodes.parents, nodes.order, skins, scale)
+    except faults.Fault as fault:
+        raise faults.Faults(str(path), [fault]) from None
+
+
+def _character(file: GltfFile, parents: list[int], order: list[int], skins: Skins,
+               scale: float | None) -> Character:
+    joints = [node for node in order if node in skins.rests]
+    place = {node: bone for bone, node in enumerate(joints)}
+    lookup = np.zeros(len(order), np.int32)
+    lookup[joints] = range(len(joints))
+    rests = np.stack([skins.rests[node] for node in joints])
+    if not np.isfinite(skins.vertices).all() or not np.isfinite(rests).all():
+        raise faults.NotFinite('meshes', 'vertices in the bind pose', 'finite numbers')
+    names = _bone_names([file.document.nodes[node].name for node in joints])
+    notes = list(skins.notes)
+    turn = TO_ROS
+    positions, vertices = rests[:, :3, 3] @ turn.T, skins.vertices @ turn.T
+    # A bone keeps the axes that the file gives it, so that its inverse bind matrix fits on.
+    linear = turn @ rests[:, :3, :3]
+    yaw = _yaw_to_front(names, positions)
+    if yaw:
+        notes.append(f'its left limbs say that it does not face +Z: turned by {yaw} degrees')
+        upright = np.round(rotation.matrix(rotation.from_axis_angle((0, 0, 1), np.radians(yaw))))
+        positions, vertices, linear = positions @ upright.T, vertices @ upright.T, upright @ linear
+    metres = _metres(vertices, scale, notes)
+    stem = _bone_names([file.path.stem])[0]
+    return Character(
+        stem, names, tuple(_parent_bone(node, parents, place) for node in joints),
+        positions * metres, np.stack([_nearest_turn(matrix) for matrix in linear]),
+        vertices * metres, skins.triangles, lookup[skins.nodes], skins.weights, metres,
+        tuple(notes))
+
+
+def _parent_bone(node: int, parents: list[int], place: dict[int, int]) -> int:
+    """Bone of the nearest node above that is one, -1 if there is none."""
+    node = parents[node]
+    while node >= 0 and node not in place:
+        node = parents[node]
+    return place.get(node, -1)
+
+
+def _bone_names(given: list[object]) -> tuple[str, ...]:
+    """Names as a doll takes them, each once: what has none is called bone_N."""
+    taken: dict[str, int] = {}
+    names = []
+    for number, name in enumerate(given):
+        text = name if isinstance(name, str) else ''
+        text = ''.join(c if c.isprintable() and c != '/' else '_' for c in text)
+        text = text.strip()[:90] or f'bone_{number}'
+        while text in taken:
+            taken[text] += 1
+            text = f'{text}_{taken[text]}'
+        taken[text] = 1
+        names.append(text)
+    return tuple(names)
+
+
+def _yaw_to_front(names: tuple[str, ...], positions: np.ndarray) -> int:
+    """Turn about the vertical, degrees, that brings the bones named left to +y."""
+    sides = np.array([side_of(name) for name in names])
+    if not (sides > 0).any() or not (sides < 0).any():
+        return 0
+    left = positions[sides > 0].mean(axis=0) - positions[sides < 0].mean(axis=0)
+    reach = np.abs(left[:2]).max()
+    if reach < 0.02 * np.ptp(positions, axis=0).max():
+        return 0
+    return round(float(np.degrees(np.arctan2(left[0], left[1]))) / 90) % 4 * 90
+
+
+def _metres(vertices: np.ndarray, scale: float | None, notes: list[str]) -> float:
+    """Metres to one unit; a guess from the size where the user gives none."""
+    extent = float(np.ptp(vertices, axis=0).max())
+    if scale is not None:
+        faults.check_positive('scale', scale)
+        return scale
+    if not 0 < extent < 1e30:
+        raise faults.OutOfRange('meshes', extent, 'a skin with a size')
+    if extent > LARGEST_METRES:
+        metres, unit = (0.01, 'centimetres') if extent <= 1000 else (0.001, 'millimetres')
+        if extent * metres > LARGEST_METRES:
+            metres, unit = 2.0 / extent, 'no known unit'
+    elif extent < SMALLEST_METRES:
+        metres, unit = (100.0, 'hundreds of metres') if extent > 0.002 else (
+            2.0 / extent, 'no known unit')
+    else:
+        return 1.0
+    notes.append(f'a size of {extent:.4g} smells of {unit}: one unit is taken for {metres:g} m '
+                 '(--scale says otherwise)')
+    return metres
+
+
+def _nearest_turn(matrix: np.ndarray) -> np.ndarray:
+    """Quaternion (4,) of the rotation nearest to a matrix (3, 3) that may scale and mirror."""
+    u, _, vt = np.linalg.svd(matrix)
+    if np.linalg.det(u @ vt) < 0:
+        u = u * (1.0, 1.0, -1.0)
+    return rotation.from_matrix(u @ vt)

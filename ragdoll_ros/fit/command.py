@@ -1,0 +1,126 @@
+"""ragdoll_fit: any rigged, skinned character, or a robot's URDF, becomes a doll."""
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from .. import faults
+from ..ragdoll import Ragdoll
+from ..scene_file import load_doll, save_doll
+from .character import read_character
+from .pipeline import Fit, Options, fit_character
+from .report import doll_report, fit_report
+
+EXAMPLE = """\
+example:
+  ragdoll_fit character.glb -o doll.yaml --picture doll.png
+  ros2 run ragdoll_ros ragdoll_node --ros-args -p scene:=doll.yaml
+
+A .urdf becomes a doll too: a robot that goes limp. A doll's own .yaml is checked and reported.
+Exit code 0: done; 2: a file or an option is wrong."""
+
+
+PICTURES = ('.png', '.jpg', '.svg', '.pdf')
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command; gives the exit code."""
+    options = _parser().parse_args(arguments)
+    try:
+        _run(options)
+    except faults.RagdollError as error:
+        print(f'ragdoll_fit: {_one_line(error)}', file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f'ragdoll_fit: {error.filename}: {error.strerror}', file=sys.stderr)
+        return 2
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        'ragdoll_fit', description=__doc__, epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('input', help='a .glb or .gltf with a skinned character, a .urdf, a .yaml')
+    parser.add_argument('-o', '--output', metavar='DOLL.yaml', help='where the doll goes')
+    parser.add_argument('--urdf', metavar='DOLL.urdf', help='write the doll as URDF too')
+    parser.add_argument('--dialect', choices=('ros', 'bullet'), default='ros',
+                        help='of that URDF: PyBullet has capsules, and takes links of no mass '
+                        'as such only where they say so')
+    parser.add_argument('--picture', metavar='OUT.png', help='draw skin and bodies side by side')
+    parser.add_argument('--mass', type=float, metavar='KG',
+                        help='of the whole doll (default: as much water as the skin holds)')
+    parser.add_argument('--masses', choices=('volume', 'proportions'), default='volume',
+                        help='share the mass by volume, or as in a human body')
+    parser.add_argument('--scale', type=float, metavar='M',
+                        help='metres to one unit of the file (default: 1, or a guess)')
+    parser.add_argument('--shape', default='best',
+                        choices=('best', 'box', 'sphere', 'capsule', 'cylinder'),
+                        help='shape of all bodies (default: the smallest that fits, each)')
+    parser.add_argument('--orientation', choices=('principal', 'bone'), default='principal',
+                        help="z along a body's longest extent, or along its bone")
+    parser.add_argument('--weight', type=float, metavar='SHARE',
+                        help='a vertex counts for every bone that moves it by this share or more '
+                        '(default: for the one that moves it most)')
+    parser.add_argument('--smallest', type=float, metavar='M',
+                        help='bones with less skin than this are merged into their parents '
+                        '(default: 0.055 of the character)')
+    return parser
+
+
+def _run(options: argparse.Namespace) -> None:
+    _check(options)
+    path = Path(options.input)
+    fit = None
+    if path.suffix.lower() in ('.yaml', '.yml'):
+        doll = load_doll(options.input)
+        report = doll_report(doll)
+    elif path.suffix.lower() in ('.urdf', '.xml'):
+        doll, report = _read_robot(path)
+    else:
+        fit = _fit(path, options)
+        doll, report = fit.doll, fit_report(fit)
+    print(report)
+    if options.output:
+        save_doll(doll, options.output, f'Fitted to {path.name}\n\n{report}')
+    if options.urdf:
+        from ..urdf import to_urdf
+        Path(options.urdf).write_text(to_urdf(doll, options.dialect), encoding='utf-8')
+    if options.picture:
+        from .picture import draw
+        draw(doll, fit.character if fit else None, options.picture)
+
+
+def _fit(path: Path, options: argparse.Namespace) -> Fit:
+    character = read_character(path, options.scale)
+    return fit_character(character, Options(
+        options.shape, options.orientation, options.weight, options.smallest, options.mass,
+        options.masses))
+
+
+def _read_robot(path: Path) -> tuple[Ragdoll, str]:
+    from ..urdf_reader import read_urdf
+    doll, notes = read_urdf(path)
+    return doll, doll_report(doll, notes)
+
+
+def _check(options: argparse.Namespace) -> None:
+    for key in ('mass', 'scale', 'smallest'):
+        if getattr(options, key) is not None:
+            faults.check_positive(f'--{key}', getattr(options, key))
+    if options.weight is not None:
+        faults.check_range('--weight', options.weight, 0, 1)
+    if options.picture and Path(options.picture).suffix.lower() not in PICTURES:
+        raise faults.WrongForm('--picture', options.picture,
+                               'a name that ends in ' + ', '.join(PICTURES))
+
+
+def _one_line(error: faults.RagdollError) -> str:
+    if isinstance(error, faults.Faults) and len(error.faults) == 1:
+        return f'{error.file}: {error.faults[0]}'
+    return str(error)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

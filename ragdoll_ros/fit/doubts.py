@@ -1,0 +1,83 @@
+"""What looks wrong with a doll that is well-formed: the mistakes that are easily made."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .. import rotation
+from ..ragdoll import Joint, Ragdoll
+from .names import roles_of
+
+DENSEST = 3000.0
+"""kg/m^3; bone has 1 900, stone 2 700."""
+
+LARGEST, SMALLEST = 20.0, 0.05
+"""Sizes between which a doll is believed to be in metres, m."""
+
+BENDS = {'shin': (-1, 'a knee that bends forwards'),
+         'forearm': (1, 'an elbow that bends backwards'),
+         'thigh': (1, 'a hip that lifts the knee backwards')}
+"""By role: which way along x the first axis takes the child, and what it is if it does not."""
+
+
+def find_doubts(doll: Ragdoll) -> list[str]:
+    """Give one sentence for each doubt: density, joints that bend the wrong way, size."""
+    return [*_size(doll), *_densities(doll), *_bends(doll)]
+
+
+def extent(doll: Ragdoll) -> float:
+    """Longest edge of the box around the doll in the bind pose, m."""
+    directions = np.concatenate([np.eye(3), -np.eye(3)])
+    reaches = [directions @ np.array(bone.position) + bone.shape.reach(rotation.rotate(
+        rotation.inverse(np.array(bone.orientation)), directions)) for bone in doll.bones]
+    furthest = np.max(reaches, axis=0)
+    return float((furthest[:3] + furthest[3:]).max())
+
+
+def _size(doll: Ragdoll) -> list[str]:
+    size = extent(doll)
+    if size > LARGEST:
+        unit = 'centimetres' if size < 1000 else 'millimetres'
+        return [f'a doll {size:.4g} m long: the size smells of {unit}']
+    if size < SMALLEST:
+        return [f'a doll {size:.4g} m long: the size smells of a scale applied twice']
+    return []
+
+
+def _densities(doll: Ragdoll) -> list[str]:
+    found = []
+    for bone in doll.bones:
+        density = bone.mass / bone.shape.volume
+        if density > DENSEST:
+            found.append(f'{bone.name}: a density of {density:.0f} kg/m^3, over {DENSEST:.0f}')
+    return found
+
+
+def _bends(doll: Ragdoll) -> list[str]:
+    names = tuple(bone.name for bone in doll.bones)
+    above = {joint.child: names.index(joint.parent) for joint in doll.joints}
+    order = (doll.root.name, *(joint.child for joint in doll.joints_from_root()))
+    place = {name: index for index, name in enumerate(order)}
+    parents = tuple(place[names[above[name]]] if name in above else -1 for name in order)
+    roles = dict(zip(order, roles_of(order, parents), strict=True))
+    found = []
+    for joint in doll.joints:
+        if roles[joint.child] in BENDS and joint.kind in ('hinge', 'universal'):
+            sign, complaint = BENDS[roles[joint.child]]
+            if sign * _reach_forward(doll, joint) < -0.05:
+                low, high = (math.degrees(angle) for angle in joint.limits[0])
+                found.append(f'{joint.child}: {complaint} (limits {low:.0f} to {high:.0f} degrees)')
+    return found
+
+
+def _reach_forward(doll: Ragdoll, joint: Joint) -> float:
+    """How far the middle of its range takes the child's middle along x, by its distance."""
+    if joint.limits[0] is None:
+        return 0.0
+    arm = np.array(doll.bone(joint.child).position) - joint.anchor
+    length = float(np.linalg.norm(arm))
+    if length < 1e-9:
+        return 0.0
+    turn = rotation.from_axis_angle(np.array(joint.axes[0]), sum(joint.limits[0]) / 2)
+    return float(rotation.rotate(turn, arm)[0] - arm[0]) / length

@@ -1,0 +1,81 @@
+"""A picture of the skin and, beside it, of the bodies that were fitted to it."""
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from .. import faults
+from ..ragdoll import Bone, Ragdoll
+from .character import Character
+from .solid import placed, surface
+
+COLORS = np.array([[0.90, 0.45, 0.35], [0.35, 0.60, 0.85], [0.50, 0.75, 0.45], [0.95, 0.75, 0.35],
+                   [0.65, 0.50, 0.80], [0.45, 0.75, 0.75], [0.85, 0.60, 0.75], [0.70, 0.65, 0.50]])
+SKIN = np.array([0.80, 0.78, 0.74])
+LIGHT = np.array([0.5, 0.4, 0.77])
+FEWER = 30_000
+"""Triangles of a skin that are drawn at the most."""
+
+
+def draw(doll: Ragdoll, character: Character | None, path: str | Path) -> None:
+    """Write skin, both, and bodies side by side, seen from ahead and to the left.
+
+    Without a character there is no skin to show, only the bodies.
+    """
+    try:
+        import matplotlib
+        matplotlib.use('Agg')
+        from matplotlib import pyplot
+    except ImportError:
+        raise faults.Unreadable(
+            '', 'no matplotlib', "pip install 'ragdoll_ros[fit]' for pictures") from None
+    bodies = [(_triangles(bone), COLORS[number % len(COLORS)])
+              for number, bone in enumerate(doll.bones)]
+    views = [('bodies', [(bodies, 1.0)])]
+    points = np.concatenate([triangles.reshape(-1, 3) for triangles, _ in bodies])
+    if character is not None:
+        triangles = character.vertices[character.triangles]
+        skin = [(triangles[::max(1, len(triangles) // FEWER)], SKIN)]
+        views = [('skin', [(skin, 1.0)]), ('skin and bodies', [(bodies, 0.5), (skin, 0.15)]),
+                 *views]
+        points = np.concatenate([points, character.vertices])
+    figure = pyplot.figure(figsize=(5 * len(views), 6), dpi=100)
+    for number, (title, layers) in enumerate(views, 1):
+        axes = figure.add_subplot(1, len(views), number, projection='3d')
+        for solids, alpha in layers:
+            _draw_solids(axes, solids, alpha)
+        _frame(axes, points)
+        axes.set_title(title)
+    figure.suptitle(doll.name)
+    figure.tight_layout()
+    figure.savefig(path)
+    pyplot.close(figure)
+
+
+def _triangles(bone: Bone) -> np.ndarray:
+    corners, triangles = surface(bone.shape)
+    return placed(bone, corners)[triangles]
+
+
+def _draw_solids(axes: object, solids: list[tuple[np.ndarray, np.ndarray]], alpha: float) -> None:
+    """All triangles in one collection: only so matplotlib sorts them by depth among each other."""
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+    corners = np.concatenate([triangles for triangles, _ in solids])
+    base = np.concatenate([np.tile(color, (len(triangles), 1)) for triangles, color in solids])
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    shade = 0.55 + 0.45 * np.maximum(normals @ LIGHT, 0)[:, None]
+    colors = np.concatenate([base * shade, np.full((len(base), 1), alpha)], axis=1)
+    axes.add_collection3d(Poly3DCollection(corners, facecolors=colors, edgecolors='none'))
+
+
+def _frame(axes: object, vertices: np.ndarray) -> None:
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    middle, half = (low + high) / 2, float((high - low).max()) * 0.36
+    for set_limits, centre in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), middle,
+                                  strict=True):
+        set_limits(centre - half, centre + half)
+    axes.set_box_aspect((1, 1, 1))
+    axes.view_init(elev=12, azim=35)
+    axes.set_axis_off()

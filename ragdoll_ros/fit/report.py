@@ -1,0 +1,73 @@
+"""What was fitted and how well, as text: for the terminal and for the head of the doll's file."""
+from __future__ import annotations
+
+import textwrap
+
+from ..ragdoll import Ragdoll, Shape
+from .doubts import extent, find_doubts
+from .pipeline import BodyFit, Fit
+from .shapes import TOLERANCE
+from .solid import covered, overlapping_pairs, shared_volume
+
+
+def fit_report(fit: Fit) -> str:
+    """Give one line for each body, then the totals, then the warnings."""
+    bones, character = fit.doll.bones, fit.character
+    inside = covered(bones, character.vertices, TOLERANCE)
+    volume, skin = sum(bone.shape.volume for bone in bones), character.volume()
+    width = max(4, *(len(bone.name) for bone in bones))
+    lines = [f'{"bone":{width}}  vertices inside  axis  {"shape":8} {"size, m":23} '
+             f'{"mass, kg":>9}  joint']
+    joints = {joint.child: joint.kind for joint in fit.doll.joints}
+    lines += [_body_line(body, joints.get(body.bone.name, 'root'), width) for body in fit.bodies]
+    lines += [
+        '',
+        f'{len(bones)} bodies for {len(character.bone_names)} bones, {fit.doll.mass:.4g} kg, '
+        f'{extent(fit.doll):.3g} m; one unit of the file is {character.scale:g} m',
+        f'{100 * inside.mean():.1f} % of {len(inside)} vertices inside a body or within 1 cm; '
+        f'volume {1000 * volume:.4g} l' + (
+            f", {volume / skin:.2f} of the skin's" if skin > 0 else '')
+        + f', {100 * shared_volume(bones):.0f} % of it shared',
+        *_overlaps(fit.doll), *_warnings([*fit.notes, *find_doubts(fit.doll)])]
+    return '\n'.join(lines)
+
+
+def doll_report(doll: Ragdoll, notes: tuple[str, ...] = ()) -> str:
+    """Tell the same of a doll that was not fitted here: as far as it goes."""
+    width = max(4, *(len(bone.name) for bone in doll.bones))
+    joints = {joint.child: joint.kind for joint in doll.joints}
+    lines = [f'{"bone":{width}}  {"shape":8} {"size, m":23} {"mass, kg":>9}  joint']
+    lines += [f'{bone.name:{width}}  {bone.shape.kind:8} {_size(bone.shape):23} {bone.mass:9.4g}  '
+              f'{joints.get(bone.name, "root")}' for bone in doll.bones]
+    lines += ['', f'{len(doll.bones)} bodies, {doll.mass:.4g} kg, {extent(doll):.3g} m',
+              *_overlaps(doll), *_warnings([*notes, *find_doubts(doll)])]
+    return '\n'.join(lines)
+
+
+def _body_line(body: BodyFit, joint: str, width: int) -> str:
+    share = f'{100 * body.inside / body.vertices:5.1f}%' if body.vertices else '     -'
+    # A star marks a z that is the principal axis, not the bone's direction.
+    axis = f'{body.axes.distinct:.2f}{"*" if body.axes.principal else " "}'
+    bone = body.bone
+    return (f'{bone.name:{width}}  {body.vertices:8d} {share} {axis}  {bone.shape.kind:8} '
+            f'{_size(bone.shape):23} {bone.mass:9.4g}  {joint}')
+
+
+def _size(shape: Shape) -> str:
+    edges = [edge for value in vars(shape).values()
+             for edge in (value if isinstance(value, tuple) else (value,))]
+    return ' x '.join(f'{edge:.4f}' for edge in edges)
+
+
+def _overlaps(doll: Ragdoll) -> list[str]:
+    jointed = {frozenset((joint.parent, joint.child)) for joint in doll.joints}
+    pairs = [pair for pair in overlapping_pairs(doll.bones) if frozenset(pair) not in jointed]
+    if not pairs:
+        return []
+    listed = ', '.join(f'{first} and {second}' for first, second in pairs)
+    return textwrap.wrap(f'overlap in the bind pose, so do not collide: {listed}', 97,
+                         subsequent_indent='  ', break_long_words=False)
+
+
+def _warnings(sentences: list[str]) -> list[str]:
+    return [f'warning: {sentence}' for sentence in sentences]

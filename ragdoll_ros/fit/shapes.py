@@ -1,0 +1,124 @@
+"""A box, ball, cylinder or capsule around a cluster of skin vertices."""
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..ragdoll import Box, Capsule, Cylinder, Shape, Sphere
+
+TOLERANCE = 0.01
+"""A vertex this far outside a body, m, still counts as inside."""
+
+WANTED = 0.95
+"""Share of a cluster's vertices that its body should hold."""
+
+MOST_POINTS = 2000
+"""Points on which shapes are tried; of larger clusters every n-th is taken."""
+
+QUANTILES = (0.7, 0.8, 0.9, 0.95, 0.98, 1.0)
+"""Shares of the points that a tried radius leaves inside."""
+
+END_CUTS = np.array([0.0, 0.01, 0.02])
+"""Shares of the points that a tried length leaves out at each end."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A shape, its centre (3,) m in the frame it was fitted in, the share of points inside."""
+
+    shape: Shape
+    centre: np.ndarray
+    share: float = 0.0
+
+
+def fit_shape(points: np.ndarray, kind: str, thinnest: float, tolerance: float) -> Fitted:
+    """Fit a shape of one kind to points (p, 3) given in its own axes, z the long one.
+
+    It is the smallest of those tried that holds enough of the points, to within the tolerance
+    (m). No edge comes out thinner than ``thinnest`` m, so that a flat, a straight, a single or
+    no cluster has a body too.
+    """
+    points = points[::max(1, -(-len(points) // MOST_POINTS))]
+    if len(points) == 0:
+        points = np.zeros((1, 3))
+    tried = [replace(fitted, share=float(np.mean(
+        outside(fitted.shape, points - fitted.centre) <= tolerance)))
+        for fitted in MAKERS[kind](points, thinnest)]
+    enough = [fitted for fitted in tried if fitted.share >= WANTED]
+    if enough:
+        return min(enough, key=lambda fitted: fitted.shape.volume)
+    return max(tried, key=lambda fitted: fitted.share)
+
+
+def choose_kind(clusters: list[np.ndarray], thinnest: float, tolerance: float) -> str:
+    """Kind of shape that holds clusters (p, 3), each in its own axes, in the smallest volume."""
+    def badness(kind: str) -> tuple[bool, float]:
+        fits = [fit_shape(points, kind, thinnest, tolerance) for points in clusters]
+        return (min(fitted.share for fitted in fits) < WANTED,
+                sum(fitted.shape.volume for fitted in fits))
+
+    return min(MAKERS, key=badness)
+
+
+def outside(shape: Shape, points: np.ndarray) -> np.ndarray:
+    """Distance (p,) m of points from a shape's surface, its own axes; zero or less inside."""
+    if isinstance(shape, Sphere):
+        return np.linalg.norm(points, axis=1) - shape.radius
+    if isinstance(shape, Capsule):
+        along = np.maximum(np.abs(points[:, 2]) - shape.length / 2, 0)
+        return np.hypot(np.linalg.norm(points[:, :2], axis=1), along) - shape.radius
+    if isinstance(shape, Cylinder):
+        beyond = np.stack([np.linalg.norm(points[:, :2], axis=1) - shape.radius,
+                           np.abs(points[:, 2]) - shape.length / 2], axis=1)
+    else:
+        beyond = np.abs(points) - np.array(shape.half_extents)
+    inside = np.minimum(beyond.max(axis=1), 0)
+    return np.linalg.norm(np.maximum(beyond, 0), axis=1) + inside
+
+
+def _boxes(points: np.ndarray, thinnest: float) -> Iterator[Fitted]:
+    cuts = np.array([0.0, 0.005, 0.01, 0.02, 0.03, 0.045])
+    for low, high in zip(*np.quantile(points, [cuts, 1 - cuts], axis=0), strict=True):
+        yield Fitted(Box(tuple(np.maximum(high - low, thinnest))), (low + high) / 2)
+
+
+def _spheres(points: np.ndarray, thinnest: float) -> Iterator[Fitted]:
+    for centre in _centres(points):
+        distances = np.linalg.norm(points - centre, axis=1)
+        for radius in np.quantile(distances, QUANTILES):
+            yield Fitted(Sphere(max(radius, thinnest / 2)), centre)
+
+
+def _cylinders(points: np.ndarray, thinnest: float) -> Iterator[Fitted]:
+    ends = np.quantile(points[:, 2], [END_CUTS, 1 - END_CUTS])
+    for centre in _centres(points):
+        radial = np.linalg.norm((points - centre)[:, :2], axis=1)
+        for radius in np.quantile(radial, QUANTILES):
+            for low, high in ends.T:
+                middle = np.array([centre[0], centre[1], (low + high) / 2])
+                yield Fitted(Cylinder(max(radius, thinnest / 2), max(high - low, thinnest)), middle)
+
+
+def _capsules(points: np.ndarray, thinnest: float) -> Iterator[Fitted]:
+    for centre in _centres(points):
+        radial = np.linalg.norm((points - centre)[:, :2], axis=1)
+        for radius in np.quantile(radial, QUANTILES):
+            radius = max(radius, thinnest / 2)
+            # A point at this distance from the axis is inside so far into the end's half ball.
+            dome = np.sqrt(np.maximum(radius ** 2 - radial ** 2, 0))
+            lows = np.quantile(points[:, 2] + dome, END_CUTS)
+            highs = np.quantile(points[:, 2] - dome, 1 - END_CUTS)
+            for low, high in zip(lows, highs, strict=True):
+                middle = np.array([centre[0], centre[1], (low + high) / 2])
+                yield Fitted(Capsule(radius, max(high - low, thinnest / 2)), middle)
+
+
+def _centres(points: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Two guesses at the middle: of the bounding box, and half way to the mean."""
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    return middle, (middle + points.mean(axis=0)) / 2
+
+
+MAKERS = {'capsule': _capsules, 'box': _boxes, 'cylinder': _cylinders, 'sphere': _spheres}

@@ -1,0 +1,27 @@
+"""ROS from its start to a signal."""
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+
+
+@contextmanager
+def ros_session(arguments: list[str]) -> Iterator[None]:
+    """Have ROS until the context ends, or until SIGINT or SIGTERM ends it, which is no error.
+
+    rclpy shuts down where the signal finds it, so that whatever a callback in progress does
+    next with ROS fails: errors after a shutdown are its consequence.
+    """
+    rclpy.init(args=arguments)
+    try:
+        yield
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except Exception:
+        if rclpy.ok():
+            raise
+    finally:
+        rclpy.try_shutdown()

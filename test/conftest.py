@@ -1,0 +1,77 @@
+"""What all tests share: this tree on the path, and a ROS domain of their own."""
+from __future__ import annotations
+
+import fcntl
+import importlib.util
+import os
+import tempfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+if importlib.util.find_spec('rclpy') is None:
+    collect_ignore_glob = ['test_ros_*.py']
+
+
+def free_domain() -> tuple[int, object]:
+    """Give a domain id that no other test session on this machine has, and its lock."""
+    for domain in range(1, 101):
+        lock = open(Path(tempfile.gettempdir()) / f'ragdoll_ros_test_domain_{domain}', 'w')  # noqa: SIM115
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            lock.close()
+            continue
+        return domain, lock
+    raise RuntimeError('no ROS domain from 1 to 100 is free')
+
+
+@pytest.fixture(scope='session')
+def ros():
+    """ROS in this process, in a domain that it shares with the processes it starts alone."""
+    import rclpy
+    domain, lock = free_domain()
+    os.environ['ROS_DOMAIN_ID'] = str(domain)
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    os.environ['PYTHONPATH'] = os.pathsep.join(
+        filter(None, [str(ROOT), os.environ.get('PYTHONPATH', '')]))
+    rclpy.init(args=[])
+    yield
+    rclpy.try_shutdown()
+    lock.close()
+
+
+@pytest.fixture
+def make_node(ros):
+    """Make ragdoll nodes in this process, with parameters as keywords; destroyed at the end."""
+    from rclpy.parameter import Parameter
+
+    from ragdoll_ros.ros.node import RagdollNode
+    nodes = []
+
+    def make(**parameters):
+        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+        nodes.append(RagdollNode(parameter_overrides=overrides))
+        return nodes[-1]
+
+    yield make
+    for node in nodes:
+        node.destroy_node()
+
+
+@pytest.fixture
+def broken_scene(tmp_path):
+    """A scene's file with five faults, and a word for each that must be told."""
+    path = tmp_path / 'broken.yaml'
+    path.write_text("""name: broken
+gravity: [0, 0]
+step: -0.01
+pace: fast
+ground: {normal: [0, 0, 0]}
+dolls:
+  - {doll: nowhere.yaml}
+""")
+    return path, ['broken.yaml: 5 faults', 'gravity', 'step', 'pace', 'ground.normal',
+                  'dolls[0].doll']

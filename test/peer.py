@@ -1,0 +1,81 @@
+"""The other side of a running node: listens, sends, calls and waits for conditions."""
+from __future__ import annotations
+
+import fcntl
+import os
+import pty
+import struct
+import subprocess
+import sys
+import termios
+import time
+
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+PATIENCE = 15.0
+"""s that a condition may take: discovery alone takes up to 3 s, up to 10 on a busy machine."""
+
+
+class Peer(Node):
+    """A node of the tests' process, with an executor of its own."""
+
+    def __init__(self, name='peer'):
+        super().__init__(name)
+        self.executor_ = SingleThreadedExecutor()
+        self.executor_.add_node(self)
+
+    def collect(self, kind, topic, qos=10):
+        """Subscribe; give the list that messages go to, each as (arrival s, message)."""
+        got = []
+        self.create_subscription(kind, topic, lambda m: got.append((time.monotonic(), m)), qos)
+        return got
+
+    def wait(self, condition, timeout=PATIENCE):
+        """Spin until the condition holds; fail if it does not in time."""
+        end = time.monotonic() + timeout
+        while not condition():
+            assert time.monotonic() < end, 'not in time'
+            self.executor_.spin_once(timeout_sec=0.1)
+
+    def sender(self, kind, topic):
+        """Publisher that a subscriber listens to already."""
+        publisher = self.create_publisher(kind, topic, 10)
+        self.wait(lambda: publisher.get_subscription_count() > 0)
+        return publisher
+
+    def call(self, kind, name, request):
+        """Call a service and give its answer."""
+        client = self.create_client(kind, name)
+        self.wait(client.service_is_ready)
+        future = client.call_async(request)
+        self.wait(future.done)
+        self.destroy_client(client)
+        return future.result()
+
+
+def start(module, *arguments, terminal=None):
+    """Start a module of the ROS side as a process; ``terminal``: on that pty's end."""
+    command = [sys.executable, '-m', f'ragdoll_ros.ros.{module}', *arguments]
+    if terminal is not None:
+        return subprocess.Popen(command, stdin=terminal, stdout=terminal, stderr=subprocess.PIPE)
+    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                            stderr=subprocess.PIPE, text=True)
+
+
+def start_on_terminal(module, *arguments):
+    """Start a module on a terminal of its own; also give the side that types and reads."""
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack('4H', 24, 120, 0, 0))
+    process = start(module, *arguments, terminal=theirs)
+    os.close(theirs)
+    os.set_blocking(ours, False)
+    return process, ours
+
+
+def end(process, sign, timeout=10.0):
+    """Send a signal; give the exit code and the seconds it took."""
+    before = time.monotonic()
+    process.send_signal(sign)
+    _, process.stderr_text = process.communicate(timeout=timeout)
+    return process.returncode, time.monotonic() - before

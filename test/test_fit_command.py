@@ -1,0 +1,117 @@
+"""ragdoll_fit as a user calls it."""
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import fit_rigs
+import numpy as np
+import pytest
+from fit_rigs import RIGS
+
+from ragdoll_ros.fit.command import main
+from ragdoll_ros.scene_file import load_doll, load_scene
+
+
+@pytest.fixture
+def glb(tmp_path):
+    return fit_rigs.write(RIGS['unreal'], tmp_path)
+
+
+def test_one_command_makes_a_scene_that_loads(glb, tmp_path, capsys):
+    out = tmp_path / 'doll.yaml'
+    assert main([str(glb), '-o', str(out)]) == 0
+    scene = load_scene(str(out))
+    assert len(scene.bones) == len(load_doll(str(out)).bones) == 20
+    printed = capsys.readouterr().out
+    head = [line for line in out.read_text().splitlines() if line.startswith('#')]
+    # The report stands in the file's head too, word for word.
+    for line in printed.splitlines():
+        assert f'# {line}'.rstrip() in head
+    for words in ('thigh_l', 'vertices', 'mass, kg', '% of', 'shared', '20 bodies for 52 bones'):
+        assert words in printed
+
+
+def test_urdf_and_picture(glb, tmp_path, capsys):
+    from xml.etree import ElementTree
+
+    from matplotlib import image
+    assert main([str(glb), '--urdf', str(tmp_path / 'doll.urdf'),
+                 '--picture', str(tmp_path / 'doll.png')]) == 0
+    names = {link.get('name') for link in ElementTree.parse(tmp_path / 'doll.urdf').iter('link')}
+    assert 'thigh_l' in names
+    pixels = image.imread(tmp_path / 'doll.png')[:, :, :3]
+    # Skin and bodies side by side: something is drawn in each third, colours in the last.
+    for third in np.array_split(pixels, 3, axis=1):
+        assert (third.min(axis=2) < 0.9).mean() > 0.02
+    last = np.array_split(pixels, 3, axis=1)[2]
+    assert (np.ptp(last, axis=2) > 0.2).mean() > 0.01
+
+
+def test_a_fitted_doll_loads_in_yourdfpy_and_pybullet(glb, tmp_path, capsys):
+    import pybullet
+    yourdfpy = pytest.importorskip('yourdfpy')
+    path = tmp_path / 'doll.urdf'
+    assert main([str(glb), '--urdf', str(path)]) == 0
+    robot = yourdfpy.URDF.load(str(path), load_meshes=False)
+    assert 'thigh_l' in robot.link_map
+    assert main([str(glb), '--urdf', str(path), '--dialect', 'bullet']) == 0
+    client = pybullet.connect(pybullet.DIRECT)
+    body = pybullet.loadURDF(str(path), physicsClientId=client)
+    mass = sum(pybullet.getDynamicsInfo(body, link, physicsClientId=client)[0]
+               for link in range(-1, pybullet.getNumJoints(body, physicsClientId=client)))
+    pybullet.disconnect(client)
+    main([str(glb), '-o', str(tmp_path / 'doll.yaml')])
+    assert mass == pytest.approx(load_doll(str(tmp_path / 'doll.yaml')).mass, rel=1e-6)
+
+
+def test_a_robot_goes_limp(tmp_path, capsys):
+    main([str(fit_rigs.write(RIGS['two_bones'], tmp_path)), '--urdf', str(tmp_path / 'a.urdf')])
+    assert main([str(tmp_path / 'a.urdf'), '-o', str(tmp_path / 'a.yaml')]) == 0
+    assert len(load_doll(str(tmp_path / 'a.yaml')).bones) == 2
+
+
+def test_a_doll_is_checked(capsys):
+    assert main(['article_doll.yaml']) == 0
+    assert 'density of 10000' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('arguments', [
+    ['--mass', '-3'], ['--mass', 'nan'], ['--scale', '0'], ['--weight', '2'], ['--smallest', '-1'],
+    ['-o', '/nowhere/at/all.yaml'], ['--picture', '/nowhere/at/all.png'],
+    ['--picture', '{folder}/x.nothing']])
+def test_wrong_options_end_with_2_and_a_sentence(glb, tmp_path, capsys, arguments):
+    assert main([str(glb), *(text.format(folder=tmp_path) for text in arguments)]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith('ragdoll_fit: ')
+    assert error.count('\n') == 1
+
+
+def test_no_such_file(capsys):
+    assert main(['no_such.glb']) == 2
+    assert 'no_such.glb' in capsys.readouterr().err
+
+
+def test_help_has_an_example():
+    root = Path(__file__).parent.parent
+    done = subprocess.run([sys.executable, '-m', 'ragdoll_ros.fit.command', '--help'], cwd=root,
+                          capture_output=True, text=True, check=True, timeout=30)
+    assert 'ragdoll_fit character.glb -o doll.yaml' in done.stdout
+    assert '--orientation' in done.stdout
+
+
+def test_a_large_character_takes_less_than_a_second(tmp_path, capsys):
+    """60 bones and more than 25 000 vertices, from file to doll; the best of three runs."""
+    from ragdoll_ros.fit.character import read_character
+    from ragdoll_ros.fit.pipeline import fit_character
+    rig = RIGS['chain_60']
+    path = tmp_path / 'large.glb'
+    mesh = fit_rigs.skin(rig.bones, around=24, rings=18)
+    path.write_bytes(fit_rigs.document(rig, mesh).glb())
+    assert len(mesh[0]) > 25_000
+    times = []
+    for _ in range(3):
+        start = time.process_time()
+        fit_character(read_character(path))
+        times.append(time.process_time() - start)
+    assert min(times) < 1

@@ -1,0 +1,63 @@
+"""Fitted dolls fall for five seconds, get no energy from nothing, and come to rest."""
+import fit_rigs
+import numpy as np
+import pytest
+from fit_rigs import RIGS, fitted
+
+from ragdoll_ros import rotation
+from ragdoll_ros.fit.character import read_character
+from ragdoll_ros.fit.pipeline import fit_character
+from ragdoll_ros.scene import above_ground
+from ragdoll_ros.simulation import Simulation
+
+QUICK = ('mixamo', 'four_legs_unnamed_centimetres', 'snake', 'star', 'one_bone')
+
+
+def energy(doll, state, gravity):
+    """Energy above the ground, J: of the bodies as the state has them, by the textbook."""
+    total = 0.0
+    for k, bone in enumerate(doll.bones):
+        spin = rotation.rotate(rotation.inverse(state.orientations[k]), state.angular[k])
+        total += bone.mass * (gravity * state.positions[k, 2] + state.linear[k] @ state.linear[k]
+                              / 2) + spin @ (np.array(bone.inertia) * spin) / 2
+    return total
+
+
+def falls_and_settles(doll):
+    scene = above_ground(doll)
+    with Simulation(scene) as simulation:
+        energies = [energy(doll, simulation.state, 9.8)]
+        for _ in range(round(5 / scene.step)):
+            state = simulation.advance()
+            energies.append(energy(doll, state, 9.8))
+    energies = np.array(energies)
+    assert np.isfinite(energies).all()
+    # What the fall has to give: the energy at the start above what is left at the end.
+    fall = energies[0] - energies[-1]
+    assert fall > 0
+    # Never more than at the start, to the 0.1 % that the engine itself is held to.
+    assert (energies - energies[0]).max() < 0.001 * energies[0]
+    # A contact that has sunk in gives back a little of what it took in the ticks before.
+    assert (energies - np.minimum.accumulate(energies)).max() < 0.05 * fall
+    # Settled: nothing moves faster than a slow roll.
+    assert np.abs(state.linear).max() < 0.1
+    assert state.positions[:, 2].max() < max(bone.position[2] for bone in doll.bones) + 0.4
+
+
+@pytest.mark.parametrize('name', QUICK)
+def test_it_falls_without_energy_from_nothing_and_settles(name):
+    falls_and_settles(fitted(name).doll)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('name', [name for name in RIGS if name not in QUICK])
+def test_all_others_fall_and_settle_too(name):
+    falls_and_settles(fitted(name).doll)
+
+
+@pytest.mark.slow
+def test_the_mannequin_falls(tmp_path):
+    pytest.importorskip('mannequin')
+    path = tmp_path / 'mannequin.glb'
+    path.write_bytes(fit_rigs.mannequin().glb())
+    falls_and_settles(fit_character(read_character(path)).doll)

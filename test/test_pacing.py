@@ -1,0 +1,65 @@
+"""The pacer against a made-up clock."""
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from ragdoll_ros.pacing import MOST_LAG, Pacer
+
+PERIOD = 10_000_000
+
+
+def ticks(pacer, calls):
+    """Ticks made at each of the calls of a timer, ns."""
+    made = []
+    for now in calls:
+        count = 0
+        while pacer.due(now):
+            count += 1
+        made.append(count)
+    return made
+
+
+def test_a_jittering_timer_makes_one_tick_a_call():
+    random.seed(1)
+    calls = [k * PERIOD + random.randint(-PERIOD // 3, PERIOD // 3) for k in range(1, 500)]
+    assert ticks(Pacer(PERIOD, 0), calls) == [1] * len(calls)
+
+
+def test_periods_that_are_no_whole_number_do_not_drift():
+    pacer = Pacer(1e9 / 60, 0)
+    assert sum(ticks(pacer, range(0, 100_000_000_000, 16_000_000))) == pytest.approx(6000, abs=1)
+
+
+def test_a_short_stall_is_caught_up():
+    pacer = Pacer(PERIOD, 0)
+    assert ticks(pacer, [PERIOD, 6 * PERIOD, 7 * PERIOD]) == [1, 5, 1]
+    assert pacer.lost == 0
+
+
+def test_a_long_stall_is_given_up_and_counted():
+    pacer = Pacer(PERIOD, 0)
+    stall = 10_000_000_000
+    assert ticks(pacer, [PERIOD, PERIOD + stall, 2 * PERIOD + stall]) == [1, 1, 1]
+    assert pacer.lost == stall - PERIOD
+
+
+def test_ticks_that_are_too_dear_do_not_pile_up():
+    """Each tick takes two periods: what is owed stays within the bound, however long it goes."""
+    pacer, now, made = Pacer(PERIOD, 0), PERIOD, 0
+    while now < 100_000_000_000:
+        assert pacer.due(now)
+        now += 2 * PERIOD
+        made += 1
+    owed = 0
+    while pacer.due(now):
+        owed += 1
+    assert made == pytest.approx(100_000_000_000 / (2 * PERIOD), abs=1)
+    assert owed <= MOST_LAG / PERIOD + 1
+
+
+def test_a_pause_owes_nothing():
+    pacer = Pacer(PERIOD, 0)
+    pacer.start(500 * PERIOD)
+    assert ticks(pacer, [500 * PERIOD, 501 * PERIOD]) == [0, 1]

@@ -1,0 +1,138 @@
+"""Packed messages against rclpy's own serialization; markers against the bones."""
+from __future__ import annotations
+
+import functools
+import timeit
+
+import numpy as np
+import pytest
+from rclpy.serialization import deserialize_message, serialize_message
+from visualization_msgs.msg import Marker
+
+from ragdoll_ros import rotation
+from ragdoll_ros.push import Push
+from ragdoll_ros.ragdoll import Bone, Box, Capsule, Cylinder, Ragdoll, Sphere
+from ragdoll_ros.ros.markers import ARROW, Markers
+from ragdoll_ros.ros.messages import to_joint_state, to_multi_dof, to_pose_array
+from ragdoll_ros.ros.packed import Packed
+from ragdoll_ros.ros.stamps import Stamps
+from ragdoll_ros.scene import Placement, Scene
+from ragdoll_ros.scene_file import load_scene
+from ragdoll_ros.simulation import Simulation
+
+STAMPS = (0, 1, 999_999_999, 1_795_257_907_785_147_064)
+
+
+@pytest.mark.parametrize('frame', ['', 'w', 'wo', 'wor', 'world', 'a/longer/frame'])
+@pytest.mark.parametrize('count', [1, 10, 1000])
+def test_packed_messages_are_what_rclpy_serializes(frame, count):
+    random = np.random.default_rng(count)
+    names = tuple(f'bone_{"x" * (k % 5)}{k}' for k in range(count))
+    poses, twists = random.normal(size=(count, 7)), random.normal(size=(count, 6))
+    angles = random.normal(size=count)
+    for make, values in ((functools.partial(to_pose_array, frame), (poses,)),
+                         (functools.partial(to_multi_dof, frame, names), (poses, twists)),
+                         (functools.partial(to_joint_state, frame, names), (angles,))):
+        packed = Packed(make, *(value.shape for value in values))
+        for stamp in STAMPS:
+            assert_same(packed.message(stamp, *values), make(stamp, *values))
+
+
+def assert_same(data, message):
+    """Serialized as rclpy does it, but for the bytes between, which rclpy leaves to chance."""
+    assert len(data) == len(serialize_message(message))
+    assert deserialize_message(data, type(message)) == message
+
+
+def test_a_doll_without_joints_has_an_empty_joint_state():
+    make = functools.partial(to_joint_state, 'world', ())
+    packed = Packed(make, (0,))
+    assert_same(packed.message(5, np.zeros(0)), make(5, np.zeros(0)))
+
+
+def test_packing_is_worth_it():
+    poses = np.random.default_rng(0).normal(size=(1000, 7))
+    make = functools.partial(to_pose_array, 'world')
+    packed = Packed(make, poses.shape)
+    plain = min(timeit.repeat(lambda: serialize_message(make(1, poses)), number=1, repeat=5))
+    quick = min(timeit.repeat(lambda: packed.message(1, poses), number=1, repeat=5))
+    assert quick < plain / 20, 'measured: a hundredth'
+
+
+def test_stamps_rise_by_one_tick_over_a_reset():
+    stamps = Stamps(100)
+    before = [stamps.at(time, is_clock=False) for time in (0, 10, 20)]
+    stamps.begin_again(20, 10)
+    after = [stamps.at(time, is_clock=False) for time in (0, 10)]
+    assert before + after == [100, 110, 120, 130, 140]
+    assert stamps.at(0, is_clock=True) == 0
+
+
+SHAPES = {'box': Box((0.1, 0.2, 0.3)), 'sphere': Sphere(0.1), 'cylinder': Cylinder(0.1, 0.4),
+          'capsule': Capsule(0.1, 0.4)}
+
+
+@pytest.fixture(params=SHAPES)
+def lone(request):
+    """A simulation of one bone of each shape, turned and away from the origin."""
+    turn = tuple(rotation.from_rpy(0.3, -0.4, 0.5))
+    bone = Bone('bone', SHAPES[request.param], 2.0, (1.0, 2.0, 3.0), turn, color=(1, 0, 0, 1))
+    with Simulation(Scene('lone', (Placement(Ragdoll('lone', (bone,))),))) as simulation:
+        yield simulation
+
+
+def test_markers_fill_the_shape_of_a_bone(lone):
+    """The markers' farthest points along any direction are those of the bone's own shape."""
+    array = Markers(lone.scene, 'map').message(7, lone.state, ())
+    assert {marker.header.frame_id for marker in array.markers} == {'map'}
+    directions = rotation.normalized(np.random.default_rng(3).normal(size=(50, 3)))
+    reach = np.max([_support(marker, directions) for marker in array.markers], axis=0)
+    turn, centre = lone.state.orientations[0], lone.state.positions[0]
+    inner = rotation.rotate(rotation.inverse(turn), directions)
+    expected = directions @ centre + lone.scene.bones[0].shape.reach(inner)
+    np.testing.assert_allclose(reach, expected, atol=1e-12)
+
+
+def _support(marker, directions):
+    """How far a marker reaches along each direction, from the meaning RViz gives its scale."""
+    pose, scale = marker.pose, marker.scale
+    turn = np.array([pose.orientation.x, pose.orientation.y, pose.orientation.z,
+                     pose.orientation.w])
+    inner = rotation.rotate(rotation.inverse(turn), directions)
+    half = np.array([scale.x, scale.y, scale.z]) / 2
+    reach = {Marker.CUBE: lambda: np.abs(inner) @ half,
+             Marker.SPHERE: lambda: np.linalg.norm(inner * half, axis=1),
+             Marker.CYLINDER: lambda: np.abs(inner[:, 2]) * half[2]
+             + np.linalg.norm(inner[:, :2] * half[:2], axis=1)}[marker.type]()
+    return directions @ np.array([pose.position.x, pose.position.y, pose.position.z]) + reach
+
+
+@pytest.mark.parametrize('local', [False, True])
+def test_the_tip_of_a_push_s_arrow_is_where_it_attacks(local):
+    with Simulation(load_scene('drop')) as simulation:
+        state, name = simulation.state, 'left_shin'
+        bone = simulation.scene.bone_index(name)
+        push = Push(name, (300.0, -400.0, 0.0), point=(0.01, 0.02, 0.1), local=local)
+        markers = Markers(simulation.scene, 'world')
+        arrow = markers.message(0, state, [push]).markers[-1]
+        assert (arrow.type, arrow.action) == (Marker.ARROW, Marker.ADD)
+        turn = np.array([arrow.pose.orientation.x, arrow.pose.orientation.y,
+                         arrow.pose.orientation.z, arrow.pose.orientation.w])
+        tail = np.array([arrow.pose.position.x, arrow.pose.position.y, arrow.pose.position.z])
+        tip = tail + rotation.rotate(turn, [arrow.scale.x, 0, 0])
+        point = push.point
+        if local:
+            point = rotation.rotate(state.orientations[bone], point)
+        np.testing.assert_allclose(tip, state.positions[bone] + point, atol=1e-12)
+        assert arrow.scale.x == pytest.approx(ARROW * 0.5 ** 0.5)
+        gone = markers.message(1, state, []).markers[-1]
+        assert (gone.ns, gone.id, gone.action) == (arrow.ns, arrow.id, Marker.DELETE)
+        assert all(marker.action == Marker.ADD
+                   for marker in markers.message(2, state, []).markers)
+
+
+def test_each_marker_is_its_own():
+    with Simulation(load_scene('crowd')) as simulation:
+        array = Markers(simulation.scene, 'world').message(0, simulation.state, ())
+        keys = [(marker.ns, marker.id) for marker in array.markers]
+        assert len(set(keys)) == len(keys) == len(simulation.scene.bone_names)

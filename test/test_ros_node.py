@@ -1,0 +1,255 @@
+"""The node in this process: time, services, exactness, what it leaves behind."""
+from __future__ import annotations
+
+import gc
+import hashlib
+import os
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseArray, Twist, Vector3, Wrench, WrenchStamped
+from peer import Peer
+from rclpy.parameter import Parameter
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState, MultiDOFJointState
+from std_msgs.msg import Header
+from std_srvs.srv import SetBool, Trigger
+from visualization_msgs.msg import MarkerArray
+
+from ragdoll_ros.push import Push
+from ragdoll_ros.ros.node import RagdollNode
+from ragdoll_ros.scene_file import load_scene
+from ragdoll_ros.simulation import Simulation
+
+SECOND = 1_000_000_000
+
+
+@pytest.fixture
+def peer(ros):
+    peer = Peer()
+    yield peer
+    peer.destroy_node()
+
+
+def digest(states):
+    """SHA-256 of all numbers of all states."""
+    sha = hashlib.sha256()
+    for state in states:
+        for part in vars(state).values():
+            sha.update(np.ascontiguousarray(part).tobytes())
+    return sha.hexdigest()
+
+
+def wrench(x=0.0, y=0.0, z=0.0):
+    return Wrench(force=Vector3(x=x, y=y, z=z))
+
+
+def script(tick):
+    """What is pushed before which tick, every 15 ticks: a message on each input in turn."""
+    number, rest = divmod(tick, 15)
+    if rest or not 1 <= number <= 20:
+        return None
+    strength = 100.0 * number
+    return (('take_force', wrench(strength)),
+            ('take_velocity', Twist(linear=Vector3(y=number / 10))),
+            ('take_push', WrenchStamped(header=Header(frame_id='left_shin'),
+                                        wrench=wrench(z=strength))))[number % 3]
+
+
+def played(node, ticks):
+    """States of a node that is pushed by the script."""
+    for tick in range(ticks):
+        message = script(tick)
+        if message:
+            getattr(node.inputs, message[0])(message[1])
+        node.tick()
+        yield node.simulation.state
+
+
+def plain(ticks):
+    """States of a simulation without any node, pushed alike."""
+    with Simulation(load_scene('drop')) as simulation:
+        for tick in range(ticks):
+            message = script(tick)
+            if message and message[0] == 'take_force':
+                simulation.push(Push('torso', (message[1].force.x, 0, 0)), 'a')
+            elif message and message[0] == 'take_velocity':
+                force = (0, 1000 * message[1].linear.y, 0)
+                simulation.push(Push('torso', force, duration=0.6), 'b')
+            elif message:
+                force = (0, 0, message[1].wrench.force.z)
+                simulation.push(Push('left_shin', force, local=True), 'c')
+            yield simulation.advance()
+
+
+def test_a_node_with_listeners_leaves_the_simulation_its_bits(make_node, peer):
+    node = make_node()
+    heard = [peer.collect(kind, topic) for kind, topic in (
+        (PoseArray, 'ragdoll/poses'), (MultiDOFJointState, 'ragdoll/state'),
+        (JointState, 'joint_states'), (MarkerArray, 'ragdoll/markers'))]
+    publishers = (node._outputs._poses, node._outputs._state, node._outputs._joints,
+                  node._outputs._markers)
+    peer.wait(lambda: all(publisher.get_subscription_count() for publisher in publishers))
+    alone = digest(plain(320))
+    assert digest(played(node, 320)) == alone
+    node.reset()
+    assert digest(played(node, 320)) == alone
+    peer.wait(lambda: all(heard))
+
+
+def test_pace_leaves_the_simulation_its_bits(make_node, peer):
+    node = make_node(real_time_factor=20.0)
+    peer.executor_.add_node(node)
+    peer.wait(lambda: node.simulation.time >= SECOND)
+    with Simulation(load_scene('drop')) as simulation:
+        while simulation.time < node.simulation.time:
+            simulation.advance()
+        assert digest([simulation.state]) == digest([node.simulation.state])
+
+
+@pytest.fixture
+def paused(make_node):
+    """A node whose time stands."""
+    node = make_node(scene='flight')
+    node.pause(True)
+    return node
+
+
+def test_a_step_is_one_tick_and_takes_a_pause(make_node, peer):
+    node = make_node()
+    peer.executor_.add_node(node)
+    assert not peer.call(Trigger, 'ragdoll/step', Trigger.Request()).success
+    assert peer.call(SetBool, 'ragdoll/pause', SetBool.Request(data=True)).success
+    before = node.simulation.time
+    answer = peer.call(Trigger, 'ragdoll/step', Trigger.Request())
+    assert answer.success and str(node.simulation.time / SECOND) in answer.message
+    assert node.simulation.time == before + node.simulation.tick
+    assert peer.call(SetBool, 'ragdoll/pause', SetBool.Request(data=False)).success
+    peer.wait(lambda: node.simulation.time > before + 3 * node.simulation.tick)
+
+
+def test_a_reset_goes_back_to_the_start_and_stays_paused(paused):
+    start = digest([paused.simulation.state])
+    paused.inputs.take_force(wrench(2000.0))
+    for _ in range(5):
+        paused.tick()
+    paused.reset()
+    assert paused.simulation.time == 0 and paused.paused
+    assert paused.simulation.pushes == ()
+    assert digest([paused.simulation.state]) == start
+
+
+def momentum(simulation):
+    masses = np.array([bone.mass for bone in simulation.scene.bones])
+    return masses @ simulation.state.linear
+
+
+def test_a_push_lasts_its_simulated_time_also_across_a_pause(paused):
+    """2000 N for 0.1 s is 200 N s, whatever happens on the wall; given while paused."""
+    paused.inputs.take_force(wrench(2000.0))
+    for _ in range(4):
+        paused.tick()
+    paused.pause(False)
+    paused.pause(True)
+    np.testing.assert_allclose(momentum(paused.simulation), [80, 0, 0], rtol=1e-6, atol=1e-6)
+    for _ in range(20):
+        paused.tick()
+    np.testing.assert_allclose(momentum(paused.simulation), [200, 0, 0], rtol=1e-6, atol=1e-6)
+
+
+def test_a_timeout_between_two_ticks_is_kept_exactly(make_node):
+    node = make_node(scene='flight', push_timeout=0.0137, cmd_vel_timeout=0.0251)
+    node.inputs.take_force(wrench(1000.0))
+    node.inputs.take_velocity(Twist(linear=Vector3(y=2.0)))
+    for _ in range(6):
+        node.tick()
+    np.testing.assert_allclose(momentum(node.simulation), [13.7, 50.2, 0], rtol=1e-6, atol=1e-6)
+
+
+def test_messages_in_a_row_push_without_a_gap(paused):
+    """Sent every 5 ticks, held for 10: as one push of 25 and 10 more ticks."""
+    for _ in range(6):
+        paused.inputs.take_force(wrench(100.0))
+        for _ in range(5):
+            paused.tick()
+    for _ in range(10):
+        paused.tick()
+    np.testing.assert_allclose(momentum(paused.simulation)[0], 100 * 0.35, rtol=1e-6)
+
+
+def stamps_of(got):
+    return [message.header.stamp.sec * SECOND + message.header.stamp.nanosec for _, message in got]
+
+
+def test_stamps_begin_with_ros_time_and_rise_by_a_tick_over_reset_and_new_scene(paused, peer):
+    got = peer.collect(PoseArray, 'ragdoll/poses')
+    peer.wait(lambda: paused._outputs._poses.get_subscription_count())
+    before = paused.get_clock().now().nanoseconds
+    for act in (paused.tick, paused.tick, paused.reset, paused.tick,
+                lambda: paused.set_parameters([Parameter('scene', value='drop')]), paused.tick):
+        count = len(got)
+        act()
+        peer.wait(lambda count=count: len(got) == count + 1)
+    assert set(np.diff(stamps_of(got))) == {10_000_000}
+    assert abs(stamps_of(got)[0] - before) < 10 * SECOND
+
+
+def test_with_publish_clock_stamps_are_the_clock_and_the_simulated_time(make_node, peer):
+    node = make_node(publish_clock=True)
+    got, clock = peer.collect(PoseArray, 'ragdoll/poses'), peer.collect(Clock, '/clock')
+    peer.wait(lambda: node.count_subscribers('ragdoll/poses') and
+              node._outputs._clock.get_subscription_count())
+    for _ in range(3):
+        node.tick()
+    peer.wait(lambda: len(got) == len(clock) == 3)
+    times = [message.clock.sec * SECOND + message.clock.nanosec for _, message in clock]
+    assert times == stamps_of(got) == [10_000_000, 20_000_000, 30_000_000]
+
+
+def test_a_node_that_uses_simulated_time_does_not_wait_for_itself(make_node, peer):
+    node = make_node(publish_clock=True, use_sim_time=True)
+    peer.executor_.add_node(node)
+    peer.wait(lambda: node.simulation.time > 10 * node.simulation.tick)
+
+
+def test_a_state_that_is_not_finite_is_not_shown_and_the_doll_goes_on(make_node, peer):
+    node = make_node()
+    got = peer.collect(PoseArray, 'ragdoll/poses')
+    peer.wait(lambda: node._outputs._poses.get_subscription_count())
+    coordinates = node.simulation._stepper.coordinates
+    coordinates.v[0] = np.nan
+    node.simulation._stepper.place(coordinates)
+    for _ in range(3):
+        node.tick()
+    assert node.tally.refused == {'state': 1}
+    peer.wait(lambda: len(got) == 3)
+    assert all(np.isfinite([pose.position.x, pose.position.y, pose.position.z]).all()
+               for _, message in got for pose in message.poses)
+
+
+def left_behind():
+    """Threads, file descriptors and memory, MB, of this process."""
+    gc.collect()
+    pages = int(Path('/proc/self/statm').read_text().split()[1])
+    return (threading.active_count(), len(os.listdir('/proc/self/fd')),
+            pages * os.sysconf('SC_PAGE_SIZE') / 1e6)
+
+
+def make_and_destroy(count):
+    for _ in range(count):
+        node = RagdollNode()
+        node.tick()
+        node.destroy_node()
+
+
+@pytest.mark.parametrize('count', [5, pytest.param(100, marks=pytest.mark.slow)])
+def test_nodes_leave_nothing_behind(ros, count):
+    """After a few to warm up: no thread, no descriptor, and far less memory than a node takes."""
+    make_and_destroy(5)
+    threads, files, memory = left_behind()
+    make_and_destroy(count)
+    after = left_behind()
+    assert after[:2] == (threads, files)
+    assert after[2] - memory < 0.5 * count + 5, 'MB; a node with its engines takes some 50'

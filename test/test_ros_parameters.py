@@ -1,0 +1,167 @@
+"""Parameters at the start and live: taken, refused with a reason, brought along by a scene."""
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import pytest
+from rcl_interfaces.msg import ParameterType
+from rclpy.parameter import Parameter
+
+from ragdoll_ros.faults import Faults, RagdollError
+from ragdoll_ros.ros.parameters import SPECS, Settings
+from ragdoll_ros.scene_file import load_scene, save_scene
+
+RANGES = {name: spec.metadata['span'] for name, spec in SPECS.items() if spec.metadata['span']}
+
+
+def put(node, **values):
+    """Set parameters together, as the service does; give the result."""
+    return node.set_parameters_atomically(
+        [Parameter(name, value=value) for name, value in values.items()])
+
+
+def value(node, name):
+    return node.get_parameter(name).value
+
+
+@pytest.fixture
+def node(make_node):
+    return make_node()
+
+
+def test_all_are_declared_with_a_description(node):
+    for name in [*SPECS, 'bone_names']:
+        assert node.describe_parameter(name).description
+    assert value(node, 'bone_names') == list(load_scene('drop').bone_names)
+    assert (value(node, 'rate'), value(node, 'real_time_factor')) == (100.0, 1.0)
+    assert value(node, 'pushed_bone') == 'torso'
+
+
+@pytest.mark.parametrize('name', RANGES)
+def test_a_number_may_be_at_its_ends_and_not_beyond(node, name):
+    lower, upper = RANGES[name]
+    for good in (lower, upper):
+        assert put(node, **{name: good}).successful
+        assert getattr(node.settings, name) == value(node, name) == good
+        node.tick()
+    bad = [upper * 1.001, math.nan, math.inf, -math.inf, lower - 0.001 * max(1, lower), -1.0]
+    for number in bad:
+        result = put(node, **{name: float(number)})
+        assert not result.successful and name in result.reason
+    assert getattr(node.settings, name) == value(node, name) == upper
+    assert node.tally.refused['parameters'] == len(bad)
+
+
+@pytest.mark.parametrize('name', [*SPECS, 'bone_names'])
+def test_a_wrong_type_is_refused_and_counted(node, name):
+    before = value(node, name)
+    wrong = [7, [1.0], [b'x']] + ([1.5] if isinstance(before, str) else ['text'])
+    for count, other in enumerate(wrong, start=1):
+        result = put(node, **{name: other})
+        assert not result.successful and result.reason
+        assert node.tally.refused['parameters'] == count
+    assert value(node, name) == before
+
+
+@pytest.mark.parametrize('name, bad, reason', [
+    ('accuracy', 'perfect', 'draft, normal, exact'), ('pushed_bone', 'tail', 'torso, head'),
+    ('pushed_bone', '', 'torso'), ('scene', 'nowhere', 'crowd'), ('scene', '', 'crowd'),
+    ('scene', 'x' * 5000, 'Unreadable'), ('scene', '~nobody/x', 'Unreadable'),
+    ('scene', '/', 'Unreadable')])
+def test_a_wrong_word_is_refused_with_what_would_be_right(node, name, bad, reason):
+    before, simulation = node.settings, node.simulation
+    result = put(node, **{name: bad})
+    assert not result.successful and reason in result.reason
+    assert node.settings == before and node.simulation is simulation
+    node.tick()
+
+
+def test_bone_names_are_read_only(node):
+    result = put(node, bone_names=['a'])
+    assert not result.successful and 'read-only' in result.reason
+
+
+def test_pace_and_rate_change_live(node):
+    assert put(node, rate=250.0, real_time_factor=0.5).successful
+    assert node.simulation.tick == 4_000_000
+    assert node._timer.timer_period_ns == 8_000_000
+    before = node.simulation.time
+    node.tick()
+    assert node.simulation.time - before == 4_000_000
+
+
+def test_accuracy_changes_live(node):
+    assert put(node, accuracy='exact').successful
+    assert node.simulation.accuracy.order == 4
+
+
+def test_a_scene_brings_its_bones_its_pace_and_its_root(node):
+    assert put(node, scene='article').successful
+    assert value(node, 'real_time_factor') == node.settings.real_time_factor == 0.6
+    assert put(node, scene='crowd').successful
+    assert value(node, 'bone_names') == list(node.simulation.scene.bone_names)
+    assert len(value(node, 'bone_names')) == 100
+    assert value(node, 'pushed_bone') == node.settings.pushed_bone == 'doll_1/torso'
+    assert value(node, 'real_time_factor') == 1.0
+    assert node.describe_parameter('bone_names').read_only
+    node.tick()
+
+
+def test_what_was_set_otherwise_stays_over_a_new_scene(make_node):
+    node = make_node(real_time_factor=0.25, rate=50.0, pushed_bone='head')
+    assert put(node, scene='article').successful
+    assert (node.settings.real_time_factor, node.settings.rate) == (0.25, 50.0)
+    assert node.settings.pushed_bone == 'head'
+    assert node.simulation.tick == 20_000_000
+
+
+def test_a_scene_without_the_pushed_bone_needs_another_in_the_same_call(make_node):
+    node = make_node(pushed_bone='head')
+    assert 'pushed_bone' in put(node, scene='crowd').reason
+    assert put(node, scene='crowd', pushed_bone='doll_3/head').successful
+    assert value(node, 'pushed_bone') == 'doll_3/head'
+
+
+def test_a_scene_that_is_set_again_is_read_again(make_node, tmp_path):
+    path = tmp_path / 'mine.yaml'
+    scene = load_scene('drop')
+    save_scene(scene, path)
+    node = make_node(scene=str(path))
+    save_scene(dataclasses.replace(scene, gravity=(0, 0, -1)), path)
+    assert put(node, scene=str(path)).successful
+    assert node.simulation.scene.gravity == (0, 0, -1)
+    path.write_text('dolls: []\n')
+    result = put(node, scene=str(path))
+    assert not result.successful and 'dolls' in result.reason
+    assert node.simulation.scene.gravity == (0, 0, -1)
+
+
+def test_the_world_s_name_and_the_clock_change_live(node):
+    assert put(node, frame_id='map', publish_clock=True).successful
+    assert node.count_publishers('/clock') == 1
+    assert put(node, publish_clock=False).successful
+    node.tick()
+    assert node._outputs._clock is None
+
+
+@pytest.mark.parametrize('values, words', [
+    ({'rate': -1.0, 'real_time_factor': math.nan, 'pushed_bone': 'tail'},
+     ['rate', 'real_time_factor', 'tail']),
+    ({'rate': 50, 'accuracy': 'foo'}, ['rate', 'DOUBLE', 'foo'])])
+def test_a_wrong_start_is_refused_with_all_that_is_wrong(make_node, values, words):
+    with pytest.raises(RagdollError) as caught:
+        make_node(**values)
+    assert all(word in str(caught.value) for word in words)
+
+
+def test_a_broken_scene_ends_the_start_with_all_its_faults(make_node, broken_scene):
+    path, words = broken_scene
+    with pytest.raises(Faults) as caught:
+        make_node(scene=str(path))
+    assert all(word in str(caught.value) for word in words)
+
+
+def test_the_defaults_are_those_of_the_default_scene(node):
+    assert dataclasses.replace(Settings(), pushed_bone='torso') == node.settings
+    assert node.describe_parameter('rate').type == ParameterType.PARAMETER_DOUBLE

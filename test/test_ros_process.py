@@ -1,0 +1,348 @@
+"""A node in a process of its own, this process as the other side, real DDS between."""
+from __future__ import annotations
+
+import math
+import os
+import re
+import select
+import signal
+import time
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import PoseArray, Twist, Vector3, Wrench, WrenchStamped
+from peer import PATIENCE, Peer, end, start, start_on_terminal
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState, MultiDOFJointState
+from std_msgs.msg import Header, String
+from std_srvs.srv import SetBool, Trigger
+from visualization_msgs.msg import MarkerArray
+
+from ragdoll_ros.scene_file import load_scene
+
+SECOND = 1_000_000_000
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+@pytest.fixture(scope='module')
+def peer(ros):
+    peer = Peer()
+    yield peer
+    peer.destroy_node()
+
+
+@pytest.fixture(scope='module')
+def running(ros):
+    """A node in the default scene."""
+    process = start('node')
+    yield process
+    end(process, signal.SIGINT)
+
+
+@pytest.fixture(scope='module')
+def heard(running, peer):
+    """What the peer hears of it, by topic; all have begun to come in."""
+    topics = {'poses': (PoseArray, 'ragdoll/poses', 10),
+              'state': (MultiDOFJointState, 'ragdoll/state', 10),
+              'joints': (JointState, 'joint_states', 10),
+              'markers': (MarkerArray, 'ragdoll/markers', 10),
+              'diagnostics': (DiagnosticArray, '/diagnostics', 10),
+              'description': (String, 'robot_description', LATCHED)}
+    got = {name: peer.collect(*topic) for name, topic in topics.items()}
+    peer.wait(lambda: all(got.values()))
+    return got
+
+
+def stamp(message):
+    return message.header.stamp.sec * SECOND + message.header.stamp.nanosec
+
+
+def poses_array(message):
+    return np.array([[p.position.x, p.position.y, p.position.z, p.orientation.x, p.orientation.y,
+                      p.orientation.z, p.orientation.w] for p in message.poses])
+
+
+def values_of(heard, peer):
+    """Values of a report on /diagnostics that was made after this call."""
+    count = len(heard['diagnostics'])
+    peer.wait(lambda: len(heard['diagnostics']) > count + 1)
+    status, = heard['diagnostics'][-1][1].status
+    return {pair.key: pair.value for pair in status.values}, status
+
+
+def test_poses_come_at_100_hz_with_exact_stamps_for_10_s(heard, peer):
+    """100 Hz within 1 % over 10 s; the first messages are left out, as discovery bunches them."""
+    begin = len(heard['poses']) + 50
+    peer.wait(lambda: len(heard['poses']) > begin + 1000, timeout=20)
+    got = heard['poses'][begin:begin + 1001]
+    assert 1000 / (got[-1][0] - got[0][0]) == pytest.approx(100, rel=0.01)
+    assert set(np.diff([stamp(message) for _, message in got])) == {10_000_000}
+    poses = np.array([poses_array(message) for _, message in got])
+    assert poses.shape == (1001, 10, 7)
+    np.testing.assert_allclose(np.linalg.norm(poses[:, :, 3:], axis=2), 1, atol=1e-12)
+    assert {message.header.frame_id for _, message in got} == {'world'}
+
+
+def test_the_order_is_that_of_bone_names(heard, peer):
+    request = GetParameters.Request(names=['bone_names'])
+    answer = peer.call(GetParameters, 'ragdoll/get_parameters', request)
+    names = list(answer.values[0].string_array_value)
+    assert names == list(load_scene('drop').bone_names)
+    poses = {stamp(message): poses_array(message) for _, message in heard['poses']}
+    common = [message for _, message in heard['state'] if stamp(message) in poses]
+    assert len(common) > 100
+    for message in common:
+        assert list(message.joint_names) == names
+        places = [[t.translation.x, t.translation.y, t.translation.z]
+                  for t in message.transforms]
+        np.testing.assert_array_equal(places, poses[stamp(message)][:, :3])
+
+
+def test_all_topics_tell_of_the_same_doll(heard):
+    scene = load_scene('drop')
+    _, joints = heard['joints'][-1]
+    assert tuple(joints.name) == scene.angle_names
+    assert len(joints.position) == 14
+    _, description = heard['description'][-1]
+    assert all(f'<link name="{name}">' in description.data for name in scene.bone_names)
+    _, markers = heard['markers'][-1]
+    assert {marker.ns for marker in markers.markers} >= set(scene.bone_names)
+    span = heard['markers'][-1][0] - heard['markers'][0][0]
+    assert len(heard['markers']) / span < 40, 'as often as a screen can use'
+
+
+def test_diagnostics_come_each_second_and_add_up(heard, peer):
+    values, status = values_of(heard, peer)
+    times = [arrival for arrival, _ in heard['diagnostics']]
+    assert np.median(np.diff(times)) == pytest.approx(1.0, abs=0.1)
+    assert status.name == 'ragdoll: simulation' and status.level == DiagnosticStatus.OK
+    assert float(values['pace']) == pytest.approx(1, abs=0.05)
+    assert 0 < float(values['tick_cost_ms']) <= float(values['tick_cost_max_ms'])
+    assert values['push'] == 'none'
+    zero = int(values['stamp_of_zero'])
+    assert (stamp(heard['poses'][-1][1]) - zero) / SECOND >= float(values['simulated_time'])
+
+
+def reset(peer, heard):
+    assert peer.call(Trigger, 'ragdoll/reset', Trigger.Request()).success
+    count = len(heard['state'])
+    peer.wait(lambda: len(heard['state']) > count)
+
+
+@pytest.mark.parametrize('kind, topic, message', [
+    (Wrench, '/ragdoll/force', Wrench(force=Vector3(x=2000.0))),
+    (Twist, '/cmd_vel', Twist(linear=Vector3(x=0.5))),
+    (WrenchStamped, '/ragdoll/push', WrenchStamped(
+        header=Header(frame_id='torso'), wrench=Wrench(force=Vector3(x=2000.0))))])
+def test_one_message_moves_the_doll(heard, peer, kind, topic, message):
+    """What `ros2 topic pub --once` sends; in the air nothing else moves the doll forward."""
+    sender = peer.sender(kind, topic)
+    reset(peer, heard)
+    sender.publish(message)
+    peer.wait(lambda: heard['state'][-1][1].twist[0].linear.x > 0.5)
+    peer.destroy_publisher(sender)
+
+
+def test_a_sleeping_doll_is_woken(heard, peer):
+    peer.wait(lambda: values_of(heard, peer)[0]['asleep'] == 'True', timeout=20)
+    sender = peer.sender(Wrench, '/ragdoll/force')
+    sender.publish(Wrench(force=Vector3(z=2000.0)))
+    peer.wait(lambda: heard['state'][-1][1].twist[0].linear.z > 1)
+    peer.destroy_publisher(sender)
+
+
+def test_rubbish_is_counted_and_nothing_else_happens(heard, peer):
+    """Every bad number on every input, a bone that is none, a flood; the doll goes on."""
+    before, _ = values_of(heard, peer)
+    numbers, refused, clamped = (math.nan, math.inf, -math.inf), 0, 0
+    kinds = ((Wrench, '/ragdoll/force', lambda v: Wrench(force=v)),
+             (Wrench, '/ragdoll/force', lambda v: Wrench(torque=v)),
+             (Twist, '/cmd_vel', lambda v: Twist(linear=v)),
+             (Twist, '/cmd_vel', lambda v: Twist(angular=v)),
+             (WrenchStamped, '/ragdoll/push', lambda v: WrenchStamped(
+                 header=Header(frame_id='head'), wrench=Wrench(force=v))))
+    for kind, topic, make in kinds:
+        sender = peer.sender(kind, topic)
+        for number in numbers:
+            sender.publish(make(Vector3(y=number)))
+        sender.publish(make(Vector3(z=1e300)))
+        refused, clamped = refused + len(numbers), clamped + 1
+        peer.wait(sender.wait_for_all_acked)
+        peer.destroy_publisher(sender)
+    sender = peer.sender(WrenchStamped, '/ragdoll/push')
+    sender.publish(WrenchStamped(header=Header(frame_id='tail')))
+    refused += 1
+
+    def counted():
+        values, _ = values_of(heard, peer)
+        counts = [int(values[key]) - int(before[key]) for key in ('refused', 'clamped')]
+        return counts == [refused, clamped] and values['last_reason']
+
+    peer.wait(counted)
+    for _ in range(3000):
+        sender.publish(WrenchStamped(header=Header(frame_id='head'),
+                                     wrench=Wrench(force=Vector3(x=1.0))))
+    count = len(heard['poses'])
+    peer.wait(lambda: len(heard['poses']) > count + 20)
+    poses = np.array([poses_array(message) for _, message in heard['poses']])
+    assert np.isfinite(poses).all()
+    peer.destroy_publisher(sender)
+
+
+def test_parameters_are_refused_with_a_reason_and_counted(heard, peer):
+    before, _ = values_of(heard, peer)
+    wrong = {'rate': [-1.0, math.nan, 'fast', 7], 'real_time_factor': [0.0, math.inf],
+             'scene': ['/nowhere'], 'pushed_bone': ['tail'], 'bone_names': [['a']],
+             'max_force': [-0.1]}
+    parameters = [Parameter(name, value=value).to_parameter_msg()
+                  for name, values in wrong.items() for value in values]
+    answer = peer.call(SetParameters, 'ragdoll/set_parameters',
+                       SetParameters.Request(parameters=parameters))
+    assert not any(result.successful for result in answer.results)
+    assert all(result.reason for result in answer.results)
+    values, _ = values_of(heard, peer)
+    counts = [int(found.get('refused parameters', 0)) for found in (before, values)]
+    assert counts[1] - counts[0] == len(parameters)
+
+
+def test_a_pause_holds_the_stamps(heard, peer):
+    assert peer.call(SetBool, 'ragdoll/pause', SetBool.Request(data=True)).success
+    values, status = values_of(heard, peer)
+    assert values['paused'] == 'True' and status.message == 'paused'
+    last = stamp(heard['poses'][-1][1])
+    assert peer.call(Trigger, 'ragdoll/step', Trigger.Request()).success
+    peer.wait(lambda: stamp(heard['poses'][-1][1]) == last + 10_000_000)
+    assert peer.call(SetBool, 'ragdoll/pause', SetBool.Request(data=False)).success
+    peer.wait(lambda: stamp(heard['poses'][-1][1]) > last + 20_000_000)
+
+
+def test_a_scene_changes_while_it_runs(heard, peer):
+    def change(name):
+        request = SetParameters.Request(parameters=[
+            Parameter('scene', value=name).to_parameter_msg()])
+        assert peer.call(SetParameters, 'ragdoll/set_parameters', request).results[0].successful
+
+    change('crowd')
+    peer.wait(lambda: len(heard['poses'][-1][1].poses) == 100)
+    peer.wait(lambda: 'doll_10/head' in heard['description'][-1][1].data)
+    assert 'type="floating"' in heard['description'][-1][1].data
+    change('drop')
+    peer.wait(lambda: len(heard['poses'][-1][1].poses) == 10)
+    assert set(np.diff([stamp(message) for _, message in heard['poses'][-20:]])) == {10_000_000}
+
+
+def test_a_signal_ends_the_node_with_0_within_2_s(peer):
+    """Thrice each, at once: a signal may find the node anywhere."""
+    signs = (signal.SIGINT, signal.SIGTERM) * 3
+    processes = [start('node', '--ros-args', '-r', f'__ns:=/signalled_{number}')
+                 for number in range(len(signs))]
+    got = [peer.collect(PoseArray, f'/signalled_{number}/ragdoll/poses')
+           for number in range(len(signs))]
+    peer.wait(lambda: all(got), timeout=30)
+    for process, sign in zip(processes, signs, strict=True):
+        code, took = end(process, sign)
+        assert (code, process.stderr_text) == (0, '')
+        assert took < 2
+
+
+def test_a_wrong_start_ends_with_2_and_a_reason(ros, broken_scene):
+    path, words = broken_scene
+    cases = [(('node', '--ros-args', '-p', 'scene:=nowhere'), ['nowhere', 'crowd']),
+             (('node', '--ros-args', '-p', 'rate:=-1.0', '-p', 'real_time_factor:=.nan'),
+              ['rate', 'real_time_factor']),
+             (('node', '--ros-args', '-p', 'rate'), ['rate']),
+             (('node', '--faster'), ['--faster']),
+             (('node', '--ros-args', '-p', f'scene:={path}'), words),
+             (('run', str(path)), words),
+             (('teleop',), ['terminal'])]
+    for (arguments, words), process in [(case, start(*case[0])) for case in cases]:
+        _, errors = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 2, arguments
+        assert all(word in errors for word in words) and 'Traceback' not in errors
+
+
+def test_help_has_an_example(ros):
+    for process in [start(module, '--help') for module in ('node', 'teleop', 'run')]:
+        output, _ = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 0 and 'examples:' in output
+
+
+class Screen:
+    """What a program on a terminal has written, and keys for it."""
+
+    def __init__(self, terminal):
+        self.text = ''
+        self._terminal = terminal
+
+    def type(self, keys):
+        os.write(self._terminal, keys)
+
+    def shows(self, pattern):
+        """Tell whether the pattern has come up since the last match, which is then forgotten."""
+        if select.select([self._terminal], [], [], 0.1)[0]:
+            try:
+                self.text += os.read(self._terminal, 65536).decode('utf-8', 'replace')
+            except OSError:
+                return False
+        match = re.search(pattern, self.text)
+        if match:
+            self.text = self.text[match.end():]
+        return bool(match)
+
+    def wait(self, pattern):
+        end = time.monotonic() + PATIENCE
+        while not self.shows(pattern):
+            assert time.monotonic() < end, f'{pattern} did not come up in {self.text[-500:]}'
+
+
+def line(push):
+    """The live line with this push."""
+    return rf'pace [01]\.\d\d  \d+\.\d s  push {push}  tick \d+\.\d\d ms  torso .* m \d+\.\d m/s'
+
+
+def test_run_shows_a_live_line_and_the_arrows_push(ros):
+    process, terminal = start_on_terminal('run', '--ros-args', '-r', '__ns:=/stage')
+    screen = Screen(terminal)
+    screen.wait(line('none'))
+    screen.type(b'\x1b[A')
+    screen.wait(line(r'\(-2000 0 1\) N'))
+    screen.type(b'\x1b[C')
+    screen.wait(line(r'\(-2000 2000 2\) N'))
+    screen.wait(line('none'))
+    screen.type(b' ')
+    screen.wait(r'paused  \d')
+    screen.type(b' ')
+    screen.wait(line('none'))
+    screen.type(b'r')
+    screen.wait(r'  0\.\d s')
+    screen.type(b'q')
+    process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0
+
+
+def test_the_teleop_sends_what_the_keys_say(peer):
+    got = peer.collect(Wrench, '/typed/ragdoll/force')
+    process, terminal = start_on_terminal('teleop', '--ros-args', '-r', '__ns:=/typed')
+    peer.wait(lambda: peer.count_publishers('/typed/ragdoll/force'))
+    screen = Screen(terminal)
+    screen.wait('waiting for the node')
+    screen.type(b'\x1b[B\x1b[D')
+    peer.wait(lambda: got and got[-1][1] == Wrench())
+    forces = [(w.force.x, w.force.y, w.force.z) for _, w in got]
+    assert (2000.0, -2000.0, 2.0) in forces
+    assert forces.count((0.0, 0.0, 0.0)) == 1
+    code, _ = end(process, signal.SIGINT)
+    assert code == 0
+
+
+def test_without_a_terminal_the_line_is_logged_each_second(ros):
+    process = start('run', '--ros-args', '-r', '__ns:=/logged', '-p', 'real_time_factor:=0.5')
+    lines = []
+    while not re.match(r'pace 0\.\d\d  \d', lines[-1] if lines else ''):
+        assert len(lines) < 20
+        lines.append(process.stdout.readline())
+    code, _ = end(process, signal.SIGTERM)
+    assert code == 0

@@ -1,0 +1,218 @@
+"""URDF becomes a doll: what to_urdf writes comes back, and robots go limp."""
+import math
+
+import numpy as np
+import pytest
+
+from ragdoll_ros import faults, rotation
+from ragdoll_ros.ragdoll import Bone, Box, Capsule, Cylinder, Joint, Ragdoll, Sphere
+from ragdoll_ros.scene import above_ground
+from ragdoll_ros.scene_file import load_doll
+from ragdoll_ros.simulation import Simulation
+from ragdoll_ros.urdf import to_urdf
+from ragdoll_ros.urdf_reader import doll_from_urdf, read_urdf
+
+TURN = rotation.from_rpy(0.3, -0.4, 0.5)
+
+
+def every_kind():
+    """A doll with each shape and each joint kind, everything askew."""
+    bones = (Bone('root', Box((0.2, 0.3, 0.4)), 5, (0, 0, 0), TURN),
+             Bone('hinged', Cylinder(0.05, 0.3), 1, (0, 0.4, 0.1), TURN),
+             Bone('swung', Capsule(0.05, 0.3), 2, (0, -0.4, 0.1), rotation.inverse(TURN)),
+             Bone('crossed', Sphere(0.1), 3, (0.4, 0, 0)),
+             Bone('stuck', Box((0.1, 0.1, 0.1)), 1, (-0.3, 0, 0.1)))
+    x, y = rotation.rotate(TURN, np.eye(3)[:2])
+    joints = (Joint('root', 'hinged', 'hinge', (0, 0.2, 0), (x,), ((-1, 0.5),), 0.1),
+              Joint('root', 'swung', 'ball', (0, -0.2, 0), ((0, -0.6, 0.8),),
+                    ((-0.8, 0.8), (-0.3, 0.3)), 0.2),
+              Joint('root', 'crossed', 'universal', (0.2, 0, 0), (x, y), ((-1, 1), (-0.5, 0.2))),
+              Joint('crossed', 'stuck', 'fixed', (-0.1, 0, 0)))
+    return Ragdoll('every', bones, joints)
+
+
+def relative(doll, position):
+    return np.subtract(position, doll.root.position)
+
+
+@pytest.mark.parametrize('name', ['doll', 'article_doll', None])
+def test_what_to_urdf_writes_comes_back(name):
+    doll = load_doll(name) if name else every_kind()
+    back = doll_from_urdf(to_urdf(doll))
+    assert back.root.name == doll.root.name
+    assert {bone.name for bone in back.bones} == {bone.name for bone in doll.bones}
+    for bone in doll.bones:
+        other = back.bone(bone.name)
+        assert other.shape == bone.shape
+        assert other.mass == bone.mass
+        # Through roll, pitch and yaw, and a row of frames: a few last digits are lost.
+        assert np.allclose(relative(back, other.position), relative(doll, bone.position),
+                           atol=1e-12)
+        turns = np.array([other.orientation, bone.orientation])
+        assert rotation.angle_between(turns[0], turns[1]) < 1e-9
+    joints = {joint.child: joint for joint in back.joints}
+    for joint in doll.joints:
+        other = joints[joint.child]
+        assert (other.kind, other.parent, other.damping) == (
+            joint.kind, joint.parent, joint.damping)
+        if joint.kind != 'fixed':
+            assert np.allclose(relative(back, other.anchor), relative(doll, joint.anchor),
+                               atol=1e-12)
+        assert np.allclose(other.axes, joint.axes, atol=1e-12)
+        assert np.allclose(other.limits, joint.limits, atol=1e-9)
+
+
+def link(name, shape='<box size="0.1 0.1 0.1"/>', mass=1.0, origin='', tag='collision'):
+    inertial = f'<inertial><mass value="{mass}"/></inertial>' if mass else ''
+    part = f'<{tag}>{origin}<geometry>{shape}</geometry></{tag}>' if shape else ''
+    return f'<link name="{name}">{inertial}{part}</link>'
+
+
+def joint(child, parent='a', kind='revolute', xyz='0 0 1', axis='0 0 1', inside=''):
+    limit = '<limit lower="-1" upper="2" effort="1" velocity="1"/>' if kind == 'revolute' else ''
+    return (f'<joint name="to_{child}" type="{kind}"><parent link="{parent}"/>'
+            f'<child link="{child}"/><origin xyz="{xyz}"/><axis xyz="{axis}"/>{limit}{inside}'
+            '</joint>')
+
+
+def robot(*parts):
+    return f'<robot name="r">{"".join(parts)}</robot>'
+
+
+def read(tmp_path, *parts):
+    path = tmp_path / 'robot.urdf'
+    path.write_text(robot(*parts))
+    return read_urdf(path)
+
+
+@pytest.mark.parametrize(('kind', 'expected', 'limits'), [
+    ('revolute', 'hinge', ((-1, 2),)), ('continuous', 'hinge', (None,)), ('fixed', 'fixed', ()),
+    ('prismatic', 'fixed', ()), ('planar', 'fixed', ()), ('floating', 'ball', (None, None)),
+    ('spherical', 'ball', (None, None))])
+def test_joint_kinds(tmp_path, kind, expected, limits):
+    doll, notes = read(tmp_path, link('a'), link('b'), joint('b', kind=kind))
+    assert doll.joints[0].kind == expected
+    assert len(doll.joints[0].limits) == len(limits)
+    for pair, wanted in zip(doll.joints[0].limits, limits, strict=True):
+        assert pair == (wanted and pytest.approx(wanted, abs=1e-9))
+    assert bool(notes) == (kind in ('prismatic', 'planar', 'floating'))
+    assert all(kind in note and 'to_b' in note for note in notes)
+    assert doll.joints[0].anchor == (0, 0, 1)
+
+
+def test_a_link_without_a_shape_rides_and_gives_its_mass(tmp_path):
+    doll, _ = read(tmp_path, link('a'), link('sensor', shape='', mass=0.5), link('tip', '', 0),
+                   joint('sensor', kind='fixed', xyz='0 0 0.3'),
+                   joint('tip', 'sensor', 'fixed', '0.1 0 0'))
+    assert [bone.name for bone in doll.bones] == ['a']
+    assert doll.mass == 1.5
+    riders = {rider.name: (rider.bone, rider.position) for rider in doll.riders}
+    assert riders == {'a': ('a', (0, 0, 0)), 'sensor': ('a', (0, 0, 0.3)),
+                      'tip': ('a', (0.1, 0, 0.3))}
+
+
+def test_a_bare_root_gives_way_to_its_child(tmp_path):
+    doll, _ = read(tmp_path, link('world', '', 0), link('a'), link('b'),
+                   joint('a', 'world', 'fixed'), joint('b'))
+    assert doll.root.name == 'a'
+    assert [(j.parent, j.child) for j in doll.joints] == [('a', 'b')]
+
+
+def test_two_branches_of_a_bare_root_stay_one_doll(tmp_path):
+    doll, notes = read(tmp_path, link('base', '', 0), link('a'), link('b'),
+                       joint('a', 'base', xyz='0 1 0'), joint('b', 'base', xyz='0 -1 0'))
+    assert notes == ('to_a: nothing with a shape above it: left out',)
+    assert [(j.parent, j.child, j.kind) for j in doll.joints] == [('a', 'b', 'hinge')]
+
+
+def test_bare_links_between_make_one_joint(tmp_path):
+    """Two axes that cross are a universal joint; three, or two askew, a ball joint."""
+    def row(second_axis):
+        return read(tmp_path, link('a'), link('v', '', 0), link('b'), joint('v', axis='1 0 0'),
+                    joint('b', 'v', xyz='0 0 0', axis=second_axis))[0]
+
+    doll = row('0 1 0')
+    assert doll.joints[0].kind == 'universal'
+    assert doll.joints[0].axes == ((1, 0, 0), (0, 1, 0))
+    assert row('0.6 0.8 0').joints[0].kind == 'ball'
+
+
+def test_hinges_apart_keep_the_first_and_say_so(tmp_path):
+    doll, notes = read(tmp_path, link('a'), link('v', '', 0), link('b'), joint('v'),
+                       joint('b', 'v', xyz='0 0 0.5'))
+    assert doll.joints[0].kind == 'hinge'
+    assert any('to_b' in note and 'fixed' in note for note in notes)
+
+
+def test_a_moving_link_without_mass_gets_that_of_water(tmp_path):
+    doll, notes = read(tmp_path, link('a'), link('b', mass=0), joint('b'))
+    assert doll.bone('b').mass == pytest.approx(1.0)
+    assert 'b has no mass' in notes[0]
+
+
+def test_zero_outside_the_limits_starts_at_the_nearest_angle(tmp_path):
+    """As the Panda's elbow: limits -3 to -0.5 start at -0.5, and count from there."""
+    text = joint('b', axis='0 1 0').replace('lower="-1" upper="2"', 'lower="-3" upper="-0.5"')
+    doll, _ = read(tmp_path, link('a'), link('b', origin='<origin xyz="0 0 1"/>'), text)
+    assert doll.joints[0].limits[0] == pytest.approx((-2.5, 0), abs=1e-9)
+    # A turn of -0.5 about y takes the child's middle from (0, 0, 1) to (-sin, 0, cos).
+    assert np.allclose(doll.bone('b').position, (-math.sin(0.5), 0, 1 + math.cos(0.5)))
+
+
+def test_several_shapes_become_the_one_that_holds_them(tmp_path):
+    two = (link('a').replace('</link>', '') + '<collision><origin xyz="0.1 0 0"/><geometry>'
+           '<box size="0.1 0.1 0.1"/></geometry></collision></link>')
+    doll, _ = read(tmp_path, two)
+    assert sorted(doll.root.shape.size) == pytest.approx([0.1, 0.1, 0.2], abs=1e-9)
+    assert np.allclose(doll.root.position, (0.05, 0, 0), atol=1e-9)
+
+
+def test_what_is_only_a_mesh_becomes_the_box_of_the_same_inertia(tmp_path):
+    box = Box((0.1, 0.2, 0.4))
+    x, y, z = box.inertia(2.0)
+    mesh = ('<link name="a"><inertial><origin xyz="0 0 0.5" rpy="0 0 0"/><mass value="2"/>'
+            f'<inertia ixx="{x}" iyy="{y}" izz="{z}" ixy="0" ixz="0" iyz="0"/></inertial>'
+            '<collision><geometry><mesh filename="a.stl"/></geometry></collision></link>')
+    doll, notes = read(tmp_path, mesh)
+    assert sorted(doll.root.shape.size) == pytest.approx([0.1, 0.2, 0.4])
+    assert sorted(doll.root.inertia) == pytest.approx(sorted((x, y, z)))
+    assert np.allclose(doll.root.position, (0, 0, 0.5))
+    assert 'only meshes' in notes[0]
+    # What no solid could have: a cube of water.
+    doll, notes = read(tmp_path, mesh.replace(f'ixx="{x}"', 'ixx="1"').replace(
+        f'iyy="{y}"', 'iyy="1"').replace(f'izz="{z}"', 'izz="1"'))
+    assert doll.root.shape.volume == pytest.approx(2e-3)
+
+
+@pytest.mark.parametrize(('text', 'kind'), [
+    ('', faults.Unreadable), ('<robot', faults.Unreadable), ('<sdf/>', faults.WrongForm),
+    ('<!DOCTYPE r [<!ENTITY a "x">]><robot>&a;</robot>', faults.Unreadable),
+    (robot(), faults.Detached), (robot(link('a'), link('a')), faults.DuplicateName),
+    (robot(link('a'), link('b')), faults.Detached),
+    (robot(link('a'), joint('b')), faults.UnknownBone),
+    (robot(link('a'), link('b'), joint('b'), joint('b')), faults.ConnectedTwice),
+    (robot(link('a'), link('b'), joint('b'), joint('a', 'b')), faults.JointCycle),
+    (robot(link('a'), link('b'), joint('b', kind='wobbly')), faults.WrongForm),
+    (robot(link('a'), link('b'), joint('b', axis='0 0 0')), faults.NotUnit),
+    (robot(link('a'), link('b'), joint('b', xyz='0 nan 0')), faults.WrongForm),
+    (robot(link('a'), link('b'), joint('b').replace('"-1"', '"3"')), faults.LimitsReversed),
+    (robot(link('a', '<box size="1 1 -1"/>')), faults.NotPositive),
+    (robot(link('a', '<box size="1 1"/>')), faults.WrongForm),
+    (robot(link('a', '<sphere/>')), faults.WrongForm),
+    (robot(link('a', mass=-1)), faults.OutOfRange), (robot(link('a', '')), faults.WrongForm)])
+def test_broken_urdf_is_a_named_fault(text, kind):
+    with pytest.raises(kind):
+        doll_from_urdf(text)
+
+
+def test_a_shipped_robot_falls_limp():
+    """The A1 that comes with PyBullet: 22 links with shapes, on their way to the ground."""
+    pybullet_data = pytest.importorskip('pybullet_data')
+    doll, _ = read_urdf(f'{pybullet_data.getDataPath()}/a1/a1.urdf')
+    with Simulation(above_ground(doll)) as simulation:
+        top = simulation.state.positions[:, 2].max()
+        for _ in range(200):
+            state = simulation.advance()
+    assert np.isfinite(state.positions).all()
+    assert state.positions[:, 2].max() < top - 0.4
+    assert np.abs(state.linear).max() < 0.5
