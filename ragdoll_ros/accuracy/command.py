@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 PARTS = ('precision', 'orders', 'pieces', 'drop', 'classes', 'projection', 'hard', 'costs',
-         'estimate')
+         'estimate', 'swing')
 NEEDED = ('scipy', 'matplotlib', 'mujoco')
 
 

@@ -247,6 +247,20 @@ def estimate(figures: Figures, pictures: Pictures) -> str:
             + _picture(pictures, 'estimate', 'Estimated over true error'))
 
 
+def swing(figures: Figures, pictures: Pictures) -> str:
+    """Swings at several frame rates."""
+    if 'swing' not in figures:
+        return ''
+    return ('## Swings, 3 s at several frame rates\n\nWorst errors of a damped spring let go at '
+            '60°, a pendulum let go level, a throw; beside them the period of the usual recipe '
+            "(VRM's spring bones), which is another at each frame rate.\n\n"
+            + table(figures['swing'], (
+                ('rate', 'frames a second', '{}'), ('spring_error', 'spring rad', '{:.1e}'),
+                ('pendulum_error', 'pendulum rad', '{:.1e}'), ('fall_error', 'throw m', '{:.1e}'),
+                ('spring_frame_s', 'frame µs', 'us'),
+                ('recipe_period_s', 'period by the recipe s', '{:.2f}'))))
+
+
 def hard_cases(figures: Figures, pictures: Pictures) -> str:
     """Hard cases."""
     if 'hard' not in figures:
@@ -256,7 +270,7 @@ def hard_cases(figures: Figures, pictures: Pictures) -> str:
 
 SECTIONS: tuple[Callable[[Figures, Pictures], str], ...] = (
     energy, precision, orders, pieces, spread, classes, ratios, switches, projection, hard_cases,
-    costs, real_time, estimate)
+    costs, real_time, estimate, swing)
 
 
 def _picture(pictures: Pictures, name: str, text: str) -> str:
