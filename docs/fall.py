@@ -1,6 +1,6 @@
 """Draws docs/fall.png: the default scene at six instants, by PyBullet's TinyRenderer.
 
-    python docs/fall.py
+python docs/fall.py
 """
 from pathlib import Path
 
@@ -25,7 +25,7 @@ def main() -> None:
                 simulation.advance()
             x, y, _ = simulation.state.positions.mean(axis=0)
             target = np.array((x, y, 0.75))
-            views.append(simulation.render(target + (3.2, -1.6, 0.9), target, *SIZE))
+            views.append(simulation.render(np.add(target, (3.2, -1.6, 0.9)), target, *SIZE))
     imsave(Path(__file__).with_name('fall.png'), np.concatenate(views, axis=1))
 
 

@@ -68,6 +68,9 @@ AT_LIMIT = 1e-3
 SOON = 0.015
 """s ahead that limits and ground are looked for."""
 
+MOST_FLIGHTS = 12
+"""Runge-Kutta steps in a tick at the most: from there on the engine's own cost less."""
+
 SHORTEST = 1e-7
 """s: a piece of flight shorter than this is not worth its stages."""
 
@@ -172,7 +175,8 @@ class Stepper:
 
     def _may_fly(self) -> bool:
         """Tell whether nothing touches and no joint presses against its limit."""
-        if self._free is None or self.touching or self._blocked:
+        if (self._free is None or self.touching or self._blocked
+                or self.effort.flights >= MOST_FLIGHTS):
             return False
         past = self._layout.past_limits(self.coordinates.q)
         if not len(past) or past.max() < -AT_LIMIT:
@@ -183,8 +187,10 @@ class Stepper:
 
     def _fly(self, duration: float, loads: Sequence[Load]) -> float:
         """Fly up to ``duration`` s; give the time flown, 0 where something comes in between."""
-        steps = self._flight_steps(duration)
-        piece = duration / max(steps, self.reach.strides(self.state, duration))
+        steps = max(self._flight_steps(duration), self.reach.strides(self.state, duration))
+        if steps > MOST_FLIGHTS:
+            return 0.0
+        piece = duration / steps
         flown = 0.0
         while flown < duration * (1 - 1e-9):
             start, state, least = self.coordinates, self.state, self._room()
