@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..push import Push
+from ..ragdoll import Bone, Ragdoll, Sphere
 from ..scene import Placement
 from ..scene_file import load_scene
 from ..simulation import Simulation
@@ -32,7 +33,10 @@ REST = 0.05
 QUICK_CASES = ('mass ratio 1:100', 'start in a self-overlap', 'limits of 2°', 'scale 0.01',
                'hits the ground at 100 m/s', 'spin 20 rad/s', 'limit slams')
 
-REASONS: dict[str, str] = {}
+REASONS: dict[str, str] = {
+    'scale 100': 'PyBullet bounds the impulse of a joint limit. Measured: with all masses 1e-7 '
+                 'times as large, which changes nothing else in the motion, the overshoot falls '
+                 'from 180° to 0.1°.'}
 """Why a case fails and what was tried, by its name; shown only beside a case that does fail."""
 
 
@@ -120,19 +124,15 @@ def rest(accuracy: str) -> list[Row]:
 
 
 def _wakes_by_touch(accuracy: str) -> bool:
-    """A doll that has lain still for seconds is hit by one that falls from 60 m (3.5 s)."""
+    """A doll that has lain for seconds is hit by a ball, 1 m wide, that rolls up (5.5 s)."""
     scene = load_scene('drop')
-    lying = dataclasses.replace(scene.dolls[0], name='lying')
-    falling = Placement(lying.doll, 'falling', (0.0, 0.1, 150.0))
-    scene = dataclasses.replace(scene, dolls=(lying, falling))
-    count = len(lying.doll.bones)
+    ball = Ragdoll('ball', (Bone('ball', Sphere(0.5), 50.0, (0.0, 0.0, 0.0)),))
+    rolling = Placement(ball, position=(-33.0, 0.0, 0.5), velocity=(6.0, 0.0, 0.0),
+                        spin=(0.0, 12.0, 0.0))
+    scene = dataclasses.replace(scene, dolls=(scene.dolls[0], rolling))
     with Simulation(scene, accuracy=accuracy) as simulation:
-        fastest = 0.0
-        for tick in range(650):
-            speed = float(np.abs(simulation.advance().linear[:count]).max())
-            if tick > 500:
-                fastest = max(fastest, speed)
-    return fastest > 1.0
+        speeds = [float(np.abs(simulation.advance().linear[:-1]).max()) for _ in range(700)]
+    return speeds[450] < REST and max(speeds[451:]) > 0.5
 
 
 COLUMNS = (('case', 'case', '{}'), ('passed', 'holds', '{}'), ('faults', 'what does not', '{}'),
