@@ -54,7 +54,7 @@ class Accuracy:
     """Stop the engine when all is at rest."""
 
 
-DRAFT = Accuracy(turn=0.15, limit=0.06, contact=4, settled=2, sink=0.015, most=32, order=2,
+DRAFT = Accuracy(turn=0.15, limit=0.06, contact=4, settled=2, sink=0.01, most=32, order=2,
                  flight_turn=0.8, redo=math.radians(4))
 NORMAL = Accuracy(turn=0.06, limit=0.025, contact=8, settled=4, sink=0.006, most=64, order=3,
                   flight_turn=0.4, redo=math.radians(2))
@@ -67,6 +67,12 @@ AT_LIMIT = 1e-3
 
 SOON = 0.015
 """s ahead that limits and ground are looked for."""
+
+LANDED = 1e-6
+"""m or rad by which a flight may end past the ground or a limit."""
+
+MOST_SECANTS = 4
+"""Flights that may be spent on finding the instant of a touch."""
 
 MOST_FLIGHTS = 12
 """Runge-Kutta steps in a tick at the most: from there on the engine's own cost less."""
@@ -201,19 +207,38 @@ class Stepper:
                 flown += piece
                 continue
             self._held |= self._layout.past_limits(self.coordinates.q) > 0
-            early = piece * least / (least - room) if least > 0 > room else 0.0
-            if early > SHORTEST and self._fly_early(start, early, loads):
-                return flown + early
+            if least > 0 > room:
+                early = self._land(start, piece, least, room, loads)
+                if early > 0:
+                    return flown + early
             self._back_to(start, state, set())
             self._blocked = True
             return flown
         return duration
 
-    def _fly_early(self, start: Coordinates, duration: float, loads: Sequence[Load]) -> bool:
-        """Fly to where a limit or the ground is just reached; tell whether that came out."""
-        self._fly_to(fly(self._free, start, duration, self.accuracy.order, 1, loads))
-        self.effort.flights += 1
-        return self._room() > -AT_LIMIT
+    def _land(self, start: Coordinates, piece: float, least: float, room: float,
+              loads: Sequence[Load]) -> float:
+        """Fly to where a limit or the ground is just reached, by secants; give the time, s.
+
+        Zero if that does not come out. The end is a hair past it: the engine takes a gap that is
+        left for room to move in within its first substep, and would eat that much of a bounce.
+        """
+        early, late = 0.0, piece
+        for _ in range(MOST_SECANTS):
+            closing = (least - room) / (late - early)
+            time = min(max(early + (least + LANDED / 2) / closing, early), late)
+            if time <= SHORTEST:
+                return 0.0
+            self._fly_to(fly(self._free, start, time, self.accuracy.order, 1, loads))
+            self.effort.flights += 1
+            reached = self._room()
+            if -LANDED <= reached <= 0:
+                return time
+            if reached > 0:
+                early, least = time, reached
+            else:
+                late, room = time, reached
+        return time if reached > -AT_LIMIT else 0.0
 
     def _fly_to(self, end: Coordinates) -> None:
         self.place(end)

@@ -147,8 +147,10 @@ class BulletEngine:
         q, v = coordinates.q.tolist(), coordinates.v.tolist()
         i = j = 0
         for doll in self._dolls:
+            # PyBullet takes any quaternion for one of length one, and its own length for a scale.
+            length = math.hypot(*q[i + 3:i + 7])
             pybullet.resetBasePositionAndOrientation(
-                doll.body, q[i:i + 3], q[i + 3:i + 7], self._client)
+                doll.body, q[i:i + 3], [x / length for x in q[i + 3:i + 7]], self._client)
             pybullet.resetBaseVelocity(
                 doll.body, v[j:j + 3], v[j + 3:j + 6], physicsClientId=self._client)
             i, j = i + 7, j + 6
