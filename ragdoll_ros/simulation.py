@@ -188,11 +188,14 @@ class Simulation:
         """Tell what went wrong so far, and what the last tick took: names end in their units."""
         stepper, guard = self._stepper, self._guard
         sunk = -float(stepper.reach.heights(self._state).min())
+        error = 0.0 if self.asleep else stepper.estimate_error()
         return {
             'energy_excess_J': float((self._motion.energy - guard.start - guard.worked).sum()),
             'energy_projected_J': float(guard.account.taken),
             'stopped_total': guard.account.stops,
             'work_of_pushes_J': float(guard.worked.sum()),
+            'error_estimate_m': error or 0.0,
+            'error_trusted': float(error is not None),
             'joint_gap_m': float(self._gap.gaps(self._state).max(initial=0.0)),
             'limit_overshoot_rad': float(
                 stepper.engine.layout.past_limits(self.coordinates.q).max(initial=0.0)),

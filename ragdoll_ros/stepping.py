@@ -123,6 +123,8 @@ class Stepper:
         """Whether something that no flight can foresee comes next: bones that meet."""
         self._held: np.ndarray
         """(k,) whether a flight ended at this limit and the joint has leaned on it since."""
+        self._last_flight: tuple | None
+        """Start, duration in s, loads and end of the flight that the last tick ended with."""
         self.effort = Effort()
         self.begin()
 
@@ -135,6 +137,7 @@ class Stepper:
     def begin(self) -> None:
         """Start from where the engine is, and forget what was before."""
         self._stale = self._blocked = False
+        self._last_flight = None
         self._held = np.zeros(len(self._layout.limits[0]), bool)
         self.look()
 
@@ -171,7 +174,25 @@ class Stepper:
             if flown > 0:
                 return Piece(flown, 0.0)
         self._blocked = False
+        self._last_flight = None
         return Piece(duration, self._step(duration, loads))
+
+    def estimate_error(self) -> float | None:
+        """Estimate the error, m, that the last tick's last flight added to the worst position.
+
+        By doing it again in two halves (Richardson): the difference is 1 - 2^-p of the error of
+        a method of order p. None if the tick did not end in a flight.
+        """
+        if self._last_flight is None:
+            return None
+        start, duration, loads, end = self._last_flight
+        order = self.accuracy.order
+        finer = fly(self._free, start, duration, order, 2, loads)
+        places = []
+        for coordinates in (end, finer):
+            self._free.place(coordinates)
+            places.append(self._free.read().positions)
+        return float(np.abs(places[0] - places[1]).max()) / (1 - 0.5 ** order)
 
     def close(self) -> None:
         """Give both engines back."""
@@ -205,6 +226,7 @@ class Stepper:
             room = self._room()
             if room >= 0 and not self.touching:
                 flown += piece
+                self._last_flight = (start, piece, loads, self.coordinates)
                 continue
             self._held |= self._layout.past_limits(self.coordinates.q) > 0
             if least > 0 > room:

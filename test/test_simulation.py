@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 
 from ragdoll_ros import faults, rotation
+from ragdoll_ros.coordinates import Coordinates
+from ragdoll_ros.engine.bullet import BulletEngine
+from ragdoll_ros.flight import fly
 from ragdoll_ros.gap import JointGap
 from ragdoll_ros.mechanics import Mechanics
 from ragdoll_ros.push import Push
@@ -291,3 +294,40 @@ def test_simulations_leave_nothing_behind(count):
     assert after[1:] == (threads, files)
     # A client takes 26 MB: were one in a hundred kept, it would show.
     assert after[0] - memory < 5_000_000 + 0.2e6 * count ** 0.5
+
+
+@pytest.mark.parametrize('accuracy', ['draft', 'normal', 'exact'])
+def test_the_error_estimate_in_flight_is_that_of_a_far_finer_flight(accuracy):
+    """True error of a tick: against ten steps of order 4 from the same start."""
+    scene = dataclasses.replace(DROP, dolls=(dataclasses.replace(
+        DROP.dolls[0], position=(0, 0, 50)),), ground=None)
+    rng = np.random.default_rng(3)
+    ratios = []
+    with Simulation(scene, accuracy=accuracy) as simulation:
+        free = BulletEngine(scene, free=True)
+        start = simulation.coordinates
+        q, v = start.q.copy(), rng.normal(size=start.v.shape)
+        lower, upper = free_limits()
+        q[7:] = (0.6 * lower + 0.4 * upper)
+        simulation.place(Coordinates(q, v))
+        for _ in range(15):
+            before = simulation.coordinates
+            simulation.advance()
+            figures = simulation.measures()
+            if not figures['error_trusted']:
+                continue
+            free.place(fly(free, before, 0.01, 4, 10))
+            truth = free.read().positions
+            flights = simulation.effort.flights
+            free.place(fly(free, before, 0.01, simulation.accuracy.order, flights))
+            error = np.abs(free.read().positions - truth).max()
+            ratios.append(figures['error_estimate_m'] * flights / error)
+        free.close()
+    ratios = np.array(ratios)
+    assert len(ratios) >= 10
+    assert np.mean((ratios > 1 / 3) & (ratios < 3)) >= 0.9
+
+
+def free_limits():
+    pairs = np.array([LIMITS[name] for name in ANGLES])
+    return pairs[:, 0], pairs[:, 1]

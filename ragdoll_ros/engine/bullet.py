@@ -26,8 +26,9 @@ from .protocol import GROUND, Contact, Load
 LARGEST_FRICTION = math.sqrt(10)
 """PyBullet caps the product of two friction coefficients at 10 (84 degrees)."""
 
-BREAKING_DISTANCE = 2e-3
-"""m at which a contact point is let go. The default, 0.02 m, eats half of every small bounce."""
+BREAKING_DISTANCE = 5e-4
+"""m at which a contact point is let go. A gap is room to move in within a substep, so that it eats
+of a bounce: the default, 0.02 m, eats half of every small one."""
 
 LEAST_BOUNCE = 0.05
 """m/s: approach speed below which nothing bounces, if the material and the substep don't ask for
@@ -176,7 +177,7 @@ class BulletEngine:
         return np.array(values)
 
     def touching(self) -> set[tuple[int, int]]:
-        """Pairs of dolls within 2 mm of touching; GROUND stands for the ground."""
+        """Pairs of dolls within half a mm of touching; GROUND stands for the ground."""
         pybullet.performCollisionDetection(self._client)
         points = pybullet.getContactPoints(physicsClientId=self._client)
         return {(self._doll_of[point[1]], self._doll_of[point[2]]) for point in points}
