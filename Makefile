@@ -26,8 +26,9 @@ help: ## this list
 run: $(READY) ## the doll falls, arrow keys push it; SCENE=crowd: another scene
 	@$(BIN)/python -m ragdoll_ros.ros.run $(SCENE)
 
+# A file's tests stay together: those of one ROS domain, and those that time, go one by one.
 test: $(READY) ## the tests, at most 90 s
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
 
 lint: $(READY) ## ruff
 	@$(BIN)/ruff check .
