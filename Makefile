@@ -31,7 +31,7 @@ test: $(READY) ## the tests, at most 90 s
 	@$(BIN)/python -m pytest -n 3 --dist loadfile
 
 lint: $(READY) ## ruff
-	@$(BIN)/ruff check .
+	@$(BIN)/python -m ruff check .
 
 slow: $(READY) ## the tests that take minutes
 	@$(BIN)/python -m pytest -m slow

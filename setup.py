@@ -78,7 +78,7 @@ setup(
         'ros': ['ros-jazzy-rclpy', 'ros-jazzy-rmw-fastrtps-cpp', 'ros-jazzy-common-interfaces'],
         'report': ['scipy', 'matplotlib', 'mujoco'],
         'fit': ['pygltflib', 'matplotlib'],
-        'test': ['pytest', 'pytest-xdist', 'ruff', 'setuptools', 'wheel', 'mannequin-x',
+        'test': ['pytest', 'pytest-xdist', 'ruff', 'setuptools', 'wheel', 'mannequin-x; python_version >= "3.11"',
                  'yourdfpy'],
         'colcon': ['colcon-core', 'colcon-ros', 'colcon-python-setup-py',
                    'colcon-common-extensions', 'setuptools<80'],

@@ -27,7 +27,7 @@ rm -rf "$folder/source" && mkdir "$folder/source"
 (cd "$here" && cp -r setup.py setup.cfg pyproject.toml package.xml config resource ragdoll_ros \
     "$folder/source")
 pip install --no-build-isolation --constraint "$folder/versions.txt" \
-    "$folder/source[ros,test,report,fit]"
+    "$folder/source[ros,report,fit]" pytest
 "$folder/venv/bin/python" -m pip list |
     grep -i '^\(numpy\|scipy\|setuptools\|pybullet\|pyyaml\|jsonschema\|ragdoll\)'
 cd "$here"
