@@ -65,6 +65,9 @@ class Simulation:
         self._start = (self._stepper.engine.save(), self._stepper.coordinates)
         self._gap = JointGap(scene)
         self._sizes = np.array([max(bone.shape.half_extents) for bone in scene.bones])
+        # A bone that is still has at most m v^2 / 2 for its speed and less than 3 times that for
+        # its spin, as no radius of gyration is longer than its largest half extent.
+        self._most_at_rest = 2 * self.mechanics.doll_masses * (2 * REST_SPEED) ** 2
         self._weightless = not any(scene.gravity)
         self._riding = riding(scene)
         self._begin()
@@ -344,6 +347,9 @@ class Simulation:
     def _rest(self) -> None:
         """Fall asleep when all has been still for a while with something to rest on."""
         if self.asleep or not self._stepper.accuracy.sleep or self._weightless:
+            return
+        if (self._motion.kinetic > self._most_at_rest).any():
+            self._still = 0
             return
         state = self._state
         speed = max(np.abs(state.linear).max(),
