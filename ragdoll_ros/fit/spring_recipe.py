@@ -11,6 +11,9 @@ rates log(z)/dt: at RATE frames a second, and with its own mass alone, the recip
 swing's at every frame. k/J is the product of the rates and 2 zeta sqrt(k/J + share g/reach) minus
 their sum, as chain.py has them. Gravity's share keeps the angle at which a rod comes to rest: the
 balance of gravity and stiffness is the recipe's. It is one for the whole chain: the mean.
+
+What differs: VRM's drag is against the world (or the spring's ``center``), a swing's against what
+it hangs from; large angles go back by the angle, not by its sine.
 """
 from __future__ import annotations
 
