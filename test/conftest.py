@@ -13,6 +13,15 @@ if importlib.util.find_spec('rclpy') is None:
     collect_ignore_glob = ['test_ros_*.py']
 
 
+LONGEST = ('test_ros_process.py', 'test_simulation.py', 'test_swing.py')
+
+
+def pytest_collection_modifyitems(items):
+    """Files that take longest go first, so that no process is left with one of them at the end."""
+    items.sort(key=lambda item: LONGEST.index(item.path.name) if item.path.name in LONGEST
+               else len(LONGEST))
+
+
 @pytest.fixture(scope='session')
 def ros():
     """ROS in this process, in a domain that it shares with the processes it starts alone."""
