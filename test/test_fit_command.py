@@ -100,6 +100,7 @@ def test_help_has_an_example():
     assert '--orientation' in done.stdout
 
 
+@pytest.mark.slow
 def test_a_large_character_takes_less_than_a_second(tmp_path, capsys):
     """60 bones and more than 25 000 vertices, from file to doll; the best of three runs."""
     from ragdoll_ros.fit.character import read_character

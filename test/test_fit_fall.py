@@ -44,6 +44,7 @@ def falls_and_settles(doll):
     assert state.positions[:, 2].max() < max(bone.position[2] for bone in doll.bones) + 0.4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', QUICK)
 def test_it_falls_without_energy_from_nothing_and_settles(name):
     falls_and_settles(fitted(name).doll)

@@ -67,6 +67,7 @@ def test_energy_put_in_by_hand_is_seen():
     assert Measure(scene).spin_drift(faster) > 1e-4
 
 
+@pytest.mark.slow
 def test_a_push_pays_for_the_energy_it_brings():
     """A force on one bone, in the reference's own motion: work and energy fit to 1e-9."""
     scene, start, _ = moving_doll(gravity=(0, 0, 0))

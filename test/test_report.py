@@ -152,6 +152,7 @@ def test_a_job_that_fails_says_where():
     assert found['at'].startswith('test_report.py')
 
 
+@pytest.mark.slow
 def test_page_and_pictures_come_from_the_json_alone(tmp_path):
     pytest.importorskip('matplotlib')
     from ragdoll_ros.accuracy.parts import drop, precision

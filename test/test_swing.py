@@ -125,6 +125,7 @@ def test_spring_is_the_closed_form_at_every_frame_rate(rate):
                                    atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_shaken_strand_does_not_depend_on_the_frame_rate():
     swing = load_scene('ponytail').dolls[0].doll.swings[0]
     size = sum(link.length for link in swing.links)
@@ -380,6 +381,7 @@ def test_a_simulation_carries_its_ponytail_and_repeats_it():
 
 # Chains
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('count', 'share'), [(1, 1e-12), (2, 0.013), (8, 0.03)])
 def test_a_hanging_chain_swings_about_as_slowly_as_the_true_one(count, share):
     mount = mounted(strand(count, 1.0, 1.0), 'pendulum', direction=(0, 0, -1))
