@@ -28,7 +28,7 @@ run: $(READY) ## the doll falls, arrow keys push it; SCENE=crowd: another scene
 
 # A file's tests stay together: those of one ROS domain, and those that time, go one by one.
 test: $(READY) ## the tests, at most 90 s
-	@$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
+	@$(BIN)/python -m pytest -n 3 --dist loadfile
 
 lint: $(READY) ## ruff
 	@$(BIN)/python -m ruff check .

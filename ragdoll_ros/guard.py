@@ -113,7 +113,7 @@ class Guard:
         spin, inertia = np.zeros_like(linear), np.zeros((len(linear), 3, 3))
         missing = np.zeros_like(linear) if moment is None else before.spin + moment - after.spin
         for doll in np.flatnonzero(missing.any(axis=1)):
-            inertia[doll] = self._mechanics.locked_inertia(state, after.centre[doll], doll)
+            inertia[doll] = self._mechanics.locked_inertia(state, after, doll)
             spin[doll] = np.linalg.solve(inertia[doll], missing[doll])
         return Shift(way, linear, spin, after.centre, inertia)
 
@@ -132,7 +132,7 @@ class Guard:
         for doll in np.flatnonzero(surplus > 0):
             centre = motion.centre[doll]
             linear = motion.momentum[doll] / self._mechanics.doll_masses[doll]
-            spin = np.linalg.solve(self._mechanics.locked_inertia(state, centre, doll),
+            spin = np.linalg.solve(self._mechanics.locked_inertia(state, motion, doll),
                                    motion.spin[doll])
             rigid = 0.5 * (motion.momentum[doll] @ linear + motion.spin[doll] @ spin)
             inner = max(0.0, motion.kinetic[doll] - rigid)

@@ -27,6 +27,8 @@ class Motion:
     """(d, 3) N s."""
     spin: np.ndarray
     """(d, 3) N m s: angular momentum about the doll's own centre of mass."""
+    turns: np.ndarray
+    """(n, 3, 3): rotation matrix of each bone."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,8 @@ class Mechanics:
         arms = state.positions - centre[self.doll_of]
         own = np.matmul(turn, moments[:, :, None])[:, :, 0]
         return Motion(kinetic - weighted @ self.gravity, kinetic, centre,
-                      self._members @ impulses, self._members @ (own + cross(arms, impulses)))
+                      self._members @ impulses, self._members @ (own + cross(arms, impulses)),
+                      turn)
 
     def shifted(self, state: State, shift: Shift) -> State:
         """Give the state after each doll is moved on and set in motion as one rigid body."""
@@ -105,17 +108,18 @@ class Mechanics:
             + (motion.spin + gained / 2) * shift.spin).sum(axis=1)
         centre = motion.centre + shift.way
         return Motion(kinetic - self.doll_masses * (centre @ self.gravity), kinetic, centre,
-                      motion.momentum + masses * shift.linear, motion.spin + gained)
+                      motion.momentum + masses * shift.linear, motion.spin + gained,
+                      motion.turns)
 
-    def locked_inertia(self, state: State, centre: np.ndarray, doll: int) -> np.ndarray:
-        """Inertia (3, 3) kg m^2 about its ``centre`` (3,) of a doll as if its joints were locked.
+    def locked_inertia(self, state: State, motion: Motion, doll: int) -> np.ndarray:
+        """Inertia (3, 3) kg m^2 about its centre of mass of a doll as if its joints were locked.
 
         Steiner's theorem: the sum of R I R^T + m (r r 1 - r r^T) over its bones.
         """
         own = slice(self.starts[doll], self.starts[doll] + int(self._members[doll].sum()))
-        turn = rotation.matrix(state.orientations[own])
+        turn = motion.turns[own]
         turned = np.matmul(turn * self.inertias[own, None, :], turn.transpose(0, 2, 1))
-        arms = state.positions[own] - centre
+        arms = state.positions[own] - motion.centre[doll]
         outer = arms.T @ (self.masses[own, None] * arms)
         return turned.sum(axis=0) + np.trace(outer) * np.eye(3) - outer
 

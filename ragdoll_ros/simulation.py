@@ -28,8 +28,9 @@ REST_SPEED = 0.05
 """m/s, and rad/s times the bone's size, below which a bone counts as still: more than the
 flutter of a joint that leans on its limit, less than any fall gives within 10 ms."""
 
-REST_WAY = 0.001
-"""m that a still bone may have moved in REST_TIME."""
+REST_WAY = 0.002
+"""m that a still bone may have moved in REST_TIME: limbs that sag against their joints' damping
+slower than 4 mm/s are stopped."""
 
 REST_TIME = SECOND // 2
 """ns that all bones must be still under gravity before the scene sleeps."""
@@ -62,9 +63,13 @@ class Simulation:
         self.mechanics = Mechanics(scene)
         self._stepper = Stepper(scene, engine, resolve_accuracy(accuracy))
         self._guard = Guard(scene, self.mechanics, self._stepper.engine.layout)
+        self._lift_out()
         self._start = (self._stepper.engine.save(), self._stepper.coordinates)
         self._gap = JointGap(scene)
         self._sizes = np.array([max(bone.shape.half_extents) for bone in scene.bones])
+        # A bone that is still has at most m v^2 / 2 for its speed and less than 3 times that for
+        # its spin, as no radius of gyration is longer than its largest half extent.
+        self._most_at_rest = 2 * self.mechanics.doll_masses * (2 * REST_SPEED) ** 2
         self._weightless = not any(scene.gravity)
         self._riding = riding(scene)
         self._begin()
@@ -162,11 +167,12 @@ class Simulation:
     def place(self, coordinates: Coordinates) -> State:
         """Put the dolls elsewhere, with other velocities, and take that as the start of all.
 
-        Bones that overlap there do not collide from then on.
+        Bones that overlap there do not collide from then on; what is in the ground is lifted.
         """
         self._stepper.place(coordinates)
         self._stepper.engine.let_overlaps_be()
         self._stepper.begin()
+        self._lift_out()
         self._start = (self._stepper.engine.save(), self._stepper.coordinates)
         self._begin()
         return self._state
@@ -208,6 +214,17 @@ class Simulation:
     def close(self) -> None:
         """Give the engine back; a second time does nothing."""
         self._stepper.close()
+
+    def _lift_out(self) -> None:
+        """Set dolls that begin in the ground onto it: else they stay, or are thrown out."""
+        stepper, layout = self._stepper, self._stepper.engine.layout
+        heights = stepper.reach.heights(stepper.state)
+        lowest = np.minimum.reduceat(heights, self.mechanics.starts)
+        if (lowest < 0).any():
+            q = stepper.coordinates.q.copy()
+            q[layout.root_positions] += np.outer(np.maximum(0, -lowest), self.scene.ground.normal)
+            stepper.place(dataclasses.replace(stepper.coordinates, q=q))
+            stepper.begin()
 
     def _begin(self) -> None:
         self.time = 0
@@ -344,6 +361,9 @@ class Simulation:
     def _rest(self) -> None:
         """Fall asleep when all has been still for a while with something to rest on."""
         if self.asleep or not self._stepper.accuracy.sleep or self._weightless:
+            return
+        if (self._motion.kinetic > self._most_at_rest).any():
+            self._still = 0
             return
         state = self._state
         speed = max(np.abs(state.linear).max(),

@@ -137,6 +137,7 @@ class Stepper:
     def begin(self) -> None:
         """Start from where the engine is, and forget what was before."""
         self._stale = self._blocked = False
+        self._past_at = (None, np.zeros(0))
         self._last_flight = None
         self._held = np.zeros(len(self._layout.limits[0]), bool)
         self.look()
@@ -205,7 +206,7 @@ class Stepper:
         if (self._free is None or self.touching or self._blocked
                 or self.effort.flights >= MOST_FLIGHTS):
             return False
-        past = self._layout.past_limits(self.coordinates.q)
+        past = self._past()
         if not len(past) or past.max() < -AT_LIMIT:
             return True
         self._held &= past > -AT_LIMIT
@@ -228,7 +229,7 @@ class Stepper:
                 flown += piece
                 self._last_flight = (start, piece, loads, self.coordinates)
                 continue
-            self._held |= self._layout.past_limits(self.coordinates.q) > 0
+            self._held |= self._past() > 0
             if least > 0 > room:
                 early = self._land(start, piece, least, room, loads)
                 if early > 0:
@@ -274,7 +275,7 @@ class Stepper:
 
     def _room(self) -> float:
         """Room (rad or m) to the nearest limit or the ground; below zero: past it."""
-        past = self._layout.past_limits(self.coordinates.q)
+        past = self._past()
         room = -float(past.max()) if len(past) else math.inf
         return min(room, self.reach.clearance(self.state))
 
@@ -298,9 +299,16 @@ class Stepper:
             substeps = min(most, 4 * substeps)
             self.effort.redone += 1
 
+    def _past(self) -> np.ndarray:
+        """Angles (k,) rad by which the limited joints are past their limits now; kept."""
+        if self._past_at[0] is not self.coordinates:
+            past = self._layout.past_limits(self.coordinates.q)
+            self._past_at = (self.coordinates, past)
+        return self._past_at[1]
+
     def _too_far(self) -> float:
         """Tell how far past a limit or in the ground, in units of what is put up with."""
-        past = float(self._layout.past_limits(self.coordinates.q).max(initial=0.0))
+        past = float(self._past().max(initial=0.0))
         sunk = -self.reach.clearance(self.state)
         return max(past / self.accuracy.redo, sunk / self.accuracy.sink)
 
@@ -324,7 +332,7 @@ class Stepper:
         need = max(1.0, spin * duration / accuracy.turn, 4.0 * tens if pushed else 0.0)
         speeds = self._layout.limit_speeds(self.coordinates)
         if len(speeds):
-            past = self._layout.past_limits(self.coordinates.q)
+            past = self._past()
             near = speeds[past + SOON * speeds > 0]
             need = max(need, near.max(initial=0.0) * duration / accuracy.limit)
         falling = self.reach.falling(state, SOON)

@@ -229,6 +229,17 @@ def test_a_doll_at_rest_sleeps_and_a_push_wakes_it():
         assert simulation.state.positions[0, 2] > still[0, 2] + 0.1
 
 
+def test_a_doll_in_the_floor_starts_on_it_and_stays_calm():
+    scene = dataclasses.replace(DROP, dolls=(dataclasses.replace(
+        DROP.dolls[0], position=(0, 0, -0.6)),))
+    with Simulation(scene) as simulation:
+        lowest = min(height(bone, simulation.state.positions[i], simulation.state.orientations[i],
+                            Ground()) for i, bone in enumerate(scene.bones))
+        assert lowest == pytest.approx(0, abs=1e-9)
+        # A fall from a height of 1.5 m reaches 5.4 m/s.
+        assert all(np.abs(simulation.advance().linear).max() < 5.4 for _ in range(200))
+
+
 def test_the_crowd_makes_no_energy():
     scene = load_scene('crowd')
     mechanics = Mechanics(scene)

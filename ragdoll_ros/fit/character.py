@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +10,9 @@ import numpy as np
 from .. import faults, rotation
 from .gltf_file import GltfFile
 from .names import side_of
-from .nodes import read_nodes
+from .nodes import Nodes, read_nodes
 from .skins import Skins, read_skins
+from .spring_bones import Spring, placed, read_springs, without_short_rods
 
 TO_ROS = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
 """glTF is Y up and faces +Z, its left is +X: (x, y, z) here is (z, x, y) there."""
@@ -45,6 +46,7 @@ class Character:
     scale: float = 1.0
     """Metres to one unit of the file."""
     notes: tuple[str, ...] = ()
+    springs: tuple[Spring, ...] = ()
 
     @functools.cached_property
     def extent(self) -> float:
@@ -88,16 +90,15 @@ def read_character(path: str | Path, scale: float | None = None) -> Character:
             skins = read_skins(file, nodes)
         if len(skins.vertices) == 0:
             raise faults.WrongForm('meshes', 0, 'a skin with vertices')
-        return _character(file, nodes.parents, nodes.order, skins, scale)
+        return _character(file, nodes, skins, scale)
     except faults.Fault as fault:
         raise faults.Faults(str(path), [fault]) from None
 
 
-def _character(file: GltfFile, parents: list[int], order: list[int], skins: Skins,
-               scale: float | None) -> Character:
-    joints = [node for node in order if node in skins.rests]
+def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) -> Character:
+    joints = [node for node in nodes.order if node in skins.rests]
     place = {node: bone for bone, node in enumerate(joints)}
-    lookup = np.zeros(len(order), np.int32)
+    lookup = np.zeros(len(nodes.order), np.int32)
     lookup[joints] = range(len(joints))
     rests = np.stack([skins.rests[node] for node in joints])
     if not np.isfinite(skins.vertices).all() or not np.isfinite(rests).all():
@@ -113,13 +114,33 @@ def _character(file: GltfFile, parents: list[int], order: list[int], skins: Skin
         notes.append(f'its left limbs say that it does not face +Z: turned by {yaw} degrees')
         upright = np.round(rotation.matrix(rotation.from_axis_angle((0, 0, 1), np.radians(yaw))))
         positions, vertices, linear = positions @ upright.T, vertices @ upright.T, upright @ linear
+        turn = upright @ turn
     metres = _metres(vertices, scale, notes)
+    springs = _springs(file, nodes, skins, place, metres * turn, notes)
     stem = _bone_names([file.path.stem])[0]
     return Character(
-        stem, names, tuple(_parent_bone(node, parents, place) for node in joints),
+        stem, names, tuple(_parent_bone(node, nodes.parents, place) for node in joints),
         positions * metres, np.stack([_nearest_turn(matrix) for matrix in linear]),
         vertices * metres, skins.triangles, lookup[skins.nodes], skins.weights, metres,
-        tuple(notes))
+        tuple(notes), springs)
+
+
+def _springs(file: GltfFile, nodes: Nodes, skins: Skins, place: dict[int, int],
+             matrix: np.ndarray, notes: list[str]) -> tuple[Spring, ...]:
+    """Springs on the character's bones, their points taken to its frame by ``matrix`` (3, 3)."""
+    found = []
+    for spring in read_springs(file, nodes, notes):
+        carrier = _parent_bone(spring.nodes[0], nodes.parents, place)
+        if carrier < 0:
+            notes.append(f'spring {spring.name} has no bone above it: left out')
+            continue
+        spring = placed(spring, nodes, skins.rests)
+        found.append(without_short_rods(replace(
+            spring, points=spring.points @ matrix.T, carrier=carrier,
+            bones=tuple(place[node] for node in spring.nodes if node in place)), notes))
+    found = [spring for spring in found if spring.rods]
+    names = _bone_names([spring.name for spring in found])
+    return tuple(replace(spring, name=name) for spring, name in zip(found, names, strict=True))
 
 
 def _parent_bone(node: int, parents: list[int], place: dict[int, int]) -> int:

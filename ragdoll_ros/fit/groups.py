@@ -52,8 +52,14 @@ def vertices_by_bone(character: Character, share: float | None = None) -> list[n
 
 
 def group_bones(character: Character, roles: tuple[str | None, ...], clusters: list[np.ndarray],
-                smallest: float | None = None) -> list[Group]:
-    """Merge bones into bodies, parents first; ``smallest`` in m, None: a share of the whole."""
+                smallest: float | None = None,
+                swinging: frozenset[int] = frozenset()) -> list[Group]:
+    """Merge bones into bodies, parents first; ``smallest`` in m, None: a share of the whole.
+
+    Bones that are ``swinging`` have no body: they ride on their parents', without their skin.
+    """
+    clusters = [np.zeros(0, np.int64) if bone in swinging else cluster
+                for bone, cluster in enumerate(clusters)]
     smallest = SMALLEST * character.extent if smallest is None else smallest
     held = [Group(bone, bones=[bone], vertices=cluster) for bone, cluster in enumerate(clusters)]
     parents = character.parents
@@ -63,7 +69,8 @@ def group_bones(character: Character, roles: tuple[str | None, ...], clusters: l
         for bone in level:
             parent = parents[bone]
             paired = max(sizes[bone], sizes[_partner(character, bone, level)])
-            if parent >= 0 and (paired < smallest or _one_limb(roles[parent], roles[bone])):
+            small = bone in swinging or paired < smallest
+            if parent >= 0 and (small or _one_limb(roles[parent], roles[bone])):
                 _absorb(held[parent], held[bone])
                 into[bone] = parent
     heads = [bone for bone in range(len(held)) if into[bone] == bone]

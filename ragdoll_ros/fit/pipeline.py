@@ -7,6 +7,7 @@ import numpy as np
 
 from .. import faults, rotation
 from ..ragdoll import Bone, Joint, Ragdoll, Rider
+from ..swing.chain import Swing
 from . import masses
 from .axes import Axes, fit_axes
 from .character import Character
@@ -15,6 +16,7 @@ from .joints import damped, make_joint
 from .names import roles_of, side_of
 from .refine import refined
 from .shapes import TOLERANCE, Fitted, choose_kind, fit_shape, outside
+from .spring_recipe import swing_of
 
 THINNEST = 0.01
 """No body is thinner than this share of the whole character."""
@@ -65,7 +67,8 @@ def fit_character(character: Character, options: Options | None = None) -> Fit:
     given, character = character, refined(character)
     roles = roles_of(character.bone_names, character.parents)
     clusters = vertices_by_bone(character, options.share)
-    groups = group_bones(character, roles, clusters, options.smallest)
+    swinging = frozenset(bone for spring in character.springs for bone in spring.bones)
+    groups = group_bones(character, roles, clusters, options.smallest, swinging)
     notes = [*character.notes, *_unmoved(character, len(given.vertices), groups)]
     directions = [_direction(character, groups, index) for index in range(len(groups))]
     areas = character.vertex_areas()
@@ -83,7 +86,8 @@ def fit_character(character: Character, options: Options | None = None) -> Fit:
               f'{character.bone_names[groups[group.parent].bone]}'
               for group in groups if group.tied]
     doll = Ragdoll(character.name, tuple(body.bone for body in bodies), tuple(joints),
-                   riders=_riders(character, groups, bodies))
+                   _swings(character, groups, bodies, notes),
+                   _riders(character, groups, bodies))
     return Fit(doll, given, tuple(bodies), tuple(notes))
 
 
@@ -190,10 +194,28 @@ def _joint(character: Character, groups: list[Group], index: int,
                       directions[index], children[0] <= 1 and children[1] == 1)
 
 
+def _swings(character: Character, groups: list[Group], bodies: list[BodyFit],
+            notes: list[str]) -> tuple[Swing, ...]:
+    """Each spring of the character, on the body that carries the bone it hangs from."""
+    carrier = _carriers(groups, bodies)
+    swings = []
+    for spring in character.springs:
+        swing, cut = swing_of(spring, spring.name, carrier[spring.carrier].name, character.scale)
+        swings.append(swing)
+        if cut:
+            notes.append(f'spring {spring.name} has too much gravity: a share of '
+                         f'{swing.gravity:g} is taken')
+    return tuple(swings)
+
+
+def _carriers(groups: list[Group], bodies: list[BodyFit]) -> dict[int, Bone]:
+    return {bone: body.bone for group, body in zip(groups, bodies, strict=True)
+            for bone in group.bones}
+
+
 def _riders(character: Character, groups: list[Group], bodies: list[BodyFit]) -> tuple[Rider, ...]:
     """Every bone of the skeleton, fixed on the body that carries it, the skeleton's order."""
-    carrier = {bone: body.bone for group, body in zip(groups, bodies, strict=True)
-               for bone in group.bones}
+    carrier = _carriers(groups, bodies)
     riders = []
     for index, name in enumerate(character.bone_names):
         body = carrier[index]

@@ -28,8 +28,14 @@ def fit_report(fit: Fit) -> str:
         f'volume {1000 * volume:.4g} l' + (
             f", {volume / skin:.2f} of the skin's" if skin > 0 else '')
         + f', {100 * shared_volume(bones):.0f} % of it shared',
-        *_overlaps(fit.doll), *_warnings([*fit.notes, *find_doubts(fit.doll)])]
+        *_swings(fit.doll), *_overlaps(fit.doll), *_warnings([*fit.notes, *find_doubts(fit.doll)])]
     return '\n'.join(lines)
+
+
+def _swings(doll: Ragdoll) -> list[str]:
+    count, links = len(doll.swings), sum(len(swing.links) for swing in doll.swings)
+    return [f'springs of the character that became swings: {count}, with {links} links; '
+            'no body holds their skin'] if count else []
 
 
 def doll_report(doll: Ragdoll, notes: tuple[str, ...] = ()) -> str:

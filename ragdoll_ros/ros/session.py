@@ -2,9 +2,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import rclpy
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.executors import ExternalShutdownException
 
 
@@ -24,4 +25,6 @@ def ros_session(arguments: list[str]) -> Iterator[None]:
         if rclpy.ok():
             raise
     finally:
-        rclpy.try_shutdown()
+        # The thread that takes the signal may be shutting down at this very moment.
+        with suppress(RCLError):
+            rclpy.try_shutdown()
