@@ -77,6 +77,8 @@ $(READY): setup.py pyproject.toml
 	@echo "Setting up $(VENV) with Python $(VERSION) and ROS 2 from" \
 	  "$(if $(VENV_FLAGS),the sourced $(ROS),PyPI's Jazzy wheels); once, a few minutes at most"
 	@test -e $@ || $(PYTHON) -m venv --clear $(VENV_FLAGS) $(VENV)
+	@# The pip of Python 3.10 (22 to 23.0) can search for versions that agree for an hour.
+	@$(PIP) install --quiet --upgrade pip
 	@# A sourced rclpy is built against the numpy beside it: that one stays.
 	@$(if $(VENV_FLAGS),$(PIP) freeze,true) | grep '^numpy==' > $(VENV)/keep.txt || true
 	@$(PIP) install --quiet --only-binary :all: pybullet 2>/dev/null || $(MAKE) pybullet-from-source
