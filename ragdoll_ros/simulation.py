@@ -70,7 +70,8 @@ class Simulation:
         # A bone that is still has at most m v^2 / 2 for its speed and less than 3 times that for
         # its spin, as no radius of gyration is longer than its largest half extent.
         self._most_at_rest = 2 * self.mechanics.doll_masses * (2 * REST_SPEED) ** 2
-        self._weightless = not any(scene.gravity)
+        self._gravity = math.hypot(*scene.gravity)
+        self._lightest = float(self.mechanics.masses.min())
         self._riding = riding(scene)
         self._begin()
 
@@ -263,9 +264,7 @@ class Simulation:
         stepper, before, motion = self._stepper, self._state, self._motion
         start = stepper.coordinates
         pull = max((math.hypot(*load.force) for load in loads), default=0.0)
-        lightest = float(self.mechanics.masses.min())
-        gravity = math.hypot(*self.scene.gravity)
-        in_air = stepper.reach.in_air(before, duration, gravity + pull / lightest)
+        in_air = stepper.reach.in_air(before, duration, self._gravity + pull / self._lightest)
         piece = stepper.go(duration, loads)
         self._see(stepper.state)
         if loads:
@@ -360,7 +359,7 @@ class Simulation:
 
     def _rest(self) -> None:
         """Fall asleep when all has been still for a while with something to rest on."""
-        if self.asleep or not self._stepper.accuracy.sleep or self._weightless:
+        if self.asleep or not self._stepper.accuracy.sleep or not self._gravity:
             return
         if (self._motion.kinetic > self._most_at_rest).any():
             self._still = 0

@@ -113,7 +113,6 @@ class Stepper:
         self._free = make_engine(scene, free=True) if accuracy.order else None
         self.reach = Reach(scene)
         self._layout = self.engine.layout
-        self._gravity = math.hypot(*scene.gravity)
         self._normal = np.array(scene.ground.normal if scene.ground else (0.0, 0.0, 1.0))
         self._damped = any(joint.damping for placement in scene.dolls
                            for joint in placement.doll.joints)
