@@ -4,6 +4,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from geometry_msgs.msg import Pose
 from visualization_msgs.msg import Marker, MarkerArray
 
 from .. import rotation
@@ -23,7 +24,7 @@ ROD = 0.01
 ARROW = 0.5
 """m: length of the arrow of a push of 1 kN; longer and shorter ones go by the square root."""
 
-_KINDS = {'box': Marker.CUBE, 'sphere': Marker.SPHERE, 'cylinder': Marker.CYLINDER}
+KINDS = {'box': Marker.CUBE, 'sphere': Marker.SPHERE, 'cylinder': Marker.CYLINDER}
 
 
 class Markers:
@@ -32,8 +33,8 @@ class Markers:
     def __init__(self, scene: Scene, frame: str) -> None:
         self._scene = scene
         self._frame = frame
-        self._parts = [part for bone in scene.bones for part in _parts(bone)]
-        self._bones = [index for index, bone in enumerate(scene.bones) for _ in _parts(bone)]
+        self._parts = [part for bone in scene.bones for part in parts(bone)]
+        self._bones = [index for index, bone in enumerate(scene.bones) for _ in parts(bone)]
         self._shifts = np.array([shift for *_, shift in self._parts])
         self._markers = [self._marker(number) for number in range(len(self._parts))]
         self._arrows = 0
@@ -47,7 +48,7 @@ class Markers:
         for marker, position, turn in zip(self._markers, positions.tolist(),
                                           orientations.tolist(), strict=True):
             marker.header = header
-            _place(marker, position, turn)
+            place(marker.pose, position, turn)
         arrows = [self._arrow(number, push, state) for number, push in enumerate(
             push for push in pushes if any(push.force))]
         gone = [Marker(ns='push', id=number, action=Marker.DELETE)
@@ -63,9 +64,9 @@ class Markers:
         color = self._scene.bones[self._bones[number]].color or GRAY
         name = self._scene.bone_names[self._bones[number]]
         same = self._bones[:number].count(self._bones[number])
-        marker = Marker(ns=name, id=same, type=_KINDS[kind], action=Marker.ADD)
+        marker = Marker(ns=name, id=same, type=KINDS[kind], action=Marker.ADD)
         marker.scale = to_vector(size)
-        _paint(marker, color)
+        paint(marker, color)
         return marker
 
     def _arrow(self, number: int, push: Push, state: State) -> Marker:
@@ -81,8 +82,9 @@ class Markers:
         tail = state.positions[bone] + point - force * (length / strength)
         marker = Marker(ns='push', id=number, type=Marker.ARROW, action=Marker.ADD)
         marker.scale = to_vector((length, 0.04, 0.06))
-        _place(marker, tail.tolist(), rotation.shortest_arc(np.array([1.0, 0, 0]), force).tolist())
-        _paint(marker, RED)
+        turn = rotation.shortest_arc(np.array([1.0, 0, 0]), force)
+        place(marker.pose, tail.tolist(), turn.tolist())
+        paint(marker, RED)
         return marker
 
 
@@ -93,11 +95,11 @@ def _rods(swings: SwingState) -> Marker:
     marker.pose.orientation.w = 1.0
     ends = np.stack([swings.roots, swings.positions], axis=1).reshape(-1, 3)
     marker.points = [to_point(end) for end in ends]
-    _paint(marker, BROWN)
+    paint(marker, BROWN)
     return marker
 
 
-def _parts(bone: Bone) -> Iterator[tuple[str, tuple[float, ...], tuple[float, ...]]]:
+def parts(bone: Bone) -> Iterator[tuple[str, tuple[float, ...], tuple[float, ...]]]:
     """Kinds, sizes (m) and shifts (m, bone axes) of the markers that make up a bone."""
     shape = bone.shape
     if isinstance(shape, Box):
@@ -112,11 +114,13 @@ def _parts(bone: Bone) -> Iterator[tuple[str, tuple[float, ...], tuple[float, ..
             yield 'sphere', (across,) * 3, (0.0, 0.0, end)
 
 
-def _place(marker: Marker, position: list[float], turn: list[float]) -> None:
-    where, how = marker.pose.position, marker.pose.orientation
+def place(pose: Pose, position: list[float], turn: list[float]) -> None:
+    """Set a pose from m and x, y, z, w; the message stays the same object."""
+    where, how = pose.position, pose.orientation
     where.x, where.y, where.z = position
     how.x, how.y, how.z, how.w = turn
 
 
-def _paint(marker: Marker, color: tuple[float, ...]) -> None:
+def paint(marker: Marker, color: tuple[float, ...]) -> None:
+    """Give a marker its colour (red, green, blue, opacity)."""
     marker.color.r, marker.color.g, marker.color.b, marker.color.a = map(float, color)
