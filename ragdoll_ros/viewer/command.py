@@ -12,6 +12,7 @@ from collections.abc import Iterator
 
 from .. import faults
 from ..scene_file import load_scene
+from .source import Source
 
 PORT = 8080
 HOST = '127.0.0.1'
@@ -25,6 +26,18 @@ EXAMPLE = """examples:
 """
 
 NO_VISER = "ragdoll_viewer needs viser: pip install 'ragdoll_ros[viewer]', or pip install viser"
+
+
+NO_ROS = ("without --scene, ragdoll_viewer listens to a node over ROS 2: source ROS, or "
+          "pip install 'ragdoll_ros[ros]', or name a scene: ragdoll_viewer --scene drop")
+
+
+class NoRos(faults.RagdollError):
+    """No ROS to listen to."""
+
+
+class WrongArguments(faults.RagdollError):
+    """What the command does not take."""
 
 
 class NoPort(faults.RagdollError):
@@ -68,9 +81,8 @@ def parser() -> argparse.ArgumentParser:
 def serve(options: argparse.Namespace, rest: list[str], stop: threading.Event) -> None:
     """Serve the page until told to stop; RagdollError if it cannot be."""
     from .page import Page
-    from .simulated import Simulated
     port = free_port(options.host, options.port)
-    source = Simulated(load_scene(options.scene))
+    source = make_source(options.scene, rest)
     try:
         with server_at(options.host, port) as server:
             page = Page(server, source)
@@ -78,6 +90,20 @@ def serve(options: argparse.Namespace, rest: list[str], stop: threading.Event) -
             page.run(stop)
     finally:
         source.close()
+
+
+def make_source(scene: str | None, rest: list[str]) -> Source:
+    """Simulate a scene here, or listen to a node; RagdollError if that cannot be."""
+    if scene is not None:
+        from .simulated import Simulated
+        if rest:
+            raise WrongArguments(f'{" ".join(rest)}: not with --scene, which does without ROS')
+        return Simulated(load_scene(scene))
+    try:
+        from .remote import Remote
+    except ImportError as error:
+        raise NoRos(f'{error}: {NO_ROS}') from None
+    return Remote(rest)
 
 
 def free_port(host: str, wanted: int | None) -> int:

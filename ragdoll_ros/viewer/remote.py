@@ -4,7 +4,9 @@ The node may be on another machine, may come later, end, and come again with ano
 """
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import operator
 import tempfile
 import threading
 import time
@@ -31,11 +33,11 @@ from ..ros.parameters import BONE_NAMES, SPECS, Settings
 from ..scene import SECOND, Scene
 from ..scene_file import save_scene
 from ..state import State
-from ..swing.mount import mounts
 from .ask import Ask, Refused
 from .remote_hands import RemoteHands
 from .remote_pushes import HeardPushes, Silent
 from .remote_scene import scene_of_node
+from .rods import Rods
 from .source import Frame, Report, Wanted
 
 NAME = 'ragdoll'
@@ -80,8 +82,9 @@ class Remote:
     @property
     def frame(self) -> Frame | None:
         """Where the node's last message says that all is; the last one that fitted the scene."""
-        data, scene, parts = self._poses, self._scene, (self._rods, self._contacts, self._angles)
-        if data is None or scene is None or (data, scene, parts) == self._framed:
+        data, scene = self._poses, self._scene
+        parts = (data, scene, self._masses, self._contacts, self._angles, self._hands.moves)
+        if data is None or scene is None or all(map(operator.is_, parts, self._framed)):
             return self._frame
         try:
             stamp, poses = poses_in(data)
@@ -89,7 +92,7 @@ class Remote:
             return self._frame
         if len(poses) != len(scene.bones) or not np.isfinite(poses).all():
             return self._frame
-        self._framed = (data, scene, parts)
+        self._framed = parts
         self._frame = self._frame_of(scene, stamp, poses)
         return self._frame
 
@@ -188,18 +191,19 @@ class Remote:
         self._zero: int | None = None
         self._note = self._problem = ''
         self._poses: bytes | None = None
-        self._rods = self._contacts = self._angles = None
+        self._rods: Rods | None = None
+        self._masses = self._contacts = self._angles = None
         self._frame: Frame | None = None
-        self._framed: object = None
+        self._framed: tuple = (None,) * 6
         self._pushes: HeardPushes | None = None
 
     def _listen(self) -> None:
         """Bring the subscriptions in line with what is wanted."""
-        wanted, scene = self._wanted, self._scene
+        wanted = self._wanted
         if wanted.frames and 'frames' not in self._subscriptions:
             self._opened, self._heard = time.monotonic(), 0.0
         kinds = {'frames': wanted.frames, 'contacts': wanted.contacts, 'angles': wanted.angles,
-                 'swings': wanted.frames and scene is not None and bool(mounts(scene)),
+                 'swings': wanted.frames and self._rods is not None and self._rods.count > 0,
                  'pushes': wanted.frames and self._pushes is not None}
         for kind, on in kinds.items():
             if on and kind not in self._subscriptions:
@@ -246,8 +250,84 @@ class Remote:
         self._contacts = poses_in(data)[1][:, :3]
 
     def _take_swings(self, data: bytes) -> None:
-        self._rods = poses_in(data)[1]
+        self._masses = poses_in(data)[1][:, :3]
 
     def _take_angles(self, message: JointState) -> None:
         if self._scene is not None and tuple(message.name) == self._scene.angle_names:
             self._angles = np.array(message.position)
+
+    def _take_description(self, message: String) -> None:
+        self._description, self._learned = message.data, False
+        self._learn_if_needed()
+
+    def _take_event(self, message: ParameterEvent) -> None:
+        """Learn anew when the node's parameters change."""
+        if message.node == self._full:
+            self._learned = False
+            self._learn_if_needed()
+
+    def _take_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name == self._status:
+                self._heard = time.monotonic()
+                values = {pair.key: pair.value for pair in status.values}
+                self._told = told(self._told, values)
+                with contextlib.suppress(KeyError, ValueError):
+                    self._zero = int(values['stamp_of_zero'])
+
+    def _learn_if_needed(self) -> None:
+        """Ask what the node simulates, until it is known; called again and again."""
+        self._hands.keep()
+        if self._description is not None and not self._learned:
+            self._ask.parameters((BONE_NAMES, *SPECS), self._learn)
+
+    def _learn(self, values: dict) -> None:
+        """Take the node's parameters, and its scene if that is another one."""
+        names = values.pop(BONE_NAMES)
+        if self._description is None or names is None or None in values.values():
+            return
+        self._settings = Settings(**values)
+        self._hands.frame_id = self._settings.frame_id
+        try:
+            scene, self._note = scene_of_node(self._settings.scene, names, self._description)
+            self._problem, self._learned = '', True
+        except faults.RagdollError as error:
+            # Between two scenes the names are those of one and the URDF that of the other.
+            self._problem = f'what the node simulates is not clear: {error}'
+            return
+        if scene != self._scene:
+            self._scene, self._rods = scene, Rods(scene)
+            self._masses = self._angles = None
+        if self._pushes is None or self._pushes.scene is not self._scene:
+            self._pushes = HeardPushes(self._scene)
+        if 'pushes' in self._subscriptions:
+            self._inputs.simulation, self._inputs.settings = self._pushes, self._settings
+        self._listen()
+
+    def _frame_of(self, scene: Scene, stamp: int, poses: np.ndarray) -> Frame:
+        unknown = np.full((len(poses), 3), np.nan)
+        state = State(poses[:, :3], poses[:, 3:], unknown, unknown)
+        # Before the first report the node's time zero is not known.
+        self._zero = stamp if self._zero is None else self._zero
+        seconds = (stamp - self._zero) / SECOND
+        rods, masses = None, self._masses
+        if masses is not None and self._rods is not None and len(masses) == self._rods.count:
+            rods = self._rods.between(masses, state)
+        pushes = ()
+        if self._pushes is not None and self._pushes.scene is scene:
+            self._pushes.time = seconds
+            pushes = self._pushes.pushes
+        frame = Frame(scene, seconds, state, pushes, rods=rods, contacts=self._contacts,
+                      angles=self._angles)
+        return dataclasses.replace(frame, held=self._hands.held(frame))
+
+
+def told(report: Report, values: dict[str, str]) -> Report:
+    """Take over what the node's diagnostics tell; what cannot be read stays as it was."""
+    try:
+        measures = {key: float(values[key]) for key in KEYS if key in values}
+        return dataclasses.replace(
+            report, paused=values['paused'] == 'True',
+            pace=float(values['real_time_factor']), measures=measures)
+    except (KeyError, ValueError):
+        return report

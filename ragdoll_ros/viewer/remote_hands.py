@@ -37,6 +37,8 @@ class RemoteHands:
         self._client = f'{socket.gethostname()} {os.getpid()}'
         self._hands: dict[str, _Hand] = {}
         self.frame_id = 'world'
+        self.moves = 0
+        """How often a hand was moved so far."""
 
     def grab(self, hand: str, bone: str, local: np.ndarray, target: np.ndarray,
              frame: Frame) -> None:
@@ -63,6 +65,11 @@ class RemoteHands:
         if held is not None:
             self._send(hand, held, InteractiveMarkerFeedback.MOUSE_UP)
 
+    def keep(self) -> None:
+        """Tell that hands which rest still hold; to be called about once a second."""
+        for hand, held in list(self._hands.items()):
+            self._send(hand, held, InteractiveMarkerFeedback.KEEP_ALIVE)
+
     def held(self, frame: Frame) -> tuple[Held, ...]:
         """What the hands hold now."""
         names, state = frame.scene.bone_names, frame.state
@@ -73,6 +80,7 @@ class RemoteHands:
             for bone in (names.index(hand.bone),))
 
     def _send(self, hand: str, held: _Hand, event: int) -> None:
+        self.moves += 1
         place = held.pose[:3] + held.target - held.begin
         turn = Quaternion(**dict(zip('xyzw', held.pose[3:].tolist(), strict=True)))
         self._publisher.publish(InteractiveMarkerFeedback(
