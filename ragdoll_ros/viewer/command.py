@@ -47,7 +47,8 @@ class NoPort(faults.RagdollError):
 def main(arguments: list[str] | None = None) -> int:
     """Serve the page until SIGINT or SIGTERM; 2 if it cannot be as asked."""
     arguments = sys.argv[1:] if arguments is None else arguments
-    options, rest = parser().parse_known_args(arguments)
+    at = arguments.index('--ros-args') if '--ros-args' in arguments else len(arguments)
+    options, for_ros = parser().parse_args(arguments[:at]), arguments[at:]
     stop = threading.Event()
     for sign in (signal.SIGINT, signal.SIGTERM):
         signal.signal(sign, lambda *_: stop.set())
@@ -57,7 +58,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(NO_VISER, file=sys.stderr)
         return 2
     try:
-        serve(options, rest, stop)
+        serve(options, for_ros, stop)
     except faults.RagdollError as error:
         print(error, file=sys.stderr)
         return 2
@@ -78,11 +79,11 @@ def parser() -> argparse.ArgumentParser:
     return parser
 
 
-def serve(options: argparse.Namespace, rest: list[str], stop: threading.Event) -> None:
+def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event) -> None:
     """Serve the page until told to stop; RagdollError if it cannot be."""
     from .page import Page
     port = free_port(options.host, options.port)
-    source = make_source(options.scene, rest)
+    source = make_source(options.scene, for_ros)
     try:
         with server_at(options.host, port) as server:
             page = Page(server, source)
@@ -92,18 +93,18 @@ def serve(options: argparse.Namespace, rest: list[str], stop: threading.Event) -
         source.close()
 
 
-def make_source(scene: str | None, rest: list[str]) -> Source:
+def make_source(scene: str | None, for_ros: list[str]) -> Source:
     """Simulate a scene here, or listen to a node; RagdollError if that cannot be."""
     if scene is not None:
         from .simulated import Simulated
-        if rest:
-            raise WrongArguments(f'{" ".join(rest)}: not with --scene, which does without ROS')
+        if for_ros:
+            raise WrongArguments(f'{" ".join(for_ros)}: not with --scene, which does without ROS')
         return Simulated(load_scene(scene))
     try:
         from .remote import Remote
     except ImportError as error:
         raise NoRos(f'{error}: {NO_ROS}') from None
-    return Remote(rest)
+    return Remote(for_ros)
 
 
 def free_port(host: str, wanted: int | None) -> int:

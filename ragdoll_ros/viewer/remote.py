@@ -18,6 +18,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray, Twist, Vector3
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
@@ -40,6 +41,8 @@ from .remote_scene import scene_of_node
 from .rods import Rods
 from .source import Frame, Report, Wanted
 
+InvalidROSArguments = rclpy_implementation.RCLInvalidROSArgsError
+
 NAME = 'ragdoll'
 
 MISSING = ('no node `{}` yet: start it with `ros2 run ragdoll_ros ragdoll_node` (same '
@@ -60,7 +63,10 @@ class Remote:
     """Listens to the node in its own namespace, in a thread of its own, while a page is open."""
 
     def __init__(self, arguments: list[str]) -> None:
-        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+        try:
+            rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+        except InvalidROSArguments as error:
+            raise Refused(str(error)) from None
         self._node = Node('ragdoll_viewer')
         self._full = f'{self._node.get_namespace().rstrip("/")}/{NAME}'
         self._status = status_name(self._node.get_namespace(), NAME)
@@ -150,8 +156,10 @@ class Remote:
         try:
             self.load(str(path))
         except Refused as error:
-            raise Refused(f'{error}\n(the scene is in {path} on the machine of this page; a node '
-                          'on another machine cannot read it there)') from None
+            if faults.Unreadable.__name__ not in str(error):
+                raise
+            raise Refused(f'the scene was written to {path} on the machine of this page; the node '
+                          f'seems to be on another one, as it cannot read that: {error}') from None
 
     def grab(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
         """Let a hand hold a bone at a point."""
