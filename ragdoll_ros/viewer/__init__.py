@@ -1,0 +1,1 @@
+"""A page in the browser: shows the scene live, grabs, pushes, edits, records."""
