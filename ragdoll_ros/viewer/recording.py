@@ -76,7 +76,7 @@ class Recording:
         """Positions (n, 3) m and orientations (n, 4) at ``time`` s, between poses on the way.
 
         Before the first and after the last pose: that one. Between two: positions on the
-        straight line, orientations on the shorter arc (normalised mean, less than 0.1 degrees
+        straight line, orientations on the shorter arc (normalised mean, less than 0.04 degrees
         from the arc's even motion as long as a bone turns less than 30 degrees in between).
         """
         after = int(np.clip(np.searchsorted(self.times, time), 1, max(1, len(self.times) - 1)))
