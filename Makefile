@@ -38,8 +38,8 @@ AS_ROOT := $(shell test "$$(id -u)" = 0 || echo sudo -n) env DEBIAN_FRONTEND=non
 chromium:
 	@command -v $(CHROMIUM) >/dev/null || command -v google-chrome >/dev/null || { \
 	  echo 'Installing chromium, in which the page is tested'; \
-	  $(AS_ROOT) apt-get update --quiet=2 && $(AS_ROOT) apt-get install --quiet=2 --yes \
-	  --no-install-recommends chromium; } >$(VENV)/chromium.log 2>&1 || true
+	  { $(AS_ROOT) apt-get update && $(AS_ROOT) apt-get install --yes --no-install-recommends \
+	  chromium; } >/dev/null 2>&1 || echo 'That needs root and Debian: apt-get install chromium' >&2; }
 
 lint: $(READY) ## ruff
 	@$(BIN)/python -m ruff check .

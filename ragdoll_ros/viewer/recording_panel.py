@@ -1,0 +1,96 @@
+"""Buttons that take what the page shows with them: the run as JSON, the view as PNG."""
+from __future__ import annotations
+
+import threading
+
+import imageio.v3 as iio
+import numpy as np
+import viser
+
+from ..scene import Scene
+from .recording import Recorder, recording_text
+
+MOST_NUMBERS = 5_000_000
+"""In one recording: 100 MB as JSON; 20 minutes of ten bones at 60 Hz, half a minute of 500."""
+
+RENDER_TIMEOUT = 20.0
+"""s that a page may take for its picture."""
+
+RECORD, STOP = 'Record', 'Stop and download'
+
+
+class RecordingPanel:
+    """Two buttons in the page's panel; what is shown is told by take(), from any thread.
+
+    All pages share one recording: whoever stops it gets it.
+    """
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._recorder: Recorder | None = None
+        self._lock = threading.Lock()
+        with server.gui.add_folder('Recording', expand_by_default=False):
+            self._button = server.gui.add_button(
+                RECORD, icon=viser.Icon.PLAYER_RECORD,
+                hint='Poses of all bones as run.json; ragdoll_viewer --play run.json shows them')
+            picture = server.gui.add_button('Picture', icon=viser.Icon.CAMERA,
+                                            hint='This view as ragdoll.png')
+        self._scene: Scene | None = None
+        self._button.on_click(self._clicked)
+        picture.on_click(_send_picture)
+
+    @property
+    def recording(self) -> bool:
+        """Whether poses are being taken."""
+        return self._recorder is not None
+
+    def take(self, scene: Scene, time: float, positions: np.ndarray,
+             orientations: np.ndarray) -> None:
+        """Tell what is shown: poses (n, 3) m and (n, 4) xyzw of the scene's bones at ``time`` s.
+
+        Another scene, or as much as one recording may hold, ends what is being taken; it waits
+        for its download.
+        """
+        self._scene = scene
+        with self._lock:
+            recorder = self._recorder
+            if recorder is None or recorder.scene is not scene:
+                return
+            if 7 * len(recorder) * len(positions) < MOST_NUMBERS:
+                recorder.add(time, positions, orientations)
+
+    def _clicked(self, event: viser.GuiEvent) -> None:
+        with self._lock:
+            recorder, self._recorder = self._recorder, None
+            if recorder is None and self._scene is not None:
+                self._recorder = Recorder(self._scene)
+            self._button.label = STOP if self._recorder else RECORD
+        if recorder and event.client is not None:
+            _send_run(recorder, event.client)
+
+
+def _send_run(recorder: Recorder, client: viser.ClientHandle) -> None:
+    if not len(recorder):
+        client.add_notification('Nothing recorded', 'No pose has come since Record was pressed.')
+        return
+    text = recording_text(recorder.recording())
+    client.send_file_download('run.json', text.encode(), save_immediately=True)
+
+
+def _send_picture(event: viser.GuiEvent) -> None:
+    client = event.client
+    if client is None:
+        return
+    size = client.camera.image_height, client.camera.image_width
+    try:
+        picture = client.get_render(*size, transport_format='png', timeout=RENDER_TIMEOUT)
+    except TimeoutError:
+        client.add_notification('No picture', f'The page drew none within {RENDER_TIMEOUT:g} s.')
+        return
+    content = iio.imwrite('<bytes>', _on_white(picture), extension='.png')
+    client.send_file_download('ragdoll.png', content, save_immediately=True)
+
+
+def _on_white(picture: np.ndarray) -> np.ndarray:
+    """Lay a picture (h, w, 4) uint8 with transparent parts on white: (h, w, 3) uint8."""
+    share = picture[..., 3:] / 255
+    return np.rint(picture[..., :3] * share + 255 * (1 - share)).astype(np.uint8)
