@@ -14,9 +14,9 @@ PATIENCE = 20.0
 
 SIZE = {'width': 960, 'height': 600}
 
-FLAGS = ('--no-sandbox --disable-gpu --disable-quic --no-first-run '
-         '--disable-background-networking --disable-component-update --disable-sync '
-         '--use-angle=swiftshader --enable-unsafe-swiftshader').split()
+FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+         '--disable-background-networking', '--disable-component-update', '--disable-sync',
+         '--use-angle=swiftshader', '--enable-unsafe-swiftshader']
 
 REQUIRED = os.environ.get('RAGDOLL_BROWSER') == 'required'
 """Whether a missing browser is a failure (.ci/run) or a reason to skip."""

@@ -1,1 +1,1 @@
-"""A page in the browser: shows the scene live, grabs, pushes, edits, records."""
+"""The page in the browser: viser, and what it shows."""

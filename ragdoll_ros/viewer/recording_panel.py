@@ -8,7 +8,9 @@ import numpy as np
 import viser
 
 from ..scene import Scene
-from .recording import Recorder, recording_text
+from .recording import Pose, Recorder
+from .recording_file import recording_text
+from .source import Frame
 
 MOST_NUMBERS = 5_000_000
 """In one recording: 100 MB as JSON; 20 minutes of ten bones at 60 Hz, half a minute of 500."""
@@ -43,20 +45,20 @@ class RecordingPanel:
         """Whether poses are being taken."""
         return self._recorder is not None
 
-    def take(self, scene: Scene, time: float, positions: np.ndarray,
-             orientations: np.ndarray) -> None:
-        """Tell what is shown: poses (n, 3) m and (n, 4) xyzw of the scene's bones at ``time`` s.
+    def take(self, frame: Frame) -> None:
+        """Tell what is shown.
 
         Another scene, or as much as one recording may hold, ends what is being taken; it waits
         for its download.
         """
-        self._scene = scene
+        self._scene = frame.scene
+        pose = Pose(frame.state.positions, frame.state.orientations, frame.rods)
         with self._lock:
             recorder = self._recorder
-            if recorder is None or recorder.scene is not scene:
+            if recorder is None or recorder.scene is not frame.scene:
                 return
-            if 7 * len(recorder) * len(positions) < MOST_NUMBERS:
-                recorder.add(time, positions, orientations)
+            if len(recorder) * (7 * len(pose.positions) + np.size(pose.rods)) < MOST_NUMBERS:
+                recorder.add(frame.time, pose)
 
     def _clicked(self, event: viser.GuiEvent) -> None:
         with self._lock:
