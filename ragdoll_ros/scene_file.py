@@ -62,7 +62,7 @@ def load_scene(name: str) -> Scene:
     except Fault as fault:
         raise Faults(str(name), [fault]) from None
     if isinstance(data, dict) and 'bones' in data:
-        return above_ground(_raise_or_give(path, *build_doll(data, path.stem)))
+        return above_ground(_raise_or_give(path, *build_doll(data, path)))
     return _raise_or_give(path, *build_scene(data, path))
 
 
@@ -73,17 +73,17 @@ def load_doll(name: str) -> Ragdoll:
         data = _read(path)
     except Fault as fault:
         raise Faults(str(name), [fault]) from None
-    return _raise_or_give(path, *build_doll(data, path.stem))
+    return _raise_or_give(path, *build_doll(data, path))
 
 
 def save_scene(scene: Scene, path: str | Path, head: str = '') -> None:
     """Write a scene with its dolls in it; load_scene gives an equal one back."""
-    _write(scene_data(scene), path, 'scene', head)
+    _write(scene_data(scene, Path(path).parent), path, 'scene', head)
 
 
 def save_doll(doll: Ragdoll, path: str | Path, head: str = '') -> None:
     """Write a doll; load_doll gives an equal one back."""
-    _write(doll_data(doll), path, 'doll', head)
+    _write(doll_data(doll, Path(path).parent), path, 'doll', head)
 
 
 def build_scene(data: object, path: Path) -> tuple[Scene | None, list[Fault]]:
@@ -100,7 +100,7 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[Fault]]:
         doll, more = _placed_doll(entry['doll'], path)
         found += [fault.at(f'{where}.doll') for fault in more]
         if doll is not None and not _any_under(found, where):
-            doll, more = _with_swings(doll, entry)
+            doll, more = _with_swings(doll, entry, path)
             found += [fault.at(where) for fault in more]
         if doll is not None and not _any_under(found, where):
             fields = {'position', 'orientation', 'velocity', 'spin', 'name'} & set(entry)
@@ -119,8 +119,9 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[Fault]]:
     return scene, found
 
 
-def build_doll(data: object, name: str = 'doll') -> tuple[Ragdoll | None, list[Fault]]:
-    """Make a doll from what a YAML file holds: the doll, or None and every fault."""
+def build_doll(data: object,
+               path: Path = Path('doll')) -> tuple[Ragdoll | None, list[Fault]]:
+    """Make a doll from what the YAML file at ``path`` holds: the doll, or None and every fault."""
     found = _schema_faults('doll', data)
     if not isinstance(data, dict):
         return None, found
@@ -138,30 +139,36 @@ def build_doll(data: object, name: str = 'doll') -> tuple[Ragdoll | None, list[F
                 found += carried_faults(key, names, carried)
     if found:
         return None, found
-    return Ragdoll(data.get('name', name), tuple(bones), tuple(joints), tuple(swings),
-                   tuple(riders)), found
+    model = str(path.parent / data['model']) if 'model' in data else None
+    return Ragdoll(data.get('name', path.stem), tuple(bones), tuple(joints), tuple(swings),
+                   tuple(riders), model), found
 
 
-def doll_data(doll: Ragdoll) -> dict:
-    """Give a doll as plain lists and numbers, the form of doll.schema.json."""
+def doll_data(doll: Ragdoll, folder: Path | None = None) -> dict:
+    """Give a doll as plain lists and numbers, the form of doll.schema.json.
+
+    The path of its character is written as seen from ``folder``, if given.
+    """
     data = {'name': doll.name, 'bones': [_bone_data(bone) for bone in doll.bones],
             'joints': [_joint_data(joint) for joint in doll.joints]}
     if doll.swings:
         data['swings'] = [swing_data(swing) for swing in doll.swings]
     if doll.riders:
         data['riders'] = [_rider_data(rider) for rider in doll.riders]
+    if doll.model is not None:
+        data['model'] = doll.model if folder is None else _seen_from(folder, doll.model)
     return data
 
 
-def scene_data(scene: Scene) -> dict:
-    """Give a scene as plain lists and numbers, the form of scene.schema.json."""
+def scene_data(scene: Scene, folder: Path | None = None) -> dict:
+    """Give a scene as plain lists and numbers, the form of scene.schema.json; see doll_data."""
     data = {'name': scene.name, 'gravity': list(scene.gravity), 'step': scene.step,
             'pace': scene.pace, 'self_collision': scene.self_collision,
             'material': dict(vars(scene.material)), 'ground': None, 'dolls': []}
     if scene.ground is not None:
         data['ground'] = {'normal': list(scene.ground.normal), 'offset': scene.ground.offset}
     for placement in scene.dolls:
-        entry = {'doll': doll_data(placement.doll), 'name': placement.name}
+        entry = {'doll': doll_data(placement.doll, folder), 'name': placement.name}
         for key in ('position', 'orientation', 'velocity', 'spin'):
             entry[key] = list(getattr(placement, key))
         data['dolls'].append(entry)
@@ -175,6 +182,15 @@ class _Loader(getattr(yaml, 'CSafeLoader', yaml.SafeLoader)):
 _Loader.add_implicit_resolver(
     'tag:yaml.org,2002:float', re.compile(r'^[-+]?[0-9][0-9_]*[eE][-+]?[0-9]+$'),
     list('-+0123456789'))
+
+
+def _seen_from(folder: Path, model: str) -> str:
+    """Path of a character as it stands in a file of ``folder``: with slashes, relative."""
+    try:
+        return Path(os.path.relpath(model, folder)).as_posix()
+    except ValueError:
+        # Another drive has no way there.
+        return model
 
 
 def _read(path: Path) -> object:
@@ -241,25 +257,25 @@ def _expected(error: jsonschema.ValidationError) -> str:
 def _placed_doll(source: object, path: Path) -> tuple[Ragdoll | None, list[Fault]]:
     """Make the doll a scene names; faults of another file carry its name."""
     if isinstance(source, dict):
-        return build_doll(source)
+        return build_doll(source, path.with_name('doll'))
     if not isinstance(source, str):
         return None, []
     try:
         file = find(source, beside=path.parent)
-        doll, found = build_doll(_read(file), file.stem)
+        doll, found = build_doll(_read(file), file)
     except Fault as fault:
         return None, [fault]
     return doll, [fault.at(f'({file.name})') for fault in found]
 
 
-def _with_swings(doll: Ragdoll, entry: dict) -> tuple[Ragdoll | None, list[Fault]]:
+def _with_swings(doll: Ragdoll, entry: dict, path: Path) -> tuple[Ragdoll | None, list[Fault]]:
     """Give the doll the swings that its place in the scene adds to its own."""
     if not entry.get('swings'):
         return doll, []
     own = len(doll.swings)
     data = doll_data(doll)
     data['swings'] = data.get('swings', []) + entry['swings']
-    dressed, found = build_doll(data)
+    dressed, found = build_doll(data, path)
     shift = re.compile(r'^swings\[(\d+)\]')
     return dressed, [type(fault)(
         shift.sub(lambda match: f'swings[{int(match[1]) - own}]', fault.path),
