@@ -4,10 +4,14 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+import time
+from collections import Counter
 from contextlib import contextmanager
 
 import numpy as np
 import pytest
+
+from ragdoll_ros.parts import parts_of
 
 PATIENCE = 20.0
 """s that the page may take for anything: it draws some 6 pictures a second without a GPU."""
@@ -21,14 +25,22 @@ FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
 REQUIRED = os.environ.get('RAGDOLL_BROWSER') == 'required'
 """Whether a missing browser is a failure (.ci/run) or a reason to skip."""
 
-POSES = """names => {
+READY = """() => (window.__viserMutable?.scene && window.__viserMutable.nodeRefFromName['']) != null"""
+
+BODIES = """() => {
   const {scene, nodeRefFromName: nodes} = window.__viserMutable;
-  if (names.some(name => !nodes[name])) return null;
   scene.updateMatrixWorld();
   const toWorld = nodes[''].matrixWorld.clone().invert();
-  return names.map(name => toWorld.clone().multiply(nodes[name].matrixWorld).elements);
+  const bodies = {};
+  for (const [name, node] of Object.entries(nodes)) node?.traverse(mesh => {
+    const kind = name.split('/scene/bodies/')[1];
+    if (!kind || !mesh.isInstancedMesh2) return;
+    bodies[kind] = Array.from({length: mesh.instancesCount}, (_, index) =>
+      toWorld.clone().multiply(mesh.matrixWorld).multiply(mesh.getMatrixAt(index)).elements);
+  });
+  return bodies;
 }"""
-"""Matrices of nodes, column by column, in the frame of the page's root: z up."""
+"""Matrices that the graphics card gets of each instance, by kind, column by column; z up."""
 
 TO_PIXELS = """points => {
   const {camera, canvas, nodeRefFromName: nodes} = window.__viserMutable;
@@ -79,24 +91,32 @@ class View:
         self.errors = []
         self.page.on('pageerror', lambda error: self.errors.append(str(error)))
         self.page.goto(url)
+        self.page.wait_for_function(READY)
 
-    def matrices(self, nodes):
-        """Poses of scene nodes as the page draws them next: (n, 4, 4), world frame, z up."""
-        self.page.wait_for_function(f'names => ({POSES})(names) !== null', arg=list(nodes))
-        columns = self.page.evaluate(POSES, list(nodes))
-        return np.array(columns).reshape(-1, 4, 4).transpose(0, 2, 1)
+    def bodies(self, scene):
+        """Place of each bone as it is drawn, (n, 3) m, z up; None while not all are there.
 
-    def positions(self, nodes):
-        """Places of scene nodes: (n, 3) m, world frame, z up."""
-        return self.matrices(nodes)[:, :3, 3]
+        Read from three.js' instances; the page keeps parts of one kind in the scene's order.
+        """
+        drawn = self.page.evaluate(BODIES)
+        kinds = [part.kind for bone in scene.bones for part in parts_of(bone)]
+        assert len(kinds) == len(scene.bones), 'bones of one part each'
+        if {kind: len(matrices) for kind, matrices in drawn.items()} != Counter(kinds):
+            return None
+        instances = {kind: iter(matrices) for kind, matrices in drawn.items()}
+        return np.array([next(instances[kind])[12:15] for kind in kinds])
 
     def pixels(self, points):
         """Where points (n, 3) m of the world are on the page: (n, 2), as the mouse counts."""
         return np.array(self.page.evaluate(TO_PIXELS, np.asarray(points).tolist()))
 
-    def wait(self, condition, *arguments):
-        """Wait until a JavaScript function of the list of arguments gives true."""
-        self.page.wait_for_function(condition, arg=list(arguments))
+    def wait(self, condition):
+        """Wait until a condition holds, and give what it said; the page goes on meanwhile."""
+        end = time.monotonic() + PATIENCE
+        while not (said := condition()):
+            assert time.monotonic() < end, 'not in time'
+            self.page.wait_for_timeout(20)
+        return said
 
     def close(self):
         self.page.close()
