@@ -6,6 +6,7 @@ and contacts ask for.
 """
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -110,7 +111,8 @@ class Stepper:
                  accuracy: Accuracy) -> None:
         self.accuracy = accuracy
         self.engine = make_engine(scene)
-        self._free = make_engine(scene, free=True) if accuracy.order else None
+        self._make_free = functools.partial(make_engine, scene, free=True)
+        self._free = self._make_free() if accuracy.order else None
         self.reach = Reach(scene)
         self._layout = self.engine.layout
         self._normal = np.array(scene.ground.normal if scene.ground else (0.0, 0.0, 1.0))
@@ -126,6 +128,13 @@ class Stepper:
         """Start, duration in s, loads and end of the flight that the last tick ended with."""
         self.effort = Effort()
         self.begin()
+
+    @property
+    def free(self) -> Engine:
+        """The scene without contacts and limits, to be asked for accelerations."""
+        if self._free is None:
+            self._free = self._make_free()
+        return self._free
 
     def look(self) -> None:
         """Read where the engine is."""

@@ -1,14 +1,14 @@
 """Bones and pushes as markers, for RViz."""
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from visualization_msgs.msg import Marker, MarkerArray
 
 from .. import rotation
+from ..parts import parts_of
 from ..push import Push
-from ..ragdoll import Bone, Box, Capsule, Cylinder
 from ..scene import Scene
 from ..state import State
 from ..swing.pose import SwingState
@@ -32,9 +32,9 @@ class Markers:
     def __init__(self, scene: Scene, frame: str) -> None:
         self._scene = scene
         self._frame = frame
-        self._parts = [part for bone in scene.bones for part in _parts(bone)]
-        self._bones = [index for index, bone in enumerate(scene.bones) for _ in _parts(bone)]
-        self._shifts = np.array([shift for *_, shift in self._parts])
+        self._parts = [part for bone in scene.bones for part in parts_of(bone)]
+        self._bones = [index for index, bone in enumerate(scene.bones) for _ in parts_of(bone)]
+        self._shifts = np.array([part.shift for part in self._parts])
         self._markers = [self._marker(number) for number in range(len(self._parts))]
         self._arrows = 0
 
@@ -59,12 +59,12 @@ class Markers:
         return MarkerArray(markers=self._markers + arrows + gone + rods)
 
     def _marker(self, number: int) -> Marker:
-        kind, size, _ = self._parts[number]
+        part = self._parts[number]
         color = self._scene.bones[self._bones[number]].color or GRAY
         name = self._scene.bone_names[self._bones[number]]
         same = self._bones[:number].count(self._bones[number])
-        marker = Marker(ns=name, id=same, type=_KINDS[kind], action=Marker.ADD)
-        marker.scale = to_vector(size)
+        marker = Marker(ns=name, id=same, type=_KINDS[part.kind], action=Marker.ADD)
+        marker.scale = to_vector(part.size)
         _paint(marker, color)
         return marker
 
@@ -95,21 +95,6 @@ def _rods(swings: SwingState) -> Marker:
     marker.points = [to_point(end) for end in ends]
     _paint(marker, BROWN)
     return marker
-
-
-def _parts(bone: Bone) -> Iterator[tuple[str, tuple[float, ...], tuple[float, ...]]]:
-    """Kinds, sizes (m) and shifts (m, bone axes) of the markers that make up a bone."""
-    shape = bone.shape
-    if isinstance(shape, Box):
-        yield 'box', shape.size, (0.0, 0.0, 0.0)
-        return
-    across = 2 * shape.radius
-    if isinstance(shape, Cylinder | Capsule):
-        yield 'cylinder', (across, across, shape.length), (0.0, 0.0, 0.0)
-    if not isinstance(shape, Cylinder):
-        half = shape.length / 2 if isinstance(shape, Capsule) else 0.0
-        for end in (half, -half) if half else (0.0,):
-            yield 'sphere', (across,) * 3, (0.0, 0.0, end)
 
 
 def _place(marker: Marker, position: list[float], turn: list[float]) -> None:

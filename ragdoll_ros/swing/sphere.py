@@ -9,6 +9,8 @@ import numpy as np
 _TINY = 1e-150
 """Keeps 0/0 away, and is lost in rounding beside any other length."""
 
+_YZX = np.array([1, 2, 0])
+
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Scalar products (n,)."""
@@ -17,12 +19,9 @@ def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Vector products (3, n)."""
-    (ax, ay, az), (bx, by, bz) = a, b
-    out = np.empty_like(b)
-    out[0] = ay * bz - az * by
-    out[1] = az * bx - ax * bz
-    out[2] = ax * by - ay * bx
-    return out
+    turned = a * b.take(_YZX, axis=0)
+    turned -= b * a.take(_YZX, axis=0)
+    return turned.take(_YZX, axis=0)
 
 
 def arc(d: np.ndarray, target: np.ndarray) -> np.ndarray:
@@ -50,8 +49,7 @@ def along(d: np.ndarray, x: np.ndarray, *tangents: np.ndarray) -> list[np.ndarra
     scale = 1 / (1 + square)
     ratio = tan / half
     slope = ratio * scale  # sin |x| / |x|
-    bend = slope * ratio / 2  # (1 - cos |x|) / |x|^2
     end = ((1 - square) * scale) * d + slope * x
     end /= np.sqrt(dot(end, end))
-    lost = slope * d + bend * x
+    lost = (ratio / 2) * (d + end)
     return [end, *(v - dot(x, v) * lost for v in tangents)]

@@ -158,6 +158,9 @@ class Swings:
                           self._order)
 
 
+_NOTHING = Flight(np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 4)))
+
+
 class _Free:
     """Masses that fall by themselves: closed form, from where the start had them."""
 
@@ -180,6 +183,8 @@ class _Free:
 
     def at(self, time: float) -> Flight:
         """Give the masses at ``time`` s."""
+        if not len(self._bone):
+            return _NOTHING
         t = time - self._begin
         return Flight(self._from + self._velocity * t + self._gravity * (t * t / 2),
                       self._velocity + self._gravity * t, self._turn)
