@@ -16,7 +16,7 @@ from ragdoll_ros.parts import parts_of
 PATIENCE = 20.0
 """s that the page may take for anything: it draws some 6 pictures a second without a GPU."""
 
-SIZE = {'width': 960, 'height': 600}
+SIZE = {'width': 800, 'height': 520}
 
 FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
          '--disable-background-networking', '--disable-component-update', '--disable-sync',
@@ -25,7 +25,7 @@ FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
 REQUIRED = os.environ.get('RAGDOLL_BROWSER') == 'required'
 """Whether a missing browser is a failure (.ci/run) or a reason to skip."""
 
-READY = """() => (window.__viserMutable?.scene && window.__viserMutable.nodeRefFromName['']) != null"""
+READY = "window.__viserMutable?.scene && window.__viserMutable.nodeRefFromName['']"
 
 BODIES = """() => {
   const {scene, nodeRefFromName: nodes} = window.__viserMutable;
