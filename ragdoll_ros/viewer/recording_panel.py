@@ -65,8 +65,8 @@ class RecordingPanel:
             recorder, self._recorder = self._recorder, None
             if recorder is None and self._scene is not None:
                 self._recorder = Recorder(self._scene)
-            self._button.label = STOP if self._recorder else RECORD
-        if recorder and event.client is not None:
+            self._button.label = RECORD if self._recorder is None else STOP
+        if recorder is not None and event.client is not None:
             _send_run(recorder, event.client)
 
 
