@@ -20,9 +20,6 @@ BROWN = (0.35, 0.2, 0.1, 1.0)
 ROD = 0.01
 """m: thickness of the rods of swings."""
 
-ARROW = 0.5
-"""m: length of the arrow of a push of 1 kN; longer and shorter ones go by the square root."""
-
 _KINDS = {'box': Marker.CUBE, 'sphere': Marker.SPHERE, 'cylinder': Marker.CYLINDER}
 
 
@@ -71,17 +68,11 @@ class Markers:
     def _arrow(self, number: int, push: Push, state: State) -> Marker:
         """Arrow whose tip is where the push attacks."""
         bone = self._scene.bone_index(push.bone)
-        turn = state.orientations[bone]
-        force, point = np.array(push.force), np.array(push.point)
-        if push.local:
-            force = rotation.rotate(turn, force)
-            point = rotation.rotate(turn, point)
-        strength = float(np.linalg.norm(force))
-        length = ARROW * (strength / 1000) ** 0.5
-        tail = state.positions[bone] + point - force * (length / strength)
+        tail, tip = push.arrow(state.positions[bone], state.orientations[bone])
         marker = Marker(ns='push', id=number, type=Marker.ARROW, action=Marker.ADD)
-        marker.scale = to_vector((length, 0.04, 0.06))
-        _place(marker, tail.tolist(), rotation.shortest_arc(np.array([1.0, 0, 0]), force).tolist())
+        marker.scale = to_vector((np.linalg.norm(tip - tail), 0.04, 0.06))
+        _place(marker, tail.tolist(), rotation.shortest_arc(
+            np.array([1.0, 0, 0]), tip - tail).tolist())
         _paint(marker, RED)
         return marker
 
