@@ -38,6 +38,9 @@ FRESH = 5e-3
 FARTHEST = 1e6
 """m from the world's origin that a hand may be."""
 
+MOST_HANDS = 20
+"""Hands that may hold something at once; one more is refused."""
+
 EVENLY = 0.05
 """s within which a hand gets where it shall be: the time between two of 20 events a second."""
 
@@ -111,6 +114,8 @@ class Hands:
         now = state.positions[index] + rotation.rotate(state.orientations[index], held)
         aim = now if target is None else np.array(_checked('target', target))
         self.let_go(name)
+        if len(self._hands) >= MOST_HANDS:
+            raise faults.OutOfRange('hands', MOST_HANDS + 1, f'at most {MOST_HANDS}')
         self._hands[name] = _Hand(index, held, now, aim, 0.0 if target is None else EVENLY)
 
     def drag(self, name: str, target: Sequence[float], within: float) -> None:

@@ -30,6 +30,18 @@ EXAMPLE = """examples:
 NO_VISER = "ragdoll_viewer needs viser: pip install 'ragdoll_ros[viewer]', or pip install viser"
 
 
+NO_ROS = ("without --scene, ragdoll_viewer listens to a node over ROS 2: source ROS, or "
+          "pip install 'ragdoll_ros[ros]', or name a scene: ragdoll_viewer --scene drop")
+
+
+class NoRos(faults.RagdollError):
+    """No ROS to listen to."""
+
+
+class WrongArguments(faults.RagdollError):
+    """What the command does not take."""
+
+
 class NoPort(faults.RagdollError):
     """An address that nothing can be served at."""
 
@@ -74,7 +86,7 @@ def serve(options: argparse.Namespace, rest: list[str], stop: threading.Event) -
     """Serve the page until told to stop; RagdollError if it cannot be."""
     from .page import Page
     port = free_port(options.host, options.port)
-    source = source_of(options)
+    source = make_source(options, rest)
     try:
         with server_at(options.host, port) as server:
             page = Page(server, source)
@@ -84,14 +96,23 @@ def serve(options: argparse.Namespace, rest: list[str], stop: threading.Event) -
         source.close()
 
 
-def source_of(options: argparse.Namespace) -> Source:
-    """Make what the options ask for; RagdollError if it cannot be."""
-    if options.play:
+def make_source(options: argparse.Namespace, rest: list[str]) -> Source:
+    """Simulate a scene here, play a run, or listen to a node; RagdollError if that cannot be."""
+    alone = next((f'--{key}' for key in ('scene', 'play') if getattr(options, key) is not None), '')
+    if alone and rest:
+        raise WrongArguments(f'{" ".join(rest)}: not with {alone}, which does without ROS')
+    if options.play is not None:
         from .playback import Playback
         from .recording_file import load_recording
         return Playback(load_recording(options.play), Path(options.play).name)
-    from .simulated import Simulated
-    return Simulated(load_scene(options.scene))
+    if options.scene is not None:
+        from .simulated import Simulated
+        return Simulated(load_scene(options.scene))
+    try:
+        from .remote import Remote
+    except ImportError as error:
+        raise NoRos(f'{error}: {NO_ROS}') from None
+    return Remote(rest)
 
 
 def free_port(host: str, wanted: int | None) -> int:

@@ -7,7 +7,6 @@ import imageio.v3 as iio
 import numpy as np
 import viser
 
-from ..scene import Scene
 from .recording import Pose, Recorder
 from .recording_file import recording_text
 from .source import Frame
@@ -36,7 +35,7 @@ class RecordingPanel:
                 hint='Poses of all bones as run.json; ragdoll_viewer --play run.json shows them')
             picture = server.gui.add_button('Picture', icon=viser.Icon.CAMERA,
                                             hint='This view as ragdoll.png')
-        self._scene: Scene | None = None
+        self._frame: Frame | None = None
         self._button.on_click(self._clicked)
         picture.on_click(_send_picture)
 
@@ -51,29 +50,31 @@ class RecordingPanel:
         Another scene, or as much as one recording may hold, ends what is being taken; it waits
         for its download.
         """
-        self._scene = frame.scene
-        pose = Pose(frame.state.positions, frame.state.orientations, frame.rods)
         with self._lock:
-            recorder = self._recorder
-            if recorder is None or recorder.scene is not frame.scene:
-                return
-            if len(recorder) * (7 * len(pose.positions) + np.size(pose.rods)) < MOST_NUMBERS:
-                recorder.add(frame.time, pose)
+            self._frame = frame
+            self._record(frame)
+
+    def _record(self, frame: Frame) -> None:
+        recorder = self._recorder
+        if recorder is None or recorder.scene is not frame.scene:
+            return
+        pose = Pose(frame.state.positions, frame.state.orientations, frame.rods)
+        numbers = pose.positions.size + pose.orientations.size + np.size(pose.rods)
+        if len(recorder) * numbers < MOST_NUMBERS:
+            recorder.add(frame.time, pose)
 
     def _clicked(self, event: viser.GuiEvent) -> None:
         with self._lock:
             recorder, self._recorder = self._recorder, None
-            if recorder is None and self._scene is not None:
-                self._recorder = Recorder(self._scene)
+            if recorder is None and self._frame is not None:
+                self._recorder = Recorder(self._frame.scene)
+                self._record(self._frame)
             self._button.label = RECORD if self._recorder is None else STOP
         if recorder is not None and event.client is not None:
             _send_run(recorder, event.client)
 
 
 def _send_run(recorder: Recorder, client: viser.ClientHandle) -> None:
-    if not len(recorder):
-        client.add_notification('Nothing recorded', 'No pose has come since Record was pressed.')
-        return
     text = recording_text(recorder.recording())
     client.send_file_download('run.json', text.encode(), save_immediately=True)
 

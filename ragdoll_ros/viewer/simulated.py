@@ -11,6 +11,7 @@ from concurrent.futures import Future
 import numpy as np
 
 from .. import faults, rotation
+from ..grab import EVENLY
 from ..pacing import Pacer
 from ..push import Push
 from ..ragdoll import Vector
@@ -110,7 +111,8 @@ class Simulated:
 
     def drag(self, hand: str, target: Vector) -> None:
         """Move a hand."""
-        self._commands.put(lambda: self._simulation.drag(hand, target))
+        self._commands.put(lambda: self._simulation.drag(hand, target,
+                                                         EVENLY * self._report.pace))
 
     def let_go(self, hand: str) -> None:
         """Open a hand; what it held keeps its speed."""
