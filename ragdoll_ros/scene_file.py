@@ -24,6 +24,9 @@ from .swing.form import swing_data, swing_from
 LARGEST_FILE = 32_000_000
 """Bytes; a doll of 10 000 bones takes 3 MB."""
 
+LARGEST_CONTENT = 5_000_000
+"""Values in a file; a doll of 10 000 bones has 0.3 million."""
+
 
 def config_folder() -> Path:
     """Folder of the shipped scenes: the checkout's, else the ROS prefix's, else the package's."""
@@ -61,6 +64,11 @@ def load_scene(name: str) -> Scene:
         data = _read(path)
     except Fault as fault:
         raise Faults(str(name), [fault]) from None
+    return scene_from(data, path)
+
+
+def scene_from(data: object, path: Path) -> Scene:
+    """Make a scene from what a YAML file at ``path`` holds, a scene or a doll; see load_scene."""
     if isinstance(data, dict) and 'bones' in data:
         return above_ground(_raise_or_give(path, *build_doll(data, path)))
     return _raise_or_give(path, *build_scene(data, path))
@@ -78,12 +86,13 @@ def load_doll(name: str) -> Ragdoll:
 
 def save_scene(scene: Scene, path: str | Path, head: str = '') -> None:
     """Write a scene with its dolls in it; load_scene gives an equal one back."""
-    _write(scene_data(scene, Path(path).parent), path, 'scene', head)
+    Path(path).write_text(scene_text(scene, Path(path).parent, head), encoding='utf-8')
 
 
 def save_doll(doll: Ragdoll, path: str | Path, head: str = '') -> None:
     """Write a doll; load_doll gives an equal one back."""
-    _write(doll_data(doll, Path(path).parent), path, 'doll', head)
+    text = _text(doll_data(doll, Path(path).parent), 'doll', head)
+    Path(path).write_text(text, encoding='utf-8')
 
 
 def build_scene(data: object, path: Path) -> tuple[Scene | None, list[Fault]]:
@@ -197,23 +206,65 @@ def _read(path: Path) -> object:
     if path.stat().st_size > LARGEST_FILE:
         raise faults.Unreadable('', f'{path.stat().st_size} bytes', f'at most {LARGEST_FILE}')
     try:
-        return yaml.load(path.read_text(encoding='utf-8'), _Loader)
+        return parse(path.read_bytes())
+    except OSError as error:
+        raise faults.Unreadable('', str(error), 'a YAML file in UTF-8') from None
+
+
+def parse(content: bytes) -> object:
+    """Give what a YAML file holds as plain data; Unreadable with the place where it is none."""
+    if len(content) > LARGEST_FILE:
+        raise faults.Unreadable('', f'{len(content)} bytes', f'at most {LARGEST_FILE}')
+    try:
+        return _construct(content.decode('utf-8'))
+    except Fault:
+        raise
     except yaml.YAMLError as error:
         mark = getattr(error, 'problem_mark', None)
         where = f'line {mark.line + 1}, column {mark.column + 1}' if mark else ''
         problem = getattr(error, 'problem', None) or 'no YAML'
         raise faults.Unreadable(where, problem, 'a YAML file') from None
-    except (UnicodeDecodeError, OSError, ValueError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise faults.Unreadable('', str(error), 'a YAML file in UTF-8') from None
 
 
-def _write(data: dict, path: str | Path, schema: str, head: str) -> None:
+def _construct(text: str) -> object:
+    loader = _Loader(text)
+    try:
+        node = loader.get_single_node()
+        # A few lines of aliases of aliases would fill the memory once they are followed.
+        if node is not None and _unfolded(node, {}) > LARGEST_CONTENT:
+            raise faults.Unreadable('', 'aliases of aliases',
+                                    f'at most {LARGEST_CONTENT} values once they are followed')
+        return None if node is None else loader.construct_document(node)
+    finally:
+        loader.dispose()
+
+
+def _unfolded(node: yaml.Node, sizes: dict[int, float]) -> float:
+    """Count what a node holds with each alias written out; without end for one inside itself."""
+    if isinstance(node, yaml.ScalarNode):
+        return 1
+    if id(node) not in sizes:
+        sizes[id(node)] = math.inf
+        pairs = isinstance(node, yaml.MappingNode)
+        parts = (part for entry in node.value for part in (entry if pairs else [entry]))
+        sizes[id(node)] = 1 + sum(_unfolded(part, sizes) for part in parts)
+    return sizes[id(node)]
+
+
+def scene_text(scene: Scene, folder: Path, head: str = '') -> str:
+    """Give what save_scene writes into a file of ``folder``."""
+    return _text(scene_data(scene, folder), 'scene', head)
+
+
+def _text(data: dict, schema: str, head: str) -> str:
     lines = [f'# yaml-language-server: $schema={schema}.schema.json',
              '# Units: m, kg, s, degrees where a key ends in _deg. x forward, y left, z up.']
     lines += ['# ' + line if line else '#' for line in head.splitlines()]
     text = yaml.safe_dump(data, sort_keys=False, width=100, allow_unicode=True,
                           default_flow_style=None)
-    Path(path).write_text('\n'.join(lines) + '\n' + text, encoding='utf-8')
+    return '\n'.join(lines) + '\n' + text
 
 
 @functools.cache

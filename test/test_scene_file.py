@@ -119,6 +119,20 @@ def test_rubbish_is_refused_in_words(tmp_path, text):
         load_scene(str(path))
 
 
+@pytest.mark.parametrize('use', ['[{}]', '{{<<: [{}]}}'])
+def test_aliases_of_aliases_do_not_fill_the_memory(tmp_path, use):
+    """Followed, ten lines are 9^9 values."""
+    first, *others = 'abcdefghij'
+    text = f'{first}: &{first} {{k: 0}}\n'
+    for name in others:
+        text += f'{name}: &{name} ' + use.format(', '.join([f'*{first}'] * 9)) + '\n'
+        first = name
+    path = tmp_path / 'bomb.yaml'
+    path.write_text(text + f'bones: [*{first}]\n')
+    with pytest.raises(faults.Faults, match='aliases'):
+        load_scene(str(path))
+
+
 def test_a_missing_file_names_the_ones_there_are():
     with pytest.raises(faults.Faults, match='drop'):
         load_scene('no such scene')

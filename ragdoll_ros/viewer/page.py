@@ -12,6 +12,7 @@ from .controls import Controls
 from .ground import light
 from .plots import Plots
 from .pointer import Pointer
+from .recording_panel import RecordingPanel
 from .source import Frame, Source, Wanted
 from .stage import Stage
 from .view import View
@@ -42,6 +43,7 @@ class Page:
         with self.tabs.add_tab('Play'):
             self.controls = Controls(server, source)
             self.view = View(server)
+            self.listeners.append(RecordingPanel(server).take)
         with self.tabs.add_tab('Plots'):
             self._plots = Plots(server)
         self._follower = Follower(server)
