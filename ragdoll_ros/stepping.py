@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .coordinates import Coordinates
-from .engine.protocol import Engine, Load
+from .engine.protocol import GROUND, Engine, Load
 from .flight import fly
 from .mechanics import Shift, cross
 from .reach import Reach
@@ -273,7 +273,8 @@ class Stepper:
               loads: Sequence[Load]) -> float:
         """Fly to where a limit or the ground is just reached, by secants; give the time, s.
 
-        Zero if that does not come out. The end is a hair past it: the engine takes a gap that is
+        Zero if that does not come out, or if bones meet on the way: within a remainder of a tick
+        Bullet would throw apart what overlaps. The end is a hair past it: the engine takes a gap that is
         left for room to move in within its first substep, and would eat that much of a bounce.
         """
         early, late = 0.0, piece
@@ -285,6 +286,8 @@ class Stepper:
             self._fly_to(fly(self._free, start, time, self.accuracy.order, 1, loads))
             self.effort.flights += 1
             reached = self._room()
+            if any(GROUND not in pair for pair in self.touching):
+                return 0.0
             if -LANDED <= reached <= 0:
                 return time
             if reached > 0:
