@@ -15,7 +15,7 @@ import numpy as np
 from . import faults, rotation
 from .coordinates import Coordinates
 from .engine.protocol import Engine, Load
-from .mechanics import Mechanics
+from .mechanics import Mechanics, cross
 from .ragdoll import Vector
 from .scene import Scene
 from .state import State
@@ -29,11 +29,17 @@ LARGEST_PULL = 2000.0
 LARGEST_ACCELERATION = 40.0
 """m/s^2 that a hand may give a whole doll: four times its weight. Light dolls get no more."""
 
-LONGEST = 1.25e-3
+LONGEST = 2.5e-3
 """s for which a hand's force stays as it is."""
+
+FRESH = 5e-3
+"""s for which a bone is taken to be as mobile, along its own axes, as it was."""
 
 FARTHEST = 1e6
 """m from the world's origin that a hand may be."""
+
+MOST_HANDS = 20
+"""Hands that may hold something at once; one more is refused."""
 
 EVENLY = 0.05
 """s within which a hand gets where it shall be: the time between two of 20 events a second."""
@@ -65,6 +71,10 @@ class _Hand:
     target: np.ndarray
     left: float = 0.0
     """s until it is at its target."""
+    mobility: np.ndarray | None = None
+    """(3, 3) 1/kg of the point, along the bone's axes."""
+    fresh: float = 0.0
+    """s for which that is taken for granted."""
 
     def after(self, duration: float) -> np.ndarray:
         """Position (3,) m after ``duration`` s."""
@@ -75,6 +85,7 @@ class _Hand:
     def move(self, duration: float) -> None:
         self.position = self.after(duration)
         self.left = max(0.0, self.left - duration)
+        self.fresh -= duration
 
 
 class Hands:
@@ -103,6 +114,8 @@ class Hands:
         now = state.positions[index] + rotation.rotate(state.orientations[index], held)
         aim = now if target is None else np.array(_checked('target', target))
         self.let_go(name)
+        if len(self._hands) >= MOST_HANDS:
+            raise faults.OutOfRange('hands', MOST_HANDS + 1, f'at most {MOST_HANDS}')
         self._hands[name] = _Hand(index, held, now, aim, 0.0 if target is None else EVENLY)
 
     def drag(self, name: str, target: Sequence[float], within: float) -> None:
@@ -119,7 +132,7 @@ class Hands:
 
     def stretch(self, duration: float) -> float:
         """Length, s, of the first of equal stretches short enough for a steady force."""
-        return duration / math.ceil(duration / LONGEST)
+        return duration / math.ceil(duration / LONGEST - 1e-6)
 
     def move(self, duration: float) -> None:
         """Let all hands go on by ``duration`` s."""
@@ -129,13 +142,16 @@ class Hands:
     def pulls(self, free: Engine, coordinates: Coordinates, state: State,
               duration: float) -> list[Pull]:
         """Loads of all hands for the next ``duration`` s; ``free``: see mobility()."""
+        for hand in self._hands.values():
+            if hand.fresh <= 0:
+                turn = rotation.matrix(state.orientations[hand.bone])
+                hand.mobility = turn.T @ mobility(free, coordinates, hand.bone, hand.point) @ turn
+                hand.fresh = FRESH
         dolls = [self._doll_of[hand.bone] for hand in self._hands.values()]
-        return [self._pull(hand, dolls.count(doll), self._masses[doll], state, duration,
-                           mobility(free, coordinates, hand.bone, hand.point))
+        return [self._pull(hand, dolls.count(doll), self._masses[doll], state, duration)
                 for hand, doll in zip(self._hands.values(), dolls, strict=True)]
 
-    def _pull(self, hand: _Hand, sharing: int, mass: float, state: State, h: float,
-              mobility: np.ndarray) -> Pull:
+    def _pull(self, hand: _Hand, sharing: int, mass: float, state: State, h: float) -> Pull:
         """Pull of a spring and damper at the end of the step that it makes (backward Euler).
 
         f = -k (x + h u' - x_hand) - c (u' - u_hand) with u' = u + h W f, W the ``mobility``.
@@ -143,12 +159,14 @@ class Hands:
         Hands that share a doll see W times their number: they add up.
         """
         stiffness, damping = mass * FREQUENCY ** 2, 2 * mass * FREQUENCY
-        arm = rotation.rotate(state.orientations[hand.bone], hand.point)
-        velocity = state.linear[hand.bone] + np.cross(state.angular[hand.bone], arm)
+        turn = rotation.matrix(state.orientations[hand.bone])
+        arm = turn @ hand.point
+        velocity = state.linear[hand.bone] + cross(state.angular[hand.bone], arm)
         end = hand.after(h)
         force = -(stiffness * (state.positions[hand.bone] + arm + h * velocity - end)
                   + damping * (velocity - (end - hand.position) / h))
-        softened = np.eye(3) + h * (damping + h * stiffness) * sharing * mobility
+        yielding = turn @ hand.mobility @ turn.T
+        softened = np.eye(3) + h * (damping + h * stiffness) * sharing * yielding
         force = np.linalg.solve(softened, force)
         most = min(LARGEST_PULL, LARGEST_ACCELERATION * mass)
         force *= min(1.0, most / max(np.linalg.norm(force), 1e-300))
@@ -170,7 +188,7 @@ def mobility(free: Engine, coordinates: Coordinates, bone: int, point: np.ndarra
         free.place(Coordinates(coordinates.q, gained))
         moved = free.read()
         arm = rotation.rotate(moved.orientations[bone], point)
-        columns.append(moved.linear[bone] + np.cross(moved.angular[bone], arm))
+        columns.append(moved.linear[bone] + cross(moved.angular[bone], arm))
     return np.array(columns).T
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from . import faults, rotation
 from .coordinates import Coordinates
 from .engine.bullet import BulletEngine
-from .engine.protocol import GROUND, Engine, Load
+from .engine.protocol import GROUND, Contact, Engine, Load
 from .gap import JointGap
 from .grab import EVENLY, Grab, Hands, Pull
 from .guard import Guard
@@ -128,6 +128,11 @@ class Simulation:
     def grabs(self) -> tuple[Grab, ...]:
         """What hands hold now."""
         return self._hands.grabs
+
+    @property
+    def contacts(self) -> list[Contact]:
+        """What touches now."""
+        return self._stepper.settle().contacts()
 
     @property
     def coordinates(self) -> Coordinates:

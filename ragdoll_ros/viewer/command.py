@@ -12,6 +12,7 @@ from collections.abc import Iterator
 
 from .. import faults
 from ..scene_file import load_scene
+from .source import Source
 
 PORT = 8080
 HOST = '127.0.0.1'
@@ -27,6 +28,18 @@ EXAMPLE = """examples:
 NO_VISER = "ragdoll_viewer needs viser: pip install 'ragdoll_ros[viewer]', or pip install viser"
 
 
+NO_ROS = ("without --scene, ragdoll_viewer listens to a node over ROS 2: source ROS, or "
+          "pip install 'ragdoll_ros[ros]', or name a scene: ragdoll_viewer --scene drop")
+
+
+class NoRos(faults.RagdollError):
+    """No ROS to listen to."""
+
+
+class WrongArguments(faults.RagdollError):
+    """What the command does not take."""
+
+
 class NoPort(faults.RagdollError):
     """An address that nothing can be served at."""
 
@@ -34,7 +47,8 @@ class NoPort(faults.RagdollError):
 def main(arguments: list[str] | None = None) -> int:
     """Serve the page until SIGINT or SIGTERM; 2 if it cannot be as asked."""
     arguments = sys.argv[1:] if arguments is None else arguments
-    options, rest = parser().parse_known_args(arguments)
+    at = arguments.index('--ros-args') if '--ros-args' in arguments else len(arguments)
+    options, for_ros = parser().parse_args(arguments[:at]), arguments[at:]
     stop = threading.Event()
     for sign in (signal.SIGINT, signal.SIGTERM):
         signal.signal(sign, lambda *_: stop.set())
@@ -44,7 +58,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(NO_VISER, file=sys.stderr)
         return 2
     try:
-        serve(options, rest, stop)
+        serve(options, for_ros, stop)
     except faults.RagdollError as error:
         print(error, file=sys.stderr)
         return 2
@@ -65,12 +79,11 @@ def parser() -> argparse.ArgumentParser:
     return parser
 
 
-def serve(options: argparse.Namespace, rest: list[str], stop: threading.Event) -> None:
+def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event) -> None:
     """Serve the page until told to stop; RagdollError if it cannot be."""
     from .page import Page
-    from .simulated import Simulated
     port = free_port(options.host, options.port)
-    source = Simulated(load_scene(options.scene))
+    source = make_source(options.scene, for_ros)
     try:
         with server_at(options.host, port) as server:
             page = Page(server, source)
@@ -78,6 +91,20 @@ def serve(options: argparse.Namespace, rest: list[str], stop: threading.Event) -
             page.run(stop)
     finally:
         source.close()
+
+
+def make_source(scene: str | None, for_ros: list[str]) -> Source:
+    """Simulate a scene here, or listen to a node; RagdollError if that cannot be."""
+    if scene is not None:
+        from .simulated import Simulated
+        if for_ros:
+            raise WrongArguments(f'{" ".join(for_ros)}: not with --scene, which does without ROS')
+        return Simulated(load_scene(scene))
+    try:
+        from .remote import Remote
+    except ImportError as error:
+        raise NoRos(f'{error}: {NO_ROS}') from None
+    return Remote(for_ros)
 
 
 def free_port(host: str, wanted: int | None) -> int:

@@ -2,24 +2,25 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 
 import viser
 
-from .bodies import Bodies
+from .camera import Follower
 from .controls import Controls
-from .ground import light, show_ground
+from .ground import light
+from .plots import Plots
+from .pointer import Pointer
 from .source import Frame, Source, Wanted
+from .stage import Stage
+from .view import View
 
 PERIOD = 1 / 60
 """s between two drawings at the least."""
 
-IDLE = 0.2
+IDLE = 0.1
 """s between two looks for a page that is open."""
-
-CAMERA = ((4.2, -1.2, 1.5), (0.0, 0.0, 0.8))
-"""Where the camera stands at first and what it looks at, m: in front of the doll, as the arrows
-have it, and a little aside."""
 
 
 class Page:
@@ -30,13 +31,21 @@ class Page:
         self.source = source
         self.listeners: list[Callable[[Frame], None]] = []
         """Called with each frame that is drawn, in the drawing thread: a recorder, say."""
+        self.selectors: list[Callable[[str], None]] = []
+        """Called with the name of a bone that is clicked on: an editor, say."""
         self._frame: Frame | None = None
-        server.initial_camera.position, server.initial_camera.look_at = CAMERA
-        server.initial_camera.fov = 0.8
+        self._stage: Stage | None = None
         light(server)
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         self._problem = server.gui.add_markdown('')
-        self.controls = Controls(server, source)
+        self.tabs = server.gui.add_tab_group()
+        with self.tabs.add_tab('Play'):
+            self.controls = Controls(server, source)
+            self.view = View(server)
+        with self.tabs.add_tab('Plots'):
+            self._plots = Plots(server)
+        self._follower = Follower(server)
+        self._pointer = Pointer(lambda: self.source, lambda: self._frame, self._select)
 
     def play(self, source: Source) -> None:
         """Show another source from now on; the last one is left open."""
@@ -45,35 +54,49 @@ class Page:
 
     def run(self, stop: threading.Event) -> None:
         """Draw until told to stop."""
-        while not stop.wait(PERIOD if self.update() else IDLE):
-            pass
+        next_time = time.monotonic()
+        while not stop.is_set():
+            is_open = self.update()
+            next_time = max(next_time + (PERIOD if is_open else IDLE), time.monotonic())
+            stop.wait(next_time - time.monotonic())
         self.source.want(Wanted())
 
     def update(self) -> bool:
         """Draw what has changed; tell whether any page is open."""
         is_open = bool(self.server.get_clients())
-        self.source.want(Wanted(frames=is_open))
+        self.source.want(self.view.wanted if is_open else Wanted())
         if is_open:
-            frame = self.source.frame
+            frame, report = self.source.frame, self.source.report
             if frame is not None and frame is not self._frame:
                 self._draw(frame)
-            report = self.source.report
-            self._problem.content = report.problem or report.note
+            if frame is not None:
+                now = time.monotonic()
+                self._plots.show(frame, report, now)
+                self._follower.follow(frame, now, self.view.follow)
+            if self._stage is not None:
+                self._stage.be_visible(bones=self.view.bones, skins=self.view.skin)
+            self._tell(report.problem, report.note)
             self.controls.show(report)
         return is_open
 
     def _draw(self, frame: Frame) -> None:
-        if self._frame is None or frame.scene is not self._frame.scene:
-            self._set_stage(frame)
+        new = self._stage is None or frame.scene is not self._stage.scene
         self._frame = frame
+        if new:
+            self._stage = Stage(self.server, frame)
+            self._pointer.attach(self._stage.bodies, self._stage.skins)
+            self.controls.show_scene(frame.scene.name)
+            self.view.show_scene(has_skin=bool(self._stage.skins.handles))
         with self.server.atomic():
-            self._bodies.show(frame.state)
+            self._stage.show(frame)
         for listener in self.listeners:
             listener(frame)
 
-    def _set_stage(self, frame: Frame) -> None:
-        """Put up what a new scene needs."""
-        self.server.scene.remove_by_name('/scene')
-        self._bodies = Bodies(self.server, frame.scene, frame.state)
-        show_ground(self.server, frame.scene)
-        self.controls.show_scene(frame.scene.name)
+    def _select(self, bone: str) -> None:
+        for selector in self.selectors:
+            selector(bone)
+
+    def _tell(self, problem: str, note: str) -> None:
+        notes = [note, *(self._stage.skins.notes if self._stage is not None else ())]
+        self._problem.content = '\n\n'.join(
+            filter(None, [problem and f'**{problem}**', *notes]))

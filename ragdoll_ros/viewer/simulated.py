@@ -5,19 +5,20 @@ import math
 import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 
 import numpy as np
 
-from .. import faults
+from .. import faults, rotation
+from ..grab import EVENLY
 from ..pacing import Pacer
 from ..push import Push
 from ..ragdoll import Vector
 from ..scene import SECOND, Scene
 from ..scene_file import load_scene
 from ..simulation import Simulation
-from .source import Frame, Report, Wanted
+from .source import Frame, Held, Report, Wanted
 
 HOLD = 0.6
 """s of simulated time that a push holds, as the node's cmd_vel_timeout."""
@@ -27,6 +28,9 @@ MEASURE_PERIOD = 0.1
 
 PACES = (0.001, 100.0)
 """Slowest and fastest, as the node's real_time_factor."""
+
+ENDING = 1.0
+"""s that the thread may take to end."""
 
 PATIENCE = 60.0
 """s that building a scene may take."""
@@ -102,18 +106,22 @@ class Simulated:
         done.result(PATIENCE)
 
     def grab(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
-        """Hold a bone at a point."""
+        """Let a hand hold a bone at a point."""
+        self._commands.put(lambda: self._pull(hand, bone, point, target))
 
     def drag(self, hand: str, target: Vector) -> None:
-        """Pull what is held."""
+        """Move a hand."""
+        self._commands.put(lambda: self._simulation.drag(hand, target,
+                                                         EVENLY * self._report.pace))
 
     def let_go(self, hand: str) -> None:
-        """Open a hand."""
+        """Open a hand; what it held keeps its speed."""
+        self._commands.put(lambda: self._simulation.let_go(hand))
 
     def close(self) -> None:
         """End the thread and give the engine back."""
         self._commands.put(None)
-        self._thread.join()
+        self._thread.join(ENDING)
         self._simulation.close()
 
     def _run(self) -> None:
@@ -122,10 +130,17 @@ class Simulated:
                 command = self._commands.get(timeout=self._patience())
                 if command is None:
                     return
-                command()
+                self._obey(command)
             except queue.Empty:
                 if self._pacer.due(time.monotonic_ns()):
                     self._tick()
+
+    def _obey(self, command: Callable[[], object]) -> None:
+        """Do what a page asks for; what can not be, as the scene has changed, is told."""
+        try:
+            command()
+        except faults.RagdollError as error:
+            self._tell(problem=str(error))
 
     @property
     def _goes(self) -> bool:
@@ -158,6 +173,10 @@ class Simulated:
         self._simulation.push(Push(bone, force, duration=HOLD), 'page')
         self._show()
 
+    def _pull(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
+        self._simulation.grab(hand, bone, point, target)
+        self._show()
+
     def _reset(self) -> None:
         self._simulation.reset()
         self._show()
@@ -184,13 +203,26 @@ class Simulated:
     def _show(self) -> None:
         simulation, wanted = self._simulation, self._wanted
         swings = simulation.swings
-        rods = None if swings is None else np.stack([swings.roots, swings.positions], axis=1)
         self._frame = Frame(
             simulation.scene, simulation.time / SECOND, simulation.state, simulation.pushes,
-            rods=rods, angles=simulation.joint_angles if wanted.angles else None)
+            held=tuple(self._held()),
+            rods=None if swings is None else np.stack([swings.roots, swings.positions], axis=1),
+            contacts=self._contacts() if wanted.contacts else None,
+            angles=simulation.joint_angles if wanted.angles else None)
         if time.monotonic() >= self._next_measure:
             self._next_measure = time.monotonic() + MEASURE_PERIOD
             self._report = Report(**{**vars(self._report), 'measures': simulation.measures()})
+
+    def _held(self) -> Iterator[Held]:
+        state = self._simulation.state
+        for grab in self._simulation.grabs:
+            bone = self._simulation.scene.bone_index(grab.bone)
+            point = rotation.rotate(state.orientations[bone], np.array(grab.point))
+            yield Held(grab.bone, state.positions[bone] + point, np.array(grab.target))
+
+    def _contacts(self) -> np.ndarray:
+        contacts = self._simulation.contacts
+        return np.array([contact.position for contact in contacts]).reshape(-1, 3)
 
 
 def _pace_of(scene: Scene) -> float:
