@@ -4,6 +4,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
+import os
 import signal
 import socket
 import sys
@@ -79,17 +80,22 @@ def parser() -> argparse.ArgumentParser:
                         'machine alone; 0.0.0.0: whoever reaches this machine may steer)')
     parser.add_argument('--port', type=int, help=f'port to serve at; it must be free ({PORT}, or '
                         'the next free one)')
+    parser.add_argument('--folder', default='.', help='where the page saves and loads dolls, and '
+                        'keeps the characters it is sent (default: the current one); it writes '
+                        'nowhere else')
     return parser
 
 
 def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event) -> None:
     """Serve the page until told to stop; RagdollError if it cannot be."""
     from .page import Page
+    if not os.access(options.folder, os.W_OK | os.X_OK) or not os.path.isdir(options.folder):
+        raise WrongArguments(f'--folder {options.folder}: expected a folder that can be written to')
     port = free_port(options.host, options.port)
     source = make_source(options, for_ros)
     try:
         with server_at(options.host, port) as server:
-            page = Page(server, source)
+            page = Page(server, source, options.folder)
             print(f'The page is at http://{shown(options.host)}:{server.get_port()}', flush=True)
             page.run(stop)
     finally:

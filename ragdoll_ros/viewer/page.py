@@ -4,11 +4,14 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import viser
 
+from ..scene import Scene
 from .camera import Follower
 from .controls import Controls
+from .editor.editor import Editor
 from .ground import light
 from .plots import Plots
 from .pointer import Pointer
@@ -25,15 +28,21 @@ IDLE = 0.1
 
 
 class Page:
-    """What viser serves. `update` is called again and again by one thread, which alone draws."""
+    """What viser serves. `update` is called again and again by one thread, which alone draws.
 
-    def __init__(self, server: viser.ViserServer, source: Source) -> None:
+    The editor, which comes with the first scene, keeps its files in ``folder``.
+    """
+
+    def __init__(self, server: viser.ViserServer, source: Source,
+                 folder: str | Path = '.') -> None:
         self.server = server
         self.source = source
         self.listeners: list[Callable[[Frame], None]] = []
         """Called with each frame that is drawn, in the drawing thread: a recorder, say."""
         self.selectors: list[Callable[[str], None]] = []
-        """Called with the name of a bone that is clicked on: an editor, say."""
+        """Called with the name of a bone that is clicked on: the editor, say."""
+        self.editor: Editor | None = None
+        self._folder = folder
         self._frame: Frame | None = None
         self._stage: Stage | None = None
         light(server)
@@ -44,6 +53,7 @@ class Page:
             self.controls = Controls(server, source)
             self.view = View(server)
             self.listeners.append(RecordingPanel(server).take)
+        self._edit_tab = self.tabs.add_tab('Edit')
         with self.tabs.add_tab('Plots'):
             self._plots = Plots(server)
         self._follower = Follower(server)
@@ -77,6 +87,8 @@ class Page:
                 self._follower.follow(frame, now, self.view.follow)
             if self._stage is not None:
                 self._stage.be_visible(bones=self.view.bones, skins=self.view.skin)
+            if self.editor is not None:
+                self.editor.take_note(report.paused)
             self._tell(report.problem, report.note)
             self.controls.show(report)
         return is_open
@@ -89,10 +101,21 @@ class Page:
             self._pointer.attach(self._stage.bodies, self._stage.skins)
             self.controls.show_scene(frame.scene.name)
             self.view.show_scene(has_skin=bool(self._stage.skins.handles))
+            self._edit(frame.scene)
         with self.server.atomic():
             self._stage.show(frame)
         for listener in self.listeners:
             listener(frame)
+
+    def _edit(self, scene: Scene) -> None:
+        """Let the scene be edited."""
+        if self.editor is not None:
+            self.editor.show(scene)
+            return
+        with self._edit_tab:
+            self.editor = Editor(self.server, scene, lambda scene: self.source.use(scene),
+                                 lambda wanted: self.source.pause(wanted), self._folder)
+        self.selectors.append(self.editor.select)
 
     def _select(self, bone: str) -> None:
         for selector in self.selectors:

@@ -6,12 +6,14 @@ of the bind pose stands at sum of W_b T_b inv(T_b at the start) v (riders.py, ad
 """
 from __future__ import annotations
 
+import functools
+import os
 from dataclasses import dataclass
 
 import numpy as np
 import viser
 
-from .. import faults
+from .. import faults, rotation
 from ..fit.character import Character, read_character
 from ..ragdoll import Ragdoll
 from ..scene import Scene
@@ -28,23 +30,27 @@ SCALE = 1e-3
 class Skin:
     """A doll's skin in its bind pose, doll's frame.
 
-    ``bones`` (b,) are the doll's bones that carry riders, ``weights`` (v, b) theirs.
+    ``bones`` (b,) are the doll's bones that carry riders, ``weights`` (v, b) theirs. ``positions``
+    (b, 3) m and ``orientations`` (b, 4) are where these bones were when the skin was bound to
+    them: in the doll's bind pose, unless a limb has been moved with its skin since.
     """
 
     vertices: np.ndarray
     triangles: np.ndarray
     bones: np.ndarray
     weights: np.ndarray
+    positions: np.ndarray
+    orientations: np.ndarray
 
 
 def skin_of(doll: Ragdoll) -> Skin | None:
     """Read the skin of a doll; None if it names no character, RagdollError if it does not fit."""
     if doll.model is None or not doll.riders:
         return None
-    character = read_character(doll.model)
+    character = _read(doll.model)
     size = _size(doll, character)
     if abs(size - 1) > SCALE:
-        character = read_character(doll.model, character.scale * size)
+        character = _read(doll.model, character.scale * size)
     index = {bone.name: k for k, bone in enumerate(doll.bones)}
     carrier = {rider.name: index[rider.bone] for rider in doll.riders}
     missing = [name for name in character.bone_names if name not in carrier]
@@ -56,25 +62,58 @@ def skin_of(doll: Ragdoll) -> Skin | None:
     rows = np.arange(len(weights))[:, None]
     np.add.at(weights, (rows, slots[character.bones]), character.weights)
     weights[weights.sum(axis=1) == 0, 0] = 1
-    return Skin(character.vertices, character.triangles, bones, weights)
+    return Skin(character.vertices, character.triangles, bones, weights,
+                *_bound(doll, character, bones))
+
+
+def _read(path: str, scale: float | None = None) -> Character:
+    """Read a character once: an edited doll comes again and again with the same."""
+    stat = os.stat(path) if os.path.isfile(path) else None
+    return _read_once(path, scale, stat and (stat.st_mtime_ns, stat.st_size))
+
+
+@functools.lru_cache(maxsize=4)
+def _read_once(path: str, scale: float | None, _: tuple[int, int] | None) -> Character:
+    return read_character(path, scale)
+
+
+def _bound(doll: Ragdoll, character: Character,
+           bones: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Poses of bodies from those of the character's bones that ride on them."""
+    place = {name: k for k, name in enumerate(character.bone_names)}
+    riders = {rider.bone: rider for rider in reversed(doll.riders) if rider.name in place}
+    riders.update({rider.bone: rider for rider in doll.riders if rider.name == rider.bone})
+    carried = [riders[doll.bones[index].name] for index in bones]
+    back = rotation.inverse(np.array([rider.orientation for rider in carried]))
+    at = [place[rider.name] for rider in carried]
+    turns = rotation.multiply(character.orientations[at], back)
+    local = np.array([rider.position for rider in carried])
+    return character.positions[at] - rotation.rotate(turns, local), turns
 
 
 def _size(doll: Ragdoll, character: Character) -> float:
-    """How much larger the doll's riders stand apart than the character's bones."""
+    """How much longer the bones of the doll's riders are than the character's: most of them.
+
+    Not how far apart they stand: limbs may have been moved.
+    """
     from ..riders import Riders
     from ..scene import Placement
     poses = State(np.array([bone.position for bone in doll.bones]),
                   np.array([bone.orientation for bone in doll.bones]),
                   np.zeros((0, 3)), np.zeros((0, 3)))
     positions, _ = Riders(Scene('bind', (Placement(doll),))).poses(poses)
-    names = [rider.name for rider in doll.riders]
-    both = [name for name in names if name in character.bone_names]
-    if len(both) < 2:
+    place = {rider.name: k for k, rider in enumerate(doll.riders)}
+    edges = np.array([(place[name], place[character.bone_names[up]], bone, up)
+                      for bone, (name, up) in enumerate(zip(
+                          character.bone_names, character.parents, strict=True))
+                      if up >= 0 and name in place and character.bone_names[up] in place])
+    if not len(edges):
         return 1.0
-    ours = positions[[names.index(name) for name in both]]
-    theirs = character.positions[[character.bone_names.index(name) for name in both]]
-    spread = np.ptp(theirs, axis=0).max()
-    return float(np.ptp(ours, axis=0).max() / spread) if spread > 0 else 1.0
+    ours = np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1)
+    theirs = np.linalg.norm(character.positions[edges[:, 2]] - character.positions[edges[:, 3]],
+                            axis=1)
+    some = theirs > 1e-3 * theirs.max()
+    return float(np.median(ours[some] / theirs[some])) if some.any() else 1.0
 
 
 class Skins:
@@ -92,7 +131,7 @@ class Skins:
                 self.notes.append(f'no skin for {placement.name}: {error}')
                 skin = None
             if skin is not None:
-                self._add(server, f'/scene/skins/{number}', placement.doll, skin)
+                self._add(server, f'/scene/skins/{number}', skin)
                 self._bones.append(first + skin.bones)
             first += len(placement.doll.bones)
 
@@ -109,10 +148,8 @@ class Skins:
         for handle in self.handles:
             handle.visible = wanted
 
-    def _add(self, server: viser.ViserServer, name: str, doll: Ragdoll, skin: Skin) -> None:
-        bones = [doll.bones[index] for index in skin.bones]
+    def _add(self, server: viser.ViserServer, name: str, skin: Skin) -> None:
         self.handles.append(server.scene.add_mesh_skinned(
             name, skin.vertices, skin.triangles, color=COLOR, side='double',
-            bone_wxyzs=np.array([bone.orientation for bone in bones])[:, WXYZ],
-            bone_positions=np.array([bone.position for bone in bones]),
+            bone_wxyzs=skin.orientations[:, WXYZ], bone_positions=skin.positions,
             skin_weights=skin.weights))

@@ -39,6 +39,7 @@ class Editor:
         self._showing = threading.RLock()
         self._history = History(scene)
         self._shown = scene
+        self._stood = False
         self.bone: str | None = None
         """Name of the chosen bone."""
         self.editing = False
@@ -82,10 +83,11 @@ class Editor:
             if not self.editing:
                 self._pause(False)
 
-    def leave(self) -> None:
-        """Take note that the page runs: no handles any more."""
-        with self._showing:
+    def take_note(self, paused: bool) -> None:
+        """Learn from the page whether time stands: where it goes on by itself, editing ends."""
+        if self._stood and not paused and self.editing:
             self._set_editing(False)
+        self._stood = paused
 
     def update(self) -> None:
         """Apply what stands in the fields; where that is wrong, say so there and change nothing."""
