@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,14 +11,15 @@ import numpy as np
 from . import faults, rotation
 from .coordinates import Coordinates
 from .engine.bullet import BulletEngine
-from .engine.protocol import GROUND, Engine, Load
+from .engine.protocol import GROUND, Contact, Engine, Load
 from .gap import JointGap
+from .grab import EVENLY, Grab, Hands, Pull
 from .guard import Guard
 from .mechanics import Mechanics, Motion
 from .push import Push
 from .scene import SECOND, STEP_RANGE, Scene
 from .state import State
-from .stepping import ACCURACIES, Accuracy, Effort, Stepper
+from .stepping import ACCURACIES, Accuracy, Effort, Stepper, firm
 from .swing.pose import SwingState
 from .swing.riding import riding
 
@@ -34,6 +36,9 @@ slower than 4 mm/s are stopped."""
 
 REST_TIME = SECOND // 2
 """ns that all bones must be still under gravity before the scene sleeps."""
+
+THROWN = SECOND
+"""ns for which a doll that was let go is stepped as finely as one that is held."""
 
 
 @dataclass
@@ -61,7 +66,8 @@ class Simulation:
         self.scene = scene
         self.step = scene.step if step is None else step
         self.mechanics = Mechanics(scene)
-        self._stepper = Stepper(scene, engine, resolve_accuracy(accuracy))
+        self._accuracy = resolve_accuracy(accuracy)
+        self._stepper = Stepper(scene, engine, self._accuracy)
         self._guard = Guard(scene, self.mechanics, self._stepper.engine.layout)
         self._lift_out()
         self._start = (self._stepper.engine.save(), self._stepper.coordinates)
@@ -110,17 +116,27 @@ class Simulation:
     @property
     def accuracy(self) -> Accuracy:
         """How fine; may be changed between ticks."""
-        return self._stepper.accuracy
+        return self._accuracy
 
     @accuracy.setter
     def accuracy(self, accuracy: str | Accuracy) -> None:
-        self._stepper.accuracy = resolve_accuracy(accuracy)
+        self._accuracy = self._stepper.accuracy = resolve_accuracy(accuracy)
 
     @property
     def pushes(self) -> tuple[Push, ...]:
         """Pushes that act now."""
         return tuple(active.push for active in self._queue
                      if active.start <= self.time < active.end)
+
+    @property
+    def grabs(self) -> tuple[Grab, ...]:
+        """What hands hold now."""
+        return self._hands.grabs
+
+    @property
+    def contacts(self) -> list[Contact]:
+        """What touches now."""
+        return self._stepper.settle().contacts()
 
     @property
     def coordinates(self) -> Coordinates:
@@ -152,6 +168,27 @@ class Simulation:
         """End the push on a channel now."""
         self._queue = [active for active in self._queue if active.channel != channel]
 
+    def grab(self, hand: str, bone: str, point: Sequence[float] = (0.0, 0.0, 0.0),
+             target: Sequence[float] | None = None) -> None:
+        """Let a hand hold a point of a bone; what it held before it lets go.
+
+        ``point`` (3,) m from the bone's centre of mass along the bone's axes; ``target`` (3,) m in
+        the world as in drag(), None: where the point is now. Raises UnknownBone, or NotFinite or
+        OutOfRange for numbers that are none or too far away.
+        """
+        self._hands.grab(hand, bone, point, target, self._state)
+
+    def drag(self, hand: str, target: Sequence[float], within: float = EVENLY) -> None:
+        """Move a hand to ``target`` (3,) m in the world, evenly ``within`` s of simulated time.
+
+        For a hand that holds nothing, nothing happens. Raises NotFinite or OutOfRange.
+        """
+        self._hands.drag(hand, target, within)
+
+    def let_go(self, hand: str) -> None:
+        """Open a hand; what it held keeps the speed that it has."""
+        self._hands.let_go(hand)
+
     def advance(self) -> State:
         """Go on by one tick."""
         self.effort = self._stepper.effort = Effort()
@@ -179,7 +216,7 @@ class Simulation:
         return self._state
 
     def reset(self) -> State:
-        """Go back to the start, to the bit; pushes that wait are dropped."""
+        """Go back to the start, to the bit; pushes that wait are dropped, and hands let go."""
         snapshot, coordinates = self._start
         self._stepper.engine.restore(snapshot)
         self._stepper.place(coordinates)
@@ -200,7 +237,8 @@ class Simulation:
             'energy_excess_J': float((self._motion.energy - guard.start - guard.worked).sum()),
             'energy_projected_J': float(guard.account.taken),
             'stopped_total': guard.account.stops,
-            'work_of_pushes_J': float(guard.worked.sum()),
+            'work_of_pushes_J': float(guard.worked.sum()) - self._grabbed,
+            'work_of_grabs_J': self._grabbed,
             'error_estimate_m': error or 0.0,
             'error_trusted': float(error is not None),
             'joint_gap_m': float(self._gap.gaps(self._state).max(initial=0.0)),
@@ -231,6 +269,10 @@ class Simulation:
         self.time = 0
         """Nanoseconds simulated since the start."""
         self._queue: list[_Active] = []
+        self._hands = Hands(self.scene, self.mechanics)
+        self._thrown_until = 0
+        self._grabbed = 0.0
+        """J: work of hands since the start."""
         self._state = self._stepper.state
         self._motion = self.mechanics.motion(self._state)
         self._guard.open(self._state)
@@ -252,12 +294,24 @@ class Simulation:
         """Go on to an instant between which no push begins or ends."""
         loads = [self._load(active) for active in self._queue
                  if active.start <= self.time < active.end]
-        if loads:
+        if loads or self._hands:
             self.asleep, self._still = False, 0
+        if self._hands:
+            self._thrown_until = end + THROWN
+        self._stepper.accuracy = (firm(self._accuracy) if self.time < self._thrown_until
+                                  else self._accuracy)
         remaining = (end - self.time) / SECOND
         while remaining > 1e-12 and not self.asleep:
-            remaining -= self._piece(remaining, loads)
+            remaining -= (self._pulled if self._hands else self._piece)(remaining, loads)
         self.time = end
+
+    def _pulled(self, duration: float, loads: list[Load]) -> float:
+        """Go through a stretch as short as hands need it; give its length, s."""
+        stepper, length = self._stepper, self._hands.stretch(duration)
+        pulls = self._hands.pulls(stepper.free, stepper.coordinates, self._state, length)
+        length = self._piece(length, [*loads, *pulls])
+        self._hands.move(length)
+        return length
 
     def _piece(self, duration: float, loads: list[Load]) -> float:
         """Go through one stretch of motion and see to what must be kept; give its length, s."""
@@ -335,9 +389,11 @@ class Simulation:
                                      rotation.inverse(before.orientations[bone]))
             lead = substep / 2 * (after.linear[bone] - before.linear[bone])
             lead_turn = substep / 2 * (after.angular[bone] - before.angular[bone])
-            work[self.mechanics.doll_of[bone]] += (
-                force @ (ways[1] - ways[0] - lead)
-                + torque @ (rotation.rotation_vector(turn) - lead_turn))
+            done = (force @ (ways[1] - ways[0] - lead)
+                    + torque @ (rotation.rotation_vector(turn) - lead_turn))
+            work[self.mechanics.doll_of[bone]] += done
+            if isinstance(load, Pull):
+                self._grabbed += float(done)
         self._guard.add_work(work)
 
     def _mean_load(self, load: Load, before: State) -> tuple[np.ndarray, np.ndarray]:
@@ -370,7 +426,7 @@ class Simulation:
         state = self._state
         speed = max(np.abs(state.linear).max(),
                     (np.abs(state.angular).max(axis=1) * self._sizes).max())
-        if speed > REST_SPEED or self._queue:
+        if speed > REST_SPEED or self._queue or self._hands:
             self._still = 0
             return
         if not self._still:

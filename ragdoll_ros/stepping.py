@@ -6,6 +6,8 @@ and contacts ask for.
 """
 from __future__ import annotations
 
+import dataclasses
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .coordinates import Coordinates
-from .engine.protocol import Engine, Load
+from .engine.protocol import GROUND, Engine, Load
 from .flight import fly
 from .mechanics import Shift, cross, damping_rate
 from .reach import Reach
@@ -44,6 +46,8 @@ class Accuracy:
     redo: float = math.radians(1.0)
     """rad past a limit from which a step is done again, four times as fine, as it is when a bone
     sinks deeper than ``sink``; infinity: never."""
+    creep: float = 1.1
+    """Times as far past a limit or in the ground as at its start that a step may end."""
     adaptive: bool = True
     """Substeps by need; otherwise always ``contact`` in 10 ms."""
     energy: bool = True
@@ -62,6 +66,19 @@ EXACT = Accuracy(turn=0.02, limit=0.02, contact=12, settled=8, sink=0.002, most=
                  flight_turn=0.2, redo=math.radians(1.5))
 ACCURACIES = {'draft': DRAFT, 'normal': NORMAL, 'exact': EXACT}
 
+
+@functools.lru_cache
+def firm(accuracy: Accuracy) -> Accuracy:
+    """Give an accuracy that is fine enough for joints that are pulled with all of a hand's force.
+
+    Steps are as short as a hand's force is steady, so that what each may add would add up.
+    """
+    return dataclasses.replace(
+        accuracy, turn=min(accuracy.turn, 0.06), limit=min(accuracy.limit, 0.025),
+        contact=max(accuracy.contact, 8), sink=min(accuracy.sink, 0.006),
+        most=max(accuracy.most, 64), redo=min(accuracy.redo, math.radians(2)), creep=1.0)
+
+
 AT_LIMIT = 1e-3
 """rad: a joint as near as this to its limit, and moving toward it, is at the limit."""
 
@@ -79,9 +96,6 @@ MOST_FLIGHTS = 12
 
 FINER = 3
 """Steps of order 4 that tell the error of one step of a flight."""
-
-GROWTH = 1.1
-"""Share of what is past a limit or in the ground already by which a step may add to it."""
 
 STIFFEST = 1.5
 """Step times the fastest rate at which damping ends a motion: from 2 on, explicit steps make
@@ -120,7 +134,8 @@ class Stepper:
                  accuracy: Accuracy) -> None:
         self.accuracy = accuracy
         self.engine = make_engine(scene)
-        self._free = make_engine(scene, free=True) if accuracy.order else None
+        self._make_free = functools.partial(make_engine, scene, free=True)
+        self._free = self._make_free() if accuracy.order else None
         self.reach = Reach(scene)
         self._layout = self.engine.layout
         self._normal = np.array(scene.ground.normal if scene.ground else (0.0, 0.0, 1.0))
@@ -139,6 +154,13 @@ class Stepper:
         """Durations, s, and loads of the tick's flights; None: it was not all flight."""
         self.effort = Effort()
         self.begin()
+
+    @property
+    def free(self) -> Engine:
+        """The scene without contacts and limits, to be asked for accelerations."""
+        if self._free is None:
+            self._free = self._make_free()
+        return self._free
 
     def look(self) -> None:
         """Read where the engine is."""
@@ -256,8 +278,10 @@ class Stepper:
               loads: Sequence[Load]) -> float:
         """Fly to where a limit or the ground is just reached, by secants; give the time, s.
 
-        Zero if that does not come out. The end is a hair past it: the engine takes a gap that is
-        left for room to move in within its first substep, and would eat that much of a bounce.
+        Zero if that does not come out, or if bones meet on the way: within a remainder of a
+        tick Bullet would throw apart what overlaps. The end is a hair past it: the engine takes a
+        gap that is left for room to move in within its first substep, and would eat that much of
+        a bounce.
         """
         early, late = 0.0, piece
         for _ in range(MOST_SECANTS):
@@ -268,6 +292,8 @@ class Stepper:
             self._fly_to(fly(self._free, start, time, self.accuracy.order, 1, loads))
             self.effort.flights += 1
             reached = self._room()
+            if any(GROUND not in pair for pair in self.touching):
+                return 0.0
             if -LANDED <= reached <= 0:
                 return time
             if reached > 0:
@@ -302,7 +328,7 @@ class Stepper:
         """Take the engine's own step, finer if it overshoots a limit; give its substep, s."""
         self.settle()
         start, state, touching = self.coordinates, self.state, self.touching
-        bound = max(1.0, GROWTH * self._too_far())
+        bound = max(1.0, self.accuracy.creep * self._too_far())
         substeps = self._substeps(duration, bool(loads))
         most = max(1, math.ceil(self.accuracy.most * duration / 0.01))
         while True:

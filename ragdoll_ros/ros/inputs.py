@@ -25,15 +25,19 @@ LEVER = 0.1
 
 
 class Inputs:
-    """Subscriptions to all that pushes. Each has a channel: a push takes its last one's place."""
+    """Subscriptions to all that pushes. Each has a channel: a push takes its last one's place.
 
-    def __init__(self, node: Node, tally: Tally) -> None:
+    ``name`` is that of the node which is pushed, for who listens beside it.
+    """
+
+    def __init__(self, node: Node, tally: Tally, name: str = '~') -> None:
         self._tally = tally
         self.simulation: Simulation
         self.settings: Settings
-        node.create_subscription(Wrench, '~/force', self.take_force, 10)
-        node.create_subscription(Twist, 'cmd_vel', self.take_velocity, 10)
-        node.create_subscription(WrenchStamped, '~/push', self.take_push, 10)
+        self.subscriptions = [
+            node.create_subscription(Wrench, f'{name}/force', self.take_force, 10),
+            node.create_subscription(Twist, 'cmd_vel', self.take_velocity, 10),
+            node.create_subscription(WrenchStamped, f'{name}/push', self.take_push, 10)]
 
     def take_force(self, message: Wrench) -> None:
         """Push the pushed bone along the world's axes; zero ends the push."""

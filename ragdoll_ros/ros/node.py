@@ -20,6 +20,7 @@ from ..scene import STEP_RANGE, Scene
 from ..simulation import Simulation
 from .diagnostics import Diagnostics
 from .inputs import Inputs
+from .interactive import Interactive
 from .outputs import Outputs
 from .parameters import Parameters, Settings
 from .services import Services
@@ -68,6 +69,7 @@ class RagdollNode(Node):
         self._stamps = Stamps(self.get_clock().now().nanoseconds)
         self._outputs = Outputs(self)
         self.inputs = Inputs(self, self.tally)
+        self.interactive = Interactive(self, self.tally, self._now)
         self._diagnostics = Diagnostics(self, self._steady, self.tally, self._facts,
                                         self._wanted_pace)
         Services(self)
@@ -156,13 +158,16 @@ class RagdollNode(Node):
     def _publish(self) -> None:
         simulation = self.simulation
         stamp = self._stamps.at(simulation.time, self.settings.publish_clock)
-        self._outputs.publish(simulation, stamp, self._now())
+        now = self._now()
+        self._outputs.publish(simulation, stamp, now)
+        self.interactive.publish(now)
 
     def _use(self, simulation: Simulation) -> None:
         """Let all parts work with this simulation and the settings as they are."""
         self.simulation = self.inputs.simulation = self._diagnostics.simulation = simulation
         self.inputs.settings = self.settings
         self._outputs.describe(simulation.scene, self.settings.frame_id)
+        self.interactive.use(simulation, self.settings)
 
     def _replace(self, simulation: Simulation) -> None:
         self._stamps.begin_again(self.simulation.time, self.simulation.tick)
@@ -177,7 +182,7 @@ class RagdollNode(Node):
 
     def _apply(self, changed: set[str]) -> None:
         """Carry a change of the settings out."""
-        settings = self.inputs.settings = self.settings
+        settings = self.inputs.settings = self.interactive.settings = self.settings
         self._outputs.be_clock(settings.publish_clock)
         if self._prepared is not None:
             simulation, self._prepared = self._prepared, None
@@ -185,7 +190,7 @@ class RagdollNode(Node):
             self._publish()
             self._diagnostics.report()
         elif 'frame_id' in changed:
-            self._outputs.describe(self.simulation.scene, settings.frame_id)
+            self._use(self.simulation)
         self.simulation.accuracy = settings.accuracy
         if changed & {'scene', 'rate', 'real_time_factor'}:
             self.simulation.step = step_of(settings)
