@@ -82,7 +82,7 @@ setup(
         # The page: 3D, panels and plots in a browser, served from Python, with no build of its own.
         'viewer': ['viser'],
         'test': ['pytest', 'pytest-xdist', 'ruff', 'setuptools', 'wheel', 'yourdfpy',
-                 'mannequin-x; python_version >= "3.11"'],
+                 'playwright', 'mannequin-x; python_version >= "3.11"'],
         'colcon': ['colcon-core', 'colcon-ros', 'colcon-python-setup-py',
                    'colcon-common-extensions', 'setuptools<80'],
     },

@@ -19,7 +19,7 @@ from .mechanics import Mechanics, Motion
 from .push import Push
 from .scene import SECOND, STEP_RANGE, Scene
 from .state import State
-from .stepping import ACCURACIES, Accuracy, Effort, Stepper
+from .stepping import ACCURACIES, Accuracy, Effort, Stepper, firm
 from .swing.pose import SwingState
 from .swing.riding import riding
 
@@ -36,6 +36,9 @@ slower than 4 mm/s are stopped."""
 
 REST_TIME = SECOND // 2
 """ns that all bones must be still under gravity before the scene sleeps."""
+
+THROWN = SECOND
+"""ns for which a doll that was let go is stepped as finely as one that is held."""
 
 
 @dataclass
@@ -63,7 +66,8 @@ class Simulation:
         self.scene = scene
         self.step = scene.step if step is None else step
         self.mechanics = Mechanics(scene)
-        self._stepper = Stepper(scene, engine, resolve_accuracy(accuracy))
+        self._accuracy = resolve_accuracy(accuracy)
+        self._stepper = Stepper(scene, engine, self._accuracy)
         self._guard = Guard(scene, self.mechanics, self._stepper.engine.layout)
         self._lift_out()
         self._start = (self._stepper.engine.save(), self._stepper.coordinates)
@@ -112,11 +116,11 @@ class Simulation:
     @property
     def accuracy(self) -> Accuracy:
         """How fine; may be changed between ticks."""
-        return self._stepper.accuracy
+        return self._accuracy
 
     @accuracy.setter
     def accuracy(self, accuracy: str | Accuracy) -> None:
-        self._stepper.accuracy = resolve_accuracy(accuracy)
+        self._accuracy = self._stepper.accuracy = resolve_accuracy(accuracy)
 
     @property
     def pushes(self) -> tuple[Push, ...]:
@@ -266,6 +270,7 @@ class Simulation:
         """Nanoseconds simulated since the start."""
         self._queue: list[_Active] = []
         self._hands = Hands(self.scene, self.mechanics)
+        self._thrown_until = 0
         self._grabbed = 0.0
         """J: work of hands since the start."""
         self._state = self._stepper.state
@@ -291,6 +296,10 @@ class Simulation:
                  if active.start <= self.time < active.end]
         if loads or self._hands:
             self.asleep, self._still = False, 0
+        if self._hands:
+            self._thrown_until = end + THROWN
+        self._stepper.accuracy = (firm(self._accuracy) if self.time < self._thrown_until
+                                  else self._accuracy)
         remaining = (end - self.time) / SECOND
         while remaining > 1e-12 and not self.asleep:
             remaining -= (self._pulled if self._hands else self._piece)(remaining, loads)
@@ -309,15 +318,15 @@ class Simulation:
         stepper, before, motion = self._stepper, self._state, self._motion
         start = stepper.coordinates
         pull = max((math.hypot(*load.force) for load in loads), default=0.0)
-        in_air = stepper.reach.in_air(before, duration, self._gravity + pull / self._lightest)
+        near = stepper.reach.near(before, duration, self._gravity + pull / self._lightest)
         piece = stepper.go(duration, loads)
         self._see(stepper.state)
         if loads:
             self._enter_work(loads, before, piece.substep)
-        if in_air and stepper.accuracy.momentum:
+        if not near and stepper.accuracy.momentum:
             self._keep_momentum(motion, piece.duration, loads, before)
         if stepper.accuracy.energy:
-            self._keep_energy(start, in_air)
+            self._keep_energy(start, near)
         return piece.duration
 
     def _see(self, state: State) -> None:
@@ -345,15 +354,18 @@ class Simulation:
         self._motion = self.mechanics.shifted_motion(self._motion, shift)
         self._stepper.shift(shift, self._state)
 
-    def _keep_energy(self, start: Coordinates, in_air: bool) -> None:
-        """Take out energy from nothing; what was in the air keeps its momentum for sure."""
+    def _keep_energy(self, start: Coordinates, near: set[tuple[int, int]]) -> None:
+        """Take out energy from nothing; what was in the air keeps its momentum for sure.
+
+        Dolls that may have touched (``near``) share their account: a bounce is over within a step.
+        """
         guard = self._guard
-        groups = guard.groups(self._stepper.touching)
+        groups = guard.groups(near)
         surplus = guard.surplus(self._motion, groups)
         if (surplus > 0).any():
             stepper = self._stepper
             self._correct(guard.without_surplus(
-                start, stepper.coordinates, self._motion, self._state, surplus, not in_air))
+                start, stepper.coordinates, self._motion, self._state, surplus, bool(near)))
             burst = guard.burst(self._motion, groups)
             if burst.any():
                 self._correct(guard.stopped(start, stepper.coordinates, burst))

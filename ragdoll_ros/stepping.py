@@ -6,6 +6,7 @@ and contacts ask for.
 """
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 from collections.abc import Sequence
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .coordinates import Coordinates
-from .engine.protocol import Engine, Load
+from .engine.protocol import GROUND, Engine, Load
 from .flight import fly
 from .mechanics import Shift, cross
 from .reach import Reach
@@ -45,6 +46,8 @@ class Accuracy:
     redo: float = math.radians(1.0)
     """rad past a limit from which a step is done again, four times as fine, as it is when a bone
     sinks deeper than ``sink``; infinity: never."""
+    creep: float = 1.0
+    """How much further, in units of ``redo`` and ``sink``, than at its start a step may end."""
     adaptive: bool = True
     """Substeps by need; otherwise always ``contact`` in 10 ms."""
     energy: bool = True
@@ -62,6 +65,19 @@ NORMAL = Accuracy(turn=0.06, limit=0.05, contact=6, settled=4, sink=0.006, most=
 EXACT = Accuracy(turn=0.02, limit=0.02, contact=12, settled=8, sink=0.002, most=256, order=4,
                  flight_turn=0.2, redo=math.radians(1.5))
 ACCURACIES = {'draft': DRAFT, 'normal': NORMAL, 'exact': EXACT}
+
+
+@functools.lru_cache
+def firm(accuracy: Accuracy) -> Accuracy:
+    """Give an accuracy that is fine enough for joints that are pulled with all of a hand's force.
+
+    Steps are as short as a hand's force is steady, so that what each may add would add up.
+    """
+    return dataclasses.replace(
+        accuracy, turn=min(accuracy.turn, 0.06), limit=min(accuracy.limit, 0.025),
+        contact=max(accuracy.contact, 8), sink=min(accuracy.sink, 0.006),
+        most=max(accuracy.most, 64), redo=min(accuracy.redo, math.radians(2)), creep=0.0)
+
 
 AT_LIMIT = 1e-3
 """rad: a joint as near as this to its limit, and moving toward it, is at the limit."""
@@ -257,7 +273,8 @@ class Stepper:
               loads: Sequence[Load]) -> float:
         """Fly to where a limit or the ground is just reached, by secants; give the time, s.
 
-        Zero if that does not come out. The end is a hair past it: the engine takes a gap that is
+        Zero if that does not come out, or if bones meet on the way: within a remainder of a tick
+        Bullet would throw apart what overlaps. The end is a hair past it: the engine takes a gap that is
         left for room to move in within its first substep, and would eat that much of a bounce.
         """
         early, late = 0.0, piece
@@ -269,6 +286,8 @@ class Stepper:
             self._fly_to(fly(self._free, start, time, self.accuracy.order, 1, loads))
             self.effort.flights += 1
             reached = self._room()
+            if any(GROUND not in pair for pair in self.touching):
+                return 0.0
             if -LANDED <= reached <= 0:
                 return time
             if reached > 0:
@@ -302,7 +321,7 @@ class Stepper:
         """Take the engine's own step, finer if it overshoots a limit; give its substep, s."""
         self.settle()
         start, state, touching = self.coordinates, self.state, self.touching
-        bound = 1.0 + max(0.0, self._too_far())
+        bound = max(1.0, max(0.0, self._too_far()) + self.accuracy.creep)
         substeps = self._substeps(duration, bool(loads))
         most = max(1, math.ceil(self.accuracy.most * duration / 0.01))
         while True:

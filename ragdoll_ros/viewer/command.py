@@ -10,6 +10,7 @@ import socket
 import sys
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 
 from .. import faults
 from ..scene_file import load_scene
@@ -21,13 +22,13 @@ HOST = '127.0.0.1'
 EXAMPLE = """examples:
   ragdoll_viewer --scene doll.yaml
   ragdoll_viewer --scene crowd --port 9000
+  ragdoll_viewer --play run.json
   ragdoll_viewer
   ragdoll_viewer --host 0.0.0.0
   ragdoll_viewer --ros-args -r __ns:=/stage
 """
 
 NO_VISER = "ragdoll_viewer needs viser: pip install 'ragdoll_ros[viewer]', or pip install viser"
-
 
 NO_ROS = ("without --scene, ragdoll_viewer listens to a node over ROS 2: source ROS, or "
           "pip install 'ragdoll_ros[ros]', or name a scene: ragdoll_viewer --scene drop")
@@ -71,7 +72,9 @@ def parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         'ragdoll_viewer', description=__doc__, epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--scene', help='a name in config/ or a path: simulate it here, without '
+    shown = parser.add_mutually_exclusive_group()
+    shown.add_argument('--play', metavar='RUN.json', help='show what the page has recorded')
+    shown.add_argument('--scene', help='a name in config/ or a path: simulate it here, without '
                         'ROS (else: listen to the node `ragdoll`)')
     parser.add_argument('--host', default=HOST, help='address to serve at (%(default)s: this '
                         'machine alone; 0.0.0.0: whoever reaches this machine may steer)')
@@ -89,7 +92,7 @@ def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event
     if not os.access(options.folder, os.W_OK | os.X_OK) or not os.path.isdir(options.folder):
         raise WrongArguments(f'--folder {options.folder}: expected a folder that can be written to')
     port = free_port(options.host, options.port)
-    source = make_source(options.scene, for_ros)
+    source = make_source(options, for_ros)
     try:
         with server_at(options.host, port) as server:
             page = Page(server, source, options.folder)
@@ -99,13 +102,18 @@ def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event
         source.close()
 
 
-def make_source(scene: str | None, for_ros: list[str]) -> Source:
-    """Simulate a scene here, or listen to a node; RagdollError if that cannot be."""
-    if scene is not None:
+def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
+    """Simulate a scene here, play a run, or listen to a node; RagdollError if that cannot be."""
+    alone = next((f'--{key}' for key in ('scene', 'play') if getattr(options, key) is not None), '')
+    if alone and for_ros:
+        raise WrongArguments(f'{" ".join(for_ros)}: not with {alone}, which does without ROS')
+    if options.play is not None:
+        from .playback import Playback
+        from .recording_file import load_recording
+        return Playback(load_recording(options.play), Path(options.play).name)
+    if options.scene is not None:
         from .simulated import Simulated
-        if for_ros:
-            raise WrongArguments(f'{" ".join(for_ros)}: not with --scene, which does without ROS')
-        return Simulated(load_scene(scene))
+        return Simulated(load_scene(options.scene))
     try:
         from .remote import Remote
     except ImportError as error:

@@ -15,6 +15,7 @@ from .editor.editor import Editor
 from .ground import light
 from .plots import Plots
 from .pointer import Pointer
+from .recording_panel import RecordingPanel
 from .source import Frame, Source, Wanted
 from .stage import Stage
 from .view import View
@@ -51,6 +52,7 @@ class Page:
         with self.tabs.add_tab('Play'):
             self.controls = Controls(server, source)
             self.view = View(server)
+            self.listeners.append(RecordingPanel(server).take)
         self._edit_tab = self.tabs.add_tab('Edit')
         with self.tabs.add_tab('Plots'):
             self._plots = Plots(server)
