@@ -239,7 +239,7 @@ class Stepper:
 
     def _may_fly(self) -> bool:
         """Tell whether nothing touches and no joint presses against its limit."""
-        if (self._free is None or self.touching or self._blocked
+        if (self._free is None or not self.accuracy.order or self.touching or self._blocked
                 or self.effort.flights >= MOST_FLIGHTS):
             return False
         past = self._past()
@@ -278,10 +278,10 @@ class Stepper:
               loads: Sequence[Load]) -> float:
         """Fly to where a limit or the ground is just reached, by secants; give the time, s.
 
-        Zero if that does not come out, or if bones meet on the way: within a remainder of a
-        tick Bullet would throw apart what overlaps. The end is a hair past it: the engine takes a
-        gap that is left for room to move in within its first substep, and would eat that much of
-        a bounce.
+        Zero if that does not come out, or if bones overlap there: within the rest of the tick,
+        which may be a sliver, they would burst apart. The end is a hair past it: the engine takes
+        a gap that is left for room to move in within its first substep, and would eat that much
+        of a bounce.
         """
         early, late = 0.0, piece
         for _ in range(MOST_SECANTS):
@@ -354,7 +354,7 @@ class Stepper:
 
     def _run(self, duration: float, substeps: int, loads: Sequence[Load]) -> None:
         """Let the engine go; what changes with the motion is looked at again each substep."""
-        if self._damped or any(load.local for load in loads):
+        if self._damped or any(load.local or load.point.any() for load in loads):
             for _ in range(substeps):
                 self.engine.step(duration / substeps, 1, loads)
         else:
