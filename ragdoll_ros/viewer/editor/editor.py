@@ -74,14 +74,11 @@ class Editor:
     def toggle(self) -> None:
         """Go to the bind pose to edit, or drop the doll."""
         with self._telling():
-            self._set_editing(not self.editing)
-            try:
-                self._run(self.scene)
-            except faults.RagdollError:
-                self._set_editing(not self.editing)
-                raise
-            if not self.editing:
+            wanted = not self.editing
+            self._run(self.scene, wanted)
+            if not wanted:
                 self._pause(False)
+            self._set_editing(wanted)
 
     def take_note(self, paused: bool) -> None:
         """Learn from the page whether time stands: where it goes on by itself, editing ends."""
@@ -107,7 +104,7 @@ class Editor:
     def take(self, scene: Scene, what: str) -> None:
         """Go on with another scene, as a step; RagdollError if it cannot run."""
         with self._acting:
-            self._run(scene)
+            self._run(scene, self.editing)
             with self._showing:
                 self._history.push(scene, what)
                 self._refresh()
@@ -172,7 +169,7 @@ class Editor:
             if scene is before:
                 return
             try:
-                self._run(scene)
+                self._run(scene, self.editing)
             except faults.RagdollError:
                 back()
                 raise
@@ -185,16 +182,18 @@ class Editor:
             self.panel.show_editing(wanted)
             self.show_handles()
 
-    def _run(self, scene: Scene) -> None:
+    def _run(self, scene: Scene, hold: bool) -> None:
         """Let the page start anew with a scene; one that it refuses was never shown."""
         before, self._shown = self._shown, scene
-        if self.editing:
+        if hold:
             # First, so that not one tick is made before it stands.
             self._pause(True)
         try:
             self._use(scene)
         except faults.RagdollError:
             self._shown = before
+            if hold and not self.editing:
+                self._pause(False)
             raise
 
     def _chosen(self) -> str:
