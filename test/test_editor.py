@@ -293,6 +293,24 @@ def test_another_scene_of_the_page_is_a_step(desk):
     assert desk.editor.scene == DROP
 
 
+def test_a_page_that_draws_late_does_not_undo(desk):
+    desk.editor.select('head')
+    scenes = []
+    for mass in (1.0, 2.0, 3.0):
+        desk.panel.body['mass'].value = mass
+        desk.editor.update()
+        scenes.append(desk.editor.scene)
+    # The first was never drawn; now the second is, when the third has been given already.
+    desk.editor.show(scenes[1])
+    desk.editor.show(scenes[2])
+    assert desk.editor.scene is scenes[2]
+    # Chosen elsewhere, the first is a step.
+    desk.editor.show(scenes[0])
+    assert desk.editor.scene is scenes[0]
+    desk.editor.undo()
+    assert desk.editor.scene is scenes[2]
+
+
 def test_many_at_once_leave_one_consistent_history(desk):
     """Viser calls from 32 threads: each update is a step, none is lost, all can be undone."""
     desk.editor.select('head')
