@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from geometry_msgs.msg import Twist, Vector3, Wrench, WrenchStamped
 from rclpy.node import Node
@@ -14,9 +15,11 @@ from rclpy.node import Node
 from .. import faults
 from ..push import Push
 from ..ragdoll import Vector
-from ..simulation import Simulation
 from .parameters import Settings
 from .tally import Tally
+
+if TYPE_CHECKING:
+    from ..simulation import Simulation
 
 WORLD = 'world'
 

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import functools
+from typing import TYPE_CHECKING
 
 import numpy as np
 from geometry_msgs.msg import PoseArray
@@ -14,7 +15,6 @@ from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
 from ..scene import Scene
-from ..simulation import Simulation
 from ..swing.mount import mounts
 from ..urdf import scene_to_urdf
 from .markers import Markers
@@ -29,10 +29,16 @@ from .messages import (
 )
 from .packed import Packed
 
+if TYPE_CHECKING:
+    from ..simulation import Simulation
+
 MARKER_PERIOD = 33_000_000
 """ns of the steady clock between two MarkerArrays: as often as a screen can use."""
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+KEPT = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""For poses: who comes while the time stands can ask for the last ones."""
 
 
 class Outputs:
@@ -40,7 +46,7 @@ class Outputs:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._poses = node.create_publisher(PoseArray, '~/poses', 10)
+        self._poses = node.create_publisher(PoseArray, '~/poses', KEPT)
         self._state = node.create_publisher(MultiDOFJointState, '~/state', 10)
         self._joints = node.create_publisher(JointState, 'joint_states', 10)
         self._swings: Publisher | None = None

@@ -9,7 +9,7 @@ from .source import Frame
 PERIOD = 1 / 30
 """s between two moves."""
 
-CAMERA = ((4.2, -1.2, 1.5), (0.0, 0.0, 0.8))
+CAMERA = ((3.2, -0.9, 1.3), (0.0, 0.0, 0.7))
 """Where it stands at first and what it looks at, m: in front of the doll, as the arrow keys have
 it, and a little aside."""
 

@@ -63,11 +63,13 @@ class Remote:
     """Listens to the node in its own namespace, in a thread of its own, while a page is open."""
 
     def __init__(self, arguments: list[str]) -> None:
+        self._context = rclpy.Context()
         try:
-            rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+            rclpy.init(args=arguments, context=self._context,
+                       signal_handler_options=SignalHandlerOptions.NO)
         except InvalidROSArguments as error:
             raise Refused(str(error)) from None
-        self._node = Node('ragdoll_viewer')
+        self._node = Node('ragdoll_viewer', context=self._context)
         self._full = f'{self._node.get_namespace().rstrip("/")}/{NAME}'
         self._status = status_name(self._node.get_namespace(), NAME)
         self._ask = Ask(self._node, NAME)
@@ -80,7 +82,7 @@ class Remote:
         self._opened = time.monotonic()
         self._folder: Path | None = None
         self._ended = threading.Event()
-        self._executor = SingleThreadedExecutor()
+        self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._spin, name='ros', daemon=True)
         self._thread.start()
@@ -182,7 +184,7 @@ class Remote:
         self._thread.join(1.0)
         self._executor.shutdown(timeout_sec=0)
         self._node.destroy_node()
-        rclpy.try_shutdown()
+        self._context.try_shutdown()
 
     def _spin(self) -> None:
         self._node.create_timer(RETRY, self._learn_if_needed)
@@ -228,7 +230,7 @@ class Remote:
 
     def _hear_frames(self) -> list:
         create = self._node.create_subscription
-        return [create(PoseArray, f'{NAME}/poses', self._take_poses, 1, raw=True),
+        return [create(PoseArray, f'{NAME}/poses', self._take_poses, LATCHED, raw=True),
                 create(String, 'robot_description', self._take_description, LATCHED),
                 create(DiagnosticArray, '/diagnostics', self._take_diagnostics, 10),
                 create(ParameterEvent, '/parameter_events', self._take_event, 10)]
