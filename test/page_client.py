@@ -39,9 +39,10 @@ class PageClient:
 
     def drag(self, name, phase, start, end, instance=0):
         """Tell of a pointer that drags a node of the scene, at two points of the world."""
+        start, end = (tuple(map(float, point)) for point in (start, end))
         self.send(_messages.SceneNodeDragMessage(
-            name=name, phase=phase, instance_index=instance, start_position=tuple(map(float, start)),
-            start_screen_pos=(0.5, 0.5), end_position=tuple(map(float, end)), end_screen_pos=(0.5, 0.5),
+            name=name, phase=phase, instance_index=instance, start_position=start,
+            start_screen_pos=(0.5, 0.5), end_position=end, end_screen_pos=(0.5, 0.5),
             button='left', modifier=None))
 
     def update(self, handle, value):

@@ -308,28 +308,6 @@ def test_contacts_on_demand(page):
     wait(lambda: not page.server.scene.get_handle_by_name('/scene/contacts').visible)
 
 
-def test_the_camera_follows_on_demand(page):
-    """By as much as the centre of mass goes, from when it is asked to."""
-    client = page.open()
-    wait(lambda: page.server.get_clients() and page._frame)
-    (handle,) = page.server.get_clients().values()
-    paused(page)
-    eye = handle.camera.position.copy()
-    client.update(page.view._follow, True)
-    wait(lambda: page._follower._last is not None)
-    begin = page._follower._last
-    page.source.pause(False)
-    wait(lambda: begin[2] - page._follower._last[2] > 0.3)
-    paused(page)
-    way = page._follower._last - begin
-    assert way[2] < -0.3
-    assert np.allclose(handle.camera.position - eye, way, atol=1e-9)
-    masses = np.array([bone.mass for bone in DROP.bones])
-    centre = masses @ page._frame.state.positions / masses.sum()
-    # The camera moves 30 times a second; the last part of a tick's way may be missing.
-    assert np.abs(page._follower._last - centre).max() < 0.2
-
-
 def test_plots_tell_energy_gap_and_pace(page):
     client = page.open()
     wait(lambda: page._frame)
