@@ -19,7 +19,7 @@ else
 VENV_FLAGS := --system-site-packages
 endif
 
-.PHONY: help run test lint slow bench hard report colcon users-versions clean
+.PHONY: help run test pictures lint slow bench hard report colcon users-versions clean
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 22
 
@@ -40,6 +40,9 @@ chromium:
 	  echo 'Installing chromium, in which the page is tested'; \
 	  { $(AS_ROOT) apt-get update && $(AS_ROOT) apt-get install --yes --no-install-recommends \
 	  chromium; } >/dev/null 2>&1 || echo 'That needs root and Debian: apt-get install chromium' >&2; }
+
+pictures: $(READY) chromium ## pictures of the page, into docs/
+	@$(BIN)/python docs/viewer.py docs
 
 lint: $(READY) ## ruff
 	@$(BIN)/python -m ruff check .

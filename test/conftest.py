@@ -9,11 +9,15 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 
-if importlib.util.find_spec('rclpy') is None:
-    collect_ignore_glob = ['test_ros_*.py']
+FILES_THAT_NEED = {'rclpy': ['test_ros_*.py'],
+                   'viser': ['test_viewer*.py', 'test_editor*.py', 'test_ros_browser.py']}
+
+collect_ignore_glob = [file for package, files in FILES_THAT_NEED.items()
+                       if importlib.util.find_spec(package) is None for file in files]
 
 
-LONGEST = ('test_ros_process.py', 'test_simulation.py', 'test_swing.py')
+LONGEST = ('test_ros_browser.py', 'test_ros_process.py', 'test_viewer_browser.py',
+           'test_simulation.py', 'test_swing.py')
 
 
 def pytest_collection_modifyitems(items):
