@@ -58,7 +58,9 @@ class PageClient:
         self._thread.join(PATIENCE)
 
     def close(self):
-        """Close the page."""
+        """Close the page; a second time does nothing."""
+        if not self._thread.is_alive():
+            return
         asyncio.run_coroutine_threadsafe(self._socket.close(), self._loop)
         self._thread.join(PATIENCE)
 

@@ -1,6 +1,7 @@
 """Buttons and keys: pushes, time, scene."""
 from __future__ import annotations
 
+import asyncio
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -56,7 +57,7 @@ class Controls:
         self._step.on_click(lambda _: self.source.step())
         reset.on_click(lambda _: self.source.reset())
         self._pace.on_update(lambda event: event.client and self._set_pace())
-        self._scene.on_update(lambda event: event.client and self._load(event.client))
+        self._scene.on_update(self._choose)
         self._add_keys(gui)
 
     def push(self, arrow: str) -> None:
@@ -86,10 +87,15 @@ class Controls:
     def _set_pace(self) -> None:
         self.source.set_pace(self._pace.value)
 
-    def _load(self, client: viser.ClientHandle) -> None:
-        if self._scene.value != OTHER:
-            with told(client):
-                self.source.load(self._scene.value)
+    async def _choose(self, event: viser.GuiEvent) -> None:
+        """Load the chosen scene; at once, before the page tells of the one that is shown."""
+        name = event.target.value
+        if event.client is not None and name != OTHER:
+            asyncio.get_running_loop().run_in_executor(None, self._load, name, event.client)
+
+    def _load(self, name: str, client: viser.ClientHandle) -> None:
+        with told(client):
+            self.source.load(name)
 
     def _add_keys(self, gui: viser.GuiApi) -> None:
         for arrow in ARROWS.values():

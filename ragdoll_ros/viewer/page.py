@@ -95,13 +95,13 @@ class Page:
 
     def _draw(self, frame: Frame) -> None:
         new = self._stage is None or frame.scene is not self._stage.scene
-        self._frame = frame
         if new:
             self._stage = Stage(self.server, frame)
             self._pointer.attach(self._stage.bodies, self._stage.skins)
             self.controls.show_scene(frame.scene.name)
             self.view.show_scene(has_skin=bool(self._stage.skins.handles))
             self._edit(frame.scene)
+        self._frame = frame
         with self.server.atomic():
             self._stage.show(frame)
         for listener in self.listeners:
