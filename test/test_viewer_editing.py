@@ -22,7 +22,6 @@ def view(folder):
     viewer = Viewer('--scene', 'drop', '--folder', str(folder))
     with chromium() as context:
         view = View(context, viewer.url)
-        view.page.set_viewport_size({'width': 1100, 'height': 1300})
         view.page.get_by_role('tab', name='Edit').click()
         press(view, 'Edit')
         view.wait(lambda: stands(view, START))
@@ -43,7 +42,8 @@ def choose(view, bone):
 
 def field(view, label):
     """Input beside a label of the panel."""
-    return view.page.get_by_label(label, exact=True).first
+    return view.page.locator(
+        f'xpath=(//label[normalize-space()="{label}"]/ancestor::*[.//input][1]//input)[1]')
 
 
 def fill(view, label, text):
@@ -55,6 +55,12 @@ def stands(view, positions):
     """Whether the bodies are drawn there; a page gets numbers of 32 bits, 1e-6 m at 2 m."""
     bodies = view.bodies(SCENE)
     return bodies is not None and abs(bodies - positions).max() < 1e-6
+
+
+def place(view, bone):
+    """Where a body is drawn, (3,) m; where it began while the page changes the scene."""
+    bodies = view.bodies(SCENE)
+    return START[bone] if bodies is None else bodies[bone]
 
 
 def said(view, text):
@@ -102,25 +108,24 @@ def test_a_faulty_value_is_refused_where_it_stands(view):
 
 
 def test_a_body_is_dragged_by_its_handle_and_dropped(view):
-    """By the arrow along y, which is seen from in front as pointing to the right."""
+    """By the arrow that points up, by 0.2 m."""
     at = START[SHIN]
-    (x0, y0), (x1, y1) = view.pixels([at + (0, 0.15, 0), at + (0, 0.35, 0)])
+    (x0, y0), (x1, y1) = view.pixels(at + np.outer((0.2, 0.4), (0, 0, 1)))
     mouse = view.page.mouse
     mouse.move(x0, y0)
     mouse.down()
     for k in range(1, 11):
         mouse.move(x0 + (x1 - x0) * k / 10, y0 + (y1 - y0) * k / 10)
     mouse.up()
-    view.wait(lambda: view.bodies(SCENE) is not None
-              and view.bodies(SCENE)[SHIN][1] - at[1] > 0.05)
+    view.wait(lambda: place(view, SHIN)[2] - at[2] > 0.05)
     moved = view.bodies(SCENE)
-    # 0.2 m, as far as a gizmo in perspective and whole pixels go; all else stays.
-    assert moved[SHIN] - at == pytest.approx((0, 0.2, 0), abs=0.03)
+    # Along that axis alone, as far as whole pixels and ten steps of the mouse go; all else stays.
+    assert moved[SHIN] - at == pytest.approx((0, 0, 0.2), abs=0.03)
     assert abs(np.delete(moved - START, SHIN, axis=0)).max() < 1e-6
     press(view, 'Undo')
     view.wait(lambda: stands(view, START))
     press(view, 'Drop it')
-    view.wait(lambda: (view.bodies(SCENE)[:, 2] < START[:, 2] - 0.1).all())
+    view.wait(lambda: place(view, 0)[2] < START[0, 2] - 0.1)
     press(view, 'Edit')
     view.wait(lambda: stands(view, START))
 
