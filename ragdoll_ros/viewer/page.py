@@ -16,6 +16,7 @@ from .ground import light
 from .plots import Plots
 from .pointer import Pointer
 from .recording_panel import RecordingPanel
+from .skin import KEEP_PAGE
 from .source import Frame, Source, Wanted
 from .stage import Stage
 from .view import View
@@ -47,6 +48,7 @@ class Page:
         self._stage: Stage | None = None
         light(server)
         server.gui.configure_theme(show_logo=False, show_share_button=False)
+        server.gui.add_html(KEEP_PAGE)
         self._problem = server.gui.add_markdown('')
         self.tabs = server.gui.add_tab_group()
         with self.tabs.add_tab('Play'):

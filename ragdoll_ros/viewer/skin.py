@@ -25,6 +25,18 @@ COLOR = (205, 190, 175)
 SCALE = 1e-3
 """Share by which a skin's size may miss the doll's before it is read again in the doll's."""
 
+KEEP_PAGE = """<img src="data:," style="display:none" onerror="
+  (function guard() {
+    const viewer = window.__viserMutable;
+    if (!viewer) return setTimeout(guard, 50);
+    if (viewer.ragdollGuard) return;
+    viewer.ragdollGuard = true;
+    viewer.nodeRefFromName = new Proxy(viewer.nodeRefFromName,
+                                       {get: (nodes, name) => nodes[name] ?? undefined});
+  })()">"""
+"""Keeps a page alive when a skin goes, or the line to the server does. Viser 1.1.1 ends the whole
+page then: as it takes a skinned mesh away it asks a node that is null, not undefined, already."""
+
 
 @dataclass(frozen=True)
 class Skin:
