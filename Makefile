@@ -1,7 +1,7 @@
 # Wants GNU make and a python3 of 3.10 or newer with its venv module; sets up the rest in .venv,
 # with ROS 2 Jazzy from PyPI's wheels, or with the ROS that the shell has sourced.
 PYTHON ?= python3
-EXTRAS := test,report,fit
+EXTRAS := test,report,fit,viewer
 VENV := .venv
 BIN := $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check
@@ -27,8 +27,19 @@ run: $(READY) ## the doll falls, arrow keys push it; SCENE=crowd: another scene
 	@$(BIN)/python -m ragdoll_ros.ros.run $(SCENE)
 
 # A file's tests stay together: those of one ROS domain, and those that time, go one by one.
-test: $(READY) ## the tests, at most 90 s
+test: $(READY) chromium ## the tests, at most 90 s
 	@$(BIN)/python -m pytest -n 3 --dist loadfile
+
+# For the tests of the page: of Playwright only the driver comes from PyPI. Where there is none to
+# be had, those tests are skipped and say so.
+CHROMIUM ?= chromium
+AS_ROOT := $(shell test "$$(id -u)" = 0 || echo sudo -n) env DEBIAN_FRONTEND=noninteractive
+.PHONY: chromium
+chromium:
+	@command -v $(CHROMIUM) >/dev/null || command -v google-chrome >/dev/null || { \
+	  echo 'Installing chromium, in which the page is tested'; \
+	  { $(AS_ROOT) apt-get update && $(AS_ROOT) apt-get install --yes --no-install-recommends \
+	  chromium; } >/dev/null 2>&1 || echo 'That needs root and Debian: apt-get install chromium' >&2; }
 
 lint: $(READY) ## ruff
 	@$(BIN)/python -m ruff check .

@@ -11,6 +11,7 @@ NAME = 'ragdoll_ros'
 EXECUTABLES = {
     'ragdoll_node': 'ragdoll_ros.ros.node:main',
     'ragdoll_teleop': 'ragdoll_ros.ros.teleop:main',
+    'ragdoll_viewer': 'ragdoll_ros.viewer.command:main',
     'ragdoll_fit': 'ragdoll_ros.fit.command:main',
     'ragdoll_report': 'ragdoll_ros.accuracy.command:main',
 }
@@ -78,8 +79,10 @@ setup(
         'ros': ['ros-jazzy-rclpy', 'ros-jazzy-rmw-fastrtps-cpp', 'ros-jazzy-common-interfaces'],
         'report': ['scipy', 'matplotlib', 'mujoco'],
         'fit': ['pygltflib', 'matplotlib'],
+        # The page: 3D, panels and plots in a browser, served from Python, with no build of its own.
+        'viewer': ['viser', 'imageio'],
         'test': ['pytest', 'pytest-xdist', 'ruff', 'setuptools', 'wheel', 'yourdfpy',
-                 'mannequin-x; python_version >= "3.11"'],
+                 'playwright', 'mannequin-x; python_version >= "3.11"'],
         'colcon': ['colcon-core', 'colcon-ros', 'colcon-python-setup-py',
                    'colcon-common-extensions', 'setuptools<80'],
     },

@@ -69,7 +69,7 @@ class Guard:
     def surplus(self, motion: Motion, groups: np.ndarray) -> np.ndarray:
         """Energy (d,) J that each doll must lose; zero or below: none.
 
-        Dolls of one group (``groups`` (d,): a number for each doll) touch and so share their
+        Dolls of one group (``groups`` (d,): a number for each doll) may touch and so share their
         energy; what is too much is taken from each in proportion to its kinetic energy.
         """
         account = self.account
@@ -88,9 +88,9 @@ class Guard:
             account.energy = energy - (excess / np.maximum(1, np.bincount(groups)))[groups]
         np.minimum(account.energy, energy, out=account.energy)
 
-    def groups(self, touching: set[tuple[int, int]]) -> np.ndarray:
-        """Number (d,) of the group that each doll is in, dolls that touch being in one."""
-        pairs = [(a, b) for a, b in touching if a != b and min(a, b) >= 0]
+    def groups(self, pairs: set[tuple[int, int]]) -> np.ndarray:
+        """Number (d,) of the group that each doll is in, the dolls of a pair being in one."""
+        pairs = [(a, b) for a, b in pairs if a != b and min(a, b) >= 0]
         if not pairs:
             return self._own_groups
         groups = self._own_groups.copy()

@@ -22,6 +22,10 @@ class Pacer:
         """Begin anew: the next tick is due one period from now, and nothing is caught up."""
         self._next = now + self.period
 
+    def wait(self, now: int) -> float:
+        """Give the ns until the next tick; 0 if it is late."""
+        return max(0.0, self._next - now)
+
     def due(self, now: int) -> bool:
         """Tell whether a tick is due, and count it as done if so."""
         lag = now - self._next

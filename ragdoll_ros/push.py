@@ -4,12 +4,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from . import faults
+import numpy as np
+
+from . import faults, rotation
 from .faults import floats, set_fields
 from .ragdoll import Vector
 
 LARGEST = 1e7
 """N and N m: beyond it a push is refused, as no body that this package is for meets it."""
+
+ARROW = 0.5
+"""m: length of the arrow of a push of 1 kN; longer and shorter ones go by the square root."""
 
 
 @dataclass(frozen=True)
@@ -41,3 +46,16 @@ class Push:
         faults.check_range('duration', self.duration, 0, 1e6)
         if self.start is not None:
             faults.check_range('start', self.start, 0, 1e9)
+
+    def arrow(self, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+        """Tail and tip (2, 3) m, world frame, of an arrow that ends where the force attacks.
+
+        The bone's centre of mass is at ``position`` (3,) m, its axes at ``orientation`` (4,).
+        """
+        force, point = np.array(self.force), np.array(self.point)
+        if self.local:
+            force, point = rotation.rotate(orientation, np.stack([force, point]))
+        strength = float(np.linalg.norm(force))
+        length = ARROW * (strength / 1000) ** 0.5
+        tip = position + point
+        return np.stack([tip - force * (length / max(strength, 1e-300)), tip])

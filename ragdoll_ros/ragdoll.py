@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
@@ -189,8 +190,17 @@ class Bone:
                    orientation=unit('orientation', self.orientation))
         faults.check_positive('mass', self.mass)
         faults.check_finite('position', self.position)
+        self._check_surface()
+
+    def _check_surface(self) -> None:
+        for key, most in (('friction', math.inf), ('rolling_friction', math.inf),
+                          ('restitution', 1)):
+            if getattr(self, key) is not None:
+                faults.check_range(key, getattr(self, key), 0, most)
         if self.color is not None:
             set_fields(self, color=floats(self.color))
+            for part in self.color:
+                faults.check_range('color', part, 0, 1)
 
     @property
     def inertia(self) -> Vector:
@@ -329,7 +339,8 @@ class Ragdoll:
     """A tree of bones. ``bones`` fixes the order; one of them, the root, has no parent.
 
     ``swings`` ride on bones and do not act back on them; ``riders`` are what else moves with the
-    bones, in the order of the skeleton they are of.
+    bones, in the order of the skeleton they are of. ``model`` is the path of the character that
+    the riders are of, made absolute; nothing here opens it.
     """
 
     name: str
@@ -337,10 +348,12 @@ class Ragdoll:
     joints: tuple[Joint, ...] = ()
     swings: tuple[Swing, ...] = ()
     riders: tuple[Rider, ...] = ()
+    model: str | None = None
 
     def __post_init__(self) -> None:
         set_fields(self, bones=tuple(self.bones), joints=tuple(self.joints),
-                   swings=tuple(self.swings), riders=tuple(self.riders))
+                   swings=tuple(self.swings), riders=tuple(self.riders),
+                   model=self.model and os.path.abspath(self.model))
         names = [bone.name for bone in self.bones]
         edges = [(joint.parent, joint.child) for joint in self.joints]
         found = tree_faults(names, edges)

@@ -6,6 +6,7 @@ import math
 import numpy as np
 
 from . import rotation
+from .engine.protocol import GROUND
 from .ragdoll import Bone, Box, Sphere
 from .scene import Scene
 from .state import State
@@ -55,18 +56,21 @@ class Reach:
             return 0.0
         return float(speeds[self.heights(state) < speeds * soon + MARGIN].max(initial=0.0))
 
-    def in_air(self, state: State, duration: float, acceleration: float) -> bool:
-        """Tell whether no bone can reach the ground or another doll within ``duration`` s.
+    def near(self, state: State, duration: float, acceleration: float) -> set[tuple[int, int]]:
+        """Pairs of dolls that may touch within ``duration`` s; GROUND stands for the ground.
 
         A bound: bounding spheres, at twice the speed they have and may gain by gravity and
-        pushes (``acceleration`` m/s^2).
+        pushes (``acceleration`` m/s^2), and the boxes around each doll's.
         """
         speeds = np.sqrt(np.einsum('ij,ij->i', state.linear, state.linear))
         far = 2 * duration * (speeds + acceleration * duration) + self._radii + MARGIN
-        heights = state.positions @ self._normal
-        if self._ground is not None and (heights - self._ground.offset < far).any():
-            return False
-        return len(self._bounds) == 2 or self._apart(state.positions, far)
+        found = set()
+        if self._ground is not None:
+            low = state.positions @ self._normal - self._ground.offset < far
+            if low.any():
+                found = {(GROUND, int(doll)) for doll in np.flatnonzero(
+                    np.logical_or.reduceat(low, self._bounds[:-1]))}
+        return found if len(self._bounds) == 2 else found | self._close(state.positions, far)
 
     def strides(self, state: State, duration: float) -> int:
         """Parts of ``duration`` s in each of which no bone passes another's half thickness."""
@@ -74,13 +78,14 @@ class Reach:
         speed = np.abs(state.linear - middle).max()
         return max(1, math.ceil(speed * duration / (2 * self._thinnest)))
 
-    def _apart(self, positions: np.ndarray, far: np.ndarray) -> bool:
-        """Tell whether the boxes around the dolls, ``far`` m wider, are clear of each other."""
+    def _close(self, positions: np.ndarray, far: np.ndarray) -> set[tuple[int, int]]:
+        """Pairs of dolls whose boxes, ``far`` m wider, overlap."""
         starts = self._bounds[:-1]
         low = np.minimum.reduceat(positions - far[:, None], starts)
         high = np.maximum.reduceat(positions + far[:, None], starts)
         overlap = ((low[:, None] <= high[None]) & (low[None] <= high[:, None])).all(axis=2)
-        return int(overlap.sum()) == len(starts)
+        return set(zip(*(places.tolist() for places in np.nonzero(np.triu(overlap, 1))),
+                       strict=True))
 
 
 def _support(bone: Bone) -> tuple[float, ...]:

@@ -24,6 +24,12 @@ from .swing.form import swing_data, swing_from
 LARGEST_FILE = 32_000_000
 """Bytes; a doll of 10 000 bones takes 3 MB."""
 
+LARGEST_CONTENT = 5_000_000
+"""Values in a file; a doll of 10 000 bones has 0.3 million."""
+
+DEEPEST = 100
+"""Levels of lists and mappings in a file; a scene has 12."""
+
 
 def config_folder() -> Path:
     """Folder of the shipped scenes: the checkout's, else the ROS prefix's, else the package's."""
@@ -61,8 +67,13 @@ def load_scene(name: str) -> Scene:
         data = _read(path)
     except Fault as fault:
         raise Faults(str(name), [fault]) from None
+    return scene_from(data, path)
+
+
+def scene_from(data: object, path: Path) -> Scene:
+    """Make a scene from what a YAML file at ``path`` holds, a scene or a doll; see load_scene."""
     if isinstance(data, dict) and 'bones' in data:
-        return above_ground(_raise_or_give(path, *build_doll(data, path.stem)))
+        return above_ground(_raise_or_give(path, *build_doll(data, path)))
     return _raise_or_give(path, *build_scene(data, path))
 
 
@@ -73,17 +84,18 @@ def load_doll(name: str) -> Ragdoll:
         data = _read(path)
     except Fault as fault:
         raise Faults(str(name), [fault]) from None
-    return _raise_or_give(path, *build_doll(data, path.stem))
+    return _raise_or_give(path, *build_doll(data, path))
 
 
 def save_scene(scene: Scene, path: str | Path, head: str = '') -> None:
     """Write a scene with its dolls in it; load_scene gives an equal one back."""
-    _write(scene_data(scene), path, 'scene', head)
+    Path(path).write_text(scene_text(scene, Path(path).parent, head), encoding='utf-8')
 
 
 def save_doll(doll: Ragdoll, path: str | Path, head: str = '') -> None:
     """Write a doll; load_doll gives an equal one back."""
-    _write(doll_data(doll), path, 'doll', head)
+    text = _text(doll_data(doll, Path(path).parent), 'doll', head)
+    Path(path).write_text(text, encoding='utf-8')
 
 
 def build_scene(data: object, path: Path) -> tuple[Scene | None, list[Fault]]:
@@ -100,7 +112,7 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[Fault]]:
         doll, more = _placed_doll(entry['doll'], path)
         found += [fault.at(f'{where}.doll') for fault in more]
         if doll is not None and not _any_under(found, where):
-            doll, more = _with_swings(doll, entry)
+            doll, more = _with_swings(doll, entry, path)
             found += [fault.at(where) for fault in more]
         if doll is not None and not _any_under(found, where):
             fields = {'position', 'orientation', 'velocity', 'spin', 'name'} & set(entry)
@@ -119,8 +131,9 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[Fault]]:
     return scene, found
 
 
-def build_doll(data: object, name: str = 'doll') -> tuple[Ragdoll | None, list[Fault]]:
-    """Make a doll from what a YAML file holds: the doll, or None and every fault."""
+def build_doll(data: object,
+               path: Path = Path('doll')) -> tuple[Ragdoll | None, list[Fault]]:
+    """Make a doll from what the YAML file at ``path`` holds: the doll, or None and every fault."""
     found = _schema_faults('doll', data)
     if not isinstance(data, dict):
         return None, found
@@ -138,30 +151,36 @@ def build_doll(data: object, name: str = 'doll') -> tuple[Ragdoll | None, list[F
                 found += carried_faults(key, names, carried)
     if found:
         return None, found
-    return Ragdoll(data.get('name', name), tuple(bones), tuple(joints), tuple(swings),
-                   tuple(riders)), found
+    model = str(path.parent / data['model']) if 'model' in data else None
+    return Ragdoll(data.get('name', path.stem), tuple(bones), tuple(joints), tuple(swings),
+                   tuple(riders), model), found
 
 
-def doll_data(doll: Ragdoll) -> dict:
-    """Give a doll as plain lists and numbers, the form of doll.schema.json."""
+def doll_data(doll: Ragdoll, folder: Path | None = None) -> dict:
+    """Give a doll as plain lists and numbers, the form of doll.schema.json.
+
+    The path of its character is written as seen from ``folder``, if given.
+    """
     data = {'name': doll.name, 'bones': [_bone_data(bone) for bone in doll.bones],
             'joints': [_joint_data(joint) for joint in doll.joints]}
     if doll.swings:
         data['swings'] = [swing_data(swing) for swing in doll.swings]
     if doll.riders:
         data['riders'] = [_rider_data(rider) for rider in doll.riders]
+    if doll.model is not None:
+        data['model'] = doll.model if folder is None else _seen_from(folder, doll.model)
     return data
 
 
-def scene_data(scene: Scene) -> dict:
-    """Give a scene as plain lists and numbers, the form of scene.schema.json."""
+def scene_data(scene: Scene, folder: Path | None = None) -> dict:
+    """Give a scene as plain lists and numbers, the form of scene.schema.json; see doll_data."""
     data = {'name': scene.name, 'gravity': list(scene.gravity), 'step': scene.step,
             'pace': scene.pace, 'self_collision': scene.self_collision,
             'material': dict(vars(scene.material)), 'ground': None, 'dolls': []}
     if scene.ground is not None:
         data['ground'] = {'normal': list(scene.ground.normal), 'offset': scene.ground.offset}
     for placement in scene.dolls:
-        entry = {'doll': doll_data(placement.doll), 'name': placement.name}
+        entry = {'doll': doll_data(placement.doll, folder), 'name': placement.name}
         for key in ('position', 'orientation', 'velocity', 'spin'):
             entry[key] = list(getattr(placement, key))
         data['dolls'].append(entry)
@@ -177,27 +196,91 @@ _Loader.add_implicit_resolver(
     list('-+0123456789'))
 
 
+def _seen_from(folder: Path, model: str) -> str:
+    """Path of a character as it stands in a file of ``folder``: with slashes, relative."""
+    try:
+        return Path(os.path.relpath(model, folder)).as_posix()
+    except ValueError:
+        # Another drive has no way there.
+        return model
+
+
 def _read(path: Path) -> object:
     if path.stat().st_size > LARGEST_FILE:
         raise faults.Unreadable('', f'{path.stat().st_size} bytes', f'at most {LARGEST_FILE}')
     try:
-        return yaml.load(path.read_text(encoding='utf-8'), _Loader)
+        return parse(path.read_bytes())
+    except OSError as error:
+        raise faults.Unreadable('', str(error), 'a YAML file in UTF-8') from None
+
+
+def parse(content: bytes) -> object:
+    """Give what a YAML file holds as plain data; Unreadable with the place where it is none."""
+    if len(content) > LARGEST_FILE:
+        raise faults.Unreadable('', f'{len(content)} bytes', f'at most {LARGEST_FILE}')
+    try:
+        return _construct(content.decode('utf-8'))
+    except Fault:
+        raise
     except yaml.YAMLError as error:
         mark = getattr(error, 'problem_mark', None)
         where = f'line {mark.line + 1}, column {mark.column + 1}' if mark else ''
         problem = getattr(error, 'problem', None) or 'no YAML'
         raise faults.Unreadable(where, problem, 'a YAML file') from None
-    except (UnicodeDecodeError, OSError, ValueError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise faults.Unreadable('', str(error), 'a YAML file in UTF-8') from None
 
 
-def _write(data: dict, path: str | Path, schema: str, head: str) -> None:
+def _construct(text: str) -> object:
+    _check_depth(text)
+    loader = _Loader(text)
+    try:
+        node = loader.get_single_node()
+        # A few lines of aliases of aliases would fill the memory once they are followed.
+        if node is not None and _unfolded(node, {}) > LARGEST_CONTENT:
+            raise faults.Unreadable('', 'aliases of aliases',
+                                    f'at most {LARGEST_CONTENT} values once they are followed')
+        return None if node is None else loader.construct_document(node)
+    finally:
+        loader.dispose()
+
+
+def _check_depth(text: str) -> None:
+    """Refuse what is nested so deeply that libyaml's recursion would end the process."""
+    depth = 0
+    for event in yaml.parse(text, _Loader):
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST:
+            mark = event.start_mark
+            raise faults.Unreadable(f'line {mark.line + 1}, column {mark.column + 1}',
+                                    'nested too deeply', f'at most {DEEPEST} levels')
+
+
+def _unfolded(node: yaml.Node, sizes: dict[int, float]) -> float:
+    """Count what a node holds with each alias written out; without end for one inside itself."""
+    if isinstance(node, yaml.ScalarNode):
+        return 1
+    if id(node) not in sizes:
+        sizes[id(node)] = math.inf
+        pairs = isinstance(node, yaml.MappingNode)
+        parts = (part for entry in node.value for part in (entry if pairs else [entry]))
+        sizes[id(node)] = 1 + sum(_unfolded(part, sizes) for part in parts)
+    return sizes[id(node)]
+
+
+def scene_text(scene: Scene, folder: Path, head: str = '') -> str:
+    """Give what save_scene writes into a file of ``folder``."""
+    return _text(scene_data(scene, folder), 'scene', head)
+
+
+def _text(data: dict, schema: str, head: str) -> str:
     lines = [f'# yaml-language-server: $schema={schema}.schema.json',
              '# Units: m, kg, s, degrees where a key ends in _deg. x forward, y left, z up.']
     lines += ['# ' + line if line else '#' for line in head.splitlines()]
     text = yaml.safe_dump(data, sort_keys=False, width=100, allow_unicode=True,
                           default_flow_style=None)
-    Path(path).write_text('\n'.join(lines) + '\n' + text, encoding='utf-8')
+    return '\n'.join(lines) + '\n' + text
 
 
 @functools.cache
@@ -241,25 +324,25 @@ def _expected(error: jsonschema.ValidationError) -> str:
 def _placed_doll(source: object, path: Path) -> tuple[Ragdoll | None, list[Fault]]:
     """Make the doll a scene names; faults of another file carry its name."""
     if isinstance(source, dict):
-        return build_doll(source)
+        return build_doll(source, path.with_name('doll'))
     if not isinstance(source, str):
         return None, []
     try:
         file = find(source, beside=path.parent)
-        doll, found = build_doll(_read(file), file.stem)
+        doll, found = build_doll(_read(file), file)
     except Fault as fault:
         return None, [fault]
     return doll, [fault.at(f'({file.name})') for fault in found]
 
 
-def _with_swings(doll: Ragdoll, entry: dict) -> tuple[Ragdoll | None, list[Fault]]:
+def _with_swings(doll: Ragdoll, entry: dict, path: Path) -> tuple[Ragdoll | None, list[Fault]]:
     """Give the doll the swings that its place in the scene adds to its own."""
     if not entry.get('swings'):
         return doll, []
     own = len(doll.swings)
     data = doll_data(doll)
     data['swings'] = data.get('swings', []) + entry['swings']
-    dressed, found = build_doll(data)
+    dressed, found = build_doll(data, path)
     shift = re.compile(r'^swings\[(\d+)\]')
     return dressed, [type(fault)(
         shift.sub(lambda match: f'swings[{int(match[1]) - own}]', fault.path),

@@ -11,7 +11,7 @@ import numpy as np
 from . import faults, rotation
 from .coordinates import Coordinates
 from .engine.bullet import BulletEngine
-from .engine.protocol import GROUND, Engine, Load
+from .engine.protocol import GROUND, Contact, Engine, Load
 from .gap import JointGap
 from .grab import EVENLY, Grab, Hands, Pull
 from .guard import Guard
@@ -135,6 +135,11 @@ class Simulation:
     def grabs(self) -> tuple[Grab, ...]:
         """What hands hold now."""
         return self._hands.grabs
+
+    @property
+    def contacts(self) -> list[Contact]:
+        """What touches now."""
+        return self._stepper.settle().contacts()
 
     @property
     def coordinates(self) -> Coordinates:
@@ -317,15 +322,15 @@ class Simulation:
         stepper, before, motion = self._stepper, self._state, self._motion
         start = stepper.coordinates
         pull = max((math.hypot(*load.force) for load in loads), default=0.0)
-        in_air = stepper.reach.in_air(before, duration, self._gravity + pull / self._lightest)
+        near = stepper.reach.near(before, duration, self._gravity + pull / self._lightest)
         piece = stepper.go(duration, loads)
         self._see(stepper.state)
         if loads:
             self._enter_work(loads, before, piece.substep)
-        if in_air and stepper.accuracy.momentum:
+        if not near and stepper.accuracy.momentum:
             self._keep_momentum(motion, piece.duration, loads, before)
         if stepper.accuracy.energy:
-            self._keep_energy(start, in_air)
+            self._keep_energy(start, near)
         return piece.duration
 
     def _see(self, state: State) -> None:
@@ -353,15 +358,18 @@ class Simulation:
         self._motion = self.mechanics.shifted_motion(self._motion, shift)
         self._stepper.shift(shift, self._state)
 
-    def _keep_energy(self, start: Coordinates, in_air: bool) -> None:
-        """Take out energy from nothing; what was in the air keeps its momentum for sure."""
+    def _keep_energy(self, start: Coordinates, near: set[tuple[int, int]]) -> None:
+        """Take out energy from nothing; what was in the air keeps its momentum for sure.
+
+        Dolls that may have touched (``near``) share their account: a bounce is over within a step.
+        """
         guard = self._guard
-        groups = guard.groups(self._stepper.touching)
+        groups = guard.groups(near)
         surplus = guard.surplus(self._motion, groups)
         if (surplus > 0).any():
             stepper = self._stepper
             self._correct(guard.without_surplus(
-                start, stepper.coordinates, self._motion, self._state, surplus, not in_air))
+                start, stepper.coordinates, self._motion, self._state, surplus, bool(near)))
             burst = guard.burst(self._motion, groups)
             if burst.any():
                 self._correct(guard.stopped(start, stepper.coordinates, burst))

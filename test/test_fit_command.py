@@ -28,6 +28,8 @@ def test_one_command_makes_a_scene_that_loads(glb, tmp_path, capsys):
     # The report stands in the file's head too, word for word.
     for line in printed.splitlines():
         assert f'# {line}'.rstrip() in head
+    assert load_doll(str(out)).model == str(glb)
+    assert f'model: {glb.name}' in out.read_text().splitlines()
     for words in ('thigh_l', 'vertices', 'mass, kg', '% of', 'shared', '20 bodies for 52 bones'):
         assert words in printed
 

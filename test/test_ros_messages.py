@@ -10,9 +10,9 @@ from rclpy.serialization import deserialize_message, serialize_message
 from visualization_msgs.msg import Marker
 
 from ragdoll_ros import rotation
-from ragdoll_ros.push import Push
+from ragdoll_ros.push import ARROW, Push
 from ragdoll_ros.ragdoll import Bone, Box, Capsule, Cylinder, Ragdoll, Sphere
-from ragdoll_ros.ros.markers import ARROW, Markers
+from ragdoll_ros.ros.markers import Markers
 from ragdoll_ros.ros.messages import to_joint_state, to_multi_dof, to_pose_array
 from ragdoll_ros.ros.packed import Packed
 from ragdoll_ros.ros.stamps import Stamps

@@ -66,6 +66,34 @@ def test_what_is_saved_is_loaded(tmp_path):
     assert load_scene(str(tmp_path / 'scene.yaml')) == scene
 
 
+def test_the_path_of_a_character_is_seen_from_its_dolls_file(tmp_path):
+    ball = Ragdoll('ball', (Bone('b', Sphere(0.1), 1, (0, 0, 0)),),
+                   model=str(tmp_path / 'characters' / 'ball.glb'))
+    (tmp_path / 'dolls').mkdir()
+    save_doll(ball, tmp_path / 'dolls' / 'ball.yaml')
+    text = (tmp_path / 'dolls' / 'ball.yaml').read_text()
+    assert yaml.safe_load(text)['model'] == '../characters/ball.glb'
+    assert load_doll(str(tmp_path / 'dolls' / 'ball.yaml')) == ball
+    # From a scene in another folder: by the doll's own file, then in the scene's.
+    (tmp_path / 'scene.yaml').write_text('dolls: [{doll: dolls/ball.yaml}]')
+    scene = load_scene(str(tmp_path / 'scene.yaml'))
+    assert scene.dolls[0].doll == ball
+    save_scene(scene, tmp_path / 'saved.yaml')
+    assert load_scene(str(tmp_path / 'saved.yaml')).dolls[0].doll == ball
+    moved = tmp_path / 'elsewhere'
+    (tmp_path / 'dolls').rename(moved)
+    assert load_doll(str(moved / 'ball.yaml')) == ball
+
+
+@pytest.mark.parametrize(('field', 'value'), [
+    ('friction', -1), ('friction', math.nan), ('rolling_friction', -0.1), ('restitution', 1.5),
+    ('color', (1, 0, 0, 2))])
+def test_a_bones_surface_is_checked_without_a_file_too(field, value):
+    with pytest.raises(faults.OutOfRange) as caught:
+        Bone('b', Sphere(0.1), 1, (0, 0, 0), **{field: value})
+    assert caught.value.path == field
+
+
 def test_all_faults_come_at_once_with_their_places(tmp_path):
     path = tmp_path / 'five.yaml'
     path.write_text(FIVE)
@@ -89,6 +117,28 @@ def test_rubbish_is_refused_in_words(tmp_path, text):
     path.write_text(text)
     with pytest.raises(faults.Faults):
         load_scene(str(path))
+
+
+@pytest.mark.parametrize('use', ['[{}]', '{{<<: [{}]}}'])
+def test_aliases_of_aliases_do_not_fill_the_memory(tmp_path, use):
+    """Followed, ten lines are 9^9 values."""
+    first, *others = 'abcdefghij'
+    text = f'{first}: &{first} {{k: 0}}\n'
+    for name in others:
+        text += f'{name}: &{name} ' + use.format(', '.join([f'*{first}'] * 9)) + '\n'
+        first = name
+    path = tmp_path / 'bomb.yaml'
+    path.write_text(text + f'bones: [*{first}]\n')
+    with pytest.raises(faults.Faults, match='aliases'):
+        load_scene(str(path))
+
+
+@pytest.mark.parametrize('text', ['[' * 100_000, '- ' * 100_000, '{a: ' * 100_000,
+                                  'bones: ' + '[' * 5000 + ']' * 5000])
+def test_what_is_nested_too_deeply_does_not_end_the_process(tmp_path, text):
+    (tmp_path / 'deep.yaml').write_text(text)
+    with pytest.raises(faults.Faults, match='nested too deeply'):
+        load_scene(str(tmp_path / 'deep.yaml'))
 
 
 def test_a_missing_file_names_the_ones_there_are():

@@ -6,6 +6,7 @@ damping and velocity clamps, which are on by default, are off.
 """
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 import tempfile
@@ -45,6 +46,10 @@ returns it faster the finer the steps, a blow that makes energy; its split impul
 LARGEST_RATE = 1e4
 """rad/s and m/s at which PyBullet clamps; its default of 100 makes energy in a 50 m drop."""
 
+HEAVIEST = 100.0
+"""kg m^2: bones with more mass times size squared than this are built in a unit of mass of their
+own, as PyBullet holds the impulse of a joint limit to 1000 N m s."""
+
 PROBE_STEP = 2.0 ** -10
 """s: the step that measures accelerations; a power of two, so that dividing by it is exact."""
 
@@ -81,6 +86,7 @@ class BulletEngine:
         self._timing: tuple[float, int] | None = None
         self._gravity = math.hypot(*scene.gravity)
         self._least_bounce = max(LEAST_BOUNCE, scene.material.restitution_speed)
+        self._unit = _unit_of_mass(scene)
         try:
             self._build()
         except BaseException:
@@ -198,7 +204,7 @@ class BulletEngine:
             if a is None:
                 a, b, position, normal = b, GROUND, np.array(point[6]), -normal
             found.append(Contact(a, GROUND if b is None else b, position, normal,
-                                 -point[8], point[9]))
+                                 -point[8], point[9] * self._unit))
         return found
 
     def save(self) -> int:
@@ -248,7 +254,8 @@ class BulletEngine:
             position, orientation = pybullet.getLinkState(
                 body, link, computeForwardKinematics=1, physicsClientId=self._client)[:2]
         turn = rotation.matrix(orientation)
-        force, torque, arm = load.force, load.torque, turn @ load.point
+        force, torque = load.force / self._unit, load.torque / self._unit
+        arm = turn @ load.point
         if load.local:
             force, torque = turn @ force, turn @ torque
         pybullet.applyExternalForce(body, link, _list(force), _list(position + arm),
@@ -286,7 +293,7 @@ class BulletEngine:
         return body
 
     def _add_doll(self, placement: Placement) -> _Doll:
-        doll = placement.doll
+        doll = self._weighed(placement.doll)
         collide = self.scene.self_collision and not self._free
         flags = _FLAGS | (pybullet.URDF_USE_SELF_COLLISION if collide else 0)
         position, orientation = placement.bone_pose(doll.root)
@@ -298,6 +305,17 @@ class BulletEngine:
             body = pybullet.loadURDF(path, _list(position), _list(orientation), flags=flags,
                                      physicsClientId=self._client)
         return self._set_up(doll, body)
+
+    def _weighed(self, doll: Ragdoll) -> Ragdoll:
+        """Give the doll with its masses, and what goes with them, in the engine's unit."""
+        if self._unit == 1:
+            return doll
+        return dataclasses.replace(
+            doll,
+            bones=tuple(dataclasses.replace(bone, mass=bone.mass / self._unit)
+                        for bone in doll.bones),
+            joints=tuple(dataclasses.replace(joint, damping=joint.damping / self._unit)
+                         for joint in doll.joints))
 
     def _set_up(self, doll: Ragdoll, body: int) -> _Doll:
         """Find links and joints by name, and switch off what PyBullet switches on."""
@@ -401,3 +419,9 @@ def bare_loop(scene: Scene, start: Coordinates,
 
 def _list(values: np.ndarray) -> list[float]:
     return [float(value) for value in values]
+
+
+def _unit_of_mass(scene: Scene) -> float:
+    """Give the kg that the engine takes for one: 1, or a power of two for giants."""
+    largest = max(bone.mass * max(bone.shape.half_extents) ** 2 for bone in scene.bones)
+    return 2.0 ** max(0, math.ceil(math.log2(largest / HEAVIEST)))

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import sys
 from pathlib import Path
 
@@ -80,7 +81,7 @@ def _run(options: argparse.Namespace) -> None:
         doll, report = _read_robot(path)
     else:
         fit = _fit(path, options)
-        doll, report = fit.doll, fit_report(fit)
+        doll, report = dataclasses.replace(fit.doll, model=str(path)), fit_report(fit)
     print(report)
     if options.output:
         save_doll(doll, options.output, f'Fitted to {path.name}\n\n{report}')

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock
@@ -10,8 +11,10 @@ from rclpy.node import Node
 
 from ..push import Push
 from ..scene import SECOND
-from ..simulation import Simulation
 from .tally import Tally
+
+if TYPE_CHECKING:
+    from ..simulation import Simulation
 
 PERIOD = 1.0
 """s of the steady clock between two reports."""

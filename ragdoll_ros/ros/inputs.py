@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from geometry_msgs.msg import Twist, Vector3, Wrench, WrenchStamped
 from rclpy.node import Node
@@ -14,9 +15,11 @@ from rclpy.node import Node
 from .. import faults
 from ..push import Push
 from ..ragdoll import Vector
-from ..simulation import Simulation
 from .parameters import Settings
 from .tally import Tally
+
+if TYPE_CHECKING:
+    from ..simulation import Simulation
 
 WORLD = 'world'
 
@@ -25,15 +28,19 @@ LEVER = 0.1
 
 
 class Inputs:
-    """Subscriptions to all that pushes. Each has a channel: a push takes its last one's place."""
+    """Subscriptions to all that pushes. Each has a channel: a push takes its last one's place.
 
-    def __init__(self, node: Node, tally: Tally) -> None:
+    ``name`` is that of the node which is pushed, for who listens beside it.
+    """
+
+    def __init__(self, node: Node, tally: Tally, name: str = '~') -> None:
         self._tally = tally
         self.simulation: Simulation
         self.settings: Settings
-        node.create_subscription(Wrench, '~/force', self.take_force, 10)
-        node.create_subscription(Twist, 'cmd_vel', self.take_velocity, 10)
-        node.create_subscription(WrenchStamped, '~/push', self.take_push, 10)
+        self.subscriptions = [
+            node.create_subscription(Wrench, f'{name}/force', self.take_force, 10),
+            node.create_subscription(Twist, 'cmd_vel', self.take_velocity, 10),
+            node.create_subscription(WrenchStamped, f'{name}/push', self.take_push, 10)]
 
     def take_force(self, message: Wrench) -> None:
         """Push the pushed bone along the world's axes; zero ends the push."""

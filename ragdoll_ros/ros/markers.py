@@ -1,15 +1,15 @@
 """Bones and pushes as markers, for RViz."""
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from geometry_msgs.msg import Pose
 from visualization_msgs.msg import Marker, MarkerArray
 
 from .. import rotation
+from ..parts import parts_of
 from ..push import Push
-from ..ragdoll import Bone, Box, Capsule, Cylinder
 from ..scene import Scene
 from ..state import State
 from ..swing.pose import SwingState
@@ -21,9 +21,6 @@ BROWN = (0.35, 0.2, 0.1, 1.0)
 ROD = 0.01
 """m: thickness of the rods of swings."""
 
-ARROW = 0.5
-"""m: length of the arrow of a push of 1 kN; longer and shorter ones go by the square root."""
-
 KINDS = {'box': Marker.CUBE, 'sphere': Marker.SPHERE, 'cylinder': Marker.CYLINDER}
 
 
@@ -33,9 +30,9 @@ class Markers:
     def __init__(self, scene: Scene, frame: str) -> None:
         self._scene = scene
         self._frame = frame
-        self._parts = [part for bone in scene.bones for part in parts(bone)]
-        self._bones = [index for index, bone in enumerate(scene.bones) for _ in parts(bone)]
-        self._shifts = np.array([shift for *_, shift in self._parts])
+        self._parts = [part for bone in scene.bones for part in parts_of(bone)]
+        self._bones = [index for index, bone in enumerate(scene.bones) for _ in parts_of(bone)]
+        self._shifts = np.array([part.shift for part in self._parts])
         self._markers = [self._marker(number) for number in range(len(self._parts))]
         self._arrows = 0
 
@@ -60,29 +57,22 @@ class Markers:
         return MarkerArray(markers=self._markers + arrows + gone + rods)
 
     def _marker(self, number: int) -> Marker:
-        kind, size, _ = self._parts[number]
+        part = self._parts[number]
         color = self._scene.bones[self._bones[number]].color or GRAY
         name = self._scene.bone_names[self._bones[number]]
         same = self._bones[:number].count(self._bones[number])
-        marker = Marker(ns=name, id=same, type=KINDS[kind], action=Marker.ADD)
-        marker.scale = to_vector(size)
+        marker = Marker(ns=name, id=same, type=KINDS[part.kind], action=Marker.ADD)
+        marker.scale = to_vector(part.size)
         paint(marker, color)
         return marker
 
     def _arrow(self, number: int, push: Push, state: State) -> Marker:
         """Arrow whose tip is where the push attacks."""
         bone = self._scene.bone_index(push.bone)
-        turn = state.orientations[bone]
-        force, point = np.array(push.force), np.array(push.point)
-        if push.local:
-            force = rotation.rotate(turn, force)
-            point = rotation.rotate(turn, point)
-        strength = float(np.linalg.norm(force))
-        length = ARROW * (strength / 1000) ** 0.5
-        tail = state.positions[bone] + point - force * (length / strength)
+        tail, tip = push.arrow(state.positions[bone], state.orientations[bone])
         marker = Marker(ns='push', id=number, type=Marker.ARROW, action=Marker.ADD)
-        marker.scale = to_vector((length, 0.04, 0.06))
-        turn = rotation.shortest_arc(np.array([1.0, 0, 0]), force)
+        marker.scale = to_vector((np.linalg.norm(tip - tail), 0.04, 0.06))
+        turn = rotation.shortest_arc(np.array([1.0, 0, 0]), tip - tail)
         place(marker.pose, tail.tolist(), turn.tolist())
         paint(marker, RED)
         return marker
@@ -97,21 +87,6 @@ def _rods(swings: SwingState) -> Marker:
     marker.points = [to_point(end) for end in ends]
     paint(marker, BROWN)
     return marker
-
-
-def parts(bone: Bone) -> Iterator[tuple[str, tuple[float, ...], tuple[float, ...]]]:
-    """Kinds, sizes (m) and shifts (m, bone axes) of the markers that make up a bone."""
-    shape = bone.shape
-    if isinstance(shape, Box):
-        yield 'box', shape.size, (0.0, 0.0, 0.0)
-        return
-    across = 2 * shape.radius
-    if isinstance(shape, Cylinder | Capsule):
-        yield 'cylinder', (across, across, shape.length), (0.0, 0.0, 0.0)
-    if not isinstance(shape, Cylinder):
-        half = shape.length / 2 if isinstance(shape, Capsule) else 0.0
-        for end in (half, -half) if half else (0.0,):
-            yield 'sphere', (across,) * 3, (0.0, 0.0, end)
 
 
 def place(pose: Pose, position: list[float], turn: list[float]) -> None:

@@ -4,12 +4,16 @@ What runs each tick is packed.Packed, which takes these functions as its model.
 """
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion, Transform, Twist, Vector3
 from sensor_msgs.msg import JointState, MultiDOFJointState
 from std_msgs.msg import Header
 
+from .. import rotation
+from ..engine.protocol import Contact
 from ..state import State
 from ..swing.pose import SwingState
 
@@ -17,6 +21,13 @@ from ..swing.pose import SwingState
 def poses_of(state: State | SwingState) -> np.ndarray:
     """Poses (n, 7) of bones or of swings' masses: position m, orientation x, y, z, w."""
     return np.concatenate([state.positions, state.orientations], axis=1)
+
+
+def contact_poses(contacts: Sequence[Contact]) -> np.ndarray:
+    """Poses (c, 7) of contacts: position m, and a turn that brings x to the normal."""
+    x = np.array([1.0, 0, 0])
+    return np.array([(*contact.position, *rotation.shortest_arc(x, contact.normal))
+                     for contact in contacts]).reshape(-1, 7)
 
 
 def twists_of(state: State) -> np.ndarray:

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import functools
+from typing import TYPE_CHECKING
 
 import numpy as np
 from geometry_msgs.msg import PoseArray
@@ -14,17 +15,30 @@ from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
 from ..scene import Scene
-from ..simulation import Simulation
 from ..swing.mount import mounts
 from ..urdf import scene_to_urdf
 from .markers import Markers
-from .messages import poses_of, to_joint_state, to_multi_dof, to_pose_array, to_time, twists_of
+from .messages import (
+    contact_poses,
+    poses_of,
+    to_joint_state,
+    to_multi_dof,
+    to_pose_array,
+    to_time,
+    twists_of,
+)
 from .packed import Packed
+
+if TYPE_CHECKING:
+    from ..simulation import Simulation
 
 MARKER_PERIOD = 33_000_000
 """ns of the steady clock between two MarkerArrays: as often as a screen can use."""
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+KEPT = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""For poses: who comes while the time stands can ask for the last ones."""
 
 
 class Outputs:
@@ -32,10 +46,11 @@ class Outputs:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._poses = node.create_publisher(PoseArray, '~/poses', 10)
+        self._poses = node.create_publisher(PoseArray, '~/poses', KEPT)
         self._state = node.create_publisher(MultiDOFJointState, '~/state', 10)
         self._joints = node.create_publisher(JointState, 'joint_states', 10)
         self._swings: Publisher | None = None
+        self._contacts = node.create_publisher(PoseArray, '~/contacts', 10)
         self._markers = node.create_publisher(MarkerArray, '~/markers', 10)
         self._description = node.create_publisher(String, 'robot_description', LATCHED)
         self._clock: Publisher | None = None
@@ -49,6 +64,7 @@ class Outputs:
         self._packed_joints = Packed(functools.partial(to_joint_state, frame, scene.angle_names),
                                      (angles,))
         self._marker_array = Markers(scene, frame)
+        self._frame = frame
         self._describe_swings(scene, frame)
         self._next_markers = 0
         self._description.publish(String(data=scene_to_urdf(scene)))
@@ -67,6 +83,9 @@ class Outputs:
             self._joints.publish(self._packed_joints.message(stamp, angles))
         if self._swings is not None and self._swings.get_subscription_count():
             self._swings.publish(self._packed_swings.message(stamp, poses_of(simulation.swings)))
+        if self._contacts.get_subscription_count():
+            self._contacts.publish(to_pose_array(self._frame, stamp,
+                                                 contact_poses(simulation.contacts)))
         if now >= self._next_markers and self._markers.get_subscription_count():
             self._next_markers = now + MARKER_PERIOD
             self._markers.publish(self._marker_array.message(stamp, state, simulation.pushes,

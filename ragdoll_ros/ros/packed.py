@@ -41,5 +41,24 @@ class Packed:
         return bytes(self._bytes)
 
 
+def poses_in(data: bytes) -> tuple[int, np.ndarray]:
+    """Stamp (ns) and poses (n, 7) of a serialized PoseArray; ValueError if it is none.
+
+    Little-endian CDR (OMG's DDS-XTypes 1.2, 7.4.1): four bytes of head, then the stamp, the
+    frame's name, the count, and float64 at multiples of eight, counted from behind the head.
+    """
+    try:
+        if data[1] != 1:
+            raise ValueError('not little-endian')
+        seconds, rest, length = struct.unpack_from('<iII', data, 4)
+        at = 16 + length + -length % 4
+        count, = struct.unpack_from('<I', data, at)
+        at += 4 + -at % 8
+        poses = np.frombuffer(data, '<f8', 7 * count, at if count else 0).reshape(-1, 7)
+    except (struct.error, IndexError) as error:
+        raise ValueError(str(error)) from None
+    return seconds * 1_000_000_000 + rest, poses
+
+
 def _stamp(nanoseconds: int) -> bytes:
     return struct.pack('=iI', *divmod(nanoseconds, 1_000_000_000))

@@ -14,7 +14,6 @@ from .. import faults
 from ..faults import RagdollError
 from ..scene import STEP_RANGE, Scene
 from ..scene_file import load_scene
-from ..simulation import resolve_accuracy
 from ..stepping import ACCURACIES
 
 
@@ -165,7 +164,8 @@ def brought(scene: Scene) -> dict:
 
 def check(settings: Settings, scene: Scene) -> None:
     """Raise a RagdollError for what no range can tell."""
-    resolve_accuracy(settings.accuracy)
+    if settings.accuracy not in ACCURACIES:
+        raise faults.OutOfRange('accuracy', settings.accuracy, 'one of ' + ', '.join(ACCURACIES))
     names = scene.bone_names
     if settings.pushed_bone not in names:
         raise faults.UnknownBone('pushed_bone', settings.pushed_bone, 'one of ' + ', '.join(names))

@@ -1,10 +1,11 @@
-"""Starts the node as a process of its own, with the teleop and one live line in front.
+"""Starts the node and the page as processes of their own, with teleop and a live line in front.
 
 Without a terminal, it logs that line every second.
 """
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import os
 import signal
 import subprocess
@@ -12,6 +13,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import IO
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -24,7 +26,9 @@ LOG_PERIOD = 1.0
 """s between two lines without a terminal."""
 
 PATIENCE = 5.0
-"""s that the node has to end."""
+"""s that a process has to end."""
+
+NO_PAGE = "No page in the browser without viser: pip install 'ragdoll_ros[viewer]' gets it"
 
 EXAMPLE = """examples:
   python -m ragdoll_ros.ros.run
@@ -48,18 +52,20 @@ def main(arguments: list[str] | None = None) -> int:
     terminal = sys.stdin.isatty() and sys.stdout.isatty()
     code = 0
     with ros_session(arguments):
-        with node_process(own, quiet=terminal) as process:
-            (_steer if terminal else _log)(Teleop(), process)
-        code = process.returncode
+        # On the node's standard output PyBullet greets, and nothing else is said there.
+        with (started('ros.node', own, stdout=subprocess.DEVNULL,
+                      stderr=subprocess.PIPE if terminal else None) as node,
+              page_process(own, terminal) as page):
+            (_steer if terminal else _log)(Teleop(), node, page)
+        code = node.returncode
     return code
 
 
 @contextmanager
-def node_process(arguments: list[str], quiet: bool) -> Iterator[subprocess.Popen]:
-    """Run the node; ``quiet``: its log goes to a pipe. It is ended with the context."""
-    command = [sys.executable, '-m', 'ragdoll_ros.ros.node', *arguments]
-    process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                               stderr=subprocess.PIPE if quiet else None)
+def started(module: str, arguments: list[str], **streams: int | None) -> Iterator[subprocess.Popen]:
+    """Run a module, its ``streams`` as for Popen. It is ended with the context."""
+    command = [sys.executable, '-m', f'ragdoll_ros.{module}', *arguments]
+    process = subprocess.Popen(command, stdin=subprocess.DEVNULL, **streams)
     try:
         yield process
     finally:
@@ -70,26 +76,40 @@ def node_process(arguments: list[str], quiet: bool) -> Iterator[subprocess.Popen
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
-        if quiet:
-            _show_log(process)
+        _show_log(process)
 
 
-def _steer(teleop: Teleop, process: subprocess.Popen) -> None:
-    os.set_blocking(process.stderr.fileno(), False)
+@contextmanager
+def page_process(arguments: list[str], quiet: bool) -> Iterator[subprocess.Popen | None]:
+    """Serve the page, which says where it is; without viser, say how to get it."""
+    if importlib.util.find_spec('viser') is None:
+        print(NO_PAGE, flush=True)
+        yield None
+        return
+    streams = {'stdout': subprocess.PIPE, 'stderr': subprocess.STDOUT} if quiet else {}
+    with started('viewer.command', arguments, **streams) as process:
+        yield process
+
+
+def _steer(teleop: Teleop, node: subprocess.Popen, page: subprocess.Popen | None) -> None:
+    told = [process for process in (node, page) if process is not None]
+    for process in told:
+        os.set_blocking(_log_of(process).fileno(), False)
 
     def attend() -> bool:
-        _show_log(process)
-        return process.poll() is None
+        for process in told:
+            _show_log(process)
+        return node.poll() is None
 
     print(HELP)
     steer(teleop, attend)
 
 
-def _log(teleop: Teleop, process: subprocess.Popen) -> None:
+def _log(teleop: Teleop, node: subprocess.Popen, _: subprocess.Popen | None) -> None:
     next_line = time.monotonic() + LOG_PERIOD
     with SingleThreadedExecutor() as executor:
         executor.add_node(teleop)
-        while rclpy.ok() and process.poll() is None:
+        while rclpy.ok() and node.poll() is None:
             executor.spin_once(timeout_sec=LOG_PERIOD)
             if time.monotonic() >= next_line:
                 next_line += LOG_PERIOD
@@ -97,11 +117,15 @@ def _log(teleop: Teleop, process: subprocess.Popen) -> None:
 
 
 def _show_log(process: subprocess.Popen) -> None:
-    """Write what the node has logged above the line."""
-    text = process.stderr.read()
-    for line in (text or b'').decode('utf-8', 'replace').splitlines():
+    """Write what a process has said to a pipe above the line."""
+    log = _log_of(process)
+    for line in ((log and log.read()) or b'').decode('utf-8', 'replace').splitlines():
         show(line)
         print()
+
+
+def _log_of(process: subprocess.Popen) -> IO[bytes] | None:
+    return process.stderr or process.stdout
 
 
 if __name__ == '__main__':

@@ -9,7 +9,7 @@ import argparse
 import shutil
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import rclpy
 from geometry_msgs.msg import Vector3, Wrench
@@ -18,13 +18,10 @@ from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 from std_srvs.srv import SetBool, Trigger
 
+from ..arrows import FORCES, total
 from .keys import Held, Keyboard
 from .session import ros_session
 from .status import Status
-
-FORCES = {'up': (-2000.0, 0.0, 1.0), 'down': (2000.0, 0.0, 1.0),
-          'right': (0.0, 2000.0, 1.0), 'left': (0.0, -2000.0, 1.0)}
-"""N, world axes (the article's keys)."""
 
 PERIOD = 0.02
 """s between two messages of a held push, well within the node's push_timeout."""
@@ -74,11 +71,6 @@ class Teleop(Node):
             self._force.publish(Wrench(force=Vector3(x=x, y=y, z=z)))
         self._pushing = bool(keys)
         return f'({force[0]:g} {force[1]:g} {force[2]:g}) N' if keys else ''
-
-
-def total(keys: Sequence[str]) -> tuple[float, ...]:
-    """Sum of the forces of all these keys, N."""
-    return tuple(map(sum, zip(*(FORCES[key] for key in keys), strict=True))) or (0.0, 0.0, 0.0)
 
 
 def steer(teleop: Teleop, attend: Callable[[], bool] = lambda: True) -> None:

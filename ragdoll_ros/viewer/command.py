@@ -1,0 +1,159 @@
+"""Shows the doll on a page in the browser: a scene of its own, or that of a node `ragdoll`."""
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import os
+import signal
+import socket
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+from .. import faults
+from ..scene_file import load_scene
+from .source import Source
+
+PORT = 8080
+HOST = '127.0.0.1'
+
+EXAMPLE = """examples:
+  ragdoll_viewer --scene doll.yaml
+  ragdoll_viewer --scene crowd --port 9000
+  ragdoll_viewer --play run.json
+  ragdoll_viewer
+  ragdoll_viewer --host 0.0.0.0
+  ragdoll_viewer --ros-args -r __ns:=/stage
+"""
+
+NO_VISER = "ragdoll_viewer needs viser: pip install 'ragdoll_ros[viewer]', or pip install viser"
+
+NO_ROS = ("without --scene, ragdoll_viewer listens to a node over ROS 2: source ROS, or "
+          "pip install 'ragdoll_ros[ros]', or name a scene: ragdoll_viewer --scene drop")
+
+
+class NoRos(faults.RagdollError):
+    """No ROS to listen to."""
+
+
+class WrongArguments(faults.RagdollError):
+    """What the command does not take."""
+
+
+class NoPort(faults.RagdollError):
+    """An address that nothing can be served at."""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Serve the page until SIGINT or SIGTERM; 2 if it cannot be as asked."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    at = arguments.index('--ros-args') if '--ros-args' in arguments else len(arguments)
+    options, for_ros = parser().parse_args(arguments[:at]), arguments[at:]
+    stop = threading.Event()
+    for sign in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(sign, lambda *_: stop.set())
+    try:
+        import viser  # noqa: F401
+    except ImportError:
+        print(NO_VISER, file=sys.stderr)
+        return 2
+    try:
+        serve(options, for_ros, stop)
+    except faults.RagdollError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+def parser() -> argparse.ArgumentParser:
+    """Say what the command takes."""
+    parser = argparse.ArgumentParser(
+        'ragdoll_viewer', description=__doc__, epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    shown = parser.add_mutually_exclusive_group()
+    shown.add_argument('--play', metavar='RUN.json', help='show what the page has recorded')
+    shown.add_argument('--scene', help='a name in config/ or a path: simulate it here, without '
+                        'ROS (else: listen to the node `ragdoll`)')
+    parser.add_argument('--host', default=HOST, help='address to serve at (%(default)s: this '
+                        'machine alone; 0.0.0.0: whoever reaches this machine may steer)')
+    parser.add_argument('--port', type=int, help=f'port to serve at; it must be free ({PORT}, or '
+                        'the next free one)')
+    parser.add_argument('--folder', default='.', help='where the page saves and loads dolls, and '
+                        'keeps the characters it is sent (default: the current one); it writes '
+                        'nowhere else')
+    return parser
+
+
+def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event) -> None:
+    """Serve the page until told to stop; RagdollError if it cannot be."""
+    from .page import Page
+    if not os.access(options.folder, os.W_OK | os.X_OK) or not os.path.isdir(options.folder):
+        raise WrongArguments(f'--folder {options.folder}: expected a folder that can be written to')
+    port = free_port(options.host, options.port)
+    source = make_source(options, for_ros)
+    try:
+        with server_at(options.host, port) as server:
+            page = Page(server, source, options.folder)
+            print(f'The page is at http://{shown(options.host)}:{server.get_port()}', flush=True)
+            page.run(stop)
+    finally:
+        source.close()
+
+
+def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
+    """Simulate a scene here, play a run, or listen to a node; RagdollError if that cannot be."""
+    alone = next((f'--{key}' for key in ('scene', 'play') if getattr(options, key) is not None), '')
+    if alone and for_ros:
+        raise WrongArguments(f'{" ".join(for_ros)}: not with {alone}, which does without ROS')
+    if options.play is not None:
+        from .playback import Playback
+        from .recording_file import load_recording
+        return Playback(load_recording(options.play), Path(options.play).name)
+    if options.scene is not None:
+        from .simulated import Simulated
+        return Simulated(load_scene(options.scene))
+    try:
+        from .remote import Remote
+    except ImportError as error:
+        raise NoRos(f'{error}: {NO_ROS}') from None
+    return Remote(for_ros)
+
+
+def free_port(host: str, wanted: int | None) -> int:
+    """Give the wanted port, or the first free one from PORT on; NoPort if there is none."""
+    reason = ''
+    for port in (wanted,) if wanted is not None else range(PORT, PORT + 100):
+        try:
+            family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+            with socket.socket(family, socket.SOCK_STREAM) as probe:
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                probe.bind(address)
+                return port
+        except (OSError, OverflowError) as error:
+            reason = getattr(error, 'strerror', None) or str(error)
+    raise NoPort(f'--host {host} --port {wanted or PORT}: {reason}; expected an address of this '
+                 'machine and a free port from 1024 to 65535')
+
+
+@contextlib.contextmanager
+def server_at(host: str, port: int) -> Iterator[object]:
+    """Have viser's server, without its own words on standard output."""
+    import viser
+    with contextlib.redirect_stdout(io.StringIO()):
+        server = viser.ViserServer(host, port, label='ragdoll', verbose=False)
+    try:
+        yield server
+    finally:
+        with contextlib.redirect_stdout(io.StringIO()):
+            server.stop()
+
+
+def shown(host: str) -> str:
+    """Give the name by which this machine's browser reaches a host."""
+    return {'0.0.0.0': '127.0.0.1', '::': '[::1]'}.get(host, f'[{host}]' if ':' in host else host)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

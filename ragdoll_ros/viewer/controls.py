@@ -1,0 +1,120 @@
+"""Buttons and keys: pushes, time, scene."""
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import viser
+
+from ..arrows import total
+from ..faults import RagdollError
+from ..ros.keys import Held
+from ..scene_file import scene_names
+from .source import Report, Source
+
+ARROWS = {'← left': 'left', '↑ away': 'up', '↓ toward': 'down', '→ right': 'right'}
+"""Label of each push, as seen from in front of the doll."""
+
+PACES = (0.05, 2.0)
+"""Slowest and fastest of the slider."""
+
+OTHER = '(other)'
+"""Stands for a scene that has no name in config/."""
+
+KEEP_KEYS = """<img src="data:," style="display:none" onerror="
+  if (!window.ragdollKeys) {
+    window.ragdollKeys = true;
+    document.documentElement.addEventListener('keydown', (event) => {
+      if (event.key.startsWith('Arrow')) event.stopPropagation();
+    });
+    document.addEventListener('click', (event) => {
+      if (event.detail) event.target.closest('[role=tab]')?.blur();
+    });
+  }">"""
+"""Keeps arrow keys from viser's camera, which would turn with each push; commands still get them:
+they listen where this does, the camera further out. A tab that was clicked gives the keys back."""
+
+
+class Controls:
+    """The panel's first tab. ``source`` may be another one later."""
+
+    def __init__(self, server: viser.ViserServer, source: Source) -> None:
+        self.source = source
+        self._held = Held()
+        self._shown = Report()
+        gui = server.gui
+        gui.add_html(KEEP_KEYS)
+        pushes = gui.add_button_group('Push', tuple(ARROWS), hint='2000 N; arrow keys do the same')
+        self._pause = gui.add_button('Pause', icon='player-pause', hint='Space')
+        self._step = gui.add_button('Step', icon='player-track-next', hint='N; while paused',
+                                    disabled=True)
+        reset = gui.add_button('Reset', icon='player-skip-back', hint='R')
+        self._pace = gui.add_slider('Pace', *PACES, step=0.05, initial_value=1.0,
+                                    hint='simulated seconds for each second on the wall')
+        self._scene = gui.add_dropdown('Scene', (OTHER, *scene_names()),
+                                        initial_value=OTHER)
+        pushes.on_click(lambda event: self.push(ARROWS[event.target.value]))
+        self._pause.on_click(lambda _: self.toggle_pause())
+        self._step.on_click(lambda _: self.source.step())
+        reset.on_click(lambda _: self.source.reset())
+        self._pace.on_update(lambda event: event.client and self._set_pace())
+        self._scene.on_update(self._choose)
+        self._add_keys(gui)
+
+    def push(self, arrow: str) -> None:
+        """Push, together with the other arrows of the last tenths of a second."""
+        now = time.monotonic()
+        self._held.take(arrow, True, now)
+        self.source.push(total(self._held.at(now)))
+
+    def toggle_pause(self) -> None:
+        """Hold the time, or let it go on."""
+        self.source.pause(not self.source.report.paused)
+
+    def show(self, report: Report) -> None:
+        """Let the panel tell how the source is."""
+        if report.paused != self._shown.paused:
+            self._pause.label = 'Go on' if report.paused else 'Pause'
+            self._pause.icon = 'player-play' if report.paused else 'player-pause'
+            self._step.disabled = not report.paused
+        if report.pace != self._shown.pace:
+            self._pace.value = min(max(report.pace, PACES[0]), PACES[1])
+        self._shown = report
+
+    def show_scene(self, name: str) -> None:
+        """Let the panel tell which scene it is."""
+        self._scene.value = name if name in self._scene.options else OTHER
+
+    def _set_pace(self) -> None:
+        self.source.set_pace(self._pace.value)
+
+    async def _choose(self, event: viser.GuiEvent) -> None:
+        """Load the chosen scene; at once, before the page tells of the one that is shown."""
+        name = event.target.value
+        if event.client is not None and name != OTHER:
+            asyncio.get_running_loop().run_in_executor(None, self._load, name, event.client)
+
+    def _load(self, name: str, client: viser.ClientHandle) -> None:
+        with told(client):
+            self.source.load(name)
+
+    def _add_keys(self, gui: viser.GuiApi) -> None:
+        for arrow in ARROWS.values():
+            command = gui.add_command(f'Push {arrow}', hotkey=f'arrow{arrow}')
+            command.on_trigger(lambda _, arrow=arrow: self.push(arrow))
+        for label, key, action in (('Pause, or go on', 'space', self.toggle_pause),
+                                   ('Step', 'N', lambda: self.source.step()),
+                                   ('Reset', 'R', lambda: self.source.reset())):
+            command = gui.add_command(label, hotkey=key)
+            command.on_trigger(lambda _, action=action: action())
+
+
+@contextmanager
+def told(client: viser.ClientHandle) -> Iterator[None]:
+    """Tell a page why what it asked for can not be."""
+    try:
+        yield
+    except RagdollError as error:
+        client.add_notification('Refused', str(error), color='red')

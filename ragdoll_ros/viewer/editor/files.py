@@ -1,0 +1,111 @@
+"""The panel's files: save, load, download, upload, and a character that becomes a doll."""
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+import viser
+
+from ... import faults
+from ...scene import Scene
+from .folder import CHARACTERS, DOLLS, LARGEST_UPLOAD, Folder
+from .form import GREEN, RED, colored
+
+
+class Host(Protocol):
+    """Whose scene is saved, and who takes the one that is loaded."""
+
+    @property
+    def scene(self) -> Scene:
+        """The scene as it is now."""
+
+    def take(self, scene: Scene, what: str) -> None:
+        """Go on with another scene; RagdollError if it cannot run."""
+
+
+class Files:
+    """Widgets for files in the GUI container that is current. Callbacks run in viser's threads."""
+
+    def __init__(self, server: viser.ViserServer, host: Host, folder: Folder) -> None:
+        self._server, self._host, self._folder = server, host, folder
+        self._fitting = threading.Lock()
+        gui = server.gui
+        self.name = gui.add_text('file', 'doll.yaml', hint=f'in {folder.path}')
+        self.save_button = gui.add_button('Save', icon='device-floppy')
+        self.load_button = gui.add_button('Load', icon='folder-open',
+                                          hint='from that folder, or one of the shipped scenes')
+        self.download_button = gui.add_button('Download', icon='download')
+        self.upload_button = gui.add_upload_button(
+            'Upload a scene or doll', icon='upload', mime_type=','.join(DOLLS))
+        self.fit_button = gui.add_upload_button(
+            'Fit a character', icon='man', mime_type=','.join(CHARACTERS),
+            hint=f'a skinned .glb, .gltf or .vrm, or a .urdf; up to {LARGEST_UPLOAD // 10**6} MB')
+        self.progress = gui.add_progress_bar(0.0, animated=True, visible=False)
+        self.said = gui.add_html('')
+        self.save_button.on_click(lambda _: self.save())
+        self.load_button.on_click(lambda _: self.load())
+        self.download_button.on_click(lambda event: self.download(event.client))
+        self.upload_button.on_upload(lambda event: self._received(event.target, self.upload))
+        self.fit_button.on_upload(lambda event: self._received(event.target, self.fit))
+
+    def save(self) -> None:
+        """Write the scene to the file that is typed."""
+        self._try(lambda: f'saved {self._folder.save(self._host.scene, self.name.value).name}')
+
+    def load(self) -> None:
+        """Take the scene of the file that is typed."""
+        self._try(lambda: self._take(self._folder.load(self.name.value), 'load',
+                                     self.name.value.strip()))
+
+    def download(self, client: viser.ClientHandle | None) -> None:
+        """Send the scene's file to the page that asked for it, or to all."""
+        name = Path(self.name.value.strip() or 'doll').stem + '.yaml'
+        to = client or self._server
+        to.send_file_download(name, self._folder.text(self._host.scene), save_immediately=True)
+
+    def upload(self, name: str, content: bytes) -> None:
+        """Take the scene, or the doll, of a YAML file that was sent."""
+        self._try(lambda: self._take(self._folder.read(name, content), 'load', name))
+
+    def fit(self, name: str, content: bytes) -> None:
+        """Make a doll of a character that was sent; one at a time."""
+        if not self._fitting.acquire(blocking=False):
+            self._say('another character is being fitted: try again when it is done', RED)
+            return
+        try:
+            self.progress.visible = True
+            self._try(lambda: self._take(self._folder.fit(name, content, self._show_progress),
+                                         'fit', name))
+        finally:
+            self.progress.visible = False
+            self._fitting.release()
+
+    def _take(self, scene: Scene, what: str, name: str) -> str:
+        self._host.take(scene, f'{what} {name}')
+        return f'{"fitted" if what == "fit" else "loaded"} {name}: {len(scene.bones)} bones'
+
+    def _show_progress(self, part: float, what: str) -> None:
+        self.progress.value = 100 * part
+        self._say(what + ' ...', GREEN)
+
+    def _try(self, action: Callable[[], str]) -> None:
+        """Do it and say so, or say in words why not."""
+        try:
+            self._say(action(), GREEN)
+        except faults.RagdollError as error:
+            self._say(str(error), RED)
+        except OSError as error:
+            self._say(f'{error.filename or "file"}: {error.strerror or error}', RED)
+
+    def _say(self, text: str, color: str) -> None:
+        self.said.content = colored(text, color)
+
+    def _received(self, button: viser.GuiUploadButtonHandle,
+                  action: Callable[[str, bytes], None]) -> None:
+        file = button.value
+        content = file.content
+        # The button keeps its last file: let go of what may be 100 MB.
+        file.content = b''
+        action(file.name, content)

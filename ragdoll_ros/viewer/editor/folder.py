@@ -1,0 +1,162 @@
+"""Where the page's files live: dolls are saved into one folder, and nothing leaves or leads out.
+
+Whoever reaches the page may send anything: all is refused with a Fault or Faults in words.
+"""
+from __future__ import annotations
+
+import dataclasses
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from ... import faults, scene_file
+from ...ragdoll import Ragdoll
+from ...scene import Scene, above_ground
+
+LARGEST_UPLOAD = 100_000_000
+"""Bytes: characters with large textures have tens of MB."""
+
+CHARACTERS = ('.glb', '.gltf', '.vrm', '.urdf')
+DOLLS = ('.yaml', '.yml')
+
+Progress = Callable[[float, str], None]
+"""Takes the part that is done, 0 to 1, and what is being done."""
+
+
+class Folder:
+    """One folder of scenes and characters."""
+
+    def __init__(self, path: str | Path = '.') -> None:
+        self.path = Path(path).resolve()
+
+    def find(self, text: str) -> Path:
+        """Path of a YAML file in this folder by what was typed, ``.yaml`` added where missing."""
+        name = text.strip()
+        try:
+            path = (self.path / name).resolve()
+            path = path if path.suffix.lower() in DOLLS else path.with_name(path.name + '.yaml')
+            inside = path.is_relative_to(self.path) and path.parent.is_dir() and name
+        except (ValueError, OSError, RuntimeError):
+            inside = False
+        if not inside or not name.isprintable() or len(path.name.encode()) > 200:
+            raise faults.WrongForm('file', text, f'the name of a file inside {self.path}')
+        return path
+
+    def save(self, scene: Scene, text: str) -> Path:
+        """Write a scene; OSError where that fails."""
+        path = self.find(text)
+        scene_file.save_scene(scene, path)
+        return path
+
+    def load(self, text: str) -> Scene:
+        """Read a scene of this folder, or of config/ by its name alone."""
+        name = text.strip().removesuffix('.yaml')
+        path = self.find(text)
+        if not path.is_file() and name in scene_file.scene_names():
+            return scene_file.load_scene(name)
+        return scene_file.load_scene(str(path))
+
+    def text(self, scene: Scene) -> bytes:
+        """Give a scene's YAML as it would be saved here."""
+        return scene_file.scene_text(scene, self.path).encode()
+
+    def read(self, name: str, content: bytes) -> Scene:
+        """Make a scene of a YAML file that was sent, as if it lay here."""
+        name = plain(name)
+        try:
+            _check_size(content)
+            data = scene_file.parse(content)
+            self._check_references(data)
+        except faults.Fault as fault:
+            raise faults.Faults(name, [fault]) from None
+        try:
+            return scene_file.scene_from(data, self.path / name)
+        except faults.Faults as error:
+            raise faults.Faults(name, error.faults) from None
+
+    def fit(self, name: str, content: bytes, progress: Progress) -> Scene:
+        """Make a doll of a character that was sent, as ragdoll_fit does; the character stays here.
+
+        The doll hangs above level ground and names its character.
+        """
+        name = plain(name)
+        suffix = Path(name).suffix.lower()
+        try:
+            if suffix not in CHARACTERS:
+                raise faults.WrongForm('', name, 'a name that ends in ' + ', '.join(CHARACTERS))
+            _check_size(content)
+            with tempfile.TemporaryDirectory() as inbox:
+                path = Path(inbox, name)
+                path.write_bytes(content)
+                doll = _fitted(path, progress)
+        except faults.Fault as fault:
+            raise faults.Faults(name, [fault]) from None
+        except faults.Faults as error:
+            raise faults.Faults(name, [_alone(fault) for fault in error.faults]) from None
+        if suffix != '.urdf':
+            progress(0.9, 'keeping the character')
+            doll = dataclasses.replace(doll, model=str(self._keep(name, content)))
+        return above_ground(doll)
+
+    def _check_references(self, data: object) -> None:
+        """Let what was sent name only dolls that lie here or in config/: no other file is read."""
+        dolls = data.get('dolls') if isinstance(data, dict) else None
+        for index, entry in enumerate(dolls if isinstance(dolls, list) else ()):
+            source = entry.get('doll') if isinstance(entry, dict) else None
+            if not isinstance(source, str) or source in scene_file.scene_names():
+                continue
+            try:
+                found = self.find(source).name
+            except faults.Fault:
+                found = ''
+            if found not in (source, f'{source}.yaml'):
+                raise faults.Unreadable(f'dolls[{index}].doll', source,
+                                        f'a file of {self.path}, or the doll itself')
+
+    def _keep(self, name: str, content: bytes) -> Path:
+        """Write a character, under another name where one stands that is another's."""
+        path = Path(self.path, name)
+        for number in range(2, 10_000):
+            try:
+                with path.open('xb') as file:
+                    file.write(content)
+                return path
+            except FileExistsError:
+                if path.is_file() and path.read_bytes() == content:
+                    return path
+            path = Path(self.path, f'{Path(name).stem}_{number}{Path(name).suffix}')
+        raise faults.Unreadable('', name, f'a name that is free in {self.path}')
+
+
+def plain(name: str) -> str:
+    """Give a file's name without folders and without what is no letter, digit, dot or dash."""
+    name = name.replace('\\', '/').rsplit('/', 1)[-1]
+    stem, dot, suffix = ''.join(c if c.isalnum() or c in '._- ' else '_' for c in name)[-90:] \
+        .strip().rpartition('.')
+    return f'{stem.lstrip(".") or "file"}{dot}{suffix}'
+
+
+def _check_size(content: bytes) -> None:
+    if len(content) > LARGEST_UPLOAD:
+        raise faults.Unreadable('', f'{len(content)} bytes', f'at most {LARGEST_UPLOAD}')
+
+
+def _fitted(path: Path, progress: Progress) -> Ragdoll:
+    # Here, as matters of files that few pages need.
+    from ...fit.character import read_character
+    from ...fit.pipeline import fit_character
+    progress(0.1, 'reading')
+    if path.suffix.lower() == '.urdf':
+        from ...urdf_reader import read_urdf
+        return read_urdf(path)[0]
+    character = read_character(path)
+    progress(0.4, f'fitting {len(character.bone_names)} bones, {len(character.vertices)} vertices')
+    return fit_character(character).doll
+
+
+def _alone(fault: faults.Fault) -> faults.Fault:
+    """Say of a file that points to others that it has to come alone."""
+    if fault.path.endswith('.uri') and not str(fault.value).startswith('data:'):
+        return type(fault)(fault.path, fault.value,
+                           'all in one file: export it as .glb, or with its buffers embedded')
+    return fault

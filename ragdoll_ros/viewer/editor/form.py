@@ -1,0 +1,106 @@
+"""The fields of a sheet as widgets, each with room for what is wrong with it right below."""
+from __future__ import annotations
+
+import html
+import threading
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import viser
+
+from ... import faults
+from ...ragdoll import JOINT_KINDS, SHAPES
+from .sheet import Field, Sheet, Value
+
+RED, GREEN = '#c92a2a', '#2b8a3e'
+
+STEPS = {'turn': 1.0, 'axis_1': 0.1, 'axis_2': 0.1, 'mass': 0.1}
+"""What a click on a number's arrow adds, 0.01 where nothing is said."""
+
+
+class Quiet(threading.local):
+    """While a thread is in it, what widgets call back there is not a user's doing."""
+
+    now = False
+
+    def __enter__(self) -> None:
+        self.now = True
+
+    def __exit__(self, *_: object) -> None:
+        self.now = False
+
+
+class Form:
+    """Widgets of some fields. Programs fill it in; what people type stays until they do."""
+
+    def __init__(self, gui: viser.GuiApi, fields: Sequence[Field],
+                 on_kind: Callable[[str, str], None]) -> None:
+        self._widgets: dict[str, Any] = {}
+        self._errors: dict[str, viser.GuiHtmlHandle] = {}
+        self._on_kind = on_kind
+        self._filling = Quiet()
+        for field in fields:
+            widget = self._widgets[field.key] = _widget(gui, field)
+            self._errors[field.key] = gui.add_html('', visible=False)
+            if field.widget in ('shape', 'joint'):
+                widget.on_update(lambda event, key=field.key: self._chosen(key))
+
+    def __getitem__(self, key: str) -> Any:
+        """Widget of a field."""
+        return self._widgets[key]
+
+    def fill(self, sheet: Sheet) -> None:
+        """Show the fields that a sheet has and hide the others; forget what was wrong."""
+        self.tell(())
+        with self._filling:
+            for key, widget in self._widgets.items():
+                widget.visible = key in sheet
+                if key in sheet:
+                    widget.value = sheet[key]
+
+    def values(self) -> Sheet:
+        """Give what stands in the fields that are shown."""
+        return {key: widget.value for key, widget in self._widgets.items() if widget.visible}
+
+    def tell(self, found: Iterable[faults.Fault]) -> None:
+        """Write each fault under the field that its path names; take the others away."""
+        said = {fault.path: text_of(fault) for fault in found}
+        for key, error in self._errors.items():
+            error.content = colored(said.get(key, ''), RED)
+            error.visible = key in said
+
+    def errors(self) -> dict[str, str]:
+        """Give what is written under the fields."""
+        return {key: error.content for key, error in self._errors.items() if error.visible}
+
+    def _chosen(self, key: str) -> None:
+        if not self._filling.now:
+            self._on_kind(key, self._widgets[key].value)
+
+
+def text_of(fault: faults.Fault) -> str:
+    """Say what is wrong with a field: the value, and what would be right."""
+    return str(type(fault)('', fault.value, fault.expected)).removeprefix('file: ')
+
+
+def colored(text: str, color: str) -> str:
+    """Give a text as HTML in a colour. What users send stands in it: nothing of it is HTML."""
+    lines = '<br>'.join(html.escape(line) for line in text.splitlines())
+    return (f'<div style="color: {color}; font-size: 0.85em; overflow-wrap: anywhere; '
+            f'padding: 0 1em 0.4em">{lines}</div>') if text else ''
+
+
+def _widget(gui: viser.GuiApi, field: Field) -> Any:
+    hint = field.hint or None
+    if field.widget in ('shape', 'joint'):
+        return gui.add_dropdown(field.label, tuple(SHAPES if field.widget == 'shape'
+                                                   else JOINT_KINDS), hint=hint)
+    if field.widget == 'text':
+        return gui.add_text(field.label, '', hint=hint)
+    if field.widget == 'color':
+        return gui.add_rgba(field.label, (0, 0, 0, 255), hint=hint)
+    start: Value = (0.0, 0.0, 0.0) if field.widget == 'vector' else 0.0
+    add = gui.add_vector3 if field.widget == 'vector' else gui.add_number
+    widget = add(field.label, start, step=STEPS.get(field.key, 0.01), hint=hint)
+    widget.precision = 4 if field.key == 'turn' else 6
+    return widget

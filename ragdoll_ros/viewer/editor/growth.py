@@ -1,0 +1,65 @@
+"""Bones that come and go: a new one at the end of a bone, a limb taken off."""
+from __future__ import annotations
+
+import dataclasses
+import re
+
+import numpy as np
+
+from ... import faults, rotation
+from ...ragdoll import Bone, Joint, Ragdoll, Rider
+from ...scene import Scene
+from .changes import USUAL, USUAL_TWIST, find, limb, replace_doll
+
+NAME = re.compile(r'[^\s/][^/\x00-\x1f]{0,99}')
+"""What config/doll.schema.json takes for a name."""
+
+
+def add_bone(scene: Scene, parent: str, name: str) -> Scene:
+    """Add a bone like ``parent`` where that one ends, on a ball joint; names its fault ``name``."""
+    placement, above = find(scene, parent)
+    if not NAME.fullmatch(name):
+        raise faults.WrongForm('name', name, 'text without / and control characters')
+    if any(bone.name == name for bone in placement.doll.bones):
+        raise faults.DuplicateName('name', name, 'a name of its own')
+    way = _outward(placement.doll, above)
+    reach = float(above.shape.reach(rotation.rotate(rotation.inverse(above.orientation), way)))
+    bone = dataclasses.replace(above, name=name, position=above.position + 2 * reach * way)
+    joint = Joint(above.name, name, 'ball', above.position + reach * way, (way,),
+                  ((-USUAL, USUAL), (-USUAL_TWIST, USUAL_TWIST)))
+    return replace_doll(scene, placement, bones=(*placement.doll.bones, bone),
+                        joints=(*placement.doll.joints, joint))
+
+
+def remove_limb(scene: Scene, name: str) -> Scene:
+    """Take off a bone and all that hangs from it, with its swings; its skin goes to the parent."""
+    placement, bone = find(scene, name)
+    doll = placement.doll
+    if bone is doll.root:
+        raise faults.Detached(f'{name}', name, 'a bone with a parent: all hangs from the root')
+    gone = set(limb(doll, bone.name))
+    joint = next(joint for joint in doll.joints if joint.child == bone.name)
+    return replace_doll(
+        scene, placement,
+        bones=tuple(bone for bone in doll.bones if bone.name not in gone),
+        joints=tuple(joint for joint in doll.joints if joint.child not in gone),
+        swings=tuple(swing for swing in doll.swings if swing.bone not in gone),
+        riders=tuple(_carried(rider, doll.bone(rider.bone), doll.bone(joint.parent))
+                     if rider.bone in gone else rider for rider in doll.riders))
+
+
+def _carried(rider: Rider, old: Bone, new: Bone) -> Rider:
+    """Give a rider to another bone: where it is in the bind pose, it stays."""
+    back = rotation.inverse(new.orientation)
+    place = old.position + rotation.rotate(old.orientation, rider.position)
+    turn = rotation.multiply(old.orientation, rider.orientation)
+    return dataclasses.replace(rider, bone=new.name, orientation=rotation.multiply(back, turn),
+                               position=rotation.rotate(back, place - np.array(new.position)))
+
+
+def _outward(doll: Ragdoll, bone: Bone) -> np.ndarray:
+    """Unit direction (3,) from where a bone hangs to its middle; up for the root."""
+    joint = next((joint for joint in doll.joints if joint.child == bone.name), None)
+    way = np.subtract(bone.position, joint.anchor) if joint else np.zeros(3)
+    length = np.linalg.norm(way)
+    return way / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])

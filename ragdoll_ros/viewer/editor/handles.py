@@ -1,0 +1,142 @@
+"""Handles in the scene that move, turn and resize a body where it stands in the bind pose."""
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import viser
+
+from ... import rotation
+from ...parts import parts_of
+from ...ragdoll import Bone, Joint
+from ...scene import Placement, Scene, height
+from ..meshes import MESHES
+from .changes import find, joint_of
+
+ROOM = '/editor'
+"""Where all of it stands in the page's scene tree."""
+
+YELLOW, BLUE, RED = (255, 200, 0), (40, 90, 220), (220, 50, 30)
+
+GROWN = 1.03
+"""The ghost is this much larger than the body, so that it is seen around it."""
+
+SIZING = {'box': (True, True, True), 'sphere': (True, False, False),
+          'cylinder': (True, False, True), 'capsule': (True, False, True)}
+"""Along which of its own axes a shape of each kind can be drawn out."""
+
+WXYZ, XYZW = [3, 0, 1, 2], [1, 2, 3, 0]
+
+STILL = 1e-6
+"""m, and rad: what a drag moves less than this, it has not moved."""
+
+
+class Handles:
+    """At most one body has handles. What is dragged is told when it is let go.
+
+    ``on_pose`` takes the new centre of mass (3,) m and orientation (4,), doll's frame;
+    ``on_size`` the new half extents (3,) m along the body's own axes.
+    """
+
+    def __init__(self, server: viser.ViserServer,
+                 on_pose: Callable[[np.ndarray, np.ndarray], None],
+                 on_size: Callable[[np.ndarray], None]) -> None:
+        self._server = server
+        self._on_pose, self._on_size = on_pose, on_size
+        self.body: viser.TransformControlsHandle | None = None
+        self.size: viser.TransformControlsHandle | None = None
+
+    def hide(self) -> None:
+        """Take all handles away."""
+        if self.body is not None:
+            self._server.scene.remove_by_name(ROOM)
+        self.body = self.size = None
+
+    def show(self, scene: Scene, name: str, limb: bool) -> None:
+        """Put handles on a bone; with ``limb`` it turns about its joint, not its own centre."""
+        self.hide()
+        (placement, bone), joint = find(scene, name), joint_of(scene, name)
+        at = joint.anchor if limb and joint else bone.position
+        with self._server.atomic():
+            self._server.scene.add_frame(
+                ROOM, position=placement.position + _lift(scene, placement),
+                wxyz=_wxyz(placement.orientation), show_axes=False)
+            self._own = self._server.scene.add_frame(
+                f'{ROOM}/own', position=bone.position, wxyz=_wxyz(bone.orientation),
+                show_axes=False)
+            self._add_ghost(bone)
+            if joint is not None:
+                self._add_pivot(joint, bone)
+            self._add_body(bone, at)
+            self._add_size(bone)
+
+    def _add_ghost(self, bone: Bone) -> None:
+        for number, part in enumerate(parts_of(bone)):
+            vertices, faces = MESHES[part.kind]
+            self._server.scene.add_mesh_simple(
+                f'{ROOM}/own/ghost_{number}', vertices * part.size * GROWN + part.shift, faces,
+                color=YELLOW, wireframe=True, cast_shadow=False, receive_shadow=False)
+
+    def _add_pivot(self, joint: Joint, bone: Bone) -> None:
+        """Draw the joint: a ball where it is, a line along each axis, the first in blue."""
+        length = 1.5 * max(bone.shape.half_extents)
+        self._server.scene.add_icosphere(f'{ROOM}/pivot', radius=0.08 * length, color=BLUE,
+                                         position=joint.anchor, cast_shadow=False)
+        if joint.axes:
+            ends = np.array([[np.subtract(joint.anchor, np.multiply(axis, length)),
+                              np.add(joint.anchor, np.multiply(axis, length))]
+                             for axis in joint.axes])
+            colors = np.array([[color, color] for color in (BLUE, RED)[:len(ends)]], np.uint8)
+            self._server.scene.add_line_segments(f'{ROOM}/axes', ends, colors,
+                                                 thickness=0.03 * length)
+
+    def _add_body(self, bone: Bone, at: Sequence[float]) -> None:
+        self.body = self._server.scene.add_transform_controls(
+            f'{ROOM}/body', scale=2.5 * max(bone.shape.half_extents), depth_test=False,
+            opacity=0.8, position=at, wxyz=_wxyz(bone.orientation))
+        # The body as the handle sees it: both move as one.
+        back = rotation.inverse(bone.orientation)
+        arm = rotation.rotate(back, np.subtract(bone.position, at))
+        body, own = self.body, self._own
+
+        @body.on_update
+        def _(event: viser.TransformControlsEvent) -> None:
+            turn = rotation.normalized(np.array(body.wxyz)[XYZW])
+            position = np.array(body.position) + rotation.rotate(turn, arm)
+            own.position, own.wxyz = position, _wxyz(turn)
+            if event.phase == 'end':
+                if rotation.angle_between(turn, bone.orientation) < STILL:
+                    turn = np.array(bone.orientation)
+                self._on_pose(_unless_still(position, bone.position), turn)
+
+    def _add_size(self, bone: Bone) -> None:
+        active = SIZING[bone.shape.kind]
+        half = np.array(bone.shape.half_extents)
+        self.size = size = self._server.scene.add_transform_controls(
+            f'{ROOM}/own/size', scale=0.8 * float(half.max()), active_axes=active,
+            disable_rotations=True, disable_sliders=True, depth_test=False,
+            position=np.where(active, half, 0.0))
+
+        @size.on_update
+        def _(event: viser.TransformControlsEvent) -> None:
+            if event.phase == 'end':
+                x, y, z = size.position
+                drawn = np.array((x, y if active[1] else x, z if active[2] else x))
+                self._on_size(_unless_still(drawn, half))
+
+
+def _lift(scene: Scene, placement: Placement) -> np.ndarray:
+    """How far (3,) m a doll that begins in the ground is set onto it when it runs."""
+    if scene.ground is None:
+        return np.zeros(3)
+    lowest = min(height(bone, *placement.bone_pose(bone), scene.ground)
+                 for bone in placement.doll.bones)
+    return max(0.0, -lowest) * np.array(scene.ground.normal)
+
+
+def _unless_still(new: np.ndarray, old: Sequence[float]) -> np.ndarray:
+    return np.where(np.abs(new - old) < STILL, old, new)
+
+
+def _wxyz(quaternion: Sequence[float]) -> np.ndarray:
+    return np.asarray(quaternion)[WXYZ]

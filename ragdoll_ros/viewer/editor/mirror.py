@@ -1,0 +1,107 @@
+"""The other side of a body: what is done to the left arm is done to the right one as well."""
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+
+from ... import faults
+from ...ragdoll import Bone, Joint, Quaternion, Ragdoll, Vector
+from ...scene import Scene
+from .changes import change_bone, change_joint, find, joint_of, limb, set_pose
+
+OTHER = {'left': 'right', 'right': 'left', 'l': 'r', 'r': 'l', 'lft': 'rgt', 'rgt': 'lft'}
+"""Words for a side in names of bones, as fit/names.py knows them."""
+
+NEAR = 0.05
+"""How far from the mirrored place a partner without such a name may be, of the doll's size."""
+
+
+def partner(scene: Scene, name: str) -> str:
+    """Give the name of the bone on the other side; UnknownBone if there is none.
+
+    By its name (left, right, L, R); else the one that stands where this one's mirror image does.
+    """
+    placement, bone = find(scene, name)
+    doll = placement.doll
+    swapped = re.sub(r'[A-Z]+(?![a-z])|[A-Z]?[a-z]+', _other_word, bone.name)
+    names = [each.name for each in doll.bones]
+    if swapped == bone.name or swapped not in names:
+        swapped = _at_mirrored_place(doll, bone)
+    if swapped is None:
+        raise faults.UnknownBone(f'{name}.both sides', name,
+                                 'a bone with a partner on the other side')
+    return scene.qualified(placement, swapped)
+
+
+def mirrored(scene: Scene, name: str, whole_limb: bool = False) -> Scene:
+    """Make the bone on the other side (and its limb) and its joint the mirror image of this one.
+
+    The mirror is the plane through the middle of the doll's root that faces its left. What the
+    two are named, their colours and what they hang from stay, and which way a partner's joint axis
+    points; swings are not mirrored.
+    """
+    placement, bone = find(scene, name)
+    names = limb(placement.doll, bone.name) if whole_limb else (bone.name,)
+    middle = placement.doll.root.position[1]
+    for each in names:
+        here = scene.qualified(placement, each)
+        scene = _copied_over(scene, here, partner(scene, here), middle)
+    return scene
+
+
+def _copied_over(scene: Scene, name: str, other: str, middle: float) -> Scene:
+    (_, bone), joint = find(scene, name), joint_of(scene, name)
+    scene = set_pose(scene, other, _point(bone.position, middle), _turn(bone.orientation))
+    kept = {key: getattr(bone, key) for key in (
+        'shape', 'mass', 'friction', 'rolling_friction', 'restitution')}
+    scene = change_bone(scene, other, **kept)
+    theirs = joint_of(scene, other)
+    if joint is None or theirs is None:
+        return scene
+    return change_joint(scene, other, kind=joint.kind, damping=joint.damping,
+                        anchor=_point(joint.anchor, middle), **_axes_and_limits(joint, theirs))
+
+
+def _axes_and_limits(joint: Joint, theirs: Joint) -> dict[str, tuple]:
+    """Mirror axes and limits. The image of a turn by t about a is one by -t about a's image."""
+    axes, limits = [], list(joint.limits)
+    for index, axis in enumerate(joint.axes):
+        image = np.array(axis) * (1, -1, 1)
+        like = theirs.axes[index] if theirs.kind == joint.kind else axis
+        if image @ np.array(like) < 0:
+            image = -image
+        elif limits[index] is not None:
+            low, high = limits[index]
+            limits[index] = (-high, -low)
+        axes.append(image + 0.0)
+    return {'axes': tuple(axes), 'limits': tuple(limits)}
+
+
+def _point(point: Vector, middle: float) -> Vector:
+    return (point[0], 2 * middle - point[1], point[2])
+
+
+def _turn(q: Quaternion) -> Quaternion:
+    """S R S with S = diag(1, -1, 1): the mirrored turn; all shapes are symmetric under S."""
+    return (-q[0], q[1], -q[2], q[3])
+
+
+def _other_word(match: re.Match) -> str:
+    word = match[0]
+    other = OTHER.get(word.lower(), word)
+    if other is word:
+        return word
+    return other.upper() if word.isupper() else other.title() if word[0].isupper() else other
+
+
+def _at_mirrored_place(doll: Ragdoll, bone: Bone) -> str | None:
+    """Name of the bone nearest to the mirrored place, None if that is none or too far."""
+    places = np.array([each.position for each in doll.bones])
+    wanted = _point(bone.position, doll.root.position[1])
+    nearest = int(np.argmin(np.linalg.norm(places - wanted, axis=1)))
+    size = float(np.ptp(places, axis=0).max())
+    if doll.bones[nearest] is bone or math.dist(places[nearest], wanted) > NEAR * size:
+        return None
+    return doll.bones[nearest].name

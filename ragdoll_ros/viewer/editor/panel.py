@@ -1,0 +1,142 @@
+"""The panel: which bone, its numbers and those of its joint, and what can be done."""
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Protocol
+
+import viser
+
+from ... import faults
+from .form import RED, Form, Quiet, colored
+from .history import History
+from .sheet import BODY, JOINT, Sheet
+
+NONE = '(no bone)'
+
+
+class Host(Protocol):
+    """Who does what the buttons say."""
+
+    def select(self, bone: str | None) -> None:
+        """Choose a bone."""
+
+    def update(self) -> None:
+        """Apply what stands in the fields."""
+
+    def undo(self) -> None:
+        """Go back a step."""
+
+    def redo(self) -> None:
+        """Go a step forward again."""
+
+    def toggle(self) -> None:
+        """Go to the bind pose to edit, or drop the doll."""
+
+    def suggest(self, key: str, kind: str) -> None:
+        """Another kind of shape or joint has been chosen, not applied yet."""
+
+    def show_handles(self) -> None:
+        """Put the handles where they belong now."""
+
+    def add_bone(self, name: str) -> None:
+        """Add a bone at the end of the chosen one."""
+
+    def remove_limb(self) -> None:
+        """Take the chosen bone off, with all that hangs from it."""
+
+
+class Panel:
+    """Widgets in the GUI container that is current."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+        self._host = host
+        self._filling = Quiet()
+        self.edit = gui.add_button('Edit', icon='pencil', hint='E: pause in the bind pose')
+        self.undo = gui.add_button('Undo', icon='arrow-back-up', hint='Ctrl+Z')
+        self.redo = gui.add_button('Redo', icon='arrow-forward-up', hint='Ctrl+Shift+Z')
+        self.bone = gui.add_dropdown('bone', (NONE,), hint='or click on it')
+        self.limb = gui.add_checkbox('whole limb', False, hint='what hangs from the bone moves '
+                                     'and turns with it; else the body alone, and pivots stay')
+        self.both = gui.add_checkbox('both sides', False,
+                                     hint='the bone on the other side becomes its mirror image')
+        self.body_folder = gui.add_folder('Body')
+        with self.body_folder:
+            self.body = Form(gui, BODY, host.suggest)
+        self.joint_folder = gui.add_folder('Joint to the parent')
+        with self.joint_folder:
+            self.joint = Form(gui, JOINT, host.suggest)
+        self.update = gui.add_button('Update', icon='check', color='green',
+                                     hint='apply the numbers; a running doll starts anew')
+        self.said = gui.add_html('')
+        self.growth_folder = gui.add_folder('Bones', expand_by_default=False)
+        with self.growth_folder:
+            self.name = gui.add_text('name', 'new bone')
+            self.add = gui.add_button('Add a bone here', icon='plus')
+            self.remove = gui.add_button('Remove this limb', icon='trash')
+        self._connect(gui)
+
+    def show_bones(self, names: tuple[str, ...], chosen: str | None) -> None:
+        """Offer these bones."""
+        options = (NONE, *names)
+        with self._filling:
+            if self.bone.options != options:
+                self.bone.options = options
+            self.bone.value = chosen or NONE
+
+    def show_sheet(self, sheet: Sheet | None, parent: str | None) -> None:
+        """Show a bone's numbers, or none."""
+        self.say('')
+        for part in (self.body_folder, self.growth_folder, self.update, self.limb, self.both):
+            part.visible = sheet is not None
+        self.joint_folder.visible = sheet is not None and 'kind' in sheet
+        self.joint_folder.label = f'Joint to {parent}'
+        self.body.fill(sheet or {})
+        self.joint.fill(sheet or {})
+
+    def values(self) -> Sheet:
+        """Give what stands in the fields."""
+        return {**self.body.values(), **self.joint.values()}
+
+    def tell(self, found: Iterable[faults.Fault]) -> None:
+        """Write each fault under its field; what belongs to none, under the Update button."""
+        found = list(found)
+        self.body.tell(found)
+        self.joint.tell(found)
+        keys = {field.key for field in (*BODY, *JOINT)}
+        self.say('\n'.join(str(fault) for fault in found if fault.path not in keys))
+
+    def say(self, text: str) -> None:
+        """Write under the Update button why something was refused; nothing: take that away."""
+        self.said.content = colored(text, RED)
+
+    def errors(self) -> dict[str, str]:
+        """Give what is written under the fields."""
+        return {**self.body.errors(), **self.joint.errors()}
+
+    def show_history(self, history: History) -> None:
+        """Let the buttons tell what they would do."""
+        for button, word, what in ((self.undo, 'Undo', history.undoes),
+                                   (self.redo, 'Redo', history.redoes)):
+            button.disabled = not what
+            button.label = f'{word}: {what}' if what else word
+
+    def show_editing(self, editing: bool) -> None:
+        """Let the button tell what it would do."""
+        self.edit.label = 'Drop it' if editing else 'Edit'
+        self.edit.icon = 'arrow-big-down-lines' if editing else 'pencil'
+
+    def _connect(self, gui: viser.GuiApi) -> None:
+        host = self._host
+        self.bone.on_update(lambda _: self._filling.now or host.select(
+            None if self.bone.value == NONE else self.bone.value))
+        self.limb.on_update(lambda _: host.show_handles())
+        self.update.on_click(lambda _: host.update())
+        self.add.on_click(lambda _: host.add_bone(self.name.value))
+        self.remove.on_click(lambda _: host.remove_limb())
+        for button, label, key, modifier, action in (
+                (self.edit, 'Edit, or drop it', 'E', None, host.toggle),
+                (self.undo, 'Undo', 'Z', 'cmd/ctrl', host.undo),
+                (self.redo, 'Redo', 'Z', 'cmd/ctrl+shift', host.redo)):
+            button.on_click(lambda _, action=action: action())
+            command = gui.add_command(label, hotkey=key, modifier=modifier)
+            command.on_trigger(lambda _, action=action: action())

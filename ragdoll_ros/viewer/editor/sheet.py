@@ -1,0 +1,242 @@
+"""A bone and its joint as the fields of a form, and back: with units, texts and all faults.
+
+Lengths in m, masses in kg, angles in degrees. A field that still holds what ``read`` gave leaves
+the scene as it is, to the bit: what a form shows is rounded.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ... import faults, rotation
+from ...ragdoll import JOINT_KINDS, SHAPES, Joint, Shape, unit
+from ...scene import Scene
+from . import changes
+
+Value = str | float | tuple[float, ...]
+Sheet = dict[str, Value]
+
+GRAY = (0.7, 0.7, 0.7, 1.0)
+"""Shown for a bone without a colour of its own."""
+
+SHAPE_FIELDS = {'box': ('size',), 'sphere': ('radius',), 'cylinder': ('radius', 'length'),
+                'capsule': ('radius', 'length')}
+"""Fields that make each kind of shape, named as its parts are."""
+
+SURFACE = ('friction', 'rolling_friction', 'restitution')
+
+DECIMALS = {'color': 0, 'turn': 4}
+"""Decimals that the form keeps of a number, 6 where nothing is said."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """One line of the form: its widget, what stands beside it, and what it means."""
+
+    key: str
+    label: str
+    widget: str
+    hint: str
+
+
+BODY = (
+    Field('shape', 'shape', 'shape', 'what the body is for contact and inertia'),
+    Field('size', 'size, m', 'vector', 'full edges along the own x, y, z of the body'),
+    Field('radius', 'radius, m', 'number', ''),
+    Field('length', 'length, m', 'number', "along the body's z; a capsule's without its ends"),
+    Field('mass', 'mass, kg', 'number', 'inertia follows: a uniform solid'),
+    Field('position', 'place, m', 'vector', "centre of mass, doll's frame (x forward, z up)"),
+    Field('turn', 'turn, °', 'vector', 'roll, pitch, yaw about the fixed x, y, z'),
+    Field('friction', 'friction', 'text', "coefficient, inf for no slip; empty: the scene's"),
+    Field('rolling_friction', 'rolling, m', 'text', "lever arm; empty: the scene's"),
+    Field('restitution', 'restitution', 'text', "0 to 1; empty: the scene's"),
+    Field('color', 'colour', 'color', ''))
+
+JOINT = (
+    Field('kind', 'joint', 'joint', 'to the parent'),
+    Field('anchor', 'pivot, m', 'vector', "where the joint is, doll's frame"),
+    Field('axis_1', 'axis 1', 'vector', 'fixed in the parent; a ball: the twist axis'),
+    Field('axis_2', 'axis 2', 'vector', 'fixed in the child, across axis 1'),
+    Field('limits_1', 'limits 1, °', 'text',
+          'lower, upper; a ball: swing; child relative to parent; empty: free'),
+    Field('limits_2', 'limits 2, °', 'text', 'lower, upper; a ball: twist; empty: free'),
+    Field('damping', 'damping', 'number', 'N m s/rad on each axis'))
+
+
+def read(scene: Scene, name: str) -> Sheet:
+    """Give the fields that a bone and its joint have; UnknownBone if there is no such bone."""
+    _, bone = changes.find(scene, name)
+    sheet: Sheet = {'shape': bone.shape.kind, **vars(bone.shape), 'mass': bone.mass,
+                    'position': bone.position, 'turn': _degrees(bone.orientation),
+                    'color': tuple(round(255 * part) for part in bone.color or GRAY)}
+    for key in SURFACE:
+        value = getattr(bone, key)
+        sheet[key] = '' if value is None else f'{value:.9g}'
+    joint = changes.joint_of(scene, name)
+    return sheet if joint is None else {**sheet, **_read_joint(joint)}
+
+
+def apply(scene: Scene, name: str, sheet: Mapping[str, Value], limb: bool = False) -> Scene:
+    """Give the scene with a bone and its joint as the sheet has them.
+
+    Raises Faults with all that is wrong, the path of each the key of its field. ``limb``: see
+    changes.py; the joint's own fields are set after the move.
+    """
+    shown, found = read(scene, name), []
+    new = {**shown, **sheet}
+    steps = _body_steps(name, limb) + (_joint_steps(name, shown) if 'kind' in shown else [])
+    for keys, step in steps:
+        if any(not _same(key, new.get(key), shown.get(key)) for key in keys):
+            try:
+                scene = step(scene, new)
+            except faults.Fault as fault:
+                found.append(_at_field(fault, keys))
+    if found:
+        raise faults.Faults(name, found)
+    return scene
+
+
+Step = tuple[tuple[str, ...], Callable[[Scene, Sheet], Scene]]
+"""Fields, and what makes the scene have them when one has changed."""
+
+
+def _body_steps(name: str, limb: bool) -> list[Step]:
+    def place(scene: Scene, new: Sheet) -> Scene:
+        _, bone = changes.find(scene, name)
+        return changes.set_pose(scene, name, _near(new['position'], bone.position), limb=limb)
+
+    def turn(scene: Scene, new: Sheet) -> Scene:
+        return changes.set_pose(scene, name, orientation=_quaternion(new['turn']), limb=limb)
+
+    def bone(*keys: str, **fields: Callable[[Sheet], object]) -> Step:
+        return keys, lambda scene, new: changes.change_bone(
+            scene, name, **{key: made(new) for key, made in fields.items()})
+
+    return [bone('shape', 'size', 'radius', 'length', shape=_shape),
+            bone('mass', mass=lambda new: new['mass']),
+            (('position',), place), (('turn',), turn),
+            bone('color', color=lambda new: tuple(part / 255 for part in new['color'])),
+            *(bone(key, **{key: lambda new, key=key: _number_or_none(key, new[key])})
+              for key in SURFACE)]
+
+
+def _joint_steps(name: str, shown: Sheet) -> list[Step]:
+    def axes_and_limits(scene: Scene, new: Sheet) -> Scene:
+        return _set_axes_and_limits(scene, name, new, shown)
+
+    def anchor(scene: Scene, new: Sheet) -> Scene:
+        old = changes.joint_of(scene, name).anchor
+        return changes.change_joint(scene, name, anchor=_near(new['anchor'], old))
+
+    def damping(scene: Scene, new: Sheet) -> Scene:
+        return changes.change_joint(scene, name, damping=new['damping'])
+
+    return [(('kind', 'axis_1', 'axis_2', 'limits_1', 'limits_2'), axes_and_limits),
+            (('anchor',), anchor), (('damping',), damping)]
+
+
+def _read_joint(joint: Joint) -> Sheet:
+    sheet: Sheet = {'kind': joint.kind, 'anchor': joint.anchor, 'damping': joint.damping}
+    for number, axis in enumerate(joint.axes, 1):
+        sheet[f'axis_{number}'] = axis
+    for number, pair in enumerate(joint.limits, 1):
+        sheet[f'limits_{number}'] = '' if pair is None else ', '.join(
+            f'{math.degrees(angle):.9g}' for angle in pair)
+    return sheet
+
+
+def _set_axes_and_limits(scene: Scene, name: str, new: Sheet, shown: Sheet) -> Scene:
+    """Set kind, axes and limits at once, as each kind asks for its own number of them."""
+    kind, joint = JOINT_KINDS[new['kind']], changes.joint_of(scene, name)
+    axes = []
+    for index in range(kind.axes):
+        key = f'axis_{index + 1}'
+        # A limb that was turned has turned its axes already.
+        kept = kind.name == joint.kind and _same(key, new[key], shown[key])
+        axes.append(joint.axes[index] if kept else unit(key, new[key]))
+    if kind.name == 'universal':
+        axes[1] = _straightened(*axes)
+    pairs = [_pair(f'limits_{number}', new.get(f'limits_{number}', ''), kind.name == 'ball')
+             for number in range(1, kind.limits + 1)]
+    limits = tuple(pair and tuple(map(math.radians, pair)) for pair in pairs)
+    try:
+        return changes.change_joint(scene, name, kind=kind.name, axes=tuple(axes), limits=limits)
+    except faults.Fault as fault:
+        for number, pair in enumerate(pairs, 1):
+            if fault.path.endswith(f'limits[{number - 1}]'):
+                raise type(fault)(f'limits_{number}', pair, fault.expected) from None
+        raise
+
+
+def _straightened(first: tuple[float, ...], second: tuple[float, ...]) -> tuple[float, ...]:
+    """Give the second axis perpendicular to the first where only rounding kept it from being."""
+    lean = float(np.dot(first, second))
+    if not 1e-7 < abs(lean) < 1e-4:
+        return second
+    return tuple(np.subtract(second, lean * np.array(first)))
+
+
+def _pair(key: str, text: str, symmetric: bool) -> tuple[float, float] | None:
+    """Read a pair of angles, degrees; one number is enough where they are symmetric."""
+    if not text.strip():
+        return None
+    parts = text.replace(',', ' ').split()
+    try:
+        numbers = [float(part) for part in parts]
+    except ValueError:
+        numbers = []
+    if symmetric and len(numbers) == 1:
+        numbers = [-numbers[0], numbers[0]]
+    if len(numbers) != 2:
+        raise faults.WrongForm(key, text, 'two angles in degrees, lower and upper, or nothing')
+    return numbers[0], numbers[1]
+
+
+def _number_or_none(key: str, text: str) -> float | None:
+    try:
+        return float(text) if text.strip() else None
+    except ValueError:
+        raise faults.WrongForm(key, text, "a number, or nothing for the scene's") from None
+
+
+def _shape(new: Sheet) -> Shape:
+    kind = new['shape']
+    for key in SHAPE_FIELDS[kind]:
+        faults.check_positive(key, new[key])
+    return SHAPES[kind](**{key: new[key] for key in SHAPE_FIELDS[kind]})
+
+
+def _degrees(orientation: tuple[float, ...]) -> tuple[float, ...]:
+    return tuple(math.degrees(angle) + 0.0 for angle in rotation.to_rpy(np.array(orientation)))
+
+
+def _quaternion(turn: tuple[float, ...]) -> np.ndarray:
+    faults.check_finite('turn', tuple(turn))
+    return rotation.from_rpy(*(math.radians(angle) for angle in turn))
+
+
+def _near(values: tuple[float, ...], old: tuple[float, ...]) -> tuple[float, ...]:
+    """Keep the exact number wherever the form shows the same rounded one."""
+    return tuple(before if abs(value - before) <= 0.5e-6 else value
+                 for value, before in zip(values, old, strict=True))
+
+
+def _same(key: str, new: Value | None, shown: Value | None) -> bool:
+    if isinstance(new, str) or new is None or shown is None:
+        return new == shown
+    tolerance = 0.5 * 10.0 ** -DECIMALS.get(key, 6)
+    if isinstance(new, tuple):
+        return all(abs(a - b) <= tolerance for a, b in zip(new, shown, strict=True))
+    return abs(new - shown) <= tolerance
+
+
+def _at_field(fault: faults.Fault, keys: tuple[str, ...]) -> faults.Fault:
+    """Give the fault the key of the field that it belongs to."""
+    said = fault.path.rsplit('.', 1)[-1].split('[')[0]
+    # Of its axes only that they are not perpendicular is left to the joint to find.
+    said = 'axis_2' if said == 'axes' else said
+    key = said if said in keys else keys[0]
+    return type(fault)(key, fault.value, fault.expected)

@@ -1,0 +1,55 @@
+"""Lines, arrows and points: swings, pushes, hands, contacts."""
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import viser
+
+from .source import Frame
+
+BROWN, RED, BLUE, YELLOW = (90, 50, 25), (230, 50, 25), (30, 110, 230), (245, 190, 0)
+ROD = 0.012
+"""m: thickness of a swing's rods."""
+
+
+class Marks:
+    """What is drawn beside the bones; each kind exists from when it is first needed."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        add = server.scene
+        self._makers: dict[str, Callable[[str, np.ndarray], viser.SceneNodeHandle]] = {
+            'rods': lambda name, points: add.add_line_segments(
+                name, points, BROWN, thickness=ROD),
+            'pushes': lambda name, points: add.add_arrows(
+                name, points, RED, shaft_radius=0.02, head_radius=0.05, head_length=0.12),
+            'hands': lambda name, points: add.add_line_segments(
+                name, points, BLUE, thickness=3.0, thickness_units='screen'),
+            'contacts': lambda name, points: add.add_point_cloud(
+                name, points, YELLOW, point_size=0.04, point_shape='circle')}
+        self._handles: dict[str, viser.SceneNodeHandle] = {}
+
+    def show(self, frame: Frame) -> None:
+        """Draw what there is; hide what has gone."""
+        scene, state = frame.scene, frame.state
+        arrows = [push.arrow(state.positions[bone], state.orientations[bone])
+                  for push in frame.pushes if any(push.force)
+                  for bone in (scene.bone_index(push.bone),)]
+        lines = [np.stack([hand.point, hand.target]) for hand in frame.held]
+        self._set('rods', frame.rods)
+        self._set('pushes', arrows)
+        self._set('hands', lines)
+        self._set('contacts', frame.contacts)
+
+    def _set(self, kind: str, points: object) -> None:
+        handle = self._handles.get(kind)
+        if points is None or not len(points):
+            if handle is not None:
+                handle.visible = False
+            return
+        points = np.asarray(points, np.float32)
+        if handle is None:
+            self._handles[kind] = self._makers[kind](f'/scene/{kind}', points)
+            return
+        handle.points = points
+        handle.visible = True

@@ -1,0 +1,60 @@
+"""Meshes of size one, to be scaled: a box, a cylinder along z, a ball.
+
+Vertices (v, 3) m and faces (f, 3), counter-clockwise seen from outside. The page's shading goes
+by vertices, so that what has an edge has its vertices there once for each side.
+"""
+from __future__ import annotations
+
+import numpy as np
+
+Mesh = tuple[np.ndarray, np.ndarray]
+
+ROUND = 24
+"""Corners of a circle."""
+
+
+def box() -> Mesh:
+    """Edges 1 m long."""
+    corners, faces = [], []
+    for axis in range(3):
+        u, w = np.eye(3)[[(axis + 1) % 3, (axis + 2) % 3]]
+        for sign in (1, -1):
+            first = len(corners)
+            corners += [(np.eye(3)[axis] * sign + a * u + b * sign * w) / 2
+                        for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+            faces += [(first, first + 1, first + 2), (first, first + 2, first + 3)]
+    return np.array(corners), np.array(faces)
+
+
+def cylinder() -> Mesh:
+    """1 m across and 1 m long."""
+    turn = np.arange(ROUND) * 2 * np.pi / ROUND
+    ring = np.stack([np.cos(turn), np.sin(turn), np.zeros(ROUND)], axis=1) / 2
+    up = np.array([0, 0, 0.5])
+    low, high = ring - up, ring + up
+    at, after = np.arange(ROUND), (np.arange(ROUND) + 1) % ROUND
+    side = [np.stack([at, after, after + ROUND], axis=1),
+            np.stack([at, after + ROUND, at + ROUND], axis=1)]
+    fan = np.stack([np.zeros(ROUND - 2, int), at[1:-1], at[2:]], axis=1)
+    caps = [fan[:, ::-1] + 2 * ROUND, fan + 3 * ROUND]
+    return np.concatenate([low, high, low, high]), np.concatenate(side + caps)
+
+
+def ball() -> Mesh:
+    """1 m across."""
+    rows = ROUND // 2
+    tilt = np.arange(rows + 1)[:, None] * np.pi / rows
+    turn = np.arange(ROUND)[None] * 2 * np.pi / ROUND
+    points = np.stack(np.broadcast_arrays(
+        np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)), axis=-1) / 2
+    row, at = (index.ravel() for index in np.mgrid[:rows, :ROUND])
+    after = (at + 1) % ROUND
+    a, b, c, d = (r * ROUND + p for r, p in ((row, at), (row + 1, at), (row + 1, after),
+                                             (row, after)))
+    faces = np.concatenate([np.stack([a, b, c], axis=1)[row < rows - 1],
+                            np.stack([a, c, d], axis=1)[row > 0]])
+    return points.reshape(-1, 3), faces
+
+
+MESHES = {'box': box(), 'cylinder': cylinder(), 'sphere': ball()}
+"""By the kinds of parts.Part."""

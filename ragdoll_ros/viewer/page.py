@@ -1,0 +1,127 @@
+"""The page: takes a source's newest frame and shows it to all who have it open."""
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import viser
+
+from ..scene import Scene
+from .camera import Follower
+from .controls import Controls
+from .editor.editor import Editor
+from .ground import light
+from .plots import Plots
+from .pointer import Pointer
+from .recording_panel import RecordingPanel
+from .source import Frame, Source, Wanted
+from .stage import Stage
+from .view import View
+
+PERIOD = 1 / 60
+"""s between two drawings at the least."""
+
+IDLE = 0.1
+"""s between two looks for a page that is open."""
+
+
+class Page:
+    """What viser serves. `update` is called again and again by one thread, which alone draws.
+
+    The editor, which comes with the first scene, keeps its files in ``folder``.
+    """
+
+    def __init__(self, server: viser.ViserServer, source: Source,
+                 folder: str | Path = '.') -> None:
+        self.server = server
+        self.source = source
+        self.listeners: list[Callable[[Frame], None]] = []
+        """Called with each frame that is drawn, in the drawing thread: a recorder, say."""
+        self.selectors: list[Callable[[str], None]] = []
+        """Called with the name of a bone that is clicked on: the editor, say."""
+        self.editor: Editor | None = None
+        self._folder = folder
+        self._frame: Frame | None = None
+        self._stage: Stage | None = None
+        light(server)
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        self._problem = server.gui.add_markdown('')
+        self.tabs = server.gui.add_tab_group()
+        with self.tabs.add_tab('Play'):
+            self.controls = Controls(server, source)
+            self.view = View(server)
+            self.listeners.append(RecordingPanel(server).take)
+        self._edit_tab = self.tabs.add_tab('Edit')
+        with self.tabs.add_tab('Plots'):
+            self._plots = Plots(server)
+        self._follower = Follower(server)
+        self._pointer = Pointer(lambda: self.source, lambda: self._frame, self._select)
+
+    def play(self, source: Source) -> None:
+        """Show another source from now on; the last one is left open."""
+        self.source.want(Wanted())
+        self.source = self.controls.source = source
+
+    def run(self, stop: threading.Event) -> None:
+        """Draw until told to stop."""
+        next_time = time.monotonic()
+        while not stop.is_set():
+            is_open = self.update()
+            next_time = max(next_time + (PERIOD if is_open else IDLE), time.monotonic())
+            stop.wait(next_time - time.monotonic())
+        self.source.want(Wanted())
+
+    def update(self) -> bool:
+        """Draw what has changed; tell whether any page is open."""
+        is_open = bool(self.server.get_clients())
+        self.source.want(self.view.wanted if is_open else Wanted())
+        if is_open:
+            frame, report = self.source.frame, self.source.report
+            if frame is not None and frame is not self._frame:
+                self._draw(frame)
+            if frame is not None:
+                now = time.monotonic()
+                self._plots.show(frame, report, now)
+                self._follower.follow(frame, now, self.view.follow)
+            if self._stage is not None:
+                self._stage.be_visible(bones=self.view.bones, skins=self.view.skin)
+            if self.editor is not None:
+                self.editor.take_note(report.paused)
+            self._tell(report.problem, report.note)
+            self.controls.show(report)
+        return is_open
+
+    def _draw(self, frame: Frame) -> None:
+        new = self._stage is None or frame.scene is not self._stage.scene
+        if new:
+            self._stage = Stage(self.server, frame)
+            self._pointer.attach(self._stage.bodies, self._stage.skins)
+            self.controls.show_scene(frame.scene.name)
+            self.view.show_scene(has_skin=bool(self._stage.skins.handles))
+            self._edit(frame.scene)
+        self._frame = frame
+        with self.server.atomic():
+            self._stage.show(frame)
+        for listener in self.listeners:
+            listener(frame)
+
+    def _edit(self, scene: Scene) -> None:
+        """Let the scene be edited."""
+        if self.editor is not None:
+            self.editor.show(scene)
+            return
+        with self._edit_tab:
+            self.editor = Editor(self.server, scene, lambda scene: self.source.use(scene),
+                                 lambda wanted: self.source.pause(wanted), self._folder)
+        self.selectors.append(self.editor.select)
+
+    def _select(self, bone: str) -> None:
+        for selector in self.selectors:
+            selector(bone)
+
+    def _tell(self, problem: str, note: str) -> None:
+        notes = [note, *(self._stage.skins.notes if self._stage is not None else ())]
+        self._problem.content = '\n\n'.join(
+            filter(None, [problem and f'**{problem}**', *notes]))

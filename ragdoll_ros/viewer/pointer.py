@@ -1,0 +1,121 @@
+"""The pointer takes bodies and drags them at the distance they had from the eye.
+
+Viser finds the nearest body under the pointer. The grabbed point A keeps its distance from the
+camera C while the pointer goes on, D being the direction to it: target = C + D |A - C|.
+"""
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import viser
+
+from .. import rotation
+from ..scene import Scene
+from ..state import State
+from .bodies import Bodies
+from .skin import Skins
+from .source import Frame, Source
+
+
+class Pointer:
+    """What all pages' pointers hold: each page has a hand of its own.
+
+    Viser's callbacks are coroutines here: they run in order, and nothing in them waits.
+    """
+
+    def __init__(self, source: Callable[[], Source], shown: Callable[[], Frame | None],
+                 select: Callable[[str], None]) -> None:
+        self._source, self._shown, self._select = source, shown, select
+        self._distances: dict[int, float] = {}
+
+    def attach(self, bodies: Bodies, skins: Skins) -> None:
+        """Let the bodies and skins of a new scene be taken."""
+        for batch in bodies.batches:
+            self._listen(batch.handle,
+                         lambda index, _, bones=batch.bones: int(bones[index or 0]))
+        for skin in skins.handles:
+            self._listen(skin, lambda _, point: self._nearest(point))
+
+    def _listen(self, handle: viser.BatchedMeshHandle | viser.MeshSkinnedHandle,
+                bone_of: Callable[[int | None, np.ndarray], int]) -> None:
+        async def dragged(event: viser.SceneNodeDragEvent) -> None:
+            if event.phase == 'start':
+                point = np.array(event.start_position)
+                self._take(event, bone_of(event.instance_index, point), point)
+            elif event.client_id in self._distances:
+                self._drag(event)
+
+        async def clicked(event: viser.SceneNodePointerEvent) -> None:
+            frame = self._shown()
+            if frame is None:
+                return
+            eye, way = np.array(event.ray_origin), np.array(event.ray_direction)
+            index = event.instance_index
+            bone = bone_of(index, eye + way * self._depth(eye, way))
+            self._select(frame.scene.bone_names[bone])
+
+        handle.on_drag('left')(dragged)
+        handle.on_click(clicked)
+
+    def _take(self, event: viser.SceneNodeDragEvent, bone: int, point: np.ndarray) -> None:
+        frame = self._shown()
+        if frame is None:
+            return
+        eye = event.client.camera.position
+        self._distances[event.client_id] = float(np.linalg.norm(point - eye))
+        local = on_bone(frame.scene, frame.state, bone, point)
+        self._source().grab(_hand(event), frame.scene.bone_names[bone], tuple(local.tolist()),
+                            self._target(event))
+
+    def _drag(self, event: viser.SceneNodeDragEvent) -> None:
+        if event.phase == 'end':
+            del self._distances[event.client_id]
+            self._source().let_go(_hand(event))
+        else:
+            self._source().drag(_hand(event), self._target(event))
+
+    def _target(self, event: viser.SceneNodeDragEvent) -> tuple[float, ...]:
+        target = kept_distance(event.client.camera.position, np.array(event.end_position),
+                               self._distances[event.client_id])
+        return tuple(target.tolist())
+
+    def _nearest(self, point: np.ndarray) -> int:
+        frame = self._shown()
+        return nearest(frame.scene, frame.state, point)
+
+    def _depth(self, eye: np.ndarray, way: np.ndarray) -> float:
+        """Distance, m, at which a ray comes nearest to a bone's centre, the nearest such bone."""
+        offsets = self._shown().state.positions - eye
+        along = offsets @ way
+        aside = np.linalg.norm(offsets - along[:, None] * way, axis=1)
+        return float(along[np.argmin(aside)])
+
+
+def kept_distance(eye: np.ndarray, pointer: np.ndarray, distance: float) -> np.ndarray:
+    """Target (3,) m in the direction of ``pointer`` (3,) m as far from the eye as ``distance``."""
+    way = pointer - eye
+    length = float(np.linalg.norm(way))
+    return eye + way * (distance / length) if length > 0 else pointer
+
+
+def on_bone(scene: Scene, state: State, bone: int, point: np.ndarray) -> np.ndarray:
+    """Point (3,) m of the world along a bone's axes, from its centre, in its bounding box.
+
+    A page shows where the bone was a moment ago: what has moved on is taken at its edge.
+    """
+    local = rotation.rotate(rotation.inverse(state.orientations[bone]),
+                            point - state.positions[bone])
+    half = np.array(scene.bones[bone].shape.half_extents)
+    return np.clip(local, -half, half)
+
+
+def nearest(scene: Scene, state: State, point: np.ndarray) -> int:
+    """Index of the bone whose bounding box is nearest to a point (3,) m."""
+    local = rotation.rotate(rotation.inverse(state.orientations), point - state.positions)
+    half = np.array([bone.shape.half_extents for bone in scene.bones])
+    return int(np.argmin(np.linalg.norm(np.maximum(np.abs(local) - half, 0), axis=1)))
+
+
+def _hand(event: viser.SceneNodeDragEvent) -> str:
+    return f'page {event.client_id}'

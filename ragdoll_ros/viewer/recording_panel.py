@@ -1,0 +1,99 @@
+"""Buttons that take what the page shows with them: the run as JSON, the view as PNG."""
+from __future__ import annotations
+
+import threading
+
+import imageio.v3 as iio
+import numpy as np
+import viser
+
+from .recording import Pose, Recorder
+from .recording_file import recording_text
+from .source import Frame
+
+MOST_NUMBERS = 5_000_000
+"""In one recording: 100 MB as JSON; 20 minutes of ten bones at 60 Hz, half a minute of 500."""
+
+RENDER_TIMEOUT = 20.0
+"""s that a page may take for its picture."""
+
+RECORD, STOP = 'Record', 'Stop and download'
+
+
+class RecordingPanel:
+    """Two buttons in the page's panel; what is shown is told by take(), from any thread.
+
+    All pages share one recording: whoever stops it gets it.
+    """
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._recorder: Recorder | None = None
+        self._lock = threading.Lock()
+        with server.gui.add_folder('Recording', expand_by_default=False):
+            self._button = server.gui.add_button(
+                RECORD, icon=viser.Icon.PLAYER_RECORD,
+                hint='Poses of all bones as run.json; ragdoll_viewer --play run.json shows them')
+            picture = server.gui.add_button('Picture', icon=viser.Icon.CAMERA,
+                                            hint='This view as ragdoll.png')
+        self._frame: Frame | None = None
+        self._button.on_click(self._clicked)
+        picture.on_click(_send_picture)
+
+    @property
+    def recording(self) -> bool:
+        """Whether poses are being taken."""
+        return self._recorder is not None
+
+    def take(self, frame: Frame) -> None:
+        """Tell what is shown.
+
+        Another scene, or as much as one recording may hold, ends what is being taken; it waits
+        for its download.
+        """
+        with self._lock:
+            self._frame = frame
+            self._record(frame)
+
+    def _record(self, frame: Frame) -> None:
+        recorder = self._recorder
+        if recorder is None or recorder.scene is not frame.scene:
+            return
+        pose = Pose(frame.state.positions, frame.state.orientations, frame.rods)
+        numbers = pose.positions.size + pose.orientations.size + np.size(pose.rods)
+        if len(recorder) * numbers < MOST_NUMBERS:
+            recorder.add(frame.time, pose)
+
+    def _clicked(self, event: viser.GuiEvent) -> None:
+        with self._lock:
+            recorder, self._recorder = self._recorder, None
+            if recorder is None and self._frame is not None:
+                self._recorder = Recorder(self._frame.scene)
+                self._record(self._frame)
+            self._button.label = RECORD if self._recorder is None else STOP
+        if recorder is not None and event.client is not None:
+            _send_run(recorder, event.client)
+
+
+def _send_run(recorder: Recorder, client: viser.ClientHandle) -> None:
+    text = recording_text(recorder.recording())
+    client.send_file_download('run.json', text.encode(), save_immediately=True)
+
+
+def _send_picture(event: viser.GuiEvent) -> None:
+    client = event.client
+    if client is None:
+        return
+    size = client.camera.image_height, client.camera.image_width
+    try:
+        picture = client.get_render(*size, transport_format='png', timeout=RENDER_TIMEOUT)
+    except TimeoutError:
+        client.add_notification('No picture', f'The page drew none within {RENDER_TIMEOUT:g} s.')
+        return
+    content = iio.imwrite('<bytes>', _on_white(picture), extension='.png')
+    client.send_file_download('ragdoll.png', content, save_immediately=True)
+
+
+def _on_white(picture: np.ndarray) -> np.ndarray:
+    """Lay a picture (h, w, 4) uint8 with transparent parts on white: (h, w, 3) uint8."""
+    share = picture[..., 3:] / 255
+    return np.rint(picture[..., :3] * share + 255 * (1 - share)).astype(np.uint8)

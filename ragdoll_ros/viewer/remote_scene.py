@@ -1,0 +1,33 @@
+"""What a node simulates, as seen from outside: its scene, if it can be read here, else its URDF."""
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+from .. import faults
+from ..scene import Ground, Placement, Scene
+from ..scene_file import load_scene
+from ..urdf import scene_to_urdf
+from ..urdf_reader import doll_from_urdf
+
+GUESSED = ('The shapes are those of `robot_description`, as the scene `{}` is not here or another '
+           'one; the ground is a guess, and swings and skins are not known.')
+
+
+def scene_of_node(name: str, names: Sequence[str], description: str) -> tuple[Scene, str]:
+    """Give the scene of a node and what should be known of it, '' if nothing.
+
+    ``name`` is the node's parameter `scene`, ``names`` its `bone_names`, ``description`` the URDF
+    that it publishes. A scene that is loaded here is the node's if it gives the same URDF, word
+    by word. Raises a RagdollError if nothing fits the names.
+    """
+    try:
+        scene = load_scene(name)
+    except faults.RagdollError:
+        scene = None
+    if (scene is not None and scene.bone_names == tuple(names)
+            and scene_to_urdf(scene) == description):
+        return scene, ''
+    doll = doll_from_urdf(description)
+    doll = dataclasses.replace(doll, bones=tuple(doll.bone(bone) for bone in names))
+    return Scene(name, (Placement(doll),), Ground()), GUESSED.format(name)

@@ -1,0 +1,187 @@
+"""A page in headless Chromium: what its three.js scene holds, what a mouse and keys do to it."""
+from __future__ import annotations
+
+import os
+import re
+import select
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+from ragdoll_ros.parts import parts_of
+
+PATIENCE = 20.0
+"""s that the page may take for anything: it draws some 6 pictures a second without a GPU."""
+
+SIZE = {'width': 800, 'height': 520}
+
+FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+         '--disable-background-networking', '--disable-component-update', '--disable-sync',
+         '--use-angle=swiftshader', '--enable-unsafe-swiftshader']
+
+REQUIRED = os.environ.get('RAGDOLL_BROWSER') == 'required'
+"""Whether a missing browser is a failure (.ci/run) or a reason to skip."""
+
+READY = "window.__viserMutable?.scene && window.__viserMutable.nodeRefFromName['']"
+
+BODIES = """() => {
+  const {scene, nodeRefFromName: nodes} = window.__viserMutable;
+  scene.updateMatrixWorld();
+  const toWorld = nodes[''].matrixWorld.clone().invert();
+  const bodies = {};
+  for (const [name, node] of Object.entries(nodes)) node?.traverse(mesh => {
+    const kind = name.split('/scene/bodies/')[1];
+    if (!kind || !mesh.isInstancedMesh2) return;
+    bodies[kind] = Array.from({length: mesh.instancesCount}, (_, index) =>
+      toWorld.clone().multiply(mesh.matrixWorld).multiply(mesh.getMatrixAt(index)).elements);
+  });
+  return bodies;
+}"""
+"""Matrices that the graphics card gets of each instance, by kind, column by column; z up."""
+
+TO_PIXELS = """points => {
+  const {camera, canvas, nodeRefFromName: nodes} = window.__viserMutable;
+  const frame = canvas.getBoundingClientRect();
+  camera.updateMatrixWorld();
+  return points.map(point => {
+    const p = camera.position.clone().set(...point).applyMatrix4(nodes[''].matrixWorld);
+    p.project(camera);
+    return [frame.left + (p.x + 1) / 2 * frame.width, frame.top + (1 - p.y) / 2 * frame.height];
+  });
+}"""
+
+
+def find_chromium():
+    """Path of a Chromium or Chrome: the environment's CHROMIUM, or one on the path."""
+    names = (os.environ.get('CHROMIUM'), 'chromium', 'google-chrome')
+    return next(filter(None, (shutil.which(name) for name in names if name)), None)
+
+
+def skip_or_fail(reason):
+    (pytest.fail if REQUIRED else pytest.skip)(reason)
+
+
+@contextmanager
+def chromium():
+    """A browser with nothing in its profile, as Playwright's context; skips where there is none."""
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        skip_or_fail("no Playwright: pip install playwright, or '.[test]'")
+    path = find_chromium()
+    if path is None:
+        skip_or_fail('no Chromium: apt-get install chromium (Debian), or CHROMIUM=/path/to/chrome')
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, \
+            sync_playwright() as playwright:
+        context = playwright.chromium.launch_persistent_context(
+            profile, executable_path=path, headless=True, args=FLAGS, viewport=SIZE)
+        context.set_default_timeout(PATIENCE * 1000)
+        yield context
+        context.close()
+
+
+class View:
+    """One page of a viewer, at ``url``."""
+
+    def __init__(self, context, url):
+        self.page = context.new_page()
+        self.errors = []
+        self.page.on('pageerror', lambda error: self.errors.append(str(error)))
+        self.page.goto(url)
+        self.page.wait_for_function(READY)
+
+    def bodies(self, scene):
+        """Place of each bone as it is drawn, (n, 3) m, z up; None while not all are there.
+
+        Read from three.js' instances; the page keeps parts of one kind in the scene's order.
+        """
+        drawn = self.page.evaluate(BODIES)
+        kinds = [part.kind for bone in scene.bones for part in parts_of(bone)]
+        assert len(kinds) == len(scene.bones), 'bones of one part each'
+        if {kind: len(matrices) for kind, matrices in drawn.items()} != Counter(kinds):
+            return None
+        instances = {kind: iter(matrices) for kind, matrices in drawn.items()}
+        return np.array([next(instances[kind])[12:15] for kind in kinds])
+
+    def pixels(self, points):
+        """Where points (n, 3) m of the world are on the page: (n, 2), as the mouse counts."""
+        return np.array(self.page.evaluate(TO_PIXELS, np.asarray(points).tolist()))
+
+    def wait(self, condition):
+        """Wait until a condition holds, and give what it said; the page goes on meanwhile."""
+        end = time.monotonic() + PATIENCE
+        while not (said := condition()):
+            assert time.monotonic() < end, 'not in time'
+            self.page.wait_for_timeout(20)
+        return said
+
+    def button(self, name):
+        return self.page.get_by_role('button', name=name, exact=True)
+
+    def press(self, button):
+        self.button(button).click()
+
+    def tab(self, name):
+        self.page.get_by_role('tab', name=name).click()
+
+    def field(self, label):
+        """The input beside a label of the panel."""
+        row = self.page.locator('.mantine-Flex-root',
+                                has=self.page.get_by_text(label, exact=True))
+        return row.locator('input').last
+
+    def see(self, text):
+        """Wait until a text stands somewhere on the page."""
+        self.page.get_by_text(text).first.wait_for()
+
+    def key(self, name):
+        self.page.keyboard.press(name)
+
+    def close(self):
+        self.page.close()
+
+
+@contextmanager
+def opened(browser, url, scene):
+    """A page at an address, with all bones in it; no script of it has failed at the end."""
+    view = View(browser, url)
+    try:
+        view.wait(lambda: view.bodies(scene) is not None)
+        yield view
+    finally:
+        view.close()
+    assert not view.errors
+
+
+@contextmanager
+def serving(*arguments, module='ragdoll_ros.viewer.command'):
+    """Run what serves a page, until SIGTERM, on which it must end well; give the page's address."""
+    process = subprocess.Popen([sys.executable, '-m', module, *arguments], cwd=ROOT,
+                               stdout=subprocess.PIPE, start_new_session=True)
+    try:
+        yield _address(process)
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=10)
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+    assert process.returncode == 0
+
+
+def _address(process):
+    said, end = b'', time.monotonic() + PATIENCE
+    while not (found := re.search(rb'(http://\S+)\n', said)):
+        assert time.monotonic() < end and process.poll() is None, said
+        if select.select([process.stdout], [], [], 1.0)[0]:
+            said += os.read(process.stdout.fileno(), 1000)
+    return found[1].decode()

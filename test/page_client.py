@@ -1,0 +1,89 @@
+"""A browser's other half: a websocket client that speaks viser's protocol, in a thread."""
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+
+import msgspec
+import viser
+import websockets
+from viser import _messages
+
+PATIENCE = 15.0
+
+
+class PageClient:
+    """One open page. It counts as open once its camera has been told."""
+
+    def __init__(self, port, position=(4.2, -1.2, 1.5), look_at=(0.0, 0.0, 0.8)):
+        self.bytes = self.windows = 0
+        self._socket = None
+        self._ready = threading.Event()
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._run, args=(port,), daemon=True)
+        self._thread.start()
+        assert self._ready.wait(PATIENCE)
+        self.send(_messages.ViewerCameraMessage(
+            wxyz=(1, 0, 0, 0), position=position, fov=0.8, near=0.01, far=1000.0,
+            image_height=700, image_width=1100, look_at=look_at, up_direction=(0, 0, 1)))
+
+    def send(self, message):
+        """Send one message as a browser would."""
+        data = msgspec.msgpack.encode(message.as_serializable_dict([]))
+        self.send_bytes(data)
+
+    def send_bytes(self, data):
+        """Send anything."""
+        asyncio.run_coroutine_threadsafe(self._socket.send(data), self._loop).result(PATIENCE)
+
+    def drag(self, name, phase, start, end, instance=0):
+        """Tell of a pointer that drags a node of the scene, at two points of the world."""
+        self.send(_messages.SceneNodeDragMessage(
+            name=name, phase=phase, instance_index=instance, start_position=tuple(start),
+            start_screen_pos=(0.5, 0.5), end_position=tuple(end), end_screen_pos=(0.5, 0.5),
+            button='left', modifier=None))
+
+    def update(self, handle, value):
+        """Change a value in the panel."""
+        self.send(_messages.GuiUpdateMessage(handle._impl.uuid, {'value': value}))
+
+    def press(self, command):
+        """Press a command's hotkey."""
+        self.send(_messages.CommandTriggerMessage(command._impl.uuid))
+
+    def drop(self):
+        """Let the line go dead, as a laptop that is closed does: no word of goodbye."""
+        self._loop.call_soon_threadsafe(self._socket.transport.abort)
+        self._thread.join(PATIENCE)
+
+    def close(self):
+        """Close the page; a second time does nothing."""
+        if not self._thread.is_alive():
+            return
+        asyncio.run_coroutine_threadsafe(self._socket.close(), self._loop)
+        self._thread.join(PATIENCE)
+
+    def _run(self, port):
+        self._loop.run_until_complete(self._listen(port))
+        self._loop.close()
+
+    async def _listen(self, port):
+        async with websockets.connect(
+                f'ws://127.0.0.1:{port}', subprotocols=[f'viser-v{viser.__version__}'],
+                max_size=None, compression=None) as self._socket:
+            self._ready.set()
+            try:
+                async for data in self._socket:
+                    self.bytes += len(data)
+                    self.windows += 1
+            except websockets.ConnectionClosed:
+                pass
+
+
+def wait(condition, timeout=PATIENCE):
+    """Wait until the condition holds; fail if it does not in time."""
+    end = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < end, 'not in time'
+        time.sleep(0.005)

@@ -1,0 +1,361 @@
+"""The page on a simulation in this process: a real viser server, real websockets to it."""
+from __future__ import annotations
+
+import dataclasses
+import threading
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+pytest.importorskip('viser')
+from page_client import PageClient, wait
+
+from ragdoll_ros import rotation
+from ragdoll_ros.ragdoll import Bone, Capsule, Joint, Ragdoll, Sphere
+from ragdoll_ros.scene import Placement, Scene
+from ragdoll_ros.scene_file import load_scene
+from ragdoll_ros.simulation import Simulation
+from ragdoll_ros.viewer.command import free_port, server_at
+from ragdoll_ros.viewer.page import Page
+from ragdoll_ros.viewer.simulated import Simulated
+
+DROP = load_scene('drop')
+
+
+@contextmanager
+def served(scene, folder='.'):
+    """A page of a scene, drawn by a thread; its clients are closed at the end."""
+    source, stop = Simulated(scene), threading.Event()
+    with server_at('127.0.0.1', free_port('127.0.0.1', 0)) as server:
+        page = Page(server, source, folder)
+        page.clients = []
+
+        def client(**camera):
+            page.clients.append(PageClient(server.get_port(), **camera))
+            return page.clients[-1]
+
+        page.open = client
+        thread = threading.Thread(target=page.run, args=(stop,))
+        thread.start()
+        try:
+            yield page
+        finally:
+            for each in page.clients:
+                each.close()
+            stop.set()
+            thread.join()
+            source.close()
+
+
+@pytest.fixture
+def page():
+    with served(DROP) as page:
+        yield page
+
+
+def drawn(page):
+    """Places (p, 3) m of all parts that are drawn, and which bone each is of."""
+    batches = page._stage.bodies.batches
+    return (np.concatenate([batch.handle.batched_positions for batch in batches]),
+            np.concatenate([batch.bones for batch in batches]))
+
+
+def paused(page):
+    """Hold the time; give the frame that is drawn then."""
+    page.source.pause(True)
+    wait(lambda: page.source.report.paused and page._frame is page.source.frame)
+    return page._frame
+
+
+def command(page, label):
+    return next(handle for handle in page.server.gui._command_handle_from_uuid.values()
+                if handle.label == label)
+
+
+def test_what_is_drawn_is_the_simulation(page):
+    """Boxes and balls of the default doll stand where a second simulation has them.
+
+    A page gets numbers of 32 bits: 1e-6 m at 2 m.
+    """
+    page.open()
+    wait(lambda: page._frame and page._frame.time > 0.3)
+    frame = paused(page)
+    with Simulation(DROP) as twin:
+        while twin.time < round(frame.time * 1e9):
+            twin.advance()
+        places, bones = drawn(page)
+        assert len(bones) == 10
+        assert np.abs(places - twin.state.positions[bones]).max() < 1e-6
+
+
+def test_a_capsule_is_a_cylinder_between_two_balls():
+    """Their ends are where the shape's are, along the bone's own z."""
+    turn = rotation.from_axis_angle((1, 2, 3), 0.7)
+    bone = Bone('b', Capsule(0.1, 0.6), 1, (0, 0, 1), turn, color=(1, 0.5, 0, 1))
+    with served(Scene('s', (Placement(Ragdoll('d', (bone,))),), gravity=(0, 0, 0))) as page:
+        page.open()
+        wait(lambda: page._stage)
+        batches = {batch.handle.name.split('/')[-1]: batch.handle
+                   for batch in page._stage.bodies.batches}
+        assert set(batches) == {'cylinder', 'sphere'}
+        along = rotation.rotate(turn, np.array([0, 0, 0.3]))
+        ends = batches['sphere'].batched_positions
+        assert np.abs(ends - np.stack([along, -along]) - (0, 0, 1)).max() < 1e-6
+        assert np.allclose(batches['cylinder'].batched_scales, [(0.2, 0.2, 0.6)])
+        assert batches['sphere'].batched_colors.tolist() == [[255, 128, 0]] * 2
+
+
+def test_time_stands_while_no_page_is_open(page):
+    """Nobody misses the fall; and nothing is computed for nobody."""
+    before = page.source.frame
+    first = page.open()
+    assert before.time < 0.1
+    wait(lambda: page.source.frame.time > 0.1)
+    first.close()
+    wait(lambda: not page.source._wanted.frames)
+    stood = page.source.frame
+    # A tick would be due within 10 ms.
+    page.source._thread.join(0.1)
+    assert page.source.frame is stood
+    page.open()
+    wait(lambda: page.source.frame.time > stood.time)
+
+
+def test_nothing_is_sent_while_nothing_moves():
+    """A scene at rest in free space: the page gets its plots' points alone, four a second."""
+    still = load_scene('flight')
+    with served(still) as page:
+        client = page.open()
+        wait(lambda: page._frame and page._frame.time > 1.0)
+        before, since = client.windows, page._frame.time
+        wait(lambda: page._frame.time > since + 1.0)
+        # 100 frames in this second would be some 60 windows.
+        assert client.windows - before < 15
+
+
+@pytest.mark.parametrize(('label', 'axis', 'sign'), [
+    ('Push up', 0, -1), ('Push down', 0, 1), ('Push left', 1, -1), ('Push right', 1, 1)])
+def test_arrow_keys_push(page, label, axis, sign):
+    """2000 N on 55 kg: 1 m/s in 28 ms. The arrow is there while the push is, and gone after."""
+    client = page.open()
+    wait(lambda: page._frame)
+    client.press(command(page, label))
+    wait(lambda: page._frame.pushes)
+    assert page._frame.pushes[0].force[axis] == 2000 * sign
+    wait(lambda: page._frame.state.linear[0, axis] * sign > 1)
+    arrow = page.server.scene.get_handle_by_name('/scene/pushes')
+    assert arrow.visible and np.sign(np.diff(arrow.points[0], axis=0)[0, axis]) == sign
+    wait(lambda: not page._frame.pushes and not arrow.visible)
+
+
+def test_arrows_pressed_together_add_up(page):
+    client = page.open()
+    wait(lambda: page._frame)
+    client.press(command(page, 'Push up'))
+    client.press(command(page, 'Push left'))
+    wait(lambda: page._frame.pushes and page._frame.pushes[0].force == (-2000, -2000, 2))
+
+
+def test_pause_step_reset_and_pace(page):
+    client = page.open()
+    wait(lambda: page._frame and page._frame.time > 0.2)
+    client.press(command(page, 'Pause, or go on'))
+    wait(lambda: page.source.report.paused)
+    held = paused(page).time
+    client.press(command(page, 'Step'))
+    wait(lambda: page._frame.time > held)
+    assert page._frame.time == pytest.approx(held + 0.01)
+    client.press(command(page, 'Reset'))
+    wait(lambda: page._frame.time == 0)
+    client.update(page.controls._pace, 0.5)
+    wait(lambda: page.source.report.pace == 0.5)
+    client.press(command(page, 'Pause, or go on'))
+    wait(lambda: page._frame.time > 0)
+
+
+def test_another_scene_by_the_dropdown(page):
+    """Ten dolls, 100 bones, in as many batches as one; then the old stage is gone."""
+    client = page.open()
+    wait(lambda: page._stage)
+    client.update(page.controls._scene, 'crowd')
+    wait(lambda: len(page._stage.scene.bones) == 100)
+    _, bones = drawn(page)
+    assert sorted(bones) == list(range(100)) and len(page._stage.bodies.batches) == 2
+    client.update(page.controls._scene, 'ponytail')
+    wait(lambda: page._stage.scene.name == 'ponytail')
+    rods = wait_for(page, '/scene/rods').points
+    assert rods.shape == (8, 2, 3) and np.allclose(rods[1:, 0], rods[:-1, 1])
+
+
+def wait_for(page, name):
+    wait(lambda: page.server.scene.get_handle_by_name(name))
+    return page.server.scene.get_handle_by_name(name)
+
+
+def test_what_cannot_be_used_is_refused_and_the_old_goes_on(page, broken_scene):
+    page.open()
+    wait(lambda: page._frame)
+    path, words = broken_scene
+    with pytest.raises(ValueError) as error:
+        page.source.load(str(path))
+    assert all(word in str(error.value) for word in words)
+    before = page._frame.time
+    wait(lambda: page._frame.time > before)
+
+
+def batch_of(page, bone):
+    """Name of the node that a bone is drawn in, its number there, and its place (3,) m."""
+    index = page._stage.scene.bone_index(bone)
+    for batch in page._stage.bodies.batches:
+        for number in np.flatnonzero(batch.bones == index):
+            return batch.handle.name, int(number), page._frame.state.positions[index]
+    raise AssertionError(bone)
+
+
+def test_a_dragged_bone_follows_at_the_distance_it_had(page):
+    """The target is as far from the eye as the grabbed point was, in the pointer's direction."""
+    eye = np.array([3.0, 1.0, 1.5])
+    client = page.open(position=tuple(eye))
+    wait(lambda: page._frame)
+    frame = paused(page)
+    node, number, place = batch_of(page, 'left_forearm')
+    client.drag(node, 'start', place, place, number)
+    wait(lambda: page.source._simulation.grabs)
+    pointer = place + (0.0, 0.4, 0.5)
+    client.drag(node, 'update', place, pointer, number)
+    distance = np.linalg.norm(place - eye)
+    target = eye + (pointer - eye) / np.linalg.norm(pointer - eye) * distance
+    wait(lambda: np.allclose(page.source._simulation.grabs[0].target, target))
+    assert page.source._simulation.grabs[0].bone == 'left_forearm'
+    page.source.pause(False)
+    bone = frame.scene.bone_index('left_forearm')
+    wait(lambda: np.linalg.norm(page._frame.state.positions[bone] - target) < 0.05)
+    assert page._frame.held[0].bone == 'left_forearm'
+    # Drawn as a line while it is held.
+    assert wait_for(page, '/scene/hands').visible
+    client.drag(node, 'end', place, pointer, number)
+    wait(lambda: not page._frame.held)
+
+
+def test_a_point_that_has_moved_on_is_taken_at_the_edge(page):
+    """The page shows the past: what was aimed at lies within the bone's box."""
+    client = page.open()
+    wait(lambda: page._frame)
+    paused(page)
+    node, number, place = batch_of(page, 'head')
+    client.drag(node, 'start', place + (0.5, 0, 0), place, number)
+    wait(lambda: page.source._simulation.grabs)
+    assert np.linalg.norm(page.source._simulation.grabs[0].point) == pytest.approx(0.1)
+
+
+def test_a_page_that_vanishes_lets_go(page):
+    """A closed laptop: no end of the drag, no goodbye. The other page goes on."""
+    stays, goes = page.open(), page.open()
+    wait(lambda: page._frame and len(page.server.get_clients()) == 2)
+    node, number, place = batch_of(page, 'head')
+    goes.drag(node, 'start', place, place, number)
+    wait(lambda: page._frame.held)
+    goes.drop()
+    page.clients.remove(goes)
+    wait(lambda: not page._frame.held and len(page.server.get_clients()) == 1)
+    before = stays.windows
+    wait(lambda: stays.windows > before)
+
+
+def test_two_pages_have_a_hand_each(page):
+    clients = [page.open(), page.open()]
+    wait(lambda: page._frame and len(page.server.get_clients()) == 2)
+    for client, bone in zip(clients, ('left_forearm', 'right_forearm'), strict=True):
+        node, number, place = batch_of(page, bone)
+        client.drag(node, 'start', place, place, number)
+    wait(lambda: len(page._frame.held) == 2)
+
+
+@pytest.mark.filterwarnings('ignore')
+@pytest.mark.parametrize('data', [b'', b'\xff\x00garbage', b'\x81\xa4type\xa7Nothing'])
+def test_garbage_on_the_socket_hurts_nobody_else(page, data, caplog):
+    stays, bad = page.open(), page.open()
+    wait(lambda: page._frame and len(page.server.get_clients()) == 2)
+    bad.send_bytes(data)
+    before = stays.windows
+    wait(lambda: stays.windows > before + 3)
+
+
+def test_a_click_chooses_the_bone_for_the_editor(page):
+    from viser import _messages
+    client = page.open()
+    wait(lambda: page.editor is not None)
+    node, number, place = batch_of(page, 'right_shin')
+    client.send(_messages.SceneNodeClickMessage(
+        name=node, instance_index=number, ray_origin=(4.0, 0.0, 1.0),
+        ray_direction=(-1.0, 0.0, 0.0), screen_pos=(0.5, 0.5), modifier=None))
+    wait(lambda: page.editor.bone == 'right_shin')
+
+
+def test_contacts_on_demand(page):
+    """At rest the doll touches the ground: the points are at its height, within its margin."""
+    client = page.open()
+    wait(lambda: page._frame)
+    assert page.server.scene.get_handle_by_name('/scene/contacts') is None
+    client.update(page.view._contacts, True)
+    wait(lambda: page._frame.contacts is not None and len(page._frame.contacts) > 3)
+    points = wait_for(page, '/scene/contacts').points
+    # Bones of the doll touch each other as well, above the ground.
+    assert points[:, 2].min() == pytest.approx(0, abs=0.01)
+    client.update(page.view._contacts, False)
+    wait(lambda: page._frame.contacts is None)
+    wait(lambda: not page.server.scene.get_handle_by_name('/scene/contacts').visible)
+
+
+def test_the_camera_follows_on_demand(page):
+    """By as much as the centre of mass goes, from when it is asked to."""
+    client = page.open()
+    wait(lambda: page.server.get_clients() and page._frame)
+    (handle,) = page.server.get_clients().values()
+    paused(page)
+    eye = handle.camera.position.copy()
+    client.update(page.view._follow, True)
+    wait(lambda: page._follower._last is not None)
+    begin = page._follower._last
+    page.source.pause(False)
+    wait(lambda: begin[2] - page._follower._last[2] > 0.3)
+    paused(page)
+    way = page._follower._last - begin
+    assert way[2] < -0.3
+    assert np.allclose(handle.camera.position - eye, way, atol=1e-9)
+    masses = np.array([bone.mass for bone in DROP.bones])
+    centre = masses @ page._frame.state.positions / masses.sum()
+    # The camera moves 30 times a second; the last part of a tick's way may be missing.
+    assert np.abs(page._follower._last - centre).max() < 0.2
+
+
+def test_plots_tell_energy_gap_and_pace(page):
+    client = page.open()
+    wait(lambda: page._frame)
+    client.press(command(page, 'Push up'))
+    wait(lambda: len(page._plots._pace._rows) > 3 and len(page._plots._energy._rows) > 3)
+    _, energy, put_in = page._plots._energy._handle.data
+    # The doll never has more than was put in: a thousandth for rounding.
+    assert put_in.max() > 10 and (energy <= put_in * 1.001 + 1e-6).all()
+    _, gap = page._plots._gap._handle.data
+    assert 0 <= gap.max() < 50
+    _, pace, wanted = page._plots._pace._handle.data
+    assert wanted.tolist() == [1.0] * len(wanted) and 0 < np.median(pace) < 2
+
+
+def test_numbers_that_run_away_are_never_drawn():
+    """A spin of 1e155 rad/s has no finite square: the scene is started anew, and that is told."""
+    bones = (Bone('a', Sphere(0.1), 1, (0, 0, 0)), Bone('b', Sphere(0.1), 1, (0, 0, 0.3)))
+    doll = Ragdoll('d', bones, (Joint('a', 'b', 'ball', (0, 0, 0.15), ((0, 0, 1),)),))
+    wild = Scene('wild', (Placement(doll, spin=(1e155, 0, 0)),), gravity=(0, 0, 0))
+    try:
+        source = Simulated(wild)
+    except (ValueError, ArithmeticError):
+        pytest.skip('the simulation refuses it at once')
+    with np.errstate(all='ignore'):
+        source.want(dataclasses.replace(source._wanted, frames=True))
+        wait(lambda: source.report.problem)
+    assert all(np.isfinite(part).all() for part in vars(source.frame.state).values()) or \
+        source.frame.time == 0
+    source.close()

@@ -1,0 +1,206 @@
+"""The page in headless Chromium: what a user sees and does, on a viewer in a process of its own."""
+from __future__ import annotations
+
+import dataclasses
+import re
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+from browser import SIZE, chromium, opened, serving
+
+from ragdoll_ros.scene_file import load_scene
+from ragdoll_ros.simulation import Simulation
+from ragdoll_ros.viewer.recording_file import load_recording
+
+SCENE = load_scene('drop')
+START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])
+
+
+@pytest.fixture(scope='module')
+def browser():
+    with chromium() as context:
+        yield context
+
+
+@pytest.fixture(scope='module')
+def states():
+    """The scene's states, tick by tick from 0 until it is at rest, by a simulation here."""
+    with Simulation(SCENE) as simulation:
+        states = [simulation.state]
+        while not simulation.asleep:
+            states.append(simulation.advance())
+    return states
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp('dolls')
+
+
+@pytest.fixture(scope='module')
+def url(folder):
+    """Where a viewer of its own serves the default scene."""
+    with serving('--port', '0', '--scene', 'drop', '--folder', str(folder)) as url:
+        yield url
+
+
+@pytest.fixture(scope='module')
+def view(browser, url):
+    with opened(browser, url, SCENE) as view:
+        yield view
+
+
+def hold_at_start(view):
+    """Paused at the start, as the page draws it."""
+    if view.button('Pause').count():
+        view.key(' ')
+        view.button('Go on').wait_for()
+    view.key('r')
+    view.wait(lambda: abs(view.bodies(SCENE) - START).max() < 1e-6)
+
+
+def go_on(view):
+    view.key(' ')
+    view.button('Pause').wait_for()
+
+
+def index_of(bodies, states):
+    """Which tick is drawn; 0 if none."""
+    off = abs(np.array([state.positions for state in states]) - bodies).max(axis=(1, 2))
+    return int(off.argmin()) if off.min() < 1e-6 else 0
+
+
+def far(view, bodies, distance):
+    """Whether each body is further than ``distance`` m from where it was."""
+    return (np.linalg.norm(view.bodies(SCENE) - bodies, axis=1) > distance).all()
+
+
+def test_sees_ten_bodies_fall(view, states):
+    """All move, and what is drawn is a tick of the fall as a simulation here has it.
+
+    A page gets numbers of 32 bits: 1e-6 m at 2 m.
+    """
+    assert len(START) == 10
+    hold_at_start(view)
+    go_on(view)
+    view.wait(lambda: far(view, START, 0.1))
+    drawn = view.wait(lambda: index_of(view.bodies(SCENE), states))
+    view.wait(lambda: index_of(view.bodies(SCENE), states) > drawn)
+
+
+@pytest.mark.parametrize(('button', 'arrow', 'axis', 'sign'), [
+    ('↑ away', 'ArrowUp', 0, -1), ('↓ toward', 'ArrowDown', 0, 1),
+    ('← left', 'ArrowLeft', 1, -1), ('→ right', 'ArrowRight', 1, 1)])
+def test_a_button_and_its_key_push_alike(view, button, arrow, axis, sign):
+    """2000 N for 0.6 s: the torso is 1 m off at once; the fall alone takes it 0.5 m."""
+    for act in (lambda: view.press(button), lambda: view.key(arrow)):
+        hold_at_start(view)
+        act()
+        go_on(view)
+        view.wait(lambda: view.bodies(SCENE)[0][axis] * sign > 1)
+
+
+def test_pause_holds_and_step_makes_one_tick(view, states):
+    hold_at_start(view)
+    for tick in (1, 2):
+        view.press('Step')
+        view.wait(lambda tick=tick: abs(
+            view.bodies(SCENE) - states[tick].positions).max() < 1e-6)
+    go_on(view)
+    view.wait(lambda: far(view, states[2].positions, 0.1))
+
+
+def test_two_pages_show_and_steer_the_same(browser, url, view):
+    hold_at_start(view)  # before the other one: what moves is drawn twice
+    with opened(browser, url, SCENE) as other:
+        other.wait(lambda: abs(other.bodies(SCENE) - START).max() < 1e-6)
+        go_on(other)
+        for each in (view, other):
+            each.wait(lambda each=each: far(each, START, 0.1))
+
+
+def test_a_run_is_recorded_and_played_back(browser, view, states, tmp_path):
+    """From the start on, each recorded pose is the simulation's at that tick, to the bit."""
+    view.page.get_by_text('Recording', exact=True).click()
+    hold_at_start(view)
+    view.press('Record')
+    go_on(view)
+    view.wait(lambda: far(view, START, 0.1))
+    with view.page.expect_download() as download:
+        view.press('Stop and download')
+    download.value.save_as(tmp_path / 'run.json')
+    hold_at_start(view)
+    recording = load_recording(tmp_path / 'run.json')
+    assert recording.scene == SCENE and len(recording) > 20
+    for time_, positions in zip(recording.times, recording.positions, strict=True):
+        np.testing.assert_array_equal(positions, states[round(time_ / SCENE.step)].positions)
+    with (serving('--port', '0', '--play', str(tmp_path / 'run.json')) as url,
+          opened(browser, url, SCENE) as page):
+        page.wait(lambda: abs(page.bodies(SCENE) - recording.positions[-1]).max() < 1e-6)
+        page.page.get_by_text(re.compile(r'run\.json: [0-9.]+ of [0-9.]+ s')).wait_for()
+
+
+def test_the_view_is_saved_as_png(view, tmp_path):
+    """As large as the page, white beside the doll, and not where the torso is seen."""
+    hold_at_start(view)
+    with view.page.expect_download() as download:
+        view.press('Picture')
+    download.value.save_as(tmp_path / 'view.png')
+    picture = iio.imread(tmp_path / 'view.png')
+    x, y = view.pixels(START[:1])[0].round().astype(int)
+    assert picture.shape == (SIZE['height'], SIZE['width'], 3)
+    assert (picture[2, 2] == 255).all() and picture[y, x].min() < 200
+
+
+def edited():
+    """The default scene with an arm of 7.5 kg whose first axis is limited to -90 to 30 degrees."""
+    placement = SCENE.dolls[0]
+    doll = placement.doll.replace_bone('left_upper_arm', mass=7.5)
+    limits = (tuple(np.radians((-90, 30)).tolist()), tuple(np.radians((-90, 90)).tolist()))
+    joints = tuple(dataclasses.replace(joint, limits=limits) if joint.child == 'left_upper_arm'
+                   else joint for joint in doll.joints)
+    doll = dataclasses.replace(doll, joints=joints)
+    return dataclasses.replace(SCENE, dolls=(dataclasses.replace(placement, doll=doll),))
+
+
+def saved(view, folder, name):
+    """What the page saves under a name."""
+    view.field('file').fill(name)
+    view.press('Save')
+    view.see(f'saved {name}.yaml')
+    return load_scene(str(folder / f'{name}.yaml'))
+
+
+def test_a_body_and_its_joint_are_edited_saved_undone_and_loaded(view, folder):
+    """The bone is chosen by a click on it; what is saved is what the edit would give here."""
+    hold_at_start(view)
+    view.page.mouse.click(*view.pixels(START[2:3])[0])
+    view.tab('Edit')
+    assert view.field('bone').input_value() == 'left_upper_arm'
+    view.field('mass, kg').fill('-1')
+    view.press('Update')
+    view.see('NotPositive: -1.0; expected above zero')
+    assert saved(view, folder, 'untouched') == SCENE
+    view.field('mass, kg').fill('7.5')
+    view.field('limits 1, °').fill('-90, 30')
+    view.press('Update')
+    view.see('Undo: numbers of left_upper_arm')
+    assert saved(view, folder, 'edited') == edited()
+    view.key('Control+z')
+    view.see('Redo: numbers of left_upper_arm')
+    assert saved(view, folder, 'undone') == SCENE
+    view.field('file').fill('edited')
+    view.press('Load')
+    view.see('loaded edited')
+    assert saved(view, folder, 'loaded') == edited()
+
+
+def test_what_is_edited_falls(view):
+    """What is drawn from then on is the edited doll's fall, as a simulation here has it."""
+    view.tab('Play')
+    hold_at_start(view)
+    with Simulation(edited()) as simulation:
+        states = [simulation.state, *(simulation.advance() for _ in range(100))]
+    go_on(view)
+    view.wait(lambda: index_of(view.bodies(SCENE), states) > 35)

@@ -1,0 +1,211 @@
+"""What the page draws: meshes, dials of joint limits, skins, the pointer's geometry."""
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip('viser')
+import fit_rigs
+from fit_rigs import RIGS
+
+from ragdoll_ros import faults, rotation
+from ragdoll_ros.fit.character import read_character
+from ragdoll_ros.fit.pipeline import fit_character
+from ragdoll_ros.ragdoll import Bone, Box, Joint, Ragdoll, Sphere
+from ragdoll_ros.riders import Riders
+from ragdoll_ros.scene import Placement, Scene, above_ground
+from ragdoll_ros.scene_file import load_scene
+from ragdoll_ros.simulation import Simulation
+from ragdoll_ros.viewer.limits import PIECES, Limits
+from ragdoll_ros.viewer.meshes import MESHES, ROUND
+from ragdoll_ros.viewer.pointer import kept_distance, nearest, on_bone
+from ragdoll_ros.viewer.rods import Rods
+from ragdoll_ros.viewer.skin import skin_of
+
+CORNERS = ROUND / 2 * np.sin(2 * np.pi / ROUND)
+"""Area of the polygon of ROUND corners in a circle of radius 1, which stands for pi."""
+
+
+@pytest.mark.parametrize(('kind', 'volume', 'tolerance'), [
+    ('box', 1, 1e-12), ('cylinder', CORNERS / 4, 1e-12),
+    # A ball of flat faces lacks some of its volume, here 3 %.
+    ('sphere', np.pi / 6, 0.03)])
+def test_a_mesh_is_closed_seen_from_outside_and_of_size_one(kind, volume, tolerance):
+    """Each edge is run once each way; by the divergence theorem the volume is positive, right."""
+    vertices, faces = MESHES[kind]
+    assert np.ptp(vertices, axis=0) == pytest.approx([1, 1, 1])
+    corners = vertices[faces]
+    assert np.einsum('ti,ti->', corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6 \
+        == pytest.approx(volume, rel=tolerance)
+    _, same = np.unique(vertices.round(9), axis=0, return_inverse=True)
+    edges = same.ravel()[faces][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    there = set(map(tuple, edges.tolist()))
+    assert len(there) == len(edges)
+    assert there == {(b, a) for a, b in there}
+
+
+def all_kinds():
+    """A doll of three limited joints of every kind, its bones turned askew."""
+    rng = np.random.default_rng(5)
+    bones = tuple(Bone(name, Box((0.2, 0.1, 0.3)), 1, position, rng.normal(size=4))
+                  for name, position in (('a', (0, 0, 1)), ('b', (0, 0, 0.5)),
+                                         ('c', (0.5, 0, 1)), ('d', (-0.5, 0, 1))))
+    joints = (Joint('a', 'b', 'hinge', (0, 0, 0.75), ((1, 1, 0),), ((-2, 2),)),
+              Joint('a', 'c', 'universal', (0.25, 0, 1), ((0, 1, 0), (0, 0, 1)),
+                    ((-1.5, 1.5), (-1.2, 1.2))),
+              Joint('a', 'd', 'ball', (-0.25, 0, 1), ((1, 0, 1),), ((-1.4, 1.4), (-2.0, 2.0))))
+    return Ragdoll('d', bones, joints)
+
+
+def test_the_last_needle_of_each_joint_moves_with_the_child():
+    """All angles of a joint turn the child: so does the needle of its last angle.
+
+    Where the child carries it is taken from the child's own pose; 1e-4 m: the engine's joints
+    gap by less here, and the page's numbers have 32 bits.
+    """
+    import viser
+    doll = all_kinds()
+    scene = Scene('s', (Placement(doll, spin=(3, -2, 4)),), gravity=(0, 0, 0))
+    server = viser.ViserServer('127.0.0.1', 0, verbose=False)
+    limits = Limits(server, scene)
+    with Simulation(scene) as simulation:
+        begin = simulation.state
+        limits.show(begin, simulation.joint_angles)
+        first = limits._handle.points.copy()
+        for _ in range(30):
+            state = simulation.advance()
+        assert np.abs(simulation.joint_angles).max() > 0.2
+        limits.show(state, simulation.joint_angles)
+    needles, before = limits._handle.points[-6:], first[-6:]
+    assert len(limits._handle.points) == 6 * (PIECES + 1)
+    for child, row in (('b', 0), ('c', 2), ('d', 5)):
+        index = scene.bone_index(child)
+        local = rotation.rotate(rotation.inverse(begin.orientations[index]),
+                                before[row] - begin.positions[index])
+        carried = state.positions[index] + rotation.rotate(state.orientations[index], local)
+        assert np.abs(carried - needles[row]).max() < 1e-4
+    limits.show(state, None)
+    assert not limits._handle.visible
+    server.stop()
+
+
+def test_needles_are_red_at_their_limit():
+    import viser
+
+    from ragdoll_ros.viewer.limits import GREEN, RED
+    scene = load_scene('drop')
+    server = viser.ViserServer('127.0.0.1', 0, verbose=False)
+    limits = Limits(server, scene)
+    with Simulation(scene) as simulation:
+        angles = simulation.joint_angles
+        state = simulation.state
+    pairs = [pair for joint in scene.dolls[0].doll.joints for pair in joint.angle_limits]
+    angles = np.array([(low + high) / 2 for low, high in pairs])
+    angles[3] = pairs[3][1] + 0.1
+    limits.show(state, angles)
+    colors = limits._handle.colors[-len(angles):, 0].tolist()
+    assert [tuple(color) for color in colors] == [
+        RED if k == 3 else GREEN for k in range(len(angles))]
+    server.stop()
+
+
+@pytest.fixture(scope='module')
+def fit():
+    return fit_rigs.fitted('mixamo')
+
+
+def seen(skin, doll, state):
+    """Vertices (v, 3) as three.js skins them: sum of W_b T_b inv(T_b in the bind pose) v."""
+    moved = np.zeros_like(skin.vertices)
+    for index, weight in zip(skin.bones, skin.weights.T, strict=True):
+        bone = doll.bones[index]
+        local = rotation.rotate(rotation.inverse(bone.orientation),
+                                skin.vertices - np.array(bone.position))
+        moved += weight[:, None] * (state.positions[index] + rotation.rotate(
+            state.orientations[index], local))
+    return moved
+
+
+def with_model(fit, tmp_path):
+    return dataclasses.replace(fit.doll, model=str(fit_rigs.write(RIGS['mixamo'], tmp_path)))
+
+
+def test_a_skin_follows_as_its_riders_say(fit, tmp_path):
+    """After a fall, by riders.py's formula with all 52 riders, though ours has fewer bones."""
+    doll = with_model(fit, tmp_path)
+    skin = skin_of(doll)
+    assert len(skin.bones) < len(doll.riders) == 52
+    assert np.allclose(skin.weights.sum(axis=1), 1)
+    scene = above_ground(doll)
+    riders = Riders(scene)
+    with Simulation(scene) as simulation:
+        for _ in range(60):
+            state = simulation.advance()
+    places, turns = riders.poses(state)
+    character = fit.character
+    order = [riders.names.index(name) for name in character.bone_names]
+    expected = np.zeros_like(character.vertices)
+    for slot, weight in zip(character.bones.T, character.weights.T, strict=True):
+        local = rotation.rotate(rotation.inverse(character.orientations[slot]),
+                                character.vertices - character.positions[slot])
+        k = np.array(order)[slot]
+        expected += weight[:, None] * (places[k] + rotation.rotate(turns[k], local))
+    found = seen(skin, doll, state)
+    assert np.abs(found - character.vertices).max() > 0.1
+    assert np.abs(found - expected).max() < 1e-6
+
+
+def test_a_skin_comes_in_the_size_that_its_doll_was_fitted_in(fit, tmp_path):
+    """`ragdoll_fit --scale 2` makes a doll twice as large; the file stays as it is."""
+    model = with_model(fit, tmp_path).model
+    double = fit_character(read_character(model, scale=2.0)).doll
+    skin = skin_of(dataclasses.replace(double, model=model))
+    assert np.allclose(skin.vertices, 2 * fit.character.vertices, atol=1e-6)
+
+
+def test_a_skin_that_does_not_fit_is_told(fit, tmp_path):
+    assert skin_of(fit.doll) is None
+    doll = with_model(fit, tmp_path)
+    with pytest.raises(faults.RagdollError, match='riders'):
+        skin_of(dataclasses.replace(doll, riders=doll.riders[:-1]))
+    Path(doll.model).write_bytes(b'rubbish')
+    with pytest.raises(faults.RagdollError, match=Path(doll.model).name):
+        skin_of(doll)
+    Path(doll.model).unlink()
+    with pytest.raises(faults.RagdollError, match=Path(doll.model).name):
+        skin_of(doll)
+
+
+def test_rods_from_masses_alone_are_the_simulations():
+    scene = load_scene('ponytail')
+    with Simulation(scene) as simulation:
+        for _ in range(40):
+            state = simulation.advance()
+        swings = simulation.swings
+        rods = Rods(scene)
+        assert rods.count == 8
+        expected = np.stack([swings.roots, swings.positions], axis=1)
+        assert np.abs(rods.between(swings.positions, state) - expected).max() < 1e-9
+
+
+def test_the_pointer_keeps_its_distance():
+    """Target = C + D |A - C|, D of length one toward the pointer."""
+    eye, point = np.array([4.0, 0, 1]), np.array([0.0, 0, 1])
+    assert kept_distance(eye, np.array([0.0, 3, 1]), 4.0) == pytest.approx([0.8, 2.4, 1])
+    assert kept_distance(eye, point, 4.0) == pytest.approx(point)
+    assert kept_distance(eye, eye, 4.0) == pytest.approx(eye)
+
+
+def test_the_nearest_body_and_its_point():
+    bones = (Bone('a', Sphere(0.5), 1, (0, 0, 0)), Bone('b', Box((2, 0.2, 0.2)), 1, (0, 1, 0)))
+    joints = (Joint('a', 'b', 'fixed', (0, 0.5, 0)),)
+    scene = Scene('s', (Placement(Ragdoll('d', bones, joints)),), gravity=(0, 0, 0))
+    with Simulation(scene) as simulation:
+        state = simulation.state
+    # Nearer to a's centre than to b's, but b reaches far out.
+    assert nearest(scene, state, np.array([0.95, 0.9, 0])) == 1
+    assert nearest(scene, state, np.array([0.3, 0.3, 0])) == 0
+    assert on_bone(scene, state, 1, np.array([5.0, 1.05, 0])) == pytest.approx([1, 0.05, 0])
