@@ -222,7 +222,7 @@ def test_a_dragged_bone_follows_at_the_distance_it_had(page):
     node, number, place = batch_of(page, 'left_forearm')
     client.drag(node, 'start', place, place, number)
     wait(lambda: page.source._simulation.grabs)
-    pointer = place + (0.0, 0.4, 0.5)
+    pointer = (*place, 0.0, 0.4, 0.5)
     client.drag(node, 'update', place, pointer, number)
     distance = np.linalg.norm(place - eye)
     target = eye + (pointer - eye) / np.linalg.norm(pointer - eye) * distance
@@ -244,7 +244,7 @@ def test_a_point_that_has_moved_on_is_taken_at_the_edge(page):
     wait(lambda: page._frame)
     paused(page)
     node, number, place = batch_of(page, 'head')
-    client.drag(node, 'start', place + (0.5, 0, 0), place, number)
+    client.drag(node, 'start', (*place, 0.5, 0, 0), place, number)
     wait(lambda: page.source._simulation.grabs)
     assert np.linalg.norm(page.source._simulation.grabs[0].point) == pytest.approx(0.1)
 
@@ -286,7 +286,7 @@ def test_a_click_chooses_the_bone_for_the_editor(page):
     from viser import _messages
     client = page.open()
     wait(lambda: page.editor is not None)
-    node, number, place = batch_of(page, 'right_shin')
+    node, number, _place = batch_of(page, 'right_shin')
     client.send(_messages.SceneNodeClickMessage(
         name=node, instance_index=number, ray_origin=(4.0, 0.0, 1.0),
         ray_direction=(-1.0, 0.0, 0.0), screen_pos=(0.5, 0.5), modifier=None))
