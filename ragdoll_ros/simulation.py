@@ -40,6 +40,9 @@ REST_TIME = SECOND // 2
 THROWN = SECOND
 """ns for which a doll that was let go is stepped as finely as one that is held."""
 
+LONGEST_THROWN = 0.01
+"""s that are gone through at once then: what fails is done again by itself."""
+
 
 @dataclass
 class _Active:
@@ -298,11 +301,12 @@ class Simulation:
             self.asleep, self._still = False, 0
         if self._hands:
             self._thrown_until = end + THROWN
-        self._stepper.accuracy = (firm(self._accuracy) if self.time < self._thrown_until
-                                  else self._accuracy)
+        thrown = self.time < self._thrown_until
+        self._stepper.accuracy = firm(self._accuracy) if thrown else self._accuracy
+        go = self._pulled if self._hands else self._piece
         remaining = (end - self.time) / SECOND
         while remaining > 1e-12 and not self.asleep:
-            remaining -= (self._pulled if self._hands else self._piece)(remaining, loads)
+            remaining -= go(min(remaining, LONGEST_THROWN) if thrown else remaining, loads)
         self.time = end
 
     def _pulled(self, duration: float, loads: list[Load]) -> float:
