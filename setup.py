@@ -80,7 +80,7 @@ setup(
         'report': ['scipy', 'matplotlib', 'mujoco'],
         'fit': ['pygltflib', 'matplotlib'],
         # The page: 3D, panels and plots in a browser, served from Python, with no build of its own.
-        'viewer': ['viser'],
+        'viewer': ['viser', 'imageio'],
         'test': ['pytest', 'pytest-xdist', 'ruff', 'setuptools', 'wheel', 'yourdfpy',
                  'playwright', 'mannequin-x; python_version >= "3.11"'],
         'colcon': ['colcon-core', 'colcon-ros', 'colcon-python-setup-py',

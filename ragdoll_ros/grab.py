@@ -35,6 +35,10 @@ LONGEST = 2.5e-3
 FRESH = 5e-3
 """s for which a bone is taken to be as mobile, along its own axes, as it was."""
 
+REACH = 2.0
+"""Distances of a bone's centre from its farthest corner within which a hand may hold it: a skin
+is wider than its bones, but a lever of any length would break joints."""
+
 FARTHEST = 1e6
 """m from the world's origin that a hand may be."""
 
@@ -94,6 +98,7 @@ class Hands:
     def __init__(self, scene: Scene, mechanics: Mechanics) -> None:
         self._scene = scene
         self._doll_of = mechanics.doll_of
+        self._gravity = mechanics.gravity
         self._masses = mechanics.doll_masses
         self._hands: dict[str, _Hand] = {}
 
@@ -111,6 +116,9 @@ class Hands:
         """Let a hand hold a point of a bone. Raises UnknownBone, NotFinite or OutOfRange."""
         index = self._scene.bone_index(bone)
         held = np.array(_checked('point', point))
+        reach = REACH * math.hypot(*self._scene.bones[index].shape.half_extents)
+        if math.hypot(*held) > reach:
+            raise faults.OutOfRange('point', point, f'at most {reach:.3g} m from the centre')
         now = state.positions[index] + rotation.rotate(state.orientations[index], held)
         aim = now if target is None else np.array(_checked('target', target))
         self.let_go(name)
@@ -154,14 +162,16 @@ class Hands:
     def _pull(self, hand: _Hand, sharing: int, mass: float, state: State, h: float) -> Pull:
         """Pull of a spring and damper at the end of the step that it makes (backward Euler).
 
-        f = -k (x + h u' - x_hand) - c (u' - u_hand) with u' = u + h W f, W the ``mobility``.
-        Stable for any h, as the hand never does more than stop the point where it shall be.
-        Hands that share a doll see W times their number: they add up.
+        f = -k (x + h u' - x_hand) - c (u' - u_hand), u' = u + h (g + W f), W the mobility: all
+        of a doll falls with g, whatever its joints. Stable for any h, as the hand never does
+        more than bring the point where it shall be. Hands that share a doll see W times their
+        number, as their pulls add up.
         """
         stiffness, damping = mass * FREQUENCY ** 2, 2 * mass * FREQUENCY
         turn = rotation.matrix(state.orientations[hand.bone])
         arm = turn @ hand.point
         velocity = state.linear[hand.bone] + cross(state.angular[hand.bone], arm)
+        velocity += h * self._gravity
         end = hand.after(h)
         force = -(stiffness * (state.positions[hand.bone] + arm + h * velocity - end)
                   + damping * (velocity - (end - hand.position) / h))

@@ -124,6 +124,26 @@ class Mechanics:
         return turned.sum(axis=0) + np.trace(outer) * np.eye(3) - outer
 
 
+def damping_rate(scene: Scene) -> float:
+    """Fastest rate, 1/s, at which the joints' damping c ends a motion: a bound on c / I.
+
+    I is the inertia in which two bones turn against each other about the joint's axis, at the
+    least that of both about their own centres of mass: 1/I = 1/Ia + 1/Ib.
+    """
+    fastest = 0.0
+    for placement in scene.dolls:
+        doll = placement.doll
+        turns = {bone.name: rotation.matrix(bone.orientation) for bone in doll.bones}
+        inertias = {bone.name: np.array(bone.inertia) for bone in doll.bones}
+        for joint in doll.joints:
+            axes = np.eye(3) if joint.kind == 'ball' else joint.axes
+            for axis in axes if joint.damping else ():
+                ease = sum(1 / (inertias[name] @ (np.array(axis) @ turns[name]) ** 2)
+                           for name in (joint.parent, joint.child))
+                fastest = max(fastest, joint.damping * float(ease))
+    return fastest
+
+
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Cross products of rows (..., 3); numpy's own costs five times as much on few rows."""
     out = np.empty(np.broadcast_shapes(np.shape(a), np.shape(b)))

@@ -27,6 +27,9 @@ LARGEST_FILE = 32_000_000
 LARGEST_CONTENT = 5_000_000
 """Values in a file; a doll of 10 000 bones has 0.3 million."""
 
+DEEPEST = 100
+"""Levels of lists and mappings in a file; a scene has 12."""
+
 
 def config_folder() -> Path:
     """Folder of the shipped scenes: the checkout's, else the ROS prefix's, else the package's."""
@@ -229,6 +232,7 @@ def parse(content: bytes) -> object:
 
 
 def _construct(text: str) -> object:
+    _check_depth(text)
     loader = _Loader(text)
     try:
         node = loader.get_single_node()
@@ -239,6 +243,18 @@ def _construct(text: str) -> object:
         return None if node is None else loader.construct_document(node)
     finally:
         loader.dispose()
+
+
+def _check_depth(text: str) -> None:
+    """Refuse what is nested so deeply that libyaml's recursion would end the process."""
+    depth = 0
+    for event in yaml.parse(text, _Loader):
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST:
+            mark = event.start_mark
+            raise faults.Unreadable(f'line {mark.line + 1}, column {mark.column + 1}',
+                                    'nested too deeply', f'at most {DEEPEST} levels')
 
 
 def _unfolded(node: yaml.Node, sizes: dict[int, float]) -> float:

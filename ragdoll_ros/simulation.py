@@ -15,7 +15,7 @@ from .engine.protocol import GROUND, Contact, Engine, Load
 from .gap import JointGap
 from .grab import EVENLY, Grab, Hands, Pull
 from .guard import Guard
-from .mechanics import Mechanics, Motion
+from .mechanics import Mechanics, Motion, cross
 from .push import Push
 from .scene import SECOND, STEP_RANGE, Scene
 from .state import State
@@ -383,13 +383,13 @@ class Simulation:
         for load in loads:
             bone = load.bone
             force, torque = self._mean_load(load, before)
-            ways = [state.positions[bone] + rotation.rotate(state.orientations[bone], load.point)
-                    for state in (before, after)]
+            places, speeds = zip(*(_point(state, bone, load.point) for state in (before, after)),
+                                 strict=True)
             turn = rotation.multiply(after.orientations[bone],
                                      rotation.inverse(before.orientations[bone]))
-            lead = substep / 2 * (after.linear[bone] - before.linear[bone])
+            lead = substep / 2 * (speeds[1] - speeds[0])
             lead_turn = substep / 2 * (after.angular[bone] - before.angular[bone])
-            done = (force @ (ways[1] - ways[0] - lead)
+            done = (force @ (places[1] - places[0] - lead)
                     + torque @ (rotation.rotation_vector(turn) - lead_turn))
             work[self.mechanics.doll_of[bone]] += done
             if isinstance(load, Pull):
@@ -452,3 +452,10 @@ def resolve_accuracy(accuracy: str | Accuracy) -> Accuracy:
     if accuracy not in ACCURACIES:
         raise faults.OutOfRange('accuracy', accuracy, 'one of ' + ', '.join(ACCURACIES))
     return ACCURACIES[accuracy]
+
+
+def _point(state: State, bone: int, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Position (3,) m and velocity (3,) m/s of a point of a bone, given along its axes."""
+    arm = rotation.rotate(state.orientations[bone], point)
+    return (state.positions[bone] + arm,
+            state.linear[bone] + cross(state.angular[bone], arm))

@@ -17,7 +17,7 @@ import numpy as np
 from .coordinates import Coordinates
 from .engine.protocol import GROUND, Engine, Load
 from .flight import fly
-from .mechanics import Shift, cross
+from .mechanics import Shift, cross, damping_rate
 from .reach import Reach
 from .scene import Scene
 from .state import State
@@ -46,8 +46,8 @@ class Accuracy:
     redo: float = math.radians(1.0)
     """rad past a limit from which a step is done again, four times as fine, as it is when a bone
     sinks deeper than ``sink``; infinity: never."""
-    creep: float = 1.0
-    """How much further, in units of ``redo`` and ``sink``, than at its start a step may end."""
+    creep: float = 1.1
+    """Times as far past a limit or in the ground as at its start that a step may end."""
     adaptive: bool = True
     """Substeps by need; otherwise always ``contact`` in 10 ms."""
     energy: bool = True
@@ -60,7 +60,7 @@ class Accuracy:
 
 DRAFT = Accuracy(turn=0.15, limit=0.1, contact=4, settled=2, sink=0.01, most=32, order=2,
                  flight_turn=0.8, redo=math.radians(8))
-NORMAL = Accuracy(turn=0.06, limit=0.05, contact=6, settled=4, sink=0.006, most=64, order=3,
+NORMAL = Accuracy(turn=0.06, limit=0.05, contact=6, settled=4, sink=0.005, most=128, order=3,
                   flight_turn=0.4, redo=math.radians(3))
 EXACT = Accuracy(turn=0.02, limit=0.02, contact=12, settled=8, sink=0.002, most=256, order=4,
                  flight_turn=0.2, redo=math.radians(1.5))
@@ -76,7 +76,7 @@ def firm(accuracy: Accuracy) -> Accuracy:
     return dataclasses.replace(
         accuracy, turn=min(accuracy.turn, 0.06), limit=min(accuracy.limit, 0.025),
         contact=max(accuracy.contact, 8), sink=min(accuracy.sink, 0.006),
-        most=max(accuracy.most, 64), redo=min(accuracy.redo, math.radians(2)), creep=0.0)
+        most=max(accuracy.most, 64), redo=min(accuracy.redo, math.radians(2)), creep=1.0)
 
 
 AT_LIMIT = 1e-3
@@ -96,6 +96,10 @@ MOST_FLIGHTS = 12
 
 FINER = 3
 """Steps of order 4 that tell the error of one step of a flight."""
+
+STIFFEST = 1.5
+"""Step times the fastest rate at which damping ends a motion: from 2 on, explicit steps make
+energy of it."""
 
 SHORTEST = 1e-7
 """s: a piece of flight shorter than this is not worth its stages."""
@@ -137,6 +141,7 @@ class Stepper:
         self._normal = np.array(scene.ground.normal if scene.ground else (0.0, 0.0, 1.0))
         self._damped = any(joint.damping for placement in scene.dolls
                            for joint in placement.doll.joints)
+        self._fading = damping_rate(scene)
         self._stale: bool
         """Whether the engine has yet to hear of a shift."""
         self._blocked: bool
@@ -234,7 +239,7 @@ class Stepper:
 
     def _may_fly(self) -> bool:
         """Tell whether nothing touches and no joint presses against its limit."""
-        if (self._free is None or self.touching or self._blocked
+        if (self._free is None or not self.accuracy.order or self.touching or self._blocked
                 or self.effort.flights >= MOST_FLIGHTS):
             return False
         past = self._past()
@@ -273,9 +278,10 @@ class Stepper:
               loads: Sequence[Load]) -> float:
         """Fly to where a limit or the ground is just reached, by secants; give the time, s.
 
-        Zero if that does not come out, or if bones meet on the way: within a remainder of a tick
-        Bullet would throw apart what overlaps. The end is a hair past it: the engine takes a gap that is
-        left for room to move in within its first substep, and would eat that much of a bounce.
+        Zero if that does not come out, or if bones overlap there: within the rest of the tick,
+        which may be a sliver, they would burst apart. The end is a hair past it: the engine takes
+        a gap that is left for room to move in within its first substep, and would eat that much
+        of a bounce.
         """
         early, late = 0.0, piece
         for _ in range(MOST_SECANTS):
@@ -315,13 +321,14 @@ class Stepper:
     def _flight_steps(self, duration: float) -> int:
         spin = math.sqrt(np.einsum('ij,ij->i', self.state.angular, self.state.angular).max())
         rate = max(spin, np.abs(self.coordinates.v[self._layout.limited[1]]).max(initial=0.0))
-        return max(1, math.ceil(rate * duration / self.accuracy.flight_turn))
+        return max(1, math.ceil(rate * duration / self.accuracy.flight_turn),
+                   math.ceil(self._fading * duration / STIFFEST))
 
     def _step(self, duration: float, loads: Sequence[Load]) -> float:
         """Take the engine's own step, finer if it overshoots a limit; give its substep, s."""
         self.settle()
         start, state, touching = self.coordinates, self.state, self.touching
-        bound = max(1.0, max(0.0, self._too_far()) + self.accuracy.creep)
+        bound = max(1.0, self.accuracy.creep * self._too_far())
         substeps = self._substeps(duration, bool(loads))
         most = max(1, math.ceil(self.accuracy.most * duration / 0.01))
         while True:
@@ -347,7 +354,7 @@ class Stepper:
 
     def _run(self, duration: float, substeps: int, loads: Sequence[Load]) -> None:
         """Let the engine go; what changes with the motion is looked at again each substep."""
-        if self._damped or any(load.local for load in loads):
+        if self._damped or any(load.local or load.point.any() for load in loads):
             for _ in range(substeps):
                 self.engine.step(duration / substeps, 1, loads)
         else:
@@ -362,7 +369,8 @@ class Stepper:
         if not accuracy.adaptive:
             return max(1, math.ceil(accuracy.contact * tens))
         spin = math.sqrt(np.einsum('ij,ij->i', state.angular, state.angular).max())
-        need = max(1.0, spin * duration / accuracy.turn, 4.0 * tens if pushed else 0.0)
+        need = max(1.0, spin * duration / accuracy.turn, 4.0 * tens if pushed else 0.0,
+                   self._fading * duration / STIFFEST)
         speeds = self._layout.limit_speeds(self.coordinates)
         if len(speeds):
             past = self._past()

@@ -2,7 +2,12 @@
 from __future__ import annotations
 
 import os
+import re
+import select
 import shutil
+import signal
+import subprocess
+import sys
 import tempfile
 import time
 from collections import Counter
@@ -10,6 +15,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from conftest import ROOT
 
 from ragdoll_ros.parts import parts_of
 
@@ -118,5 +124,64 @@ class View:
             self.page.wait_for_timeout(20)
         return said
 
+    def button(self, name):
+        return self.page.get_by_role('button', name=name, exact=True)
+
+    def press(self, button):
+        self.button(button).click()
+
+    def tab(self, name):
+        self.page.get_by_role('tab', name=name).click()
+
+    def field(self, label):
+        """The input beside a label of the panel."""
+        row = self.page.locator('.mantine-Flex-root',
+                                has=self.page.get_by_text(label, exact=True))
+        return row.locator('input').last
+
+    def see(self, text):
+        """Wait until a text stands somewhere on the page."""
+        self.page.get_by_text(text).first.wait_for()
+
+    def key(self, name):
+        self.page.keyboard.press(name)
+
     def close(self):
         self.page.close()
+
+
+@contextmanager
+def opened(browser, url, scene):
+    """A page at an address, with all bones in it; no script of it has failed at the end."""
+    view = View(browser, url)
+    try:
+        view.wait(lambda: view.bodies(scene) is not None)
+        yield view
+    finally:
+        view.close()
+    assert not view.errors
+
+
+@contextmanager
+def serving(*arguments, module='ragdoll_ros.viewer.command'):
+    """Run what serves a page, until SIGTERM, on which it must end well; give the page's address."""
+    process = subprocess.Popen([sys.executable, '-m', module, *arguments], cwd=ROOT,
+                               stdout=subprocess.PIPE, start_new_session=True)
+    try:
+        yield _address(process)
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=10)
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+    assert process.returncode == 0
+
+
+def _address(process):
+    said, end = b'', time.monotonic() + PATIENCE
+    while not (found := re.search(rb'(http://\S+)\n', said)):
+        assert time.monotonic() < end and process.poll() is None, said
+        if select.select([process.stdout], [], [], 1.0)[0]:
+            said += os.read(process.stdout.fileno(), 1000)
+    return found[1].decode()

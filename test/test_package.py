@@ -25,7 +25,7 @@ SCENES = ('import pathlib, ragdoll_ros.scene_file as f; '
 ROSDEP_KEYS = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml', 'scipy': 'python3-scipy',
                'jsonschema': 'python3-jsonschema', 'matplotlib': 'python3-matplotlib',
                'mpl_toolkits': 'python3-matplotlib', 'pybullet': 'python3-pybullet-pip'}
-NO_ROSDEP_KEY = {'mujoco', 'pygltflib', 'viser'}
+NO_ROSDEP_KEY = {'imageio', 'mujoco', 'pygltflib', 'viser'}
 """Needed by extras only; said in the README."""
 
 COUNT_POSES = """

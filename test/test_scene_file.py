@@ -133,6 +133,14 @@ def test_aliases_of_aliases_do_not_fill_the_memory(tmp_path, use):
         load_scene(str(path))
 
 
+@pytest.mark.parametrize('text', ['[' * 100_000, '- ' * 100_000, '{a: ' * 100_000,
+                                  'bones: ' + '[' * 5000 + ']' * 5000])
+def test_what_is_nested_too_deeply_does_not_end_the_process(tmp_path, text):
+    (tmp_path / 'deep.yaml').write_text(text)
+    with pytest.raises(faults.Faults, match='nested too deeply'):
+        load_scene(str(tmp_path / 'deep.yaml'))
+
+
 def test_a_missing_file_names_the_ones_there_are():
     with pytest.raises(faults.Faults, match='drop'):
         load_scene('no such scene')

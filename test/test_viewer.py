@@ -101,7 +101,7 @@ def test_a_capsule_is_a_cylinder_between_two_balls():
         assert set(batches) == {'cylinder', 'sphere'}
         along = rotation.rotate(turn, np.array([0, 0, 0.3]))
         ends = batches['sphere'].batched_positions
-        assert np.abs(ends - ((0, 0, 1) + np.stack([along, -along]))).max() < 1e-6
+        assert np.abs(ends - np.stack([along, -along]) - (0, 0, 1)).max() < 1e-6
         assert np.allclose(batches['cylinder'].batched_scales, [(0.2, 0.2, 0.6)])
         assert batches['sphere'].batched_colors.tolist() == [[255, 128, 0]] * 2
 
@@ -180,7 +180,7 @@ def test_another_scene_by_the_dropdown(page):
     wait(lambda: page._stage)
     client.update(page.controls._scene, 'crowd')
     wait(lambda: len(page._stage.scene.bones) == 100)
-    places, bones = drawn(page)
+    _, bones = drawn(page)
     assert sorted(bones) == list(range(100)) and len(page._stage.bodies.batches) == 2
     client.update(page.controls._scene, 'ponytail')
     wait(lambda: page._stage.scene.name == 'ponytail')

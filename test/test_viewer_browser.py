@@ -1,20 +1,13 @@
 """The page in headless Chromium: what a user sees and does, on a viewer in a process of its own."""
 from __future__ import annotations
 
-import os
+import dataclasses
 import re
-import select
-import signal
-import subprocess
-import sys
-import time
-from contextlib import contextmanager
 
 import imageio.v3 as iio
 import numpy as np
 import pytest
-from browser import PATIENCE, SIZE, View, chromium
-from conftest import ROOT
+from browser import SIZE, chromium, opened, serving
 
 from ragdoll_ros.scene_file import load_scene
 from ragdoll_ros.simulation import Simulation
@@ -40,65 +33,36 @@ def states():
     return states
 
 
-class Viewer:
-    """`ragdoll_viewer` as a process; ``url`` is what it printed."""
-
-    def __init__(self, *arguments):
-        command = [sys.executable, '-m', 'ragdoll_ros.viewer.command', '--port', '0', *arguments]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, cwd=ROOT,
-                                        start_new_session=True)
-        said, end = b'', time.monotonic() + PATIENCE
-        while not (found := re.search(rb'http://\S+\n', said)):
-            assert time.monotonic() < end and self.process.poll() is None, said
-            if select.select([self.process.stdout], [], [], 1.0)[0]:
-                said += os.read(self.process.stdout.fileno(), 1000)
-        self.url = found[0].decode().strip()
-
-    def end(self):
-        """Give the exit code after SIGTERM."""
-        self.process.send_signal(signal.SIGTERM)
-        self.process.communicate(timeout=10)
-        return self.process.returncode
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp('dolls')
 
 
 @pytest.fixture(scope='module')
-def viewer():
-    viewer = Viewer('--scene', 'drop')
-    yield viewer
-    assert viewer.end() == 0
-
-
-@contextmanager
-def opened(browser, viewer):
-    """A page of a viewer, with all bones in it; no script of it has failed at the end."""
-    view = View(browser, viewer.url)
-    view.wait(lambda: view.bodies(SCENE) is not None)
-    yield view
-    view.close()
-    assert not view.errors
+def url(folder):
+    """Where a viewer of its own serves the default scene."""
+    with serving('--port', '0', '--scene', 'drop', '--folder', str(folder)) as url:
+        yield url
 
 
 @pytest.fixture(scope='module')
-def view(browser, viewer):
-    with opened(browser, viewer) as view:
+def view(browser, url):
+    with opened(browser, url, SCENE) as view:
         yield view
-
-
-def press(view, button):
-    view.page.get_by_role('button', name=button, exact=True).click()
-
-
-def key(view, name):
-    view.page.keyboard.press(name)
 
 
 def hold_at_start(view):
     """Paused at the start, as the page draws it."""
-    if view.page.get_by_role('button', name='Pause', exact=True).count():
-        key(view, ' ')
-        view.page.get_by_role('button', name='Go on', exact=True).wait_for()
-    key(view, 'r')
+    if view.button('Pause').count():
+        view.key(' ')
+        view.button('Go on').wait_for()
+    view.key('r')
     view.wait(lambda: abs(view.bodies(SCENE) - START).max() < 1e-6)
+
+
+def go_on(view):
+    view.key(' ')
+    view.button('Pause').wait_for()
 
 
 def index_of(bodies, states):
@@ -118,6 +82,8 @@ def test_sees_ten_bodies_fall(view, states):
     A page gets numbers of 32 bits: 1e-6 m at 2 m.
     """
     assert len(START) == 10
+    hold_at_start(view)
+    go_on(view)
     view.wait(lambda: far(view, START, 0.1))
     drawn = view.wait(lambda: index_of(view.bodies(SCENE), states))
     view.wait(lambda: index_of(view.bodies(SCENE), states) > drawn)
@@ -128,28 +94,28 @@ def test_sees_ten_bodies_fall(view, states):
     ('← left', 'ArrowLeft', 1, -1), ('→ right', 'ArrowRight', 1, 1)])
 def test_a_button_and_its_key_push_alike(view, button, arrow, axis, sign):
     """2000 N for 0.6 s: the torso is 1 m off at once; the fall alone takes it 0.5 m."""
-    for act in (lambda: press(view, button), lambda: key(view, arrow)):
+    for act in (lambda: view.press(button), lambda: view.key(arrow)):
         hold_at_start(view)
         act()
-        key(view, ' ')
+        go_on(view)
         view.wait(lambda: view.bodies(SCENE)[0][axis] * sign > 1)
 
 
 def test_pause_holds_and_step_makes_one_tick(view, states):
     hold_at_start(view)
     for tick in (1, 2):
-        press(view, 'Step')
+        view.press('Step')
         view.wait(lambda tick=tick: abs(
             view.bodies(SCENE) - states[tick].positions).max() < 1e-6)
-    press(view, 'Go on')
+    go_on(view)
     view.wait(lambda: far(view, states[2].positions, 0.1))
 
 
-def test_two_pages_show_and_steer_the_same(browser, viewer, view):
-    with opened(browser, viewer) as other:
-        hold_at_start(view)
+def test_two_pages_show_and_steer_the_same(browser, url, view):
+    hold_at_start(view)  # before the other one: what moves is drawn twice
+    with opened(browser, url, SCENE) as other:
         other.wait(lambda: abs(other.bodies(SCENE) - START).max() < 1e-6)
-        press(other, 'Go on')
+        go_on(other)
         for each in (view, other):
             each.wait(lambda each=each: far(each, START, 0.1))
 
@@ -158,31 +124,83 @@ def test_a_run_is_recorded_and_played_back(browser, view, states, tmp_path):
     """From the start on, each recorded pose is the simulation's at that tick, to the bit."""
     view.page.get_by_text('Recording', exact=True).click()
     hold_at_start(view)
-    press(view, 'Record')
-    press(view, 'Go on')
+    view.press('Record')
+    go_on(view)
     view.wait(lambda: far(view, START, 0.1))
     with view.page.expect_download() as download:
-        press(view, 'Stop and download')
+        view.press('Stop and download')
     download.value.save_as(tmp_path / 'run.json')
+    hold_at_start(view)
     recording = load_recording(tmp_path / 'run.json')
     assert recording.scene == SCENE and len(recording) > 20
     for time_, positions in zip(recording.times, recording.positions, strict=True):
         np.testing.assert_array_equal(positions, states[round(time_ / SCENE.step)].positions)
-    player = Viewer('--play', str(tmp_path / 'run.json'))
-    with opened(browser, player) as page:
+    with (serving('--port', '0', '--play', str(tmp_path / 'run.json')) as url,
+          opened(browser, url, SCENE) as page):
         page.wait(lambda: abs(page.bodies(SCENE) - recording.positions[-1]).max() < 1e-6)
         page.page.get_by_text(re.compile(r'run\.json: [0-9.]+ of [0-9.]+ s')).wait_for()
-    assert player.end() == 0
 
 
 def test_the_view_is_saved_as_png(view, tmp_path):
     """As large as the page, white beside the doll, and not where the torso is seen."""
     hold_at_start(view)
     with view.page.expect_download() as download:
-        press(view, 'Picture')
+        view.press('Picture')
     download.value.save_as(tmp_path / 'view.png')
     picture = iio.imread(tmp_path / 'view.png')
     x, y = view.pixels(START[:1])[0].round().astype(int)
     assert picture.shape == (SIZE['height'], SIZE['width'], 3)
     assert (picture[2, 2] == 255).all() and picture[y, x].min() < 200
-    press(view, 'Go on')
+
+
+def edited():
+    """The default scene with an arm of 7.5 kg whose first axis is limited to -90 to 30 degrees."""
+    placement = SCENE.dolls[0]
+    doll = placement.doll.replace_bone('left_upper_arm', mass=7.5)
+    limits = (tuple(np.radians((-90, 30)).tolist()), tuple(np.radians((-90, 90)).tolist()))
+    joints = tuple(dataclasses.replace(joint, limits=limits) if joint.child == 'left_upper_arm'
+                   else joint for joint in doll.joints)
+    doll = dataclasses.replace(doll, joints=joints)
+    return dataclasses.replace(SCENE, dolls=(dataclasses.replace(placement, doll=doll),))
+
+
+def saved(view, folder, name):
+    """What the page saves under a name."""
+    view.field('file').fill(name)
+    view.press('Save')
+    view.see(f'saved {name}.yaml')
+    return load_scene(str(folder / f'{name}.yaml'))
+
+
+def test_a_body_and_its_joint_are_edited_saved_undone_and_loaded(view, folder):
+    """The bone is chosen by a click on it; what is saved is what the edit would give here."""
+    hold_at_start(view)
+    view.page.mouse.click(*view.pixels(START[2:3])[0])
+    view.tab('Edit')
+    assert view.field('bone').input_value() == 'left_upper_arm'
+    view.field('mass, kg').fill('-1')
+    view.press('Update')
+    view.see('NotPositive: -1.0; expected above zero')
+    assert saved(view, folder, 'untouched') == SCENE
+    view.field('mass, kg').fill('7.5')
+    view.field('limits 1, °').fill('-90, 30')
+    view.press('Update')
+    view.see('Undo: numbers of left_upper_arm')
+    assert saved(view, folder, 'edited') == edited()
+    view.key('Control+z')
+    view.see('Redo: numbers of left_upper_arm')
+    assert saved(view, folder, 'undone') == SCENE
+    view.field('file').fill('edited')
+    view.press('Load')
+    view.see('loaded edited')
+    assert saved(view, folder, 'loaded') == edited()
+
+
+def test_what_is_edited_falls(view):
+    """What is drawn from then on is the edited doll's fall, as a simulation here has it."""
+    view.tab('Play')
+    hold_at_start(view)
+    with Simulation(edited()) as simulation:
+        states = [simulation.state, *(simulation.advance() for _ in range(100))]
+    go_on(view)
+    view.wait(lambda: index_of(view.bodies(SCENE), states) > 35)

@@ -23,15 +23,18 @@ PACES = (0.05, 2.0)
 OTHER = '(other)'
 """Stands for a scene that has no name in config/."""
 
-KEEP_ARROWS = """<img src="data:," style="display:none" onerror="
-  if (!window.ragdollArrows) {
-    window.ragdollArrows = true;
+KEEP_KEYS = """<img src="data:," style="display:none" onerror="
+  if (!window.ragdollKeys) {
+    window.ragdollKeys = true;
     document.documentElement.addEventListener('keydown', (event) => {
       if (event.key.startsWith('Arrow')) event.stopPropagation();
     });
+    document.addEventListener('click', (event) => {
+      if (event.detail) event.target.closest('[role=tab]')?.blur();
+    });
   }">"""
 """Keeps arrow keys from viser's camera, which would turn with each push; commands still get them:
-they listen where this does, the camera further out."""
+they listen where this does, the camera further out. A tab that was clicked gives the keys back."""
 
 
 class Controls:
@@ -42,7 +45,7 @@ class Controls:
         self._held = Held()
         self._shown = Report()
         gui = server.gui
-        gui.add_html(KEEP_ARROWS)
+        gui.add_html(KEEP_KEYS)
         pushes = gui.add_button_group('Push', tuple(ARROWS), hint='2000 N; arrow keys do the same')
         self._pause = gui.add_button('Pause', icon='player-pause', hint='Space')
         self._step = gui.add_button('Step', icon='player-track-next', hint='N; while paused',

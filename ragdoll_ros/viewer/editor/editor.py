@@ -2,8 +2,9 @@
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,9 @@ from .folder import Folder
 from .handles import Handles
 from .history import History
 from .panel import Panel
+
+UNSEEN = 20
+"""Scenes given to the page that it has not shown yet."""
 
 
 class Editor:
@@ -38,7 +42,7 @@ class Editor:
         self._acting = threading.RLock()
         self._showing = threading.RLock()
         self._history = History(scene)
-        self._shown = scene
+        self._given: deque[Scene] = deque(maxlen=UNSEEN)
         self._stood = False
         self.bone: str | None = None
         """Name of the chosen bone."""
@@ -58,8 +62,11 @@ class Editor:
     def show(self, scene: Scene) -> None:
         """Take note that the page shows another scene now: a step that can be undone."""
         with self._showing:
-            if scene != self._shown:
-                self._shown = scene
+            if scene in self._given:
+                # One of ours; the page draws late, and may have left out some before it.
+                while self._given.popleft() != scene:
+                    pass
+            elif scene != self.scene:
                 self._history.push(scene, f'scene {scene.name}')
                 self._refresh()
 
@@ -74,14 +81,11 @@ class Editor:
     def toggle(self) -> None:
         """Go to the bind pose to edit, or drop the doll."""
         with self._telling():
-            self._set_editing(not self.editing)
-            try:
-                self._run(self.scene)
-            except faults.RagdollError:
-                self._set_editing(not self.editing)
-                raise
-            if not self.editing:
+            wanted = not self.editing
+            self._run(self.scene, wanted)
+            if not wanted:
                 self._pause(False)
+            self._set_editing(wanted)
 
     def take_note(self, paused: bool) -> None:
         """Learn from the page whether time stands: where it goes on by itself, editing ends."""
@@ -107,7 +111,7 @@ class Editor:
     def take(self, scene: Scene, what: str) -> None:
         """Go on with another scene, as a step; RagdollError if it cannot run."""
         with self._acting:
-            self._run(scene)
+            self._run(scene, self.editing)
             with self._showing:
                 self._history.push(scene, what)
                 self._refresh()
@@ -172,7 +176,7 @@ class Editor:
             if scene is before:
                 return
             try:
-                self._run(scene)
+                self._run(scene, self.editing)
             except faults.RagdollError:
                 back()
                 raise
@@ -185,16 +189,20 @@ class Editor:
             self.panel.show_editing(wanted)
             self.show_handles()
 
-    def _run(self, scene: Scene) -> None:
+    def _run(self, scene: Scene, hold: bool) -> None:
         """Let the page start anew with a scene; one that it refuses was never shown."""
-        before, self._shown = self._shown, scene
-        if self.editing:
+        with self._showing:
+            self._given.append(scene)
+        if hold:
             # First, so that not one tick is made before it stands.
             self._pause(True)
         try:
             self._use(scene)
         except faults.RagdollError:
-            self._shown = before
+            with self._showing, suppress(ValueError):
+                self._given.remove(scene)
+            if hold and not self.editing:
+                self._pause(False)
             raise
 
     def _chosen(self) -> str:

@@ -105,7 +105,7 @@ class Files:
     def _received(self, button: viser.GuiUploadButtonHandle,
                   action: Callable[[str, bytes], None]) -> None:
         file = button.value
-        if file.name:
-            # Let go of it at once: it may be 100 MB. This calls back with no name.
-            button.value = viser.UploadedFile('', b'')
-            action(file.name, file.content)
+        content = file.content
+        # The button keeps its last file: let go of what may be 100 MB.
+        file.content = b''
+        action(file.name, content)

@@ -39,7 +39,7 @@ def mirrored(scene: Scene, name: str, whole_limb: bool = False) -> Scene:
     """Make the bone on the other side (and its limb) and its joint the mirror image of this one.
 
     The mirror is the plane through the middle of the doll's root that faces its left. What the
-    two were named and what they hang from stays, and which way round a partner's joint axis
+    two are named, their colours and what they hang from stay, and which way a partner's joint axis
     points; swings are not mirrored.
     """
     placement, bone = find(scene, name)
@@ -55,7 +55,7 @@ def _copied_over(scene: Scene, name: str, other: str, middle: float) -> Scene:
     (_, bone), joint = find(scene, name), joint_of(scene, name)
     scene = set_pose(scene, other, _point(bone.position, middle), _turn(bone.orientation))
     kept = {key: getattr(bone, key) for key in (
-        'shape', 'mass', 'friction', 'rolling_friction', 'restitution', 'color')}
+        'shape', 'mass', 'friction', 'rolling_friction', 'restitution')}
     scene = change_bone(scene, other, **kept)
     theirs = joint_of(scene, other)
     if joint is None or theirs is None:

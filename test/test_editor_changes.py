@@ -1,0 +1,326 @@
+"""Changes of bones and joints: what must follow follows, what must stay stays."""
+import itertools
+import math
+
+import fit_rigs
+import numpy as np
+import pytest
+
+from ragdoll_ros import faults, rotation
+from ragdoll_ros.ragdoll import JOINT_KINDS, SHAPES
+from ragdoll_ros.riders import Riders
+from ragdoll_ros.scene import above_ground
+from ragdoll_ros.scene_file import load_scene
+from ragdoll_ros.simulation import Simulation
+from ragdoll_ros.state import State
+from ragdoll_ros.viewer.editor import changes, growth, mirror, sheet
+from ragdoll_ros.viewer.editor.history import History
+
+DROP = load_scene('drop')
+TURN = rotation.from_axis_angle((1, 2, -1), 0.7)
+
+
+@pytest.fixture(scope='module')
+def fitted():
+    return above_ground(fit_rigs.fitted('mixamo').doll)
+
+
+def bone_of(scene, name):
+    return changes.find(scene, name)[1]
+
+
+def rider_poses(scene):
+    poses = [placement.bone_pose(bone) for placement in scene.dolls
+             for bone in placement.doll.bones]
+    state = State(np.array([p for p, _ in poses]), np.array([q for _, q in poses]),
+                  np.zeros((len(poses), 3)), np.zeros((len(poses), 3)))
+    return Riders(scene).poses(state)
+
+
+def farthest(poses, others):
+    return max(np.abs(poses[0] - others[0]).max(),
+               rotation.angle_between(poses[1], others[1]).max())
+
+
+def test_a_new_mass_scales_the_inertia():
+    scene = changes.change_bone(DROP, 'torso', mass=30)
+    before, after = bone_of(DROP, 'torso'), bone_of(scene, 'torso')
+    # A box of 0.1 x 0.2 x 0.4 m: m (y^2 + z^2) / 12.
+    assert after.inertia[0] == pytest.approx(30 * (0.2 ** 2 + 0.4 ** 2) / 12, rel=1e-12)
+    assert np.array(after.inertia) == pytest.approx(3 * np.array(before.inertia), rel=1e-12)
+    assert load_scene('drop') == DROP
+
+
+def test_only_what_is_asked_for_changes():
+    scene = changes.change_bone(DROP, 'head', restitution=0.25)
+    assert changes.change_bone(scene, 'head', restitution=None) == DROP
+    assert [a == b for a, b in zip(scene.bones, DROP.bones, strict=True)].count(False) == 1
+
+
+@pytest.mark.parametrize(('change', 'path', 'kind'), [
+    (lambda: changes.change_bone(DROP, 'head', mass=-1), 'head.mass', faults.NotPositive),
+    (lambda: changes.change_bone(DROP, 'head', mass=math.nan), 'head.mass', faults.NotFinite),
+    (lambda: changes.change_bone(DROP, 'head', restitution=2), 'head.restitution',
+     faults.OutOfRange),
+    (lambda: changes.change_bone(DROP, 'no bone', mass=1), '', faults.UnknownBone),
+    (lambda: changes.set_pose(DROP, 'head', (0, 0, math.inf)), 'head.position', faults.NotFinite),
+    (lambda: changes.set_pose(DROP, 'head', orientation=(0, 0, 0, 0)), 'head.orientation',
+     faults.NotUnit),
+    (lambda: changes.set_size(DROP, 'head', (0, 1, 1)), 'head.size', faults.NotPositive),
+    (lambda: changes.set_shape(DROP, 'head', 'cone'), 'head.shape', faults.WrongForm),
+    (lambda: changes.set_limits(DROP, 'left_shin', [(30, 10)]),
+     'left_shin.joint.limits_deg[0]', faults.LimitsReversed),
+    (lambda: changes.set_limits(DROP, 'left_shin', [None, None]), 'left_shin.joint.limits_deg',
+     faults.WrongAxes),
+    (lambda: changes.set_joint_kind(DROP, 'left_shin', 'screw'), 'left_shin.joint.kind',
+     faults.WrongAxes),
+    (lambda: changes.change_joint(DROP, 'left_thigh', axes=((1, 0, 0), (1, 1, 0))),
+     'left_thigh.joint.axes', faults.WrongAxes),
+    (lambda: changes.change_joint(DROP, 'torso', damping=1), 'torso.joint', faults.Detached),
+    (lambda: growth.add_bone(DROP, 'head', 'torso'), 'name', faults.DuplicateName),
+    (lambda: growth.add_bone(DROP, 'head', 'a/b'), 'name', faults.WrongForm),
+    (lambda: growth.remove_limb(DROP, 'torso'), 'torso', faults.Detached),
+    (lambda: mirror.mirrored(DROP, 'head'), 'head.both sides', faults.UnknownBone)])
+def test_what_is_wrong_is_refused_with_its_place(change, path, kind):
+    with pytest.raises(kind) as caught:
+        change()
+    assert caught.value.path == path
+
+
+def test_reversed_limits_are_told_in_degrees():
+    with pytest.raises(faults.LimitsReversed, match=r'\(30, 10\); expected lower <= upper'):
+        changes.set_limits(DROP, 'left_shin', [(30, 10)])
+
+
+def test_a_body_that_moves_leaves_pivots_neighbours_and_skin(fitted):
+    name = fitted.bone_names[3]
+    scene = changes.set_pose(fitted, name, np.add(bone_of(fitted, name).position, (.1, .2, .3)),
+                             TURN)
+    assert scene.dolls[0].doll.joints == fitted.dolls[0].doll.joints
+    assert [a.name for a, b in zip(scene.bones, fitted.bones, strict=True) if a != b] == [name]
+    assert farthest(rider_poses(scene), rider_poses(fitted)) < 1e-9
+    with Simulation(scene) as simulation:
+        assert np.abs(simulation.joint_angles).max() < 1e-9
+
+
+def test_a_limb_moves_as_one_piece(fitted):
+    """Points of it keep their distances, whatever they are: bodies, pivots, skin."""
+    name = 'mixamorig:LeftArm'
+    old = bone_of(fitted, name)
+    scene = changes.set_pose(fitted, name, np.add(old.position, (0, .1, .2)),
+                             rotation.multiply(TURN, old.orientation), limb=True)
+    doll, before = scene.dolls[0].doll, fitted.dolls[0].doll
+    names = changes.limb(before, name)
+    assert 'mixamorig:LeftForeArm' in names and 'mixamorig:Hips' not in names
+    assert all(doll.bone(bone.name) == bone for bone in before.bones if bone.name not in names)
+
+    def points(scene):
+        doll = scene.dolls[0].doll
+        lift = scene.dolls[0].position
+        riders = rider_poses(scene)[0] - lift
+        return np.array([*(doll.bone(each).position for each in names),
+                         *(joint.anchor for joint in doll.joints if joint.child in names),
+                         *(point for rider, point in zip(doll.riders, riders, strict=True)
+                           if rider.bone in names)])
+
+    here, there = points(fitted), points(scene)
+    distances = [np.linalg.norm(p[:, None] - p[None], axis=2) for p in (here, there)]
+    assert np.abs(distances[0] - distances[1]).max() < 1e-9
+    moved = np.array(bone_of(scene, name).position) + rotation.rotate(TURN, here - old.position)
+    assert np.abs(moved - there).max() < 1e-9
+    for joint, still in zip(doll.joints, before.joints, strict=True):
+        if joint.child in names:
+            assert np.abs(rotation.rotate(TURN, still.axes) - joint.axes).max(initial=0) < 1e-9
+    with Simulation(scene) as simulation:
+        assert np.abs(simulation.joint_angles).max() < 1e-9
+
+
+@pytest.mark.parametrize(('name', 'kind'), list(itertools.product(
+    ('head', 'left_upper_arm', 'left_shin'), SHAPES)))
+def test_another_shape_fills_the_same_box(name, kind):
+    """Along the doll's axes it reaches as far, or less where it is round."""
+    scene = changes.set_shape(DROP, name, kind)
+    bone, before = bone_of(scene, name), bone_of(DROP, name)
+    assert bone.shape.kind == kind and bone.mass == before.mass
+    assert bone.position == before.position
+    reach = [each.shape.reach(rotation.rotate(rotation.inverse(each.orientation), np.eye(3)))
+             for each in (bone, before)]
+    if kind == 'sphere':
+        assert np.prod(reach[0]) == pytest.approx(np.prod(reach[1]), rel=1e-9)
+    else:
+        assert reach[0] == pytest.approx(reach[1], rel=0.11 if kind == 'capsule' else 1e-9)
+
+
+@pytest.mark.parametrize(('name', 'kind'), list(itertools.product(
+    ('head', 'left_shin', 'left_thigh'), JOINT_KINDS)))
+def test_every_joint_can_become_every_kind_and_falls(name, kind):
+    scene = changes.set_joint_kind(DROP, name, kind)
+    for again in JOINT_KINDS:
+        assert changes.joint_of(changes.set_joint_kind(scene, name, again), name).kind == again
+    with Simulation(scene) as simulation:
+        for _ in range(3):
+            assert np.isfinite(simulation.advance().positions).all()
+
+
+def test_a_hinge_that_becomes_universal_keeps_its_axis_and_limits():
+    joint = changes.joint_of(changes.set_joint_kind(DROP, 'left_shin', 'universal'), 'left_shin')
+    was = changes.joint_of(DROP, 'left_shin')
+    assert (joint.axes[0], joint.limits[0]) == (was.axes[0], was.limits[0])
+    assert changes.joint_of(changes.set_joint_kind(changes.set_joint_kind(
+        DROP, 'left_shin', 'universal'), 'left_shin', 'hinge'), 'left_shin') == was
+
+
+def extremes(joint):
+    """All turns that a joint's limits stop at, as matrices."""
+    return [rotation.matrix(rotation.from_axis_angle(axis, angle))
+            for axis, pair in zip(joint.axes, joint.limits, strict=True) for angle in pair]
+
+
+def test_the_shipped_doll_is_its_own_mirror_image():
+    for name in DROP.bone_names:
+        if name.startswith(('left', 'right')):
+            assert mirror.mirrored(DROP, name) == DROP
+
+
+@pytest.mark.parametrize('kind', ['hinge', 'universal'])
+def test_a_mirrored_edit_is_the_mirror_image(kind):
+    """The partner's joint stops where the image of this one's does: S R S, S = diag(1, -1, 1)."""
+    name, other = 'left_thigh', 'right_thigh'
+    scene = changes.set_joint_kind(DROP, name, kind)
+    axes = (rotation.rotate(TURN, np.eye(3)[:len(changes.joint_of(scene, name).axes)]))
+    scene = changes.change_joint(scene, name, axes=tuple(axes), anchor=(0.01, 0.08, 0.87))
+    scene = changes.set_limits(scene, name, [(-10, 70), (-30, 50)][:len(axes)])
+    scene = changes.change_bone(changes.set_pose(scene, name, (0.1, 0.2, 0.7), TURN), name, mass=9)
+    scene = mirror.mirrored(scene, name)
+    here, there = bone_of(scene, name), bone_of(scene, other)
+    flip = np.diag((1.0, -1.0, 1.0))
+    assert there.mass == 9 and there.color == bone_of(DROP, other).color
+    assert np.abs(flip @ here.position - there.position).max() < 1e-12
+    assert np.abs(flip @ rotation.matrix(here.orientation) @ flip
+                  - rotation.matrix(there.orientation)).max() < 1e-12
+    images = [flip @ turn @ flip for turn in extremes(changes.joint_of(scene, name))]
+    for turn in extremes(changes.joint_of(scene, other)):
+        # Limits are kept to 1e-9 degrees.
+        assert min(np.abs(turn - image).max() for image in images) < 1e-10
+    assert mirror.mirrored(scene, other) == scene
+
+
+@pytest.mark.parametrize(('rig', 'name', 'other'), [
+    ('mixamo', 'mixamorig:LeftForeArm', 'mixamorig:RightForeArm'),
+    ('unreal', 'calf_l', 'calf_r'), ('vrm', 'J_Bip_L_Hand', 'J_Bip_R_Hand'),
+    ('makehuman', 'upperleg01.L', 'upperleg01.R'), ('spider', 'p2_1_1', 'p2_-1_1')])
+def test_partners_are_found_by_name_or_place(rig, name, other):
+    scene = above_ground(fit_rigs.fitted(rig).doll)
+    assert mirror.partner(scene, name) == other
+    assert mirror.partner(scene, other) == name
+
+
+def test_a_bone_that_is_added_and_taken_off_leaves_nothing(fitted):
+    name = fitted.bone_names[-1]
+    grown = growth.add_bone(fitted, name, 'tail')
+    with Simulation(grown) as simulation:
+        assert np.abs(simulation.joint_angles).max() < 1e-9
+        simulation.advance()
+    assert growth.remove_limb(grown, 'tail') == fitted
+
+
+def test_a_limb_that_is_taken_off_leaves_its_skin_to_the_parent(fitted):
+    name = 'mixamorig:LeftArm'
+    scene = growth.remove_limb(fitted, name)
+    gone = set(fitted.bone_names) - set(scene.bone_names)
+    assert name in gone and 'mixamorig:LeftForeArm' in gone
+    assert farthest(rider_poses(scene), rider_poses(fitted)) < 1e-9
+
+
+def test_undo_and_redo_give_equal_scenes():
+    history = History(DROP)
+    scenes = [DROP]
+    for mass in (1, 2, 3):
+        scenes.append(changes.change_bone(scenes[-1], 'head', mass=mass))
+        history.push(scenes[-1], f'mass {mass}')
+    for scene in scenes[-2::-1]:
+        assert history.undo() == scene
+    assert history.undo() == DROP and history.undoes == '' and history.redoes == 'mass 1'
+    for scene in scenes[1:]:
+        assert history.redo() == scene
+    assert history.redo() == scenes[-1] and history.redoes == ''
+    history.undo()
+    history.push(DROP, 'something else')
+    assert history.redoes == '' and history.undo() == scenes[2]
+
+
+def test_the_same_scene_again_is_no_step():
+    history = History(DROP)
+    history.push(load_scene('drop'), 'nothing')
+    assert history.undoes == ''
+
+
+def test_the_history_ends_somewhere():
+    history = History(DROP, most=2)
+    for mass in (1, 2, 3):
+        history.push(changes.change_bone(DROP, 'head', mass=mass), str(mass))
+    for _ in range(5):
+        history.undo()
+    assert bone_of(history.scene, 'head').mass == 1
+
+
+@pytest.mark.parametrize('name', ['drop', 'article', 'crowd', 'ponytail'])
+def test_a_sheet_that_nobody_touched_changes_nothing(name):
+    scene = load_scene(name)
+    for bone in scene.bone_names[:25]:
+        assert sheet.apply(scene, bone, sheet.read(scene, bone)) is scene
+
+
+def test_a_number_that_is_shown_rounded_stays_as_it_is():
+    third = changes.set_pose(DROP, 'head', (1 / 3, 2 / 3, 1.5))
+    fields = sheet.read(third, 'head')
+    fields['position'] = (0.333333, 0.666667, 1.6)
+    assert bone_of(sheet.apply(third, 'head', fields), 'head').position == (1 / 3, 2 / 3, 1.6)
+
+
+def test_a_sheet_tells_all_its_faults_at_their_fields():
+    wrong = {'mass': -1.0, 'size': (0.1, 0.0, 0.1), 'position': (0.0, math.nan, 0.0),
+             'turn': (0.0, math.inf, 0.0), 'friction': 'much', 'restitution': '1.5',
+             'rolling_friction': '-1', 'anchor': (math.inf, 0.0, 0.0), 'limits_1': '30, 10',
+             'damping': -2.0}
+    with pytest.raises(faults.Faults) as caught:
+        sheet.apply(DROP, 'left_shin', wrong)
+    assert {fault.path for fault in caught.value.faults} == set(wrong)
+
+
+@pytest.mark.parametrize(('wrong', 'field', 'words'), [
+    ({'limits_1': '5'}, 'limits_1', 'two angles'), ({'limits_1': 'a, b'}, 'limits_1', "'a, b'"),
+    ({'limits_1': '-400, 0'}, 'limits_1', r'\(-400.0, 0.0\).*within one turn'),
+    ({'limits_1': 'nan, 1'}, 'limits_1', 'finite'), ({'limits_2': '9, 1'}, 'limits_2', r'9.*1'),
+    ({'axis_1': (0.0, 0.0, 0.0)}, 'axis_1', 'not zero'),
+    ({'axis_2': (0.0, 1.0, 0.5)}, 'axis_2', 'perpendicular')])
+def test_a_faulty_joint_is_told_at_its_field(wrong, field, words):
+    with pytest.raises(faults.Faults, match=words) as caught:
+        sheet.apply(DROP, 'left_thigh', wrong)
+    assert [fault.path for fault in caught.value.faults] == [field]
+
+
+def test_a_balls_limits_may_be_typed_as_one_number():
+    scene = changes.set_joint_kind(DROP, 'left_thigh', 'ball')
+    scene = sheet.apply(scene, 'left_thigh', {'limits_1': '40', 'limits_2': '-20 20'})
+    assert np.degrees(changes.joint_of(scene, 'left_thigh').limits) == pytest.approx(
+        np.array([[-40, 40], [-20, 20]]))
+
+
+@pytest.mark.parametrize('seed', range(40))
+def test_whatever_is_typed_is_taken_or_refused(seed):
+    random = np.random.default_rng(seed)
+    name = DROP.bone_names[seed % len(DROP.bone_names)]
+    numbers = (0.0, -1.0, 1e-320, 1e308, -1e308, math.nan, math.inf, 0.3)
+    texts = ('', 'x', '1e999', '-', '1, 2, 3', 'nan', '0 0', '\0', '1e308', '-90, 90')
+    fields = sheet.read(DROP, name)
+    for key in random.choice(list(fields), 3):
+        if isinstance(fields[key], tuple):
+            fields[key] = tuple(float(x) for x in random.choice(numbers, len(fields[key])))
+        elif key not in ('shape', 'kind'):
+            fields[key] = random.choice(texts) if isinstance(fields[key], str) else float(
+                random.choice(numbers))
+    try:
+        sheet.apply(DROP, name, fields)
+    except faults.Faults as error:
+        assert all(fault.path in fields for fault in error.faults)

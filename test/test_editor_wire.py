@@ -1,0 +1,157 @@
+"""The editor as an open page speaks to it: clicks, drags, typed values and files over the wire."""
+import threading
+
+import fit_rigs
+import pytest
+
+viser = pytest.importorskip('viser')
+
+from page_client import PageClient, wait  # noqa: E402
+from test_fit_broken import BROKEN  # noqa: E402
+from viser import _messages  # noqa: E402
+
+from ragdoll_ros.scene_file import load_scene  # noqa: E402
+from ragdoll_ros.viewer.editor import changes  # noqa: E402
+from ragdoll_ros.viewer.page import Page  # noqa: E402
+from ragdoll_ros.viewer.simulated import Simulated  # noqa: E402
+
+DROP = load_scene('drop')
+
+
+class Browser(PageClient):
+    """One open page, and what a user does there."""
+
+    def click_body(self, page, bone):
+        """Click where the page draws a bone."""
+        index = DROP.bone_index(bone)
+        batch, = (batch for batch in page._stage.bodies.batches if index in batch.bones)
+        self.send(_messages.SceneNodeClickMessage(
+            batch.handle.name, list(batch.bones).index(index), (4.0, 0.0, 1.0), (-1.0, 0.0, 0.0),
+            (0.5, 0.5), None))
+
+    def press_button(self, button):
+        self.update(button, True)
+
+    def drag_handle(self, handle, position):
+        """Take a handle, bring it somewhere in ten steps, let it go."""
+        begin, name = handle.position, handle.name
+        self.send(_messages.TransformControlsDragStartMessage(name))
+        for k in range(1, 11):
+            at = tuple(a + (b - a) * k / 10 for a, b in zip(begin.tolist(), position, strict=True))
+            self.send(_messages.TransformControlsUpdateMessage(name, tuple(handle.wxyz), at))
+        self.send(_messages.TransformControlsDragEndMessage(name))
+
+    def upload(self, button, name, content):
+        """Send a file in parts of 1 MB, as the page does."""
+        uuid, size = button._impl.uuid, 1_000_000
+        parts = [content[k:k + size] for k in range(0, len(content), size)]
+        self.send(_messages.FileTransferStartUpload(uuid, name, name, 'x', len(parts),
+                                                    len(content)))
+        for number, part in enumerate(parts):
+            self.send(_messages.FileTransferPart(uuid, name, number, part))
+
+
+@pytest.fixture
+def page(tmp_path):
+    server = viser.ViserServer('127.0.0.1', 0, verbose=False)
+    source = Simulated(DROP)
+    page = Page(server, source, tmp_path)
+    stop = threading.Event()
+    thread = threading.Thread(target=page.run, args=(stop,), daemon=True)
+    thread.start()
+    yield page
+    stop.set()
+    thread.join(10)
+    server.stop()
+    source.close()
+
+
+@pytest.fixture
+def browser(page):
+    browser = Browser(page.server.get_port())
+    wait(lambda: page.editor is not None)
+    yield browser
+    browser.close()
+
+
+def command(page, label):
+    return next(each for each in page.server.gui._command_handle_from_uuid.values()
+                if each.label == label)
+
+
+def test_a_bone_is_clicked_dragged_typed_and_undone(page, browser):
+    editor = page.editor
+    browser.click_body(page, 'left_shin')
+    wait(lambda: editor.bone == 'left_shin')
+    browser.press_button(editor.panel.edit)
+    wait(lambda: editor.handles.body is not None)
+    assert page.source.report.paused and page.source.frame.time == 0
+    browser.drag_handle(editor.handles.body, (0.02, 0.1, 0.45))
+    wait(lambda: editor.panel.body['position'].value == (0.02, 0.1, 0.45))
+    moved = editor.scene
+    assert changes.find(moved, 'left_shin')[1].position == pytest.approx((0.02, 0.1, 0.45))
+    assert page.source.frame.scene is moved
+    browser.update(editor.panel.body['mass'], 7)
+    browser.update(editor.panel.joint['limits_1'], '-5, 100')
+    browser.press_button(editor.panel.update)
+    wait(lambda: changes.find(editor.scene, 'left_shin')[1].mass == 7)
+    browser.update(editor.panel.joint['limits_1'], '100, -5')
+    browser.press_button(editor.panel.update)
+    wait(lambda: 'limits_1' in editor.panel.errors())
+    browser.press(command(page, 'Undo'))
+    wait(lambda: editor.scene == moved and not editor.panel.errors())
+    browser.press(command(page, 'Undo'))
+    wait(lambda: editor.scene == DROP and page.source.frame.scene is editor.scene)
+    browser.press(command(page, 'Edit, or drop it'))
+    wait(lambda: page.source.frame.time > 0.05 and editor.handles.body is None)
+
+
+def test_editing_ends_where_the_page_goes_on(page, browser):
+    page.editor.select('head')
+    browser.press_button(page.editor.panel.edit)
+    wait(lambda: page.editor.handles.body is not None and page.editor._stood)
+    browser.press_button(page.controls._pause)
+    wait(lambda: page.editor.handles.body is None)
+    assert not page.editor.editing
+
+
+def test_a_scene_from_elsewhere_can_be_undone(page, browser):
+    page.source.load('crowd')
+    wait(lambda: page.editor.scene.name == 'crowd')
+    browser.press(command(page, 'Undo'))
+    wait(lambda: page.source.frame.scene == DROP)
+
+
+def test_a_character_is_uploaded_and_its_skin_shown(page, browser):
+    """3 MB of it, with a picture that nothing reads."""
+    made = fit_rigs.document(fit_rigs.RIGS['vrm'])
+    made.view(bytes(3_000_000))
+    browser.upload(page.editor.files.fit_button, 'vrm.glb', made.glb())
+    wait(lambda: page.editor.scene.dolls[0].doll.model is not None)
+    wait(lambda: page._stage.scene is page.editor.scene and page._stage.skins.handles)
+    assert page._stage.skins.notes == []
+
+
+def test_rubbish_leaves_the_page_as_it_was(page, browser):
+    files = page.editor.files
+    for number, (name, content) in enumerate(BROKEN.items()):
+        if number % 8 == 0:
+            button = (files.fit_button, files.upload_button)[number // 8 % 2]
+            browser.upload(button, f'{number}_{name}', content)
+            wait(lambda number=number: f'{number}_' in files.said.content
+                 and 'expected' in files.said.content)
+    # Values that no field can have, buttons that are none.
+    for handle, value in ((page.editor.panel.body['mass'], 'x'), (page.editor.panel.bone, 'nobody'),
+                          (page.editor.panel.body['size'], [1]), (files.name, None),
+                          (page.editor.panel.body['shape'], 'cone')):
+        browser.update(handle, value)
+    browser.press_button(page.editor.panel.update)
+    browser.send(_messages.TransformControlsDragEndMessage('/editor/body'))
+    before = page.source.frame.time
+    wait(lambda: page.source.frame.time > before + 0.05)
+    assert page.editor.scene == DROP
+    browser.click_body(page, 'head')
+    wait(lambda: page.editor.bone == 'head')
+    browser.update(page.editor.panel.body['mass'], 2)
+    browser.press_button(page.editor.panel.update)
+    wait(lambda: changes.find(page.editor.scene, 'head')[1].mass == 2)

@@ -1,0 +1,152 @@
+"""The page in headless Chromium on a node in another process: seen, dragged, killed, restarted."""
+from __future__ import annotations
+
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+from browser import READY, chromium, opened, serving
+from geometry_msgs.msg import PoseArray
+from peer import Peer, end, kill, start
+from visualization_msgs.msg import InteractiveMarkerFeedback
+
+from ragdoll_ros.scene_file import load_scene
+
+SCENE = load_scene('drop')
+START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])
+TORSO = 0
+
+LIFT = np.array((0, 0, 0.1))
+"""m that the pointer first goes, to take hold, and then for each third of the way."""
+
+@pytest.fixture(scope='module')
+def listener(ros):
+    """A peer that listens in a thread of its own: what it notes is when a message came."""
+    peer = Peer()
+    thread = threading.Thread(target=peer.executor_.spin, daemon=True)
+    thread.start()
+    yield peer
+    peer.executor_.shutdown()
+    thread.join()
+    peer.destroy_node()
+
+
+@pytest.fixture(scope='module')
+def heard(listener):
+    """Poses and pointers' feedback, each with its arrival in s."""
+    return (listener.collect(PoseArray, 'ragdoll/poses'),
+            listener.collect(InteractiveMarkerFeedback, 'ragdoll/interactive/feedback'))
+
+
+@pytest.fixture(scope='module')
+def browser():
+    with chromium() as context:
+        yield context
+
+
+@pytest.fixture(scope='module')
+def node(ros):
+    """The node as it runs now: a list, whose last one may be replaced."""
+    nodes = [start('node')]
+    yield nodes
+    assert end(nodes[-1], signal.SIGINT)[0] == 0
+
+
+@pytest.fixture(scope='module')
+def view(browser, node):
+    """A page on a node of the default scene, each a process of its own."""
+    with serving('--port', '0') as url, opened(browser, url, SCENE) as view:
+        yield view
+
+
+def torso(message):
+    place = message.poses[TORSO].position
+    return np.array((place.x, place.y, place.z))
+
+
+def hold_at_start(view):
+    """Paused at the start, as the page draws it."""
+    if view.button('Pause').count():
+        view.key(' ')
+        view.button('Go on').wait_for()
+    view.key('r')
+    view.wait(lambda: abs(view.bodies(SCENE) - START).max() < 1e-6)
+
+
+def falls(view):
+    """Whether all bones have left their places at the start."""
+    return (np.linalg.norm(view.bodies(SCENE) - START, axis=1) > 0.1).all()
+
+
+def test_what_make_run_starts_shows_ten_bodies_that_fall(browser, ros):
+    with (serving(module='ragdoll_ros.ros.run') as url, opened(browser, url, SCENE) as view):
+        hold_at_start(view)
+        view.key(' ')
+        view.wait(lambda: falls(view))
+
+
+def test_a_dragged_body_follows_within_200_ms(view, heard):
+    """From the drag's arrival at the node until the bone has gone half of a third of a metre.
+
+    On the node's clock: from the last tick before to the first one after. Without a GPU the page
+    draws too slowly to be asked; it must show the bone there in the end.
+    """
+    poses, feedback = heard
+    hold_at_start(view)
+    mouse = view.page.mouse
+    mouse.move(*view.pixels(START[:1])[0])
+    mouse.down()
+    mouse.move(*view.pixels(START[:1] + LIFT)[0])
+    view.wait(lambda: any(message.event_type == InteractiveMarkerFeedback.MOUSE_DOWN
+                          and message.marker_name == 'torso' for _, message in feedback))
+    view.key(' ')
+    view.wait(lambda: hangs(poses))
+    height, held = torso(poses[-1][1])[2], feedback[-1][1].mouse_point.z
+    sent = time.monotonic()
+    mouse.move(*view.pixels(START[:1] + 4 * LIFT)[0])
+    view.wait(lambda: torso(poses[-1][1])[2] > height + 0.15)
+    arrived = next(at for at, message in feedback if message.mouse_point.z > held + 0.01)
+    before = max(stamp(message) for at, message in poses if at <= arrived)
+    after = min(stamp(message) for at, message in poses
+                if at > arrived and torso(message)[2] > height + 0.15)
+    shown = next(at for at, message in poses if stamp(message) == after)
+    print(f'{after - before:.3f} s from the drag, {shown - sent:.3f} s from the mouse')
+    assert after - before < 0.2
+    view.wait(lambda: view.bodies(SCENE)[TORSO][2] > height + 0.15)
+    mouse.up()
+    view.wait(lambda: torso(poses[-1][1])[2] < 0.5)
+
+
+def test_a_page_that_goes_asks_nothing_of_the_node_and_may_come_back(view, heard, listener):
+    hold_at_start(view)
+    address = view.page.url
+    assert listener.count_subscribers('ragdoll/poses') == 2
+    view.page.goto('about:blank')
+    view.wait(lambda: listener.count_subscribers('ragdoll/poses') == 1)
+    view.page.goto(address)
+    view.page.wait_for_function(READY)
+    view.wait(lambda: view.bodies(SCENE) is not None)
+    hold_at_start(view)
+
+
+def test_goes_on_with_a_node_that_was_killed_and_started_again(view, node):
+    kill(node[0])
+    view.see('has been silent for')
+    node.append(start('node'))
+    view.button('Pause').wait_for()
+    hold_at_start(view)
+    view.key(' ')
+    view.wait(lambda: falls(view))
+    assert not view.page.get_by_text('has been silent for').count()
+
+
+def stamp(message):
+    return message.header.stamp.sec + message.header.stamp.nanosec / 1e9
+
+
+def hangs(poses):
+    """Whether the torso has been within 1 cm for a quarter of a second, and is not at the start."""
+    last = np.array([torso(message) for _, message in poses[-25:]])
+    return np.ptp(last, axis=0).max() < 0.01 and abs(last - START[TORSO]).max() > 1e-6
