@@ -17,6 +17,7 @@ from ..scene_file import load_scene
 from .source import Source
 
 PORT = 8080
+LAST_PORT = 65535
 HOST = '127.0.0.1'
 
 EXAMPLE = """examples:
@@ -78,7 +79,7 @@ def parser() -> argparse.ArgumentParser:
                         'ROS (else: listen to the node `ragdoll`)')
     parser.add_argument('--host', default=HOST, help='address to serve at (%(default)s: this '
                         'machine alone; 0.0.0.0: whoever reaches this machine may steer)')
-    parser.add_argument('--port', type=int, help=f'port to serve at; it must be free ({PORT}, or '
+    parser.add_argument('--port', type=port, help=f'port to serve at; it must be free ({PORT}, or '
                         'the next free one)')
     parser.add_argument('--folder', default='.', help='where the page saves and loads dolls, and '
                         'keeps the characters it is sent (default: the current one); it writes '
@@ -86,15 +87,22 @@ def parser() -> argparse.ArgumentParser:
     return parser
 
 
+def port(text: str) -> int:
+    """Read a port's number; 0 stands for any free one."""
+    if not 0 <= int(text) <= LAST_PORT:
+        raise argparse.ArgumentTypeError(f'{text}: expected 0, any free one, to {LAST_PORT}')
+    return int(text)
+
+
 def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event) -> None:
     """Serve the page until told to stop; RagdollError if it cannot be."""
     from .page import Page
     if not os.access(options.folder, os.W_OK | os.X_OK) or not os.path.isdir(options.folder):
         raise WrongArguments(f'--folder {options.folder}: expected a folder that can be written to')
-    port = free_port(options.host, options.port)
+    number = free_port(options.host, options.port)
     source = make_source(options, for_ros)
     try:
-        with server_at(options.host, port) as server:
+        with server_at(options.host, number) as server:
             page = Page(server, source, options.folder)
             print(f'The page is at http://{shown(options.host)}:{server.get_port()}', flush=True)
             page.run(stop)
@@ -131,8 +139,8 @@ def free_port(host: str, wanted: int | None) -> int:
                 probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
                 probe.bind(address)
                 return port
-        except (OSError, OverflowError) as error:
-            reason = getattr(error, 'strerror', None) or str(error)
+        except OSError as error:
+            reason = error.strerror or str(error)
     raise NoPort(f'--host {host} --port {wanted or PORT}: {reason}; expected an address of this '
                  'machine and a free port from 1024 to 65535')
 

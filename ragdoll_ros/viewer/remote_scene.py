@@ -28,6 +28,9 @@ def scene_of_node(name: str, names: Sequence[str], description: str) -> tuple[Sc
     if (scene is not None and scene.bone_names == tuple(names)
             and scene_to_urdf(scene) == description):
         return scene, ''
-    doll = doll_from_urdf(description)
+    # A doll's bones have no slash in their names; those of a scene with several dolls do.
+    named = {name.replace('/', '_'): name for name in names}
+    doll = dataclasses.replace(doll_from_urdf(description), riders=())
+    doll = doll.renamed(lambda bone: named.get(bone, bone))
     doll = dataclasses.replace(doll, bones=tuple(doll.bone(bone) for bone in names))
     return Scene(name, (Placement(doll),), Ground()), GUESSED.format(name)

@@ -1,0 +1,289 @@
+"""The page's ROS side with a real node in a process of its own, DDS between."""
+from __future__ import annotations
+
+import dataclasses
+import os
+import signal
+import sys
+import threading
+
+import numpy as np
+import pytest
+
+pytest.importorskip('viser')
+from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion, Vector3, Wrench
+from page_client import PageClient, wait
+from peer import STARTED, Peer, end, kill, start
+from rclpy.serialization import serialize_message
+from std_msgs.msg import Header
+
+from ragdoll_ros.ros.messages import to_pose_array
+from ragdoll_ros.ros.packed import poses_in
+from ragdoll_ros.scene_file import load_scene, save_scene
+from ragdoll_ros.urdf import scene_to_urdf
+from ragdoll_ros.viewer.command import free_port, server_at
+from ragdoll_ros.viewer.page import Page
+from ragdoll_ros.viewer.remote import Remote
+from ragdoll_ros.viewer.remote_scene import scene_of_node
+from ragdoll_ros.viewer.source import Wanted
+
+OPEN = Wanted(frames=True)
+
+
+@pytest.fixture(autouse=True)
+def nothing_runs_on():
+    before = len(STARTED)
+    yield
+    for process in STARTED[before:]:
+        kill(process)
+
+
+@pytest.fixture
+def peer(ros):
+    peer = Peer()
+    yield peer
+    peer.destroy_node()
+
+
+@pytest.fixture
+def remote(ros):
+    remote = Remote([])
+    yield remote
+    remote.close()
+
+
+@pytest.fixture
+def node(ros):
+    process = start('node')
+    yield process
+    if process.poll() is None:
+        end(process, signal.SIGINT)
+
+
+def seen(remote, name='drop'):
+    """Wait until the node's scene is shown."""
+    wait(lambda: remote.frame is not None and remote.frame.scene.name == name)
+    return remote.frame
+
+
+@pytest.mark.parametrize('frame', ['', 'w', 'world', 'a/longer/frame'])
+@pytest.mark.parametrize('count', [0, 1, 10, 333])
+def test_poses_read_from_bytes_are_what_was_serialized(frame, count):
+    poses = np.random.default_rng(1).normal(size=(count, 7))
+    stamp, found = poses_in(serialize_message(to_pose_array(frame, 7_000_000_009, poses)))
+    assert stamp == 7_000_000_009 and np.array_equal(found, poses)
+
+
+def test_bytes_that_are_no_poses_are_a_value_error():
+    data = serialize_message(PoseArray(header=Header(frame_id='w'), poses=[
+        Pose(position=Point(x=1.0), orientation=Quaternion())]))
+    for wrong in (b'', b'\x00\x01\x00\x00', data[:-8], b'\x00\x00' + data[2:],
+                  data[:12] + b'\xff\xff\xff\xff' + data[16:]):
+        with pytest.raises(ValueError):
+            poses_in(wrong)
+
+
+def test_shows_what_the_node_publishes(node, remote, peer):
+    """The poses are those of ~/poses, with their scene and their time since the start."""
+    remote.want(OPEN)
+    frame = seen(remote)
+    assert frame.scene == load_scene('drop') and not remote.report.note
+    got = peer.collect(PoseArray, 'ragdoll/poses')
+    peer.wait(lambda: len(got) > 5)
+    wait(lambda: remote.frame.time > frame.time)
+    shown = remote.frame
+    peer.wait(lambda: any(np.array_equal(
+        [[p.position.x, p.position.y, p.position.z] for p in message.poses],
+        shown.state.positions) for _, message in got))
+    wait(lambda: remote.report.measures)
+    before = remote.frame.time
+    assert 0 < before < 60
+
+
+def test_listens_to_what_is_shown_alone(node, remote, peer):
+    remote.want(Wanted())
+    topics = ('ragdoll/poses', 'ragdoll/contacts', 'joint_states', 'ragdoll/swings',
+              'robot_description')
+
+    def listened():
+        return [topic for topic in topics if peer.count_subscribers(topic)]
+
+    peer.wait(lambda: peer.count_publishers('ragdoll/poses'))
+    assert listened() == []
+    remote.want(OPEN)
+    seen(remote)
+    peer.wait(lambda: listened() == ['ragdoll/poses', 'robot_description'])
+    assert remote.frame.contacts is None and remote.frame.angles is None
+    remote.want(Wanted(frames=True, contacts=True, angles=True))
+    wait(lambda: remote.frame.contacts is not None and remote.frame.angles is not None)
+    assert len(remote.frame.angles) == 14
+    remote.load('ponytail')
+    seen(remote, 'ponytail')
+    wait(lambda: remote.frame.rods is not None)
+    assert remote.frame.rods.shape == (8, 2, 3)
+    peer.wait(lambda: listened() == list(topics))
+    remote.want(Wanted())
+    peer.wait(lambda: listened() == [])
+
+
+def test_a_node_that_is_paused_is_seen_as_it_stands(node, remote, peer):
+    """It publishes nothing: the last poses are kept for who comes late."""
+    remote.want(OPEN)
+    seen(remote)
+    remote.pause(True)
+    wait(lambda: remote.report.paused)
+    late = Remote([])
+    late.want(OPEN)
+    frame = seen(late)
+    wait(lambda: late.report.paused)
+    wait(lambda: np.array_equal(late.frame.state.positions, remote.frame.state.positions))
+    before = frame.time
+    late.step()
+    wait(lambda: late.frame.time > before)
+    late.close()
+
+
+def test_steers_the_node(node, remote):
+    remote.want(OPEN)
+    seen(remote)
+    remote.set_pace(0.5)
+    wait(lambda: remote.report.pace == 0.5)
+    remote.push((0.0, 2000.0, 1.0))
+    wait(lambda: remote.frame.pushes)
+    assert remote.frame.pushes[0].force == pytest.approx((0, 2000, 1))
+    wait(lambda: not remote.frame.pushes)
+    wait(lambda: remote.report.measures['work_of_pushes_J'] > 100)
+    late = remote.frame.time
+    remote.reset()
+    wait(lambda: remote.frame.time < late)
+
+
+def test_pushes_of_others_are_shown(node, remote, peer):
+    """2000 N on ~/force for 0.1 s of simulated time, at a tenth of real time."""
+    remote.want(OPEN)
+    seen(remote)
+    remote.set_pace(0.1)
+    wait(lambda: remote.report.pace == 0.1)
+    sender = peer.sender(Wrench, 'ragdoll/force')
+    peer.wait(lambda: sender.get_subscription_count() == 2)
+    sender.publish(Wrench(force=Vector3(x=2000.0)))
+    wait(lambda: remote.frame.pushes)
+    assert remote.frame.pushes[0].bone == 'torso'
+    wait(lambda: not remote.frame.pushes)
+
+
+def test_a_grab_lifts_the_bone_and_rests_longer_than_the_nodes_patience(node, remote):
+    """A pointer that rests sends nothing: the hand is kept for it beyond 3 s."""
+    remote.want(OPEN)
+    frame = seen(remote)
+    bone = frame.scene.bone_index('head')
+    target = np.array([0.3, 0.2, 2.2])
+    remote.grab('page 1', 'head', (0.0, 0.0, 0.1), tuple(target))
+    wait(lambda: np.linalg.norm(remote.frame.state.positions[bone] - target) < 0.2)
+    assert remote.frame.held[0].bone == 'head'
+    since = remote.frame.time
+    wait(lambda: remote.frame.time > since + 3.5)
+    assert np.linalg.norm(remote.frame.state.positions[bone] - target) < 0.2
+    remote.let_go('page 1')
+    wait(lambda: not remote.frame.held)
+    wait(lambda: remote.frame.state.positions[bone][2] < 1.0)
+
+
+def test_uses_an_edited_scene_or_says_why_not(node, remote, tmp_path):
+    remote.want(OPEN)
+    seen(remote)
+    heavier = load_scene('drop')
+    doll = heavier.dolls[0].doll.replace_bone('head', mass=7.5)
+    heavier = dataclasses.replace(heavier, name='heavier', dolls=(
+        dataclasses.replace(heavier.dolls[0], doll=doll),))
+    remote.use(heavier)
+    assert seen(remote, 'heavier').scene.bones[1].mass == 7.5
+    assert not remote.report.note
+    with pytest.raises(ValueError, match='nowhere'):
+        remote.load('nowhere')
+    assert remote.frame.scene.name == 'heavier'
+
+
+def test_no_node_is_said_and_heals_by_itself(remote):
+    remote.want(OPEN)
+    wait(lambda: 'no node' in remote.report.problem and 'ragdoll_node' in remote.report.problem)
+    with pytest.raises(ValueError, match='no node'):
+        remote.load('drop')
+    process = start('node')
+    seen(remote)
+    assert not remote.report.problem
+    kill(process)
+    wait(lambda: 'silent' in remote.report.problem)
+    start('node', '--ros-args', '-p', 'scene:=crowd')
+    seen(remote, 'crowd')
+    wait(lambda: not remote.report.problem)
+    assert len(remote.frame.state.positions) == 100
+
+
+def test_a_scene_that_is_not_here_is_shown_by_its_urdf(remote, tmp_path):
+    """The file is another one by now: what the node took is what is shown."""
+    path = tmp_path / 'mine.yaml'
+    scene = load_scene('crowd')
+    save_scene(scene, path)
+    start('node', '--ros-args', '-p', f'scene:={path}')
+    remote.want(OPEN)
+    seen(remote, 'crowd')
+    remote.want(Wanted())
+    wait(lambda: not remote._subscriptions)
+    save_scene(load_scene('drop'), path)
+    remote._forget()
+    remote.want(OPEN)
+    wait(lambda: remote.frame is not None)
+    assert 'robot_description' in remote.report.note
+    assert remote.frame.scene.bone_names == scene.bone_names
+    assert np.allclose([bone.shape.half_extents for bone in remote.frame.scene.bones],
+                       [bone.shape.half_extents for bone in scene.bones])
+
+
+@pytest.mark.parametrize('name', ['drop', 'crowd', 'article', 'flight', 'ponytail'])
+def test_shapes_and_axes_from_a_urdf_are_the_scenes(name):
+    """The bones' frames are those of the poses: half extents along the same axes."""
+    scene = load_scene(name)
+    found, note = scene_of_node('/not/here.yaml', scene.bone_names, scene_to_urdf(scene))
+    assert note and found.bone_names == scene.bone_names
+    for ours, theirs in zip(found.bones, scene.bones, strict=True):
+        assert type(ours.shape) is type(theirs.shape)
+        assert ours.shape.half_extents == pytest.approx(theirs.shape.half_extents)
+        assert ours.color is None or ours.color == pytest.approx(theirs.color)
+
+
+def test_the_page_draws_the_node(node, ros):
+    """The whole way: node, DDS, page, websocket; with the namespace's own commands."""
+    source, stop = Remote([]), threading.Event()
+    with server_at('127.0.0.1', free_port('127.0.0.1', 0)) as server:
+        page = Page(server, source)
+        thread = threading.Thread(target=page.run, args=(stop,))
+        thread.start()
+        client = PageClient(server.get_port())
+        try:
+            wait(lambda: page._frame is not None)
+            before = page._frame.time
+            wait(lambda: page._frame.time > before + 0.1)
+            source.pause(True)
+            wait(lambda: source.report.paused and page._frame is source.frame)
+            boxes = next(batch for batch in page._stage.bodies.batches if len(batch.bones) == 9)
+            assert np.abs(boxes.handle.batched_positions
+                          - page._frame.state.positions[boxes.bones]).max() < 1e-6
+            kill(node)
+            wait(lambda: 'silent' in page._problem.content)
+        finally:
+            client.close()
+            stop.set()
+            thread.join()
+            source.close()
+
+
+def test_the_viewer_leaves_at_a_signal(ros):
+    """Without any node: it waits for one, and ends within 2 s."""
+    import subprocess
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'ragdoll_ros.viewer.command', '--port', '0'],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
+    assert 'The page is at' in process.stdout.readline()
+    code, seconds = end(process, signal.SIGTERM)
+    assert code == 0 and seconds < 2 and 'Traceback' not in process.stderr_text

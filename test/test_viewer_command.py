@@ -1,0 +1,105 @@
+"""`ragdoll_viewer` as a process: its address, its ends, and what it refuses."""
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+
+import pytest
+
+pytest.importorskip('viser')
+from conftest import ROOT
+from page_client import PageClient
+
+COMMAND = [sys.executable, '-m', 'ragdoll_ros.viewer.command']
+
+
+def run(*arguments):
+    return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, cwd=ROOT,
+                          timeout=30)
+
+
+def start(*arguments):
+    """Start it; give the process and the port of the address that it prints."""
+    process = subprocess.Popen([*COMMAND, *arguments], stdout=subprocess.PIPE, text=True, cwd=ROOT,
+                               stderr=subprocess.PIPE)
+    line = process.stdout.readline()
+    found = re.fullmatch(r'The page is at http://127\.0\.0\.1:(\d+)\n', line)
+    assert found, line
+    return process, int(found[1])
+
+
+@pytest.mark.parametrize('sign', [signal.SIGINT, signal.SIGTERM])
+def test_says_where_it_is_serves_and_ends_within_two_seconds(sign):
+    process, port = start('--scene', 'drop', '--port', '0')
+    with urllib.request.urlopen(f'http://127.0.0.1:{port}', timeout=5) as answer:
+        assert answer.status == 200 and b'<html' in answer.read()
+    PageClient(port)
+    begin = time.monotonic()
+    process.send_signal(sign)
+    out, error = process.communicate(timeout=10)
+    assert time.monotonic() - begin < 2
+    assert process.returncode == 0 and not out and 'Traceback' not in error
+
+
+def test_is_for_this_machine_alone_unless_told_otherwise():
+    """Its socket, as Linux lists it, listens on 127.0.0.1: 0100007F."""
+    process, port = start('--scene', 'drop', '--port', '0')
+    listening = [line.split()[1] for path in ('/proc/net/tcp', '/proc/net/tcp6')
+                 if os.path.exists(path) for line in open(path) if line.split()[3] == '0A']
+    process.terminate()
+    process.wait(10)
+    assert [place for place in listening if place.endswith(f':{port:04X}')] == [
+        f'0100007F:{port:04X}']
+
+
+def test_a_port_that_was_asked_for_and_is_taken_is_an_error():
+    with socket.socket() as taken:
+        taken.bind(('127.0.0.1', 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        done = run('--scene', 'drop', '--port', str(port))
+    assert done.returncode == 2
+    assert str(port) in done.stderr and 'in use' in done.stderr and 'Traceback' not in done.stderr
+
+
+@pytest.mark.parametrize(('arguments', 'words'), [
+    (('--scene', 'nowhere'), ['nowhere', 'drop']),
+    (('--scene', 'drop', '--host', '203.0.113.1'), ['203.0.113.1', 'address']),
+    (('--scene', 'drop', '--host', 'no such host'), ['no such host']),
+    (('--scene', 'drop', '--port', '99999'), ['99999', '65535']),
+    (('--scene', 'drop', '--port', 'x'), ['--port', "'x'"]),
+    (('--scene', 'drop', '--ros-args', '-r', '__ns:=/a'), ['--ros-args', '--scene']),
+    (('--scene', 'drop', '--folder', '/nonexistent'), ['/nonexistent', 'folder']),
+    (('--nonsense',), ['--nonsense'])])
+def test_refuses_with_exit_code_two(arguments, words):
+    done = run(*arguments)
+    assert done.returncode == 2 and 'Traceback' not in done.stderr
+    assert all(word in done.stderr for word in words), done.stderr
+
+
+def test_a_broken_scene_is_refused_with_all_its_faults(broken_scene):
+    path, words = broken_scene
+    done = run('--scene', str(path))
+    assert done.returncode == 2 and all(word in done.stderr for word in words)
+
+
+@pytest.mark.parametrize(('missing', 'word', 'arguments'), [
+    ('viser', 'ragdoll_ros[viewer]', ('--scene', 'drop')), ('rclpy', 'ragdoll_ros[ros]', ())])
+def test_says_what_to_install(tmp_path, missing, word, arguments):
+    """A package that cannot be imported, as where it is not installed."""
+    (tmp_path / f'{missing}.py').write_text('raise ImportError("not here")\n')
+    path = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', '')])
+    done = subprocess.run([*COMMAND, *arguments, '--port', '0'], capture_output=True, text=True,
+                          cwd=ROOT, timeout=30, env={**os.environ, 'PYTHONPATH': path})
+    assert done.returncode == 2 and word in done.stderr and 'Traceback' not in done.stderr
+
+
+def test_help_has_examples():
+    done = run('--help')
+    assert done.returncode == 0 and 'ragdoll_viewer --scene doll.yaml' in done.stdout
