@@ -100,21 +100,31 @@ class Guard:
 
     def momentum_due(self, before: Motion, after: Motion, duration: float,
                      impulse: np.ndarray | float = 0.0,
-                     moment: np.ndarray | float | None = 0.0) -> Shift:
-        """Tell what dolls in the air lack of the momentum, and of the way, that they must have.
+                     moment: np.ndarray | float | None = 0.0) -> tuple[Shift, Motion]:
+        """Tell what dolls in the air lack of the momentum, and of the way, that they must have,
+        and their motion with it.
 
         ``impulse`` (d, 3) N s and ``moment`` (d, 3) N m s are what pushes gave; no moment: the
         angular momentum is left as it is. The lack is made up by a motion of the whole doll as
-        one rigid body, with a spin Ic^-1 dL, so that no joint notices.
+        one rigid body, with a spin Ic^-1 dL, so that no joint notices. It adds P v + M v v / 2 to
+        the kinetic energy, and L w + w I w / 2 about the centre of mass.
         """
         masses = self._mechanics.doll_masses[:, None]
-        due = before.momentum + impulse + masses * (self._gravity * duration)
-        way = before.centre + (before.momentum + due) * (duration / 2 / masses) - after.centre
-        linear = (due - after.momentum) / masses
+        momentum = before.momentum + impulse + masses * (self._gravity * duration)
+        centre = before.centre + (before.momentum + momentum) * (duration / 2 / masses)
+        linear = (momentum - after.momentum) / masses
+        gained = (momentum + after.momentum) * linear
         if moment is None:
-            return Shift(way, linear, np.zeros_like(linear))
-        missing = before.spin + moment - after.spin
-        return Shift(way, linear, np.linalg.solve(after.inertia, missing[:, :, None])[:, :, 0])
+            moment, turned = after.spin, np.zeros_like(linear)
+        else:
+            moment = before.spin + moment
+            lack = moment - after.spin
+            turned = np.linalg.solve(after.inertia, lack[:, :, None])[:, :, 0]
+            gained += (moment + after.spin) * turned
+        kinetic = after.kinetic + gained.sum(axis=1) / 2
+        energy = kinetic - self._mechanics.doll_masses * (centre @ self._gravity)
+        return (Shift(centre - after.centre, linear, turned),
+                Motion(energy, kinetic, centre, momentum, moment, after.inertia))
 
     def without_surplus(self, before: Coordinates, coordinates: Coordinates, motion: Motion,
                         surplus: np.ndarray, touched: bool) -> Coordinates:

@@ -89,18 +89,6 @@ class Mechanics:
         return State(state.positions + way, state.orientations, state.linear + linear + turned,
                      state.angular + spin)
 
-    def shifted_motion(self, motion: Motion, shift: Shift) -> Motion:
-        """Give the sums after such a shift: a rigid motion adds P v + M v v / 2 to the kinetic
-        energy, and L w + w I w / 2 about the centre of mass.
-        """
-        pushed = self.doll_masses[:, None] * shift.linear
-        gained = np.matmul(motion.inertia, shift.spin[:, :, None])[:, :, 0]
-        kinetic = motion.kinetic + ((motion.momentum + pushed / 2) * shift.linear
-                                    + (motion.spin + gained / 2) * shift.spin).sum(axis=1)
-        centre = motion.centre + shift.way
-        return Motion(kinetic - self.doll_masses * (centre @ self.gravity), kinetic, centre,
-                      motion.momentum + pushed, motion.spin + gained, motion.inertia)
-
 
 _CROSS = np.array([[0, 0, 0, 0, 0, 1, 0, -1, 0], [0, 0, -1, 0, 0, 0, 1, 0, 0],
                    [0, 1, 0, -1, 0, 0, 0, 0, 0]], float)

@@ -26,16 +26,20 @@ class Reach:
         self._normal = np.array(scene.ground.normal if scene.ground else (0, 0, 1))
         counts = [len(placement.doll.bones) for placement in scene.dolls]
         self._bounds = np.cumsum([0, *counts])
+        self._last: tuple[State | None, np.ndarray] = (None, np.zeros(0))
+        """The heights told last, and of which state."""
 
     def heights(self, state: State) -> np.ndarray:
         """Distances (n,) m of the bones' lowest points from the ground; infinity without one."""
         if self._ground is None:
             return np.full(len(self._radii), math.inf)
-        down = np.abs(self._normal @ state.turns)
-        across = np.sqrt(np.maximum(0, 1 - down[:, 2] ** 2))
-        boxes, along, rounds, rims = self._sizes[:, :3], *self._sizes[:, 3:].T
-        reach = (boxes * down).sum(axis=1) + along * down[:, 2] + rounds + rims * across
-        return state.positions @ self._normal - self._ground.offset - reach
+        if self._last[0] is not state:
+            down = np.abs(self._normal @ state.turns)
+            across = np.sqrt(np.maximum(0, 1 - down[:, 2] ** 2))
+            boxes, along, rounds, rims = self._sizes[:, :3], *self._sizes[:, 3:].T
+            reach = (boxes * down).sum(axis=1) + along * down[:, 2] + rounds + rims * across
+            self._last = (state, state.positions @ self._normal - self._ground.offset - reach)
+        return self._last[1]
 
     def clearance(self, state: State) -> float:
         """Distance, m, that all bones keep from the ground at the least: a lower bound if far."""

@@ -347,9 +347,9 @@ class Simulation:
         impulse = moment = 0.0
         if loads:
             impulse, moment = self._given(loads, duration, state)
-        shift = self._guard.momentum_due(before, self._motion, duration, impulse, moment)
-        self._state = self.mechanics.shifted(self._state, self._motion, shift)
-        self._motion = self.mechanics.shifted_motion(self._motion, shift)
+        after = self._motion
+        shift, self._motion = self._guard.momentum_due(before, after, duration, impulse, moment)
+        self._state = self.mechanics.shifted(self._state, after, shift)
         self._stepper.shift(self._state)
 
     def _given(self, loads: list[Load], duration: float,
@@ -392,14 +392,14 @@ class Simulation:
         for load in loads:
             bone = load.bone
             force, torque = self._mean_load(load, before)
-            places, speeds = zip(*(_point(state, bone, load.point) for state in (before, after)),
-                                 strict=True)
-            turn = rotation.multiply(after.orientations[bone],
-                                     rotation.inverse(before.orientations[bone]))
-            lead = substep / 2 * (speeds[1] - speeds[0])
-            lead_turn = substep / 2 * (after.angular[bone] - before.angular[bone])
-            done = (force @ (places[1] - places[0] - lead)
-                    + torque @ (rotation.rotation_vector(turn) - lead_turn))
+            (place, speed), (end, end_speed) = (_point(state, bone, load.point)
+                                                for state in (before, after))
+            done = force @ (end - place - substep / 2 * (end_speed - speed))
+            if torque.any():
+                turn = rotation.multiply(after.orientations[bone],
+                                         rotation.inverse(before.orientations[bone]))
+                lead = substep / 2 * (after.angular[bone] - before.angular[bone])
+                done += torque @ (rotation.rotation_vector(turn) - lead)
             work[self.mechanics.doll_of[bone]] += done
             if isinstance(load, Pull):
                 self._grabbed += float(done)
@@ -409,8 +409,7 @@ class Simulation:
         """Force and torque in world axes, of a local load the mean of its start and end."""
         if not load.local:
             return load.force, load.torque
-        turns = (before.orientations[load.bone], self._state.orientations[load.bone])
-        mean = sum(rotation.matrix(turn) for turn in turns) / 2
+        mean = (before.turns[load.bone] + self._state.turns[load.bone]) / 2
         return mean @ load.force, mean @ load.torque
 
     def _load(self, active: _Active) -> Load:
@@ -465,6 +464,8 @@ def resolve_accuracy(accuracy: str | Accuracy) -> Accuracy:
 
 def _point(state: State, bone: int, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Position (3,) m and velocity (3,) m/s of a point of a bone, given along its axes."""
-    arm = rotation.rotate(state.orientations[bone], point)
+    if not point.any():
+        return state.positions[bone], state.linear[bone]
+    arm = state.turns[bone] @ point
     return (state.positions[bone] + arm,
             state.linear[bone] + cross(state.angular[bone], arm))

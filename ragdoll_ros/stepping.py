@@ -43,6 +43,8 @@ class Accuracy:
     """Order of the flight's Runge-Kutta method; 0: the engine's own step in flight too."""
     flight_turn: float
     """rad that the fastest bone may turn in one Runge-Kutta step."""
+    longest: float = 0.1
+    """s of flight that are gone through in one step at the most; 0: a tick."""
     redo: float = math.radians(1.0)
     """rad past a limit from which a step is done again, four times as fine, as it is when a bone
     sinks deeper than ``sink``; infinity: never."""
@@ -59,7 +61,7 @@ class Accuracy:
 
 
 DRAFT = Accuracy(turn=0.15, limit=0.1, contact=4, settled=2, sink=0.01, most=32, order=2,
-                 flight_turn=0.8, redo=math.radians(8))
+                 flight_turn=0.4, redo=math.radians(8))
 NORMAL = Accuracy(turn=0.06, limit=0.05, contact=6, settled=4, sink=0.005, most=128, order=3,
                   flight_turn=0.4, redo=math.radians(3))
 EXACT = Accuracy(turn=0.02, limit=0.02, contact=12, settled=8, sink=0.002, most=256, order=4,
@@ -104,8 +106,8 @@ STIFFEST = 1.5
 """Step times the fastest rate at which damping ends a motion: from 2 on, explicit steps make
 energy of it."""
 
-LONGEST_STEP = 0.1
-"""s of flight that are gone through in one step at the most."""
+LAG = 0.1
+"""Share of a motion that joint damping may take away before the engine hears that it is slower."""
 
 SHORTEST = 1e-7
 """s: a piece of flight shorter than this is not worth its stages."""
@@ -148,8 +150,6 @@ class Stepper:
         counts = np.cumsum([0, *(len(placement.doll.bones) for placement in scene.dolls)])
         self._roots = np.array([start + placement.doll.bones.index(placement.doll.root)
                                 for start, placement in zip(counts[:-1], scene.dolls, strict=True)])
-        self._damped = any(joint.damping for placement in scene.dolls
-                           for joint in placement.doll.joints)
         self._fading = damping_rate(scene)
         self._stale: bool
         """Whether the engine has yet to hear of a shift."""
@@ -189,8 +189,9 @@ class Stepper:
 
     def look(self) -> None:
         """Read where the engine is."""
-        self.state: State = self.engine.read()
-        self.coordinates: Coordinates = self.engine.coordinates()
+        self.state: State
+        self.coordinates: Coordinates
+        self.state, self.coordinates = self.engine.look()
         self.touching = self.engine.touching()
 
     def begin(self) -> None:
@@ -279,17 +280,17 @@ class Stepper:
 
     def _fly(self, duration: float, loads: Sequence[Load]) -> float:
         """Fly up to ``duration`` s; give the time flown, 0 where something comes in between."""
-        longest = self._longest_step()
-        looks = self.reach.strides(self.state, duration)
-        parts = max(looks, math.ceil(duration / longest))
+        if loads or self._loaded:
+            self._path, self._loaded = None, bool(loads)
+        parts = self.reach.strides(self.state, duration)
+        if not self._leads_on(duration):
+            parts = max(parts, math.ceil(duration / self._longest_step()))
         if parts > MOST_FLIGHTS:
             return 0.0
         stretch, flown = duration / parts, 0.0
-        if loads or self._loaded:
-            self._path, self._loaded = None, bool(loads)
         while flown < duration * (1 - 1e-9):
-            start, state, least = self.coordinates, self.state, self._room()
-            self._onward(stretch, duration - flown if loads else longest, loads)
+            start, state = self.coordinates, self.state
+            self._onward(stretch, duration - flown if loads else self.accuracy.longest, loads)
             begin = self._along
             self._fly_to(begin + stretch)
             room = self._room()
@@ -298,9 +299,10 @@ class Stepper:
                 self._along += stretch
                 continue
             self._held |= self._past() > 0
-            early = 0.0
-            if room >= 0 or least > 0:
-                early = self._meet(begin, self._land(begin, stretch, least, room))
+            early, least = stretch, self._room(start, state)
+            if room < 0:
+                early = self._land(begin, stretch, least, room) if least > 0 else 0.0
+            early = self._meet(begin, early)
             self._path = None
             if early > SHORTEST:
                 return flown + early
@@ -309,30 +311,33 @@ class Stepper:
             return flown
         return duration
 
+    def _leads_on(self, stretch: float) -> bool:
+        """Tell whether a path is under way that leads on by ``stretch`` s."""
+        path = self._path
+        return path is not None and self._along + stretch <= path.duration * (1 + 1e-9)
+
     def _onward(self, stretch: float, longest: float, loads: Sequence[Load]) -> None:
         """See that the path leads on from here by ``stretch`` s at the least.
 
-        A new one is as many stretches long as fit into ``longest`` s.
+        A new one is as many stretches long as speeds allow, and fit into ``longest`` s.
         """
-        path = self._path
-        if path is not None and self._along + stretch <= path.duration * (1 + 1e-9):
+        if self._leads_on(stretch):
             return
+        path = self._path
         over = path is not None and self._along > path.duration * (1 - 1e-9)
-        length = stretch * max(1, math.floor(longest / stretch * (1 + 1e-9)))
-        self._path = Path(self._free, self.coordinates, length, self.accuracy.order, loads,
-                          after=path if over else None)
+        count = max(1, math.floor(min(longest, self._longest_step()) / stretch * (1 + 1e-9)))
+        self._path = Path(self._free, self.coordinates, stretch * count, self.accuracy.order,
+                          loads, after=path if over else None)
         self._along = 0.0
         self.effort.flights += 1
 
     def _land(self, begin: float, stretch: float, least: float, room: float) -> float:
         """Go back along the path to where a limit or the ground is just reached; give the time, s.
 
-        ``least`` and ``room`` (rad or m) are there where the stretch begins and ends. The end is
+        ``least`` > 0 > ``room`` (rad or m) are there where the stretch begins and ends. The end is
         a hair past the touch: the engine takes a gap that is left for room to move in within its
         first substep, and would eat that much of a bounce. Zero if that does not come out.
         """
-        if room >= 0:
-            return stretch
         grounded = self.reach.clearance(self.state) < 0
         early, late = 0.0, stretch
         above, below = least + LANDED / 2, room + LANDED / 2
@@ -391,17 +396,17 @@ class Stepper:
         self._stale = False
         self.coordinates, self.state, self.touching = start, state, touching
 
-    def _room(self) -> float:
+    def _room(self, coordinates: Coordinates | None = None, state: State | None = None) -> float:
         """Room (rad or m) to the nearest limit or the ground; below zero: past it."""
-        past = self._past()
+        past = self._layout.past_limits(coordinates.q) if coordinates else self._past()
         room = -float(past.max()) if len(past) else math.inf
-        return min(room, self.reach.clearance(self.state))
+        return min(room, self.reach.clearance(state or self.state))
 
     def _longest_step(self) -> float:
-        """Longest step of a flight, s, that speeds and damping allow."""
+        """Longest step of a flight, s, that speeds and damping allow within a tick."""
         spin = math.sqrt(np.einsum('ij,ij->i', self.state.angular, self.state.angular).max())
         rate = max(spin, np.abs(self.coordinates.v[self._layout.limited[1]]).max(initial=0.0))
-        return min(LONGEST_STEP, self.accuracy.flight_turn / max(rate, 1e-9),
+        return min(self.accuracy.flight_turn / max(rate, 1e-9),
                    STIFFEST / max(self._fading, 1e-9))
 
     def _step(self, duration: float, loads: Sequence[Load]) -> float:
@@ -434,12 +439,14 @@ class Stepper:
         return max(past / self.accuracy.redo, sunk / self.accuracy.sink)
 
     def _run(self, duration: float, substeps: int, loads: Sequence[Load]) -> None:
-        """Let the engine go; what changes with the motion is looked at again each substep."""
-        if self._damped or any(load.local or load.point.any() for load in loads):
-            for _ in range(substeps):
-                self.engine.step(duration / substeps, 1, loads)
-        else:
-            self.engine.step(duration, substeps, loads)
+        """Let the engine go; what changes with the motion is looked at again now and then."""
+        calls = math.ceil(self._fading * duration / LAG)
+        if any(load.local or load.point.any() for load in loads):
+            calls = substeps
+        calls = max(1, min(calls, substeps))
+        for call in range(calls):
+            share = substeps * (call + 1) // calls - substeps * call // calls
+            self.engine.step(duration * share / substeps, share, loads)
         self.effort.substeps += substeps
         self.look()
 
