@@ -45,6 +45,9 @@ class Accuracy:
     """rad that the fastest bone may turn in one Runge-Kutta step."""
     longest: float = 0.1
     """s of flight that are gone through in one step at the most; 0: a tick."""
+    land: bool = True
+    """A flight goes up to the instant at which a joint reaches its limit; otherwise the engine
+    takes over a tick earlier."""
     redo: float = math.radians(1.0)
     """rad past a limit from which a step is done again, four times as fine, as it is when a bone
     sinks deeper than ``sink``; infinity: never."""
@@ -61,7 +64,7 @@ class Accuracy:
 
 
 DRAFT = Accuracy(turn=0.15, limit=0.1, contact=4, settled=2, sink=0.01, most=32, order=2,
-                 flight_turn=0.4, redo=math.radians(8))
+                 flight_turn=0.4, land=False, redo=math.radians(8))
 NORMAL = Accuracy(turn=0.06, limit=0.05, contact=6, settled=4, sink=0.005, most=128, order=3,
                   flight_turn=0.4, redo=math.radians(3))
 EXACT = Accuracy(turn=0.02, limit=0.02, contact=12, settled=8, sink=0.002, most=256, order=4,
@@ -236,7 +239,7 @@ class Stepper:
 
     def go(self, duration: float, loads: Sequence[Load]) -> Piece:
         """Move on by ``duration`` s, or by less: up to the next touch or limit in a flight."""
-        if self._may_fly():
+        if self._may_fly(duration):
             flown = self._fly(duration, loads)
             if flown > 0:
                 if self._flown is not None:
@@ -266,17 +269,21 @@ class Stepper:
         if self._free is not None:
             self._free.close()
 
-    def _may_fly(self) -> bool:
+    def _may_fly(self, duration: float) -> bool:
         """Tell whether nothing touches and no joint presses against its limit."""
         if (self._free is None or not self.accuracy.order or self.touching or self._blocked
                 or self.effort.flights >= MOST_FLIGHTS):
             return False
         past = self._past()
-        if not len(past) or past.max() < -AT_LIMIT:
+        if not len(past):
+            return True
+        speeds = self._layout.limit_speeds(self.coordinates)
+        ahead = past if self.accuracy.land else past + speeds * duration
+        if ahead.max() < -AT_LIMIT:
             return True
         self._held &= past > -AT_LIMIT
-        pressing = (past >= -AT_LIMIT) & (self._layout.limit_speeds(self.coordinates) > 0)
-        return not (self._held | pressing | (past > AT_LIMIT)).any()
+        pressing = (past >= -AT_LIMIT) & (speeds > 0)
+        return not (self._held | pressing | (past > AT_LIMIT) | (ahead > AT_LIMIT)).any()
 
     def _fly(self, duration: float, loads: Sequence[Load]) -> float:
         """Fly up to ``duration`` s; give the time flown, 0 where something comes in between."""
@@ -292,7 +299,11 @@ class Stepper:
             start, state = self.coordinates, self.state
             self._onward(stretch, duration - flown if loads else self.accuracy.longest, loads)
             begin = self._along
-            self._fly_to(begin + stretch)
+            ahead = self._path.at(begin + stretch)
+            if not self.accuracy.land and (self._layout.past_limits(ahead.q) > 0).any():
+                self._blocked = True
+                return flown
+            self._fly_to(ahead)
             room = self._room()
             if room >= 0 and not self.touching:
                 flown += stretch
@@ -344,13 +355,13 @@ class Stepper:
         for _ in range(MOST_LOOKS):
             time = (early * below - late * above) / (below - above)
             if grounded:
-                self._fly_to(begin + time)
+                self._fly_to(self._path.at(begin + time))
                 off = self._room() + LANDED / 2
             else:
                 past = self._layout.past_limits(self._path.at(begin + time).q)
                 off = LANDED / 2 - float(past.max())
             if abs(off) <= LANDED / 2:
-                self._fly_to(begin + time)
+                self._fly_to(self._path.at(begin + time))
                 return time
             # Regula falsi, by halves where one end stays (Dowell and Jarratt, BIT 11, 1971).
             if off * below < 0:
@@ -371,17 +382,16 @@ class Stepper:
         early, speed = 0.0, self.reach.closing(self.state)
         while (late - early) * speed > MET:
             time = (early + late) / 2
-            self._fly_to(begin + time)
+            self._fly_to(self._path.at(begin + time))
             if any(GROUND not in pair for pair in self.touching):
                 late = time
             else:
                 early = time
-        self._fly_to(begin + late)
+        self._fly_to(self._path.at(begin + late))
         return late
 
-    def _fly_to(self, time: float) -> None:
-        """Go to where the path is ``time`` s after its start."""
-        self._set(self._path.at(time))
+    def _fly_to(self, coordinates: Coordinates) -> None:
+        self._set(coordinates)
         self.touching = self.engine.touching()
 
     def _set(self, coordinates: Coordinates) -> None:
