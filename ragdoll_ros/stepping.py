@@ -87,6 +87,10 @@ def firm(accuracy: Accuracy) -> Accuracy:
 AT_LIMIT = 1e-3
 """rad: a joint as near as this to its limit, and moving toward it, is at the limit."""
 
+HUMAN = 1.8
+"""m: extent of a doll for which ``Accuracy`` counts substeps in 10 ms. What is smaller falls and
+rolls by its own size sooner, as the root of its size."""
+
 SOON = 0.015
 """s ahead that limits and ground are looked for."""
 
@@ -154,6 +158,9 @@ class Stepper:
         self._roots = np.array([start + placement.doll.bones.index(placement.doll.root)
                                 for start, placement in zip(counts[:-1], scene.dolls, strict=True)])
         self._fading = damping_rate(scene)
+        smallest = min(placement.doll.extent for placement in scene.dolls)
+        self._span = 0.01 * min(1.0, math.sqrt(smallest / HUMAN))
+        """s in which as many substeps are taken as the accuracy says for 10 ms."""
         self._stale: bool
         """Whether the engine has yet to hear of a shift."""
         self._blocked: bool
@@ -426,7 +433,7 @@ class Stepper:
         bound = max(1.0, self.accuracy.creep * self._too_far())
         substeps = self._substeps(duration, bool(loads))
         self._blocked = False
-        most = max(1, math.ceil(self.accuracy.most * duration / 0.01))
+        most = max(1, math.ceil(self.accuracy.most * duration / self._span))
         while True:
             self._run(duration, substeps, loads)
             if substeps >= most or self._too_far() <= bound:
@@ -463,7 +470,7 @@ class Stepper:
     def _substeps(self, duration: float, pushed: bool) -> int:
         """Count the substeps that this state asks for, a power of two."""
         accuracy, state = self.accuracy, self.state
-        tens = duration / 0.01
+        tens = duration / self._span
         if not accuracy.adaptive:
             return max(1, math.ceil(accuracy.contact * tens))
         spin = math.sqrt(np.einsum('ij,ij->i', state.angular, state.angular).max())
