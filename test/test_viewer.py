@@ -285,7 +285,7 @@ def test_garbage_on_the_socket_hurts_nobody_else(page, data, caplog):
 def test_a_click_chooses_the_bone_for_the_editor(page):
     from viser import _messages
     client = page.open()
-    wait(lambda: page.editor is not None)
+    wait(lambda: page._frame)
     node, number, _ = batch_of(page, 'right_shin')
     client.send(_messages.SceneNodeClickMessage(
         name=node, instance_index=number, ray_origin=(4.0, 0.0, 1.0),
@@ -306,6 +306,29 @@ def test_contacts_on_demand(page):
     client.update(page.view._contacts, False)
     wait(lambda: page._frame.contacts is None)
     wait(lambda: not page.server.scene.get_handle_by_name('/scene/contacts').visible)
+
+
+def test_the_camera_follows_on_demand(page):
+    """By as much as the centre of mass goes, from where it was when the camera was asked to.
+
+    The camera moves 30 times a second, and catches up while the time stands.
+    """
+    client = page.open()
+    wait(lambda: page._frame and page.server.get_clients())
+    (handle,) = page.server.get_clients().values()
+    masses = np.array([bone.mass for bone in DROP.bones])
+
+    def centre():
+        return masses @ page._frame.state.positions / masses.sum()
+
+    paused(page)
+    eye, begin = handle.camera.position.copy(), centre()
+    client.update(page.view._follow, True)
+    wait(lambda: page._follower._last is not None)
+    page.source.pause(False)
+    wait(lambda: begin[2] - centre()[2] > 0.3)
+    paused(page)
+    wait(lambda: np.allclose(handle.camera.position - eye, centre() - begin, rtol=0, atol=1e-9))
 
 
 def test_plots_tell_energy_gap_and_pace(page):
