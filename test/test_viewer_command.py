@@ -41,10 +41,12 @@ def test_says_where_it_is_serves_and_ends_within_two_seconds(sign):
     with urllib.request.urlopen(f'http://127.0.0.1:{port}', timeout=5) as answer:
         assert answer.status == 200 and b'<html' in answer.read()
     PageClient(port)
-    begin = time.monotonic()
-    process.send_signal(sign)
-    out, error = process.communicate(timeout=10)
-    assert time.monotonic() - begin < 2
+    # A browser connects once more than it needs to, in reserve.
+    with socket.create_connection(('127.0.0.1', port)):
+        begin = time.monotonic()
+        process.send_signal(sign)
+        out, error = process.communicate(timeout=10)
+        assert time.monotonic() - begin < 2
     assert process.returncode == 0 and not out and 'Traceback' not in error
 
 
