@@ -117,7 +117,7 @@ class View:
         self.page.evaluate(PLAIN)
 
     def bodies(self, scene):
-        """Place of each bone as it is drawn, (n, 3) m, z up; None while not all are there.
+        """Place of each bone as it is drawn, (n, 3) m, z up; NaN while not all are there.
 
         Read from three.js' instances; the page keeps parts of one kind in the scene's order.
         """
@@ -125,9 +125,13 @@ class View:
         kinds = [part.kind for bone in scene.bones for part in parts_of(bone)]
         assert len(kinds) == len(scene.bones), 'bones of one part each'
         if {kind: len(matrices) for kind, matrices in drawn.items()} != Counter(kinds):
-            return None
+            return np.full((len(kinds), 3), np.nan)
         instances = {kind: iter(matrices) for kind, matrices in drawn.items()}
         return np.array([next(instances[kind])[12:15] for kind in kinds])
+
+    def has(self, name):
+        """Whether a node of this name is drawn."""
+        return self.page.evaluate('name => !!window.__viserMutable.nodeRefFromName[name]', name)
 
     def pixels(self, points):
         """Where points (n, 3) m of the world are on the page: (n, 2), as the mouse counts."""
@@ -156,6 +160,10 @@ class View:
                                 has=self.page.get_by_text(label, exact=True))
         return row.locator('input').last
 
+    def top(self, part):
+        """How far below the page's upper edge a part of it begins, pixels."""
+        return part.bounding_box()['y']
+
     def see(self, text):
         """Wait until a text stands somewhere on the page."""
         self.page.get_by_text(text).first.wait_for()
@@ -172,7 +180,7 @@ def opened(browser, url, scene):
     """A page at an address, with all bones in it; no script of it has failed at the end."""
     view = View(browser, url)
     try:
-        view.wait(lambda: view.bodies(scene) is not None)
+        view.wait(lambda: np.isfinite(view.bodies(scene)).all())
         yield view
     finally:
         view.close()

@@ -126,7 +126,6 @@ def test_a_page_that_goes_asks_nothing_of_the_node_and_may_come_back(view, heard
     view.page.goto('about:blank')
     view.wait(lambda: listener.count_subscribers('ragdoll/poses') == 1)
     view.go(address)
-    view.wait(lambda: view.bodies(SCENE) is not None)
     hold_at_start(view)
 
 
