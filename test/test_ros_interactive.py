@@ -231,9 +231,11 @@ def test_a_flood_of_clients_is_held_off(node, peer, client):
 
     def refused():
         # Again and again: a slow machine forgets the first hands before it has heard the last.
-        for number in itertools.islice(numbers, 10):
+        for number in itertools.islice(numbers, 30):
             client._id = f'client {number}'
             client.press('head')
+        for _ in range(200):
+            peer.executor_.spin_once(timeout_sec=0.01)
         return node.tally.refused['~/interactive/feedback'] > 0
 
     peer.wait(refused)
