@@ -10,7 +10,7 @@ import viser
 import websockets
 from viser import _messages
 
-PATIENCE = 15.0
+PATIENCE = 30.0
 
 
 class PageClient:

@@ -69,9 +69,19 @@ def page(tmp_path):
 @pytest.fixture
 def browser(page):
     browser = Browser(page.server.get_port())
-    wait(lambda: page.editor is not None)
+    # The first frame is drawn: by then, clicks are listened to.
+    wait(lambda: page._frame is not None)
     yield browser
     browser.close()
+
+
+def settled(editor):
+    """Wait until what the editor has begun is done: it fills in the fields last.
+
+    A person does not type into them in the few ms between.
+    """
+    with editor._acting, editor._showing:
+        pass
 
 
 def command(page, label):
@@ -88,6 +98,7 @@ def test_a_bone_is_clicked_dragged_typed_and_undone(page, browser):
     assert page.source.report.paused and page.source.frame.time == 0
     browser.drag_handle(editor.handles.body, (0.02, 0.1, 0.45))
     wait(lambda: editor.panel.body['position'].value == (0.02, 0.1, 0.45))
+    settled(editor)
     moved = editor.scene
     assert changes.find(moved, 'left_shin')[1].position == pytest.approx((0.02, 0.1, 0.45))
     assert page.source.frame.scene is moved
@@ -95,6 +106,7 @@ def test_a_bone_is_clicked_dragged_typed_and_undone(page, browser):
     browser.update(editor.panel.joint['limits_1'], '-5, 100')
     browser.press_button(editor.panel.update)
     wait(lambda: changes.find(editor.scene, 'left_shin')[1].mass == 7)
+    settled(editor)
     browser.update(editor.panel.joint['limits_1'], '100, -5')
     browser.press_button(editor.panel.update)
     wait(lambda: 'limits_1' in editor.panel.errors())
@@ -152,6 +164,7 @@ def test_rubbish_leaves_the_page_as_it_was(page, browser):
     assert page.editor.scene == DROP
     browser.click_body(page, 'head')
     wait(lambda: page.editor.bone == 'head')
+    settled(page.editor)
     browser.update(page.editor.panel.body['mass'], 2)
     browser.press_button(page.editor.panel.update)
     wait(lambda: changes.find(page.editor.scene, 'head')[1].mass == 2)

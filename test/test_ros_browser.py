@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from browser import READY, chromium, opened, serving
+from browser import chromium, opened, serving
 from geometry_msgs.msg import PoseArray
 from peer import Peer, end, kill, start
 from visualization_msgs.msg import InteractiveMarkerFeedback
@@ -125,9 +125,7 @@ def test_a_page_that_goes_asks_nothing_of_the_node_and_may_come_back(view, heard
     assert listener.count_subscribers('ragdoll/poses') == 2
     view.page.goto('about:blank')
     view.wait(lambda: listener.count_subscribers('ragdoll/poses') == 1)
-    view.page.goto(address)
-    view.page.wait_for_function(READY)
-    view.wait(lambda: view.bodies(SCENE) is not None)
+    view.go(address)
     hold_at_start(view)
 
 

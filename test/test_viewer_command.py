@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import urllib.request
+from pathlib import Path
 
 import pytest
 
@@ -40,18 +41,21 @@ def test_says_where_it_is_serves_and_ends_within_two_seconds(sign):
     with urllib.request.urlopen(f'http://127.0.0.1:{port}', timeout=5) as answer:
         assert answer.status == 200 and b'<html' in answer.read()
     PageClient(port)
-    begin = time.monotonic()
-    process.send_signal(sign)
-    out, error = process.communicate(timeout=10)
-    assert time.monotonic() - begin < 2
+    # A browser connects once more than it needs to, in reserve.
+    with socket.create_connection(('127.0.0.1', port)):
+        begin = time.monotonic()
+        process.send_signal(sign)
+        out, error = process.communicate(timeout=10)
+        assert time.monotonic() - begin < 2
     assert process.returncode == 0 and not out and 'Traceback' not in error
 
 
 def test_is_for_this_machine_alone_unless_told_otherwise():
     """Its socket, as Linux lists it, listens on 127.0.0.1: 0100007F."""
     process, port = start('--scene', 'drop', '--port', '0')
-    listening = [line.split()[1] for path in ('/proc/net/tcp', '/proc/net/tcp6')
-                 if os.path.exists(path) for line in open(path) if line.split()[3] == '0A']
+    listening = [line.split()[1] for path in map(Path, ('/proc/net/tcp', '/proc/net/tcp6'))
+                 if path.exists() for line in path.read_text().splitlines()
+                 if line.split()[3] == '0A']
     process.terminate()
     process.wait(10)
     assert [place for place in listening if place.endswith(f':{port:04X}')] == [
