@@ -307,6 +307,8 @@ class Remote:
 
     def _learn_if_needed(self) -> None:
         """Ask what the node simulates, until it is known; called again and again."""
+        if time.monotonic() - self._heard > SILENCE:
+            self._hands.forget()
         self._hands.keep()
         if self._description is not None and not self._learned:
             self._ask.parameters((BONE_NAMES, *SPECS), self._learn)
@@ -326,6 +328,7 @@ class Remote:
             self._problem = f'what the node simulates is not clear: {error}'
             return
         if scene != self._scene:
+            self._hands.forget()
             self._scene, self._rods = scene, Rods(scene)
             self._masses = self._angles = None
         if self._pushes is None or self._pushes.scene is not self._scene:
@@ -340,6 +343,9 @@ class Remote:
         # Before the first report the node's time zero is not known.
         self._zero = stamp if self._zero is None else self._zero
         seconds = (stamp - self._zero) / SECOND
+        if self._frame is not None and seconds < self._frame.time:
+            # A reset, or a node that was started again.
+            self._hands.forget()
         rods, masses = None, self._masses
         if masses is not None and self._rods is not None and len(masses) == self._rods.count:
             rods = self._rods.between(masses, state)
