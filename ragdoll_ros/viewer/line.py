@@ -4,7 +4,6 @@ from __future__ import annotations
 import asyncio
 
 import viser
-from websockets.exceptions import ConnectionClosed
 
 PERIOD = 0.5
 """s from an answer to the next question."""
@@ -21,13 +20,17 @@ async def is_dead(client: viser.ClientHandle) -> None:
     """
     # Viser has no public way to a client's connection.
     connections = client._viser_server._websock_server._live_connections
-    try:
-        while (connection := connections.get(client.client_id)) is not None:
-            await asyncio.wait_for(_answer(connection), PATIENCE)
-            await asyncio.sleep(PERIOD)
-    except (asyncio.TimeoutError, ConnectionClosed):
-        return
+    while (connection := connections.get(client.client_id)) is not None:
+        answer = asyncio.ensure_future(_answer(connection))
+        try:
+            await asyncio.wait([answer], timeout=PATIENCE)
+        finally:
+            answer.cancel()
+        if not answer.done() or answer.exception() is not None:
+            return
+        await asyncio.sleep(PERIOD)
 
 
 async def _answer(connection: object) -> None:
+    """Ping; websockets' ConnectionClosed if there is nobody."""
     await (await connection.ping())
