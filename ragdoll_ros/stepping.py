@@ -43,7 +43,7 @@ class Accuracy:
     """Order of the flight's Runge-Kutta method; 0: the engine's own step in flight too."""
     flight_turn: float
     """rad that the fastest bone may turn in one Runge-Kutta step."""
-    longest: float = 0.1
+    longest: float = 0.05
     """s of flight that are gone through in one step at the most; 0: a tick."""
     land: bool = True
     """A flight goes up to the instant at which a joint reaches its limit; otherwise the engine
