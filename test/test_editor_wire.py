@@ -7,6 +7,7 @@ import pytest
 viser = pytest.importorskip('viser')
 
 from page_client import PageClient, wait  # noqa: E402
+from test_editor import RUBBISH  # noqa: E402
 from test_fit_broken import BROKEN  # noqa: E402
 from viser import _messages  # noqa: E402
 
@@ -145,13 +146,16 @@ def test_a_character_is_uploaded_and_its_skin_shown(page, browser):
 
 
 def test_rubbish_leaves_the_page_as_it_was(page, browser):
+    """The doll falls on meanwhile, in the same process."""
     files = page.editor.files
-    for number, (name, content) in enumerate(BROKEN.items()):
-        if number % 8 == 0:
-            button = (files.fit_button, files.upload_button)[number // 8 % 2]
-            browser.upload(button, f'{number}_{name}', content)
-            wait(lambda number=number: f'{number}_' in files.said.content
-                 and 'expected' in files.said.content)
+    wait(lambda: page._frame is not None)
+    for number, (name, content) in enumerate([*list(BROKEN.items())[::8], *RUBBISH.items()]):
+        button = (files.fit_button, files.upload_button)[number % 2]
+        before = page.source.frame.time
+        browser.upload(button, f'{number}_{name}', content)
+        wait(lambda number=number: f'{number}_' in files.said.content
+             and 'expected' in files.said.content)
+        wait(lambda before=before: page.source.frame.time > before)
     # Values that no field can have, buttons that are none.
     for handle, value in ((page.editor.panel.body['mass'], 'x'), (page.editor.panel.bone, 'nobody'),
                           (page.editor.panel.body['size'], [1]), (files.name, None),

@@ -282,6 +282,23 @@ def test_garbage_on_the_socket_hurts_nobody_else(page, data, caplog):
     wait(lambda: stays.windows > before + 3)
 
 
+@pytest.mark.parametrize('phase', ['start', 'update'])
+@pytest.mark.parametrize('number', [np.nan, np.inf, 1e300])
+def test_a_pointer_that_points_nowhere_moves_nothing(page, phase, number):
+    client = page.open()
+    wait(lambda: page._frame)
+    node, bone, place = batch_of(page, 'head')
+    if phase == 'update':
+        client.drag(node, 'start', place, place, bone)
+        wait(lambda: page._frame.held)
+    client.drag(node, phase, place if phase == 'update' else (number,) * 3, (number,) * 3, bone)
+    client.drag(node, 'end', place, place, bone)
+    since = page._frame.time
+    wait(lambda: not page._frame.held and page._frame.time > since + 0.1)
+    assert np.isfinite(page._frame.state.positions).all()
+    assert np.abs(page._frame.state.positions).max() < 10
+
+
 def test_a_click_chooses_the_bone_for_the_editor(page):
     from viser import _messages
     client = page.open()
