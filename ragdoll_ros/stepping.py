@@ -63,11 +63,11 @@ class Accuracy:
     """Stop the engine when all is at rest."""
 
 
-DRAFT = Accuracy(turn=0.15, limit=0.1, contact=4, settled=2, sink=0.01, most=32, order=2,
-                 flight_turn=0.4, land=False, redo=math.radians(8))
-NORMAL = Accuracy(turn=0.06, limit=0.05, contact=6, settled=4, sink=0.005, most=128, order=3,
-                  flight_turn=0.4, redo=math.radians(3))
-EXACT = Accuracy(turn=0.02, limit=0.02, contact=12, settled=8, sink=0.002, most=256, order=4,
+DRAFT = Accuracy(turn=0.3, limit=0.15, contact=2, settled=1, sink=0.01, most=32, order=2,
+                 flight_turn=0.4, land=False, redo=math.radians(6))
+NORMAL = Accuracy(turn=0.1, limit=0.06, contact=6, settled=2, sink=0.004, most=128, order=3,
+                  flight_turn=0.4, redo=math.radians(2.5))
+EXACT = Accuracy(turn=0.04, limit=0.03, contact=6, settled=3, sink=0.0015, most=256, order=4,
                  flight_turn=0.2, redo=math.radians(1.5))
 ACCURACIES = {'draft': DRAFT, 'normal': NORMAL, 'exact': EXACT}
 
