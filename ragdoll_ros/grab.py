@@ -152,7 +152,7 @@ class Hands:
         """Loads of all hands for the next ``duration`` s; ``free``: see mobility()."""
         for hand in self._hands.values():
             if hand.fresh <= 0:
-                turn = rotation.matrix(state.orientations[hand.bone])
+                turn = state.turns[hand.bone]
                 hand.mobility = turn.T @ mobility(free, coordinates, hand.bone, hand.point) @ turn
                 hand.fresh = FRESH
         dolls = [self._doll_of[hand.bone] for hand in self._hands.values()]
@@ -168,7 +168,7 @@ class Hands:
         number, as their pulls add up.
         """
         stiffness, damping = mass * FREQUENCY ** 2, 2 * mass * FREQUENCY
-        turn = rotation.matrix(state.orientations[hand.bone])
+        turn = state.turns[hand.bone]
         arm = turn @ hand.point
         velocity = state.linear[hand.bone] + cross(state.angular[hand.bone], arm)
         velocity += h * self._gravity

@@ -98,27 +98,36 @@ class Guard:
             groups[groups == groups[b]] = groups[a]
         return groups
 
-    def momentum_due(self, before: Motion, after: Motion, state: State, duration: float,
-                     impulse: np.ndarray, moment: np.ndarray | None) -> Shift:
-        """Tell what dolls in the air lack of the momentum, and of the way, that they must have.
+    def momentum_due(self, before: Motion, after: Motion, duration: float,
+                     impulse: np.ndarray | float = 0.0,
+                     moment: np.ndarray | float | None = 0.0) -> tuple[Shift, Motion]:
+        """Tell what dolls in the air lack of the momentum, and of the way, that they must have,
+        and their motion with it.
 
         ``impulse`` (d, 3) N s and ``moment`` (d, 3) N m s are what pushes gave; no moment: the
         angular momentum is left as it is. The lack is made up by a motion of the whole doll as
-        one rigid body, with a spin Ic^-1 dL, so that no joint notices.
+        one rigid body, with a spin Ic^-1 dL, so that no joint notices. It adds P v + M v v / 2 to
+        the kinetic energy, and L w + w I w / 2 about the centre of mass.
         """
         masses = self._mechanics.doll_masses[:, None]
-        impulse = impulse + masses * self._gravity * duration
-        way = before.centre + (before.momentum + impulse / 2) * duration / masses - after.centre
-        linear = (before.momentum + impulse - after.momentum) / masses
-        spin, inertia = np.zeros_like(linear), np.zeros((len(linear), 3, 3))
-        missing = np.zeros_like(linear) if moment is None else before.spin + moment - after.spin
-        for doll in np.flatnonzero(missing.any(axis=1)):
-            inertia[doll] = self._mechanics.locked_inertia(state, after, doll)
-            spin[doll] = np.linalg.solve(inertia[doll], missing[doll])
-        return Shift(way, linear, spin, after.centre, inertia)
+        momentum = before.momentum + impulse + masses * (self._gravity * duration)
+        centre = before.centre + (before.momentum + momentum) * (duration / 2 / masses)
+        linear = (momentum - after.momentum) / masses
+        gained = (momentum + after.momentum) * linear
+        if moment is None:
+            moment, turned = after.spin, np.zeros_like(linear)
+        else:
+            moment = before.spin + moment
+            lack = moment - after.spin
+            turned = np.linalg.solve(after.inertia, lack[:, :, None])[:, :, 0]
+            gained += (moment + after.spin) * turned
+        kinetic = after.kinetic + gained.sum(axis=1) / 2
+        energy = kinetic - self._mechanics.doll_masses * (centre @ self._gravity)
+        return (Shift(centre - after.centre, linear, turned),
+                Motion(energy, kinetic, centre, momentum, moment, after.inertia))
 
     def without_surplus(self, before: Coordinates, coordinates: Coordinates, motion: Motion,
-                        state: State, surplus: np.ndarray, touched: bool) -> Coordinates:
+                        surplus: np.ndarray, touched: bool) -> Coordinates:
         """Take ``surplus`` (d,) J out of the dolls' motion.
 
         Each doll keeps its momentum and angular momentum: of its motion only what it does
@@ -132,8 +141,7 @@ class Guard:
         for doll in np.flatnonzero(surplus > 0):
             centre = motion.centre[doll]
             linear = motion.momentum[doll] / self._mechanics.doll_masses[doll]
-            spin = np.linalg.solve(self._mechanics.locked_inertia(state, motion, doll),
-                                   motion.spin[doll])
+            spin = np.linalg.solve(motion.inertia[doll], motion.spin[doll])
             rigid = 0.5 * (motion.momentum[doll] @ linear + motion.spin[doll] @ spin)
             inner = max(0.0, motion.kinetic[doll] - rigid)
             scale = math.sqrt(max(0.0, 1 - surplus[doll] / inner)) if inner > 0 else 0.0

@@ -27,8 +27,8 @@ class Motion:
     """(d, 3) N s."""
     spin: np.ndarray
     """(d, 3) N m s: angular momentum about the doll's own centre of mass."""
-    turns: np.ndarray
-    """(n, 3, 3): rotation matrix of each bone."""
+    inertia: np.ndarray
+    """(d, 3, 3) kg m^2 about that centre, as if the doll's joints were locked in its pose."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,6 @@ class Shift:
     """(d, 3) m/s, of the centres of mass."""
     spin: np.ndarray
     """(d, 3) rad/s about the centres of mass."""
-    centre: np.ndarray
-    """(d, 3) m: the centres of mass before."""
-    inertia: np.ndarray
-    """(d, 3, 3) kg m^2: the locked inertia about it; zero where there is no spin to add."""
 
 
 class Mechanics:
@@ -61,67 +57,58 @@ class Mechanics:
         self._members = (self.doll_of == np.arange(len(counts))[:, None]).astype(float)
         self._weights = self._members * self.masses
         self.doll_masses = self._weights.sum(axis=1)
-
-    def kinetic(self, state: State) -> np.ndarray:
-        """Kinetic energy of each bone, (n,) J."""
-        body = np.matmul(state.angular[:, None, :], rotation.matrix(state.orientations))[:, 0]
-        return 0.5 * (self.masses * np.einsum('ij,ij->i', state.linear, state.linear)
-                      + np.einsum('ij,ij,ij->i', self.inertias, body, body))
+        self._of_points = _sums_of_points()
 
     def energy(self, state: State) -> np.ndarray:
         """Kinetic energy plus that of height of each doll, (d,) J."""
-        height = self._weights @ (state.positions @ self.gravity)
-        return self._members @ self.kinetic(state) - height
+        return self.motion(state).energy
 
     def motion(self, state: State) -> Motion:
-        """All sums at once."""
-        turn = rotation.matrix(state.orientations)
-        body = np.matmul(state.angular[:, None, :], turn)[:, 0]
-        impulses = self.masses[:, None] * state.linear
-        moments = self.inertias * body
-        kinetic = self._members @ (0.5 * (np.einsum('ij,ij->i', impulses, state.linear)
-                                          + np.einsum('ij,ij->i', moments, body)))
-        weighted = self._weights @ state.positions
-        centre = weighted / self.doll_masses[:, None]
-        arms = state.positions - centre[self.doll_of]
-        own = np.matmul(turn, moments[:, :, None])[:, :, 0]
-        return Motion(kinetic - weighted @ self.gravity, kinetic, centre,
-                      self._members @ impulses, self._members @ (own + cross(arms, impulses)),
-                      turn)
-
-    def shifted(self, state: State, shift: Shift) -> State:
-        """Give the state after each doll is moved on and set in motion as one rigid body."""
-        doll = self.doll_of
-        arms = state.positions - shift.centre[doll]
-        return State(state.positions + shift.way[doll], state.orientations,
-                     state.linear + shift.linear[doll] + cross(shift.spin[doll], arms),
-                     state.angular + shift.spin[doll])
-
-    def shifted_motion(self, motion: Motion, shift: Shift) -> Motion:
-        """Give the sums after such a shift: a rigid motion adds P v + M v v / 2 to the kinetic
-        energy, and L w + w I w / 2 about the centre of mass.
-        """
-        masses = self.doll_masses[:, None]
-        gained = np.matmul(shift.inertia, shift.spin[:, :, None])[:, :, 0]
-        kinetic = motion.kinetic + (
-            (motion.momentum + masses * shift.linear / 2) * shift.linear
-            + (motion.spin + gained / 2) * shift.spin).sum(axis=1)
-        centre = motion.centre + shift.way
+        """All sums at once: of each bone as a point at its centre of mass, plus its own turning."""
+        count, turns = len(self.masses), state.turns
+        inertias = np.matmul(turns * self.inertias[:, None, :], turns.transpose(0, 2, 1))
+        spins = np.matmul(inertias, state.angular[:, :, None])[:, :, 0]
+        energies = (spins * state.angular).sum(axis=1, keepdims=True) / 2
+        own = np.concatenate([energies, spins, inertias.reshape(count, 9)], axis=1)
+        centre = self._weights @ state.positions / self.doll_masses[:, None]
+        point = np.concatenate([state.positions - centre[self.doll_of], state.linear], axis=1)
+        squares = (point[:, :, None] * point[:, None, :]).reshape(count, 36)
+        sums = self._members @ own + self._weights @ squares @ self._of_points
+        kinetic = sums[:, 0]
         return Motion(kinetic - self.doll_masses * (centre @ self.gravity), kinetic, centre,
-                      motion.momentum + masses * shift.linear, motion.spin + gained,
-                      motion.turns)
+                      self._weights @ state.linear, sums[:, 1:4], sums[:, 4:].reshape(-1, 3, 3))
 
-    def locked_inertia(self, state: State, motion: Motion, doll: int) -> np.ndarray:
-        """Inertia (3, 3) kg m^2 about its centre of mass of a doll as if its joints were locked.
+    def shifted(self, state: State, motion: Motion, shift: Shift) -> State:
+        """Give the state after each doll is moved on and set in motion as one rigid body."""
+        rows = (shift.way, shift.linear, shift.spin, motion.centre,
+                (shift.spin @ _CROSS).reshape(-1, 3, 3))
+        if len(shift.way) > 1:
+            rows = tuple(row[self.doll_of] for row in rows)
+        way, linear, spin, centre, turning = rows
+        turned = np.matmul((state.positions - centre)[:, None, :], turning)[:, 0]
+        return State(state.positions + way, state.orientations, state.linear + linear + turned,
+                     state.angular + spin)
 
-        Steiner's theorem: the sum of R I R^T + m (r r 1 - r r^T) over its bones.
-        """
-        own = slice(self.starts[doll], self.starts[doll] + int(self._members[doll].sum()))
-        turn = motion.turns[own]
-        turned = np.matmul(turn * self.inertias[own, None, :], turn.transpose(0, 2, 1))
-        arms = state.positions[own] - motion.centre[doll]
-        outer = arms.T @ (self.masses[own, None] * arms)
-        return turned.sum(axis=0) + np.trace(outer) * np.eye(3) - outer
+
+_CROSS = np.array([[0, 0, 0, 0, 0, 1, 0, -1, 0], [0, 0, -1, 0, 0, 0, 1, 0, 0],
+                   [0, 1, 0, -1, 0, 0, 0, 0, 0]], float)
+"""(3, 9) takes w to the matrix M with r M = w x r for rows r."""
+
+
+def _sums_of_points() -> np.ndarray:
+    """Matrix (36, 13) that takes all products z_i z_j of z = (r, v), position and velocity of a
+    unit mass, to its kinetic energy v v / 2 (1), angular momentum r x v (3), and its inertia
+    r r 1 - r r^T (9, Steiner's theorem).
+    """
+    table = np.zeros((6, 6, 13))
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        table[3 + i, 3 + i, 0] = 0.5
+        table[j, 3 + k, 1 + i], table[k, 3 + j, 1 + i] = 1, -1
+        for other in (j, k):
+            table[other, other, 4 + 4 * i] = 1
+            table[i, other, 4 + 3 * i + other] = -1
+    return table.reshape(36, 13)
 
 
 def damping_rate(scene: Scene) -> float:

@@ -5,7 +5,6 @@ import math
 
 import numpy as np
 
-from . import rotation
 from .engine.protocol import GROUND
 from .ragdoll import Bone, Box, Sphere
 from .scene import Scene
@@ -27,16 +26,20 @@ class Reach:
         self._normal = np.array(scene.ground.normal if scene.ground else (0, 0, 1))
         counts = [len(placement.doll.bones) for placement in scene.dolls]
         self._bounds = np.cumsum([0, *counts])
+        self._last: tuple[State | None, np.ndarray] = (None, np.zeros(0))
+        """The heights told last, and of which state."""
 
     def heights(self, state: State) -> np.ndarray:
         """Distances (n,) m of the bones' lowest points from the ground; infinity without one."""
         if self._ground is None:
             return np.full(len(self._radii), math.inf)
-        down = np.abs(self._normal @ rotation.matrix(state.orientations))
-        across = np.sqrt(np.maximum(0, 1 - down[:, 2] ** 2))
-        boxes, along, rounds, rims = self._sizes[:, :3], *self._sizes[:, 3:].T
-        reach = (boxes * down).sum(axis=1) + along * down[:, 2] + rounds + rims * across
-        return state.positions @ self._normal - self._ground.offset - reach
+        if self._last[0] is not state:
+            down = np.abs(self._normal @ state.turns)
+            across = np.sqrt(np.maximum(0, 1 - down[:, 2] ** 2))
+            boxes, along, rounds, rims = self._sizes[:, :3], *self._sizes[:, 3:].T
+            reach = (boxes * down).sum(axis=1) + along * down[:, 2] + rounds + rims * across
+            self._last = (state, state.positions @ self._normal - self._ground.offset - reach)
+        return self._last[1]
 
     def clearance(self, state: State) -> float:
         """Distance, m, that all bones keep from the ground at the least: a lower bound if far."""
@@ -72,11 +75,14 @@ class Reach:
                     np.logical_or.reduceat(low, self._bounds[:-1]))}
         return found if len(self._bounds) == 2 else found | self._close(state.positions, far)
 
+    def closing(self, state: State) -> float:
+        """Largest difference, m/s, of two bones' speeds along one of the axes."""
+        low, high = state.linear.min(axis=0), state.linear.max(axis=0)
+        return float((high - low).max())
+
     def strides(self, state: State, duration: float) -> int:
         """Parts of ``duration`` s in each of which no bone passes another's half thickness."""
-        middle = state.linear.mean(axis=0)
-        speed = np.abs(state.linear - middle).max()
-        return max(1, math.ceil(speed * duration / (2 * self._thinnest)))
+        return max(1, math.ceil(self.closing(state) * duration / (4 * self._thinnest)))
 
     def _close(self, positions: np.ndarray, far: np.ndarray) -> set[tuple[int, int]]:
         """Pairs of dolls whose boxes, ``far`` m wider, overlap."""

@@ -194,7 +194,8 @@ class Simulation:
 
     def advance(self) -> State:
         """Go on by one tick."""
-        self.effort = self._stepper.effort = Effort()
+        self._stepper.begin_tick()
+        self.effort = self._stepper.effort
         end = self.time + self.tick
         while self.time < end:
             self._go(min(end, self._next_change()))
@@ -343,20 +344,24 @@ class Simulation:
 
     def _keep_momentum(self, before: Motion, duration: float, loads: list[Load],
                        state: State) -> None:
-        impulse = np.zeros_like(before.momentum)
-        moment = np.zeros_like(before.momentum)
-        steady = True
+        impulse = moment = 0.0
+        if loads:
+            impulse, moment = self._given(loads, duration, state)
+        after = self._motion
+        shift, self._motion = self._guard.momentum_due(before, after, duration, impulse, moment)
+        self._state = self.mechanics.shifted(self._state, after, shift)
+        self._stepper.shift(self._state)
+
+    def _given(self, loads: list[Load], duration: float,
+               before: State) -> tuple[np.ndarray, np.ndarray | None]:
+        """Impulse (d, 3) N s and moment (d, 3) N m s of loads; no moment where a force has one."""
+        impulse, moment = np.zeros((2, len(self.scene.dolls), 3))
         for load in loads:
             doll = self.mechanics.doll_of[load.bone]
-            force, torque = self._mean_load(load, state)
+            force, torque = self._mean_load(load, before)
             impulse[doll] += force * duration
             moment[doll] += torque * duration
-            steady = steady and not load.force.any()
-        shift = self._guard.momentum_due(before, self._motion, self._state, duration, impulse,
-                                         moment if steady else None)
-        self._state = self.mechanics.shifted(self._state, shift)
-        self._motion = self.mechanics.shifted_motion(self._motion, shift)
-        self._stepper.shift(shift, self._state)
+        return impulse, None if any(load.force.any() for load in loads) else moment
 
     def _keep_energy(self, start: Coordinates, near: set[tuple[int, int]]) -> None:
         """Take out energy from nothing; what was in the air keeps its momentum for sure.
@@ -369,7 +374,7 @@ class Simulation:
         if (surplus > 0).any():
             stepper = self._stepper
             self._correct(guard.without_surplus(
-                start, stepper.coordinates, self._motion, self._state, surplus, bool(near)))
+                start, stepper.coordinates, self._motion, surplus, bool(near)))
             burst = guard.burst(self._motion, groups)
             if burst.any():
                 self._correct(guard.stopped(start, stepper.coordinates, burst))
@@ -387,14 +392,14 @@ class Simulation:
         for load in loads:
             bone = load.bone
             force, torque = self._mean_load(load, before)
-            places, speeds = zip(*(_point(state, bone, load.point) for state in (before, after)),
-                                 strict=True)
-            turn = rotation.multiply(after.orientations[bone],
-                                     rotation.inverse(before.orientations[bone]))
-            lead = substep / 2 * (speeds[1] - speeds[0])
-            lead_turn = substep / 2 * (after.angular[bone] - before.angular[bone])
-            done = (force @ (places[1] - places[0] - lead)
-                    + torque @ (rotation.rotation_vector(turn) - lead_turn))
+            (place, speed), (end, end_speed) = (_point(state, bone, load.point)
+                                                for state in (before, after))
+            done = force @ (end - place - substep / 2 * (end_speed - speed))
+            if torque.any():
+                turn = rotation.multiply(after.orientations[bone],
+                                         rotation.inverse(before.orientations[bone]))
+                lead = substep / 2 * (after.angular[bone] - before.angular[bone])
+                done += torque @ (rotation.rotation_vector(turn) - lead)
             work[self.mechanics.doll_of[bone]] += done
             if isinstance(load, Pull):
                 self._grabbed += float(done)
@@ -404,8 +409,7 @@ class Simulation:
         """Force and torque in world axes, of a local load the mean of its start and end."""
         if not load.local:
             return load.force, load.torque
-        turns = (before.orientations[load.bone], self._state.orientations[load.bone])
-        mean = sum(rotation.matrix(turn) for turn in turns) / 2
+        mean = (before.turns[load.bone] + self._state.turns[load.bone]) / 2
         return mean @ load.force, mean @ load.torque
 
     def _load(self, active: _Active) -> Load:
@@ -460,6 +464,8 @@ def resolve_accuracy(accuracy: str | Accuracy) -> Accuracy:
 
 def _point(state: State, bone: int, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Position (3,) m and velocity (3,) m/s of a point of a bone, given along its axes."""
-    arm = rotation.rotate(state.orientations[bone], point)
+    if not point.any():
+        return state.positions[bone], state.linear[bone]
+    arm = state.turns[bone] @ point
     return (state.positions[bone] + arm,
             state.linear[bone] + cross(state.angular[bone], arm))

@@ -2,8 +2,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+
+from . import rotation
 
 
 @dataclass(frozen=True)
@@ -22,3 +25,8 @@ class State:
     """(n, 3) m/s, of the centre of mass."""
     angular: np.ndarray
     """(n, 3) rad/s, world axes."""
+
+    @cached_property
+    def turns(self) -> np.ndarray:
+        """(n, 3, 3): the rotation matrices of the orientations."""
+        return rotation.matrix(self.orientations)

@@ -16,8 +16,8 @@ import numpy as np
 
 from .coordinates import Coordinates
 from .engine.protocol import GROUND, Engine, Load
-from .flight import fly
-from .mechanics import Shift, cross, damping_rate
+from .flight import Path, fly
+from .mechanics import damping_rate
 from .reach import Reach
 from .scene import Scene
 from .state import State
@@ -43,6 +43,8 @@ class Accuracy:
     """Order of the flight's Runge-Kutta method; 0: the engine's own step in flight too."""
     flight_turn: float
     """rad that the fastest bone may turn in one Runge-Kutta step."""
+    longest: float = 0.1
+    """s of flight that are gone through in one step at the most; 0: a tick."""
     redo: float = math.radians(1.0)
     """rad past a limit from which a step is done again, four times as fine, as it is when a bone
     sinks deeper than ``sink``; infinity: never."""
@@ -59,7 +61,7 @@ class Accuracy:
 
 
 DRAFT = Accuracy(turn=0.15, limit=0.1, contact=4, settled=2, sink=0.01, most=32, order=2,
-                 flight_turn=0.8, redo=math.radians(8))
+                 flight_turn=0.4, redo=math.radians(8))
 NORMAL = Accuracy(turn=0.06, limit=0.05, contact=6, settled=4, sink=0.005, most=128, order=3,
                   flight_turn=0.4, redo=math.radians(3))
 EXACT = Accuracy(turn=0.02, limit=0.02, contact=12, settled=8, sink=0.002, most=256, order=4,
@@ -88,8 +90,11 @@ SOON = 0.015
 LANDED = 1e-6
 """m or rad by which a flight may end past the ground or a limit."""
 
-MOST_SECANTS = 4
-"""Flights that may be spent on finding the instant of a touch."""
+MET = 2e-5
+"""m by which bones may overlap where a flight ends because they touch."""
+
+MOST_LOOKS = 30
+"""Looks at a path that may be spent on finding the instant of a touch; some five are."""
 
 MOST_FLIGHTS = 12
 """Runge-Kutta steps in a tick at the most: from there on the engine's own cost less."""
@@ -100,6 +105,9 @@ FINER = 3
 STIFFEST = 1.5
 """Step times the fastest rate at which damping ends a motion: from 2 on, explicit steps make
 energy of it."""
+
+LAG = 0.1
+"""Share of a motion that joint damping may take away before the engine hears that it is slower."""
 
 SHORTEST = 1e-7
 """s: a piece of flight shorter than this is not worth its stages."""
@@ -132,15 +140,16 @@ class Stepper:
 
     def __init__(self, scene: Scene, make_engine: type[Engine],
                  accuracy: Accuracy) -> None:
-        self.accuracy = accuracy
+        self._accuracy = accuracy
         self.engine = make_engine(scene)
         self._make_free = functools.partial(make_engine, scene, free=True)
         self._free = self._make_free() if accuracy.order else None
         self.reach = Reach(scene)
         self._layout = self.engine.layout
         self._normal = np.array(scene.ground.normal if scene.ground else (0.0, 0.0, 1.0))
-        self._damped = any(joint.damping for placement in scene.dolls
-                           for joint in placement.doll.joints)
+        counts = np.cumsum([0, *(len(placement.doll.bones) for placement in scene.dolls)])
+        self._roots = np.array([start + placement.doll.bones.index(placement.doll.root)
+                                for start, placement in zip(counts[:-1], scene.dolls, strict=True)])
         self._fading = damping_rate(scene)
         self._stale: bool
         """Whether the engine has yet to hear of a shift."""
@@ -152,8 +161,24 @@ class Stepper:
         """Where the tick began."""
         self._flown: list[tuple[float, Sequence[Load]]] | None
         """Durations, s, and loads of the tick's flights; None: it was not all flight."""
+        self._path: Path | None
+        """The step of a flight that is under way: it may lead over many ticks."""
+        self._along: float
+        """s: where on the path."""
+        self._loaded = False
+        """Whether it is a path under loads, which ends with the piece."""
         self.effort = Effort()
         self.begin()
+
+    @property
+    def accuracy(self) -> Accuracy:
+        """How fine; may be changed between pieces."""
+        return self._accuracy
+
+    @accuracy.setter
+    def accuracy(self, accuracy: Accuracy) -> None:
+        if accuracy is not self._accuracy:
+            self._accuracy, self._path = accuracy, None
 
     @property
     def free(self) -> Engine:
@@ -164,13 +189,15 @@ class Stepper:
 
     def look(self) -> None:
         """Read where the engine is."""
-        self.state: State = self.engine.read()
-        self.coordinates: Coordinates = self.engine.coordinates()
+        self.state: State
+        self.coordinates: Coordinates
+        self.state, self.coordinates = self.engine.look()
         self.touching = self.engine.touching()
 
     def begin(self) -> None:
         """Start from where the engine is, and forget what was before."""
         self._stale = self._blocked = False
+        self._path = None
         self._past_at = (None, np.zeros(0))
         self._flown = None
         self._held = np.zeros(len(self._layout.limits[0]), bool)
@@ -178,22 +205,22 @@ class Stepper:
 
     def place(self, coordinates: Coordinates) -> None:
         """Put the scene elsewhere; what touches stays as it was."""
-        self.engine.place(coordinates)
-        self._stale = False
-        self.coordinates = coordinates
-        self.state = self.engine.read()
+        self._path = None
+        self._set(coordinates)
 
-    def shift(self, shift: Shift, state: State) -> None:
-        """Move dolls on as rigid bodies, to where they are in ``state``; the engine hears of it
-        when it is next needed.
+    def shift(self, state: State) -> None:
+        """Take ``state``, to which dolls were moved on as rigid bodies without a turn; the engine
+        hears of it when it is next needed.
         """
         layout = self._layout
         q, v = self.coordinates.q.copy(), self.coordinates.v.copy()
-        arms = q[layout.root_positions] - shift.centre
-        q[layout.root_positions] += shift.way
-        v[layout.root_velocities] += shift.linear + cross(shift.spin, arms)
-        v[layout.root_spins] += shift.spin
+        q[layout.root_positions] = state.positions[self._roots]
+        v[layout.root_velocities] = state.linear[self._roots]
+        v[layout.root_spins] = state.angular[self._roots]
+        past = self._past_at[1] if self._past_at[0] is self.coordinates else None
         self.coordinates, self.state, self._stale = Coordinates(q, v), state, True
+        if past is not None:
+            self._past_at = (self.coordinates, past)
 
     def settle(self) -> Engine:
         """Give the engine, with the dolls in it where they are."""
@@ -202,18 +229,20 @@ class Stepper:
             self._stale = False
         return self.engine
 
+    def begin_tick(self) -> None:
+        """Count efforts, and note what is flown, from here on."""
+        self.effort = Effort()
+        self._departure, self._flown = self.coordinates, []
+
     def go(self, duration: float, loads: Sequence[Load]) -> Piece:
         """Move on by ``duration`` s, or by less: up to the next touch or limit in a flight."""
-        if not (self.effort.flights or self.effort.substeps):
-            self._departure, self._flown = self.coordinates, []
         if self._may_fly():
             flown = self._fly(duration, loads)
             if flown > 0:
                 if self._flown is not None:
                     self._flown.append((flown, loads))
                 return Piece(flown, 0.0)
-        self._blocked = False
-        self._flown = None
+        self._path = self._flown = None
         return Piece(duration, self._step(duration, loads))
 
     def estimate_error(self) -> float | None:
@@ -224,7 +253,7 @@ class Stepper:
         """
         if not self._flown:
             return None
-        coordinates, steps = self._departure, FINER * self.effort.flights
+        coordinates, steps = self._departure, FINER * max(1, self.effort.flights)
         for duration, loads in self._flown:
             coordinates = fly(self._free, coordinates, duration, 4, steps, loads)
         self._free.place(coordinates)
@@ -251,60 +280,115 @@ class Stepper:
 
     def _fly(self, duration: float, loads: Sequence[Load]) -> float:
         """Fly up to ``duration`` s; give the time flown, 0 where something comes in between."""
-        steps = max(self._flight_steps(duration), self.reach.strides(self.state, duration))
-        if steps > MOST_FLIGHTS:
+        if loads or self._loaded:
+            self._path, self._loaded = None, bool(loads)
+        parts = self.reach.strides(self.state, duration)
+        if not self._leads_on(duration):
+            parts = max(parts, math.ceil(duration / self._longest_step()))
+        if parts > MOST_FLIGHTS:
             return 0.0
-        piece = duration / steps
-        flown = 0.0
+        stretch, flown = duration / parts, 0.0
         while flown < duration * (1 - 1e-9):
-            start, state, least = self.coordinates, self.state, self._room()
-            self._fly_to(fly(self._free, start, piece, self.accuracy.order, 1, loads))
-            self.effort.flights += 1
+            start, state = self.coordinates, self.state
+            self._onward(stretch, duration - flown if loads else self.accuracy.longest, loads)
+            begin = self._along
+            self._fly_to(begin + stretch)
             room = self._room()
             if room >= 0 and not self.touching:
-                flown += piece
+                flown += stretch
+                self._along += stretch
                 continue
             self._held |= self._past() > 0
-            if least > 0 > room:
-                early = self._land(start, piece, least, room, loads)
-                if early > 0:
-                    return flown + early
+            early, least = stretch, self._room(start, state)
+            if room < 0:
+                early = self._land(begin, stretch, least, room) if least > 0 else 0.0
+            early = self._meet(begin, early)
+            self._path = None
+            if early > SHORTEST:
+                return flown + early
             self._back_to(start, state, set())
             self._blocked = True
             return flown
         return duration
 
-    def _land(self, start: Coordinates, piece: float, least: float, room: float,
-              loads: Sequence[Load]) -> float:
-        """Fly to where a limit or the ground is just reached, by secants; give the time, s.
+    def _leads_on(self, stretch: float) -> bool:
+        """Tell whether a path is under way that leads on by ``stretch`` s."""
+        path = self._path
+        return path is not None and self._along + stretch <= path.duration * (1 + 1e-9)
 
-        Zero if that does not come out, or if bones overlap there: within the rest of the tick,
-        which may be a sliver, they would burst apart. The end is a hair past it: the engine takes
-        a gap that is left for room to move in within its first substep, and would eat that much
-        of a bounce.
+    def _onward(self, stretch: float, longest: float, loads: Sequence[Load]) -> None:
+        """See that the path leads on from here by ``stretch`` s at the least.
+
+        A new one is as many stretches long as speeds allow, and fit into ``longest`` s.
         """
-        early, late = 0.0, piece
-        for _ in range(MOST_SECANTS):
-            closing = (least - room) / (late - early)
-            time = min(max(early + (least + LANDED / 2) / closing, early), late)
-            if time <= SHORTEST:
-                return 0.0
-            self._fly_to(fly(self._free, start, time, self.accuracy.order, 1, loads))
-            self.effort.flights += 1
-            reached = self._room()
-            if any(GROUND not in pair for pair in self.touching):
-                return 0.0
-            if -LANDED <= reached <= 0:
-                return time
-            if reached > 0:
-                early, least = time, reached
-            else:
-                late, room = time, reached
-        return time if reached > -AT_LIMIT else 0.0
+        if self._leads_on(stretch):
+            return
+        path = self._path
+        over = path is not None and self._along > path.duration * (1 - 1e-9)
+        count = max(1, math.floor(min(longest, self._longest_step()) / stretch * (1 + 1e-9)))
+        self._path = Path(self._free, self.coordinates, stretch * count, self.accuracy.order,
+                          loads, after=path if over else None)
+        self._along = 0.0
+        self.effort.flights += 1
 
-    def _fly_to(self, end: Coordinates) -> None:
-        self.place(end)
+    def _land(self, begin: float, stretch: float, least: float, room: float) -> float:
+        """Go back along the path to where a limit or the ground is just reached; give the time, s.
+
+        ``least`` > 0 > ``room`` (rad or m) are there where the stretch begins and ends. The end is
+        a hair past the touch: the engine takes a gap that is left for room to move in within its
+        first substep, and would eat that much of a bounce. Zero if that does not come out.
+        """
+        grounded = self.reach.clearance(self.state) < 0
+        early, late = 0.0, stretch
+        above, below = least + LANDED / 2, room + LANDED / 2
+        for _ in range(MOST_LOOKS):
+            time = (early * below - late * above) / (below - above)
+            if grounded:
+                self._fly_to(begin + time)
+                off = self._room() + LANDED / 2
+            else:
+                past = self._layout.past_limits(self._path.at(begin + time).q)
+                off = LANDED / 2 - float(past.max())
+            if abs(off) <= LANDED / 2:
+                self._fly_to(begin + time)
+                return time
+            # Regula falsi, by halves where one end stays (Dowell and Jarratt, BIT 11, 1971).
+            if off * below < 0:
+                early, above = late, below
+            else:
+                above /= 2
+            late, below = time, off
+        return 0.0
+
+    def _meet(self, begin: float, late: float) -> float:
+        """Go back along the path to where bones begin to touch, if they do; give the time, s.
+
+        By bisection, down to a depth that the engine's way of pushing bones apart, depth over
+        LIMIT_RETURN, makes no speed of.
+        """
+        if not any(GROUND not in pair for pair in self.touching):
+            return late
+        early, speed = 0.0, self.reach.closing(self.state)
+        while (late - early) * speed > MET:
+            time = (early + late) / 2
+            self._fly_to(begin + time)
+            if any(GROUND not in pair for pair in self.touching):
+                late = time
+            else:
+                early = time
+        self._fly_to(begin + late)
+        return late
+
+    def _fly_to(self, time: float) -> None:
+        """Go to where the path is ``time`` s after its start."""
+        self._set(self._path.at(time))
         self.touching = self.engine.touching()
+
+    def _set(self, coordinates: Coordinates) -> None:
+        self.engine.place(coordinates)
+        self._stale = False
+        self.coordinates = coordinates
+        self.state = self.engine.read()
 
     def _back_to(self, start: Coordinates, state: State,
                  touching: set[tuple[int, int]]) -> None:
@@ -312,17 +396,18 @@ class Stepper:
         self._stale = False
         self.coordinates, self.state, self.touching = start, state, touching
 
-    def _room(self) -> float:
+    def _room(self, coordinates: Coordinates | None = None, state: State | None = None) -> float:
         """Room (rad or m) to the nearest limit or the ground; below zero: past it."""
-        past = self._past()
+        past = self._layout.past_limits(coordinates.q) if coordinates else self._past()
         room = -float(past.max()) if len(past) else math.inf
-        return min(room, self.reach.clearance(self.state))
+        return min(room, self.reach.clearance(state or self.state))
 
-    def _flight_steps(self, duration: float) -> int:
+    def _longest_step(self) -> float:
+        """Longest step of a flight, s, that speeds and damping allow within a tick."""
         spin = math.sqrt(np.einsum('ij,ij->i', self.state.angular, self.state.angular).max())
         rate = max(spin, np.abs(self.coordinates.v[self._layout.limited[1]]).max(initial=0.0))
-        return max(1, math.ceil(rate * duration / self.accuracy.flight_turn),
-                   math.ceil(self._fading * duration / STIFFEST))
+        return min(self.accuracy.flight_turn / max(rate, 1e-9),
+                   STIFFEST / max(self._fading, 1e-9))
 
     def _step(self, duration: float, loads: Sequence[Load]) -> float:
         """Take the engine's own step, finer if it overshoots a limit; give its substep, s."""
@@ -330,6 +415,7 @@ class Stepper:
         start, state, touching = self.coordinates, self.state, self.touching
         bound = max(1.0, self.accuracy.creep * self._too_far())
         substeps = self._substeps(duration, bool(loads))
+        self._blocked = False
         most = max(1, math.ceil(self.accuracy.most * duration / 0.01))
         while True:
             self._run(duration, substeps, loads)
@@ -353,12 +439,14 @@ class Stepper:
         return max(past / self.accuracy.redo, sunk / self.accuracy.sink)
 
     def _run(self, duration: float, substeps: int, loads: Sequence[Load]) -> None:
-        """Let the engine go; what changes with the motion is looked at again each substep."""
-        if self._damped or any(load.local or load.point.any() for load in loads):
-            for _ in range(substeps):
-                self.engine.step(duration / substeps, 1, loads)
-        else:
-            self.engine.step(duration, substeps, loads)
+        """Let the engine go; what changes with the motion is looked at again now and then."""
+        calls = math.ceil(self._fading * duration / LAG)
+        if any(load.local or load.point.any() for load in loads):
+            calls = substeps
+        calls = max(1, min(calls, substeps))
+        for call in range(calls):
+            share = substeps * (call + 1) // calls - substeps * call // calls
+            self.engine.step(duration * share / substeps, share, loads)
         self.effort.substeps += substeps
         self.look()
 
@@ -377,8 +465,8 @@ class Stepper:
             near = speeds[past + SOON * speeds > 0]
             need = max(need, near.max(initial=0.0) * duration / accuracy.limit)
         falling = self.reach.falling(state, SOON)
-        if self.touching or falling:
-            moving = falling > 0.3 or spin > 1.0
+        if self.touching or falling or self._blocked:
+            moving = falling > 0.3 or spin > 1.0 or self._blocked
             need = max(need, (accuracy.contact if moving else accuracy.settled) * tens,
                        falling * duration / accuracy.sink)
         most = max(1, math.ceil(accuracy.most * tens))

@@ -120,34 +120,27 @@ class BulletEngine:
 
     def read(self) -> State:
         """Poses and velocities of all bones."""
-        rows = []
-        for doll in self._dolls:
-            bones = []
-            if doll.children:
-                links = pybullet.getLinkStates(
-                    doll.body, doll.children, computeLinkVelocity=1,
-                    computeForwardKinematics=1, physicsClientId=self._client)
-                bones = [link[0] + link[1] + link[6] + link[7] for link in links]
-            pose = pybullet.getBasePositionAndOrientation(doll.body, self._client)
-            motion = pybullet.getBaseVelocity(doll.body, self._client)
-            bones.insert(doll.root, pose[0] + pose[1] + motion[0] + motion[1])
-            rows += bones
-        table = np.array(rows)
-        return State(table[:, 0:3], table[:, 3:7], table[:, 7:10], table[:, 10:13])
+        return _state([row for doll in self._dolls for row in self._rows(doll)])
 
     def coordinates(self) -> Coordinates:
         """Generalised coordinates of all dolls."""
+        return self.look()[1]
+
+    def look(self) -> tuple[State, Coordinates]:
+        """Both at once, in less time."""
+        rows: list[tuple] = []
         q: list[float] = []
         v: list[float] = []
         for doll in self._dolls:
-            pose = pybullet.getBasePositionAndOrientation(doll.body, self._client)
-            motion = pybullet.getBaseVelocity(doll.body, self._client)
-            q += pose[0] + pose[1]
-            v += motion[0] + motion[1]
+            own = self._rows(doll)
+            root = own[doll.root]
+            q += root[:7]
+            v += root[7:]
             for joint in self._joints(doll):
                 q += joint[0]
                 v += joint[1]
-        return Coordinates(np.array(q), np.array(v))
+            rows += own
+        return _state(rows), Coordinates(np.array(q), np.array(v))
 
     def place(self, coordinates: Coordinates) -> None:
         """Put all dolls where ``coordinates`` says."""
@@ -229,6 +222,19 @@ class BulletEngine:
             width, height, view, lens, shadow=1, lightDirection=[2, 1, 4],
             renderer=pybullet.ER_TINY_RENDERER, physicsClientId=self._client)
         return np.reshape(np.array(image[2], np.uint8), (height, width, 4))[:, :, :3]
+
+    def _rows(self, doll: _Doll) -> list[tuple]:
+        """Position, orientation, linear and angular velocity of each bone."""
+        bones = []
+        if doll.children:
+            links = pybullet.getLinkStates(
+                doll.body, doll.children, computeLinkVelocity=1, computeForwardKinematics=1,
+                physicsClientId=self._client)
+            bones = [link[0] + link[1] + link[6] + link[7] for link in links]
+        pose = pybullet.getBasePositionAndOrientation(doll.body, self._client)
+        motion = pybullet.getBaseVelocity(doll.body, self._client)
+        bones.insert(doll.root, pose[0] + pose[1] + motion[0] + motion[1])
+        return bones
 
     def _joints(self, doll: _Doll) -> tuple:
         """States of the joints that move: each (angles, rates, ...)."""
@@ -415,6 +421,11 @@ def bare_loop(scene: Scene, start: Coordinates,
                                computeForwardKinematics=1, physicsClientId=client)
 
     return tick, engine.close
+
+
+def _state(rows: list[tuple]) -> State:
+    table = np.array(rows)
+    return State(table[:, 0:3], table[:, 3:7], table[:, 7:10], table[:, 10:13])
 
 
 def _list(values: np.ndarray) -> list[float]:

@@ -88,6 +88,10 @@ class MujocoEngine:
             q[iq:iq + 4] = rotation.multiply(turn, rotation.inverse(seat))
         return Coordinates(q, self._outwards(self._data.qpos, self._data.qvel))
 
+    def look(self) -> tuple[State, Coordinates]:
+        """Both at once."""
+        return self.read(), self.coordinates()
+
     def place(self, coordinates: Coordinates) -> None:
         """Put all dolls where ``coordinates`` says."""
         q, v = coordinates.q.copy(), coordinates.v.copy()

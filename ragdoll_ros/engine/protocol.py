@@ -66,6 +66,9 @@ class Engine(Protocol):
     def coordinates(self) -> Coordinates:
         """Generalised coordinates of all dolls."""
 
+    def look(self) -> tuple[State, Coordinates]:
+        """Both at once, as after each step."""
+
     def place(self, coordinates: Coordinates) -> None:
         """Put all dolls where ``coordinates`` says."""
 
