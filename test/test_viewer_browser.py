@@ -101,6 +101,19 @@ def test_a_button_and_its_key_push_alike(view, button, arrow, axis, sign):
         view.wait(lambda: view.bodies(SCENE)[0][axis] * sign > 1)
 
 
+@pytest.mark.parametrize('click', [
+    lambda view: view.press('Reset'), lambda view: view.page.get_by_label('Contacts').click(),
+    lambda view: view.page.locator('.mantine-Slider-root').click()],
+    ids=['button', 'checkbox', 'slider'])
+def test_what_was_clicked_gives_the_keys_back(view, click):
+    """Else Space would press it again, and the arrow keys would move it, or nothing."""
+    hold_at_start(view)
+    click(view)
+    view.key('ArrowLeft')
+    go_on(view)
+    view.wait(lambda: view.bodies(SCENE)[0][1] < -0.5)
+
+
 def test_pause_holds_and_step_makes_one_tick(view, states):
     hold_at_start(view)
     for tick in (1, 2):

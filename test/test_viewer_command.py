@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import urllib.request
+from pathlib import Path
 
 import pytest
 
@@ -51,7 +52,8 @@ def test_is_for_this_machine_alone_unless_told_otherwise():
     """Its socket, as Linux lists it, listens on 127.0.0.1: 0100007F."""
     process, port = start('--scene', 'drop', '--port', '0')
     listening = [line.split()[1] for path in ('/proc/net/tcp', '/proc/net/tcp6')
-                 if os.path.exists(path) for line in open(path) if line.split()[3] == '0A']
+                 if os.path.exists(path) for line in Path(path).read_text().splitlines()
+                 if line.split()[3] == '0A']
     process.terminate()
     process.wait(10)
     assert [place for place in listening if place.endswith(f':{port:04X}')] == [
