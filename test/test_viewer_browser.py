@@ -114,6 +114,28 @@ def test_what_was_clicked_gives_the_keys_back(view, click):
     view.wait(lambda: view.bodies(SCENE)[0][1] < -0.5)
 
 
+def test_the_camera_follows_on_demand(view):
+    """Pushed metres away the doll is at the middle of the picture, and after a reset again."""
+    middle = np.array((SIZE['width'], SIZE['height'])) / 2
+    masses = [bone.mass for bone in SCENE.bones]
+
+    def off():
+        centre = np.average(view.bodies(SCENE), axis=0, weights=masses)
+        return np.linalg.norm(view.pixels([centre])[0] - middle)
+
+    hold_at_start(view)
+    view.page.get_by_role('checkbox', name='Follow').check()
+    view.wait(lambda: off() < 2)
+    view.key('ArrowLeft')
+    go_on(view)
+    view.wait(lambda: view.bodies(SCENE)[0][1] < -3)
+    view.key(' ')
+    view.wait(lambda: off() < 2)
+    hold_at_start(view)
+    view.wait(lambda: off() < 2)
+    view.page.get_by_role('checkbox', name='Follow').uncheck()
+
+
 def test_pause_holds_and_step_makes_one_tick(view, states):
     hold_at_start(view)
     for tick in (1, 2):
