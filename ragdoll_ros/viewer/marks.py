@@ -7,6 +7,7 @@ import numpy as np
 import viser
 
 from .. import rotation
+from ..push import Push
 from ..ragdoll import Bone
 from .source import Frame
 
@@ -36,8 +37,8 @@ class Marks:
     def show(self, frame: Frame) -> None:
         """Draw what there is; hide what has gone."""
         scene, state = frame.scene, frame.state
-        arrows = [_before(scene.bones[bone], state.orientations[bone], state.positions[bone],
-                          push.arrow(state.positions[bone], state.orientations[bone]))
+        arrows = [arrow_before(scene.bones[bone], push, state.positions[bone],
+                               state.orientations[bone])
                   for push in frame.pushes if any(push.force)
                   for bone in (scene.bone_index(push.bone),)]
         lines = [np.stack([hand.point, hand.target]) for hand in frame.held]
@@ -61,9 +62,13 @@ class Marks:
         handle.visible = True
 
 
-def _before(bone: Bone, orientation: np.ndarray, position: np.ndarray,
-            arrow: np.ndarray) -> np.ndarray:
-    """Move an arrow, tail and tip (2, 3) m, back until its tip is before the bone, to be seen."""
+def arrow_before(bone: Bone, push: Push, position: np.ndarray,
+                 orientation: np.ndarray) -> np.ndarray:
+    """Tail and tip (2, 3) m, world frame, of a push's arrow, its tip before the bone, to be seen.
+
+    The bone's centre of mass is at ``position`` (3,) m, its axes at ``orientation`` (4,).
+    """
+    arrow = push.arrow(position, orientation)
     way = rotation.normalized(arrow[1] - arrow[0])
     local = rotation.rotate(rotation.inverse(orientation), way)
     depth = (arrow[1] - position) @ way + bone.shape.reach(local)
