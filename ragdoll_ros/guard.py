@@ -13,7 +13,6 @@ import numpy as np
 
 from .coordinates import Coordinates, Layout
 from .mechanics import Mechanics, Motion, Shift, cross
-from .ragdoll import Ragdoll
 from .scene import Scene
 from .state import State
 
@@ -47,7 +46,8 @@ class Guard:
         self._mechanics = mechanics
         self._layout = layout
         self._gravity = np.array(scene.gravity)
-        heights = [_size(placement.doll) for placement in scene.dolls]
+        # Falling by a third of its size sets the scale of a doll's energy.
+        heights = [placement.doll.extent / 3 for placement in scene.dolls]
         self._fall = mechanics.doll_masses * np.linalg.norm(scene.gravity) * heights
         self._own_groups = np.arange(len(scene.dolls))
 
@@ -178,10 +178,3 @@ class Guard:
         v[root] = locked + scale * (v[root] - locked)
         v[turn] = spin + scale * (v[turn] - spin)
         v[turn[-1] + 1:layout.own_v[doll].stop] *= scale
-
-
-def _size(doll: Ragdoll) -> float:
-    """A third of a doll's size, m: falling so far sets the scale of its energy."""
-    positions = np.array([bone.position for bone in doll.bones])
-    largest = max(max(bone.shape.half_extents) for bone in doll.bones)
-    return float(np.ptp(positions, axis=0).max() + 2 * largest) / 3

@@ -20,11 +20,8 @@ import numpy as np
 
 from . import rotation
 from .ragdoll import Bone, Box, Capsule, Cylinder, Joint, Shape, Sphere
-from .scene import Placement, Scene
+from .scene import Placement, Scene, grip
 from .urdf import joint_frame
-
-LARGEST_FRICTION = 10.0
-"""What friction without limit becomes: PyBullet's cap on the product of two."""
 
 CONTACT_TIME = 0.02
 """Time constant of a contact, s: MuJoCo's default."""
@@ -144,8 +141,8 @@ def _material(scene: Scene, bone: Bone | None) -> dict[str, str]:
     friction = rolling = 0.0
     restitution = plain.restitution
     if bone is not None:
-        own = min(plain.friction if bone.friction is None else bone.friction, LARGEST_FRICTION)
-        friction = math.sqrt(own * min(plain.friction, LARGEST_FRICTION))
+        own = plain.friction if bone.friction is None else bone.friction
+        friction = math.sqrt(grip(own) * grip(plain.friction))
         rolling = plain.rolling_friction if bone.rolling_friction is None \
             else bone.rolling_friction
         restitution = math.sqrt(restitution * (restitution if bone.restitution is None

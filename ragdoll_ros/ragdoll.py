@@ -364,6 +364,13 @@ class Ragdoll:
             raise fault
 
     @property
+    def extent(self) -> float:
+        """Longest side, m, of the box around the doll as it is bound, along the world's axes."""
+        positions = np.array([bone.position for bone in self.bones])
+        largest = max(max(bone.shape.half_extents) for bone in self.bones)
+        return float(np.ptp(positions, axis=0).max() + 2 * largest)
+
+    @property
     def root(self) -> Bone:
         """The bone without a parent."""
         children = {joint.child for joint in self.joints}

@@ -43,8 +43,11 @@ class Accuracy:
     """Order of the flight's Runge-Kutta method; 0: the engine's own step in flight too."""
     flight_turn: float
     """rad that the fastest bone may turn in one Runge-Kutta step."""
-    longest: float = 0.1
+    longest: float = 0.05
     """s of flight that are gone through in one step at the most; 0: a tick."""
+    land: bool = True
+    """A flight goes up to the instant at which a joint reaches its limit; otherwise the engine
+    takes over a tick earlier."""
     redo: float = math.radians(1.0)
     """rad past a limit from which a step is done again, four times as fine, as it is when a bone
     sinks deeper than ``sink``; infinity: never."""
@@ -61,7 +64,7 @@ class Accuracy:
 
 
 DRAFT = Accuracy(turn=0.15, limit=0.1, contact=4, settled=2, sink=0.01, most=32, order=2,
-                 flight_turn=0.4, redo=math.radians(8))
+                 flight_turn=0.4, land=False, redo=math.radians(8))
 NORMAL = Accuracy(turn=0.06, limit=0.05, contact=6, settled=4, sink=0.005, most=128, order=3,
                   flight_turn=0.4, redo=math.radians(3))
 EXACT = Accuracy(turn=0.02, limit=0.02, contact=12, settled=8, sink=0.002, most=256, order=4,
@@ -83,6 +86,10 @@ def firm(accuracy: Accuracy) -> Accuracy:
 
 AT_LIMIT = 1e-3
 """rad: a joint as near as this to its limit, and moving toward it, is at the limit."""
+
+HUMAN = 1.8
+"""m: extent of a doll for which ``Accuracy`` counts substeps in 10 ms. What is smaller falls and
+rolls by its own size sooner, as the root of its size."""
 
 SOON = 0.015
 """s ahead that limits and ground are looked for."""
@@ -151,6 +158,9 @@ class Stepper:
         self._roots = np.array([start + placement.doll.bones.index(placement.doll.root)
                                 for start, placement in zip(counts[:-1], scene.dolls, strict=True)])
         self._fading = damping_rate(scene)
+        smallest = min(placement.doll.extent for placement in scene.dolls)
+        self._span = 0.01 * min(1.0, math.sqrt(smallest / HUMAN))
+        """s in which as many substeps are taken as the accuracy says for 10 ms."""
         self._stale: bool
         """Whether the engine has yet to hear of a shift."""
         self._blocked: bool
@@ -236,7 +246,7 @@ class Stepper:
 
     def go(self, duration: float, loads: Sequence[Load]) -> Piece:
         """Move on by ``duration`` s, or by less: up to the next touch or limit in a flight."""
-        if self._may_fly():
+        if self._may_fly(duration):
             flown = self._fly(duration, loads)
             if flown > 0:
                 if self._flown is not None:
@@ -266,17 +276,21 @@ class Stepper:
         if self._free is not None:
             self._free.close()
 
-    def _may_fly(self) -> bool:
+    def _may_fly(self, duration: float) -> bool:
         """Tell whether nothing touches and no joint presses against its limit."""
         if (self._free is None or not self.accuracy.order or self.touching or self._blocked
                 or self.effort.flights >= MOST_FLIGHTS):
             return False
         past = self._past()
-        if not len(past) or past.max() < -AT_LIMIT:
+        if not len(past):
+            return True
+        speeds = self._layout.limit_speeds(self.coordinates)
+        ahead = past if self.accuracy.land else past + speeds * duration
+        if ahead.max() < -AT_LIMIT:
             return True
         self._held &= past > -AT_LIMIT
-        pressing = (past >= -AT_LIMIT) & (self._layout.limit_speeds(self.coordinates) > 0)
-        return not (self._held | pressing | (past > AT_LIMIT)).any()
+        pressing = (past >= -AT_LIMIT) & (speeds > 0)
+        return not (self._held | pressing | (past > AT_LIMIT) | (ahead > AT_LIMIT)).any()
 
     def _fly(self, duration: float, loads: Sequence[Load]) -> float:
         """Fly up to ``duration`` s; give the time flown, 0 where something comes in between."""
@@ -292,7 +306,11 @@ class Stepper:
             start, state = self.coordinates, self.state
             self._onward(stretch, duration - flown if loads else self.accuracy.longest, loads)
             begin = self._along
-            self._fly_to(begin + stretch)
+            ahead = self._path.at(begin + stretch)
+            if not self.accuracy.land and (self._layout.past_limits(ahead.q) > 0).any():
+                self._blocked = True
+                return flown
+            self._fly_to(ahead)
             room = self._room()
             if room >= 0 and not self.touching:
                 flown += stretch
@@ -344,13 +362,13 @@ class Stepper:
         for _ in range(MOST_LOOKS):
             time = (early * below - late * above) / (below - above)
             if grounded:
-                self._fly_to(begin + time)
+                self._fly_to(self._path.at(begin + time))
                 off = self._room() + LANDED / 2
             else:
                 past = self._layout.past_limits(self._path.at(begin + time).q)
                 off = LANDED / 2 - float(past.max())
             if abs(off) <= LANDED / 2:
-                self._fly_to(begin + time)
+                self._fly_to(self._path.at(begin + time))
                 return time
             # Regula falsi, by halves where one end stays (Dowell and Jarratt, BIT 11, 1971).
             if off * below < 0:
@@ -371,17 +389,16 @@ class Stepper:
         early, speed = 0.0, self.reach.closing(self.state)
         while (late - early) * speed > MET:
             time = (early + late) / 2
-            self._fly_to(begin + time)
+            self._fly_to(self._path.at(begin + time))
             if any(GROUND not in pair for pair in self.touching):
                 late = time
             else:
                 early = time
-        self._fly_to(begin + late)
+        self._fly_to(self._path.at(begin + late))
         return late
 
-    def _fly_to(self, time: float) -> None:
-        """Go to where the path is ``time`` s after its start."""
-        self._set(self._path.at(time))
+    def _fly_to(self, coordinates: Coordinates) -> None:
+        self._set(coordinates)
         self.touching = self.engine.touching()
 
     def _set(self, coordinates: Coordinates) -> None:
@@ -416,7 +433,7 @@ class Stepper:
         bound = max(1.0, self.accuracy.creep * self._too_far())
         substeps = self._substeps(duration, bool(loads))
         self._blocked = False
-        most = max(1, math.ceil(self.accuracy.most * duration / 0.01))
+        most = max(1, math.ceil(self.accuracy.most * duration / self._span))
         while True:
             self._run(duration, substeps, loads)
             if substeps >= most or self._too_far() <= bound:
@@ -453,7 +470,7 @@ class Stepper:
     def _substeps(self, duration: float, pushed: bool) -> int:
         """Count the substeps that this state asks for, a power of two."""
         accuracy, state = self.accuracy, self.state
-        tens = duration / 0.01
+        tens = duration / self._span
         if not accuracy.adaptive:
             return max(1, math.ceil(accuracy.contact * tens))
         spin = math.sqrt(np.einsum('ij,ij->i', state.angular, state.angular).max())

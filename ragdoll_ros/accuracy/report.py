@@ -87,7 +87,7 @@ def orders(figures: Figures, pictures: Pictures) -> str:
     if 'orders' not in figures:
         return ''
     return ('## Orders\n\nSlope of the error over the tick, by least squares on the logarithms; '
-            'ours with one setting at each tick.\n\n' + table(figures['orders'], (
+            'ours with one setting, and a flight step of one tick.\n\n' + table(figures['orders'], (
                 ('title', 'motion', '{}'), ('label', 'method', '{}'), ('theory', 'theory', '{}'),
                 ('order', 'measured', '{:.2f}'), ('order_finest', 'between the finest', '{:.2f}'),
                 ('points', 'points', '{}')))

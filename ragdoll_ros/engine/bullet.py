@@ -19,13 +19,10 @@ import pybullet
 from .. import rotation
 from ..coordinates import UNLIMITED, Coordinates, Layout
 from ..ragdoll import Ragdoll
-from ..scene import Placement, Scene
+from ..scene import Placement, Scene, grip
 from ..state import State
 from ..urdf import to_urdf
 from .protocol import GROUND, Contact, Load
-
-LARGEST_FRICTION = math.sqrt(10)
-"""PyBullet caps the product of two friction coefficients at 10 (84 degrees)."""
 
 BREAKING_DISTANCE = 5e-4
 """m at which a contact point is let go. A gap is room to move in within a substep, so that it eats
@@ -371,7 +368,7 @@ class BulletEngine:
         rolling = material.rolling_friction if rolling is None else rolling
         restitution = material.restitution if restitution is None else restitution
         pybullet.changeDynamics(
-            body, link, lateralFriction=min(math.sqrt(friction), LARGEST_FRICTION),
+            body, link, lateralFriction=math.sqrt(grip(friction)),
             rollingFriction=rolling, spinningFriction=0, restitution=math.sqrt(restitution),
             physicsClientId=self._client)
 

@@ -1,12 +1,14 @@
 """The order of each method: how fast its error goes to zero with the tick."""
 from __future__ import annotations
 
+import dataclasses
 import functools
 import itertools
 import math
 
 import numpy as np
 
+from ...stepping import ACCURACIES
 from ..measure import compare
 from ..methods import Method, bullet, mujoco, ours, run
 from ..runner import Job, Options, Row
@@ -24,7 +26,8 @@ CEILING = 0.3
 
 def methods() -> list[Method]:
     """One method of each family, a single step to a tick where we have the choice."""
-    return [*map(ours, ('draft', 'normal', 'exact')), bullet(1),
+    return [*(ours(dataclasses.replace(setting, longest=0.0), f'ours-{name}')
+              for name, setting in ACCURACIES.items()), bullet(1),
             *(mujoco(name, 1) for name in ('euler', 'implicitfast', 'rk4'))]
 
 
