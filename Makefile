@@ -50,8 +50,9 @@ lint: $(READY) ## ruff
 slow: $(READY) ## the tests that take minutes
 	@$(BIN)/python -m pytest -m slow
 
-bench: $(READY) ## cost of a tick and of its parts
+bench: $(READY) ## cost of a tick and of its parts, and of the page, 2 min
 	@$(BIN)/python -m ragdoll_ros.ros.bench
+	@$(BIN)/python test/page_cost.py
 
 report: $(READY) ## accuracy against independent references, into docs/, 20 min
 	@$(BIN)/python -m ragdoll_ros.accuracy.command --out docs

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -132,18 +133,18 @@ class Scene:
             if name in names[:index]:
                 raise faults.DuplicateName(f'dolls[{index}].name', name, 'a name of its own')
 
-    @property
+    @cached_property
     def bones(self) -> tuple[Bone, ...]:
         """Every bone, doll by doll: the order of all arrays."""
         return tuple(bone for placement in self.dolls for bone in placement.doll.bones)
 
-    @property
+    @cached_property
     def bone_names(self) -> tuple[str, ...]:
         """Name of every bone; with several dolls, doll/bone."""
         return tuple(self.qualified(placement, bone.name)
                      for placement in self.dolls for bone in placement.doll.bones)
 
-    @property
+    @cached_property
     def angle_names(self) -> tuple[str, ...]:
         """Name of every joint angle, doll by doll, joint by joint as the doll lists them."""
         return tuple(self.qualified(placement, name) for placement in self.dolls

@@ -196,6 +196,19 @@ _Loader.add_implicit_resolver(
     list('-+0123456789'))
 
 
+def _whole_number(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> float:
+    """Read an int; one that no float can hold is infinite, as 1e400 is, and refused as that."""
+    number = loader.construct_yaml_int(node)
+    try:
+        float(number)
+    except OverflowError:
+        return math.inf if number > 0 else -math.inf
+    return number
+
+
+_Loader.add_constructor('tag:yaml.org,2002:int', _whole_number)
+
+
 def _seen_from(folder: Path, model: str) -> str:
     """Path of a character as it stands in a file of ``folder``: with slashes, relative."""
     try:

@@ -87,9 +87,9 @@ def firm(accuracy: Accuracy) -> Accuracy:
 AT_LIMIT = 1e-3
 """rad: a joint as near as this to its limit, and moving toward it, is at the limit."""
 
-HUMAN = 1.8
-"""m: extent of a doll for which ``Accuracy`` counts substeps in 10 ms. What is smaller falls and
-rolls by its own size sooner, as the root of its size."""
+HUMAN = 1.4
+"""m: extent of the default doll, for which Accuracy counts substeps in 10 ms. What is smaller
+falls and rolls by its own size sooner, as the root of its size."""
 
 SOON = 0.015
 """s ahead that limits and ground are looked for."""
@@ -382,7 +382,7 @@ class Stepper:
         """Go back along the path to where bones begin to touch, if they do; give the time, s.
 
         By bisection, down to a depth that the engine's way of pushing bones apart, depth over
-        LIMIT_RETURN, makes no speed of.
+        RETURN, makes no speed of.
         """
         if not any(GROUND not in pair for pair in self.touching):
             return late

@@ -20,7 +20,7 @@ from conftest import ROOT
 from ragdoll_ros.parts import parts_of
 
 PATIENCE = 20.0
-"""s that the page may take for anything: it draws some 6 pictures a second without a GPU."""
+"""s that the page may take for anything, on a busy machine without a GPU."""
 
 SIZE = {'width': 800, 'height': 520}
 
@@ -32,6 +32,18 @@ REQUIRED = os.environ.get('RAGDOLL_BROWSER') == 'required'
 """Whether a missing browser is a failure (.ci/run) or a reason to skip."""
 
 READY = "window.__viserMutable?.scene && window.__viserMutable.nodeRefFromName['']"
+
+PLAIN = """() => {
+  const {scene} = window.__viserMutable;
+  Object.defineProperty(scene, 'environment', {get: () => null, set() {}});
+  const unshade = () => {
+    scene.traverse(node => { if (node.isLight) node.castShadow = false; });
+    requestAnimationFrame(unshade);
+  };
+  unshade();
+}"""
+"""Neither reflections nor shadows: without a GPU, those cost each page that is opened 8 s of a
+processor before its first pictures, and two thirds of every further one."""
 
 BODIES = """() => {
   const {scene, nodeRefFromName: nodes} = window.__viserMutable;
@@ -96,11 +108,16 @@ class View:
         self.page = context.new_page()
         self.errors = []
         self.page.on('pageerror', lambda error: self.errors.append(str(error)))
+        self.go(url)
+
+    def go(self, url):
+        """Go to an address, a viewer's, and wait until the page draws."""
         self.page.goto(url)
         self.page.wait_for_function(READY)
+        self.page.evaluate(PLAIN)
 
     def bodies(self, scene):
-        """Place of each bone as it is drawn, (n, 3) m, z up; None while not all are there.
+        """Place of each bone as it is drawn, (n, 3) m, z up; NaN while not all are there.
 
         Read from three.js' instances; the page keeps parts of one kind in the scene's order.
         """
@@ -108,9 +125,13 @@ class View:
         kinds = [part.kind for bone in scene.bones for part in parts_of(bone)]
         assert len(kinds) == len(scene.bones), 'bones of one part each'
         if {kind: len(matrices) for kind, matrices in drawn.items()} != Counter(kinds):
-            return None
+            return np.full((len(kinds), 3), np.nan)
         instances = {kind: iter(matrices) for kind, matrices in drawn.items()}
         return np.array([next(instances[kind])[12:15] for kind in kinds])
+
+    def has(self, name):
+        """Whether a node of this name is drawn."""
+        return self.page.evaluate('name => !!window.__viserMutable.nodeRefFromName[name]', name)
 
     def pixels(self, points):
         """Where points (n, 3) m of the world are on the page: (n, 2), as the mouse counts."""
@@ -139,6 +160,10 @@ class View:
                                 has=self.page.get_by_text(label, exact=True))
         return row.locator('input').last
 
+    def top(self, part):
+        """How far below the page's upper edge a part of it begins, pixels."""
+        return part.bounding_box()['y']
+
     def see(self, text):
         """Wait until a text stands somewhere on the page."""
         self.page.get_by_text(text).first.wait_for()
@@ -155,7 +180,7 @@ def opened(browser, url, scene):
     """A page at an address, with all bones in it; no script of it has failed at the end."""
     view = View(browser, url)
     try:
-        view.wait(lambda: view.bodies(scene) is not None)
+        view.wait(lambda: np.isfinite(view.bodies(scene)).all())
         yield view
     finally:
         view.close()

@@ -10,7 +10,7 @@ import viser
 import websockets
 from viser import _messages
 
-PATIENCE = 15.0
+PATIENCE = 30.0
 
 
 class PageClient:
@@ -18,6 +18,7 @@ class PageClient:
 
     def __init__(self, port, position=(4.2, -1.2, 1.5), look_at=(0.0, 0.0, 0.8)):
         self.bytes = self.windows = 0
+        self.arrivals = []
         self._socket = None
         self._ready = threading.Event()
         self._loop = asyncio.new_event_loop()
@@ -78,6 +79,7 @@ class PageClient:
                 async for data in self._socket:
                     self.bytes += len(data)
                     self.windows += 1
+                    self.arrivals.append(time.monotonic())
             except websockets.ConnectionClosed:
                 pass
 

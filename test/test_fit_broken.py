@@ -1,5 +1,6 @@
 """Broken files: exit code 2, one clear sentence, no traceback, little memory."""
 import json
+import math
 import os
 import struct
 import subprocess
@@ -101,6 +102,14 @@ BROKEN = {
     'matrix_short.glb': changed(set_in(*NODES, 'matrix', [1, 2, 3])),
     'matrix_text.glb': changed(set_in(*NODES, 'matrix', ['a'] * 16)),
     'matrix_huge.glb': changed(set_in(*NODES, 'matrix', [1e300] * 16)),
+    'matrix_1e400.glb': glb_of(json.dumps(good().data).replace(
+        '"nodes": [{', '"nodes": [{"matrix": [' + ', '.join(['1e400'] * 16) + '], ').encode()),
+    'matrix_digits.glb': changed(set_in(*NODES, 'matrix', [10 ** 400] * 16)),
+    'matrix_more_digits.glb': glb_of(b'{"nodes": [' + b'9' * 10_000 + b']}'),
+    'matrix_nan.glb': changed(set_in(*NODES, 'matrix', [math.nan] * 16)),
+    'count_digits.glb': changed(set_in('accessors', 1, 'count', 10 ** 400)),
+    'offset_digits.glb': changed(set_in('bufferViews', 1, 'byteOffset', 10 ** 400)),
+    'utf_16.glb': glb_of('{"asset": {"version": "2.0"}}'.encode('utf-16')),
     'matrix_zero.glb': changed(set_in('nodes', 0, 'matrix', [0] * 16)),
     'joints_outside.glb': changed(set_in('skins', 0, 'joints', [2, 99])),
     'joints_none.glb': changed(set_in('skins', 0, 'joints', [])),

@@ -4,11 +4,13 @@ from __future__ import annotations
 import signal
 import threading
 import time
+import urllib.parse
 
 import numpy as np
 import pytest
-from browser import READY, chromium, opened, serving
+from browser import chromium, opened, serving
 from geometry_msgs.msg import PoseArray
+from network import Network
 from peer import Peer, end, kill, start
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
@@ -119,15 +121,47 @@ def test_a_dragged_body_follows_within_200_ms(view, heard):
     view.wait(lambda: torso(poses[-1][1])[2] < 0.5)
 
 
+@pytest.mark.slow
+def test_a_page_whose_line_is_cut_lets_go_and_comes_back_to_what_is(browser, view, heard, listener):
+    """A closed laptop, while its mouse holds the torso; meanwhile others pause the doll."""
+    poses, feedback = heard
+    hold_at_start(view)
+    address = urllib.parse.urlsplit(view.page.url)
+    network = Network(address.port)
+    try:
+        with opened(browser, f'http://127.0.0.1:{network.port}', SCENE) as far:
+            far.page.mouse.move(*far.pixels(START[:1])[0])
+            far.page.mouse.down()
+            feedback.clear()
+            far.page.mouse.move(*far.pixels(START[:1] + LIFT)[0])
+            far.wait(lambda: feedback)
+            far.page.mouse.move(*far.pixels(START[:1] + 4 * LIFT)[0])
+            far.key(' ')
+            far.wait(lambda: torso(poses[-1][1])[2] > START[TORSO][2] + 0.2)
+            feedback.clear()
+            network.cut()
+            view.wait(lambda: any(message.event_type == InteractiveMarkerFeedback.MOUSE_UP
+                                  for _, message in list(feedback)))
+            view.wait(lambda: torso(poses[-1][1])[2] < 0.5)
+            view.key(' ')
+            view.button('Go on').wait_for()
+            network.come_back()
+            far.button('Go on').wait_for()
+            far.wait(lambda: far.bodies(SCENE) is not None and abs(
+                far.bodies(SCENE)[TORSO] - torso(poses[-1][1])).max() < 1e-6)
+            far.page.mouse.up()
+            assert not view.errors
+    finally:
+        network.close()
+
+
 def test_a_page_that_goes_asks_nothing_of_the_node_and_may_come_back(view, heard, listener):
     hold_at_start(view)
     address = view.page.url
     assert listener.count_subscribers('ragdoll/poses') == 2
     view.page.goto('about:blank')
     view.wait(lambda: listener.count_subscribers('ragdoll/poses') == 1)
-    view.page.goto(address)
-    view.page.wait_for_function(READY)
-    view.wait(lambda: view.bodies(SCENE) is not None)
+    view.go(address)
     hold_at_start(view)
 
 

@@ -11,12 +11,16 @@ import numpy as np
 import pytest
 
 pytest.importorskip('viser')
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion, Vector3, Wrench
 from page_client import PageClient, wait
 from peer import STARTED, Peer, end, kill, start
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Header
 
+from ragdoll_ros.ragdoll import Sphere
 from ragdoll_ros.ros.messages import to_pose_array
 from ragdoll_ros.ros.packed import poses_in
 from ragdoll_ros.scene_file import load_scene, save_scene
@@ -189,6 +193,17 @@ def test_a_grab_lifts_the_bone_and_rests_longer_than_the_nodes_patience(node, re
     wait(lambda: remote.frame.state.positions[bone][2] < 1.0)
 
 
+def test_a_reset_lets_go_here_too(node, remote):
+    """The node opens its hands; none is shown that pulls nothing."""
+    remote.want(OPEN)
+    seen(remote)
+    wait(lambda: remote.report.measures and remote.frame.time > 0.5)
+    remote.grab('page 1', 'head', (0.0, 0.0, 0.1), (0.3, 0.2, 2.2))
+    wait(lambda: remote.frame.held and remote.report.measures['work_of_grabs_J'] > 1)
+    remote.reset()
+    wait(lambda: not remote.frame.held)
+
+
 def test_uses_an_edited_scene_or_says_why_not(node, remote, tmp_path):
     remote.want(OPEN)
     seen(remote)
@@ -252,30 +267,99 @@ def test_shapes_and_axes_from_a_urdf_are_the_scenes(name):
         assert ours.color is None or ours.color == pytest.approx(theirs.color)
 
 
-def test_the_page_draws_the_node(node, ros):
-    """The whole way: node, DDS, page, websocket; with the namespace's own commands."""
+@pytest.fixture
+def page(ros):
+    """The whole way: DDS, page, websocket, one page that is open."""
     source, stop = Remote([]), threading.Event()
     with server_at('127.0.0.1', free_port('127.0.0.1', 0)) as server:
         page = Page(server, source)
         thread = threading.Thread(target=page.run, args=(stop,))
         thread.start()
-        client = PageClient(server.get_port())
+        page.client = PageClient(server.get_port())
         try:
-            wait(lambda: page._frame is not None)
-            before = page._frame.time
-            wait(lambda: page._frame.time > before + 0.1)
-            source.pause(True)
-            wait(lambda: source.report.paused and page._frame is source.frame)
-            boxes = next(batch for batch in page._stage.bodies.batches if len(batch.bones) == 9)
-            assert np.abs(boxes.handle.batched_positions
-                          - page._frame.state.positions[boxes.bones]).max() < 1e-6
-            kill(node)
-            wait(lambda: 'silent' in page._problem.content)
+            yield page
         finally:
-            client.close()
+            page.client.close()
             stop.set()
             thread.join()
             source.close()
+
+
+def drawn(page, scene):
+    """Whether every bone of the scene is drawn, where the node has it."""
+    stage, frame = page._stage, page._frame
+    if stage is None or stage.scene != scene or frame.scene is not stage.scene:
+        return False
+    return all(np.abs(batch.handle.batched_positions
+                      - frame.state.positions[batch.bones]).max() < 1e-6
+               for batch in stage.bodies.batches) and sorted(np.concatenate(
+                   [batch.bones for batch in stage.bodies.batches])) == list(
+                       range(len(scene.bones)))
+
+
+def test_the_page_draws_the_node(node, page):
+    wait(lambda: page._frame is not None)
+    before = page._frame.time
+    wait(lambda: page._frame.time > before + 0.1)
+    page.source.pause(True)
+    wait(lambda: page.source.report.paused and page._frame is page.source.frame)
+    assert drawn(page, load_scene('drop'))
+    kill(node)
+    wait(lambda: 'silent' in page._problem.content)
+
+
+def test_an_open_page_follows_a_node_that_comes_back_with_another_scene(node, page, peer):
+    """Killed while a hand of the page holds a bone that is not there any more then.
+
+    The new node hears nothing of that bone, of which it would have to warn.
+    """
+    wait(lambda: page._frame is not None)
+    page.source.grab('page 0', 'head', (0.0, 0.0, 0.0), (0.0, 0.0, 2.0))
+    wait(lambda: page._frame.held)
+    kill(node)
+    wait(lambda: 'silent' in page._problem.content)
+    start('node', '--ros-args', '-p', 'scene:=crowd')
+    wait(lambda: page._stage.scene == load_scene('crowd'))
+    wait(lambda: not page._problem.content)
+    page.source.pause(True)
+    wait(lambda: page.source.report.paused)
+    wait(lambda: drawn(page, load_scene('crowd')))
+    assert not page._frame.held
+    reports = peer.collect(DiagnosticArray, '/diagnostics')
+    peer.wait(lambda: len(reports) > 1)
+    assert {pair.key: pair.value for pair in reports[-1][1].status[0].values}['refused'] == '0'
+
+
+def test_an_open_page_follows_the_scene_that_others_set(node, page, peer, broken_scene, tmp_path):
+    """Other bones, the same bones in another size, swings; what the node refuses changes nothing.
+
+    All while the page's hand holds the head and its pointer goes on dragging.
+    """
+    def set_scene(name):
+        value = Parameter('scene', value=str(name)).to_parameter_msg()
+        answer = peer.call(SetParametersAtomically, 'ragdoll/set_parameters_atomically',
+                           SetParametersAtomically.Request(parameters=[value]))
+        page.source.drag('page 0', (0.0, 0.0, 2.0))
+        return answer.result.successful
+
+    wait(lambda: page._frame is not None)
+    larger = load_scene('drop')
+    doll = larger.dolls[0].doll.replace_bone('head', shape=Sphere(0.15))
+    larger = dataclasses.replace(larger, dolls=(
+        dataclasses.replace(larger.dolls[0], doll=doll),))
+    save_scene(larger, tmp_path / 'larger.yaml')
+    for name in ('crowd', 'drop', tmp_path / 'larger.yaml', 'ponytail'):
+        page.source.grab('page 0', page._frame.scene.bone_names[1], (0.0,) * 3, (0.0, 0.0, 2.0))
+        assert set_scene(name)
+        wait(lambda name=name: page._stage.scene == load_scene(str(name)))
+        before = page._frame.time
+        wait(lambda before=before: page._frame.time != before)
+    assert not set_scene(broken_scene[0])
+    before = page._frame.time
+    wait(lambda: page._frame.time > before + 0.1)
+    page.source.pause(True)
+    wait(lambda: page.source.report.paused)
+    wait(lambda: drawn(page, load_scene('ponytail')))
 
 
 def test_the_viewer_leaves_at_a_signal(ros):

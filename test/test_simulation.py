@@ -250,7 +250,7 @@ def test_the_crowd_makes_no_energy():
             assert mechanics.energy(simulation.advance()).sum() <= start * 1.001
 
 
-def fingerprint(simulation, ticks=2000):
+def fingerprint(simulation, ticks=1000):
     """SHA-256 over the states of a run with 20 pushes."""
     rng = np.random.default_rng(5)
     names = simulation.scene.bone_names

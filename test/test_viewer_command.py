@@ -41,18 +41,20 @@ def test_says_where_it_is_serves_and_ends_within_two_seconds(sign):
     with urllib.request.urlopen(f'http://127.0.0.1:{port}', timeout=5) as answer:
         assert answer.status == 200 and b'<html' in answer.read()
     PageClient(port)
-    begin = time.monotonic()
-    process.send_signal(sign)
-    out, error = process.communicate(timeout=10)
-    assert time.monotonic() - begin < 2
+    # A browser connects once more than it needs to, in reserve.
+    with socket.create_connection(('127.0.0.1', port)):
+        begin = time.monotonic()
+        process.send_signal(sign)
+        out, error = process.communicate(timeout=10)
+        assert time.monotonic() - begin < 2
     assert process.returncode == 0 and not out and 'Traceback' not in error
 
 
 def test_is_for_this_machine_alone_unless_told_otherwise():
     """Its socket, as Linux lists it, listens on 127.0.0.1: 0100007F."""
     process, port = start('--scene', 'drop', '--port', '0')
-    listening = [line.split()[1] for path in ('/proc/net/tcp', '/proc/net/tcp6')
-                 if os.path.exists(path) for line in Path(path).read_text().splitlines()
+    listening = [line.split()[1] for path in map(Path, ('/proc/net/tcp', '/proc/net/tcp6'))
+                 if path.exists() for line in path.read_text().splitlines()
                  if line.split()[3] == '0A']
     process.terminate()
     process.wait(10)
@@ -105,13 +107,3 @@ def test_says_what_to_install(tmp_path, missing, word, arguments):
 def test_help_has_examples():
     done = run('--help')
     assert done.returncode == 0 and 'ragdoll_viewer --scene doll.yaml' in done.stdout
-
-
-def test_a_page_of_a_recording_or_a_node_needs_no_engine():
-    """It may run on a machine without PyBullet."""
-    done = subprocess.run([sys.executable, '-c', 'import sys\n'
-                           'import ragdoll_ros.viewer.page, ragdoll_ros.viewer.playback\n'
-                           'try: import ragdoll_ros.viewer.remote\n'
-                           'except ModuleNotFoundError as error: assert error.name == "rclpy"\n'
-                           'sys.exit("pybullet" in sys.modules)'], cwd=ROOT, timeout=60)
-    assert done.returncode == 0

@@ -20,6 +20,9 @@ PORT = 8080
 LAST_PORT = 65535
 HOST = '127.0.0.1'
 
+ENDING = 0.5
+"""s that viser may take to say goodbye to its pages."""
+
 EXAMPLE = """examples:
   ragdoll_viewer                          show the node `ragdoll`
   ragdoll_viewer --ros-args -r __ns:=/stage     ... in another namespace
@@ -147,7 +150,11 @@ def free_port(host: str, wanted: int | None) -> int:
 
 @contextlib.contextmanager
 def server_at(host: str, port: int) -> Iterator[object]:
-    """Have viser's server, without its own words on standard output."""
+    """Have viser's server, without its own words on standard output.
+
+    At the end it would wait 6 s for each connection on which nothing was asked yet, such as a
+    browser keeps in reserve: it is left to itself then.
+    """
     import viser
     with contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host, port, label='ragdoll', verbose=False)
@@ -155,7 +162,9 @@ def server_at(host: str, port: int) -> Iterator[object]:
         yield server
     finally:
         with contextlib.redirect_stdout(io.StringIO()):
-            server.stop()
+            ending = threading.Thread(target=server.stop, daemon=True)
+            ending.start()
+            ending.join(ENDING)
 
 
 def shown(host: str) -> str:

@@ -47,6 +47,7 @@ class Controls:
         self.source = source
         self._held = Held()
         self._shown = Report()
+        self._loop = server.get_event_loop()
         gui = server.gui
         gui.add_html(KEEP_KEYS)
         pushes = gui.add_button_group(
@@ -89,8 +90,13 @@ class Controls:
         self._shown = report
 
     def show_scene(self, name: str) -> None:
-        """Let the panel tell which scene it is."""
-        self._scene.value = name if name in self._scene.options else OTHER
+        """Let the panel tell which scene it is.
+
+        It is written where `_choose` reads it, in viser's thread: written from another one, it
+        could come between a choice that arrives at this moment and its reading, and win.
+        """
+        shown = name if name in self._scene.options else OTHER
+        self._loop.call_soon_threadsafe(setattr, self._scene, 'value', shown)
 
     def _set_pace(self) -> None:
         self.source.set_pace(self._pace.value)

@@ -106,6 +106,8 @@ class Page:
         self._frame = frame
         with self.server.atomic():
             self._stage.show(frame)
+        # Else viser waits for more to send along, up to its own 60th of a second.
+        self.server.flush()
         for listener in self.listeners:
             listener(frame)
 

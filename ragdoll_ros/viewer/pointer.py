@@ -5,6 +5,7 @@ camera C while the pointer goes on, D being the direction to it: target = C + D 
 """
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 
 import numpy as np
@@ -14,6 +15,7 @@ from .. import rotation
 from ..scene import Scene
 from ..state import State
 from .bodies import Bodies
+from .line import is_dead
 from .skin import Skins
 from .source import Frame, Source
 
@@ -28,6 +30,7 @@ class Pointer:
                  select: Callable[[str], None]) -> None:
         self._source, self._shown, self._select = source, shown, select
         self._distances: dict[int, float] = {}
+        self._watches: dict[int, asyncio.Task] = {}
 
     def attach(self, bodies: Bodies, skins: Skins) -> None:
         """Let the bodies and skins of a new scene be taken."""
@@ -67,11 +70,30 @@ class Pointer:
         local = on_bone(frame.scene, frame.state, bone, point)
         self._source().grab(_hand(event), frame.scene.bone_names[bone], tuple(local.tolist()),
                             self._target(event))
+        self._watch(event)
+
+    def _watch(self, event: viser.SceneNodeDragEvent) -> None:
+        """Let go if the page's line dies before it says that it lets go."""
+        async def watch() -> None:
+            await is_dead(event.client)
+            self._let_go(event)
+
+        self._unwatch(event)
+        self._watches[event.client_id] = asyncio.get_running_loop().create_task(watch())
+
+    def _unwatch(self, event: viser.SceneNodeDragEvent) -> None:
+        watch = self._watches.pop(event.client_id, None)
+        if watch is not None:
+            watch.cancel()
+
+    def _let_go(self, event: viser.SceneNodeDragEvent) -> None:
+        if self._distances.pop(event.client_id, None) is not None:
+            self._source().let_go(_hand(event))
 
     def _drag(self, event: viser.SceneNodeDragEvent) -> None:
         if event.phase == 'end':
-            del self._distances[event.client_id]
-            self._source().let_go(_hand(event))
+            self._unwatch(event)
+            self._let_go(event)
         else:
             self._source().drag(_hand(event), self._target(event))
 

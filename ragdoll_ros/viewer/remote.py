@@ -35,6 +35,7 @@ from ..scene import SECOND, Scene
 from ..scene_file import save_scene
 from ..state import State
 from .ask import Ask, Refused
+from .newest import Newest
 from .remote_hands import RemoteHands
 from .remote_pushes import HeardPushes, Silent
 from .remote_scene import scene_of_node
@@ -77,6 +78,8 @@ class Remote:
         self._velocity = self._node.create_publisher(Twist, 'cmd_vel', 10)
         self._wanted = Wanted()
         self._subscriptions: dict[str, list] = {}
+        self._newest: dict[str, Newest] = {}
+        self._taking = threading.Lock()
         self._forget()
         self._heard = 0.0
         self._opened = time.monotonic()
@@ -90,6 +93,11 @@ class Remote:
     @property
     def frame(self) -> Frame | None:
         """Where the node's last message says that all is; the last one that fitted the scene."""
+        with self._taking:
+            return self._newest_frame()
+
+    def _newest_frame(self) -> Frame | None:
+        self._take()
         data, scene = self._poses, self._scene
         parts = (data, scene, self._masses, self._contacts, self._angles, self._hands.moves)
         if data is None or scene is None or all(map(operator.is_, parts, self._framed)):
@@ -219,6 +227,7 @@ class Remote:
             if on and kind not in self._subscriptions:
                 self._subscriptions[kind] = getattr(self, f'_hear_{kind}')()
             elif not on:
+                self._newest.pop(kind, None)
                 for subscription in self._subscriptions.pop(kind, ()):
                     self._node.destroy_subscription(subscription)
         if 'contacts' not in self._subscriptions:
@@ -230,29 +239,40 @@ class Remote:
 
     def _hear_frames(self) -> list:
         create = self._node.create_subscription
-        return [create(PoseArray, f'{NAME}/poses', self._take_poses, LATCHED, raw=True),
+        return [*self._hear('frames', PoseArray, f'{NAME}/poses', LATCHED),
                 create(String, 'robot_description', self._take_description, LATCHED),
                 create(DiagnosticArray, '/diagnostics', self._take_diagnostics, 10),
                 create(ParameterEvent, '/parameter_events', self._take_event, 10)]
 
     def _hear_contacts(self) -> list:
-        return [self._node.create_subscription(
-            PoseArray, f'{NAME}/contacts', self._take_contacts, 1, raw=True)]
+        return self._hear('contacts', PoseArray, f'{NAME}/contacts')
 
     def _hear_angles(self) -> list:
-        return [self._node.create_subscription(
-            JointState, 'joint_states', self._take_angles, 1)]
+        return self._hear('angles', JointState, 'joint_states', raw=False)
 
     def _hear_swings(self) -> list:
-        return [self._node.create_subscription(
-            PoseArray, f'{NAME}/swings', self._take_swings, 1, raw=True)]
+        return self._hear('swings', PoseArray, f'{NAME}/swings')
+
+    def _hear(self, kind: str, message: type, topic: str, qos: object = 1,
+              raw: bool = True) -> list:
+        """Subscribe to what comes with every tick; it is taken when the page draws."""
+        self._newest[kind] = Newest(self._node, message, topic, qos, raw)
+        return [self._newest[kind].subscription]
 
     def _hear_pushes(self) -> list:
         self._inputs = Inputs(self._node, Silent(), NAME)
         self._inputs.simulation, self._inputs.settings = self._pushes, self._settings
         return self._inputs.subscriptions
 
-    def _take_poses(self, data: bytes) -> None:
+    def _take(self) -> None:
+        """Take what has come of all that moves; what is no such message is left."""
+        for kind, newest in list(self._newest.items()):
+            message = newest.take()
+            if message is not None:
+                with contextlib.suppress(ValueError):
+                    getattr(self, f'_take_{kind}')(message)
+
+    def _take_frames(self, data: bytes) -> None:
         self._poses = data
         self._heard = time.monotonic()
 
@@ -287,6 +307,8 @@ class Remote:
 
     def _learn_if_needed(self) -> None:
         """Ask what the node simulates, until it is known; called again and again."""
+        if time.monotonic() - self._heard > SILENCE:
+            self._hands.forget()
         self._hands.keep()
         if self._description is not None and not self._learned:
             self._ask.parameters((BONE_NAMES, *SPECS), self._learn)
@@ -306,6 +328,7 @@ class Remote:
             self._problem = f'what the node simulates is not clear: {error}'
             return
         if scene != self._scene:
+            self._hands.forget()
             self._scene, self._rods = scene, Rods(scene)
             self._masses = self._angles = None
         if self._pushes is None or self._pushes.scene is not self._scene:
@@ -320,6 +343,9 @@ class Remote:
         # Before the first report the node's time zero is not known.
         self._zero = stamp if self._zero is None else self._zero
         seconds = (stamp - self._zero) / SECOND
+        if self._frame is not None and seconds < self._frame.time:
+            # A reset, or a node that was started again.
+            self._hands.forget()
         rods, masses = None, self._masses
         if masses is not None and self._rods is not None and len(masses) == self._rods.count:
             rods = self._rods.between(masses, state)

@@ -65,6 +65,11 @@ class RemoteHands:
         if held is not None:
             self._send(hand, held, InteractiveMarkerFeedback.MOUSE_UP)
 
+    def forget(self) -> None:
+        """Hold nothing any more: the node has let go, or is another one."""
+        self._hands.clear()
+        self.moves += 1
+
     def keep(self) -> None:
         """Tell that hands which rest still hold; to be called about once a second."""
         for hand, held in list(self._hands.items()):
