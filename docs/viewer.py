@@ -4,10 +4,10 @@ make pictures, or python docs/viewer.py FOLDER
 """
 from __future__ import annotations
 
+import contextlib
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -22,15 +22,27 @@ from ragdoll_ros.scene_file import load_scene  # noqa: E402
 
 SIZE = {'width': 1000, 'height': 600}
 
-CAMERA = '?initialCameraPosition=3.4,-0.7,1.35&initialCameraLookAt=0,0.45,0.8'
-"""In front of the doll, which stands beside the panel then."""
+ASIDE = 0.31
+"""m to the doll's left for each m away at which the camera looks: the doll is beside the panel."""
 
 
-@contextmanager
-def page(context: browser.BrowserContext, scene: str) -> Iterator[browser.View]:
+def camera(away: float, high: float, at: float, turn: float = -0.2) -> str:
+    """Give the part of an address for a camera before the doll.
+
+    It stands ``away`` m from the doll and ``high`` m above the ground, ``turn`` rad to the doll's
+    left, and looks at the height ``at``, m.
+    """
+    ahead, left = np.array((np.cos(turn), np.sin(turn))), np.array((-np.sin(turn), np.cos(turn)))
+    eye, look = away * ahead, ASIDE * away * left
+    return (f'?initialCameraPosition={eye[0]:.3f},{eye[1]:.3f},{high}'
+            f'&initialCameraLookAt={look[0]:.3f},{look[1]:.3f},{at}')
+
+
+@contextlib.contextmanager
+def page(context: browser.BrowserContext, scene: str, seen_from: str) -> Iterator[browser.View]:
     """Open a page on a scene, paused at its start, without viser's word on slow drawing."""
     with browser.serving('--port', '0', '--scene', scene, '--folder', tempfile.gettempdir()) as url:
-        view = browser.View(context, url + CAMERA)
+        view = browser.View(context, url + seen_from)
         view.page.locator('.mantine-Notification-closeButton').click()
         view.key(' ')
         view.button('Go on').wait_for()
@@ -57,34 +69,36 @@ def step(view: browser.View, ticks: int) -> None:
 
 def fall(context: browser.BrowserContext, folder: Path) -> None:
     """The default doll, pushed aside after its feet have touched the ground."""
-    with page(context, 'drop') as view:
-        step(view, 36)
+    with page(context, 'drop', camera(2.7, 1.2, 0.65)) as view:
+        step(view, 24)
         view.key('ArrowRight')
-        step(view, 10)
+        step(view, 12)
         (folder / 'viewer_fall.png').write_bytes(shot(view))
 
 
 def grab(context: browser.BrowserContext, folder: Path) -> None:
-    """The doll hanging by a forearm from the pointer."""
+    """The doll hangs by a forearm from the pointer, which pulls it aside."""
     scene = load_scene('drop')
     at = np.array(scene.bones[scene.bone_index('left_forearm')].position)
-    with page(context, 'drop') as view:
+    with page(context, 'drop', camera(3.2, 1.2, 0.95)) as view:
         mouse = view.page.mouse
         mouse.move(*view.pixels([at])[0])
         mouse.down()
-        mouse.move(*view.pixels([np.add(at, (0, 0, 0.1))])[0])
+        mouse.move(*view.pixels([np.add(at, (0, -0.3, 0.4))])[0], steps=5)
+        view.key(' ')
+        view.page.wait_for_timeout(3000)
+        view.key(' ')
+        view.button('Go on').wait_for()
+        mouse.move(*view.pixels([np.add(at, (0, -1.0, 0.5))])[0], steps=5)
         shot(view)
-        view.key(' ')
-        mouse.move(*view.pixels([np.add(at, (0, -0.5, 0.35))])[0], steps=10)
-        view.page.wait_for_timeout(4000)
-        view.key(' ')
+        step(view, 9)
         (folder / 'viewer_grab.png').write_bytes(shot(view))
         mouse.up()
 
 
 def edit(context: browser.BrowserContext, folder: Path) -> None:
     """The editor with a chosen thigh in its bind pose."""
-    with page(context, 'drop') as view:
+    with page(context, 'drop', camera(2.2, 1.3, 0.85, turn=0.5)) as view:
         view.tab('Edit')
         view.press('Edit')
         view.button('Drop it').wait_for()
@@ -95,13 +109,16 @@ def edit(context: browser.BrowserContext, folder: Path) -> None:
 
 
 def skin(context: browser.BrowserContext, folder: Path) -> None:
-    """A fitted character, its skin on the falling bones."""
+    """A fitted character, its bones of glass about its skin, pushed aside."""
     with tempfile.TemporaryDirectory() as inbox:
         rig, doll = Path(inbox, 'mannequin.glb'), Path(inbox, 'mannequin.yaml')
         rig.write_bytes(fit_rigs.mannequin().glb())
-        fit.main([str(rig), '-o', str(doll)])
-        with page(context, str(doll)) as view:
-            step(view, 34)
+        with contextlib.redirect_stdout(None):
+            fit.main([str(rig), '-o', str(doll)])
+        with page(context, str(doll), camera(3.1, 1.2, 0.75)) as view:
+            view.page.get_by_label('Bones').check()
+            view.page.mouse.move(10, 10)
+            step(view, 30)
             view.key('ArrowRight')
             step(view, 12)
             (folder / 'viewer_skin.png').write_bytes(shot(view))
@@ -110,6 +127,7 @@ def skin(context: browser.BrowserContext, folder: Path) -> None:
 def main(folder: Path) -> None:
     """Take all pictures."""
     browser.SIZE.update(SIZE)
+    browser.PATIENCE = 100.0
     with browser.chromium() as context:
         for picture in (fall, grab, edit, skin):
             picture(context, folder)

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 from .ragdoll import Bone, Box, Capsule, Cylinder, Vector
 
+PLAIN = (0.5, 0.64, 0.82, 1.0)
+"""Red, green, blue, opacity of a bone that has no colour of its own."""
+
 
 @dataclass(frozen=True)
 class Part:

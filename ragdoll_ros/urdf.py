@@ -19,6 +19,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from . import rotation
+from .parts import PLAIN
 from .ragdoll import Bone, Box, Capsule, Joint, Ragdoll, Sphere
 from .scene import Scene
 
@@ -87,7 +88,7 @@ def _link(bone: Bone, frame: tuple[np.ndarray, np.ndarray], dialect: str) -> lis
     centre = rotation.rotate(back, bone.position - frame[0])
     turn = rotation.multiply(back, bone.orientation)
     ixx, iyy, izz = bone.inertia
-    color = bone.color or (0.7, 0.7, 0.7, 1.0)
+    color = bone.color or PLAIN
     lines = [f'  <link name={quoteattr(bone.name)}>',
              '    <inertial>', f'      {_origin(centre, turn)}',
              f'      <mass value="{bone.mass!r}"/>',

@@ -271,6 +271,14 @@ def test_a_sheet_that_nobody_touched_changes_nothing(name):
         assert sheet.apply(scene, bone, sheet.read(scene, bone)) is scene
 
 
+def test_a_colour_is_changed_and_its_opacity_kept():
+    clear = changes.change_bone(DROP, 'head', color=(0.2, 0.4, 0.6, 0.5))
+    fields = sheet.read(clear, 'head')
+    assert fields['color'] == (51, 102, 153)
+    fields['color'] = (255, 102, 153)
+    assert bone_of(sheet.apply(clear, 'head', fields), 'head').color == (1, 0.4, 0.6, 0.5)
+
+
 def test_a_number_that_is_shown_rounded_stays_as_it_is():
     third = changes.set_pose(DROP, 'head', (1 / 3, 2 / 3, 1.5))
     fields = sheet.read(third, 'head')

@@ -14,12 +14,14 @@ from fit_rigs import RIGS
 from ragdoll_ros import faults, rotation
 from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.pipeline import fit_character
+from ragdoll_ros.push import Push
 from ragdoll_ros.ragdoll import Bone, Box, Joint, Ragdoll, Sphere
 from ragdoll_ros.riders import Riders
 from ragdoll_ros.scene import Placement, Scene, above_ground
 from ragdoll_ros.scene_file import load_scene
 from ragdoll_ros.simulation import Simulation
 from ragdoll_ros.viewer.limits import PIECES, Limits
+from ragdoll_ros.viewer.marks import arrow_before
 from ragdoll_ros.viewer.meshes import MESHES, ROUND
 from ragdoll_ros.viewer.pointer import kept_distance, nearest, on_bone
 from ragdoll_ros.viewer.rods import Rods
@@ -209,3 +211,17 @@ def test_the_nearest_body_and_its_point():
     assert nearest(scene, state, np.array([0.95, 0.9, 0])) == 1
     assert nearest(scene, state, np.array([0.3, 0.3, 0])) == 0
     assert on_bone(scene, state, 1, np.array([5.0, 1.05, 0])) == pytest.approx([1, 0.05, 0])
+
+
+@pytest.mark.parametrize(('push', 'tip'), [
+    (Push('box', (0, 2000, 0)), (1, -1, 3)), (Push('box', (0, -500, 0)), (1, 5, 3)),
+    # Turned by 90 degrees about z, its length of 6 m along x is along y.
+    (Push('box', (8, 0, 0), local=True), (1, -1, 3)),
+    (Push('box', (0, 0, -8), point=(1, 0.5, 0.5)), (2, 2.5, 4))])
+def test_the_arrow_of_a_push_ends_before_the_body(push, tip):
+    """Of a box of 6 x 4 x 2 m; the arrow is as long and runs as the push says."""
+    box, place = Bone('box', Box((6, 4, 2)), 1, (0, 0, 0)), np.array((1.0, 2.0, 3.0))
+    turn = rotation.from_rpy(0, 0, np.pi / 2)
+    arrow = arrow_before(box, push, place, turn)
+    assert arrow[1] == pytest.approx(tip)
+    assert np.diff(arrow, axis=0) == pytest.approx(np.diff(push.arrow(place, turn), axis=0))

@@ -8,11 +8,11 @@ from visualization_msgs.msg import (
     Marker,
 )
 
-from ..parts import Part, parts_of
+from ..parts import PLAIN, Part, parts_of
 from ..ragdoll import Bone
 from ..scene import Scene
 from ..state import State
-from .markers import GRAY, KINDS, paint, place
+from .markers import KINDS, paint, place
 from .messages import to_vector
 
 OPACITY = 0.15
@@ -61,5 +61,5 @@ def _ghost(bone: Bone, part: Part) -> Marker:
     ghost = Marker(type=KINDS[part.kind], action=Marker.ADD)
     ghost.scale = to_vector([GROWTH * side for side in part.size])
     place(ghost.pose, list(part.shift), [0.0, 0.0, 0.0, 1.0])
-    paint(ghost, (*(bone.color or GRAY)[:3], OPACITY))
+    paint(ghost, (*(bone.color or PLAIN)[:3], OPACITY))
     return ghost

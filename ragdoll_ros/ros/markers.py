@@ -8,14 +8,13 @@ from geometry_msgs.msg import Pose
 from visualization_msgs.msg import Marker, MarkerArray
 
 from .. import rotation
-from ..parts import parts_of
+from ..parts import PLAIN, parts_of
 from ..push import Push
 from ..scene import Scene
 from ..state import State
 from ..swing.pose import SwingState
 from .messages import to_header, to_point, to_vector
 
-GRAY = (0.7, 0.7, 0.7, 1.0)
 RED = (0.9, 0.2, 0.1, 1.0)
 BROWN = (0.35, 0.2, 0.1, 1.0)
 ROD = 0.01
@@ -58,7 +57,7 @@ class Markers:
 
     def _marker(self, number: int) -> Marker:
         part = self._parts[number]
-        color = self._scene.bones[self._bones[number]].color or GRAY
+        color = self._scene.bones[self._bones[number]].color or PLAIN
         name = self._scene.bone_names[self._bones[number]]
         same = self._bones[:number].count(self._bones[number])
         marker = Marker(ns=name, id=same, type=KINDS[part.kind], action=Marker.ADD)

@@ -7,12 +7,13 @@ import numpy as np
 import viser
 
 from .. import rotation
-from ..parts import parts_of
+from ..parts import PLAIN, parts_of
 from ..scene import Scene
 from ..state import State
 from .meshes import MESHES
 
-GRAY = (0.7, 0.7, 0.7, 1.0)
+GLASS = 0.45
+"""Opacity of bones through which their skin is to be seen."""
 
 WXYZ = [3, 0, 1, 2]
 """Viser's order of a quaternion, from ours."""
@@ -33,7 +34,7 @@ class Bodies:
     def __init__(self, server: viser.ViserServer, scene: Scene, state: State) -> None:
         parts = [(index, part) for index, bone in enumerate(scene.bones)
                  for part in parts_of(bone)]
-        colors = np.array([(bone.color or GRAY)[:3] for bone in scene.bones])
+        colors = np.array([(bone.color or PLAIN)[:3] for bone in scene.bones])
         self.batches: list[Batch] = []
         for kind, (vertices, faces) in MESHES.items():
             mine = [(index, part) for index, part in parts if part.kind == kind]
@@ -55,10 +56,11 @@ class Bodies:
             batch.handle.batched_positions = positions
             batch.handle.batched_wxyzs = turns
 
-    def be_visible(self, wanted: bool) -> None:
-        """Show the bones, or hide them."""
+    def be_visible(self, wanted: bool, glass: bool) -> None:
+        """Show the bones, as of glass if so wished, or hide them."""
         for batch in self.batches:
             batch.handle.visible = wanted
+            batch.handle.opacity = GLASS if glass else None
 
 
 def _placed(state: State, bones: np.ndarray,

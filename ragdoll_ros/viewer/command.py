@@ -24,12 +24,11 @@ ENDING = 0.5
 """s that viser may take to say goodbye to its pages."""
 
 EXAMPLE = """examples:
-  ragdoll_viewer --scene doll.yaml
+  ragdoll_viewer                          show the node `ragdoll`
+  ragdoll_viewer --ros-args -r __ns:=/stage     ... in another namespace
+  ragdoll_viewer --scene doll.yaml        simulate a doll or scene here
   ragdoll_viewer --scene crowd --port 9000
-  ragdoll_viewer --play run.json
-  ragdoll_viewer
-  ragdoll_viewer --host 0.0.0.0
-  ragdoll_viewer --ros-args -r __ns:=/stage
+  ragdoll_viewer --play run.json          show a recording
 """
 
 NO_VISER = "ragdoll_viewer needs viser: pip install 'ragdoll_ros[viewer]', or pip install viser"
@@ -85,8 +84,8 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument('--port', type=port, help=f'port to serve at; it must be free ({PORT}, or '
                         'the next free one)')
     parser.add_argument('--folder', default='.', help='where the page saves and loads dolls, and '
-                        'keeps the characters it is sent (default: the current one); it writes '
-                        'nowhere else')
+                        'keeps the characters it is sent (default: the current one); pages '
+                        'can write nowhere else')
     return parser
 
 
@@ -123,8 +122,9 @@ def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
         from .recording_file import load_recording
         return Playback(load_recording(options.play), Path(options.play).name)
     if options.scene is not None:
+        scene = load_scene(options.scene)
         from .simulated import Simulated
-        return Simulated(load_scene(options.scene))
+        return Simulated(scene)
     try:
         from .remote import Remote
     except ImportError as error:

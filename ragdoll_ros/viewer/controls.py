@@ -14,8 +14,8 @@ from ..ros.keys import Held
 from ..scene_file import scene_names
 from .source import Report, Source
 
-ARROWS = {'← left': 'left', '↑ away': 'up', '↓ toward': 'down', '→ right': 'right'}
-"""Label of each push, as seen from in front of the doll."""
+ARROWS = {'←': 'left', '↑': 'up', '↓': 'down', '→': 'right'}
+"""Label of each push: short, so that all stand in one row."""
 
 PACES = (0.05, 2.0)
 """Slowest and fastest of the slider."""
@@ -30,11 +30,14 @@ KEEP_KEYS = """<img src="data:," style="display:none" onerror="
       if (event.key.startsWith('Arrow')) event.stopPropagation();
     });
     document.addEventListener('click', (event) => {
-      if (event.detail) event.target.closest('[role=tab]')?.blur();
+      const at = document.activeElement;
+      const typed = at?.matches('input:not([type=checkbox]), textarea');
+      if (event.detail && (!typed || event.target.closest('[role=option]'))) at?.blur();
     });
   }">"""
 """Keeps arrow keys from viser's camera, which would turn with each push; commands still get them:
-they listen where this does, the camera further out. A tab that was clicked gives the keys back."""
+they listen where this does, the camera further out. What was clicked gives the keys back, or
+Space would press it again, a checkbox keep all keys; but for a field in which one types."""
 
 
 class Controls:
@@ -47,7 +50,9 @@ class Controls:
         self._loop = server.get_event_loop()
         gui = server.gui
         gui.add_html(KEEP_KEYS)
-        pushes = gui.add_button_group('Push', tuple(ARROWS), hint='2000 N; arrow keys do the same')
+        pushes = gui.add_button_group(
+            'Push', tuple(ARROWS), hint='2000 N, as seen from in front of the doll: left, away, '
+            'toward you, right; arrow keys do the same')
         self._pause = gui.add_button('Pause', icon='player-pause', hint='Space')
         self._step = gui.add_button('Step', icon='player-track-next', hint='N; while paused',
                                     disabled=True)

@@ -6,6 +6,9 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
+from .. import rotation
+from ..push import Push
+from ..ragdoll import Bone
 from .source import Frame
 
 BROWN, RED, BLUE, YELLOW = (90, 50, 25), (230, 50, 25), (30, 110, 230), (245, 190, 0)
@@ -25,6 +28,8 @@ class Marks:
                 name, points, RED, shaft_radius=0.02, head_radius=0.05, head_length=0.12),
             'hands': lambda name, points: add.add_line_segments(
                 name, points, BLUE, thickness=3.0, thickness_units='screen'),
+            'pointers': lambda name, points: add.add_point_cloud(
+                name, points, BLUE, point_size=0.05, point_shape='circle'),
             'contacts': lambda name, points: add.add_point_cloud(
                 name, points, YELLOW, point_size=0.04, point_shape='circle')}
         self._handles: dict[str, viser.SceneNodeHandle] = {}
@@ -32,13 +37,15 @@ class Marks:
     def show(self, frame: Frame) -> None:
         """Draw what there is; hide what has gone."""
         scene, state = frame.scene, frame.state
-        arrows = [push.arrow(state.positions[bone], state.orientations[bone])
+        arrows = [arrow_before(scene.bones[bone], push, state.positions[bone],
+                               state.orientations[bone])
                   for push in frame.pushes if any(push.force)
                   for bone in (scene.bone_index(push.bone),)]
         lines = [np.stack([hand.point, hand.target]) for hand in frame.held]
         self._set('rods', frame.rods)
         self._set('pushes', arrows)
         self._set('hands', lines)
+        self._set('pointers', [hand.target for hand in frame.held])
         self._set('contacts', frame.contacts)
 
     def _set(self, kind: str, points: object) -> None:
@@ -53,3 +60,16 @@ class Marks:
             return
         handle.points = points
         handle.visible = True
+
+
+def arrow_before(bone: Bone, push: Push, position: np.ndarray,
+                 orientation: np.ndarray) -> np.ndarray:
+    """Tail and tip (2, 3) m, world frame, of a push's arrow, its tip before the bone, to be seen.
+
+    The bone's centre of mass is at ``position`` (3,) m, its axes at ``orientation`` (4,).
+    """
+    arrow = push.arrow(position, orientation)
+    way = rotation.normalized(arrow[1] - arrow[0])
+    local = rotation.rotate(rotation.inverse(orientation), way)
+    depth = (arrow[1] - position) @ way + bone.shape.reach(local)
+    return arrow - way * depth

@@ -11,8 +11,7 @@ from ..ragdoll import Vector
 from ..scene import Scene
 from ..state import State
 from .recording import Recording
-from .simulated import PACES
-from .source import Frame, Report, Wanted
+from .source import PACES, Frame, Report, Wanted
 
 
 class Fixed(faults.RagdollError):

@@ -18,6 +18,9 @@ SPAN = 20.0
 
 HEIGHT = 170
 
+PADDING = (10, 16, 0, 0)
+"""Pixels above, right, below, left: room for the halves of the outermost numbers."""
+
 
 class Plots:
     """Three plots over simulated time."""
@@ -25,7 +28,7 @@ class Plots:
     def __init__(self, server: viser.ViserServer) -> None:
         self._energy = _Plot(server, 'Energy since the start, J', (
             ('doll', 'crimson'), ('put in by pushes and grabs', 'royalblue')))
-        self._gap = _Plot(server, 'Joint gap, mm', (('largest', 'darkorange'),))
+        self._gap = _Plot(server, 'Joint gap, µm', (('largest', 'darkorange'),))
         self._pace = _Plot(server, 'Pace, simulated s each s', (
             ('is', 'seagreen'), ('asked for', 'silver')))
         self._scene: object = None
@@ -43,7 +46,9 @@ class Plots:
             pace = (frame.time - self._last[0]) / (now - self._last[1])
             self._pace.add(frame.time, pace, 0.0 if report.paused else report.pace)
         self._next, self._last = now + PERIOD, (frame.time, now)
-        self._gap.add(frame.time, 1e3 * self._gaps.gaps(frame.state).max(initial=0.0))
+        # Without what is less than a nanometre: rounding, which would fill the plot.
+        gap = 1e6 * self._gaps.gaps(frame.state).max(initial=0.0)
+        self._gap.add(frame.time, round(float(gap), 3))
         measures = report.measures
         if measures and measures is not self._measured:
             self._measured = measures
@@ -67,7 +72,7 @@ class _Plot:
         series = (uplot.Series(label='s'), *(
             uplot.Series(label=label, stroke=color, width=2) for label, color in lines))
         self._handle = server.gui.add_uplot(
-            self._data(), series, title=title, height=HEIGHT,
+            self._data(), series, title=title, height=HEIGHT, padding=PADDING,
             scales={'x': uplot.Scale(time=False)})
 
     def add(self, *row: float) -> None:

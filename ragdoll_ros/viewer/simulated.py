@@ -18,16 +18,13 @@ from ..ragdoll import Vector
 from ..scene import SECOND, Scene
 from ..scene_file import load_scene
 from ..simulation import Simulation
-from .source import Frame, Held, Report, Wanted
+from .source import PACES, Frame, Held, Report, Wanted
 
 HOLD = 0.6
 """s of simulated time that a push holds, as the node's cmd_vel_timeout."""
 
 MEASURE_PERIOD = 0.1
 """s on the wall between two looks at what went wrong so far."""
-
-PACES = (0.001, 100.0)
-"""Slowest and fastest, as the node's real_time_factor."""
 
 ENDING = 1.0
 """s that the thread may take to end."""

@@ -15,6 +15,9 @@ from ..ragdoll import Vector
 from ..scene import Scene
 from ..state import State
 
+PACES = (0.001, 100.0)
+"""Slowest and fastest, as the node's real_time_factor."""
+
 
 @dataclass(frozen=True)
 class Held:

@@ -32,5 +32,6 @@ class Stage:
 
     def be_visible(self, bones: bool, skins: bool) -> None:
         """Show bones and skins; bones at least where there is no skin."""
-        self.bodies.be_visible(bones or not (skins and self.skins.handles))
+        clad = bool(skins and self.skins.handles)
+        self.bodies.be_visible(bones or not clad, glass=clad)
         self.skins.be_visible(skins)

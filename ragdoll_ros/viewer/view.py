@@ -22,7 +22,8 @@ class View:
                 'Skin', initial_value=True, visible=False,
                 hint="the fitted character's skin, following the bones")
             self._bones = server.gui.add_checkbox(
-                'Bones', initial_value=False, visible=False, hint='the bodies under the skin')
+                'Bones', initial_value=False, visible=False,
+                hint='the bodies that move the skin, as of glass')
 
     def show_scene(self, has_skin: bool) -> None:
         """Offer what there is to show."""

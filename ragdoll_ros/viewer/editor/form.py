@@ -98,7 +98,7 @@ def _widget(gui: viser.GuiApi, field: Field) -> Any:
     if field.widget == 'text':
         return gui.add_text(field.label, '', hint=hint)
     if field.widget == 'color':
-        return gui.add_rgba(field.label, (0, 0, 0, 255), hint=hint)
+        return gui.add_rgb(field.label, (0, 0, 0), hint=hint)
     start: Value = (0.0, 0.0, 0.0) if field.widget == 'vector' else 0.0
     add = gui.add_vector3 if field.widget == 'vector' else gui.add_number
     widget = add(field.label, start, step=STEPS.get(field.key, 0.01), hint=hint)

@@ -12,15 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ... import faults, rotation
+from ...parts import PLAIN
 from ...ragdoll import JOINT_KINDS, SHAPES, Joint, Shape, unit
 from ...scene import Scene
 from . import changes
 
 Value = str | float | tuple[float, ...]
 Sheet = dict[str, Value]
-
-GRAY = (0.7, 0.7, 0.7, 1.0)
-"""Shown for a bone without a colour of its own."""
 
 SHAPE_FIELDS = {'box': ('size',), 'sphere': ('radius',), 'cylinder': ('radius', 'length'),
                 'capsule': ('radius', 'length')}
@@ -71,7 +69,7 @@ def read(scene: Scene, name: str) -> Sheet:
     _, bone = changes.find(scene, name)
     sheet: Sheet = {'shape': bone.shape.kind, **vars(bone.shape), 'mass': bone.mass,
                     'position': bone.position, 'turn': _degrees(bone.orientation),
-                    'color': tuple(round(255 * part) for part in bone.color or GRAY)}
+                    'color': tuple(round(255 * part) for part in (bone.color or PLAIN)[:3])}
     for key in SURFACE:
         value = getattr(bone, key)
         sheet[key] = '' if value is None else f'{value:.9g}'
@@ -111,6 +109,12 @@ def _body_steps(name: str, limb: bool) -> list[Step]:
     def turn(scene: Scene, new: Sheet) -> Scene:
         return changes.set_pose(scene, name, orientation=_quaternion(new['turn']), limb=limb)
 
+    def color(scene: Scene, new: Sheet) -> Scene:
+        _, old = changes.find(scene, name)
+        opacity = (old.color or PLAIN)[3:]
+        return changes.change_bone(
+            scene, name, color=(*(part / 255 for part in new['color']), *opacity))
+
     def bone(*keys: str, **fields: Callable[[Sheet], object]) -> Step:
         return keys, lambda scene, new: changes.change_bone(
             scene, name, **{key: made(new) for key, made in fields.items()})
@@ -118,7 +122,7 @@ def _body_steps(name: str, limb: bool) -> list[Step]:
     return [bone('shape', 'size', 'radius', 'length', shape=_shape),
             bone('mass', mass=lambda new: new['mass']),
             (('position',), place), (('turn',), turn),
-            bone('color', color=lambda new: tuple(part / 255 for part in new['color'])),
+            (('color',), color),
             *(bone(key, **{key: lambda new, key=key: _number_or_none(key, new[key])})
               for key in SURFACE)]
 
