@@ -15,7 +15,7 @@ import numpy as np
 
 from . import faults, rotation
 from .fit.axes import fit_axes
-from .fit.shapes import choose_kind, fit_shape
+from .fit.shapes import fit_best
 from .fit.solid import surface
 from .ragdoll import (
     LARGEST_SWING,
@@ -141,7 +141,7 @@ def _around(shapes: list[tuple[Shape, Pose]]) -> tuple[Shape, Pose]:
                              for shape, (centre, turn) in shapes])
     axes = fit_axes(points, np.ones(len(points)), np.array([0.0, 0.0, 1.0]))
     local = points @ axes.frame
-    fitted = fit_shape(local, choose_kind([local], THINNEST, 0.0), THINNEST, 0.0)
+    fitted, = fit_best([local], THINNEST, 0.0)
     return fitted.shape, (axes.frame @ fitted.centre, rotation.from_matrix(axes.frame))
 
 

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from ragdoll_ros.fit.axes import STANDS_OUT, fit_axes, spread
-from ragdoll_ros.fit.shapes import MAKERS, choose_kind, fit_shape, outside
+from ragdoll_ros.fit.shapes import MAKERS, fit_best, fit_shape, outside
 from ragdoll_ros.ragdoll import Box, Capsule, Cylinder, Sphere
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -126,9 +126,8 @@ def test_a_solid_is_recognised_by_its_skin(solid):
     weights = np.random.default_rng(1).dirichlet((1, 1, 1), size=(len(triangles), 12))
     points = np.einsum('tsk,tkd->tsd', weights, corners[triangles]).reshape(-1, 3)
     points += (1, 2, 3)
-    kind = choose_kind([points], 0.01, 0.001)
-    fitted = fit_shape(points, kind, 0.01, 0.001)
-    assert kind == solid.kind
+    fitted, = fit_best([points], 0.01, 0.001)
+    assert fitted.shape.kind == solid.kind
     assert np.allclose(fitted.centre, (1, 2, 3), atol=0.02)
     # Up to a twentieth of the skin may stay outside, so the fit may be a little smaller.
     assert fitted.shape.volume == pytest.approx(solid.volume, rel=0.15)

@@ -15,7 +15,7 @@ from .groups import Group, group_bones, partner, vertices_by_bone
 from .joints import damped, make_joint
 from .names import roles_of, side_of
 from .refine import refined
-from .shapes import TOLERANCE, Fitted, choose_kind, fit_shape, outside
+from .shapes import TOLERANCE, Fitted, fit_best, fit_shape, outside
 from .spring_recipe import swing_of
 
 THINNEST = 0.01
@@ -127,15 +127,15 @@ def _fit_shapes(character: Character, groups: list[Group], axes: list[Axes],
     clouds = [(character.vertices[group.vertices] if len(group.vertices)
                else character.positions[[group.bone]]) @ own.frame
               for group, own in zip(groups, axes, strict=True)]
-    kinds: dict[int, str] = {}
-    fits = []
-    for index, (cloud, own) in enumerate(zip(clouds, axes, strict=True)):
-        pair = tuple(sorted({index, partner(character, groups, index)}))
-        if kind == 'best' and pair[0] not in kinds:
-            kinds[pair[0]] = choose_kind([clouds[k] for k in pair], *sizes)
-        fitted = fit_shape(cloud, kinds.get(pair[0], kind), *sizes)
-        fits.append(Fitted(_rounded(fitted.shape), own.frame @ fitted.centre, fitted.share))
-    return fits
+    fits: dict[int, Fitted] = {}
+    for index, cloud in enumerate(clouds):
+        if kind != 'best':
+            fits[index] = fit_shape(cloud, kind, *sizes)
+        elif index not in fits:
+            pair = sorted({index, partner(character, groups, index)})
+            fits.update(zip(pair, fit_best([clouds[k] for k in pair], *sizes), strict=True))
+    return [Fitted(_rounded(fits[index].shape), own.frame @ fits[index].centre, fits[index].share)
+            for index, own in enumerate(axes)]
 
 
 def _rounded(shape: object) -> object:

@@ -43,23 +43,26 @@ def fit_shape(points: np.ndarray, kind: str, thinnest: float, tolerance: float) 
     points = points[::max(1, -(-len(points) // MOST_POINTS))]
     if len(points) == 0:
         points = np.zeros((1, 3))
-    tried = [replace(fitted, share=float(np.mean(
-        outside(fitted.shape, points - fitted.centre) <= tolerance)))
-        for fitted in MAKERS[kind](points, thinnest)]
-    enough = [fitted for fitted in tried if fitted.share >= WANTED]
-    if enough:
-        return min(enough, key=lambda fitted: fitted.shape.volume)
+    tried = []
+    for fitted in sorted(MAKERS[kind](points, thinnest), key=lambda fitted: fitted.shape.volume):
+        off = outside(fitted.shape, points - fitted.centre)
+        tried.append(replace(fitted, share=np.count_nonzero(off <= tolerance) / len(off)))
+        if tried[-1].share >= WANTED:
+            return tried[-1]
     return max(tried, key=lambda fitted: fitted.share)
 
 
-def choose_kind(clusters: list[np.ndarray], thinnest: float, tolerance: float) -> str:
-    """Kind of shape that holds clusters (p, 3), each in its own axes, in the smallest volume."""
-    def badness(kind: str) -> tuple[bool, float]:
-        fits = [fit_shape(points, kind, thinnest, tolerance) for points in clusters]
+def fit_best(clusters: list[np.ndarray], thinnest: float, tolerance: float) -> list[Fitted]:
+    """Fit shapes of one kind to clusters (p, 3), each in its own axes.
+
+    The kind is the one that holds them in the smallest volume.
+    """
+    def badness(fits: list[Fitted]) -> tuple[bool, float]:
         return (min(fitted.share for fitted in fits) < WANTED,
                 sum(fitted.shape.volume for fitted in fits))
 
-    return min(MAKERS, key=badness)
+    return min(([fit_shape(points, kind, thinnest, tolerance) for points in clusters]
+                for kind in MAKERS), key=badness)
 
 
 def outside(shape: Shape, points: np.ndarray) -> np.ndarray:
@@ -104,13 +107,13 @@ def _cylinders(points: np.ndarray, thinnest: float) -> Iterator[Fitted]:
 def _capsules(points: np.ndarray, thinnest: float) -> Iterator[Fitted]:
     for centre in _centres(points):
         radial = np.linalg.norm((points - centre)[:, :2], axis=1)
-        for radius in np.quantile(radial, QUANTILES):
-            radius = max(radius, thinnest / 2)
-            # A point at this distance from the axis is inside so far into the end's half ball.
-            dome = np.sqrt(np.maximum(radius ** 2 - radial ** 2, 0))
-            lows = np.quantile(points[:, 2] + dome, END_CUTS)
-            highs = np.quantile(points[:, 2] - dome, 1 - END_CUTS)
-            for low, high in zip(lows, highs, strict=True):
+        radii = np.maximum(np.quantile(radial, QUANTILES), thinnest / 2)
+        # A point at this distance from the axis is inside so far into the end's half ball.
+        domes = np.sqrt(np.maximum(radii[:, None] ** 2 - radial ** 2, 0))
+        lows = np.quantile(points[:, 2] + domes, END_CUTS, axis=1)
+        highs = np.quantile(points[:, 2] - domes, 1 - END_CUTS, axis=1)
+        for radius, *ends in zip(radii, lows.T, highs.T, strict=True):
+            for low, high in zip(*ends, strict=True):
                 middle = np.array([centre[0], centre[1], (low + high) / 2])
                 yield Fitted(Capsule(radius, max(high - low, thinnest / 2)), middle)
 
