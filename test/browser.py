@@ -23,6 +23,10 @@ PATIENCE = 20.0
 """s that the page may take for anything, on a busy machine without a GPU."""
 
 SIZE = {'width': 800, 'height': 520}
+"""Of the page, as the mouse counts."""
+
+SHARPNESS = 0.5
+"""Pixels that are drawn to each of those: without a GPU, half of them take half the time."""
 
 FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
          '--disable-background-networking', '--disable-component-update', '--disable-sync',
@@ -95,7 +99,8 @@ def chromium():
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, \
             sync_playwright() as playwright:
         context = playwright.chromium.launch_persistent_context(
-            profile, executable_path=path, headless=True, args=FLAGS, viewport=SIZE)
+            profile, executable_path=path, headless=True, args=FLAGS, viewport=SIZE,
+            device_scale_factor=SHARPNESS)
         context.set_default_timeout(PATIENCE * 1000)
         yield context
         context.close()

@@ -8,7 +8,7 @@ import fit_rigs
 import imageio.v3 as iio
 import numpy as np
 import pytest
-from browser import SIZE, chromium, opened, serving
+from browser import SHARPNESS, SIZE, chromium, opened, serving
 from test_fit_broken import BROKEN
 
 from ragdoll_ros.scene_file import load_scene
@@ -117,7 +117,7 @@ def test_what_was_clicked_gives_the_keys_back(view, click):
 
 
 def test_the_camera_follows_on_demand(view):
-    """Pushed metres away the doll is at the middle of the picture, and after a reset again."""
+    """Pushed away the doll is at the middle of the picture, and after a reset again."""
     middle = np.array((SIZE['width'], SIZE['height'])) / 2
     masses = [bone.mass for bone in SCENE.bones]
 
@@ -130,7 +130,7 @@ def test_the_camera_follows_on_demand(view):
     view.wait(lambda: off() < 2)
     view.key('ArrowLeft')
     go_on(view)
-    view.wait(lambda: view.bodies(SCENE)[0][1] < -3)
+    view.wait(lambda: view.bodies(SCENE)[0][1] < -1.5)
     view.key(' ')
     view.wait(lambda: off() < 2)
     hold_at_start(view)
@@ -163,13 +163,13 @@ def test_a_run_is_recorded_and_played_back(browser, view, states, tmp_path):
     hold_at_start(view)
     view.press('Record')
     go_on(view)
-    view.wait(lambda: far(view, START, 0.1))
+    view.wait(lambda: far(view, START, 0.3))  # a quarter of a second, 15 pictures
     with view.page.expect_download() as download:
         view.press('Stop and download')
     download.value.save_as(tmp_path / 'run.json')
     hold_at_start(view)
     recording = load_recording(tmp_path / 'run.json')
-    assert recording.scene == SCENE and len(recording) > 20
+    assert recording.scene == SCENE and len(recording) > 5
     for time_, positions in zip(recording.times, recording.positions, strict=True):
         np.testing.assert_array_equal(positions, states[round(time_ / SCENE.step)].positions)
     with (serving('--port', '0', '--play', str(tmp_path / 'run.json')) as url,
@@ -190,7 +190,7 @@ def test_the_view_is_saved_as_png(view, tmp_path):
     picture = iio.imread(tmp_path / 'view.png')
     share = picture.shape[0] / SIZE['height']
     x, y = (view.pixels(START[:1])[0] * share).astype(int)
-    assert share >= 0.75 and picture.shape[1:] == (share * SIZE['width'], 3)
+    assert share >= 0.75 * SHARPNESS and picture.shape[1:] == (share * SIZE['width'], 3)
     assert (picture[2, 2] == 255).all() and picture[y, x].min() < 200
 
 
