@@ -19,6 +19,7 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Header
+from std_srvs.srv import SetBool, Trigger
 
 from ragdoll_ros.ragdoll import Sphere
 from ragdoll_ros.ros.messages import to_pose_array
@@ -34,12 +35,22 @@ from ragdoll_ros.viewer.source import Wanted
 OPEN = Wanted(frames=True)
 
 
+@pytest.fixture(scope='module')
+def nodes(ros):
+    """The nodes that served one test after the other so far; only the last one may still run."""
+    nodes = []
+    yield nodes
+    for process in nodes:
+        kill(process)
+
+
 @pytest.fixture(autouse=True)
-def nothing_runs_on():
+def nothing_runs_on(nodes):
     before = len(STARTED)
     yield
     for process in STARTED[before:]:
-        kill(process)
+        if process not in nodes:
+            kill(process)
 
 
 @pytest.fixture
@@ -57,11 +68,29 @@ def remote(ros):
 
 
 @pytest.fixture
-def node(ros):
-    process = start('node')
-    yield process
-    if process.poll() is None:
-        end(process, signal.SIGINT)
+def node(nodes, peer):
+    """The node in the default scene as it begins: another one only where the last was killed."""
+    if not nodes or nodes[-1].poll() is not None:
+        nodes.append(start('node'))
+    yield nodes[-1]
+    if nodes[-1].poll() is None:
+        assert set_parameters(peer, scene='drop', real_time_factor=1.0)
+        assert peer.call(SetBool, 'ragdoll/pause', SetBool.Request(data=False)).success
+        assert peer.call(Trigger, 'ragdoll/reset', Trigger.Request()).success
+
+
+@pytest.fixture
+def no_node(nodes):
+    """No node runs as the test begins."""
+    if nodes and nodes[-1].poll() is None:
+        end(nodes[-1], signal.SIGINT)
+
+
+def set_parameters(peer, **values):
+    """Whether the node takes these parameters."""
+    parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
+    return peer.call(SetParametersAtomically, 'ragdoll/set_parameters_atomically',
+                     SetParametersAtomically.Request(parameters=parameters)).result.successful
 
 
 def seen(remote, name='drop'):
@@ -113,7 +142,7 @@ def test_listens_to_what_is_shown_alone(node, remote, peer):
         return [topic for topic in topics if peer.count_subscribers(topic)]
 
     peer.wait(lambda: peer.count_publishers('ragdoll/poses'))
-    assert listened() == []
+    peer.wait(lambda: listened() == [])
     remote.want(OPEN)
     seen(remote)
     peer.wait(lambda: listened() == ['ragdoll/poses', 'robot_description'])
@@ -219,7 +248,7 @@ def test_uses_an_edited_scene_or_says_why_not(node, remote, tmp_path):
     assert remote.frame.scene.name == 'heavier'
 
 
-def test_no_node_is_said_and_heals_by_itself(remote):
+def test_no_node_is_said_and_heals_by_itself(no_node, remote):
     remote.want(OPEN)
     wait(lambda: 'no node' in remote.report.problem and 'ragdoll_node' in remote.report.problem)
     with pytest.raises(ValueError, match='no node'):
@@ -235,7 +264,7 @@ def test_no_node_is_said_and_heals_by_itself(remote):
     assert len(remote.frame.state.positions) == 100
 
 
-def test_a_scene_that_is_not_here_is_shown_by_its_urdf(remote, tmp_path):
+def test_a_scene_that_is_not_here_is_shown_by_its_urdf(no_node, remote, tmp_path):
     """The file is another one by now: what the node took is what is shown."""
     path = tmp_path / 'mine.yaml'
     scene = load_scene('crowd')
@@ -336,11 +365,9 @@ def test_an_open_page_follows_the_scene_that_others_set(node, page, peer, broken
     All while the page's hand holds the head and its pointer goes on dragging.
     """
     def set_scene(name):
-        value = Parameter('scene', value=str(name)).to_parameter_msg()
-        answer = peer.call(SetParametersAtomically, 'ragdoll/set_parameters_atomically',
-                           SetParametersAtomically.Request(parameters=[value]))
+        taken = set_parameters(peer, scene=str(name))
         page.source.drag('page 0', (0.0, 0.0, 2.0))
-        return answer.result.successful
+        return taken
 
     wait(lambda: page._frame is not None)
     larger = load_scene('drop')
@@ -362,7 +389,7 @@ def test_an_open_page_follows_the_scene_that_others_set(node, page, peer, broken
     wait(lambda: drawn(page, load_scene('ponytail')))
 
 
-def test_the_viewer_leaves_at_a_signal(ros):
+def test_the_viewer_leaves_at_a_signal(no_node):
     """Without any node: it waits for one, and ends within 2 s."""
     import subprocess
     process = subprocess.Popen(

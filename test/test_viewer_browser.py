@@ -91,16 +91,16 @@ def test_sees_ten_bodies_fall(view, states):
     view.wait(lambda: index_of(view.bodies(SCENE), states) > drawn)
 
 
-@pytest.mark.parametrize(('button', 'arrow', 'axis', 'sign'), [
-    ('↑', 'ArrowUp', 0, -1), ('↓', 'ArrowDown', 0, 1),
-    ('←', 'ArrowLeft', 1, -1), ('→', 'ArrowRight', 1, 1)])
-def test_a_button_and_its_key_push_alike(view, button, arrow, axis, sign):
+@pytest.mark.parametrize(('act', 'axis', 'sign'), [
+    (lambda view: view.press('↑'), 0, -1), (lambda view: view.press('↓'), 0, 1),
+    (lambda view: view.press('←'), 1, -1), (lambda view: view.press('→'), 1, 1),
+    (lambda view: view.key('ArrowUp'), 0, -1)], ids=['up', 'down', 'left', 'right', 'key'])
+def test_a_button_or_a_key_pushes(view, act, axis, sign):
     """2000 N for 0.6 s: the torso is 1 m off at once; the fall alone takes it 0.5 m."""
-    for act in (lambda: view.press(button), lambda: view.key(arrow)):
-        hold_at_start(view)
-        act()
-        go_on(view)
-        view.wait(lambda: view.bodies(SCENE)[0][axis] * sign > 1)
+    hold_at_start(view)
+    act(view)
+    go_on(view)
+    view.wait(lambda: view.bodies(SCENE)[0][axis] * sign > 1)
 
 
 @pytest.mark.parametrize('click', [
