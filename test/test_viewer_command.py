@@ -17,6 +17,8 @@ pytest.importorskip('viser')
 from conftest import ROOT
 from page_client import PageClient
 
+from ragdoll_ros.viewer.command import main
+
 COMMAND = [sys.executable, '-m', 'ragdoll_ros.viewer.command']
 
 
@@ -35,9 +37,18 @@ def start(*arguments):
     return process, int(found[1])
 
 
+def places_of(port):
+    """Where sockets listen on a port, as Linux lists them; 127.0.0.1 is 0100007F."""
+    listening = [line.split()[1] for path in map(Path, ('/proc/net/tcp', '/proc/net/tcp6'))
+                 if path.exists() for line in path.read_text().splitlines()
+                 if line.split()[3] == '0A']
+    return [place for place in listening if place.endswith(f':{port:04X}')]
+
+
 @pytest.mark.parametrize('sign', [signal.SIGINT, signal.SIGTERM])
 def test_says_where_it_is_serves_and_ends_within_two_seconds(sign):
     process, port = start('--scene', 'drop', '--port', '0')
+    assert places_of(port) == [f'0100007F:{port:04X}'], 'this machine alone'
     with urllib.request.urlopen(f'http://127.0.0.1:{port}', timeout=5) as answer:
         assert answer.status == 200 and b'<html' in answer.read()
     PageClient(port)
@@ -50,26 +61,23 @@ def test_says_where_it_is_serves_and_ends_within_two_seconds(sign):
     assert process.returncode == 0 and not out and 'Traceback' not in error
 
 
-def test_is_for_this_machine_alone_unless_told_otherwise():
-    """Its socket, as Linux lists it, listens on 127.0.0.1: 0100007F."""
-    process, port = start('--scene', 'drop', '--port', '0')
-    listening = [line.split()[1] for path in map(Path, ('/proc/net/tcp', '/proc/net/tcp6'))
-                 if path.exists() for line in path.read_text().splitlines()
-                 if line.split()[3] == '0A']
-    process.terminate()
-    process.wait(10)
-    assert [place for place in listening if place.endswith(f':{port:04X}')] == [
-        f'0100007F:{port:04X}']
-
-
-def test_a_port_that_was_asked_for_and_is_taken_is_an_error():
+def test_a_port_that_was_asked_for_and_is_taken_is_an_error(signals, capsys):
     with socket.socket() as taken:
         taken.bind(('127.0.0.1', 0))
         taken.listen()
         port = taken.getsockname()[1]
-        done = run('--scene', 'drop', '--port', str(port))
-    assert done.returncode == 2
-    assert str(port) in done.stderr and 'in use' in done.stderr and 'Traceback' not in done.stderr
+        assert main(['--scene', 'drop', '--port', str(port)]) == 2
+    said = capsys.readouterr().err
+    assert str(port) in said and 'in use' in said
+
+
+@pytest.fixture
+def signals():
+    """The command takes the signals of its process: they are given back."""
+    before = {sign: signal.getsignal(sign) for sign in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for sign, handler in before.items():
+        signal.signal(sign, handler)
 
 
 @pytest.mark.parametrize(('arguments', 'words'), [
@@ -79,18 +87,26 @@ def test_a_port_that_was_asked_for_and_is_taken_is_an_error():
     (('--scene', 'drop', '--port', '99999'), ['99999', '65535']),
     (('--scene', 'drop', '--port', 'x'), ['--port', "'x'"]),
     (('--scene', 'drop', '--ros-args', '-r', '__ns:=/a'), ['--ros-args', '--scene']),
-    (('--scene', 'drop', '--folder', '/nonexistent'), ['/nonexistent', 'folder']),
-    (('--nonsense',), ['--nonsense'])])
-def test_refuses_with_exit_code_two(arguments, words):
-    done = run(*arguments)
-    assert done.returncode == 2 and 'Traceback' not in done.stderr
-    assert all(word in done.stderr for word in words), done.stderr
+    (('--scene', 'drop', '--folder', '/nonexistent'), ['/nonexistent', 'folder'])])
+def test_refuses_with_exit_code_two(arguments, words, signals, capsys):
+    try:
+        code = main(list(arguments))
+    except SystemExit as error:
+        code = error.code
+    said = capsys.readouterr().err
+    assert code == 2 and all(word in said for word in words), said
+
+
+def test_a_wrong_option_ends_the_process_with_two():
+    done = run('--nonsense')
+    assert done.returncode == 2 and '--nonsense' in done.stderr and 'Traceback' not in done.stderr
 
 
 def test_a_broken_scene_is_refused_with_all_its_faults(broken_scene):
     path, words = broken_scene
     done = run('--scene', str(path))
     assert done.returncode == 2 and all(word in done.stderr for word in words)
+    assert 'Traceback' not in done.stderr
 
 
 @pytest.mark.parametrize(('missing', 'word', 'arguments'), [

@@ -37,6 +37,10 @@ NO_ROS = ("without --scene, ragdoll_viewer listens to a node over ROS 2: source 
           "pip install 'ragdoll_ros[ros]', or name a scene: ragdoll_viewer --scene drop")
 
 
+class NoViser(faults.RagdollError):
+    """Nothing to serve a page with."""
+
+
 class NoRos(faults.RagdollError):
     """No ROS to listen to."""
 
@@ -57,11 +61,6 @@ def main(arguments: list[str] | None = None) -> int:
     stop = threading.Event()
     for sign in (signal.SIGINT, signal.SIGTERM):
         signal.signal(sign, lambda *_: stop.set())
-    try:
-        import viser  # noqa: F401
-    except ImportError:
-        print(NO_VISER, file=sys.stderr)
-        return 2
     try:
         serve(options, for_ros, stop)
     except faults.RagdollError as error:
@@ -98,18 +97,28 @@ def port(text: str) -> int:
 
 def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event) -> None:
     """Serve the page until told to stop; RagdollError if it cannot be."""
-    from .page import Page
     if not os.access(options.folder, os.W_OK | os.X_OK) or not os.path.isdir(options.folder):
         raise WrongArguments(f'--folder {options.folder}: expected a folder that can be written to')
     number = free_port(options.host, options.port)
     source = make_source(options, for_ros)
     try:
+        Page = page_class()
         with server_at(options.host, number) as server:
             page = Page(server, source, options.folder)
             print(f'The page is at http://{shown(options.host)}:{server.get_port()}', flush=True)
             page.run(stop)
     finally:
         source.close()
+
+
+def page_class() -> type:
+    """Import what takes longest, only once all else is as it should be; NoViser without it."""
+    try:
+        import viser  # noqa: F401
+    except ImportError:
+        raise NoViser(NO_VISER) from None
+    from .page import Page
+    return Page
 
 
 def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
