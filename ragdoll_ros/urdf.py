@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -24,6 +23,9 @@ from .ragdoll import Bone, Box, Capsule, Joint, Ragdoll, Sphere
 from .scene import Scene
 
 UNLIMITED = 'continuous'
+
+ESCAPES = str.maketrans({'&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;',
+                         '\t': '&#9;', '\n': '&#10;', '\r': '&#13;'})
 
 
 def joint_frame(joint: Joint) -> np.ndarray:
@@ -53,15 +55,15 @@ def scene_to_urdf(scene: Scene) -> str:
     for placement in scene.dolls:
         doll = placement.doll.renamed(functools.partial(scene.qualified, placement))
         position, _ = placement.bone_pose(doll.root)
-        lines += [f'  <joint name={quoteattr(doll.root.name)} type="floating">',
-                  '    <parent link="world"/>', f'    <child link={quoteattr(doll.root.name)}/>',
+        lines += [f'  <joint name={_quoted(doll.root.name)} type="floating">',
+                  '    <parent link="world"/>', f'    <child link={_quoted(doll.root.name)}/>',
                   f'    {_origin(position, np.array(placement.orientation))}', '  </joint>',
                   *_tree(doll, 'ros', limited=True)]
     return _document(scene.name, lines)
 
 
 def _document(name: str, lines: list[str]) -> str:
-    return '\n'.join(['<?xml version="1.0"?>', f'<robot name={quoteattr(name)}>', *lines,
+    return '\n'.join(['<?xml version="1.0"?>', f'<robot name={_quoted(name)}>', *lines,
                       '</robot>', ''])
 
 
@@ -89,7 +91,7 @@ def _link(bone: Bone, frame: tuple[np.ndarray, np.ndarray], dialect: str) -> lis
     turn = rotation.multiply(back, bone.orientation)
     ixx, iyy, izz = bone.inertia
     color = bone.color or PLAIN
-    lines = [f'  <link name={quoteattr(bone.name)}>',
+    lines = [f'  <link name={_quoted(bone.name)}>',
              '    <inertial>', f'      {_origin(centre, turn)}',
              f'      <mass value="{bone.mass!r}"/>',
              f'      <inertia ixx="{ixx!r}" iyy="{iyy!r}" izz="{izz!r}" ixy="0" ixz="0" iyz="0"/>',
@@ -97,7 +99,7 @@ def _link(bone: Bone, frame: tuple[np.ndarray, np.ndarray], dialect: str) -> lis
     for position, geometry in _geometries(bone, centre, turn, dialect):
         origin = _origin(position, turn)
         lines += ['    <visual>', f'      {origin}', f'      {geometry}',
-                  f'      <material name={quoteattr(bone.name)}>'
+                  f'      <material name={_quoted(bone.name)}>'
                   f'<color rgba={_numbers(color)}/></material>', '    </visual>',
                   '    <collision>', f'      {origin}', f'      {geometry}', '    </collision>']
     return [*lines, '  </link>']
@@ -148,9 +150,9 @@ def _row(joint: Joint, row: list, place: tuple, dialect: str) -> list[str]:
     for index, (name, kind, axis, limit) in enumerate(row, start=1):
         last = index == len(row)
         child = joint.child if last else f'{joint.child}/{index}'
-        lines += [f'  <joint name={quoteattr(name)} type="{kind}">',
-                  f'    <parent link={quoteattr(parent)}/>',
-                  f'    <child link={quoteattr(child)}/>',
+        lines += [f'  <joint name={_quoted(name)} type="{kind}">',
+                  f'    <parent link={_quoted(parent)}/>',
+                  f'    <child link={_quoted(child)}/>',
                   f'    {_origin(*place) if index == 1 else "<origin/>"}']
         if axis is not None:
             lines.append(f'    <axis xyz={_numbers(axis)}/>')
@@ -167,8 +169,13 @@ def _row(joint: Joint, row: list, place: tuple, dialect: str) -> list[str]:
 
 def _massless(name: str, dialect: str) -> list[str]:
     if dialect == 'ros':
-        return [f'  <link name={quoteattr(name)}/>']
-    return [f'  <link name={quoteattr(name)}>',
+        return [f'  <link name={_quoted(name)}/>']
+    return [f'  <link name={_quoted(name)}>',
             '    <inertial><mass value="0"/>'
             '<inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial>',
             '  </link>']
+
+
+def _quoted(text: str) -> str:
+    """Write an attribute; xml.sax.saxutils could, but loads HTTP and TLS with every node."""
+    return f'"{text.translate(ESCAPES)}"'

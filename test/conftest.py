@@ -16,9 +16,9 @@ collect_ignore_glob = [file for package, files in FILES_THAT_NEED.items()
                        if importlib.util.find_spec(package) is None for file in files]
 
 
-LONGEST = ('test_ros_process.py', 'test_viewer_browser.py', 'test_ros_browser.py',
-           'test_ros_viewer.py', 'test_grab.py', 'test_simulation.py', 'test_editor.py',
-           'test_viewer.py', 'test_swing.py')
+LONGEST = ('test_ros_viewer.py', 'test_viewer_browser.py', 'test_ros_process.py',
+           'test_ros_browser.py', 'test_ros_programs.py', 'test_grab.py', 'test_simulation.py',
+           'test_editor.py', 'test_viewer.py', 'test_swing.py')
 
 
 def pytest_collection_modifyitems(items):

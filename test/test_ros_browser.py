@@ -57,8 +57,11 @@ def node(ros):
 
 
 @pytest.fixture(scope='module')
-def view(browser, node):
-    """A page on a node of the default scene, each a process of its own."""
+def view(browser, node, heard):
+    """A page on a node of the default scene, each a process of its own.
+
+    It comes last: what it sends is heard from the first message on.
+    """
     with serving('--port', '0') as url, opened(browser, url, SCENE) as view:
         yield view
 

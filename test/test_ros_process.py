@@ -2,17 +2,13 @@
 from __future__ import annotations
 
 import math
-import os
-import re
-import select
 import signal
-import time
 
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseArray, Twist, Vector3, Wrench, WrenchStamped
-from peer import PATIENCE, STARTED, Peer, end, kill, start, start_on_terminal
+from peer import Peer, end, kill, start
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -34,21 +30,15 @@ def peer(ros):
     peer.destroy_node()
 
 
-@pytest.fixture(autouse=True)
-def nothing_runs_on():
-    """Kill what a test that failed has left running."""
-    before = len(STARTED)
-    yield
-    for process in STARTED[before:]:
-        kill(process)
-
-
 @pytest.fixture(scope='module')
 def running(ros):
     """A node in the default scene."""
     process = start('node')
     yield process
-    end(process, signal.SIGINT)
+    try:
+        end(process, signal.SIGINT)
+    finally:
+        kill(process)
 
 
 @pytest.fixture(scope='module')
@@ -259,118 +249,3 @@ def test_a_scene_changes_while_it_runs(heard, peer):
     change('drop')
     peer.wait(lambda: len(heard['poses'][-1][1].poses) == 10)
     assert set(np.diff([stamp(message) for _, message in heard['poses'][-20:]])) == {10_000_000}
-
-
-def test_a_signal_ends_the_node_with_0_within_2_s(peer):
-    """Twice each, at once: a signal may find the node anywhere."""
-    signs = (signal.SIGINT, signal.SIGTERM) * 2
-    processes = [start('node', '--ros-args', '-r', f'__ns:=/signalled_{number}')
-                 for number in range(len(signs))]
-    got = [peer.collect(PoseArray, f'/signalled_{number}/ragdoll/poses')
-           for number in range(len(signs))]
-    peer.wait(lambda: all(got), timeout=30)
-    for process, sign in zip(processes, signs, strict=True):
-        code, took = end(process, sign)
-        assert code == 0, process.stderr_text
-        assert took < 2
-
-
-def test_a_wrong_start_ends_with_2_and_a_reason(ros, broken_scene):
-    path, words = broken_scene
-    cases = [(('node', '--ros-args', '-p', 'scene:=nowhere'), ['nowhere', 'crowd']),
-             (('node', '--ros-args', '-p', 'rate:=-1.0', '-p', 'real_time_factor:=.nan'),
-              ['rate', 'real_time_factor']),
-             (('node', '--ros-args', '-p', 'rate'), ['rate']),
-             (('node', '--faster'), ['--faster']),
-             (('node', '--ros-args', '-p', f'scene:={path}'), words),
-             (('run', str(path)), words),
-             (('teleop',), ['terminal'])]
-    for (arguments, words), process in [(case, start(*case[0])) for case in cases]:
-        _, errors = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 2, arguments
-        assert all(word in errors for word in words) and 'Traceback' not in errors
-
-
-def test_help_has_an_example(ros):
-    for process in [start(module, '--help') for module in ('node', 'teleop', 'run')]:
-        output, _ = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 0 and 'examples:' in output
-
-
-class Screen:
-    """What a program on a terminal has written, and keys for it."""
-
-    def __init__(self, terminal):
-        self.text = ''
-        self._terminal = terminal
-
-    def type(self, keys):
-        os.write(self._terminal, keys)
-
-    def shows(self, pattern):
-        """Tell whether the pattern has come up since the last match, which is then forgotten."""
-        if select.select([self._terminal], [], [], 0.1)[0]:
-            try:
-                self.text += os.read(self._terminal, 65536).decode('utf-8', 'replace')
-            except OSError:
-                return False
-        match = re.search(pattern, self.text)
-        if match:
-            self.text = self.text[match.end():]
-        return bool(match)
-
-    def wait(self, pattern):
-        end = time.monotonic() + PATIENCE
-        while not self.shows(pattern):
-            assert time.monotonic() < end, f'{pattern} did not come up in {self.text[-500:]}'
-
-
-def line(push):
-    """The live line with this push."""
-    return rf'pace [01]\.\d\d  \d+\.\d s  push {push}  tick \d+\.\d\d ms  torso .* m \d+\.\d m/s'
-
-
-def test_run_shows_a_live_line_and_the_arrows_push(ros):
-    process, terminal = start_on_terminal('run', '--ros-args', '-r', '__ns:=/stage')
-    screen = Screen(terminal)
-    screen.wait(line('none'))
-    screen.type(b'\x1b[A')
-    screen.wait(line(r'\(-2000 0 1\) N'))
-    screen.wait(line('none'))
-    screen.type(b'\x1b[A\x1b[C')
-    screen.wait(line(r'\(-2000 2000 2\) N'))
-    screen.wait(line('none'))
-    screen.type(b' ')
-    screen.wait(r'paused  \d')
-    screen.type(b' ')
-    screen.wait(line('none'))
-    screen.type(b'r')
-    screen.wait(r'  0\.\d s')
-    screen.type(b'q')
-    process.communicate(timeout=PATIENCE)
-    assert process.returncode == 0
-
-
-def test_the_teleop_sends_what_the_keys_say(peer):
-    got = peer.collect(Wrench, '/typed/ragdoll/force')
-    process, terminal = start_on_terminal('teleop', '--ros-args', '-r', '__ns:=/typed')
-    peer.wait(lambda: peer.count_publishers('/typed/ragdoll/force'))
-    screen = Screen(terminal)
-    screen.wait('waiting for the node')
-    screen.type(b'\x1b[B\x1b[D')
-    peer.wait(lambda: got and got[-1][1] == Wrench())
-    forces = [(w.force.x, w.force.y, w.force.z) for _, w in got]
-    assert (2000.0, -2000.0, 2.0) in forces
-    assert forces.count((0.0, 0.0, 0.0)) == 1
-    code, _ = end(process, signal.SIGINT)
-    assert code == 0
-
-
-def test_without_a_terminal_the_line_is_logged_each_second(ros):
-    process = start('run', '--ros-args', '-r', '__ns:=/logged', '-p', 'real_time_factor:=0.5')
-    lines = []
-    while not re.match(r'pace 0\.\d\d  \d', lines[-1] if lines else ''):
-        assert len(lines) < 20
-        lines.append(process.stdout.readline())
-    code, _ = end(process, signal.SIGTERM)
-    assert code == 0

@@ -1,5 +1,6 @@
 """URDF becomes a doll: what to_urdf writes comes back, and robots go limp."""
 import math
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -33,6 +34,12 @@ def every_kind():
 
 def relative(doll, position):
     return np.subtract(position, doll.root.position)
+
+
+def test_any_name_is_written_as_xml():
+    name = 'a <"b"> & \'c\'\t\n\r ä'
+    text = to_urdf(Ragdoll('x', (Bone(name, Sphere(1), 1, (0, 0, 0)),), ()))
+    assert ElementTree.fromstring(text).find('link').get('name') == name
 
 
 @pytest.mark.parametrize('name', ['doll', 'article_doll', None])
