@@ -105,11 +105,16 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[Fault]]:
         return None, found
     placements = []
     entries = data.get('dolls')
+    named = functools.cache(lambda name: _named_doll(name, path))  # a crowd's is read once
     for index, entry in enumerate(entries if isinstance(entries, list) else ()):
         where = f'dolls[{index}]'
         if not isinstance(entry, dict) or 'doll' not in entry:
             continue
-        doll, more = _placed_doll(entry['doll'], path)
+        source = entry['doll']
+        if isinstance(source, dict):
+            doll, more = build_doll(source, path.with_name('doll'))
+        else:
+            doll, more = named(source) if isinstance(source, str) else (None, [])
         found += [fault.at(f'{where}.doll') for fault in more]
         if doll is not None and not _any_under(found, where):
             doll, more = _with_swings(doll, entry, path)
@@ -334,14 +339,10 @@ def _expected(error: jsonschema.ValidationError) -> str:
     return (rule.get(error.validator, '') .format(value) + (about and f' ({about})')).strip()
 
 
-def _placed_doll(source: object, path: Path) -> tuple[Ragdoll | None, list[Fault]]:
+def _named_doll(name: str, path: Path) -> tuple[Ragdoll | None, list[Fault]]:
     """Make the doll a scene names; faults of another file carry its name."""
-    if isinstance(source, dict):
-        return build_doll(source, path.with_name('doll'))
-    if not isinstance(source, str):
-        return None, []
     try:
-        file = find(source, beside=path.parent)
+        file = find(name, beside=path.parent)
         doll, found = build_doll(_read(file), file)
     except Fault as fault:
         return None, [fault]

@@ -13,7 +13,8 @@ from test_fit_broken import BROKEN
 
 from ragdoll_ros.scene_file import load_scene
 from ragdoll_ros.simulation import Simulation
-from ragdoll_ros.viewer.recording_file import load_recording
+from ragdoll_ros.viewer.recording import Recording
+from ragdoll_ros.viewer.recording_file import load_recording, save_recording
 
 SCENE = load_scene('drop')
 START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])
@@ -104,9 +105,10 @@ def test_a_button_or_a_key_pushes(view, act, axis, sign):
 
 
 @pytest.mark.parametrize('click', [
-    lambda view: view.press('Reset'), lambda view: view.page.get_by_label('Contacts').click(),
-    lambda view: view.page.locator('.mantine-Slider-root').click()],
-    ids=['button', 'checkbox', 'slider'])
+    lambda view: view.press('Reset'),
+    pytest.param(lambda view: view.page.get_by_label('Contacts').click(), marks=pytest.mark.slow),
+    pytest.param(lambda view: view.page.locator('.mantine-Slider-root').click(),
+                 marks=pytest.mark.slow)], ids=['button', 'checkbox', 'slider'])
 def test_what_was_clicked_gives_the_keys_back(view, click):
     """Else Space would press it again, and the arrow keys would move it, or nothing."""
     hold_at_start(view)
@@ -116,6 +118,7 @@ def test_what_was_clicked_gives_the_keys_back(view, click):
     view.wait(lambda: view.bodies(SCENE)[0][1] < -0.5)
 
 
+@pytest.mark.slow  # test_viewer.py has what the camera is told
 def test_the_camera_follows_on_demand(view):
     """Pushed away the doll is at the middle of the picture, and after a reset again."""
     middle = np.array((SIZE['width'], SIZE['height'])) / 2
@@ -148,6 +151,7 @@ def test_pause_holds_and_step_makes_one_tick(view, states):
     view.wait(lambda: far(view, states[2].positions, 0.1))
 
 
+@pytest.mark.slow  # test_viewer.py has two pages without a browser
 def test_two_pages_show_and_steer_the_same(browser, url, view):
     hold_at_start(view)  # before the other one: what moves is drawn twice
     with opened(browser, url, SCENE) as other:
@@ -157,7 +161,7 @@ def test_two_pages_show_and_steer_the_same(browser, url, view):
             each.wait(lambda each=each: far(each, START, 0.1))
 
 
-def test_a_run_is_recorded_and_played_back(browser, view, states, tmp_path):
+def test_a_run_is_recorded(view, states, tmp_path):
     """From the start on, each recorded pose is the simulation's at that tick, to the bit."""
     view.page.get_by_text('Recording', exact=True).click()
     hold_at_start(view)
@@ -172,6 +176,16 @@ def test_a_run_is_recorded_and_played_back(browser, view, states, tmp_path):
     assert recording.scene == SCENE and len(recording) > 5
     for time_, positions in zip(recording.times, recording.positions, strict=True):
         np.testing.assert_array_equal(positions, states[round(time_ / SCENE.step)].positions)
+
+
+@pytest.mark.slow  # test_viewer_playback.py plays without a browser
+def test_a_run_is_played_back(browser, states, tmp_path):
+    """To its last pose, where it stays."""
+    made = [states[tick] for tick in (0, 10, 20)]
+    recording = Recording(SCENE, np.array((0, 10, 20)) * SCENE.step,
+                          np.array([state.positions for state in made]),
+                          np.array([state.orientations for state in made]))
+    save_recording(recording, tmp_path / 'run.json')
     with (serving('--port', '0', '--play', str(tmp_path / 'run.json')) as url,
           opened(browser, url, SCENE) as page):
         page.wait(lambda: abs(page.bodies(SCENE) - recording.positions[-1]).max() < 1e-6)
@@ -284,6 +298,7 @@ def upload(view, button, name, content):
     chooser.value.set_files({'name': name, 'mimeType': '', 'buffer': content})
 
 
+@pytest.mark.slow  # test_editor_wire.py uploads both without a browser
 def test_rubbish_is_refused_and_a_character_is_fitted(view):
     """What was uploaded is told by its name; the skin is in the page then."""
     view.tab('Edit')
