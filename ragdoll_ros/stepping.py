@@ -116,6 +116,10 @@ energy of it."""
 LAG = 0.1
 """Share of a motion that joint damping may take away before the engine hears that it is slower."""
 
+HELPED = 0.98
+"""Share of an overshoot that finer steps must come below to be tried once more: where contacts
+press a joint past its limit, they never do."""
+
 SHORTEST = 1e-7
 """s: a piece of flight shorter than this is not worth its stages."""
 
@@ -427,17 +431,20 @@ class Stepper:
                    STIFFEST / max(self._fading, 1e-9))
 
     def _step(self, duration: float, loads: Sequence[Load]) -> float:
-        """Take the engine's own step, finer if it overshoots a limit; give its substep, s."""
+        """Take the engine's own step, finer where that overshoots less; give its substep, s."""
         self.settle()
         start, state, touching = self.coordinates, self.state, self.touching
         bound = max(1.0, self.accuracy.creep * self._too_far())
         substeps = self._substeps(duration, bool(loads))
         self._blocked = False
         most = max(1, math.ceil(self.accuracy.most * duration / self._span))
+        last = math.inf
         while True:
             self._run(duration, substeps, loads)
-            if substeps >= most or self._too_far() <= bound:
+            far = self._too_far()
+            if substeps >= most or far <= bound or far > HELPED * last:
                 return duration / substeps
+            last = far
             self._back_to(start, state, touching)
             substeps = min(most, 4 * substeps)
             self.effort.redone += 1
