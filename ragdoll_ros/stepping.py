@@ -6,6 +6,7 @@ and contacts ask for.
 """
 from __future__ import annotations
 
+import bisect
 import dataclasses
 import functools
 import math
@@ -63,11 +64,11 @@ class Accuracy:
     """Stop the engine when all is at rest."""
 
 
-DRAFT = Accuracy(turn=0.3, limit=0.15, contact=2, settled=1, sink=0.01, most=32, order=2,
+DRAFT = Accuracy(turn=0.3, limit=0.15, contact=3, settled=2, sink=0.01, most=32, order=2,
                  flight_turn=0.4, land=False, redo=math.radians(6))
 NORMAL = Accuracy(turn=0.1, limit=0.06, contact=6, settled=4, sink=0.004, most=128, order=3,
                   flight_turn=0.4, redo=math.radians(2.5))
-EXACT = Accuracy(turn=0.04, limit=0.03, contact=6, settled=3, sink=0.0015, most=256, order=4,
+EXACT = Accuracy(turn=0.04, limit=0.03, contact=8, settled=4, sink=0.0015, most=256, order=4,
                  flight_turn=0.2, redo=math.radians(1.5))
 ACCURACIES = {'draft': DRAFT, 'normal': NORMAL, 'exact': EXACT}
 
@@ -115,6 +116,9 @@ energy of it."""
 
 LAG = 0.1
 """Share of a motion that joint damping may take away before the engine hears that it is slower."""
+
+GRADES = sorted({math.ceil(2 ** (k / 2)) for k in range(24)})
+"""Counts of substeps: 1, 2, 3, 4, 6, 8, 12 ... A change makes the engine set up its step anew."""
 
 HELPED = 0.98
 """Share of an overshoot that finer steps must come below to be tried once more: where contacts
@@ -475,7 +479,7 @@ class Stepper:
         self.look()
 
     def _substeps(self, duration: float, pushed: bool) -> int:
-        """Count the substeps that this state asks for, a power of two."""
+        """Count the substeps that this state asks for, one of the grades."""
         accuracy, state = self.accuracy, self.state
         tens = duration / self._span
         if not accuracy.adaptive:
@@ -494,5 +498,5 @@ class Stepper:
             need = max(need, (accuracy.contact if moving else accuracy.settled) * tens,
                        falling * duration / accuracy.sink)
         most = max(1, math.ceil(accuracy.most * tens))
-        return min(most, math.ceil(2 ** (math.ceil(2 * math.log2(need)) / 2)))
+        return min(most, GRADES[bisect.bisect_left(GRADES, need)]) if need < most else most
 
