@@ -64,12 +64,12 @@ class Accuracy:
     """Stop the engine when all is at rest."""
 
 
-DRAFT = Accuracy(turn=0.3, limit=0.15, contact=3, settled=2, sink=0.01, most=32, order=2,
+DRAFT = Accuracy(turn=0.3, limit=0.15, contact=3, settled=2, sink=0.01, most=32, order=3,
                  flight_turn=0.4, land=False, redo=math.radians(6))
-NORMAL = Accuracy(turn=0.1, limit=0.06, contact=6, settled=4, sink=0.004, most=128, order=3,
-                  flight_turn=0.4, redo=math.radians(2.5))
+NORMAL = Accuracy(turn=0.1, limit=0.06, contact=6, settled=4, sink=0.004, most=128, order=4,
+                  flight_turn=0.2, redo=math.radians(2.5))
 EXACT = Accuracy(turn=0.04, limit=0.03, contact=8, settled=4, sink=0.0015, most=256, order=4,
-                 flight_turn=0.2, redo=math.radians(1.5))
+                 flight_turn=0.1, redo=math.radians(1.5))
 ACCURACIES = {'draft': DRAFT, 'normal': NORMAL, 'exact': EXACT}
 
 
@@ -165,6 +165,8 @@ class Stepper:
         counts = np.cumsum([0, *(len(placement.doll.bones) for placement in scene.dolls)])
         self._roots = np.array([start + placement.doll.bones.index(placement.doll.root)
                                 for start, placement in zip(counts[:-1], scene.dolls, strict=True)])
+        self._solid = bool(scene.ground or scene.self_collision or len(scene.dolls) > 1)
+        """Whether anything can touch at all."""
         self._fading = damping_rate(scene)
         smallest = min(placement.doll.extent for placement in scene.dolls)
         self._span = 0.01 * min(1.0, math.sqrt(smallest / HUMAN))
@@ -304,7 +306,7 @@ class Stepper:
         """Fly up to ``duration`` s; give the time flown, 0 where something comes in between."""
         if loads or self._loaded:
             self._path, self._loaded = None, bool(loads)
-        parts = self.reach.strides(self.state, duration)
+        parts = self.reach.strides(self.state, duration) if self._solid else 1
         if not self._leads_on(duration):
             parts = max(parts, math.ceil(duration / self._longest_step()))
         if parts > MOST_FLIGHTS:
@@ -407,7 +409,7 @@ class Stepper:
 
     def _fly_to(self, coordinates: Coordinates) -> None:
         self._set(coordinates)
-        self.touching = self.engine.touching()
+        self.touching = self.engine.touching() if self._solid else set()
 
     def _set(self, coordinates: Coordinates) -> None:
         self.engine.place(coordinates)
