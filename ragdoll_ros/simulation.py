@@ -231,10 +231,6 @@ class Simulation:
         self._begin()
         return self._state
 
-    def render(self, eye: np.ndarray, target: np.ndarray, width: int, height: int) -> np.ndarray:
-        """Draw what is seen from ``eye`` (m) looking at ``target`` (m): (h, w, 3) uint8."""
-        return self._stepper.settle().render(eye, target, width, height)
-
     def measures(self) -> dict[str, float]:
         """Tell what went wrong so far, and what the last tick took: names end in their units."""
         stepper, guard = self._stepper, self._guard
