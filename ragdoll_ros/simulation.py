@@ -18,8 +18,9 @@ from .guard import Guard
 from .mechanics import Mechanics, Motion, cross
 from .push import Push
 from .scene import SECOND, STEP_RANGE, Scene
+from .settings import HUMAN, Accuracy, firm, resolve_accuracy
 from .state import State
-from .stepping import ACCURACIES, HUMAN, Accuracy, Effort, Stepper, firm
+from .stepping import Effort, Stepper
 from .swing.pose import SwingState
 from .swing.riding import riding
 
@@ -450,15 +451,6 @@ class Simulation:
             self._correct(dataclasses.replace(coordinates, v=np.zeros_like(coordinates.v)))
             self._guard.settle(self._motion.energy, self._guard.groups(self._stepper.touching))
             self.asleep = True
-
-
-def resolve_accuracy(accuracy: str | Accuracy) -> Accuracy:
-    """Give the settings that a name stands for; OutOfRange for a name that is none."""
-    if isinstance(accuracy, Accuracy):
-        return accuracy
-    if accuracy not in ACCURACIES:
-        raise faults.OutOfRange('accuracy', accuracy, 'one of ' + ', '.join(ACCURACIES))
-    return ACCURACIES[accuracy]
 
 
 def _point(state: State, bone: int, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -21,8 +21,8 @@ from ragdoll_ros.mechanics import Mechanics
 from ragdoll_ros.ragdoll import Bone, Box, Ragdoll, Sphere
 from ragdoll_ros.scene import Placement, Scene
 from ragdoll_ros.scene_file import load_scene
+from ragdoll_ros.settings import NORMAL
 from ragdoll_ros.simulation import Simulation
-from ragdoll_ros.stepping import NORMAL
 
 DROP, FLIGHT = load_scene('drop'), load_scene('flight')
 BONES = DROP.bone_names

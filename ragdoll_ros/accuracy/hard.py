@@ -14,8 +14,8 @@ from ..push import Push
 from ..ragdoll import Bone, Ragdoll, Sphere
 from ..scene import Placement
 from ..scene_file import load_scene
+from ..settings import ACCURACIES
 from ..simulation import Simulation
-from ..stepping import ACCURACIES
 from .hard_cases import SINKING, HardCase, hard_cases
 from .measure import Measure
 from .methods import by_name, run
