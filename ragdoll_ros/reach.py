@@ -65,6 +65,8 @@ class Reach:
         A bound: bounding spheres, at twice the speed they have and may gain by gravity and
         pushes (``acceleration`` m/s^2), and the boxes around each doll's.
         """
+        if self._ground is None and len(self._bounds) == 2:
+            return set()
         speeds = np.sqrt(np.einsum('ij,ij->i', state.linear, state.linear))
         far = 2 * duration * (speeds + acceleration * duration) + self._radii + MARGIN
         found = set()

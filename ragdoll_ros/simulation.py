@@ -18,8 +18,9 @@ from .guard import Guard
 from .mechanics import Mechanics, Motion, cross
 from .push import Push
 from .scene import SECOND, STEP_RANGE, Scene
+from .settings import HUMAN, Accuracy, firm, resolve_accuracy
 from .state import State
-from .stepping import ACCURACIES, Accuracy, Effort, Stepper, firm
+from .stepping import Effort, Stepper
 from .swing.pose import SwingState
 from .swing.riding import riding
 
@@ -27,12 +28,13 @@ MOST_PUSHES = 1000
 """Pushes that may wait at once; one more is refused."""
 
 REST_SPEED = 0.05
-"""m/s, and rad/s times the bone's size, below which a bone counts as still: more than the
-flutter of a joint that leans on its limit, less than any fall gives within 10 ms."""
+"""m/s, and rad/s times the bone's size, below which a bone of the default doll counts as still:
+more than the flutter of a joint that leans on its limit, less than any fall gives within 10 ms.
+For other dolls it goes with the root of their size."""
 
 REST_WAY = 0.002
-"""m that a still bone may have moved in REST_TIME: limbs that sag against their joints' damping
-slower than 4 mm/s are stopped."""
+"""m that a still bone of the default doll may have moved in REST_TIME: limbs that sag against
+their joints' damping slower than 4 mm/s are stopped. For other dolls it goes with their size."""
 
 REST_TIME = SECOND // 2
 """ns that all bones must be still under gravity before the scene sleeps."""
@@ -78,7 +80,9 @@ class Simulation:
         self._sizes = np.array([max(bone.shape.half_extents) for bone in scene.bones])
         # A bone that is still has at most m v^2 / 2 for its speed and less than 3 times that for
         # its spin, as no radius of gyration is longer than its largest half extent.
-        self._most_at_rest = 2 * self.mechanics.doll_masses * (2 * REST_SPEED) ** 2
+        size = min(placement.doll.extent for placement in scene.dolls) / HUMAN
+        self._still_speed, self._still_way = math.sqrt(size) * REST_SPEED, size * REST_WAY
+        self._most_at_rest = 2 * self.mechanics.doll_masses * (2 * self._still_speed) ** 2
         self._gravity = math.hypot(*scene.gravity)
         self._lightest = float(self.mechanics.masses.min())
         self._riding = riding(scene)
@@ -227,10 +231,6 @@ class Simulation:
         self._stepper.begin()
         self._begin()
         return self._state
-
-    def render(self, eye: np.ndarray, target: np.ndarray, width: int, height: int) -> np.ndarray:
-        """Draw what is seen from ``eye`` (m) looking at ``target`` (m): (h, w, 3) uint8."""
-        return self._stepper.settle().render(eye, target, width, height)
 
     def measures(self) -> dict[str, float]:
         """Tell what went wrong so far, and what the last tick took: names end in their units."""
@@ -434,7 +434,7 @@ class Simulation:
         state = self._state
         speed = max(np.abs(state.linear).max(),
                     (np.abs(state.angular).max(axis=1) * self._sizes).max())
-        if speed > REST_SPEED or self._queue or self._hands:
+        if speed > self._still_speed or self._queue or self._hands:
             self._still = 0
             return
         if not self._still:
@@ -445,21 +445,12 @@ class Simulation:
         way = np.abs(state.positions - self._still_from.positions).max()
         turn = rotation.angle_between(state.orientations, self._still_from.orientations)
         self._still = 0
-        if (max(way, (turn * self._sizes).max()) < REST_WAY
+        if (max(way, (turn * self._sizes).max()) < self._still_way
                 and any(GROUND in pair for pair in self._stepper.touching)):
             coordinates = self._stepper.coordinates
             self._correct(dataclasses.replace(coordinates, v=np.zeros_like(coordinates.v)))
             self._guard.settle(self._motion.energy, self._guard.groups(self._stepper.touching))
             self.asleep = True
-
-
-def resolve_accuracy(accuracy: str | Accuracy) -> Accuracy:
-    """Give the settings that a name stands for; OutOfRange for a name that is none."""
-    if isinstance(accuracy, Accuracy):
-        return accuracy
-    if accuracy not in ACCURACIES:
-        raise faults.OutOfRange('accuracy', accuracy, 'one of ' + ', '.join(ACCURACIES))
-    return ACCURACIES[accuracy]
 
 
 def _point(state: State, bone: int, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

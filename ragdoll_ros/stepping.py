@@ -6,7 +6,7 @@ and contacts ask for.
 """
 from __future__ import annotations
 
-import dataclasses
+import bisect
 import functools
 import math
 from collections.abc import Sequence
@@ -20,76 +20,11 @@ from .flight import Path, fly
 from .mechanics import damping_rate
 from .reach import Reach
 from .scene import Scene
+from .settings import HUMAN, Accuracy
 from .state import State
-
-
-@dataclass(frozen=True)
-class Accuracy:
-    """How fine. Each mechanism can be switched off, to see its price and its worth."""
-
-    turn: float
-    """rad that the fastest bone may turn in one of the engine's substeps."""
-    limit: float
-    """rad that a joint near its limit may turn in one substep."""
-    contact: int
-    """Least substeps in 10 ms while something touches and moves."""
-    settled: int
-    """Least substeps in 10 ms while something touches and hardly moves."""
-    sink: float
-    """m that a bone may fall in one substep onto the ground."""
-    most: int
-    """Most substeps in 10 ms."""
-    order: int
-    """Order of the flight's Runge-Kutta method; 0: the engine's own step in flight too."""
-    flight_turn: float
-    """rad that the fastest bone may turn in one Runge-Kutta step."""
-    longest: float = 0.05
-    """s of flight that are gone through in one step at the most; 0: a tick."""
-    land: bool = True
-    """A flight goes up to the instant at which a joint reaches its limit; otherwise the engine
-    takes over a tick earlier."""
-    redo: float = math.radians(1.0)
-    """rad past a limit from which a step is done again, four times as fine, as it is when a bone
-    sinks deeper than ``sink``; infinity: never."""
-    creep: float = 1.1
-    """Times as far past a limit or in the ground as at its start that a step may end."""
-    adaptive: bool = True
-    """Substeps by need; otherwise always ``contact`` in 10 ms."""
-    energy: bool = True
-    """Take out energy that nothing put in."""
-    momentum: bool = True
-    """Keep the momentum of what is in the air."""
-    sleep: bool = True
-    """Stop the engine when all is at rest."""
-
-
-DRAFT = Accuracy(turn=0.3, limit=0.15, contact=2, settled=1, sink=0.01, most=32, order=2,
-                 flight_turn=0.4, land=False, redo=math.radians(6))
-NORMAL = Accuracy(turn=0.1, limit=0.06, contact=6, settled=2, sink=0.004, most=128, order=3,
-                  flight_turn=0.4, redo=math.radians(2.5))
-EXACT = Accuracy(turn=0.04, limit=0.03, contact=6, settled=3, sink=0.0015, most=256, order=4,
-                 flight_turn=0.2, redo=math.radians(1.5))
-ACCURACIES = {'draft': DRAFT, 'normal': NORMAL, 'exact': EXACT}
-
-
-@functools.lru_cache
-def firm(accuracy: Accuracy) -> Accuracy:
-    """Give an accuracy that is fine enough for joints that are pulled with all of a hand's force.
-
-    Steps are as short as a hand's force is steady, so that what each may add would add up.
-    """
-    return dataclasses.replace(
-        accuracy, turn=min(accuracy.turn, 0.06), limit=min(accuracy.limit, 0.025),
-        contact=max(accuracy.contact, 8), sink=min(accuracy.sink, 0.006),
-        most=max(accuracy.most, 64), redo=min(accuracy.redo, math.radians(2)), creep=1.0)
-
 
 AT_LIMIT = 1e-3
 """rad: a joint as near as this to its limit, and moving toward it, is at the limit."""
-
-HUMAN = 1.4
-"""m: extent of the default doll, for which Accuracy counts substeps in 10 ms. What is smaller
-falls and rolls by its own size sooner, as the root of its size."""
 
 SOON = 0.015
 """s ahead that limits and ground are looked for."""
@@ -115,6 +50,13 @@ energy of it."""
 
 LAG = 0.1
 """Share of a motion that joint damping may take away before the engine hears that it is slower."""
+
+GRADES = sorted({math.ceil(2 ** (k / 2)) for k in range(24)})
+"""Counts of substeps: 1, 2, 3, 4, 6, 8, 12 ... A change makes the engine set up its step anew."""
+
+HELPED = 0.98
+"""Share of an overshoot that finer steps must come below to be tried once more: where contacts
+press a joint past its limit, they never do."""
 
 SHORTEST = 1e-7
 """s: a piece of flight shorter than this is not worth its stages."""
@@ -153,10 +95,11 @@ class Stepper:
         self._free = self._make_free() if accuracy.order else None
         self.reach = Reach(scene)
         self._layout = self.engine.layout
-        self._normal = np.array(scene.ground.normal if scene.ground else (0.0, 0.0, 1.0))
         counts = np.cumsum([0, *(len(placement.doll.bones) for placement in scene.dolls)])
         self._roots = np.array([start + placement.doll.bones.index(placement.doll.root)
                                 for start, placement in zip(counts[:-1], scene.dolls, strict=True)])
+        self._solid = bool(scene.ground or scene.self_collision or len(scene.dolls) > 1)
+        """Whether anything can touch at all."""
         self._fading = damping_rate(scene)
         smallest = min(placement.doll.extent for placement in scene.dolls)
         self._span = 0.01 * min(1.0, math.sqrt(smallest / HUMAN))
@@ -296,7 +239,7 @@ class Stepper:
         """Fly up to ``duration`` s; give the time flown, 0 where something comes in between."""
         if loads or self._loaded:
             self._path, self._loaded = None, bool(loads)
-        parts = self.reach.strides(self.state, duration)
+        parts = self.reach.strides(self.state, duration) if self._solid else 1
         if not self._leads_on(duration):
             parts = max(parts, math.ceil(duration / self._longest_step()))
         if parts > MOST_FLIGHTS:
@@ -399,7 +342,7 @@ class Stepper:
 
     def _fly_to(self, coordinates: Coordinates) -> None:
         self._set(coordinates)
-        self.touching = self.engine.touching()
+        self.touching = self.engine.touching() if self._solid else set()
 
     def _set(self, coordinates: Coordinates) -> None:
         self.engine.place(coordinates)
@@ -427,17 +370,20 @@ class Stepper:
                    STIFFEST / max(self._fading, 1e-9))
 
     def _step(self, duration: float, loads: Sequence[Load]) -> float:
-        """Take the engine's own step, finer if it overshoots a limit; give its substep, s."""
+        """Take the engine's own step, finer where that overshoots less; give its substep, s."""
         self.settle()
         start, state, touching = self.coordinates, self.state, self.touching
         bound = max(1.0, self.accuracy.creep * self._too_far())
         substeps = self._substeps(duration, bool(loads))
         self._blocked = False
         most = max(1, math.ceil(self.accuracy.most * duration / self._span))
+        last = math.inf
         while True:
             self._run(duration, substeps, loads)
-            if substeps >= most or self._too_far() <= bound:
+            far = self._too_far()
+            if substeps >= most or far <= bound or far > HELPED * last:
                 return duration / substeps
+            last = far
             self._back_to(start, state, touching)
             substeps = min(most, 4 * substeps)
             self.effort.redone += 1
@@ -468,7 +414,7 @@ class Stepper:
         self.look()
 
     def _substeps(self, duration: float, pushed: bool) -> int:
-        """Count the substeps that this state asks for, a power of two."""
+        """Count the substeps that this state asks for, one of the grades."""
         accuracy, state = self.accuracy, self.state
         tens = duration / self._span
         if not accuracy.adaptive:
@@ -487,5 +433,5 @@ class Stepper:
             need = max(need, (accuracy.contact if moving else accuracy.settled) * tens,
                        falling * duration / accuracy.sink)
         most = max(1, math.ceil(accuracy.most * tens))
-        return min(most, math.ceil(2 ** (math.ceil(2 * math.log2(need)) / 2)))
+        return min(most, GRADES[bisect.bisect_left(GRADES, need)]) if need < most else most
 

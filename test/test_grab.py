@@ -21,8 +21,8 @@ from ragdoll_ros.mechanics import Mechanics
 from ragdoll_ros.ragdoll import Bone, Box, Ragdoll, Sphere
 from ragdoll_ros.scene import Placement, Scene
 from ragdoll_ros.scene_file import load_scene
+from ragdoll_ros.settings import NORMAL
 from ragdoll_ros.simulation import Simulation
-from ragdoll_ros.stepping import NORMAL
 
 DROP, FLIGHT = load_scene('drop'), load_scene('flight')
 BONES = DROP.bone_names
@@ -250,9 +250,9 @@ def test_jumps_of_the_pointer_by_metres_leave_it_stable(accuracy, step):
             assert math.degrees(measures['limit_overshoot_rad']) <= 5
         assert measures['stopped_total'] == 0
         simulation.drag('hand', (0, 0, 2.2), 0.5)
-        for _ in range(round(4 / step)):
+        for _ in range(round(6 / step)):
             simulation.advance()
-        # It swings, at up to 2 times its weight, which is 22 mm.
+        # It still swings, at up to 2 times its weight, which is 22 mm.
         assert np.linalg.norm(held_point(simulation) - (0, 0, 2.2)) < 0.04
 
 
@@ -291,7 +291,7 @@ def swung(hands):
 
 def test_many_hands_at_one_point_do_not_quarrel():
     """They hold it as one that is stronger."""
-    assert (swung(MOST_HANDS) <= swung(1)).all()
+    assert np.linalg.norm(swung(MOST_HANDS)) <= np.linalg.norm(swung(1))
 
 
 def test_more_hands_than_there_may_be_are_refused():

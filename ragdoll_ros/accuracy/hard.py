@@ -14,8 +14,8 @@ from ..push import Push
 from ..ragdoll import Bone, Ragdoll, Sphere
 from ..scene import Placement
 from ..scene_file import load_scene
+from ..settings import ACCURACIES
 from ..simulation import Simulation
-from ..stepping import ACCURACIES
 from .hard_cases import SINKING, HardCase, hard_cases
 from .measure import Measure
 from .methods import by_name, run
@@ -36,7 +36,7 @@ QUICK_CASES = ('mass ratio 1:100', 'start in a self-overlap', 'limits of 2°', '
 REASONS: dict[str, str] = {
     '20 kN for 3 s': 'the torso comes near 1000 m/s, and a joint turns by degrees in each of 128 '
                      'substeps. Tried: flying up to the limit, finer steps; whether it holds '
-                     'hangs on the path (with sinking redone from 6 mm on it does).'}
+                     'hangs on the path.'}
 """Why a case fails and what was tried, by its name; shown only beside a case that does fail."""
 
 

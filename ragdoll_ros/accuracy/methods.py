@@ -14,9 +14,9 @@ from .. import faults
 from ..engine.bullet import BulletEngine
 from ..engine.mujoco import MujocoEngine
 from ..engine.protocol import Engine
+from ..settings import ACCURACIES, Accuracy
 from ..simulation import Simulation
 from ..state import State
-from ..stepping import ACCURACIES, Accuracy
 from .quickstart import STEP as QUICKSTART_STEP
 from .quickstart import Quickstart
 from .trajectory import Trajectory

@@ -213,15 +213,6 @@ class BulletEngine:
             pybullet.disconnect(self._client)
             self._client = -1
 
-    def render(self, eye: np.ndarray, target: np.ndarray, width: int, height: int) -> np.ndarray:
-        """Draw the scene with PyBullet's TinyRenderer, seen from ``eye`` (m): (h, w, 3) uint8."""
-        view = pybullet.computeViewMatrix(_list(eye), _list(target), [0, 0, 1])
-        lens = pybullet.computeProjectionMatrixFOV(40, width / height, 0.1, 100)
-        image = pybullet.getCameraImage(
-            width, height, view, lens, shadow=1, lightDirection=[2, 1, 4],
-            renderer=pybullet.ER_TINY_RENDERER, physicsClientId=self._client)
-        return np.reshape(np.array(image[2], np.uint8), (height, width, 4))[:, :, :3]
-
     def _rows(self, doll: _Doll) -> list[tuple]:
         """Position, orientation, linear and angular velocity of each bone."""
         bones = []

@@ -84,9 +84,6 @@ class Engine(Protocol):
     def contacts(self) -> list[Contact]:
         """What touches at the end of the last substep."""
 
-    def render(self, eye: np.ndarray, target: np.ndarray, width: int, height: int) -> np.ndarray:
-        """Draw the scene as seen from ``eye`` (m): (height, width, 3) uint8."""
-
     def save(self) -> object:
         """Give a snapshot that restore brings back to the bit."""
 

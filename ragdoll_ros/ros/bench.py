@@ -20,8 +20,8 @@ from rclpy.node import Node
 from ..engine.bullet import BulletEngine, bare_loop
 from ..scene import Scene
 from ..scene_file import load_scene
+from ..settings import ACCURACIES
 from ..simulation import Simulation
-from ..stepping import ACCURACIES
 from ..swing.cost import tick_cost
 from .messages import poses_of, to_pose_array
 from .outputs import Outputs

@@ -14,7 +14,7 @@ from .. import faults
 from ..faults import RagdollError
 from ..scene import STEP_RANGE, Scene
 from ..scene_file import load_scene
-from ..stepping import ACCURACIES
+from ..settings import ACCURACIES
 
 
 def _setting(default: object, description: str, span: tuple[float, float] | None = None,

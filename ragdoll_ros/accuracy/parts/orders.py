@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from ...stepping import ACCURACIES
+from ...settings import ACCURACIES
 from ..measure import compare
 from ..methods import Method, bullet, mujoco, ours, run
 from ..runner import Job, Options, Row

@@ -4,7 +4,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 
-from ...stepping import ACCURACIES
+from ...settings import ACCURACIES
 from ..measure import Measure, compare
 from ..methods import median_run, ours
 from ..runner import Job, Options, Row
