@@ -24,7 +24,7 @@ STAMPS = (0, 1, 999_999_999, 1_795_257_907_785_147_064)
 
 
 @pytest.mark.parametrize('frame', ['', 'w', 'wo', 'wor', 'world', 'a/longer/frame'])
-@pytest.mark.parametrize('count', [1, 10, 1000])
+@pytest.mark.parametrize('count', [1, 10, 100])
 def test_packed_messages_are_what_rclpy_serializes(frame, count):
     random = np.random.default_rng(count)
     names = tuple(f'bone_{"x" * (k % 5)}{k}' for k in range(count))

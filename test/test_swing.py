@@ -241,7 +241,7 @@ TABLE = list(itertools.product((0, 1e-3, 1, 1e3, 1e6, 1e9), (0, 0.05, 1, 100),
 
 
 @pytest.mark.parametrize('kind', ['jump', 'turn', 'both'])
-@pytest.mark.parametrize('rate', [15, 60, 1000])
+@pytest.mark.parametrize('rate', [15, pytest.param(60, marks=pytest.mark.slow), 1000])
 def test_extremes_stay_bounded(kind, rate):
     stiffness, _, mass, length = np.array(TABLE).T
     swinging = [mounted(Link(el, m, k, zeta), direction=(1, 0.3, -0.2), root=(0.1, 0.05, 0))
