@@ -373,8 +373,13 @@ class Simulation:
         surplus = guard.surplus(self._motion, groups)
         if (surplus > 0).any():
             stepper = self._stepper
-            self._correct(guard.without_surplus(
-                start, stepper.coordinates, self._motion, surplus, bool(near)))
+            # What is tolerated goes with the kinetic energy: once more, with what is left of it.
+            for _ in range(2):
+                self._correct(guard.without_surplus(
+                    start, stepper.coordinates, self._motion, surplus, bool(near)))
+                surplus = guard.surplus(self._motion, groups)
+                if (surplus <= 0).all():
+                    break
             burst = guard.burst(self._motion, groups)
             if burst.any():
                 self._correct(guard.stopped(start, stepper.coordinates, burst))
