@@ -373,17 +373,17 @@ class Stepper:
         """Take the engine's own step, finer where that overshoots less; give its substep, s."""
         self.settle()
         start, state, touching = self.coordinates, self.state, self.touching
-        bound = max(1.0, self.accuracy.creep * self._too_far())
+        bounds = [max(1.0, self.accuracy.creep * far) for far in self._too_far()]
         substeps = self._substeps(duration, bool(loads))
         self._blocked = False
         most = max(1, math.ceil(self.accuracy.most * duration / self._span))
         last = math.inf
         while True:
             self._run(duration, substeps, loads)
-            far = self._too_far()
-            if substeps >= most or far <= bound or far > HELPED * last:
+            over = max(far / bound for far, bound in zip(self._too_far(), bounds, strict=True))
+            if substeps >= most or over <= 1 or over > HELPED * last:
                 return duration / substeps
-            last = far
+            last = over
             self._back_to(start, state, touching)
             substeps = min(most, 4 * substeps)
             self.effort.redone += 1
@@ -395,11 +395,11 @@ class Stepper:
             self._past_at = (self.coordinates, past)
         return self._past_at[1]
 
-    def _too_far(self) -> float:
-        """Tell how far past a limit or in the ground, in units of what is put up with."""
+    def _too_far(self) -> tuple[float, float]:
+        """Tell how far past a limit and in the ground, in units of what is put up with."""
         past = float(self._past().max(initial=0.0))
         sunk = -self.reach.clearance(self.state)
-        return max(past / self.accuracy.redo, sunk / self.accuracy.sink)
+        return past / self.accuracy.redo, sunk / self.accuracy.sink
 
     def _run(self, duration: float, substeps: int, loads: Sequence[Load]) -> None:
         """Let the engine go; what changes with the motion is looked at again now and then."""
