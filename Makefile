@@ -27,7 +27,7 @@ run: $(READY) ## the doll falls, arrow keys push it; SCENE=crowd: another scene
 	@$(BIN)/python -m ragdoll_ros.ros.run $(SCENE)
 
 # A file's tests stay together: those of one ROS domain, and those that time, go one by one.
-test: $(READY) chromium ## the tests, at most 90 s
+test: $(READY) chromium ## the tests, two minutes on two cores
 	@$(BIN)/python -m pytest -n 3 --dist loadfile
 
 # For the tests of the page: of Playwright only the driver comes from PyPI. Where there is none to
