@@ -140,7 +140,7 @@ def test_a_page_whose_line_is_cut_lets_go_and_comes_back_to_what_is(browser, vie
             far.wait(lambda: feedback)
             far.page.mouse.move(*far.pixels(START[:1] + 4 * LIFT)[0])
             far.key(' ')
-            far.wait(lambda: torso(poses[-1][1])[2] > START[TORSO][2] + 0.2)
+            far.wait(lambda: poses and torso(poses[-1][1])[2] > START[TORSO][2] + 0.2)
             feedback.clear()
             network.cut()
             view.wait(lambda: any(message.event_type == InteractiveMarkerFeedback.MOUSE_UP
