@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import faults, rotation
+from . import faults
 from .coordinates import Coordinates
 from .engine.protocol import Engine, Load
-from .mechanics import Mechanics, cross
+from .mechanics import Mechanics, point_motion
 from .ragdoll import Vector
 from .scene import Scene
 from .state import State
@@ -119,7 +119,7 @@ class Hands:
         reach = REACH * math.hypot(*self._scene.bones[index].shape.half_extents)
         if math.hypot(*held) > reach:
             raise faults.OutOfRange('point', point, f'at most {reach:.3g} m from the centre')
-        now = state.positions[index] + rotation.rotate(state.orientations[index], held)
+        now, _ = point_motion(state, index, held)
         aim = now if target is None else np.array(_checked('target', target))
         self.let_go(name)
         if len(self._hands) >= MOST_HANDS:
@@ -169,11 +169,10 @@ class Hands:
         """
         stiffness, damping = mass * FREQUENCY ** 2, 2 * mass * FREQUENCY
         turn = state.turns[hand.bone]
-        arm = turn @ hand.point
-        velocity = state.linear[hand.bone] + cross(state.angular[hand.bone], arm)
-        velocity += h * self._gravity
+        place, velocity = point_motion(state, hand.bone, hand.point)
+        velocity = velocity + h * self._gravity
         end = hand.after(h)
-        force = -(stiffness * (state.positions[hand.bone] + arm + h * velocity - end)
+        force = -(stiffness * (place + h * velocity - end)
                   + damping * (velocity - (end - hand.position) / h))
         yielding = turn @ hand.mobility @ turn.T
         softened = np.eye(3) + h * (damping + h * stiffness) * sharing * yielding
@@ -196,9 +195,7 @@ def mobility(free: Engine, coordinates: Coordinates, bone: int, point: np.ndarra
     for axis in np.eye(3):
         gained = free.acceleration(still, [Load(bone, axis, np.zeros(3), point)]) - rest
         free.place(Coordinates(coordinates.q, gained))
-        moved = free.read()
-        arm = rotation.rotate(moved.orientations[bone], point)
-        columns.append(moved.linear[bone] + cross(moved.angular[bone], arm))
+        columns.append(point_motion(free.read(), bone, point)[1])
     return np.array(columns).T
 
 

@@ -131,6 +131,15 @@ def damping_rate(scene: Scene) -> float:
     return fastest
 
 
+def point_motion(state: State, bone: int, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Position (3,) m and velocity (3,) m/s of a point of a bone, given along its axes."""
+    if not point.any():
+        return state.positions[bone], state.linear[bone]
+    arm = state.turns[bone] @ point
+    return (state.positions[bone] + arm,
+            state.linear[bone] + cross(state.angular[bone], arm))
+
+
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Cross products of rows (..., 3); numpy's own costs five times as much on few rows."""
     out = np.empty(np.broadcast_shapes(np.shape(a), np.shape(b)))

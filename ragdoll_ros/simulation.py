@@ -15,7 +15,7 @@ from .engine.protocol import GROUND, Contact, Engine, Load
 from .gap import JointGap
 from .grab import EVENLY, Grab, Hands, Pull
 from .guard import Guard
-from .mechanics import Mechanics, Motion, cross
+from .mechanics import Mechanics, Motion, point_motion
 from .push import Push
 from .scene import SECOND, STEP_RANGE, Scene
 from .settings import HUMAN, Accuracy, firm, resolve_accuracy
@@ -397,8 +397,8 @@ class Simulation:
         for load in loads:
             bone = load.bone
             force, torque = self._mean_load(load, before)
-            (place, speed), (end, end_speed) = (_point(state, bone, load.point)
-                                                for state in (before, after))
+            (place, speed), (end, end_speed) = (
+                point_motion(state, bone, load.point) for state in (before, after))
             done = force @ (end - place - substep / 2 * (end_speed - speed))
             if torque.any():
                 turn = rotation.multiply(after.orientations[bone],
@@ -456,12 +456,3 @@ class Simulation:
             self._correct(dataclasses.replace(coordinates, v=np.zeros_like(coordinates.v)))
             self._guard.settle(self._motion.energy, self._guard.groups(self._stepper.touching))
             self.asleep = True
-
-
-def _point(state: State, bone: int, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Position (3,) m and velocity (3,) m/s of a point of a bone, given along its axes."""
-    if not point.any():
-        return state.positions[bone], state.linear[bone]
-    arm = state.turns[bone] @ point
-    return (state.positions[bone] + arm,
-            state.linear[bone] + cross(state.angular[bone], arm))

@@ -304,14 +304,15 @@ class Stepper:
         above, below = least + LANDED / 2, room + LANDED / 2
         for _ in range(MOST_LOOKS):
             time = (early * below - late * above) / (below - above)
+            coordinates = self._path.at(begin + time)
             if grounded:
-                self._fly_to(self._path.at(begin + time))
+                self._fly_to(coordinates)
                 off = self._room() + LANDED / 2
             else:
-                past = self._layout.past_limits(self._path.at(begin + time).q)
-                off = LANDED / 2 - float(past.max())
+                off = LANDED / 2 - float(self._layout.past_limits(coordinates.q).max())
             if abs(off) <= LANDED / 2:
-                self._fly_to(self._path.at(begin + time))
+                if not grounded:
+                    self._fly_to(coordinates)
                 return time
             # Regula falsi, by halves where one end stays (Dowell and Jarratt, BIT 11, 1971).
             if off * below < 0:

@@ -150,6 +150,14 @@ class View:
             self.page.wait_for_timeout(20)
         return said
 
+    def hold_at(self, scene, start):
+        """Pause at the start, where the bones are at (n, 3) m, as the page draws it."""
+        if self.button('Pause').count():
+            self.key(' ')
+            self.button('Go on').wait_for()
+        self.key('r')
+        self.wait(lambda: abs(self.bodies(scene) - start).max() < 1e-6)
+
     def button(self, name):
         return self.page.get_by_role('button', name=name, exact=True)
 

@@ -44,6 +44,15 @@ def ros():
 
 
 @pytest.fixture
+def peer(ros):
+    """The other side of a node, for one test."""
+    from peer import Peer
+    peer = Peer()
+    yield peer
+    peer.destroy_node()
+
+
+@pytest.fixture
 def make_node(ros):
     """Make ragdoll nodes in this process, with parameters as keywords; destroyed at the end."""
     from rclpy.parameter import Parameter

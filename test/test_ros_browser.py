@@ -71,15 +71,6 @@ def torso(message):
     return np.array((place.x, place.y, place.z))
 
 
-def hold_at_start(view):
-    """Paused at the start, as the page draws it."""
-    if view.button('Pause').count():
-        view.key(' ')
-        view.button('Go on').wait_for()
-    view.key('r')
-    view.wait(lambda: abs(view.bodies(SCENE) - START).max() < 1e-6)
-
-
 def falls(view):
     """Whether all bones have left their places at the start."""
     return (np.linalg.norm(view.bodies(SCENE) - START, axis=1) > 0.1).all()
@@ -87,7 +78,7 @@ def falls(view):
 
 def test_what_make_run_starts_shows_ten_bodies_that_fall(browser, ros):
     with (serving(module='ragdoll_ros.ros.run') as url, opened(browser, url, SCENE) as view):
-        hold_at_start(view)
+        view.hold_at(SCENE, START)
         view.key(' ')
         view.wait(lambda: falls(view))
 
@@ -99,7 +90,7 @@ def test_a_dragged_body_follows_within_200_ms(view, heard):
     draws too slowly to be asked; it must show the bone there in the end.
     """
     poses, feedback = heard
-    hold_at_start(view)
+    view.hold_at(SCENE, START)
     mouse = view.page.mouse
     mouse.move(*view.pixels(START[:1])[0])
     mouse.down()
@@ -128,7 +119,7 @@ def test_a_dragged_body_follows_within_200_ms(view, heard):
 def test_a_page_whose_line_is_cut_lets_go_and_comes_back_to_what_is(browser, view, heard, listener):
     """A closed laptop, while its mouse holds the torso; meanwhile others pause the doll."""
     poses, feedback = heard
-    hold_at_start(view)
+    view.hold_at(SCENE, START)
     address = urllib.parse.urlsplit(view.page.url)
     network = Network(address.port)
     try:
@@ -159,13 +150,13 @@ def test_a_page_whose_line_is_cut_lets_go_and_comes_back_to_what_is(browser, vie
 
 
 def test_a_page_that_goes_asks_nothing_of_the_node_and_may_come_back(view, heard, listener):
-    hold_at_start(view)
+    view.hold_at(SCENE, START)
     address = view.page.url
     assert listener.count_subscribers('ragdoll/poses') == 2
     view.page.goto('about:blank')
     view.wait(lambda: listener.count_subscribers('ragdoll/poses') == 1)
     view.go(address)
-    hold_at_start(view)
+    view.hold_at(SCENE, START)
 
 
 @pytest.mark.slow  # test_ros_viewer.py kills and starts nodes under a page without a browser
@@ -174,7 +165,7 @@ def test_goes_on_with_a_node_that_was_killed_and_started_again(view, node):
     view.see('has been silent for')
     node.append(start('node'))
     view.button('Pause').wait_for()
-    hold_at_start(view)
+    view.hold_at(SCENE, START)
     view.key(' ')
     view.wait(lambda: falls(view))
     assert not view.page.get_by_text('has been silent for').count()

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 from geometry_msgs.msg import Point, Pose, Quaternion
-from peer import Peer
 from rclpy.parameter import Parameter
 from rviz_client import QOS, RvizClient
 from std_msgs.msg import Header
@@ -23,13 +22,6 @@ from ragdoll_ros.ros import interactive
 from ragdoll_ros.scene import SECOND
 
 HERE = Pose(position=Point(x=0.0, y=0.0, z=1.0), orientation=Quaternion(w=1.0))
-
-
-@pytest.fixture
-def peer(ros):
-    peer = Peer()
-    yield peer
-    peer.destroy_node()
 
 
 @pytest.fixture

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseArray, Twist, Vector3, Wrench, WrenchStamped
-from peer import Peer
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, MultiDOFJointState
@@ -24,13 +23,6 @@ from ragdoll_ros.scene_file import load_scene
 from ragdoll_ros.simulation import Simulation
 
 SECOND = 1_000_000_000
-
-
-@pytest.fixture
-def peer(ros):
-    peer = Peer()
-    yield peer
-    peer.destroy_node()
 
 
 def digest(states):

@@ -14,7 +14,7 @@ pytest.importorskip('viser')
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion, Vector3, Wrench
 from page_client import PageClient, wait
-from peer import STARTED, Peer, end, kill, start
+from peer import STARTED, end, kill, start
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
@@ -51,13 +51,6 @@ def nothing_runs_on(nodes):
     for process in STARTED[before:]:
         if process not in nodes:
             kill(process)
-
-
-@pytest.fixture
-def peer(ros):
-    peer = Peer()
-    yield peer
-    peer.destroy_node()
 
 
 @pytest.fixture

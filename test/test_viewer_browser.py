@@ -54,15 +54,6 @@ def view(browser, url):
         yield view
 
 
-def hold_at_start(view):
-    """Paused at the start, as the page draws it."""
-    if view.button('Pause').count():
-        view.key(' ')
-        view.button('Go on').wait_for()
-    view.key('r')
-    view.wait(lambda: abs(view.bodies(SCENE) - START).max() < 1e-6)
-
-
 def go_on(view):
     view.key(' ')
     view.button('Pause').wait_for()
@@ -85,7 +76,7 @@ def test_sees_ten_bodies_fall(view, states):
     A page gets numbers of 32 bits: 1e-6 m at 2 m.
     """
     assert len(START) == 10
-    hold_at_start(view)
+    view.hold_at(SCENE, START)
     go_on(view)
     view.wait(lambda: far(view, START, 0.1))
     drawn = view.wait(lambda: index_of(view.bodies(SCENE), states))
@@ -98,7 +89,7 @@ def test_sees_ten_bodies_fall(view, states):
     (lambda view: view.key('ArrowUp'), 0, -1)], ids=['up', 'down', 'left', 'right', 'key'])
 def test_a_button_or_a_key_pushes(view, act, axis, sign):
     """2000 N for 0.6 s: the torso is 1 m off at once; the fall alone takes it 0.5 m."""
-    hold_at_start(view)
+    view.hold_at(SCENE, START)
     act(view)
     go_on(view)
     view.wait(lambda: view.bodies(SCENE)[0][axis] * sign > 1)
@@ -111,7 +102,7 @@ def test_a_button_or_a_key_pushes(view, act, axis, sign):
                  marks=pytest.mark.slow)], ids=['button', 'checkbox', 'slider'])
 def test_what_was_clicked_gives_the_keys_back(view, click):
     """Else Space would press it again, and the arrow keys would move it, or nothing."""
-    hold_at_start(view)
+    view.hold_at(SCENE, START)
     click(view)
     view.key('ArrowLeft')
     go_on(view)
@@ -128,7 +119,7 @@ def test_the_camera_follows_on_demand(view):
         centre = np.average(view.bodies(SCENE), axis=0, weights=masses)
         return np.linalg.norm(view.pixels([centre])[0] - middle)
 
-    hold_at_start(view)
+    view.hold_at(SCENE, START)
     view.page.get_by_role('checkbox', name='Follow').check()
     view.wait(lambda: off() < 2)
     view.key('ArrowLeft')
@@ -136,13 +127,13 @@ def test_the_camera_follows_on_demand(view):
     view.wait(lambda: view.bodies(SCENE)[0][1] < -1.5)
     view.key(' ')
     view.wait(lambda: off() < 2)
-    hold_at_start(view)
+    view.hold_at(SCENE, START)
     view.wait(lambda: off() < 2)
     view.page.get_by_role('checkbox', name='Follow').uncheck()
 
 
 def test_pause_holds_and_step_makes_one_tick(view, states):
-    hold_at_start(view)
+    view.hold_at(SCENE, START)
     for tick in (1, 2):
         view.press('Step')
         view.wait(lambda tick=tick: abs(
@@ -153,7 +144,7 @@ def test_pause_holds_and_step_makes_one_tick(view, states):
 
 @pytest.mark.slow  # test_viewer.py has two pages without a browser
 def test_two_pages_show_and_steer_the_same(browser, url, view):
-    hold_at_start(view)  # before the other one: what moves is drawn twice
+    view.hold_at(SCENE, START)  # before the other one: what moves is drawn twice
     with opened(browser, url, SCENE) as other:
         other.wait(lambda: abs(other.bodies(SCENE) - START).max() < 1e-6)
         go_on(other)
@@ -164,14 +155,14 @@ def test_two_pages_show_and_steer_the_same(browser, url, view):
 def test_a_run_is_recorded(view, states, tmp_path):
     """From the start on, each recorded pose is the simulation's at that tick, to the bit."""
     view.page.get_by_text('Recording', exact=True).click()
-    hold_at_start(view)
+    view.hold_at(SCENE, START)
     view.press('Record')
     go_on(view)
     view.wait(lambda: far(view, START, 0.3))  # a quarter of a second, 15 pictures
     with view.page.expect_download() as download:
         view.press('Stop and download')
     download.value.save_as(tmp_path / 'run.json')
-    hold_at_start(view)
+    view.hold_at(SCENE, START)
     recording = load_recording(tmp_path / 'run.json')
     assert recording.scene == SCENE and len(recording) > 5
     for time_, positions in zip(recording.times, recording.positions, strict=True):
@@ -197,7 +188,7 @@ def test_the_view_is_saved_as_png(view, tmp_path):
 
     Viser draws three quarters of the pixels each way where a page is slow.
     """
-    hold_at_start(view)
+    view.hold_at(SCENE, START)
     with view.page.expect_download() as download:
         view.press('Picture')
     download.value.save_as(tmp_path / 'view.png')
@@ -237,7 +228,7 @@ def choose(view, name):
 
 def test_a_body_and_its_joint_are_edited_saved_undone_and_loaded(view, folder):
     """What is saved is what the edit would give here; a faulty value is refused below its field."""
-    hold_at_start(view)
+    view.hold_at(SCENE, START)
     view.tab('Edit')
     choose(view, 'left_upper_arm')
     view.field('mass, kg').fill('-1')
@@ -263,7 +254,7 @@ def test_a_body_and_its_joint_are_edited_saved_undone_and_loaded(view, folder):
 def test_what_is_edited_falls(view):
     """What is drawn from then on is the edited doll's fall, as a simulation here has it."""
     view.tab('Play')
-    hold_at_start(view)
+    view.hold_at(SCENE, START)
     with Simulation(edited()) as simulation:
         states = [simulation.state, *(simulation.advance() for _ in range(100))]
     go_on(view)
@@ -272,7 +263,7 @@ def test_what_is_edited_falls(view):
 
 def test_a_body_is_dragged_by_its_handle(view):
     """By the arrow out of its top, by 0.2 m, as far as whole pixels and ten steps go."""
-    hold_at_start(view)
+    view.hold_at(SCENE, START)
     view.tab('Edit')
     choose(view, 'head')
     view.press('Edit')
