@@ -19,7 +19,7 @@ from conftest import ROOT
 
 from ragdoll_ros.parts import parts_of
 
-PATIENCE = 20.0
+PATIENCE = 60.0
 """s that the page may take for anything, on a busy machine without a GPU."""
 
 SIZE = {'width': 800, 'height': 520}
@@ -208,7 +208,7 @@ def serving(*arguments, module='ragdoll_ros.viewer.command'):
     try:
         yield _address(process)
         process.send_signal(signal.SIGTERM)
-        process.communicate(timeout=10)
+        process.communicate(timeout=PATIENCE)
     finally:
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)

@@ -4,7 +4,7 @@ from __future__ import annotations
 import asyncio
 import threading
 
-PATIENCE = 15.0
+PATIENCE = 60.0
 
 
 class Network:

@@ -10,7 +10,7 @@ import viser
 import websockets
 from viser import _messages
 
-PATIENCE = 30.0
+PATIENCE = 60.0
 
 
 class PageClient:

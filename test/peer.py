@@ -16,7 +16,7 @@ from pathlib import Path
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-PATIENCE = 30.0
+PATIENCE = 60.0
 """s that a condition may take: discovery alone takes up to 3 s, up to 10 on a busy machine, where
 what comes 100 times a second on many topics is heard some 10 s late as well."""
 

@@ -57,12 +57,13 @@ def node(ros):
 
 
 @pytest.fixture(scope='module')
-def view(browser, node, heard):
+def view(browser, node, listener, heard):
     """A page on a node of the default scene, each a process of its own.
 
-    It comes last: what it sends is heard from the first message on.
+    The listener hears both from here on: that takes seconds where the machine is busy.
     """
     with serving('--port', '0') as url, opened(browser, url, SCENE) as view:
+        view.wait(lambda: all(topic.get_publisher_count() for topic in listener.subscriptions))
         yield view
 
 
