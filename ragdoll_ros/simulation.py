@@ -11,7 +11,7 @@ import numpy as np
 from . import faults, rotation
 from .coordinates import Coordinates
 from .engine.bullet import BulletEngine
-from .engine.protocol import GROUND, Contact, Engine, Load
+from .engine.protocol import GROUND, PRESSED, Contact, Engine, Load
 from .gap import JointGap
 from .grab import EVENLY, Grab, Hands, Pull
 from .guard import Guard
@@ -213,7 +213,8 @@ class Simulation:
     def place(self, coordinates: Coordinates) -> State:
         """Put the dolls elsewhere, with other velocities, and take that as the start of all.
 
-        Bones that overlap there do not collide from then on; what is in the ground is lifted.
+        Bones that overlap there do not collide from then on, and what is in the ground is lifted;
+        what merely rests on something, up to PRESSED deep in it, rests on.
         """
         self._stepper.place(coordinates)
         self._stepper.engine.let_overlaps_be()
@@ -262,10 +263,11 @@ class Simulation:
         """Set dolls that begin in the ground onto it: else they stay, or are thrown out."""
         stepper, layout = self._stepper, self._stepper.engine.layout
         heights = stepper.reach.heights(stepper.state)
-        lowest = np.minimum.reduceat(heights, self.mechanics.starts)
-        if (lowest < 0).any():
+        depths = -np.minimum.reduceat(heights, self.mechanics.starts)
+        if (depths > PRESSED).any():
             q = stepper.coordinates.q.copy()
-            q[layout.root_positions] += np.outer(np.maximum(0, -lowest), self.scene.ground.normal)
+            ways = np.where(depths > PRESSED, depths, 0)
+            q[layout.root_positions] += np.outer(ways, self.scene.ground.normal)
             stepper.place(dataclasses.replace(stepper.coordinates, q=q))
             stepper.begin()
 

@@ -78,19 +78,26 @@ def new_report(heard, peer):
     return last_report(heard)
 
 
-def test_poses_come_at_100_hz_with_exact_stamps_for_10_s(heard, peer):
-    """100 Hz within 1 % over 10 s; the first messages are left out, as discovery bunches them.
+def hear_1001(heard, peer):
+    """The next 1001 poses, some left out first: discovery bunches them."""
+    begin = len(heard['poses']) + 50
+    peer.wait(lambda: len(heard['poses']) > begin + 1000)
+    return heard['poses'][begin:begin + 1001]
 
-    Where others take the machine's time away, the node may fall behind: three tries.
-    """
+
+@pytest.mark.slow
+def test_poses_come_at_100_hz(heard, peer):
+    """Within 1 % over 10 s, in one of three tries: others may take the machine's time away."""
     for _ in range(3):
-        begin = len(heard['poses']) + 50
-        peer.wait(lambda begin=begin: len(heard['poses']) > begin + 1000, timeout=20)
-        got = heard['poses'][begin:begin + 1001]
+        got = hear_1001(heard, peer)
         rate = 1000 / (got[-1][0] - got[0][0])
         if rate == pytest.approx(100, rel=0.01):
             break
     assert rate == pytest.approx(100, rel=0.01)
+
+
+def test_poses_have_exact_stamps_for_10_s(heard, peer):
+    got = hear_1001(heard, peer)
     assert set(np.diff([stamp(message) for _, message in got])) == {10_000_000}
     poses = np.array([poses_array(message) for _, message in got])
     assert poses.shape == (1001, 10, 7)

@@ -14,6 +14,10 @@ from ..state import State
 GROUND = -1
 """Index that stands for the ground where a bone's would stand."""
 
+PRESSED = 1e-4
+"""m of overlap up to which a start is one of bones that rest or slide on each other. What overlaps
+by more was put there, and would burst apart."""
+
 
 @dataclass(frozen=True)
 class Contact:
@@ -79,7 +83,7 @@ class Engine(Protocol):
         """Pairs of dolls that touch where they are now; GROUND stands for the ground."""
 
     def let_overlaps_be(self) -> None:
-        """Let pairs of bones of one doll that overlap now collide no more: they would burst."""
+        """Let bones of one doll that overlap by more than PRESSED now collide no more."""
 
     def contacts(self) -> list[Contact]:
         """What touches at the end of the last substep."""

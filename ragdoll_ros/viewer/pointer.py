@@ -6,6 +6,7 @@ camera C while the pointer goes on, D being the direction to it: target = C + D 
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -116,9 +117,8 @@ class Pointer:
 
 def kept_distance(eye: np.ndarray, pointer: np.ndarray, distance: float) -> np.ndarray:
     """Target (3,) m in the direction of ``pointer`` (3,) m as far from the eye as ``distance``."""
-    way = pointer - eye
-    length = float(np.linalg.norm(way))
-    return eye + way * (distance / length) if length > 0 else pointer
+    length = math.dist(eye, pointer)
+    return eye + (pointer - eye) * (distance / length) if 0 < length < math.inf else pointer
 
 
 def on_bone(scene: Scene, state: State, bone: int, point: np.ndarray) -> np.ndarray:

@@ -23,8 +23,8 @@ NAME = 'pieces'
 LENGTH = 0.1
 """s"""
 FINE = 128
-FIRST, LAST = 0.25, 2.0
-"""s: instants between which pieces begin: from just before the first touch on."""
+FIRST, LAST = 0.25, 1.3
+"""s: instants between which pieces begin: from just before the first touch until it lies still."""
 
 
 def jobs(options: Options) -> list[Job]:
