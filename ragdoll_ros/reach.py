@@ -59,21 +59,26 @@ class Reach:
             return 0.0
         return float(speeds[self.heights(state) < speeds * soon + MARGIN].max(initial=0.0))
 
-    def near(self, state: State, duration: float, acceleration: float) -> set[tuple[int, int]]:
+    def near(self, state: State, duration: float, acceleration: float,
+             touching: set[tuple[int, int]]) -> set[tuple[int, int]]:
         """Pairs of dolls that may touch within ``duration`` s; GROUND stands for the ground.
 
         A bound: bounding spheres, at twice the speed they have and may gain by gravity and
-        pushes (``acceleration`` m/s^2), and the boxes around each doll's.
+        pushes (``acceleration`` m/s^2), and the boxes around each doll's. Where it is plain from
+        what is ``touching`` now, nothing is computed.
         """
-        if self._ground is None and len(self._bounds) == 2:
-            return set()
+        if len(self._bounds) == 2:
+            if self._ground is None:
+                return set()
+            if (0, GROUND) in touching:
+                return {(0, GROUND)}
         speeds = np.sqrt(np.einsum('ij,ij->i', state.linear, state.linear))
         far = 2 * duration * (speeds + acceleration * duration) + self._radii + MARGIN
         found = set()
         if self._ground is not None:
             low = state.positions @ self._normal - self._ground.offset < far
             if low.any():
-                found = {(GROUND, int(doll)) for doll in np.flatnonzero(
+                found = {(int(doll), GROUND) for doll in np.flatnonzero(
                     np.logical_or.reduceat(low, self._bounds[:-1]))}
         return found if len(self._bounds) == 2 else found | self._close(state.positions, far)
 

@@ -55,9 +55,9 @@ class Accuracy:
 
 DRAFT = Accuracy(turn=0.3, limit=0.15, contact=3, settled=2, sink=0.01, most=32, order=3,
                  flight_turn=0.4, land=False, redo=math.radians(6))
-NORMAL = Accuracy(turn=0.1, limit=0.06, contact=6, settled=4, sink=0.004, most=128, order=4,
+NORMAL = Accuracy(turn=0.1, limit=0.06, contact=4, settled=3, sink=0.004, most=128, order=4,
                   flight_turn=0.2, redo=math.radians(2.5))
-EXACT = Accuracy(turn=0.04, limit=0.03, contact=8, settled=4, sink=0.0015, most=256, order=4,
+EXACT = Accuracy(turn=0.04, limit=0.03, contact=6, settled=4, sink=0.0015, most=256, order=4,
                  flight_turn=0.1, redo=math.radians(1.5))
 ACCURACIES = {'draft': DRAFT, 'normal': NORMAL, 'exact': EXACT}
 

@@ -22,7 +22,7 @@ from ..ragdoll import Ragdoll
 from ..scene import Placement, Scene, grip
 from ..state import State
 from ..urdf import to_urdf
-from .protocol import GROUND, PRESSED, Contact, Load
+from .protocol import GROUND, Contact, Load, pressed
 
 BREAKING_DISTANCE = 5e-4
 """m at which a contact point is let go. A gap is room to move in within a substep, so that it eats
@@ -181,10 +181,11 @@ class BulletEngine:
         return {(self._doll_of[point[1]], self._doll_of[point[2]]) for point in points}
 
     def let_overlaps_be(self) -> None:
-        """Let bones of one doll that overlap by more than PRESSED now collide no more."""
+        """Let bones of one doll that overlap by more than pressed() now collide no more."""
+        depth = pressed(self.scene)
         pybullet.performCollisionDetection(physicsClientId=self._client)
         for point in pybullet.getContactPoints(physicsClientId=self._client):
-            if point[1] == point[2] and point[8] < -PRESSED:
+            if point[1] == point[2] and point[8] < -depth:
                 pybullet.setCollisionFilterPair(*point[1:5], 0, physicsClientId=self._client)
 
     def contacts(self) -> list[Contact]:

@@ -15,7 +15,7 @@ from ..ragdoll import Joint, Limits, Ragdoll
 from ..scene import Placement, Scene
 from ..state import State
 from ..urdf import joint_frame
-from .protocol import GROUND, PRESSED, Contact, Load
+from .protocol import GROUND, Contact, Load, pressed
 
 INTEGRATORS = ('euler', 'implicitfast', 'rk4')
 """Order 1 with implicit joint damping; order 1, implicit in all velocities; order 4."""
@@ -124,14 +124,14 @@ class MujocoEngine:
         return {tuple(pair) for pair in self._doll_of[self._data.contact.geom].tolist()}
 
     def let_overlaps_be(self) -> None:
-        """Let bones of one doll that overlap by more than PRESSED now collide no more."""
+        """Let bones of one doll that overlap by more than pressed() now collide no more."""
         self._refresh()
         self._mujoco.mj_collision(self._model, self._data)
         bodies, roots = self._model.geom_bodyid, self._model.body_rootid
-        pairs = set()
+        pairs, depth = set(), pressed(self.scene)
         for contact in self._data.contact:
             a, b = bodies[contact.geom]
-            if contact.dist < -PRESSED and a and b and roots[a] == roots[b]:
+            if contact.dist < -depth and a and b and roots[a] == roots[b]:
                 pairs.add(frozenset(self._model.body(int(body)).name for body in (a, b)))
         if pairs:
             here = self.coordinates()

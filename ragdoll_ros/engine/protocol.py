@@ -14,9 +14,9 @@ from ..state import State
 GROUND = -1
 """Index that stands for the ground where a bone's would stand."""
 
-PRESSED = 1e-4
-"""m of overlap up to which a start is one of bones that rest or slide on each other. What overlaps
-by more was put there, and would burst apart."""
+PRESSED = 0.025
+"""Overlap, as a share of half the thinnest bone's thickness, up to which bones rest or slide on
+each other where a motion starts. What overlaps by more was put there, and would burst apart."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Engine(Protocol):
         """Pairs of dolls that touch where they are now; GROUND stands for the ground."""
 
     def let_overlaps_be(self) -> None:
-        """Let bones of one doll that overlap by more than PRESSED now collide no more."""
+        """Let bones of one doll that overlap by more than pressed() now collide no more."""
 
     def contacts(self) -> list[Contact]:
         """What touches at the end of the last substep."""
@@ -96,3 +96,8 @@ class Engine(Protocol):
 
     def close(self) -> None:
         """Give everything back to the system."""
+
+
+def pressed(scene: Scene) -> float:
+    """Depth, m, up to which a scene's bones may rest in each other and in the ground."""
+    return PRESSED * min(min(bone.shape.half_extents) for bone in scene.bones)
