@@ -68,9 +68,10 @@ class Layout:
             self.own_v.append(slice(first_v, v))
         self._plain = (np.array(plain_q), np.array(plain_v))
         self._roots = self._indices(roots)
-        self._balls = self._indices(balls)
+        self._turning = self._indices(roots + balls)
+        self.root_orientations = self._roots[0]
         self.root_positions = self._roots[0][:, :1] - 3 + np.arange(3)
-        """(d, 3): where in q each doll's root position stands."""
+        """(d, 4) and (d, 3): where in q each root's orientation and position stand."""
         self.root_velocities = self._roots[1][:, :1] - 3 + np.arange(3)
         self.root_spins = self._roots[1]
         """(d, 3) each: where in v each root's linear and angular velocity stand."""
@@ -80,23 +81,30 @@ class Layout:
         """Where the limited angles stand in q and their rates in v."""
         self.limits = (low[some], high[some])
 
+    def root_turns(self, q: np.ndarray) -> np.ndarray:
+        """Rotation matrices (d, 3, 3) of the roots."""
+        return rotation.matrix(q[self._roots[0]])
+
+    def with_spins_turned(self, v: np.ndarray, turns: np.ndarray) -> np.ndarray:
+        """Give v, or its rate, with the roots' angular part turned by matrices (d, 3, 3)."""
+        v, spin = v.copy(), self.root_spins
+        v[spin] = np.matmul(turns, v[spin][:, :, None])[:, :, 0]
+        return v
+
     def derivative(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Rate of change of q: q' = w q / 2 for w in the outer frame, q w / 2 in the body's."""
+        """Rate of change of q, q w / 2 for quaternions: in ``v`` here, roots too have their
+        angular velocity along their own axes.
+        """
         rate = np.empty_like(q)
         rate[self._plain[0]] = v[self._plain[1]]
-        at, spin = self._roots
-        rate[at] = 0.5 * rotation.multiply(_pure(v[spin]), q[at])
-        if len(self._balls[0]):
-            at, spin = self._balls
-            rate[at] = 0.5 * rotation.multiply(q[at], _pure(v[spin]))
+        at, spin = self._turning
+        rate[at] = 0.5 * rotation.multiply(q[at], _pure(v[spin]))
         return rate
 
     def normalized(self, q: np.ndarray) -> np.ndarray:
         """Give the same coordinates with every quaternion of length one."""
-        q = q.copy()
-        for at, _ in (self._roots, self._balls):
-            if len(at):
-                q[at] = rotation.normalized(q[at])
+        q, at = q.copy(), self._turning[0]
+        q[at] = rotation.normalized(q[at])
         return q
 
     def past_limits(self, q: np.ndarray) -> np.ndarray:

@@ -33,7 +33,10 @@ class Motion:
 
 @dataclass(frozen=True)
 class Shift:
-    """A displacement of d dolls and a motion of each as one rigid body, to be added."""
+    """A displacement of d dolls and a motion of each as one rigid body, to be added.
+
+    What is a single body may be turned before.
+    """
 
     way: np.ndarray
     """(d, 3) m."""
@@ -41,6 +44,8 @@ class Shift:
     """(d, 3) m/s, of the centres of mass."""
     spin: np.ndarray
     """(d, 3) rad/s about the centres of mass."""
+    turn: np.ndarray | None = None
+    """(d, 4) quaternions, no turn for dolls of several bones; None: no turn at all."""
 
 
 class Mechanics:
@@ -80,14 +85,19 @@ class Mechanics:
 
     def shifted(self, state: State, motion: Motion, shift: Shift) -> State:
         """Give the state after each doll is moved on and set in motion as one rigid body."""
+        orientations, angular = state.orientations, state.angular
+        if shift.turn is not None:
+            turns = shift.turn[self.doll_of]
+            orientations = rotation.multiply(turns, orientations)
+            angular = rotation.rotate(turns, angular)
         rows = (shift.way, shift.linear, shift.spin, motion.centre,
                 (shift.spin @ _CROSS).reshape(-1, 3, 3))
         if len(shift.way) > 1:
             rows = tuple(row[self.doll_of] for row in rows)
         way, linear, spin, centre, turning = rows
         turned = np.matmul((state.positions - centre)[:, None, :], turning)[:, 0]
-        return State(state.positions + way, state.orientations, state.linear + linear + turned,
-                     state.angular + spin)
+        return State(state.positions + way, orientations, state.linear + linear + turned,
+                     angular + spin)
 
 
 _CROSS = np.array([[0, 0, 0, 0, 0, 1, 0, -1, 0], [0, 0, -1, 0, 0, 0, 1, 0, 0],

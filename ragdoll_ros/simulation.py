@@ -356,7 +356,7 @@ class Simulation:
         after = self._motion
         shift, self._motion = self._guard.momentum_due(before, after, duration, impulse, moment)
         self._state = self.mechanics.shifted(self._state, after, shift)
-        self._stepper.shift(self._state)
+        self._stepper.shift(self._state, shift.turn)
 
     def _given(self, loads: list[Load], duration: float,
                before: State) -> tuple[np.ndarray, np.ndarray | None]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import rotation
 from .coordinates import Coordinates
 from .engine.protocol import GROUND, Engine, Load
 from .flight import Path, fly
@@ -161,13 +162,15 @@ class Stepper:
         self._path = None
         self._set(coordinates)
 
-    def shift(self, state: State) -> None:
-        """Take ``state``, to which dolls were moved on as rigid bodies without a turn; the engine
-        hears of it when it is next needed.
+    def shift(self, state: State, turn: np.ndarray | None) -> None:
+        """Take ``state``, to which dolls were moved on as rigid bodies and turned by ``turn``
+        (d, 4), if at all; the engine hears of it when it is next needed.
         """
         layout = self._layout
         q, v = self.coordinates.q.copy(), self.coordinates.v.copy()
         q[layout.root_positions] = state.positions[self._roots]
+        if turn is not None:
+            q[layout.root_orientations] = rotation.multiply(turn, q[layout.root_orientations])
         v[layout.root_velocities] = state.linear[self._roots]
         v[layout.root_spins] = state.angular[self._roots]
         past = self._past_at[1] if self._past_at[0] is self.coordinates else None

@@ -1,4 +1,5 @@
 """The report's own arithmetic, its page and its command line."""
+import dataclasses
 import json
 import math
 
@@ -8,16 +9,19 @@ import pytest
 pytest.importorskip('scipy')
 pytest.importorskip('mujoco')
 
+from ragdoll_ros import rotation
 from ragdoll_ros.accuracy import command, figures, goals, hard, plots, starts, tables
 from ragdoll_ros.accuracy.measure import Measure
 from ragdoll_ros.accuracy.methods import bullet, by_name, median_run, ours, quickstart, run
-from ragdoll_ros.accuracy.motions.flight import free_fall, gentle_flight
+from ragdoll_ros.accuracy.motions.flight import free_fall, gentle_flight, tumbling_box
 from ragdoll_ros.accuracy.motions.mechanisms import OMEGA, swing
 from ragdoll_ros.accuracy.parts import classes, orders
 from ragdoll_ros.accuracy.references.articulated import Articulated
 from ragdoll_ros.accuracy.report import markdown
 from ragdoll_ros.accuracy.runner import Job, attempt
 from ragdoll_ros.accuracy.trajectory import Trajectory
+from ragdoll_ros.mechanics import Mechanics
+from ragdoll_ros.state import State
 
 
 def test_the_slope_of_a_power_is_its_order():
@@ -67,6 +71,25 @@ def test_costs_are_medians_over_runs():
     result = median_run(bullet(1), free_fall().trial, 3)
     assert result.costs.shape == (100,)
     assert 0 < result.rate < 1
+
+
+@pytest.mark.parametrize(('accuracy', 'bound'), [('draft', 1e-2), ('normal', 1e-4),
+                                                 ('exact', 1e-5)])
+def test_a_plate_tumbles_as_euler_says(accuracy, bound):
+    """About its unstable axis, where errors grow some thousandfold in 5 s; alone and as a pair."""
+    motion = tumbling_box()
+    trial = motion.trial
+    other = dataclasses.replace(trial.scene.dolls[0], name='other', position=(9.0, 0.0, 0.0))
+    both = dataclasses.replace(trial, scene=dataclasses.replace(
+        trial.scene, dolls=(*trial.scene.dolls, other)))
+    for moved in (run(ours(accuracy), trial).moved, run(ours(accuracy), both).moved):
+        truth = motion.truth(moved.times)
+        turned = rotation.angle_between(moved.orientations[:, 0], truth.orientations[:, 0])
+        assert turned.max() < bound
+        spins = [Mechanics(trial.scene).motion(State(*(
+            part[i, :1] for part in (moved.positions, moved.orientations, moved.linear,
+                                     moved.angular)))).spin[0] for i in range(len(moved.times))]
+        assert np.abs(np.array(spins) - spins[0]).max() < 1e-9 * np.linalg.norm(spins[0])
 
 
 def test_the_gentle_flight_touches_no_limit():
