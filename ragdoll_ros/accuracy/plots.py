@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -18,6 +20,9 @@ MARKS = {'ours': 'D', 'quickstart': 'X', 'PyBullet': 'o', 'MuJoCo euler': 'v',
          'MuJoCo implicitfast': '^', 'MuJoCo rk4': 's'}
 SMALLEST = 1e-16
 """Where errors of zero are drawn."""
+
+LINE = 0.06
+"""Share of an axis' height that a line of text takes."""
 
 FASTEST_SLOWEST = (4e-4, 1.5)
 """Range of CPU s per simulated s in all diagrams."""
@@ -224,20 +229,33 @@ def _work_precision(axes: Axes, rows: Sequence[Row], yardstick: str) -> None:
             axes.plot(*zip(*own, strict=True), marker=MARKS[family], color=COLOURS[family],
                       ms=8 if big else 4, lw=1.5 if family == 'ours' else 1,
                       zorder=3 if big else 2, label=family)
-    for row in rows:
-        if row['family'] == 'ours':
-            place = (_number(row['cpu_s_per_s']), max(_number(row[yardstick]), SMALLEST))
-            axes.annotate(row['label'].removeprefix('ours '), place, xytext=(7, 0), va='center',
-                          textcoords='offset points', fontsize=7, color=BLUE)
     front = _front([(x, y) for _, x, y in points])
     axes.step(*zip(*front, strict=True), where='post', color='black', lw=0.7, ls='--', zorder=1,
               label='front')
     axes.set(xscale='log', yscale='log', xlim=FASTEST_SLOWEST, xlabel='CPU s per simulated s',
              ylabel=WORDS[yardstick])
+    _name_settings(axes, [row for row in rows if row['family'] == 'ours'], yardstick)
     axes.grid(True, which='major', lw=0.3)
     axes.axvline(1.0, color=RED, lw=1)
     axes.annotate('real time', (1.0, 0.02), xycoords=('data', 'axes fraction'), color=RED,
                   fontsize=8, ha='right', va='bottom', rotation=90)
+
+
+def _name_settings(axes: Axes, rows: Sequence[Row], yardstick: str) -> None:
+    """Write each setting beside its point; one text for points that are as high on the axes."""
+    low, high = np.log10(axes.get_ylim())
+    groups: list[list[tuple[float, float, str]]] = []
+    for row in rows:
+        height = math.log10(max(_number(row[yardstick]), SMALLEST))
+        point = (_number(row['cpu_s_per_s']), height, row['label'].removeprefix('ours '))
+        if groups and abs(groups[-1][0][1] - height) < LINE * (high - low):
+            groups[-1].append(point)
+        else:
+            groups.append([point])
+    for group in groups:
+        places, heights, names = zip(*group, strict=True)
+        axes.annotate(', '.join(names), (max(places), 10 ** float(np.mean(heights))), fontsize=7,
+                      xytext=(7, 0), textcoords='offset points', va='center', color=BLUE)
 
 
 def _front(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
