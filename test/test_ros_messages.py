@@ -59,13 +59,60 @@ def test_packing_is_worth_it():
     assert quick < plain / 20, 'measured: a hundredth'
 
 
-def test_stamps_rise_by_one_tick_over_a_reset():
-    stamps = Stamps(100)
-    before = [stamps.at(time, is_clock=False) for time in (0, 10, 20)]
-    stamps.begin_again(20, 10)
-    after = [stamps.at(time, is_clock=False) for time in (0, 10)]
+class RosTime:
+    """ROS time as a test sets it, ns, and stamps that go by it."""
+
+    def __init__(self, now):
+        self.now = now
+        self.stamps = Stamps(lambda: self.now)
+
+    def stamp(self, time):
+        self.stamps.follow(time)
+        return self.stamps.at(time, is_clock=False)
+
+
+def test_stamps_rise_by_one_tick_over_a_reset_where_ros_time_is_slower():
+    ros = RosTime(100)
+    before = [ros.stamp(time) for time in (0, 10, 20)]
+    ros.stamps.begin_again(20, 10)
+    after = [ros.stamp(time) for time in (0, 10)]
     assert before + after == [100, 110, 120, 130, 140]
-    assert stamps.at(0, is_clock=True) == 0
+    assert ros.stamps.at(0, is_clock=True) == 0
+
+
+def test_stamps_are_set_to_ros_time_at_a_reset_and_after_a_pause_and_never_back():
+    """And at no other time, as the steps between are to be ticks."""
+    ros = RosTime(100)
+    assert [ros.stamp(time) for time in (10, 20)] == [110, 120]
+    ros.now = 500
+    assert ros.stamp(30) == 130
+    ros.stamps.go_on(30)
+    assert [ros.stamp(time) for time in (40, 50)] == [510, 520]
+    ros.now = 900
+    ros.stamps.begin_again(50, 10)
+    assert [ros.stamp(time) for time in (0, 10)] == [900, 910]
+    ros.now = 300
+    ros.stamps.go_on(10)
+    assert ros.stamp(20) == 920
+
+
+@pytest.mark.parametrize('first', [50, 504_770_000_000], ids=['behind', 'ahead'])
+def test_stamps_begin_with_ros_time_also_where_it_begins_later(first):
+    """A /clock that comes after the node; one that begins anew, as a recording's in a loop."""
+    ros = RosTime(0)
+    assert [ros.stamp(time) for time in (10, 20, 1000)] == [10, 20, 1000]
+    ros.now = first
+    assert [ros.stamp(time) for time in (1010, 1020)] == [first, first + 10]
+    ros.now = first + 5_000_000_000
+    assert ros.stamp(1030) == first + 20
+    ros.now = 7
+    assert [ros.stamp(time) for time in (1040, 1050)] == [7, 17]
+
+
+def test_a_computer_s_clock_that_is_set_back_a_little_moves_no_stamp():
+    ros = RosTime(5_000_000_000)
+    ros.now -= 500_000_000
+    assert ros.stamp(10) == 5_000_000_010
 
 
 SHAPES = {'box': Box((0.1, 0.2, 0.3)), 'sphere': Sphere(0.1), 'cylinder': Cylinder(0.1, 0.4),
@@ -86,7 +133,8 @@ def test_markers_fill_the_shape_of_a_bone(lone):
     array = Markers(lone.scene, 'map').message(7, lone.state, ())
     assert {marker.header.frame_id for marker in array.markers} == {'map'}
     directions = rotation.normalized(np.random.default_rng(3).normal(size=(50, 3)))
-    reach = np.max([_support(marker, directions) for marker in array.markers], axis=0)
+    reach = np.max([_support(marker, directions) for marker in array.markers
+                    if marker.action == Marker.ADD], axis=0)
     turn, centre = lone.state.orientations[0], lone.state.positions[0]
     inner = rotation.rotate(rotation.inverse(turn), directions)
     expected = directions @ centre + lone.scene.bones[0].shape.reach(inner)
@@ -134,5 +182,35 @@ def test_the_tip_of_a_push_s_arrow_is_where_it_attacks(local):
 def test_each_marker_is_its_own():
     with Simulation(load_scene('crowd')) as simulation:
         array = Markers(simulation.scene, 'world').message(0, simulation.state, ())
-        keys = [(marker.ns, marker.id) for marker in array.markers]
+        keys = [(marker.ns, marker.id) for marker in array.markers
+                if marker.action == Marker.ADD]
         assert len(set(keys)) == len(keys) == len(simulation.scene.bone_names)
+
+
+def shown(screen, array):
+    """What RViz shows once it has taken an array in, by the meaning of each action."""
+    for marker in array.markers:
+        if marker.action == Marker.DELETEALL:
+            screen.clear()
+        elif marker.action == Marker.DELETE:
+            screen.pop((marker.ns, marker.id), None)
+        else:
+            screen[marker.ns, marker.id] = marker
+    return screen
+
+
+def test_another_scene_leaves_nothing_of_the_last_one():
+    """Also no arrow of a push that was in flight, and it erases once: RViz builds all anew then."""
+    screen = {}
+    for name in ('crowd', 'ponytail', 'drop'):
+        with Simulation(load_scene(name)) as simulation:
+            markers = Markers(simulation.scene, 'world')
+            push = Push(simulation.scene.bone_names[0], (100.0, 0.0, 0.0))
+            swings = simulation.swings if name == 'ponytail' else None
+            for pushes in ([], [push]):
+                array = markers.message(0, simulation.state, pushes, swings)
+                shown(screen, array)
+            assert {name for name, _ in screen} - {'push', 'swings'} == set(
+                simulation.scene.bone_names)
+            assert ('swings' in {name for name, _ in screen}) == (name == 'ponytail')
+            assert Marker.DELETEALL not in {marker.action for marker in array.markers}

@@ -9,8 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray, Twist, Vector3, Wrench, WrenchStamped
 from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, MultiDOFJointState
 from std_msgs.msg import Header
@@ -171,21 +175,141 @@ def test_messages_in_a_row_push_without_a_gap(paused):
     np.testing.assert_allclose(momentum(paused.simulation)[0], 100 * 0.35, rtol=1e-6)
 
 
+def stamp_of(message):
+    return message.header.stamp.sec * SECOND + message.header.stamp.nanosec
+
+
 def stamps_of(got):
-    return [message.header.stamp.sec * SECOND + message.header.stamp.nanosec for _, message in got]
+    return [stamp_of(message) for _, message in got]
 
 
-def test_stamps_begin_with_ros_time_and_rise_by_a_tick_over_reset_and_new_scene(paused, peer):
+def put_scene(node, name):
+    return node.set_parameters([Parameter('scene', value=name)])
+
+
+def test_stamps_rise_by_ticks_and_are_ros_time_where_the_doll_begins_or_goes_on(paused, peer):
+    """Each ``act`` publishes once; what the last stamps lag behind is more than ten ticks then."""
     got = peer.collect(PoseArray, 'ragdoll/poses')
     peer.wait(lambda: paused._outputs._poses.get_subscription_count())
-    before = paused.get_clock().now().nanoseconds
-    for act in (paused.tick, paused.tick, paused.reset, paused.tick,
-                lambda: paused.set_parameters([Parameter('scene', value='drop')]), paused.tick):
-        count = len(got)
+
+    def go_on():
+        paused.pause(False)
+        paused.tick()
+
+    def ros_time():
+        return paused.get_clock().now().nanoseconds
+
+    for act in (go_on, paused.reset, lambda: put_scene(paused, 'drop')):
+        paused.pause(True)
+        for _ in range(3):
+            paused.tick()
+        late = paused._stamp(paused.simulation.time) + 10 * paused.simulation.tick
+        peer.wait(lambda late=late: ros_time() > late)
+        before, count = ros_time(), len(got)
         act()
-        peer.wait(lambda count=count: len(got) == count + 1)
-    assert set(np.diff(stamps_of(got))) == {10_000_000}
-    assert abs(stamps_of(got)[0] - before) < 10 * SECOND
+        peer.wait(lambda count=count: len(got) > count)
+        assert before <= stamps_of(got)[-1] <= ros_time() + paused.simulation.tick
+        paused.tick()
+        paused.tick()
+        peer.wait(lambda count=count: len(got) == count + 3)
+        assert set(np.diff(stamps_of(got)[-3:])) == {paused.simulation.tick}
+    assert min(np.diff(stamps_of(got))) > 0
+
+
+def test_stamps_are_those_of_a_clock_that_another_tells(make_node, peer):
+    """A /clock is heard after the node has begun, as it can not be before."""
+    node = make_node(use_sim_time=True)
+    got = peer.collect(PoseArray, 'ragdoll/poses')
+    clock = peer.sender(Clock, '/clock')
+    peer.wait(lambda: node._outputs._poses.get_subscription_count())
+    peer.executor_.add_node(node)
+
+    def told():
+        clock.publish(Clock(clock=Time(sec=504, nanosec=770_000_000)))
+        return node.get_clock().now().nanoseconds
+
+    peer.wait(told)
+    peer.wait(lambda: stamps_of(got)[-1] > 504 * SECOND)
+    count = len(got)
+    peer.wait(lambda: len(got) > count + 9)
+    later = [stamp for stamp in stamps_of(got) if stamp > 504 * SECOND]
+    assert later[0] == 504_770_000_000
+    assert set(np.diff(later)) == {node.simulation.tick}
+    reports = peer.collect(DiagnosticArray, '/diagnostics')
+    peer.wait(lambda: reports)
+    assert stamps_of(reports)[0] == 504_770_000_000
+
+
+def test_reports_bear_the_time_that_the_node_itself_tells(make_node, peer):
+    node = make_node(publish_clock=True)
+    peer.executor_.add_node(node)
+    reports = peer.collect(DiagnosticArray, '/diagnostics')
+    peer.wait(lambda: reports)
+    values = {pair.key: pair.value for pair in reports[0][1].status[0].values}
+    # The value is written with six digits.
+    assert stamps_of(reports)[0] / SECOND == pytest.approx(float(values['simulated_time']),
+                                                           rel=1e-5)
+
+
+def late_comer(peer, kind, display):
+    """What a display of config/ragdoll.rviz hears of its topic if it is made now."""
+    topic = display['Topic']
+    words = {key: topic[f'{key} Policy'].upper().replace(' ', '_')
+             for key in ('Durability', 'History', 'Reliability')}
+    return peer.collect(kind, topic['Value'], QoSProfile(
+        depth=topic['Depth'], history=HistoryPolicy[words['History']],
+        durability=DurabilityPolicy[words['Durability']],
+        reliability=ReliabilityPolicy[words['Reliability']]))
+
+
+def heads(node, poses, markers):
+    """Where the head is in the last PoseArray, in the last MarkerArray, and indeed."""
+    index = node.simulation.scene.bone_index('head')
+    marker, = (marker for marker in markers[-1][1].markers if marker.ns == 'head')
+    return (np.array([[pose.position.x, pose.position.y, pose.position.z]
+                      for pose in (poses[-1][1].poses[index], marker.pose)]),
+            node.simulation.state.positions[index])
+
+
+def test_rviz_shows_what_is_also_if_it_comes_while_the_time_stands(make_node, peer):
+    """After the last tick of a run, a step, a reset and another frame: early comer and late."""
+    config = yaml.safe_load((Path(__file__).parent.parent / 'config/ragdoll.rviz').read_text())
+    displays = {display['Name']: display
+                for display in config['Visualization Manager']['Displays']}
+    node = make_node()
+    early = peer.collect(MarkerArray, 'ragdoll/markers')
+    peer.wait(lambda: node._outputs._markers.get_subscription_count())
+    for act in (lambda: None, node.tick, node.reset,
+                lambda: node.set_parameters([Parameter('frame_id', value='map')])):
+        node.pause(False)
+        # Two ticks at once: the second one's markers come too soon for a screen.
+        node.tick()
+        node.tick()
+        node.pause(True)
+        act()
+        poses = late_comer(peer, PoseArray, displays['Bones'])
+        late = late_comer(peer, MarkerArray, displays['Shapes'])
+        newest = (node._stamp(node.simulation.time), node.settings.frame_id)
+        for markers in (early, late):
+            peer.wait(lambda markers=markers, poses=poses, newest=newest: poses and markers and {
+                (stamp_of(message), message.header.frame_id)
+                for message in (poses[-1][1], markers[-1][1].markers[-1])} == {newest})
+            places, truth = heads(node, poses, markers)
+            np.testing.assert_allclose(places, [truth, truth], atol=1e-12)
+    assert newest[1] == 'map'
+
+
+def test_a_clock_that_stands_is_told_to_who_comes_late(make_node, peer):
+    """Who goes by /clock, as rclpy's own time source, asks for no past messages."""
+    node = make_node(publish_clock=True)
+    for _ in range(7):
+        node.tick()
+    node.pause(True)
+    peer.executor_.add_node(node)
+    got = peer.collect(Clock, '/clock', QoSProfile(
+        depth=1, reliability=ReliabilityPolicy.BEST_EFFORT))
+    peer.wait(lambda: got)
+    assert got[-1][1].clock.nanosec == 70_000_000
 
 
 def test_with_publish_clock_stamps_are_the_clock_and_the_simulated_time(make_node, peer):

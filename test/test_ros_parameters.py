@@ -82,6 +82,12 @@ def test_bone_names_are_read_only(node):
     assert not result.successful and 'read-only' in result.reason
 
 
+def test_bone_names_are_the_scene_s_whatever_the_start_says(make_node):
+    """As with a dump of the parameters that another scene had."""
+    assert value(make_node(bone_names=['a', 'b']), 'bone_names') == list(
+        load_scene('drop').bone_names)
+
+
 def test_pace_and_rate_change_live(node):
     assert put(node, rate=250.0, real_time_factor=0.5).successful
     assert node.simulation.tick == 4_000_000

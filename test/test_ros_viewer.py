@@ -20,6 +20,7 @@ from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
+from visualization_msgs.msg import InteractiveMarkerFeedback
 
 from ragdoll_ros.ragdoll import Sphere
 from ragdoll_ros.ros.messages import to_pose_array
@@ -213,6 +214,43 @@ def test_a_grab_lifts_the_bone_and_rests_longer_than_the_nodes_patience(node, re
     remote.let_go('page 1')
     wait(lambda: not remote.frame.held)
     wait(lambda: remote.frame.state.positions[bone][2] < 1.0)
+
+
+def test_a_hand_rests_also_where_ros_time_stands(node, peer):
+    """A page that is to go by a /clock which nobody tells still says that it holds the bone."""
+    remote = Remote(['--ros-args', '-p', 'use_sim_time:=true'])
+    try:
+        remote.want(OPEN)
+        seen(remote)
+        feedback = peer.collect(InteractiveMarkerFeedback, 'ragdoll/interactive/feedback')
+        remote.grab('page 1', 'head', (0.0, 0.0, 0.1), (0.3, 0.2, 2.2))
+        peer.wait(lambda: sum(message.event_type == InteractiveMarkerFeedback.KEEP_ALIVE
+                              for _, message in feedback) > 1)
+        remote.let_go('page 1')
+    finally:
+        remote.close()
+
+
+def test_a_pause_opens_no_hand(node, remote, peer):
+    """The node's stamps are set to ROS time as it goes on; the page's time goes on as the doll's.
+
+    Its pace is so slow that a second on the wall would be seen.
+    """
+    remote.want(OPEN)
+    seen(remote)
+    remote.set_pace(0.01)
+    wait(lambda: remote.report.measures and remote.report.pace == 0.01)
+    remote.grab('page 1', 'head', (0.0, 0.0, 0.1), (0.3, 0.2, 2.2))
+    wait(lambda: remote.frame.held)
+    remote.pause(True)
+    wait(lambda: remote.report.paused)
+    before, stamp = remote.frame.time, remote._zero
+    remote.pause(False)
+    wait(lambda: remote._zero > stamp)
+    wait(lambda: remote.frame.time > before)
+    assert remote.frame.time < before + 0.1
+    assert remote.frame.held
+    remote.let_go('page 1')
 
 
 def test_a_reset_lets_go_here_too(node, remote):

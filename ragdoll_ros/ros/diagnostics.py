@@ -11,6 +11,7 @@ from rclpy.node import Node
 
 from ..push import Push
 from ..scene import SECOND
+from .messages import to_time
 from .tally import Tally
 
 if TYPE_CHECKING:
@@ -27,13 +28,13 @@ class Diagnostics:
     """Collects what each tick cost; reports pace, cost, errors and counts.
 
     ``facts`` gives what only the node knows, as names and values; ``wanted_pace`` the pace that
-    is asked for now, 0 while the doll is paused.
+    is asked for now, 0 while the doll is paused; ``stamp`` the ns that a report is to bear.
     """
 
     def __init__(self, node: Node, steady: Clock, tally: Tally, facts: Callable[[], dict],
-                 wanted_pace: Callable[[], float]) -> None:
+                 wanted_pace: Callable[[], float], stamp: Callable[[], int]) -> None:
         self._node, self._steady, self._tally = node, steady, tally
-        self._facts, self._wanted_pace = facts, wanted_pace
+        self._facts, self._wanted_pace, self._stamp = facts, wanted_pace, stamp
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._told = 0
         self._last: dict[str, float] | None = None
@@ -59,7 +60,7 @@ class Diagnostics:
             message=message, hardware_id=self.simulation.scene.name,
             values=[KeyValue(key=key, value=value) for key, value in values.items()])
         array = DiagnosticArray(status=[status])
-        array.header.stamp = self._node.get_clock().now().to_msg()
+        array.header.stamp = to_time(self._stamp())
         self._publisher.publish(array)
 
     def _close(self) -> None:

@@ -94,13 +94,21 @@ class Interactive:
         if self._updates.get_subscription_count():
             self._updates.publish(self._update(markers=handles.markers, erases=gone))
 
-    def publish(self, now: int) -> None:
-        """Tell where the markers are at ``now``, and let go for clients that are gone."""
+    def publish(self, now: int, still: bool = False) -> None:
+        """Tell where the markers are at ``now``, and let go for clients that are gone.
+
+        ``still``: nothing may follow, so that markers can not wait.
+        """
         for hand, drag in list(self._drags.items()):
             if now - drag.heard > VANISHED:
                 self._let_go(hand)
-        if now >= self._next and self._updates.get_subscription_count():
+        if still or now >= self._next:
             self._next = now + MARKER_PERIOD
+            self.publish_poses()
+
+    def publish_poses(self) -> None:
+        """Tell where the markers are, now, if somebody listens."""
+        if self._updates.get_subscription_count():
             self._handles.move(self._simulation.state)
             self._sequence += 1
             self._updates.publish(self._update(poses=self._handles.poses))

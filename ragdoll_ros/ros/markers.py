@@ -34,10 +34,14 @@ class Markers:
         self._shifts = np.array([part.shift for part in self._parts])
         self._markers = [self._marker(number) for number in range(len(self._parts))]
         self._arrows = 0
+        self._fresh = True
 
     def message(self, stamp: int, state: State, pushes: Sequence[Push],
                 swings: SwingState | None = None) -> MarkerArray:
-        """Markers where the bones are; arrows of pushes that have ended are taken away."""
+        """Markers where the bones are; arrows of pushes that have ended are taken away.
+
+        The first message takes away whatever the scene before has left.
+        """
         header = to_header(stamp, self._frame)
         orientations = state.orientations[self._bones]
         positions = state.positions[self._bones] + rotation.rotate(orientations, self._shifts)
@@ -51,9 +55,11 @@ class Markers:
                 for number in range(len(arrows), self._arrows)]
         self._arrows = len(arrows)
         rods = [] if swings is None else [_rods(swings)]
-        for marker in arrows + gone + rods:
+        before = [Marker(action=Marker.DELETEALL)] if self._fresh else []
+        self._fresh = False
+        for marker in before + arrows + gone + rods:
             marker.header = header
-        return MarkerArray(markers=self._markers + arrows + gone + rods)
+        return MarkerArray(markers=before + self._markers + arrows + gone + rods)
 
     def _marker(self, number: int) -> Marker:
         part = self._parts[number]

@@ -36,6 +36,9 @@ SHORTEST_PERIOD = 1_000_000
 LONGEST_BURST = 20_000_000
 """ns that the timer may make ticks for before others have their turn."""
 
+STANDING_CLOCK = 0.5
+"""s on the wall between two messages on /clock while the doll is paused."""
+
 CATCH_UP = 2
 """Times the wanted pace at which a stall is caught up: listeners' queues are ten messages long."""
 
@@ -66,18 +69,19 @@ class RagdollNode(Node):
         self.simulation = make_simulation(self._tuning.scene, self.settings)
         self._prepared: Simulation | None = None
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._stamps = Stamps(self.get_clock().now().nanoseconds)
+        self._stamps = Stamps(self._ros_time)
         self._outputs = Outputs(self)
         self.inputs = Inputs(self, self.tally)
         self.interactive = Interactive(self, self.tally, self._now)
         self._diagnostics = Diagnostics(self, self._steady, self.tally, self._facts,
-                                        self._wanted_pace)
+                                        self._wanted_pace, self._time_of_report)
         Services(self)
         self.paused = False
         self._use(self.simulation)
         self._outputs.be_clock(self.settings.publish_clock)
         self._pacer = Pacer(self._period(), self._now())
         self._timer = self.create_timer(1.0, self._catch_up, clock=self._steady)
+        self.create_timer(STANDING_CLOCK, self._repeat_clock, clock=self._steady)
         self._restart_timer()
         self._tuning.watch(self._prepare, self._apply)
 
@@ -104,8 +108,12 @@ class RagdollNode(Node):
 
     def pause(self, wanted: bool) -> None:
         """Hold the time, or let it go on from where it is."""
+        if self.paused and not wanted:
+            self._stamps.go_on(self.simulation.time)
         self.paused = wanted
         self._restart_timer()
+        if wanted:
+            self._show_as_it_stands()
         self._diagnostics.report()
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
@@ -133,6 +141,19 @@ class RagdollNode(Node):
     def _now(self) -> int:
         return self._steady.now().nanoseconds
 
+    def _ros_time(self) -> int:
+        return self.get_clock().now().nanoseconds
+
+    def _stamp(self, time: int) -> int:
+        """Give the stamp of a simulated time, ns."""
+        return self._stamps.at(time, self.settings.publish_clock)
+
+    def _time_of_report(self) -> int:
+        """ROS time; where this node is the clock, what it says, heard or not."""
+        if self.settings.publish_clock:
+            return self._stamp(self.simulation.time)
+        return self._ros_time()
+
     def _period(self) -> float:
         """Give the ns on the wall from one tick to the next."""
         return self.simulation.tick / self.settings.real_time_factor
@@ -156,11 +177,20 @@ class RagdollNode(Node):
         self._timer.reset()
 
     def _publish(self) -> None:
-        simulation = self.simulation
-        stamp = self._stamps.at(simulation.time, self.settings.publish_clock)
-        now = self._now()
-        self._outputs.publish(simulation, stamp, now)
-        self.interactive.publish(now)
+        simulation, now = self.simulation, self._now()
+        self._stamps.follow(simulation.time)
+        self._outputs.publish(simulation, self._stamp(simulation.time), now, self.paused)
+        self.interactive.publish(now, self.paused)
+
+    def _show_as_it_stands(self) -> None:
+        """Bring up to date what is not published with every tick."""
+        self._outputs.publish_markers(self.simulation, self._stamp(self.simulation.time))
+        self.interactive.publish_poses()
+
+    def _repeat_clock(self) -> None:
+        """Tell the standing time to who has come since: those who go by /clock ask for no past."""
+        if self.paused:
+            self._outputs.publish_clock(self._stamp(self.simulation.time))
 
     def _use(self, simulation: Simulation) -> None:
         """Let all parts work with this simulation and the settings as they are."""
@@ -191,6 +221,8 @@ class RagdollNode(Node):
             self._diagnostics.report()
         elif 'frame_id' in changed:
             self._use(self.simulation)
+            if self.paused:
+                self._publish()
         self.simulation.accuracy = settings.accuracy
         if changed & {'scene', 'rate', 'real_time_factor'}:
             self.simulation.step = step_of(settings)
@@ -201,8 +233,7 @@ class RagdollNode(Node):
 
     def _facts(self) -> dict:
         return {'paused': self.paused, 'real_time_factor': self.settings.real_time_factor,
-                'lost_time': self._pacer.lost / 1e9, 'stamp_of_zero': self._stamps.at(
-                    0, self.settings.publish_clock)}
+                'lost_time': self._pacer.lost / 1e9, 'stamp_of_zero': self._stamp(0)}
 
 
 def step_of(settings: Settings) -> float:

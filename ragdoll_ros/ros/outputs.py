@@ -38,7 +38,7 @@ MARKER_PERIOD = 33_000_000
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 KEPT = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""For poses: who comes while the time stands can ask for the last ones."""
+"""For what stands still with the time: who comes then can ask for the last ones."""
 
 
 class Outputs:
@@ -51,7 +51,7 @@ class Outputs:
         self._joints = node.create_publisher(JointState, 'joint_states', 10)
         self._swings: Publisher | None = None
         self._contacts = node.create_publisher(PoseArray, '~/contacts', 10)
-        self._markers = node.create_publisher(MarkerArray, '~/markers', 10)
+        self._markers = node.create_publisher(MarkerArray, '~/markers', KEPT)
         self._description = node.create_publisher(String, 'robot_description', LATCHED)
         self._clock: Publisher | None = None
 
@@ -69,13 +69,16 @@ class Outputs:
         self._next_markers = 0
         self._description.publish(String(data=scene_to_urdf(scene)))
 
-    def publish(self, simulation: Simulation, stamp: int, now: int) -> None:
-        """Publish where the simulation is; ``stamp`` and the steady clock's ``now`` in ns."""
+    def publish(self, simulation: Simulation, stamp: int, now: int,
+                still: bool = False) -> None:
+        """Publish where the simulation is; ``stamp`` and the steady clock's ``now`` in ns.
+
+        ``still``: nothing may follow, so that markers can not wait.
+        """
         state = simulation.state
         poses = poses_of(state)
         self._poses.publish(self._packed_poses.message(stamp, poses))
-        if self._clock is not None:
-            self._clock.publish(Clock(clock=to_time(stamp)))
+        self.publish_clock(stamp)
         if self._state.get_subscription_count():
             self._state.publish(self._packed_state.message(stamp, poses, twists_of(state)))
         if self._joints.get_subscription_count():
@@ -86,10 +89,19 @@ class Outputs:
         if self._contacts.get_subscription_count():
             self._contacts.publish(to_pose_array(self._frame, stamp,
                                                  contact_poses(simulation.contacts)))
-        if now >= self._next_markers and self._markers.get_subscription_count():
+        if still or (now >= self._next_markers and self._markers.get_subscription_count()):
             self._next_markers = now + MARKER_PERIOD
-            self._markers.publish(self._marker_array.message(stamp, state, simulation.pushes,
-                                                             simulation.swings))
+            self.publish_markers(simulation, stamp)
+
+    def publish_markers(self, simulation: Simulation, stamp: int) -> None:
+        """Publish the markers now, heard or not: of a time that stands, late comers ask for them."""
+        self._markers.publish(self._marker_array.message(stamp, simulation.state,
+                                                         simulation.pushes, simulation.swings))
+
+    def publish_clock(self, stamp: int) -> None:
+        """Tell the time, ns, if it is this node that tells it."""
+        if self._clock is not None:
+            self._clock.publish(Clock(clock=to_time(stamp)))
 
     def _describe_swings(self, scene: Scene, frame: str) -> None:
         """Make ready for the masses of a scene's swings; a scene without any has no topic."""
@@ -105,7 +117,7 @@ class Outputs:
     def be_clock(self, wanted: bool) -> None:
         """Begin or end to publish /clock."""
         if wanted and self._clock is None:
-            self._clock = self._node.create_publisher(Clock, '/clock', 10)
+            self._clock = self._node.create_publisher(Clock, '/clock', KEPT)
         elif not wanted and self._clock is not None:
             self._node.destroy_publisher(self._clock)
             self._clock = None

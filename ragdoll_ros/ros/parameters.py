@@ -93,7 +93,9 @@ class Parameters:
             raise WrongParameters('\n'.join(found))
         self._bone_names = ParameterDescriptor(
             description='Names of all bones, in the order of ~/poses', read_only=True)
-        node.declare_parameter(BONE_NAMES, list(self.scene.bone_names), self._bone_names)
+        # What a dump of another scene's parameters brings along would not be true.
+        node.declare_parameter(BONE_NAMES, list(self.scene.bone_names), self._bone_names,
+                               ignore_override=True)
 
     def watch(self, prepare: Callable[[set[str], Settings, Scene], None],
               apply: Callable[[set[str]], None]) -> None:

@@ -17,6 +17,7 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray, Twist, Vector3
 from rcl_interfaces.msg import ParameterEvent
+from rclpy.clock import Clock, ClockType
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
@@ -195,7 +196,9 @@ class Remote:
         self._context.try_shutdown()
 
     def _spin(self) -> None:
-        self._node.create_timer(RETRY, self._learn_if_needed)
+        # ROS time may stand, and hands rest on all the same.
+        self._node.create_timer(RETRY, self._learn_if_needed,
+                                clock=Clock(clock_type=ClockType.STEADY_TIME))
         while not self._ended.is_set():
             self._executor.spin_once(timeout_sec=1.0)
 
@@ -207,6 +210,7 @@ class Remote:
         self._learned = False
         self._told = Report()
         self._zero: int | None = None
+        self._simulated = 0.0
         self._note = self._problem = ''
         self._poses: bytes | None = None
         self._rods: Rods | None = None
@@ -303,7 +307,13 @@ class Remote:
                 values = {pair.key: pair.value for pair in status.values}
                 self._told = told(self._told, values)
                 with contextlib.suppress(KeyError, ValueError):
-                    self._zero = int(values['stamp_of_zero'])
+                    self._take_time(int(values['stamp_of_zero']), float(values['simulated_time']))
+
+    def _take_time(self, zero: int, simulated: float) -> None:
+        """Take the stamp of time zero, ns, and the time, s, which goes back at a new start."""
+        if simulated < self._simulated:
+            self._hands.forget()
+        self._zero, self._simulated = zero, simulated
 
     def _learn_if_needed(self) -> None:
         """Ask what the node simulates, until it is known; called again and again."""
@@ -343,9 +353,6 @@ class Remote:
         # Before the first report the node's time zero is not known.
         self._zero = stamp if self._zero is None else self._zero
         seconds = (stamp - self._zero) / SECOND
-        if self._frame is not None and seconds < self._frame.time:
-            # A reset, or a node that was started again.
-            self._hands.forget()
         rods, masses = None, self._masses
         if masses is not None and self._rods is not None and len(masses) == self._rods.count:
             rods = self._rods.between(masses, state)
