@@ -71,7 +71,7 @@ class RosTime:
         return self.stamps.at(time, is_clock=False)
 
 
-def test_stamps_rise_by_one_tick_over_a_reset_where_ros_time_is_slower():
+def test_stamps_rise_by_one_tick_over_a_new_start():
     ros = RosTime(100)
     before = [ros.stamp(time) for time in (0, 10, 20)]
     ros.stamps.begin_again(20, 10)
@@ -86,13 +86,14 @@ def test_stamps_are_set_to_ros_time_at_a_reset_and_after_a_pause_and_never_back(
     assert [ros.stamp(time) for time in (10, 20)] == [110, 120]
     ros.now = 500
     assert ros.stamp(30) == 130
-    ros.stamps.go_on(30)
+    ros.stamps.catch_up(30)
     assert [ros.stamp(time) for time in (40, 50)] == [510, 520]
     ros.now = 900
     ros.stamps.begin_again(50, 10)
+    ros.stamps.catch_up(0)
     assert [ros.stamp(time) for time in (0, 10)] == [900, 910]
     ros.now = 300
-    ros.stamps.go_on(10)
+    ros.stamps.catch_up(10)
     assert ros.stamp(20) == 920
 
 

@@ -183,11 +183,7 @@ def stamps_of(got):
     return [stamp_of(message) for _, message in got]
 
 
-def put_scene(node, name):
-    return node.set_parameters([Parameter('scene', value=name)])
-
-
-def test_stamps_rise_by_ticks_and_are_ros_time_where_the_doll_begins_or_goes_on(paused, peer):
+def test_stamps_rise_by_ticks_and_are_ros_time_after_a_reset_and_a_pause(paused, peer):
     """Each ``act`` publishes once; what the last stamps lag behind is more than ten ticks then."""
     got = peer.collect(PoseArray, 'ragdoll/poses')
     peer.wait(lambda: paused._outputs._poses.get_subscription_count())
@@ -199,7 +195,7 @@ def test_stamps_rise_by_ticks_and_are_ros_time_where_the_doll_begins_or_goes_on(
     def ros_time():
         return paused.get_clock().now().nanoseconds
 
-    for act in (go_on, paused.reset, lambda: put_scene(paused, 'drop')):
+    for act in (go_on, paused.reset):
         paused.pause(True)
         for _ in range(3):
             paused.tick()
@@ -211,8 +207,9 @@ def test_stamps_rise_by_ticks_and_are_ros_time_where_the_doll_begins_or_goes_on(
         assert before <= stamps_of(got)[-1] <= ros_time() + paused.simulation.tick
         paused.tick()
         paused.tick()
-        peer.wait(lambda count=count: len(got) == count + 3)
-        assert set(np.diff(stamps_of(got)[-3:])) == {paused.simulation.tick}
+        paused.set_parameters([Parameter('scene', value='drop')])
+        peer.wait(lambda count=count: len(got) == count + 4)
+        assert set(np.diff(stamps_of(got)[-4:])) == {paused.simulation.tick}
     assert min(np.diff(stamps_of(got))) > 0
 
 
@@ -229,7 +226,7 @@ def test_stamps_are_those_of_a_clock_that_another_tells(make_node, peer):
         return node.get_clock().now().nanoseconds
 
     peer.wait(told)
-    peer.wait(lambda: stamps_of(got)[-1] > 504 * SECOND)
+    peer.wait(lambda: max(stamps_of(got), default=0) > 504 * SECOND)
     count = len(got)
     peer.wait(lambda: len(got) > count + 9)
     later = [stamp for stamp in stamps_of(got) if stamp > 504 * SECOND]

@@ -102,14 +102,14 @@ class RagdollNode(Node):
     def reset(self) -> None:
         """Go back to the start, to the bit, and publish it."""
         self._stamps.begin_again(self.simulation.time, self.simulation.tick)
+        self._stamps.catch_up(0)
         self.simulation.reset()
-        self._publish()
-        self._diagnostics.report()
+        self._begin()
 
     def pause(self, wanted: bool) -> None:
         """Hold the time, or let it go on from where it is."""
         if self.paused and not wanted:
-            self._stamps.go_on(self.simulation.time)
+            self._stamps.catch_up(self.simulation.time)
         self.paused = wanted
         self._restart_timer()
         if wanted:
@@ -182,6 +182,11 @@ class RagdollNode(Node):
         self._outputs.publish(simulation, self._stamp(simulation.time), now, self.paused)
         self.interactive.publish(now, self.paused)
 
+    def _begin(self) -> None:
+        """Publish a start: first which stamp it has, so that listeners know the next one's time."""
+        self._diagnostics.report()
+        self._publish()
+
     def _show_as_it_stands(self) -> None:
         """Bring up to date what is not published with every tick."""
         self._outputs.publish_markers(self.simulation, self._stamp(self.simulation.time))
@@ -217,8 +222,7 @@ class RagdollNode(Node):
         if self._prepared is not None:
             simulation, self._prepared = self._prepared, None
             self._replace(simulation)
-            self._publish()
-            self._diagnostics.report()
+            self._begin()
         elif 'frame_id' in changed:
             self._use(self.simulation)
             if self.paused:

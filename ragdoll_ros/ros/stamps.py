@@ -12,10 +12,11 @@ class Stamps:
     """Stamps in ns that rise by exactly one tick from state to state.
 
     They count simulated time from a ROS time, so that they fit the stamps of others, and run at
-    the doll's own pace from there. They are set to ROS time again where the doll begins anew or
-    goes on after a pause, forwards only; and, also backwards, where ROS time itself begins: at
-    the first word of a /clock, or as it goes back. While the node itself is the clock
-    (``publish_clock``), they are the simulated time and go back to zero at a reset, as /clock does.
+    the doll's own pace from there. A reset and the end of a pause set them to ROS time again,
+    forwards only; a new scene adds one tick. Where ROS time itself begins, at the first word of a
+    /clock or as it goes back, they begin with it, be it backwards. While the node itself is the
+    clock (``publish_clock``), they are the simulated time and go back to zero at a reset, as
+    /clock does.
 
     ``now`` gives ROS time, ns; zero: not known yet.
     """
@@ -34,10 +35,10 @@ class Stamps:
 
     def begin_again(self, time: int, tick: int) -> None:
         """Let simulated time begin at zero again, after it has reached ``time``."""
-        self.start = max(self.start + time + tick, self._now())
+        self.start += time + tick
 
-    def go_on(self, time: int) -> None:
-        """Let simulated time go on from ``time`` after it has stood there."""
+    def catch_up(self, time: int) -> None:
+        """Let simulated ``time`` be now, unless that is behind the stamps already."""
         self.start = max(self.start, self._now() - time)
 
     def at(self, time: int, is_clock: bool) -> int:

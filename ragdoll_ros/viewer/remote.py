@@ -210,6 +210,7 @@ class Remote:
         self._learned = False
         self._told = Report()
         self._zero: int | None = None
+        self._zero_of_poses: int | None = None
         self._simulated = 0.0
         self._note = self._problem = ''
         self._poses: bytes | None = None
@@ -277,7 +278,8 @@ class Remote:
                     getattr(self, f'_take_{kind}')(message)
 
     def _take_frames(self, data: bytes) -> None:
-        self._poses = data
+        # With the time zero that holds for them: a report of another one comes before its poses.
+        self._poses, self._zero_of_poses = data, self._zero
         self._heard = time.monotonic()
 
     def _take_contacts(self, data: bytes) -> None:
@@ -352,7 +354,8 @@ class Remote:
         state = State(poses[:, :3], poses[:, 3:], unknown, unknown)
         # Before the first report the node's time zero is not known.
         self._zero = stamp if self._zero is None else self._zero
-        seconds = (stamp - self._zero) / SECOND
+        zero = self._zero if self._zero_of_poses is None else self._zero_of_poses
+        seconds = (stamp - zero) / SECOND
         rods, masses = None, self._masses
         if masses is not None and self._rods is not None and len(masses) == self._rods.count:
             rods = self._rods.between(masses, state)
