@@ -26,6 +26,9 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 Limits = tuple[float, float]
 
+WORLD = 'world'
+"""Name of the frame that everything is in; no bone may bear it, for frames are told by names."""
+
 
 @dataclass(frozen=True)
 class Sphere:
@@ -188,6 +191,8 @@ class Bone:
     def __post_init__(self) -> None:
         set_fields(self, mass=float(self.mass), position=floats(self.position),
                    orientation=unit('orientation', self.orientation))
+        if self.name == WORLD:
+            raise faults.DuplicateName('name', self.name, "a name other than the world frame's")
         faults.check_positive('mass', self.mass)
         faults.check_finite('position', self.position)
         self._check_surface()

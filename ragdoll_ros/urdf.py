@@ -19,7 +19,7 @@ import numpy as np
 
 from . import rotation
 from .parts import PLAIN
-from .ragdoll import Bone, Box, Capsule, Joint, Ragdoll, Sphere
+from .ragdoll import WORLD, Bone, Box, Capsule, Joint, Ragdoll, Sphere
 from .scene import Scene
 
 UNLIMITED = 'continuous'
@@ -43,20 +43,21 @@ def to_urdf(doll: Ragdoll, dialect: str = 'ros', limited: bool = True) -> str:
     return _document(doll.name, _tree(doll, dialect, limited))
 
 
-def scene_to_urdf(scene: Scene) -> str:
+def scene_to_urdf(scene: Scene, frame: str = WORLD) -> str:
     """Write all dolls of a scene in ROS's dialect, under the bone names of the scene.
 
-    One doll stands for itself; several hang on a link ``world`` by floating joints, each where
-    its root is at the start, for URDF knows one tree only.
+    One doll stands for itself; several hang on a link named as the world's ``frame`` by floating
+    joints, each where its root is at the start, for URDF knows one tree only.
     """
     if len(scene.dolls) == 1:
         return to_urdf(scene.dolls[0].doll)
-    lines = ['  <link name="world"/>']
+    lines = [f'  <link name={_quoted(frame)}/>']
     for placement in scene.dolls:
         doll = placement.doll.renamed(functools.partial(scene.qualified, placement))
         position, _ = placement.bone_pose(doll.root)
         lines += [f'  <joint name={_quoted(doll.root.name)} type="floating">',
-                  '    <parent link="world"/>', f'    <child link={_quoted(doll.root.name)}/>',
+                  f'    <parent link={_quoted(frame)}/>',
+                  f'    <child link={_quoted(doll.root.name)}/>',
                   f'    {_origin(position, np.array(placement.orientation))}', '  </joint>',
                   *_tree(doll, 'ros', limited=True)]
     return _document(scene.name, lines)

@@ -9,6 +9,7 @@ plain shape, the box of the same inertia.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from .fit.shapes import fit_best
 from .fit.solid import surface
 from .ragdoll import (
     LARGEST_SWING,
+    WORLD,
     Bone,
     Box,
     Capsule,
@@ -74,7 +76,7 @@ def _doll(tree: UrdfTree) -> tuple[Ragdoll, list[str]]:
     if not any(solids.values()):
         raise faults.WrongForm('link', list(tree.links)[:5], 'a link with a shape or an inertia')
     carriers = _carriers(tree, solids)
-    names = _names([name for name in tree.links if carriers[name] == name])
+    names = _names([name for name in tree.links if carriers[name] == name], [WORLD])
     root = next(name for name in tree.order if carriers[name] == name)
     masses = dict.fromkeys(names, 0.0)
     for name, link in tree.links.items():
@@ -252,12 +254,12 @@ def _riders(poses: dict[str, Pose], carriers: dict[str, str], names: dict[str, s
     return tuple(riders)
 
 
-def _names(given: list[str]) -> dict[str, str]:
-    """Names as a doll takes them, each once."""
+def _names(given: list[str], taken: Sequence[str] = ()) -> dict[str, str]:
+    """Names as a doll takes them, each once, and none of those that are taken."""
     names: dict[str, str] = {}
     for name in given:
         text = _plain(name)
-        while text in names.values():
+        while text in names.values() or text in taken:
             text += '_'
         names[name] = text
     return names

@@ -202,11 +202,12 @@ def test_two_meshes_with_a_skin_each(tmp_path, plain):
 
 def test_names_become_fit_for_a_doll(tmp_path):
     made = document(RIGS['chain'])
-    for number, name in enumerate(('a/b', 'same', 'same', '', '\ud800x', 'tab\tbed', '  ', 'ü骨')):
+    for number, name in enumerate(('a/b', 'same', 'same', '', '\ud800x', 'tab\tbed', '  ', 'ü骨',
+                                   'world')):
         made.data['nodes'][number + 2]['name'] = name
     character = read(made, tmp_path)
-    assert character.bone_names[:8] == (
-        'a_b', 'same', 'same_2', 'bone_3', '_x', 'tab_bed', 'bone_6', 'ü骨')
+    assert character.bone_names[:9] == (
+        'a_b', 'same', 'same_2', 'bone_3', '_x', 'tab_bed', 'bone_6', 'ü骨', 'world_2')
     assert len(set(character.bone_names)) == 10
 
 

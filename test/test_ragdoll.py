@@ -51,6 +51,7 @@ def test_volume_and_inertia_are_those_of_the_uniform_solid(shape):
     (lambda: Cylinder(math.nan, 1), faults.NotFinite),
     (lambda: Capsule(1, math.inf), faults.NotFinite),
     (lambda: bone('a', mass=0), faults.NotPositive),
+    (lambda: bone('world'), faults.DuplicateName),
     (lambda: bone('a', position=(0, math.nan, 0)), faults.NotFinite),
     (lambda: bone('a', orientation=(0, 0, 0, 0)), faults.NotUnit),
     (lambda: hinge('a', 'b', limits=((1, -1),)), faults.LimitsReversed),

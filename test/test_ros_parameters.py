@@ -7,10 +7,13 @@ import math
 import pytest
 from rcl_interfaces.msg import ParameterType
 from rclpy.parameter import Parameter
+from std_msgs.msg import String
 
 from ragdoll_ros.faults import Faults, RagdollError
+from ragdoll_ros.ros.outputs import LATCHED
 from ragdoll_ros.ros.parameters import SPECS, Settings
 from ragdoll_ros.scene_file import load_scene, save_scene
+from ragdoll_ros.urdf_tree import parse_urdf
 
 RANGES = {name: spec.metadata['span'] for name, spec in SPECS.items() if spec.metadata['span']}
 
@@ -66,7 +69,8 @@ def test_a_wrong_type_is_refused_and_counted(node, name):
 
 @pytest.mark.parametrize('name, bad, reason', [
     ('accuracy', 'perfect', 'draft, normal, exact'), ('pushed_bone', 'tail', 'torso, head'),
-    ('pushed_bone', '', 'torso'), ('scene', 'nowhere', 'crowd'), ('scene', '', 'crowd'),
+    ('pushed_bone', '', 'torso'), ('frame_id', '', 'a name'), ('frame_id', '/world', 'slash'),
+    ('frame_id', 'left_shin', 'no bone'), ('scene', 'nowhere', 'crowd'), ('scene', '', 'crowd'),
     ('scene', 'x' * 5000, 'Unreadable'), ('scene', '~nobody/x', 'Unreadable'),
     ('scene', '/', 'Unreadable')])
 def test_a_wrong_word_is_refused_with_what_would_be_right(node, name, bad, reason):
@@ -129,6 +133,13 @@ def test_a_scene_without_the_pushed_bone_needs_another_in_the_same_call(make_nod
     assert value(node, 'pushed_bone') == 'doll_3/head'
 
 
+def test_a_scene_with_a_bone_of_the_world_s_name_is_refused(make_node):
+    node = make_node(scene='crowd', frame_id='torso')
+    result = put(node, scene='drop')
+    assert not result.successful and 'frame_id' in result.reason
+    assert put(node, scene='drop', frame_id='map').successful
+
+
 def test_a_scene_that_is_set_again_is_read_again(make_node, tmp_path):
     path = tmp_path / 'mine.yaml'
     scene = load_scene('drop')
@@ -143,6 +154,16 @@ def test_a_scene_that_is_set_again_is_read_again(make_node, tmp_path):
     assert node.simulation.scene.gravity == (0, 0, -1)
 
 
+def test_the_world_s_name_is_that_of_the_description_s_root(make_node, peer):
+    """Several dolls hang on it; poses are given in it."""
+    node = make_node(scene='crowd', frame_id='map')
+    got = peer.collect(String, 'robot_description', LATCHED)
+    peer.wait(lambda: got)
+    assert parse_urdf(got[-1][1].data).order[0] == 'map'
+    assert put(node, frame_id='odom').successful
+    peer.wait(lambda: parse_urdf(got[-1][1].data).order[0] == 'odom')
+
+
 def test_the_world_s_name_and_the_clock_change_live(node):
     assert put(node, frame_id='map', publish_clock=True).successful
     assert node.count_publishers('/clock') == 1
@@ -154,7 +175,8 @@ def test_the_world_s_name_and_the_clock_change_live(node):
 @pytest.mark.parametrize('values, words', [
     ({'rate': -1.0, 'real_time_factor': math.nan, 'pushed_bone': 'tail'},
      ['rate', 'real_time_factor', 'tail']),
-    ({'rate': 50, 'accuracy': 'foo'}, ['rate', 'DOUBLE', 'foo'])])
+    ({'rate': 50, 'accuracy': 'foo'}, ['rate', 'DOUBLE', 'foo']),
+    ({'frame_id': 'left_shin'}, ['frame_id', 'left_shin'])])
 def test_a_wrong_start_is_refused_with_all_that_is_wrong(make_node, values, words):
     with pytest.raises(RagdollError) as caught:
         make_node(**values)

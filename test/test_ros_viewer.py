@@ -313,7 +313,9 @@ def test_a_scene_that_is_not_here_is_shown_by_its_urdf(no_node, remote, tmp_path
 def test_shapes_and_axes_from_a_urdf_are_the_scenes(name):
     """The bones' frames are those of the poses: half extents along the same axes."""
     scene = load_scene(name)
-    found, note = scene_of_node('/not/here.yaml', scene.bone_names, scene_to_urdf(scene))
+    found, note = scene_of_node('/not/here.yaml', scene.bone_names, scene_to_urdf(scene, 'map'))
+    same, nothing = scene_of_node(name, scene.bone_names, scene_to_urdf(scene, 'map'), 'map')
+    assert same == scene and not nothing
     assert note and found.bone_names == scene.bone_names
     for ours, theirs in zip(found.bones, scene.bones, strict=True):
         assert type(ours.shape) is type(theirs.shape)

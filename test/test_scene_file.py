@@ -94,6 +94,15 @@ def test_a_bones_surface_is_checked_without_a_file_too(field, value):
     assert caught.value.path == field
 
 
+def test_a_bone_may_not_be_called_as_the_world(tmp_path):
+    """A push in the frame `world` could be meant for either."""
+    path = tmp_path / 'doll.yaml'
+    path.write_text('bones: [{name: world, mass: 1, position: [0, 0, 0], '
+                    'shape: {sphere: {radius: 0.1}}}]')
+    with pytest.raises(faults.Faults, match=r'bones\[0\].name: DuplicateName: .world.; expected'):
+        load_scene(str(path))
+
+
 def test_all_faults_come_at_once_with_their_places(tmp_path):
     path = tmp_path / 'five.yaml'
     path.write_text(FIVE)

@@ -166,6 +166,13 @@ def test_zero_outside_the_limits_starts_at_the_nearest_angle(tmp_path):
     assert np.allclose(doll.bone('b').position, (-math.sin(0.5), 0, 1 + math.cos(0.5)))
 
 
+def test_a_world_with_a_shape_is_a_bone_of_another_name(tmp_path):
+    """Its frame keeps the name: as a rider, which no push is told by."""
+    doll, _ = read(tmp_path, link('world'), link('b'), joint('b', 'world'))
+    assert [bone.name for bone in doll.bones] == ['world_', 'b']
+    assert [(rider.name, rider.bone) for rider in doll.riders] == [('world', 'world_'), ('b', 'b')]
+
+
 def test_several_shapes_become_the_one_that_holds_them(tmp_path):
     two = (link('a').replace('</link>', '') + '<collision><origin xyz="0.1 0 0"/><geometry>'
            '<box size="0.1 0.1 0.1"/></geometry></collision></link>')

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import faults, rotation
+from ..ragdoll import WORLD
 from .gltf_file import GltfFile
 from .names import side_of
 from .nodes import Nodes, read_nodes
@@ -153,7 +154,7 @@ def _parent_bone(node: int, parents: list[int], place: dict[int, int]) -> int:
 
 def _bone_names(given: list[object]) -> tuple[str, ...]:
     """Names as a doll takes them, each once: what has none is called bone_N."""
-    taken: dict[str, int] = {}
+    taken = {WORLD: 1}
     names = []
     for number, name in enumerate(given):
         text = name if isinstance(name, str) else ''

@@ -14,14 +14,12 @@ from rclpy.node import Node
 
 from .. import faults
 from ..push import Push
-from ..ragdoll import Vector
+from ..ragdoll import WORLD, Vector
 from .parameters import Settings
 from .tally import Tally
 
 if TYPE_CHECKING:
     from ..simulation import Simulation
-
-WORLD = 'world'
 
 LEVER = 0.1
 """m: a torque may be as strong as the strongest force at this lever."""

@@ -35,9 +35,9 @@ from visualization_msgs.srv import GetInteractiveMarkers
 
 from .. import faults, rotation
 from ..grab import EVENLY
+from ..ragdoll import WORLD
 from ..simulation import Simulation
 from .handles import Handles
-from .inputs import WORLD
 from .outputs import MARKER_PERIOD
 from .parameters import Settings
 from .tally import Tally

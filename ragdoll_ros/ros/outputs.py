@@ -67,7 +67,7 @@ class Outputs:
         self._frame = frame
         self._describe_swings(scene, frame)
         self._next_markers = 0
-        self._description.publish(String(data=scene_to_urdf(scene)))
+        self._description.publish(String(data=scene_to_urdf(scene, frame)))
 
     def publish(self, simulation: Simulation, stamp: int, now: int,
                 still: bool = False) -> None:
@@ -94,7 +94,7 @@ class Outputs:
             self.publish_markers(simulation, stamp)
 
     def publish_markers(self, simulation: Simulation, stamp: int) -> None:
-        """Publish the markers now, heard or not: of a time that stands, late comers ask for them."""
+        """Publish the markers, heard or not: who comes while the time stands asks for them."""
         self._markers.publish(self._marker_array.message(stamp, simulation.state,
                                                          simulation.pushes, simulation.swings))
 

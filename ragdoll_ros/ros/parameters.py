@@ -12,6 +12,7 @@ from rclpy.parameter import Parameter
 
 from .. import faults
 from ..faults import RagdollError
+from ..ragdoll import WORLD
 from ..scene import STEP_RANGE, Scene
 from ..scene_file import load_scene
 from ..settings import ACCURACIES
@@ -52,7 +53,8 @@ class Settings:
     max_force: float = _setting(
         10000.0, 'Longest force, N, and ten times the longest torque, N m; longer is clamped',
         (0.0, 1e5))
-    frame_id: str = _setting('world', 'Name of the world frame in all messages')
+    frame_id: str = _setting(WORLD, 'Name of the world frame in all messages',
+                             constraints='no bone of bone_names, no slash at its beginning')
     publish_clock: bool = _setting(False, 'Publish simulated time on /clock and stamp by it')
     accuracy: str = _setting('normal', 'How finely to simulate',
                              constraints='one of ' + ', '.join(ACCURACIES))
@@ -171,6 +173,11 @@ def check(settings: Settings, scene: Scene) -> None:
     names = scene.bone_names
     if settings.pushed_bone not in names:
         raise faults.UnknownBone('pushed_bone', settings.pushed_bone, 'one of ' + ', '.join(names))
+    frame = settings.frame_id
+    if not frame or frame.startswith('/'):
+        raise faults.OutOfRange('frame_id', frame, 'a name without a slash at its beginning')
+    if frame in names:
+        raise faults.DuplicateName('frame_id', frame, 'a name that no bone bears')
 
 
 def _given(parameters: list[Parameter]) -> dict:

@@ -333,7 +333,8 @@ class Remote:
         self._settings = Settings(**values)
         self._hands.frame_id = self._settings.frame_id
         try:
-            scene, self._note = scene_of_node(self._settings.scene, names, self._description)
+            scene, self._note = scene_of_node(self._settings.scene, names, self._description,
+                                              self._settings.frame_id)
             self._problem, self._learned = '', True
         except faults.RagdollError as error:
             # Between two scenes the names are those of one and the URDF that of the other.

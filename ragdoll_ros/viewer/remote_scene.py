@@ -5,6 +5,7 @@ import dataclasses
 from collections.abc import Sequence
 
 from .. import faults
+from ..ragdoll import WORLD
 from ..scene import Ground, Placement, Scene
 from ..scene_file import load_scene
 from ..urdf import scene_to_urdf
@@ -14,19 +15,20 @@ GUESSED = ('The shapes are those of `robot_description`, as the scene `{}` is no
            'one; the ground is a guess, and swings and skins are not known.')
 
 
-def scene_of_node(name: str, names: Sequence[str], description: str) -> tuple[Scene, str]:
+def scene_of_node(name: str, names: Sequence[str], description: str,
+                  frame: str = WORLD) -> tuple[Scene, str]:
     """Give the scene of a node and what should be known of it, '' if nothing.
 
     ``name`` is the node's parameter `scene`, ``names`` its `bone_names`, ``description`` the URDF
-    that it publishes. A scene that is loaded here is the node's if it gives the same URDF, word
-    by word. Raises a RagdollError if nothing fits the names.
+    that it publishes, ``frame`` its `frame_id`. A scene that is loaded here is the node's if it
+    gives the same URDF, word by word. Raises a RagdollError if nothing fits the names.
     """
     try:
         scene = load_scene(name)
     except faults.RagdollError:
         scene = None
     if (scene is not None and scene.bone_names == tuple(names)
-            and scene_to_urdf(scene) == description):
+            and scene_to_urdf(scene, frame) == description):
         return scene, ''
     # A doll's bones have no slash in their names; those of a scene with several dolls do.
     named = {name.replace('/', '_'): name for name in names}
