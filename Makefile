@@ -89,6 +89,10 @@ $(READY): setup.py pyproject.toml
 	  echo 'ROS $(ROS) is sourced, but $(PYTHON) ($(VERSION)) cannot import its rclpy:' >&2; \
 	  echo 'use the Python of that ROS, make PYTHON=/usr/bin/python3, or a shell without ROS' >&2; \
 	  exit 1; }
+	@test $(ROS) = wheels || $(PYTHON) -c 'from rclpy.node import Node; \
+	  Node.add_post_set_parameters_callback' 2>/dev/null || { \
+	  echo 'ROS $(ROS) is sourced: Jazzy or newer is needed; or use a shell without ROS' >&2; \
+	  exit 1; }
 	@echo "Setting up $(VENV) with Python $(VERSION) and ROS 2 from" \
 	  "$(if $(VENV_FLAGS),the sourced $(ROS),PyPI's Jazzy wheels); once, a few minutes at most"
 	@test -e $@ || $(PYTHON) -m venv --clear $(VENV_FLAGS) $(VENV)

@@ -15,6 +15,8 @@ from xml.etree import ElementTree
 import pytest
 import yaml
 
+from ragdoll_ros.viewer.command import NO_VISER
+
 ROOT = Path(__file__).resolve().parent.parent
 SETUP = (ROOT / 'setup.py').read_text()
 EXECUTABLES = dict(re.findall(r"'(ragdoll_\w+)': '([\w.]+:main)'", SETUP))
@@ -26,7 +28,7 @@ ROSDEP_KEYS = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml', 'scipy': 'pytho
                'jsonschema': 'python3-jsonschema', 'matplotlib': 'python3-matplotlib',
                'mpl_toolkits': 'python3-matplotlib', 'pybullet': 'python3-pybullet-pip'}
 NO_ROSDEP_KEY = {'imageio', 'mujoco', 'pygltflib', 'viser'}
-"""Needed by extras only; said in the README."""
+"""Needed by extras only; the README says how to get them."""
 
 COUNT_POSES = """
 import rclpy
@@ -109,7 +111,7 @@ def site_packages(prefix: Path) -> Path:
 
 
 def test_versions_and_words_agree(wheel):
-    """package.xml, setup.py as it reached the wheel, and the newest entry of CHANGELOG.rst."""
+    """package.xml, and setup.py as it reached the wheel."""
     manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
     with zipfile.ZipFile(wheel) as files:
         name = next(name for name in files.namelist() if name.endswith('.dist-info/METADATA'))
@@ -117,8 +119,17 @@ def test_versions_and_words_agree(wheel):
     for tag, header in (('name', 'Name'), ('version', 'Version'), ('description', 'Summary')):
         assert built[header].replace('-', '_') == manifest.findtext(tag).replace('-', '_')
     assert (built['License'] or built['License-Expression']) == manifest.findtext('license')
-    newest = re.search(r'^(\d[.\d]*) \(.*\)\n-+$', (ROOT / 'CHANGELOG.rst').read_text(), re.M)
-    assert newest[1] == manifest.findtext('version')
+
+
+def test_changelog_has_the_headings_that_catkin_prepare_release_knows():
+    """REP 132: what is not released is Forthcoming; the newest release is the manifest's."""
+    headings = re.findall(r'^(\S.*)\n-+$', (ROOT / 'CHANGELOG.rst').read_text(), re.M)
+    released = headings[headings[0] == 'Forthcoming':]
+    assert headings and all(re.fullmatch(r'\d+\.\d+\.\d+ \(\d{4}-\d\d-\d\d\)', heading)
+                            for heading in released)
+    if released:
+        assert released[0].split()[0] == ElementTree.parse(ROOT / 'package.xml').getroot().findtext(
+            'version')
 
 
 def test_manifest_names_what_the_package_imports():
@@ -129,6 +140,39 @@ def test_manifest_names_what_the_package_imports():
     used = {module for path in (ROOT / 'ragdoll_ros').rglob('*.py') for module in imported(path)}
     used -= set(sys.stdlib_module_names) | NO_ROSDEP_KEY | {'ragdoll_ros'}
     assert {ROSDEP_KEYS.get(module, module) for module in used} <= declared
+
+
+def test_readme_says_how_to_get_what_rosdep_does_not_know():
+    """By an extra for an environment of one's own; and for ROS's Python, which Ubuntu guards.
+
+    PEP 668: pip refuses to touch that one without a word of consent.
+    """
+    readme = (ROOT / 'README.md').read_text()
+    named = {extra for text in re.findall(r"pip install '\.\[(.*?)\]'", readme)
+             for extra in text.split(',')}
+    extras = dict(re.findall(r"'(\w+)': \[(.*?)\]", SETUP, re.S))
+    got = {module for extra in named for module in re.findall(r"'(\w[\w-]*)", extras[extra])}
+    assert got >= NO_ROSDEP_KEY
+    workspace = readme.split('## With ROS 2 Jazzy\n')[1].split('\n## ')[0]
+    command = 'PIP_BREAK_SYSTEM_PACKAGES=1 pip install viser'
+    assert command in workspace and command in NO_VISER
+
+
+@pytest.mark.skipif(shutil.which('make') is None, reason='no make')
+@pytest.mark.parametrize('distribution, body, told', [
+    ('humble', 'pass', True), ('jazzy', 'add_post_set_parameters_callback = None', False)])
+def test_make_refuses_a_ros_that_is_too_old(tmp_path, distribution, body, told):
+    """By what its rclpy has. Whatever else comes of it: nothing can be set up in that place."""
+    (tmp_path / 'rclpy').mkdir()
+    (tmp_path / 'rclpy/__init__.py').write_text('')
+    (tmp_path / 'rclpy/node.py').write_text(f'class Node:\n    {body}\n')
+    done = subprocess.run(
+        ['make', '-C', str(ROOT), 'lint', f'PYTHON={sys.executable}', 'VENV=/dev/null/venv'],
+        env={**without_paths(), 'PYTHONPATH': str(tmp_path), 'ROS_DISTRO': distribution,
+             'MAKEFLAGS': ''}, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert (f'ROS {distribution} is sourced: Jazzy or newer is needed' in done.stderr) == told
+    assert ('Setting up' in done.stdout) != told
 
 
 def test_every_program_is_an_executable():

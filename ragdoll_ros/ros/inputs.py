@@ -28,7 +28,8 @@ LEVER = 0.1
 class Inputs:
     """Subscriptions to all that pushes. Each has a channel: a push takes its last one's place.
 
-    ``name`` is that of the node which is pushed, for who listens beside it.
+    ``name`` is that of the node which is pushed, for who listens beside it. All are reliable: what
+    is sent once, as soon as somebody listens, was lost 3 times in 40 to a best-effort subscription.
     """
 
     def __init__(self, node: Node, tally: Tally, name: str = '~') -> None:

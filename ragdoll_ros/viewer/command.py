@@ -31,7 +31,8 @@ EXAMPLE = """examples:
   ragdoll_viewer --play run.json          show a recording
 """
 
-NO_VISER = "ragdoll_viewer needs viser: pip install 'ragdoll_ros[viewer]', or pip install viser"
+NO_VISER = ("ragdoll_viewer needs viser: pip install 'ragdoll_ros[viewer]', or, for the Python of "
+            "Ubuntu's ROS, PIP_BREAK_SYSTEM_PACKAGES=1 pip install viser")
 
 NO_ROS = ("without --scene, ragdoll_viewer listens to a node over ROS 2: source ROS, or "
           "pip install 'ragdoll_ros[ros]', or name a scene: ragdoll_viewer --scene drop")
