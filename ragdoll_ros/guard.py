@@ -110,8 +110,9 @@ class Guard:
         return found
 
     def momentum_due(self, before: Motion, after: Motion, duration: float,
-                     touched: np.ndarray, impulse: np.ndarray | float = 0.0,
-                     moment: np.ndarray | float | None = 0.0) -> tuple[Shift, Motion]:
+                     impulse: np.ndarray | float = 0.0,
+                     moment: np.ndarray | float | None = 0.0,
+                     touched: np.ndarray | None = None) -> tuple[Shift, Motion]:
         """Tell what dolls in the air lack of the momentum, and of the way, that they must have,
         and their motion with it. Those that were ``touched`` (d,) stay as they are.
 
@@ -124,7 +125,7 @@ class Guard:
         masses = self._mechanics.doll_masses[:, None]
         momentum = before.momentum + impulse + masses * (self._gravity * duration)
         centre = before.centre + (before.momentum + momentum) * (duration / 2 / masses)
-        if touched.any():
+        if touched is not None:
             momentum = np.where(touched[:, None], after.momentum, momentum)
             centre = np.where(touched[:, None], after.centre, centre)
         linear = (momentum - after.momentum) / masses
@@ -133,7 +134,9 @@ class Guard:
         if moment is None:
             moment, turned = spin, np.zeros_like(linear)
         else:
-            moment = np.where(touched[:, None], spin, before.spin + moment)
+            moment = before.spin + moment
+            if touched is not None:
+                moment = np.where(touched[:, None], spin, moment)
             turn = self._aligning(spin, moment)
             if turn is not None:
                 matrices = rotation.matrix(turn)

@@ -97,7 +97,6 @@ class Simulation:
         self._still_speed, self._still_way = math.sqrt(size) / slower * REST_SPEED, size * REST_WAY
         self._still_time = slower * REST_TIME
         self._most_at_rest = 2 * self.mechanics.doll_masses * (2 * self._still_speed) ** 2
-        self._lightest = float(self.mechanics.masses.min())
         self._riding = riding(scene)
         self._begin()
 
@@ -360,10 +359,7 @@ class Simulation:
         """Go through one stretch of motion and see to what must be kept; give its length, s."""
         stepper, before, motion = self._stepper, self._state, self._motion
         start = stepper.coordinates
-        pull = max((math.hypot(*load.force) for load in loads), default=0.0)
-        near = stepper.reach.near(before, duration, self._gravity + pull / self._lightest,
-                                  stepper.touching)
-        piece = stepper.go(duration, loads, near)
+        piece = stepper.go(duration, loads)
         self._see(stepper.state)
         if loads:
             self._enter_work(loads, before, piece)
@@ -387,15 +383,17 @@ class Simulation:
 
         What loads that turn with a bone give in a flight, nobody knows better than the flight.
         """
-        touched = self._guard.touched(piece.touched)
-        if touched.all() or (not piece.substep and any(load.local for load in loads)):
+        touched = self._guard.touched(piece.touched) if piece.touched else None
+        if touched is not None and touched.all():
+            return
+        if not piece.substep and any(load.local for load in loads):
             return
         impulse = moment = 0.0
         if loads:
             impulse, moment = self._given(loads, piece.duration, state)
         after = self._motion
-        shift, self._motion = self._guard.momentum_due(before, after, piece.duration, touched,
-                                                       impulse, moment)
+        shift, self._motion = self._guard.momentum_due(before, after, piece.duration, impulse,
+                                                       moment, touched)
         self._state = self.mechanics.shifted(self._state, after, shift)
         self._stepper.shift(self._state, shift.turn)
 

@@ -104,6 +104,8 @@ class Stepper:
         self._solid = bool(scene.ground or scene.self_collision or len(scene.dolls) > 1)
         """Whether anything can touch at all."""
         self._fading = damping_rate(scene)
+        self._gravity = math.hypot(*scene.gravity)
+        self._lightest = min(bone.mass for bone in scene.bones)
         smallest = min(placement.doll.extent for placement in scene.dolls)
         self._span = 0.01 * min(1.0, math.sqrt(smallest / HUMAN))
         """s in which as many substeps are taken as the accuracy says for 10 ms."""
@@ -193,11 +195,8 @@ class Stepper:
         self._most_flights = math.ceil(MOST_FLIGHTS * max(1.0, tick / self._span))
         self._departure, self._flown = self.coordinates, []
 
-    def go(self, duration: float, loads: Sequence[Load], near: set[tuple[int, int]]) -> Piece:
-        """Move on by ``duration`` s, or by less: up to the next touch or limit in a flight.
-
-        ``near`` are the pairs that may touch meanwhile, as Reach.near tells.
-        """
+    def go(self, duration: float, loads: Sequence[Load]) -> Piece:
+        """Move on by ``duration`` s, or by less: up to the next touch or limit in a flight."""
         if self._may_fly(duration):
             flown = self._fly(duration, loads)
             if flown > 0:
@@ -205,7 +204,7 @@ class Stepper:
                     self._flown.append((flown, loads))
                 return Piece(flown, 0.0, set())
         self._path = self._flown = None
-        return self._step(duration, loads, near)
+        return self._step(duration, loads)
 
     def estimate_error(self) -> float | None:
         """Estimate the error, m, that the last tick added to the worst position.
@@ -379,9 +378,10 @@ class Stepper:
         return min(self.accuracy.flight_turn / max(rate, 1e-9),
                    STIFFEST / max(self._fading, 1e-9))
 
-    def _step(self, duration: float, loads: Sequence[Load], near: set[tuple[int, int]]) -> Piece:
+    def _step(self, duration: float, loads: Sequence[Load]) -> Piece:
         """Take the engine's own step, finer where that overshoots less."""
         self.settle()
+        near = self._near(duration, loads)
         start, state, touching = self.coordinates, self.state, self.touching
         bounds = [max(1.0, self.accuracy.creep * far) for far in self._too_far()]
         substeps = self._substeps(duration, bool(loads))
@@ -398,6 +398,12 @@ class Stepper:
             self._back_to(start, state, touching)
             substeps = min(most, 4 * substeps)
             self.effort.redone += 1
+
+    def _near(self, duration: float, loads: Sequence[Load]) -> set[tuple[int, int]]:
+        """Pairs of dolls, or of a doll and GROUND, that may touch within ``duration`` s."""
+        pull = max((math.hypot(*load.force) for load in loads), default=0.0)
+        return self.reach.near(self.state, duration, self._gravity + pull / self._lightest,
+                               self.touching)
 
     def _past(self) -> np.ndarray:
         """Angles (k,) rad by which the limited joints are past their limits now; kept."""

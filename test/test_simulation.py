@@ -234,6 +234,24 @@ def test_momentum_is_kept_in_the_air_beside_the_ground():
     assert checked > 30
 
 
+def test_momentum_is_kept_in_the_air_while_others_lie_on_the_ground():
+    scene = load_scene('drop')
+    spun = dataclasses.replace(scene.dolls[0], position=(0.0, 0.0, 30.0), spin=(3.0, 20.0, 5.0))
+    ball = Placement(BALL, position=(20.0, 0.0, 0.1))
+    scene = dataclasses.replace(scene, dolls=(ball, spun))
+    mechanics = Mechanics(scene)
+    due = mechanics.doll_masses[1] * np.array(scene.gravity) * scene.step
+    with Simulation(scene) as simulation:
+        before, rested = mechanics.motion(simulation.state), 0
+        for _ in range(100):
+            after = mechanics.motion(simulation.advance())
+            assert after.momentum[1] - before.momentum[1] == pytest.approx(due, abs=1e-9)
+            assert after.spin[1] == pytest.approx(before.spin[1], abs=1e-9)
+            assert np.abs(after.momentum[0]).max() < 1e-3
+            before, rested = after, rested + bool(simulation.effort.substeps)
+    assert rested > 50
+
+
 @pytest.mark.parametrize('friction', [0.3, 0.5, math.inf])
 def test_rolling_friction_is_a_lever_arm(friction):
     """A ball that rolls slows down by 5/7 g b / R."""
