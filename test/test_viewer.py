@@ -18,6 +18,8 @@ from ragdoll_ros.scene_file import load_scene
 from ragdoll_ros.simulation import Simulation
 from ragdoll_ros.viewer.command import free_port, server_at
 from ragdoll_ros.viewer.page import Page
+from ragdoll_ros.viewer.playback import Playback
+from ragdoll_ros.viewer.recording import Recording
 from ragdoll_ros.viewer.simulated import Simulated
 
 DROP = load_scene('drop')
@@ -186,6 +188,20 @@ def test_another_scene_by_the_dropdown(page):
     wait(lambda: page._stage.scene.name == 'ponytail')
     rods = wait_for(page, '/scene/rods').points
     assert rods.shape == (8, 2, 3) and np.allclose(rods[1:, 0], rods[:-1, 1])
+
+
+def test_a_scene_that_is_refused_is_not_chosen(page):
+    """The list goes on naming the scene that is shown, and the page that chose is told why."""
+    client = page.open()
+    wait(lambda: page.controls._scene.value == 'drop')
+    state, simulated = page.source.frame.state, page.source
+    page.play(Playback(Recording(DROP, np.zeros(1), state.positions[None],
+                                 state.orientations[None])))
+    simulated.close()
+    handle, seen = page.controls._scene, []
+    handle.on_update(lambda event: seen.append(handle.value))
+    client.update(handle, 'crowd')
+    wait(lambda: 'crowd' in seen and handle.value == 'drop')
 
 
 def wait_for(page, name):

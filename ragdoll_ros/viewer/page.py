@@ -120,6 +120,7 @@ class Page:
             self.editor = Editor(self.server, scene, lambda scene: self.source.use(scene),
                                  lambda wanted: self.source.pause(wanted), self._folder)
         self.selectors.append(self.editor.select)
+        self.controls.before_step = self.editor.leave
 
     def _select(self, bone: str) -> None:
         for selector in self.selectors:
