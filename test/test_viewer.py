@@ -12,7 +12,7 @@ pytest.importorskip('viser')
 from page_client import PageClient, wait
 
 from ragdoll_ros import rotation
-from ragdoll_ros.ragdoll import Bone, Capsule, Joint, Ragdoll, Sphere
+from ragdoll_ros.ragdoll import Bone, Capsule, Joint, Ragdoll, Rider, Sphere
 from ragdoll_ros.scene import Placement, Scene
 from ragdoll_ros.scene_file import load_scene
 from ragdoll_ros.simulation import Simulation
@@ -202,6 +202,18 @@ def test_a_scene_that_is_refused_is_not_chosen(page):
     handle.on_update(lambda event: seen.append(handle.value))
     client.update(handle, 'crowd')
     wait(lambda: 'crowd' in seen and handle.value == 'drop')
+
+
+def test_what_was_sent_is_text_on_the_page(page):
+    """A doll's name, which anyone may send, is told with the skin that it has not: as no HTML."""
+    placement = DROP.dolls[0]
+    doll = dataclasses.replace(placement.doll, riders=(Rider('r', 'torso', (0, 0, 0)),),
+                               model='nothing.glb')
+    page.open()
+    page.source.use(dataclasses.replace(DROP, dolls=(
+        dataclasses.replace(placement, doll=doll, name='<iframe srcdoc=x>'),)))
+    wait(lambda: 'no skin for &lt;iframe srcdoc=x&gt;' in page._problem.content)
+    assert '<iframe' not in page._problem.content
 
 
 def wait_for(page, name):
