@@ -103,11 +103,18 @@ class Guard:
             groups[groups == groups[b]] = groups[a]
         return groups
 
+    def touched(self, pairs: set[tuple[int, int]]) -> np.ndarray:
+        """Tell which dolls (d,) are in one of the pairs."""
+        found = np.zeros(len(self._own_groups), bool)
+        found[[doll for pair in pairs for doll in pair if doll >= 0]] = True
+        return found
+
     def momentum_due(self, before: Motion, after: Motion, duration: float,
                      impulse: np.ndarray | float = 0.0,
-                     moment: np.ndarray | float | None = 0.0) -> tuple[Shift, Motion]:
+                     moment: np.ndarray | float | None = 0.0,
+                     touched: np.ndarray | None = None) -> tuple[Shift, Motion]:
         """Tell what dolls in the air lack of the momentum, and of the way, that they must have,
-        and their motion with it.
+        and their motion with it. Those that were ``touched`` (d,) stay as they are.
 
         ``impulse`` (d, 3) N s and ``moment`` (d, 3) N m s are what pushes gave; no moment: the
         angular momentum is left as it is. The lack is made up by a motion of the whole doll as
@@ -118,6 +125,9 @@ class Guard:
         masses = self._mechanics.doll_masses[:, None]
         momentum = before.momentum + impulse + masses * (self._gravity * duration)
         centre = before.centre + (before.momentum + momentum) * (duration / 2 / masses)
+        if touched is not None:
+            momentum = np.where(touched[:, None], after.momentum, momentum)
+            centre = np.where(touched[:, None], after.centre, centre)
         linear = (momentum - after.momentum) / masses
         gained = (momentum + after.momentum) * linear
         spin, inertia, turn = after.spin, after.inertia, None
@@ -125,6 +135,8 @@ class Guard:
             moment, turned = spin, np.zeros_like(linear)
         else:
             moment = before.spin + moment
+            if touched is not None:
+                moment = np.where(touched[:, None], spin, moment)
             turn = self._aligning(spin, moment)
             if turn is not None:
                 matrices = rotation.matrix(turn)

@@ -70,7 +70,7 @@ class Reach:
         if len(self._bounds) == 2:
             if self._ground is None:
                 return set()
-            if (0, GROUND) in touching:
+            if any(GROUND in pair for pair in touching):
                 return {(0, GROUND)}
         speeds = np.sqrt(np.einsum('ij,ij->i', state.linear, state.linear))
         far = 2 * duration * (speeds + acceleration * duration) + self._radii + MARGIN

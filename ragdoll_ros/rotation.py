@@ -108,6 +108,20 @@ def from_rotation_vector(vectors: np.ndarray) -> np.ndarray:
     return np.concatenate([np.sinc(half / np.pi) / 2 * vectors, np.cos(half)], axis=-1)
 
 
+def mean_of_turn(vector: np.ndarray) -> np.ndarray:
+    """Mean (3, 3) of all rotation matrices on a steady way from none to a rotation vector (3,).
+
+    1 + (1 - cos a) / a^2 [r] + (a - sin a) / a^3 [r]^2 for the vector r, a long, and [r] w = r x w.
+    """
+    x, y, z = vector
+    angle = math.hypot(x, y, z)
+    across = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+    if angle < 1e-4:
+        return np.eye(3) + across / 2 + across @ across / 6
+    return (np.eye(3) + (1 - math.cos(angle)) / angle ** 2 * across
+            + (angle - math.sin(angle)) / angle ** 3 * across @ across)
+
+
 def rotation_vector(q: np.ndarray) -> np.ndarray:
     """Rotation vectors (..., 3) in rad, at most pi long, of unit quaternions (..., 4)."""
     q = np.asarray(q, float)

@@ -15,12 +15,12 @@ from .engine.protocol import GROUND, Contact, Engine, Load, pressed
 from .gap import JointGap
 from .grab import EVENLY, Grab, Hands, Pull
 from .guard import Guard
-from .mechanics import Mechanics, Motion, point_motion
+from .mechanics import Mechanics, Motion, cross, point_motion
 from .push import Push
 from .scene import SECOND, STEP_RANGE, Scene
 from .settings import HUMAN, Accuracy, firm, resolve_accuracy
 from .state import State
-from .stepping import Effort, Stepper
+from .stepping import Effort, Piece, Stepper
 from .swing.pose import SwingState
 from .swing.riding import riding
 
@@ -37,15 +37,24 @@ REST_WAY = 0.0012
 their joints' damping slower than 4 mm/s are stopped. For other dolls it goes with their size."""
 
 REST_TIME = 3 * SECOND // 10
-"""ns that all bones must be still under gravity before the scene sleeps. In 44 starts of the report
-bones that were not put to sleep then moved 2 mm more within 3 s in the median, as they do after
-0.5 s, at the most 15 mm; 60 mm after 0.2 s."""
+"""ns that all bones must be still before the scene sleeps; longer in weak gravity, under which all
+goes slower as its root. In 44 starts of the report bones that were not put to sleep then moved 2 mm
+more within 3 s in the median, as they do after 0.5 s, at the most 15 mm; 60 mm after 0.2 s."""
+
+EARTH = 9.8
+"""m/s^2: gravity for which the three above were measured."""
 
 THROWN = SECOND
 """ns for which a doll that was let go is stepped as finely as one that is held."""
 
 LONGEST_THROWN = 0.01
 """s that are gone through at once then: what fails is done again by itself."""
+
+STEADY = 0.2
+"""rad that a bone may turn while a torque, or a force along its axes, is entered as one."""
+
+LEAST_SHARE = 0.01
+"""Of a tick: stretches under such loads are no shorter, however fast the bone spins."""
 
 
 @dataclass
@@ -83,10 +92,11 @@ class Simulation:
         # A bone that is still has at most m v^2 / 2 for its speed and less than 3 times that for
         # its spin, as no radius of gyration is longer than its largest half extent.
         size = min(placement.doll.extent for placement in scene.dolls) / HUMAN
-        self._still_speed, self._still_way = math.sqrt(size) * REST_SPEED, size * REST_WAY
-        self._most_at_rest = 2 * self.mechanics.doll_masses * (2 * self._still_speed) ** 2
         self._gravity = math.hypot(*scene.gravity)
-        self._lightest = float(self.mechanics.masses.min())
+        slower = max(1.0, math.sqrt(EARTH / self._gravity)) if self._gravity else math.inf
+        self._still_speed, self._still_way = math.sqrt(size) / slower * REST_SPEED, size * REST_WAY
+        self._still_time = slower * REST_TIME
+        self._most_at_rest = 2 * self.mechanics.doll_masses * (2 * self._still_speed) ** 2
         self._riding = riding(scene)
         self._begin()
 
@@ -200,7 +210,7 @@ class Simulation:
 
     def advance(self) -> State:
         """Go on by one tick."""
-        self._stepper.begin_tick()
+        self._stepper.begin_tick(self.step)
         self.effort = self._stepper.effort
         end = self.time + self.tick
         while self.time < end:
@@ -218,11 +228,13 @@ class Simulation:
         Bones that overlap there do not collide from then on, and what is in the ground is lifted;
         what merely rests on something, up to pressed() deep in it, rests on.
         """
-        self._stepper.place(coordinates)
-        self._stepper.engine.let_overlaps_be()
-        self._stepper.begin()
+        stepper, engine = self._stepper, self._stepper.engine
+        stepper.place(coordinates)
+        engine.let_overlaps_be()
+        stepper.begin()
         self._lift_out()
-        self._start = (self._stepper.engine.save(), self._stepper.coordinates)
+        engine.forget(self._start[0])
+        self._start = (engine.save(), stepper.coordinates)
         self._begin()
         return self._state
 
@@ -311,9 +323,29 @@ class Simulation:
         self._stepper.accuracy = firm(self._accuracy) if thrown else self._accuracy
         go = self._pulled if self._hands else self._piece
         remaining = (end - self.time) / SECOND
+        least = LEAST_SHARE * remaining
         while remaining > 1e-12 and not self.asleep:
-            remaining -= go(min(remaining, LONGEST_THROWN) if thrown else remaining, loads)
+            length = min(remaining, LONGEST_THROWN) if thrown else remaining
+            if loads:
+                length = min(length, max(least, self._steady(loads)))
+            remaining -= go(length, loads)
         self.time = end
+
+    def _steady(self, loads: list[Load]) -> float:
+        """Longest stretch, s, in which no bone that a torque or a load along its own axes pushes
+        turns by more than STEADY: w t + a t^2 / 2, where a is at most what the bone alone had.
+        """
+        longest = math.inf
+        for load in loads:
+            if load.local or load.torque.any():
+                spin = math.hypot(*self._state.angular[load.bone])
+                force, arm, torque = (
+                    math.hypot(*vector) for vector in (load.force, load.point, load.torque))
+                gain = (torque + force * arm) / self.mechanics.inertias[load.bone].min()
+                root = math.sqrt(spin * spin + 2 * gain * STEADY)
+                if root > 0:
+                    longest = min(longest, 2 * STEADY / (spin + root))
+        return longest
 
     def _pulled(self, duration: float, loads: list[Load]) -> float:
         """Go through a stretch as short as hands need it; give its length, s."""
@@ -327,17 +359,14 @@ class Simulation:
         """Go through one stretch of motion and see to what must be kept; give its length, s."""
         stepper, before, motion = self._stepper, self._state, self._motion
         start = stepper.coordinates
-        pull = max((math.hypot(*load.force) for load in loads), default=0.0)
-        near = stepper.reach.near(before, duration, self._gravity + pull / self._lightest,
-                                  stepper.touching)
         piece = stepper.go(duration, loads)
         self._see(stepper.state)
         if loads:
-            self._enter_work(loads, before, piece.substep)
-        if not near and stepper.accuracy.momentum:
-            self._keep_momentum(motion, piece.duration, loads, before)
+            self._enter_work(loads, before, piece)
+        if stepper.accuracy.momentum:
+            self._keep_momentum(motion, piece, loads, before)
         if stepper.accuracy.energy:
-            self._keep_energy(start, near)
+            self._keep_energy(start, piece.touched)
         return piece.duration
 
     def _see(self, state: State) -> None:
@@ -348,13 +377,23 @@ class Simulation:
         self._stepper.place(coordinates)
         self._see(self._stepper.state)
 
-    def _keep_momentum(self, before: Motion, duration: float, loads: list[Load],
+    def _keep_momentum(self, before: Motion, piece: Piece, loads: list[Load],
                        state: State) -> None:
+        """Give dolls that touched nothing outside themselves the momentum that they must have.
+
+        What loads that turn with a bone give in a flight, nobody knows better than the flight.
+        """
+        touched = self._guard.touched(piece.touched) if piece.touched else None
+        if touched is not None and touched.all():
+            return
+        if not piece.substep and any(load.local for load in loads):
+            return
         impulse = moment = 0.0
         if loads:
-            impulse, moment = self._given(loads, duration, state)
+            impulse, moment = self._given(loads, piece.duration, state)
         after = self._motion
-        shift, self._motion = self._guard.momentum_due(before, after, duration, impulse, moment)
+        shift, self._motion = self._guard.momentum_due(before, after, piece.duration, impulse,
+                                                       moment, touched)
         self._state = self.mechanics.shifted(self._state, after, shift)
         self._stepper.shift(self._state, shift.turn)
 
@@ -391,12 +430,14 @@ class Simulation:
                 self._correct(guard.stopped(start, stepper.coordinates, burst))
         guard.settle(self._motion.energy, groups)
 
-    def _enter_work(self, loads: list[Load], before: State, substep: float) -> None:
+    def _enter_work(self, loads: list[Load], before: State, piece: Piece) -> None:
         """Work of forces along their points' ways, and of torques through their bones' turns.
 
-        A step that takes the velocity first (semi-implicit Euler, ``substep`` h) moves a point by
-        h v' where its energy grows by F (v + v') h / 2: the difference adds up to
-        F (v_end - v_start) h / 2 and is left out of the account.
+        A step that takes the velocity first (semi-implicit Euler, a substep h long) moves a point
+        by h v' where its energy grows by F (v + v') h / 2: the difference adds up to
+        F (v_end - v_start) h / 2 and is left out of the account. Where the load turns with its
+        bone, what it does beyond mean times way is that of two even changes, t dF dv / 12. Turns
+        are no vectors: the integral of w is the turn's plus t^2 / 12 w_start x w_end (Magnus).
         """
         work = np.zeros(len(self.scene.dolls))
         after = self._state
@@ -405,23 +446,32 @@ class Simulation:
             force, torque = self._mean_load(load, before)
             (place, speed), (end, end_speed) = (
                 point_motion(state, bone, load.point) for state in (before, after))
-            done = force @ (end - place - substep / 2 * (end_speed - speed))
+            faster, spun = end_speed - speed, after.angular[bone] - before.angular[bone]
+            done = force @ (end - place - piece.substep / 2 * faster)
             if torque.any():
-                turn = rotation.multiply(after.orientations[bone],
-                                         rotation.inverse(before.orientations[bone]))
-                lead = substep / 2 * (after.angular[bone] - before.angular[bone])
-                done += torque @ (rotation.rotation_vector(turn) - lead)
+                swept = self._turned(bone, before) + piece.duration ** 2 / 12 * cross(
+                    before.angular[bone], after.angular[bone])
+                done += torque @ (swept - piece.substep / 2 * spun)
+            if load.local:
+                change = after.turns[bone] - before.turns[bone]
+                done += piece.duration / 12 * (change @ load.force @ faster
+                                               + change @ load.torque @ spun)
             work[self.mechanics.doll_of[bone]] += done
             if isinstance(load, Pull):
                 self._grabbed += float(done)
         self._guard.add_work(work)
 
     def _mean_load(self, load: Load, before: State) -> tuple[np.ndarray, np.ndarray]:
-        """Force and torque in world axes, of a local load the mean of its start and end."""
+        """Force and torque in world axes; of a local load the mean of its bone's steady turn."""
         if not load.local:
             return load.force, load.torque
-        mean = (before.turns[load.bone] + self._state.turns[load.bone]) / 2
+        mean = rotation.mean_of_turn(self._turned(load.bone, before)) @ before.turns[load.bone]
         return mean @ load.force, mean @ load.torque
+
+    def _turned(self, bone: int, before: State) -> np.ndarray:
+        """Rotation vector (3,) rad, in the world, by which a bone has turned since."""
+        return rotation.rotation_vector(rotation.multiply(
+            self._state.orientations[bone], rotation.inverse(before.orientations[bone])))
 
     def _load(self, active: _Active) -> Load:
         """Give a push's load; its point is tied to the bone when the push begins."""
@@ -451,7 +501,7 @@ class Simulation:
         if not self._still:
             self._still_from = state
         self._still += self.tick
-        if self._still < REST_TIME:
+        if self._still < self._still_time:
             return
         way = np.abs(state.positions - self._still_from.positions).max()
         turn = rotation.angle_between(state.orientations, self._still_from.orientations)

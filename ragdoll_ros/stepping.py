@@ -40,7 +40,7 @@ MOST_LOOKS = 30
 """Looks at a path that may be spent on finding the instant of a touch; some five are."""
 
 MOST_FLIGHTS = 12
-"""Runge-Kutta steps in a tick at the most: from there on the engine's own cost less."""
+"""Runge-Kutta steps in 10 ms at the most: from there on the engine's own cost less."""
 
 FINER = 3
 """Steps of order 4 that tell the error of one step of a flight."""
@@ -52,7 +52,7 @@ energy of it."""
 LAG = 0.1
 """Share of a motion that joint damping may take away before the engine hears that it is slower."""
 
-GRADES = sorted({math.ceil(2 ** (k / 2)) for k in range(24)})
+GRADES = sorted({math.ceil(2 ** (k / 2)) for k in range(40)})
 """Counts of substeps: 1, 2, 3, 4, 6, 8, 12 ... A change makes the engine set up its step anew."""
 
 HELPED = 0.98
@@ -83,6 +83,8 @@ class Piece:
     """s."""
     substep: float
     """s; 0 for a flight."""
+    touched: set[tuple[int, int]]
+    """Pairs of dolls, or of a doll and GROUND, that touched or may have."""
 
 
 class Stepper:
@@ -102,6 +104,8 @@ class Stepper:
         self._solid = bool(scene.ground or scene.self_collision or len(scene.dolls) > 1)
         """Whether anything can touch at all."""
         self._fading = damping_rate(scene)
+        self._gravity = math.hypot(*scene.gravity)
+        self._lightest = min(bone.mass for bone in scene.bones)
         smallest = min(placement.doll.extent for placement in scene.dolls)
         self._span = 0.01 * min(1.0, math.sqrt(smallest / HUMAN))
         """s in which as many substeps are taken as the accuracy says for 10 ms."""
@@ -185,9 +189,10 @@ class Stepper:
             self._stale = False
         return self.engine
 
-    def begin_tick(self) -> None:
-        """Count efforts, and note what is flown, from here on."""
+    def begin_tick(self, tick: float) -> None:
+        """Count efforts, and note what is flown, from here on, for ``tick`` s."""
         self.effort = Effort()
+        self._most_flights = math.ceil(MOST_FLIGHTS * max(1.0, tick / self._span))
         self._departure, self._flown = self.coordinates, []
 
     def go(self, duration: float, loads: Sequence[Load]) -> Piece:
@@ -197,9 +202,9 @@ class Stepper:
             if flown > 0:
                 if self._flown is not None:
                     self._flown.append((flown, loads))
-                return Piece(flown, 0.0)
+                return Piece(flown, 0.0, set())
         self._path = self._flown = None
-        return Piece(duration, self._step(duration, loads))
+        return self._step(duration, loads)
 
     def estimate_error(self) -> float | None:
         """Estimate the error, m, that the last tick added to the worst position.
@@ -225,7 +230,7 @@ class Stepper:
     def _may_fly(self, duration: float) -> bool:
         """Tell whether nothing touches and no joint presses against its limit."""
         if (self._free is None or not self.accuracy.order or self.touching or self._blocked
-                or self.effort.flights >= MOST_FLIGHTS):
+                or self.effort.flights >= self._most_flights):
             return False
         past = self._past()
         if not len(past):
@@ -245,7 +250,7 @@ class Stepper:
         parts = self.reach.strides(self.state, duration) if self._solid else 1
         if not self._leads_on(duration):
             parts = max(parts, math.ceil(duration / self._longest_step()))
-        if parts > MOST_FLIGHTS:
+        if parts > self._most_flights:
             return 0.0
         stretch, flown = duration / parts, 0.0
         while flown < duration * (1 - 1e-9):
@@ -373,24 +378,32 @@ class Stepper:
         return min(self.accuracy.flight_turn / max(rate, 1e-9),
                    STIFFEST / max(self._fading, 1e-9))
 
-    def _step(self, duration: float, loads: Sequence[Load]) -> float:
-        """Take the engine's own step, finer where that overshoots less; give its substep, s."""
+    def _step(self, duration: float, loads: Sequence[Load]) -> Piece:
+        """Take the engine's own step, finer where that overshoots less."""
         self.settle()
+        near = self._near(duration, loads)
         start, state, touching = self.coordinates, self.state, self.touching
         bounds = [max(1.0, self.accuracy.creep * far) for far in self._too_far()]
         substeps = self._substeps(duration, bool(loads))
         self._blocked = False
         most = max(1, math.ceil(self.accuracy.most * duration / self._span))
         last = math.inf
+        watch = bool(near) and not any(a != b for a, b in touching)
         while True:
-            self._run(duration, substeps, loads)
+            touched = self._run(duration, substeps, loads, watch)
             over = max(far / bound for far, bound in zip(self._too_far(), bounds, strict=True))
             if substeps >= most or over <= 1 or over > HELPED * last:
-                return duration / substeps
+                return Piece(duration, duration / substeps, touched if watch else near)
             last = over
             self._back_to(start, state, touching)
             substeps = min(most, 4 * substeps)
             self.effort.redone += 1
+
+    def _near(self, duration: float, loads: Sequence[Load]) -> set[tuple[int, int]]:
+        """Pairs of dolls, or of a doll and GROUND, that may touch within ``duration`` s."""
+        pull = max((math.hypot(*load.force) for load in loads), default=0.0)
+        return self.reach.near(self.state, duration, self._gravity + pull / self._lightest,
+                               self.touching)
 
     def _past(self) -> np.ndarray:
         """Angles (k,) rad by which the limited joints are past their limits now; kept."""
@@ -405,17 +418,25 @@ class Stepper:
         sunk = -self.reach.clearance(self.state)
         return past / self.accuracy.redo, sunk / self.accuracy.sink
 
-    def _run(self, duration: float, substeps: int, loads: Sequence[Load]) -> None:
-        """Let the engine go; what changes with the motion is looked at again now and then."""
+    def _run(self, duration: float, substeps: int, loads: Sequence[Load],
+             watch: bool) -> set[tuple[int, int]]:
+        """Let the engine go; what changes with the motion is looked at again now and then.
+
+        Gives the pairs that touched in one of the substeps, if these are to be watched.
+        """
         calls = math.ceil(self._fading * duration / LAG)
-        if any(load.local or load.point.any() for load in loads):
+        if watch or any(load.local or load.point.any() for load in loads):
             calls = substeps
         calls = max(1, min(calls, substeps))
+        touched = set()
         for call in range(calls):
             share = substeps * (call + 1) // calls - substeps * call // calls
             self.engine.step(duration * share / substeps, share, loads)
+            if watch:
+                touched |= self.engine.touched()
         self.effort.substeps += substeps
         self.look()
+        return {(a, b) for a, b in touched if a != b}
 
     def _substeps(self, duration: float, pushed: bool) -> int:
         """Count the substeps that this state asks for, one of the grades."""
@@ -437,5 +458,5 @@ class Stepper:
             need = max(need, (accuracy.contact if moving else accuracy.settled) * tens,
                        falling * duration / accuracy.sink)
         most = max(1, math.ceil(accuracy.most * tens))
-        return min(most, GRADES[bisect.bisect_left(GRADES, need)]) if need < most else most
+        return min(most, GRADES[bisect.bisect_left(GRADES, min(need, most))])
 

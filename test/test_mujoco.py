@@ -140,6 +140,16 @@ def test_a_ball_rests_on_a_tilted_ground_and_tells_of_it():
     assert contact.position == pytest.approx(normal * (1.1 - .1), abs=1e-3)
 
 
+@pytest.mark.parametrize('engine', ENGINES)
+def test_a_contact_lies_on_its_first_bone_however_deep(engine):
+    ball = Ragdoll('ball', (Bone('ball', Sphere(.1), 2.0, (0, 0, 0)),))
+    deep = engine(Scene('deep', (Placement(ball, position=(0, 0, .098)),), Ground()))
+    deep.step(1e-5, 1)
+    contact, = deep.contacts()
+    assert contact.position == pytest.approx((0, 0, -.002), abs=1e-6)
+    assert contact.depth == pytest.approx(.002, abs=1e-6)
+
+
 def test_jointed_and_overlapping_pairs_do_not_collide():
     """Three boxes in one another, two of them jointed: at rest they stay where they are."""
     bones = tuple(Bone(name, Box((.2, .2, .2)), 1.0, (x, 0, 0))

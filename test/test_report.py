@@ -2,9 +2,12 @@
 import dataclasses
 import json
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
+from conftest import ROOT
 
 pytest.importorskip('scipy')
 pytest.importorskip('mujoco')
@@ -17,9 +20,11 @@ from ragdoll_ros.accuracy.motions.flight import free_fall, gentle_flight, tumbli
 from ragdoll_ros.accuracy.motions.mechanisms import OMEGA, swing
 from ragdoll_ros.accuracy.parts import classes, orders
 from ragdoll_ros.accuracy.references.articulated import Articulated
+from ragdoll_ros.accuracy.references.tumbling import tumble
 from ragdoll_ros.accuracy.report import markdown
 from ragdoll_ros.accuracy.runner import Job, attempt
 from ragdoll_ros.accuracy.trajectory import Trajectory
+from ragdoll_ros.accuracy.trial import Trial
 from ragdoll_ros.mechanics import Mechanics
 from ragdoll_ros.state import State
 
@@ -65,6 +70,33 @@ def test_a_pendulum_hangs_still_at_its_root():
     assert np.abs(moved.positions[:, 0]).max() < 1e-10
     quarter = round(np.pi / 2 / OMEGA / .01 * 1.066)
     assert abs(moved.positions[quarter, 1, 0]) < .05
+
+
+@pytest.mark.parametrize('tick', [0.05, 0.2])
+def test_finer_settings_are_finer_in_long_ticks_too(tick):
+    """The steps of a flight that a tick may take go with its length."""
+    motion = tumbling_box()
+    scene = motion.trial.scene
+    fast = dataclasses.replace(scene.dolls[0], spin=(6.0, 8.0, 11.0))
+    trial = Trial(dataclasses.replace(scene, dolls=(fast,), step=tick), 1.0)
+    turns, _ = tumble(scene.bones[0].inertia, fast.spin, trial.times())
+    draft, normal, exact = (rotation.angle_between(
+        run(ours(accuracy), trial).moved.orientations[:, 0], turns).max()
+        for accuracy in ('draft', 'normal', 'exact'))
+    assert exact < normal / 4 < draft / 16
+    assert exact < 1e-5
+
+
+def test_the_quickstart_owes_nothing_to_what_ran_before():
+    """PyBullet keeps its contact margin for a whole process, whichever client sets it."""
+    code = ('from ragdoll_ros.accuracy.methods import quickstart, run\n'
+            'from ragdoll_ros.accuracy.starts import trial\n'
+            'print(run(quickstart(), trial("drop .4 m", 0)).moved.positions.tobytes().hex())')
+    alone = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+                           cwd=ROOT, check=True).stdout.split()[-1]
+    trial = starts.trial('drop .4 m', 0)
+    run(ours('normal'), trial)
+    assert run(quickstart(), trial).moved.positions.tobytes().hex() == alone
 
 
 def test_costs_are_medians_over_runs():

@@ -69,6 +69,7 @@ def hard_cases() -> list[HardCase]:
             load_doll('doll'), 1.0, 20.0, velocity=(20.0, 0.0, -100.0)), flung),
         HardCase('2 kN for 3 s', lambda: _pulled(2e3), flung),
         HardCase('20 kN for 3 s', lambda: _pulled(2e4), dataclasses.replace(flung, rest=False)),
+        HardCase('wrung by 300 N m for 3 s', _wrung, flung),
         HardCase('ten dolls on one spot', _heap),
         HardCase('ticks of 1/30 s', lambda: _drop(load_doll('doll'), tick=1 / 30)),
         HardCase('ticks of 1/500 s', lambda: _drop(load_doll('doll'), tick=1 / 500)),
@@ -150,6 +151,12 @@ def _pulled(force: float) -> Trial:
     scene = load_scene('drop')
     pull = Push('torso', (-force, 0.0, 1.0), start=0.2, duration=3.0)
     return Trial(scene, 30.0, None, (pull,))
+
+
+def _wrung() -> Trial:
+    scene = load_scene('drop')
+    wring = Push('left_upper_arm', torque=(120.0, -240.0, 134.0), start=0.2, duration=3.0)
+    return Trial(scene, 20.0, None, (wring,))
 
 
 def _heap() -> Trial:

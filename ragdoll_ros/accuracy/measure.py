@@ -74,8 +74,8 @@ class Measure:
     def work(self, trial: Trial, moved: Trajectory) -> np.ndarray:
         """Work (t,) J that the pushes have done so far.
 
-        Force times way is exact, as the force is steady within a tick; torque times turn is
-        taken by the trapezoid rule.
+        Force times way is exact, as the force is steady within a tick. The integral of the
+        angular velocity w is the tick's turn plus t^2 / 12 w_start x w_end (Magnus' series).
         """
         work = np.zeros(len(moved.times))
         for push in trial.pushes:
@@ -84,9 +84,11 @@ class Measure:
             acts = (push.start <= middle) & (middle < push.start + push.duration)
             place = moved.positions[:, bone] + rotation.rotate(
                 moved.orientations[:, bone], np.array(push.point))
-            spins = moved.angular[:, bone]
-            gained = np.diff(place, axis=0) @ push.force
-            gained += (spins[1:] + spins[:-1]) / 2 @ push.torque * np.diff(moved.times)
+            spins, turns = moved.angular[:, bone], moved.orientations[:, bone]
+            swept = rotation.rotation_vector(rotation.multiply(
+                turns[1:], rotation.inverse(turns[:-1])))
+            swept += np.diff(moved.times)[:, None] ** 2 / 12 * np.cross(spins[:-1], spins[1:])
+            gained = np.diff(place, axis=0) @ push.force + swept @ push.torque
             work[1:] += np.cumsum(gained * acts)
         return work
 

@@ -1,6 +1,6 @@
 """PyBullet as its quickstart guide shows it: load a URDF, set gravity, step at 1/240 s.
 
-This file, beside engine/bullet.py, imports pybullet, and on purpose knows nothing of what that
+This file, beside engine/bullet.py, imports pybullet, and on purpose does nothing of what that
 file does: inertia, damping, joint motors, contact margins and solver are PyBullet's defaults.
 """
 from __future__ import annotations
@@ -11,11 +11,15 @@ import tempfile
 import numpy as np
 import pybullet
 
+from ..engine.bullet import BREAKING_DISTANCE
 from ..state import State
 from ..urdf import to_urdf
 from .trial import Trial
 
 STEP = 1 / 240
+
+DEFAULT_BREAKING_DISTANCE = 0.02
+"""m: PyBullet keeps one for all clients of a process; here it is what it would be alone."""
 
 
 class Quickstart:
@@ -24,6 +28,8 @@ class Quickstart:
     def __init__(self, trial: Trial) -> None:
         self._trial = trial
         self._client = pybullet.connect(pybullet.DIRECT)
+        pybullet.setPhysicsEngineParameter(contactBreakingThreshold=DEFAULT_BREAKING_DISTANCE,
+                                           physicsClientId=self._client)
         self._time = 0.0
         pybullet.setGravity(*trial.scene.gravity, physicsClientId=self._client)
         self._add_ground()
@@ -65,7 +71,9 @@ class Quickstart:
         return State(table[:, 0:3], table[:, 3:7], table[:, 7:10], table[:, 10:13])
 
     def close(self) -> None:
-        """Give everything back."""
+        """Give everything back, to others of this process the breaking distance too."""
+        pybullet.setPhysicsEngineParameter(contactBreakingThreshold=BREAKING_DISTANCE,
+                                           physicsClientId=self._client)
         pybullet.disconnect(self._client)
 
     def _pose(self, link: int) -> tuple[float, ...]:

@@ -177,6 +177,10 @@ class BulletEngine:
     def touching(self) -> set[tuple[int, int]]:
         """Pairs of dolls within half a mm of touching; GROUND stands for the ground."""
         pybullet.performCollisionDetection(self._client)
+        return self.touched()
+
+    def touched(self) -> set[tuple[int, int]]:
+        """Pairs of dolls that touched in the last substep, as it saw them."""
         points = pybullet.getContactPoints(physicsClientId=self._client)
         return {(self._doll_of[point[1]], self._doll_of[point[2]]) for point in points}
 
@@ -207,6 +211,10 @@ class BulletEngine:
     def restore(self, snapshot: int) -> None:
         """Go back to a snapshot."""
         pybullet.restoreState(stateId=snapshot, physicsClientId=self._client)
+
+    def forget(self, snapshot: int) -> None:
+        """Give back what a snapshot holds."""
+        pybullet.removeState(snapshot, physicsClientId=self._client)
 
     def close(self) -> None:
         """Give everything back to the system; a second time does nothing."""
@@ -356,15 +364,19 @@ class BulletEngine:
 
     def _set_material(self, body: int, link: int, friction: float | None,
                       rolling: float | None, restitution: float | None) -> None:
-        """Set a link's part of a contact: PyBullet multiplies the two parts, so take roots."""
+        """Set a link's part of a contact: PyBullet multiplies the two parts, so take roots.
+
+        For rolling it adds each one's lever arm times the other's friction.
+        """
         material = self.scene.material
         friction = material.friction if friction is None else friction
         rolling = material.rolling_friction if rolling is None else rolling
         restitution = material.restitution if restitution is None else restitution
+        sliding = math.sqrt(grip(friction))
         pybullet.changeDynamics(
-            body, link, lateralFriction=math.sqrt(grip(friction)),
-            rollingFriction=rolling, spinningFriction=0, restitution=math.sqrt(restitution),
-            physicsClientId=self._client)
+            body, link, lateralFriction=sliding,
+            rollingFriction=rolling / (2 * sliding) if sliding else 0.0, spinningFriction=0,
+            restitution=math.sqrt(restitution), physicsClientId=self._client)
 
     def _let_neighbours_be(self, doll: Ragdoll, body: int, links: dict[str, int]) -> None:
         """Bones that share a joint do not collide."""

@@ -119,6 +119,10 @@ class MujocoEngine:
         """Pairs of dolls that touch where they are now; GROUND stands for the ground."""
         self._refresh()
         self._mujoco.mj_collision(self._model, self._data)
+        return self.touched()
+
+    def touched(self) -> set[tuple[int, int]]:
+        """Pairs of dolls that touched in the last substep, as it saw them."""
         if not self._data.ncon:
             return set()
         return {tuple(pair) for pair in self._doll_of[self._data.contact.geom].tolist()}
@@ -152,7 +156,7 @@ class MujocoEngine:
             normal, position = -contact.frame[:3].copy(), contact.pos.copy()
             if a == GROUND:
                 a, b, normal = b, GROUND, -normal
-            position -= normal * contact.dist / 2
+            position += normal * contact.dist / 2
             found.append(Contact(a, b, position, normal, -contact.dist, float(force[0])))
         return found
 
@@ -168,6 +172,9 @@ class MujocoEngine:
         kind = self._mujoco.mjtState.mjSTATE_INTEGRATION
         self._mujoco.mj_setState(self._model, self._data, snapshot, kind)
         self._stale = True
+
+    def forget(self, snapshot: object) -> None:
+        """Nothing to give back: the memory goes with the object."""
 
     def close(self) -> None:
         """Nothing to give back: the memory goes with the object."""

@@ -82,6 +82,9 @@ class Engine(Protocol):
     def touching(self) -> set[tuple[int, int]]:
         """Pairs of dolls that touch where they are now; GROUND stands for the ground."""
 
+    def touched(self) -> set[tuple[int, int]]:
+        """Pairs of dolls that touched in the last substep, as it saw them."""
+
     def let_overlaps_be(self) -> None:
         """Let bones of one doll that overlap by more than pressed() now collide no more."""
 
@@ -93,6 +96,9 @@ class Engine(Protocol):
 
     def restore(self, snapshot: object) -> None:
         """Go back to a snapshot."""
+
+    def forget(self, snapshot: object) -> None:
+        """Give back what a snapshot holds."""
 
     def close(self) -> None:
         """Give everything back to the system."""
