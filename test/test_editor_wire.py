@@ -132,7 +132,7 @@ def test_a_step_ends_editing(page, browser):
     """The doll leaves its bind pose by one tick, without handles in the air; it stays paused."""
     page.editor.select('head')
     browser.press_button(page.editor.panel.edit)
-    wait(lambda: page.editor.handles.body is not None and page.editor._stood)
+    wait(lambda: page.editor.handles.body is not None and page._frame.time == 0)
     browser.press(command(page, 'Step'))
     wait(lambda: page._frame.time > 0)
     assert page.editor.handles.body is None and not page.editor.editing

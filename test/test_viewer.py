@@ -146,7 +146,7 @@ def test_arrow_keys_push(page, label, axis, sign):
     wait(lambda: page._frame.pushes)
     assert page._frame.pushes[0].force[axis] == 2000 * sign
     wait(lambda: page._frame.state.linear[0, axis] * sign > 1)
-    arrow = page.server.scene.get_handle_by_name('/scene/pushes')
+    arrow = wait_for(page, '/scene/pushes')
     assert arrow.visible and np.sign(np.diff(arrow.points[0], axis=0)[0, axis]) == sign
     wait(lambda: not page._frame.pushes and not arrow.visible)
 
