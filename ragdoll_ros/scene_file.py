@@ -318,8 +318,15 @@ def _schema_faults(schema: str, data: object) -> list[Fault]:
         for part in error.absolute_path:
             path += f'[{part}]' if isinstance(part, int) else f'.{part}' if path else str(part)
         kind = _NAMED.get(error.validator, faults.WrongForm)
-        found.append(kind(path, error.instance, _expected(error)))
+        found.append(kind(path, _wrong(error), _expected(error)))
     return sorted(found, key=lambda fault: fault.path)
+
+
+def _wrong(error: jsonschema.ValidationError) -> object:
+    """Give what is wrong at the place of an error: of a mapping, the keys that none has."""
+    if error.validator != 'additionalProperties':
+        return error.instance
+    return ', '.join(str(key) for key in error.instance if key not in error.schema['properties'])
 
 
 def _expected(error: jsonschema.ValidationError) -> str:

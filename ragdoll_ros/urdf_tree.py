@@ -12,9 +12,13 @@ from xml.etree import ElementTree
 import numpy as np
 
 from . import faults, rotation
-from .ragdoll import Box, Capsule, Cylinder, Shape, Sphere, tree_faults
+from .ragdoll import SHAPES, Shape, tree_faults
 
 LARGEST_TEXT = 32_000_000
+
+SIZES = {'box': ('size',), 'sphere': ('radius',), 'cylinder': ('radius', 'length'),
+         'capsule': ('radius', 'length')}
+"""What a URDF says of each shape."""
 
 JOINT_TYPES = ('revolute', 'continuous', 'fixed', 'prismatic', 'planar', 'floating', 'spherical')
 
@@ -162,13 +166,13 @@ def _joint(element: ElementTree.Element) -> UrdfJoint:
 def _shape(geometry: ElementTree.Element, where: str) -> Shape | None:
     """Give the shape; None for a mesh and whatever else is no plain shape."""
     for element in geometry:
-        if element.tag == 'box':
-            return Box(tuple(_vector(element, 'size', where)))
-        if element.tag == 'sphere':
-            return Sphere(_number(element, 'radius', where))
-        if element.tag in ('cylinder', 'capsule'):
-            kind = Cylinder if element.tag == 'cylinder' else Capsule
-            return kind(_number(element, 'radius', where), _number(element, 'length', where))
+        if element.tag in SIZES:
+            sizes = {key: tuple(_vector(element, key, where)) if key == 'size'
+                     else _number(element, key, where) for key in SIZES[element.tag]}
+            try:
+                return SHAPES[element.tag](**sizes)
+            except faults.Fault as fault:
+                raise fault.at(where) from None
     return None
 
 

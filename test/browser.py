@@ -169,9 +169,12 @@ class View:
 
     def field(self, label):
         """The input beside a label of the panel."""
-        row = self.page.locator('.mantine-Flex-root',
-                                has=self.page.get_by_text(label, exact=True))
-        return row.locator('input').last
+        return self.row(label).locator('input').last
+
+    def row(self, label):
+        """What stands in a line of the panel, beside a label."""
+        return self.page.locator('.mantine-Flex-root',
+                                 has=self.page.get_by_text(label, exact=True))
 
     def top(self, part):
         """How far below the page's upper edge a part of it begins, pixels."""

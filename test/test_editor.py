@@ -19,6 +19,8 @@ from ragdoll_ros.scene_file import load_doll, load_scene, save_doll, save_scene 
 from ragdoll_ros.simulation import Simulation  # noqa: E402
 from ragdoll_ros.viewer.editor import changes, folder  # noqa: E402
 from ragdoll_ros.viewer.editor.editor import Editor  # noqa: E402
+from ragdoll_ros.viewer.playback import Playback  # noqa: E402
+from ragdoll_ros.viewer.recording import Recording  # noqa: E402
 from ragdoll_ros.viewer.simulated import Simulated  # noqa: E402
 from ragdoll_ros.viewer.source import Wanted  # noqa: E402
 
@@ -197,6 +199,44 @@ def test_editing_holds_the_bind_pose_and_dropping_lets_go(desk):
     assert desk.editor.handles.body is None
 
 
+@pytest.mark.parametrize('stood', [True, False])
+def test_what_refuses_to_be_edited_is_as_it_was(desk, stood):
+    """A recording, say: one that stood stands on, one that went goes on."""
+    desk.editor.take_note(paused=stood)
+    desk.reason = 'a recording has one scene'
+    desk.editor.toggle()
+    assert desk.asked == ([True] if stood else [True, False])
+    assert not desk.editor.editing and 'one scene' in desk.panel.said.content
+
+
+def test_a_recording_at_its_end_is_not_started(server, tmp_path):
+    """Nor held: started anew, it goes."""
+    turns = np.tile((0, 0, 0, 1.0), (2, len(DROP.bones), 1))
+    source = Playback(Recording(DROP, np.arange(2.0), np.zeros((2, len(DROP.bones), 3)), turns))
+    source.set_pace(100)
+    source.want(Wanted(frames=True))
+    wait(lambda: source.report.paused)
+    # From here on it would take a quarter of an hour.
+    source.set_pace(0.001)
+    server.gui.reset()
+    editor = Editor(server, DROP, source.use, source.pause, tmp_path)
+    editor.take_note(source.report.paused)
+    editor.toggle()
+    assert 'a recording has one scene' in editor.panel.said.content
+    assert source.report.paused
+    source.reset()
+    assert not source.report.paused
+
+
+def test_leaving_takes_the_handles_and_lets_the_time_stand(desk):
+    desk.editor.select('left_forearm')
+    desk.editor.toggle()
+    asked = list(desk.asked)
+    desk.editor.leave()
+    assert not desk.editor.editing and desk.editor.handles.body is None and desk.asked == asked
+    assert desk.panel.edit.label == 'Edit'
+
+
 def test_handles_move_turn_and_resize(desk):
     desk.editor.select('left_forearm')
     desk.editor.toggle()
@@ -363,6 +403,14 @@ def test_a_shipped_scene_loads_by_its_name(desk):
     assert desk.editor.scene == load_scene('crowd')
 
 
+def test_what_is_saved_is_called_a_scene(desk):
+    """Not a doll, which ragdoll_fit and `doll:` would take."""
+    desk.files.save()
+    assert load_scene(str(desk.path / 'scene.yaml')) == DROP
+    with pytest.raises(faults.Faults):
+        load_doll(str(desk.path / 'scene.yaml'))
+
+
 def test_what_cannot_be_written_is_told(desk):
     (desk.path / 'taken.yaml').mkdir()
     desk.files.name.value = 'taken'
@@ -394,6 +442,28 @@ def test_an_uploaded_scene_reads_no_other_files(desk, tmp_path_factory):
         assert 'dolls[0].doll' in desk.said() and 'abc123' not in desk.said()
     desk.files.upload('x.yaml', b'dolls: [{doll: own.yaml}]')
     assert desk.editor.scene.bone_names == ('b',)
+
+
+@pytest.mark.parametrize('model', ['/etc/hostname', '../away/secret.glb', 'link.glb', 'a/../../x',
+                                   '/dev/zero'])
+@pytest.mark.parametrize('place', ['', 'dolls[0].doll.'])
+def test_an_uploaded_doll_opens_no_other_files(desk, tmp_path_factory, model, place):
+    """A character that lies here may be named, by the doll or by a doll within a scene."""
+    secret = tmp_path_factory.mktemp('away') / 'secret.glb'
+    secret.write_bytes(b'')
+    (desk.path / 'link.glb').symlink_to(secret)
+    made = yaml.safe_load(bone())
+
+    def upload(model):
+        doll = {**made, 'model': model}
+        scene = {'dolls': [{'doll': doll}]} if place else doll
+        desk.files.upload('x.yaml', yaml.safe_dump(scene).encode())
+
+    upload(model)
+    assert f'{place}model: Unreadable' in desk.said() and f'inside {desk.path}' in desk.said()
+    assert desk.editor.scene == DROP and desk.asked == []
+    upload('here.glb')
+    assert desk.editor.scene.dolls[0].doll.model == str(desk.path / 'here.glb')
 
 
 BOMB = b'a: &a [x, x]\n' + b''.join(

@@ -128,6 +128,17 @@ def test_editing_ends_where_the_page_goes_on(page, browser):
     assert not page.editor.editing
 
 
+def test_a_step_ends_editing(page, browser):
+    """The doll leaves its bind pose by one tick, without handles in the air; it stays paused."""
+    page.editor.select('head')
+    browser.press_button(page.editor.panel.edit)
+    wait(lambda: page.editor.handles.body is not None and page._frame.time == 0)
+    browser.press(command(page, 'Step'))
+    wait(lambda: page._frame.time > 0)
+    assert page.editor.handles.body is None and not page.editor.editing
+    assert page.source.report.paused and page._frame.time == pytest.approx(0.01)
+
+
 def test_a_scene_from_elsewhere_can_be_undone(page, browser):
     page.source.load('crowd')
     wait(lambda: page.editor.scene.name == 'crowd')

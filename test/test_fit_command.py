@@ -89,6 +89,17 @@ def test_wrong_options_end_with_2_and_a_sentence(glb, tmp_path, capsys, argument
     assert error.count('\n') == 1
 
 
+@pytest.mark.parametrize('option', [
+    ['--mass', '3'], ['--masses', 'proportions'], ['--scale', '2'], ['--shape', 'box'],
+    ['--orientation', 'bone'], ['--weight', '0.3'], ['--smallest', '0.1']])
+@pytest.mark.parametrize('name', ['article_doll.yaml', 'robot.urdf'])
+def test_options_of_a_fit_are_refused_where_nothing_is_fitted(capsys, name, option):
+    assert main([name, *option]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f'ragdoll_fit: {option[0]}: WrongForm: ') and option[1] in error
+    assert 'a .glb or .gltf to fit' in error
+
+
 def test_no_such_file(capsys):
     assert main(['no_such.glb']) == 2
     assert 'no_such.glb' in capsys.readouterr().err

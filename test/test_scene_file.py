@@ -155,6 +155,18 @@ def test_a_missing_file_names_the_ones_there_are():
         load_scene('no such scene')
 
 
+def test_a_misspelled_key_is_named(tmp_path):
+    """And nothing else of what stands beside it."""
+    path = tmp_path / 'ball.yaml'
+    path.write_text('bones: [{name: b, shape: {sphere: {radius: 1}}, mass: 1, position: [0, 0, 0], '
+                    'colour: [1, 0, 0, 1], masss: 2}]')
+    with pytest.raises(faults.Faults) as caught:
+        load_scene(str(path))
+    fault, = caught.value.faults
+    assert (fault.path, fault.value) == ('bones[0]', 'colour, masss')
+    assert 'only name, shape, mass' in fault.expected
+
+
 def test_numbers_may_be_written_as_1e3(tmp_path):
     data = {'dolls': [{'doll': 'doll.yaml'}]}
     path = tmp_path / 'scene.yaml'

@@ -230,3 +230,12 @@ def test_a_shipped_robot_falls_limp():
     assert np.isfinite(state.positions).all()
     assert state.positions[:, 2].max() < top - 0.4
     assert np.abs(state.linear).max() < 0.5
+
+
+@pytest.mark.parametrize('shape', ['<box size="1 0 1"/>', '<sphere radius="-1"/>',
+                                   '<cylinder radius="1" length="0"/>',
+                                   '<capsule radius="0" length="1"/>'])
+def test_a_size_that_cannot_be_is_told_with_its_link(shape):
+    with pytest.raises(faults.NotPositive) as caught:
+        doll_from_urdf(f'<robot name="r">{link("forearm", shape)}</robot>')
+    assert caught.value.path.startswith('link forearm.')

@@ -12,12 +12,14 @@ pytest.importorskip('viser')
 from page_client import PageClient, wait
 
 from ragdoll_ros import rotation
-from ragdoll_ros.ragdoll import Bone, Capsule, Joint, Ragdoll, Sphere
+from ragdoll_ros.ragdoll import Bone, Capsule, Joint, Ragdoll, Rider, Sphere
 from ragdoll_ros.scene import Placement, Scene
 from ragdoll_ros.scene_file import load_scene
 from ragdoll_ros.simulation import Simulation
 from ragdoll_ros.viewer.command import free_port, server_at
 from ragdoll_ros.viewer.page import Page
+from ragdoll_ros.viewer.playback import Playback
+from ragdoll_ros.viewer.recording import Recording
 from ragdoll_ros.viewer.simulated import Simulated
 
 DROP = load_scene('drop')
@@ -144,7 +146,7 @@ def test_arrow_keys_push(page, label, axis, sign):
     wait(lambda: page._frame.pushes)
     assert page._frame.pushes[0].force[axis] == 2000 * sign
     wait(lambda: page._frame.state.linear[0, axis] * sign > 1)
-    arrow = page.server.scene.get_handle_by_name('/scene/pushes')
+    arrow = wait_for(page, '/scene/pushes')
     assert arrow.visible and np.sign(np.diff(arrow.points[0], axis=0)[0, axis]) == sign
     wait(lambda: not page._frame.pushes and not arrow.visible)
 
@@ -186,6 +188,32 @@ def test_another_scene_by_the_dropdown(page):
     wait(lambda: page._stage.scene.name == 'ponytail')
     rods = wait_for(page, '/scene/rods').points
     assert rods.shape == (8, 2, 3) and np.allclose(rods[1:, 0], rods[:-1, 1])
+
+
+def test_a_scene_that_is_refused_is_not_chosen(page):
+    """The list goes on naming the scene that is shown, and the page that chose is told why."""
+    client = page.open()
+    wait(lambda: page.controls._scene.value == 'drop')
+    state, simulated = page.source.frame.state, page.source
+    page.play(Playback(Recording(DROP, np.zeros(1), state.positions[None],
+                                 state.orientations[None])))
+    simulated.close()
+    handle, seen = page.controls._scene, []
+    handle.on_update(lambda event: seen.append(handle.value))
+    client.update(handle, 'crowd')
+    wait(lambda: 'crowd' in seen and handle.value == 'drop')
+
+
+def test_what_was_sent_is_text_on_the_page(page):
+    """A doll's name, which anyone may send, is told with the skin that it has not: as no HTML."""
+    placement = DROP.dolls[0]
+    doll = dataclasses.replace(placement.doll, riders=(Rider('r', 'torso', (0, 0, 0)),),
+                               model='nothing.glb')
+    page.open()
+    page.source.use(dataclasses.replace(DROP, dolls=(
+        dataclasses.replace(placement, doll=doll, name='<iframe srcdoc=x>'),)))
+    wait(lambda: 'no skin for &lt;iframe srcdoc=x&gt;' in page._problem.content)
+    assert '<iframe' not in page._problem.content
 
 
 def wait_for(page, name):

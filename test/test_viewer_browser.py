@@ -283,6 +283,41 @@ def test_a_body_is_dragged_by_its_handle(view):
     view.wait(lambda: abs(view.bodies(SCENE) - START).max() < 1e-6)
 
 
+CUT_OFF = """() => [...document.querySelectorAll('.mantine-NumberInput-input')]
+    .filter(field => field.scrollWidth > field.clientWidth).map(field => field.value)"""
+
+
+def test_numbers_are_seen_whole(view):
+    """Three beside each other, as a fitted doll has them: to the micrometre."""
+    view.hold_at(SCENE, START)
+    view.tab('Edit')
+    choose(view, 'right_shin')
+    fields = view.row('place, m').locator('input')
+    for number, text in enumerate(('-0.123457', '-1.123456', '-0.888888')):
+        fields.nth(number).fill(text)
+    assert fields.count() == 3 and view.page.evaluate(CUT_OFF) == []
+
+
+PLOTTED = """async () => {
+  const charts = Object.values(window.__viserTestpoints?.uplots ?? {}).map(point => point.chart);
+  const chart = charts.find(chart => chart.series.length === 3 && chart.ctx.canvas.width > 0);
+  if (!chart) return null;
+  chart.setData([[0, 1], [0, 888888], [0, 888888]]);
+  await new Promise(requestAnimationFrame);
+  const {width, height} = chart.ctx.canvas;
+  const ink = chart.ctx.getImageData(0, 0, width, height).data.filter((_, k) => k % 4 === 3);
+  return Array.from({length: width}, (_, x) => ink.some((a, k) => a && k % width === x));
+}"""
+
+
+def test_numbers_beside_a_plot_are_seen_whole(view):
+    """Hundreds of thousands: what is drawn begins within the plot, not at its very edge."""
+    view.hold_at(SCENE, START)
+    view.tab('Plots')
+    inked = view.wait(lambda: view.page.evaluate(PLOTTED))
+    assert any(inked[:40]) and not any(inked[:2])
+
+
 def upload(view, button, name, content):
     with view.page.expect_file_chooser() as chooser:
         view.press(button)

@@ -15,7 +15,7 @@ from ragdoll_ros import faults, rotation
 from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.pipeline import fit_character
 from ragdoll_ros.push import Push
-from ragdoll_ros.ragdoll import Bone, Box, Joint, Ragdoll, Sphere
+from ragdoll_ros.ragdoll import Bone, Box, Joint, Ragdoll, Rider, Sphere
 from ragdoll_ros.riders import Riders
 from ragdoll_ros.scene import Placement, Scene, above_ground
 from ragdoll_ros.scene_file import load_scene
@@ -25,7 +25,7 @@ from ragdoll_ros.viewer.marks import arrow_before
 from ragdoll_ros.viewer.meshes import MESHES, ROUND
 from ragdoll_ros.viewer.pointer import kept_distance, nearest, on_bone
 from ragdoll_ros.viewer.rods import Rods
-from ragdoll_ros.viewer.skin import skin_of
+from ragdoll_ros.viewer.skin import Skins, skin_of
 
 CORNERS = ROUND / 2 * np.sin(2 * np.pi / ROUND)
 """Area of the polygon of ROUND corners in a circle of radius 1, which stands for pi."""
@@ -225,3 +225,18 @@ def test_the_arrow_of_a_push_ends_before_the_body(push, tip):
     arrow = arrow_before(box, push, place, turn)
     assert arrow[1] == pytest.approx(tip)
     assert np.diff(arrow, axis=0) == pytest.approx(np.diff(push.arrow(place, turn), axis=0))
+
+
+def test_a_character_that_cannot_be_opened_is_told_and_the_doll_shown_without():
+    """A path that is too long for the system, or through what is no folder: no error of Python."""
+    import viser
+    ball = Ragdoll('d', (Bone('b', Sphere(0.1), 1, (0, 0, 0)),),
+                   riders=(Rider('r', 'b', (0, 0, 0)),))
+    dolls = tuple(Placement(dataclasses.replace(ball, model=model), name=name)
+                  for name, model in (('long', 'm' * 300), ('through', f'{__file__}/x.glb')))
+    server = viser.ViserServer('127.0.0.1', 0, verbose=False)
+    skins = Skins(server, Scene('s', dolls))
+    server.stop()
+    assert [note.split(':')[0] for note in skins.notes] == ['no skin for long',
+                                                            'no skin for through']
+    assert all('expected a' in note for note in skins.notes) and not skins.handles

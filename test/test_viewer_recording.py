@@ -9,6 +9,7 @@ from ragdoll_ros import faults, rotation
 from ragdoll_ros.scene import SECOND
 from ragdoll_ros.scene_file import load_scene
 from ragdoll_ros.simulation import Simulation
+from ragdoll_ros.state import State
 from ragdoll_ros.viewer.recording import Pose, Recorder, Recording
 from ragdoll_ros.viewer.recording_file import load_recording, recording_text, save_recording
 
@@ -181,3 +182,51 @@ def test_a_missing_file_is_refused(tmp_path):
 
 def test_text_is_what_is_saved(run, written):
     assert written.read_text() == recording_text(run[0])
+
+
+@pytest.fixture
+def panel():
+    """A recording's panel on a server, its button, and a click on that."""
+    viser = pytest.importorskip('viser')
+    from ragdoll_ros.viewer.recording_panel import RecordingPanel
+    server = viser.ViserServer('127.0.0.1', 0, verbose=False)
+    panel = RecordingPanel(server)
+    yield panel, panel._button, lambda: panel._clicked(viser.GuiEvent(None, None, panel._button))
+    server.stop()
+
+
+def frame(scene, time):
+    from ragdoll_ros.viewer.source import Frame
+    still = np.zeros((len(scene.bones), 3))
+    return Frame(scene, time, State(still, np.tile((0, 0, 0, 1.0), (len(still), 1)), still, still))
+
+
+def test_the_button_tells_that_another_scene_has_ended_a_recording(panel):
+    panel, button, click = panel
+    scenes = load_scene('drop'), load_scene('drop')
+    panel.take(frame(scenes[0], 0.0))
+    click()
+    panel.take(frame(scenes[0], 0.1))
+    assert panel.recording and button.label == 'Stop and download'
+    panel.take(frame(scenes[1], 0.0))
+    assert not panel.recording and button.label == 'Download (scene has changed)'
+    # Ended is ended, even where the first scene comes back.
+    panel.take(frame(scenes[0], 0.2))
+    assert len(panel._recorder) == 2
+    click()
+    assert button.label == 'Record'
+    click()
+    assert panel.recording and button.label == 'Stop and download'
+
+
+def test_the_button_tells_that_a_recording_is_full(panel, monkeypatch):
+    """Ten bones are 70 numbers an instant: three of them are within 279, a fourth is not."""
+    from ragdoll_ros.viewer import recording_panel
+    monkeypatch.setattr(recording_panel, 'MOST_NUMBERS', 279)
+    panel, button, click = panel
+    panel.take(frame(load_scene('drop'), 0.0))
+    scene = panel._frame.scene
+    click()
+    for tick in range(1, 5):
+        panel.take(frame(scene, tick / 100))
+    assert len(panel._recorder) == 3 and button.label == 'Download (recording is full)'

@@ -94,6 +94,9 @@ def read_character(path: str | Path, scale: float | None = None) -> Character:
         return _character(file, nodes, skins, scale)
     except faults.Fault as fault:
         raise faults.Faults(str(path), [fault]) from None
+    except OSError as error:
+        fault = faults.Unreadable('', error.strerror or str(error), 'a file that can be read')
+        raise faults.Faults(str(path), [fault]) from None
 
 
 def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) -> Character:

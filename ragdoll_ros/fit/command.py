@@ -24,11 +24,19 @@ Exit code 0: done; 2: a file or an option is wrong."""
 
 PICTURES = ('.png', '.jpg', '.svg', '.pdf')
 
+DOLLS, ROBOTS = ('.yaml', '.yml'), ('.urdf', '.xml')
+"""Files that hold bodies already; every other one is a character, for which they are made."""
+
+FITTING = ('mass', 'masses', 'scale', 'shape', 'orientation', 'weight', 'smallest')
+"""Options that say how bodies are made."""
+
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; gives the exit code."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
     try:
+        _check(options, parser)
         _run(options)
     except faults.RagdollError as error:
         print(f'ragdoll_fit: {_one_line(error)}', file=sys.stderr)
@@ -71,13 +79,12 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _run(options: argparse.Namespace) -> None:
-    _check(options)
     path = Path(options.input)
     fit = None
-    if path.suffix.lower() in ('.yaml', '.yml'):
+    if path.suffix.lower() in DOLLS:
         doll = load_doll(options.input)
         report = doll_report(doll)
-    elif path.suffix.lower() in ('.urdf', '.xml'):
+    elif path.suffix.lower() in ROBOTS:
         doll, report = _read_robot(path)
     else:
         fit = _fit(path, options)
@@ -106,7 +113,12 @@ def _read_robot(path: Path) -> tuple[Ragdoll, str]:
     return doll, doll_report(doll, notes)
 
 
-def _check(options: argparse.Namespace) -> None:
+def _check(options: argparse.Namespace, parser: argparse.ArgumentParser) -> None:
+    suffix = Path(options.input).suffix.lower()
+    for key in FITTING if suffix in (*DOLLS, *ROBOTS) else ():
+        if getattr(options, key) != parser.get_default(key):
+            raise faults.WrongForm(f'--{key}', getattr(options, key),
+                                   f'a .glb or .gltf to fit: what a {suffix} says of bodies stays')
     for key in ('mass', 'scale', 'smallest'):
         if getattr(options, key) is not None:
             faults.check_positive(f'--{key}', getattr(options, key))

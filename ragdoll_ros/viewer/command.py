@@ -83,7 +83,7 @@ def parser() -> argparse.ArgumentParser:
                         'machine alone; 0.0.0.0: whoever reaches this machine may steer)')
     parser.add_argument('--port', type=port, help=f'port to serve at; it must be free ({PORT}, or '
                         'the next free one)')
-    parser.add_argument('--folder', default='.', help='where the page saves and loads dolls, and '
+    parser.add_argument('--folder', default='.', help='where the page saves and loads scenes, and '
                         'keeps the characters it is sent (default: the current one); pages '
                         'can write nowhere else')
     return parser

@@ -3,8 +3,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
 import viser
 
@@ -45,8 +44,11 @@ class Controls:
 
     def __init__(self, server: viser.ViserServer, source: Source) -> None:
         self.source = source
+        self.before_step: Callable[[], None] = lambda: None
+        """Called before a single tick is asked for."""
         self._held = Held()
         self._shown = Report()
+        self._scene_shown = OTHER
         self._loop = server.get_event_loop()
         gui = server.gui
         gui.add_html(KEEP_KEYS)
@@ -54,8 +56,8 @@ class Controls:
             'Push', tuple(ARROWS), hint='2000 N, as seen from in front of the doll: left, away, '
             'toward you, right; arrow keys do the same')
         self._pause = gui.add_button('Pause', icon='player-pause', hint='Space')
-        self._step = gui.add_button('Step', icon='player-track-next', hint='N; while paused',
-                                    disabled=True)
+        self._step = gui.add_button('Step', icon='player-track-next', disabled=True,
+                                    hint='N; while paused; ends editing')
         reset = gui.add_button('Reset', icon='player-skip-back', hint='R')
         self._pace = gui.add_slider('Pace', *PACES, step=0.05, initial_value=1.0,
                                     hint='simulated seconds for each second on the wall')
@@ -63,7 +65,7 @@ class Controls:
                                         initial_value=OTHER)
         pushes.on_click(lambda event: self.push(ARROWS[event.target.value]))
         self._pause.on_click(lambda _: self.toggle_pause())
-        self._step.on_click(lambda _: self.source.step())
+        self._step.on_click(lambda _: self.step())
         reset.on_click(lambda _: self.source.reset())
         self._pace.on_update(lambda event: event.client and self._set_pace())
         self._scene.on_update(self._choose)
@@ -78,6 +80,11 @@ class Controls:
     def toggle_pause(self) -> None:
         """Hold the time, or let it go on."""
         self.source.pause(not self.source.report.paused)
+
+    def step(self) -> None:
+        """Make one tick while the time stands."""
+        self.before_step()
+        self.source.step()
 
     def show(self, report: Report) -> None:
         """Let the panel tell how the source is."""
@@ -95,7 +102,7 @@ class Controls:
         It is written where `_choose` reads it, in viser's thread: written from another one, it
         could come between a choice that arrives at this moment and its reading, and win.
         """
-        shown = name if name in self._scene.options else OTHER
+        self._scene_shown = shown = name if name in self._scene.options else OTHER
         self._loop.call_soon_threadsafe(setattr, self._scene, 'value', shown)
 
     def _set_pace(self) -> None:
@@ -108,24 +115,18 @@ class Controls:
             asyncio.get_running_loop().run_in_executor(None, self._load, name, event.client)
 
     def _load(self, name: str, client: viser.ClientHandle) -> None:
-        with told(client):
+        try:
             self.source.load(name)
+        except RagdollError as error:
+            self.show_scene(self._scene_shown)
+            client.add_notification('Refused', str(error), color='red')
 
     def _add_keys(self, gui: viser.GuiApi) -> None:
         for arrow in ARROWS.values():
             command = gui.add_command(f'Push {arrow}', hotkey=f'arrow{arrow}')
             command.on_trigger(lambda _, arrow=arrow: self.push(arrow))
         for label, key, action in (('Pause, or go on', 'space', self.toggle_pause),
-                                   ('Step', 'N', lambda: self.source.step()),
+                                   ('Step', 'N', self.step),
                                    ('Reset', 'R', lambda: self.source.reset())):
             command = gui.add_command(label, hotkey=key)
             command.on_trigger(lambda _, action=action: action())
-
-
-@contextmanager
-def told(client: viser.ClientHandle) -> Iterator[None]:
-    """Tell a page why what it asked for can not be."""
-    try:
-        yield
-    except RagdollError as error:
-        client.add_notification('Refused', str(error), color='red')

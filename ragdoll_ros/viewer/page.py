@@ -12,6 +12,7 @@ from ..scene import Scene
 from .camera import Follower
 from .controls import Controls
 from .editor.editor import Editor
+from .editor.form import RED, colored
 from .ground import light
 from .plots import Plots
 from .pointer import Pointer
@@ -23,6 +24,8 @@ from .view import View
 
 PERIOD = 1 / 60
 """s between two drawings at the least."""
+
+GREY = '#495057'
 
 IDLE = 0.1
 """s between two looks for a page that is open."""
@@ -49,7 +52,7 @@ class Page:
         light(server)
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         server.gui.add_html(KEEP_PAGE)
-        self._problem = server.gui.add_markdown('')
+        self._problem = server.gui.add_html('')
         self.tabs = server.gui.add_tab_group()
         with self.tabs.add_tab('Play'):
             self.controls = Controls(server, source)
@@ -120,6 +123,7 @@ class Page:
             self.editor = Editor(self.server, scene, lambda scene: self.source.use(scene),
                                  lambda wanted: self.source.pause(wanted), self._folder)
         self.selectors.append(self.editor.select)
+        self.controls.before_step = self.editor.leave
 
     def _select(self, bone: str) -> None:
         for selector in self.selectors:
@@ -127,5 +131,5 @@ class Page:
 
     def _tell(self, problem: str, note: str) -> None:
         notes = [note, *(self._stage.skins.notes if self._stage is not None else ())]
-        self._problem.content = '\n\n'.join(
-            filter(None, [problem and f'**{problem}**', *notes]))
+        self._problem.content = colored(problem, RED) + ''.join(colored(each, GREY)
+                                                                for each in notes)

@@ -58,10 +58,10 @@ class Playback:
             self._wanted = wanted.frames
 
     def pause(self, wanted: bool) -> None:
-        """Hold the time, or let it go on; at the end, go on from the start."""
+        """Hold the time, or let it go on; at the end it stands, and goes on from the start."""
         with self._lock:
             instant = self._now()
-            self._paused = wanted
+            self._paused = wanted and instant < self._recording.duration
             self._go_on_from(0.0 if instant >= self._recording.duration and not wanted else instant)
 
     def step(self) -> None:

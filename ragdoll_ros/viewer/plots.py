@@ -18,8 +18,9 @@ SPAN = 20.0
 
 HEIGHT = 170
 
-PADDING = (10, 16, 0, 0)
-"""Pixels above, right, below, left: room for the halves of the outermost numbers."""
+PADDING = (10, 16, 0, 26)
+"""Pixels above, right, below, left: room for the halves of the outermost numbers, and for up to
+1,000,000 on the left, where four digits have room without."""
 
 
 class Plots:

@@ -18,6 +18,8 @@ RENDER_TIMEOUT = 20.0
 """s that a page may take for its picture."""
 
 RECORD, STOP = 'Record', 'Stop and download'
+ELSEWHERE, FULL = 'Download (scene has changed)', 'Download (recording is full)'
+"""Labels of the button; the last two once a recording has ended by itself."""
 
 
 class RecordingPanel:
@@ -28,6 +30,7 @@ class RecordingPanel:
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._recorder: Recorder | None = None
+        self._ended = False
         self._lock = threading.Lock()
         with server.gui.add_folder('Recording', expand_by_default=False):
             self._button = server.gui.add_button(
@@ -42,7 +45,7 @@ class RecordingPanel:
     @property
     def recording(self) -> bool:
         """Whether poses are being taken."""
-        return self._recorder is not None
+        return self._recorder is not None and not self._ended
 
     def take(self, frame: Frame) -> None:
         """Tell what is shown.
@@ -56,20 +59,32 @@ class RecordingPanel:
 
     def _record(self, frame: Frame) -> None:
         recorder = self._recorder
-        if recorder is None or recorder.scene is not frame.scene:
+        if recorder is None or self._ended:
+            return
+        if recorder.scene is not frame.scene:
+            self._end(ELSEWHERE)
             return
         pose = Pose(frame.state.positions, frame.state.orientations, frame.rods)
         numbers = pose.positions.size + pose.orientations.size + np.size(pose.rods)
-        if len(recorder) * numbers < MOST_NUMBERS:
-            recorder.add(frame.time, pose)
+        recorder.add(frame.time, pose)
+        if (len(recorder) + 1) * numbers > MOST_NUMBERS:
+            self._end(FULL)
+
+    def _end(self, label: str) -> None:
+        """Take no more, and let the button tell why."""
+        self._ended = True
+        self._button.label = label
 
     def _clicked(self, event: viser.GuiEvent) -> None:
         with self._lock:
             recorder, self._recorder = self._recorder, None
+            self._ended = False
             if recorder is None and self._frame is not None:
                 self._recorder = Recorder(self._frame.scene)
+                self._button.label = STOP
                 self._record(self._frame)
-            self._button.label = RECORD if self._recorder is None else STOP
+            else:
+                self._button.label = RECORD
         if recorder is not None and event.client is not None:
             _send_run(recorder, event.client)
 

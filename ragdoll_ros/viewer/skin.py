@@ -80,12 +80,16 @@ def skin_of(doll: Ragdoll) -> Skin | None:
 
 def _read(path: str, scale: float | None = None) -> Character:
     """Read a character once: an edited doll comes again and again with the same."""
-    stat = os.stat(path) if os.path.isfile(path) else None
-    return _read_once(path, scale, stat and (stat.st_mtime_ns, stat.st_size))
+    try:
+        stat = os.stat(path)
+    except (OSError, ValueError):
+        # Reading it says what is wrong.
+        return read_character(path, scale)
+    return _read_once(path, scale, (stat.st_mtime_ns, stat.st_size))
 
 
 @functools.lru_cache(maxsize=4)
-def _read_once(path: str, scale: float | None, _: tuple[int, int] | None) -> Character:
+def _read_once(path: str, scale: float | None, _: tuple[int, int]) -> Character:
     return read_character(path, scale)
 
 

@@ -93,6 +93,12 @@ class Editor:
             self._set_editing(False)
         self._stood = paused
 
+    def leave(self) -> None:
+        """End editing where the doll is about to leave its bind pose; time stays as it is."""
+        with self._acting:
+            if self.editing:
+                self._set_editing(False)
+
     def update(self) -> None:
         """Apply what stands in the fields; where that is wrong, say so there and change nothing."""
         with self._telling():
@@ -193,6 +199,7 @@ class Editor:
         """Let the page start anew with a scene; one that it refuses was never shown."""
         with self._showing:
             self._given.append(scene)
+        stood = self._stood
         if hold:
             # First, so that not one tick is made before it stands.
             self._pause(True)
@@ -201,7 +208,7 @@ class Editor:
         except faults.RagdollError:
             with self._showing, suppress(ValueError):
                 self._given.remove(scene)
-            if hold and not self.editing:
+            if hold and not (stood or self.editing):
                 self._pause(False)
             raise
 

@@ -32,8 +32,9 @@ class Files:
         self._server, self._host, self._folder = server, host, folder
         self._fitting = threading.Lock()
         gui = server.gui
-        self.name = gui.add_text('file', 'doll.yaml', hint=f'in {folder.path}')
-        self.save_button = gui.add_button('Save', icon='device-floppy')
+        self.name = gui.add_text('file', 'scene.yaml', hint=f'in {folder.path}')
+        self.save_button = gui.add_button('Save', icon='device-floppy',
+                                          hint='the whole scene, its dolls in it')
         self.load_button = gui.add_button('Load', icon='folder-open',
                                           hint='from that folder, or one of the shipped scenes')
         self.download_button = gui.add_button('Download', icon='download')
@@ -61,7 +62,7 @@ class Files:
 
     def download(self, client: viser.ClientHandle | None) -> None:
         """Send the scene's file to the page that asked for it, or to all."""
-        name = Path(self.name.value.strip() or 'doll').stem + '.yaml'
+        name = Path(self.name.value.strip() or 'scene').stem + '.yaml'
         to = client or self._server
         to.send_file_download(name, self._folder.text(self._host.scene), save_immediately=True)
 

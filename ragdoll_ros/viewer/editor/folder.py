@@ -1,4 +1,4 @@
-"""Where the page's files live: dolls are saved into one folder, and nothing leaves or leads out.
+"""Where the page's files live: scenes are saved into one folder, and nothing leaves or leads out.
 
 Whoever reaches the page may send anything: all is refused with a Fault or Faults in words.
 """
@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import dataclasses
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from ... import faults, scene_file
@@ -66,7 +66,8 @@ class Folder:
         try:
             _check_size(content)
             data = scene_file.parse(content)
-            self._check_references(data)
+            self._check_dolls(data)
+            self._check_models(data)
         except faults.Fault as fault:
             raise faults.Faults(name, [fault]) from None
         try:
@@ -98,11 +99,9 @@ class Folder:
             doll = dataclasses.replace(doll, model=str(self._keep(name, content)))
         return above_ground(doll)
 
-    def _check_references(self, data: object) -> None:
+    def _check_dolls(self, data: object) -> None:
         """Let what was sent name only dolls that lie here or in config/: no other file is read."""
-        dolls = data.get('dolls') if isinstance(data, dict) else None
-        for index, entry in enumerate(dolls if isinstance(dolls, list) else ()):
-            source = entry.get('doll') if isinstance(entry, dict) else None
+        for place, source in _dolls_of(data):
             if not isinstance(source, str) or source in scene_file.scene_names():
                 continue
             try:
@@ -110,8 +109,21 @@ class Folder:
             except faults.Fault:
                 found = ''
             if found not in (source, f'{source}.yaml'):
-                raise faults.Unreadable(f'dolls[{index}].doll', source,
+                raise faults.Unreadable(place, source,
                                         f'a file of {self.path}, or the doll itself')
+
+    def _check_models(self, data: object) -> None:
+        """Let the dolls that were sent name only characters that lie here."""
+        for place, doll in [('', data), *_dolls_of(data)]:
+            model = doll.get('model') if isinstance(doll, dict) else None
+            if not isinstance(model, str):
+                continue
+            try:
+                inside = (self.path / model).resolve().is_relative_to(self.path)
+            except (ValueError, OSError, RuntimeError):
+                inside = False
+            if not inside:
+                raise faults.Unreadable('model', model, f'a file inside {self.path}').at(place)
 
     def _keep(self, name: str, content: bytes) -> Path:
         """Write a character, under another name where one stands that is another's."""
@@ -126,6 +138,14 @@ class Folder:
                     return path
             path = Path(self.path, f'{Path(name).stem}_{number}{Path(name).suffix}')
         raise faults.Unreadable('', name, f'a name that is free in {self.path}')
+
+
+def _dolls_of(data: object) -> Iterator[tuple[str, object]]:
+    """Give the place and the value of each ``doll`` in what may be a scene."""
+    dolls = data.get('dolls') if isinstance(data, dict) else None
+    for index, entry in enumerate(dolls if isinstance(dolls, list) else ()):
+        if isinstance(entry, dict):
+            yield f'dolls[{index}].doll', entry.get('doll')
 
 
 def plain(name: str) -> str:

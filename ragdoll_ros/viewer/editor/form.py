@@ -15,7 +15,17 @@ from .sheet import Field, Sheet, Value
 RED, GREEN = '#c92a2a', '#2b8a3e'
 
 STEPS = {'turn': 1.0, 'axis_1': 0.1, 'axis_2': 0.1, 'mass': 0.1}
-"""What a click on a number's arrow adds, 0.01 where nothing is said."""
+"""What an arrow key adds to a number, 0.01 where nothing is said."""
+
+ROOMY = """<style>
+  .mantine-Flex-root:has(> .mantine-NumberInput-root) {column-gap: 0.25em !important}
+  .mantine-Flex-root > .mantine-NumberInput-root .mantine-NumberInput-section {display: none}
+  .mantine-Flex-root > .mantine-NumberInput-root input {padding: 0 0.3em !important}
+  .mantine-Flex-root:has(> div > div > .mantine-Flex-root > .mantine-NumberInput-root)
+    > :first-child {width: 4.7em !important}
+</style>"""
+"""Makes room for all digits in fields of three numbers, which viser cuts after four: without arrows
+to click on (the arrow keys still count up and down), and with room for a short label only."""
 
 
 class Quiet(threading.local):

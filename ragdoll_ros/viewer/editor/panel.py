@@ -7,7 +7,7 @@ from typing import Protocol
 import viser
 
 from ... import faults
-from .form import RED, Form, Quiet, colored
+from .form import RED, ROOMY, Form, Quiet, colored
 from .history import History
 from .sheet import BODY, JOINT, Sheet
 
@@ -59,6 +59,7 @@ class Panel:
                                      'and turns with it; else the body alone, and pivots stay')
         self.both = gui.add_checkbox('both sides', False,
                                      hint='the bone on the other side becomes its mirror image')
+        gui.add_html(ROOMY)
         self.body_folder = gui.add_folder('Body')
         with self.body_folder:
             self.body = Form(gui, BODY, host.suggest)
