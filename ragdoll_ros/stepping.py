@@ -379,25 +379,41 @@ class Stepper:
                    STIFFEST / max(self._fading, 1e-9))
 
     def _step(self, duration: float, loads: Sequence[Load]) -> Piece:
-        """Take the engine's own step, finer where that overshoots less."""
+        """Take the engine's own step, finer where that overshoots less.
+
+        What is too far already at its start is jammed: that takes a solver more turns. Where a
+        bone sinks however fine the step is, friction pushes it in faster than the ground bears
+        it up (Painleve's paradox, at which an engine's solver never ends): then the ground has no
+        friction for this step.
+        """
         self.settle()
         near = self._near(duration, loads)
         start, state, touching = self.coordinates, self.state, self.touching
-        bounds = [max(1.0, self.accuracy.creep * far) for far in self._too_far()]
+        far = self._too_far()
+        bounds = [max(1.0, self.accuracy.creep * part) for part in far]
+        self.engine.be_thorough(max(far) > 1)
         substeps = self._substeps(duration, bool(loads))
         self._blocked = False
         most = max(1, math.ceil(self.accuracy.most * duration / self._span))
-        last = math.inf
+        coarsest, last, slips = substeps, math.inf, False
         watch = bool(near) and not any(a != b for a, b in touching)
         while True:
             touched = self._run(duration, substeps, loads, watch)
-            over = max(far / bound for far, bound in zip(self._too_far(), bounds, strict=True))
-            if substeps >= most or over <= 1 or over > HELPED * last:
-                return Piece(duration, duration / substeps, touched if watch else near)
-            last = over
+            past, sunk = np.divide(self._too_far(), bounds)
+            over = max(past, sunk)
+            finest = substeps >= most or over > HELPED * last
+            if over <= 1 or (finest and (slips or sunk <= max(1.0, past))):
+                break
             self._back_to(start, state, touching)
-            substeps = min(most, 4 * substeps)
             self.effort.redone += 1
+            if finest:
+                self.engine.be_slippery(True)
+                substeps, last, slips = coarsest, math.inf, True
+            else:
+                substeps, last = min(most, 4 * substeps), over
+        if slips:
+            self.engine.be_slippery(False)
+        return Piece(duration, duration / substeps, touched if watch else near)
 
     def _near(self, duration: float, loads: Sequence[Load]) -> set[tuple[int, int]]:
         """Pairs of dolls, or of a doll and GROUND, that may touch within ``duration`` s."""

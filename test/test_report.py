@@ -263,6 +263,15 @@ def test_a_hard_case_is_held_against_its_rule():
     assert 'energy from nothing' in hard.faults(case, {**good, 'excess': math.nan})
 
 
+@pytest.mark.parametrize(('name', 'number'), [
+    ('push .1 to 3 s', 62), ('start outside', 84), ('start outside', 34)])
+def test_starts_that_once_sank_do_not(name, number):
+    """A shin dragged at 38 m/s that friction drove 36 mm into the ground, and jammed legs."""
+    trial = starts.trial(name, number)
+    moved = run(ours('normal'), trial).moved
+    assert Measure(trial.scene).sinking(moved) < 0.005
+
+
 @pytest.mark.slow
 def test_the_quick_report_runs(tmp_path):
     """Nothing in it fails; figures for every part are there."""

@@ -127,6 +127,12 @@ class MujocoEngine:
             return set()
         return {tuple(pair) for pair in self._doll_of[self._data.contact.geom].tolist()}
 
+    def be_thorough(self, wanted: bool) -> None:
+        """Nothing to do: this solver goes on until it has an answer."""
+
+    def be_slippery(self, wanted: bool) -> None:
+        """Nothing to do: this solver finds an answer with any friction."""
+
     def let_overlaps_be(self) -> None:
         """Let bones of one doll that overlap by more than pressed() now collide no more."""
         self._refresh()

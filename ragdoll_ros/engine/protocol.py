@@ -85,6 +85,12 @@ class Engine(Protocol):
     def touched(self) -> set[tuple[int, int]]:
         """Pairs of dolls that touched in the last substep, as it saw them."""
 
+    def be_thorough(self, wanted: bool) -> None:
+        """Solve contacts that bear on each other, or as fast as is enough for others."""
+
+    def be_slippery(self, wanted: bool) -> None:
+        """Take the ground's friction away, or give it back."""
+
     def let_overlaps_be(self) -> None:
         """Let bones of one doll that overlap by more than pressed() now collide no more."""
 
