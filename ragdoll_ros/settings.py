@@ -53,7 +53,7 @@ class Accuracy:
     """Stop the engine when all is at rest."""
 
 
-DRAFT = Accuracy(turn=0.3, limit=0.15, contact=3, settled=2, sink=0.009, most=32, order=3,
+DRAFT = Accuracy(turn=0.3, limit=0.15, contact=3, settled=2, sink=0.009, most=46, order=3,
                  flight_turn=0.4, land=False, redo=math.radians(6))
 NORMAL = Accuracy(turn=0.1, limit=0.06, contact=4, settled=3, sink=0.004, most=128, order=4,
                   flight_turn=0.2, redo=math.radians(2.5))

@@ -118,7 +118,8 @@ def test_a_plate_tumbles_as_euler_says(accuracy, bound):
         truth = motion.truth(moved.times)
         turned = rotation.angle_between(moved.orientations[:, 0], truth.orientations[:, 0])
         assert turned.max() < bound
-        spins = [Mechanics(trial.scene).motion(State(*(
+        mechanics = Mechanics(trial.scene)
+        spins = [mechanics.motion(State(*(
             part[i, :1] for part in (moved.positions, moved.orientations, moved.linear,
                                      moved.angular)))).spin[0] for i in range(len(moved.times))]
         assert np.abs(np.array(spins) - spins[0]).max() < 1e-9 * np.linalg.norm(spins[0])

@@ -79,29 +79,29 @@ def new_report(heard, peer):
     return last_report(heard)
 
 
-def hear_1001(heard, peer):
-    """The next 1001 poses, some left out first: discovery bunches them."""
+def next_poses(heard, peer, count):
+    """The next poses, so many, some left out first: discovery bunches them."""
     begin = len(heard['poses']) + 50
-    peer.wait(lambda: len(heard['poses']) > begin + 1000)
-    return heard['poses'][begin:begin + 1001]
+    peer.wait(lambda: len(heard['poses']) >= begin + count)
+    return heard['poses'][begin:begin + count]
 
 
 @pytest.mark.slow
 def test_poses_come_at_100_hz(heard, peer):
     """Within 1 % over 10 s, in one of three tries: others may take the machine's time away."""
     for _ in range(3):
-        got = hear_1001(heard, peer)
+        got = next_poses(heard, peer, 1001)
         rate = 1000 / (got[-1][0] - got[0][0])
         if rate == pytest.approx(100, rel=0.01):
             break
     assert rate == pytest.approx(100, rel=0.01)
 
 
-def test_poses_have_exact_stamps_for_10_s(heard, peer):
-    got = hear_1001(heard, peer)
+def test_poses_come_with_exact_stamps(heard, peer):
+    got = next_poses(heard, peer, 300)
     assert set(np.diff([stamp(message) for _, message in got])) == {10_000_000}
     poses = np.array([poses_array(message) for _, message in got])
-    assert poses.shape == (1001, 10, 7)
+    assert poses.shape == (300, 10, 7)
     np.testing.assert_allclose(np.linalg.norm(poses[:, :, 3:], axis=2), 1, atol=1e-12)
     assert {message.header.frame_id for _, message in got} == {'world'}
 
