@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,43 +14,25 @@ from .engine.protocol import GROUND, Contact, Engine, Load, pressed
 from .gap import JointGap
 from .grab import EVENLY, Grab, Hands, Pull
 from .guard import Guard
-from .mechanics import Mechanics, Motion, cross, point_motion
+from .mechanics import Mechanics, Motion
 from .push import Push
+from .rest import Rest
 from .scene import SECOND, STEP_RANGE, Scene
-from .settings import HUMAN, Accuracy, firm, resolve_accuracy
+from .settings import Accuracy, firm, resolve_accuracy
 from .state import State
 from .stepping import Effort, Piece, Stepper
 from .swing.pose import SwingState
 from .swing.riding import riding
+from .work import longest_stretch, mean_load, work
 
 MOST_PUSHES = 1000
 """Pushes that may wait at once; one more is refused."""
-
-REST_SPEED = 0.05
-"""m/s, and rad/s times the bone's size, below which a bone of the default doll counts as still:
-more than the flutter of a joint that leans on its limit, less than any fall gives within 10 ms.
-For other dolls it goes with the root of their size."""
-
-REST_WAY = 0.0012
-"""m that a still bone of the default doll may have moved in REST_TIME: limbs that sag against
-their joints' damping slower than 4 mm/s are stopped. For other dolls it goes with their size."""
-
-REST_TIME = 3 * SECOND // 10
-"""ns that all bones must be still before the scene sleeps; longer in weak gravity, under which all
-goes slower as its root. In 44 starts of the report bones that were not put to sleep then moved 2 mm
-more within 3 s in the median, as they do after 0.5 s, at the most 15 mm; 60 mm after 0.2 s."""
-
-EARTH = 9.8
-"""m/s^2: gravity for which the three above were measured."""
 
 THROWN = SECOND
 """ns for which a doll that was let go is stepped as finely as one that is held."""
 
 LONGEST_THROWN = 0.01
 """s that are gone through at once then: what fails is done again by itself."""
-
-STEADY = 0.2
-"""rad that a bone may turn while a torque, or a force along its axes, is entered as one."""
 
 LEAST_SHARE = 0.01
 """Of a tick: stretches under such loads are no shorter, however fast the bone spins."""
@@ -88,15 +69,7 @@ class Simulation:
         self._lift_out()
         self._start = (self._stepper.engine.save(), self._stepper.coordinates)
         self._gap = JointGap(scene)
-        self._sizes = np.array([max(bone.shape.half_extents) for bone in scene.bones])
-        # A bone that is still has at most m v^2 / 2 for its speed and less than 3 times that for
-        # its spin, as no radius of gyration is longer than its largest half extent.
-        size = min(placement.doll.extent for placement in scene.dolls) / HUMAN
-        self._gravity = math.hypot(*scene.gravity)
-        slower = max(1.0, math.sqrt(EARTH / self._gravity)) if self._gravity else math.inf
-        self._still_speed, self._still_way = math.sqrt(size) / slower * REST_SPEED, size * REST_WAY
-        self._still_time = slower * REST_TIME
-        self._most_at_rest = 2 * self.mechanics.doll_masses * (2 * self._still_speed) ** 2
+        self._rest = Rest(scene)
         self._riding = riding(scene)
         self._begin()
 
@@ -217,7 +190,7 @@ class Simulation:
             self._go(min(end, self._next_change()))
         self._redone += self.effort.redone
         self._queue = [active for active in self._queue if active.end > self.time]
-        self._rest()
+        self._fall_asleep()
         if self._riding:
             self._riding.follow(self.time, self._state)
         return self._state
@@ -297,7 +270,7 @@ class Simulation:
         self._state = self._stepper.state
         self._motion = self.mechanics.motion(self._state)
         self._guard.open(self._state)
-        self._still = 0
+        self._rest.disturb()
         self._redone = 0
         self.asleep = False
         """Whether all is at rest and the engine stands."""
@@ -316,7 +289,8 @@ class Simulation:
         loads = [self._load(active) for active in self._queue
                  if active.start <= self.time < active.end]
         if loads or self._hands:
-            self.asleep, self._still = False, 0
+            self.asleep = False
+            self._rest.disturb()
         if self._hands:
             self._thrown_until = end + THROWN
         thrown = self.time < self._thrown_until
@@ -327,25 +301,11 @@ class Simulation:
         while remaining > 1e-12 and not self.asleep:
             length = min(remaining, LONGEST_THROWN) if thrown else remaining
             if loads:
-                length = min(length, max(least, self._steady(loads)))
+                length = min(length, max(least, min(
+                    longest_stretch(load, self._state, self.mechanics.inertias[load.bone])
+                    for load in loads)))
             remaining -= go(length, loads)
         self.time = end
-
-    def _steady(self, loads: list[Load]) -> float:
-        """Longest stretch, s, in which no bone that a torque or a load along its own axes pushes
-        turns by more than STEADY: w t + a t^2 / 2, where a is at most what the bone alone had.
-        """
-        longest = math.inf
-        for load in loads:
-            if load.local or load.torque.any():
-                spin = math.hypot(*self._state.angular[load.bone])
-                force, arm, torque = (
-                    math.hypot(*vector) for vector in (load.force, load.point, load.torque))
-                gain = (torque + force * arm) / self.mechanics.inertias[load.bone].min()
-                root = math.sqrt(spin * spin + 2 * gain * STEADY)
-                if root > 0:
-                    longest = min(longest, 2 * STEADY / (spin + root))
-        return longest
 
     def _pulled(self, duration: float, loads: list[Load]) -> float:
         """Go through a stretch as short as hands need it; give its length, s."""
@@ -403,7 +363,7 @@ class Simulation:
         impulse, moment = np.zeros((2, len(self.scene.dolls), 3))
         for load in loads:
             doll = self.mechanics.doll_of[load.bone]
-            force, torque = self._mean_load(load, before)
+            force, torque = mean_load(load, before, self._state)
             impulse[doll] += force * duration
             moment[doll] += torque * duration
         return impulse, None if any(load.force.any() for load in loads) else moment
@@ -431,47 +391,13 @@ class Simulation:
         guard.settle(self._motion.energy, groups)
 
     def _enter_work(self, loads: list[Load], before: State, piece: Piece) -> None:
-        """Work of forces along their points' ways, and of torques through their bones' turns.
-
-        A step that takes the velocity first (semi-implicit Euler, a substep h long) moves a point
-        by h v' where its energy grows by F (v + v') h / 2: the difference adds up to
-        F (v_end - v_start) h / 2 and is left out of the account. Where the load turns with its
-        bone, what it does beyond mean times way is that of two even changes, t dF dv / 12. Turns
-        are no vectors: the integral of w is the turn's plus t^2 / 12 w_start x w_end (Magnus).
-        """
-        work = np.zeros(len(self.scene.dolls))
-        after = self._state
+        done = np.zeros(len(self.scene.dolls))
         for load in loads:
-            bone = load.bone
-            force, torque = self._mean_load(load, before)
-            (place, speed), (end, end_speed) = (
-                point_motion(state, bone, load.point) for state in (before, after))
-            faster, spun = end_speed - speed, after.angular[bone] - before.angular[bone]
-            done = force @ (end - place - piece.substep / 2 * faster)
-            if torque.any():
-                swept = self._turned(bone, before) + piece.duration ** 2 / 12 * cross(
-                    before.angular[bone], after.angular[bone])
-                done += torque @ (swept - piece.substep / 2 * spun)
-            if load.local:
-                change = after.turns[bone] - before.turns[bone]
-                done += piece.duration / 12 * (change @ load.force @ faster
-                                               + change @ load.torque @ spun)
-            work[self.mechanics.doll_of[bone]] += done
+            joules = work(load, before, self._state, piece)
+            done[self.mechanics.doll_of[load.bone]] += joules
             if isinstance(load, Pull):
-                self._grabbed += float(done)
-        self._guard.add_work(work)
-
-    def _mean_load(self, load: Load, before: State) -> tuple[np.ndarray, np.ndarray]:
-        """Force and torque in world axes; of a local load the mean of its bone's steady turn."""
-        if not load.local:
-            return load.force, load.torque
-        mean = rotation.mean_of_turn(self._turned(load.bone, before)) @ before.turns[load.bone]
-        return mean @ load.force, mean @ load.torque
-
-    def _turned(self, bone: int, before: State) -> np.ndarray:
-        """Rotation vector (3,) rad, in the world, by which a bone has turned since."""
-        return rotation.rotation_vector(rotation.multiply(
-            self._state.orientations[bone], rotation.inverse(before.orientations[bone])))
+                self._grabbed += joules
+        self._guard.add_work(done)
 
     def _load(self, active: _Active) -> Load:
         """Give a push's load; its point is tied to the bone when the push begins."""
@@ -485,28 +411,13 @@ class Simulation:
                                push.local)
         return active.load
 
-    def _rest(self) -> None:
-        """Fall asleep when all has been still for a while with something to rest on."""
-        if self.asleep or not self._stepper.accuracy.sleep or not self._gravity:
+    def _fall_asleep(self) -> None:
+        """Sleep when all has been still for a while with something to rest on."""
+        if self.asleep or not self._stepper.accuracy.sleep:
             return
-        if (self._motion.kinetic > self._most_at_rest).any():
-            self._still = 0
-            return
-        state = self._state
-        speed = max(np.abs(state.linear).max(),
-                    (np.abs(state.angular).max(axis=1) * self._sizes).max())
-        if speed > self._still_speed or self._queue or self._hands:
-            self._still = 0
-            return
-        if not self._still:
-            self._still_from = state
-        self._still += self.tick
-        if self._still < self._still_time:
-            return
-        way = np.abs(state.positions - self._still_from.positions).max()
-        turn = rotation.angle_between(state.orientations, self._still_from.orientations)
-        self._still = 0
-        if (max(way, (turn * self._sizes).max()) < self._still_way
+        if self._queue or self._hands:
+            self._rest.disturb()
+        elif (self._rest.has_come(self._state, self._motion.kinetic, self.tick)
                 and any(GROUND in pair for pair in self._stepper.touching)):
             coordinates = self._stepper.coordinates
             self._correct(dataclasses.replace(coordinates, v=np.zeros_like(coordinates.v)))
