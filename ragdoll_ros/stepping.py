@@ -258,9 +258,11 @@ class Stepper:
             self._onward(stretch, duration - flown if loads else self.accuracy.longest, loads)
             begin = self._along
             ahead = self._path.at(begin + stretch)
-            if not self.accuracy.land and (self._layout.past_limits(ahead.q) > 0).any():
-                self._blocked = True
-                return flown
+            if not self.accuracy.land:
+                past = self._layout.past_limits(ahead.q) > 0
+                if past.any():
+                    self._held |= past
+                    return flown
             self._fly_to(ahead)
             room = self._room()
             if room >= 0 and not self.touching:

@@ -252,6 +252,19 @@ def test_momentum_is_kept_in_the_air_while_others_lie_on_the_ground():
     assert rested > 50
 
 
+@pytest.mark.parametrize('accuracy', ['draft', 'normal', 'exact'])
+def test_a_joint_that_leans_on_its_limit_starts_no_flight_in_vain(accuracy):
+    """Spun slowly, high up, its knees stay straight: PyBullet steps, and nothing else is tried."""
+    scene = load_scene('drop')
+    spun = dataclasses.replace(scene.dolls[0], position=(0.0, 0.0, 1000.0), spin=(0.2, 0.1, 0.3))
+    with Simulation(dataclasses.replace(scene, dolls=(spun,)), accuracy=accuracy) as simulation:
+        flights = 0
+        for _ in range(60):
+            simulation.advance()
+            flights += simulation.effort.flights
+    assert flights <= 2
+
+
 @pytest.mark.parametrize('friction', [0.3, 0.5, math.inf])
 def test_rolling_friction_is_a_lever_arm(friction):
     """A ball that rolls slows down by 5/7 g b / R."""
