@@ -67,13 +67,11 @@ class Layout:
             self.own_q.append(slice(q, len(lower)))
             self.own_v.append(slice(first_v, v))
         self._plain = (np.array(plain_q), np.array(plain_v))
-        self._roots = self._indices(roots)
         self._turning = self._indices(roots + balls)
-        self.root_orientations = self._roots[0]
-        self.root_positions = self._roots[0][:, :1] - 3 + np.arange(3)
+        self.root_orientations, self.root_spins = self._indices(roots)
+        self.root_positions = self.root_orientations[:, :1] - 3 + np.arange(3)
         """(d, 4) and (d, 3): where in q each root's orientation and position stand."""
-        self.root_velocities = self._roots[1][:, :1] - 3 + np.arange(3)
-        self.root_spins = self._roots[1]
+        self.root_velocities = self.root_spins[:, :1] - 3 + np.arange(3)
         """(d, 3) each: where in v each root's linear and angular velocity stand."""
         low, high = np.array(lower)[plain_q], np.array(upper)[plain_q]
         some = np.isfinite(low) | np.isfinite(high)
@@ -83,7 +81,7 @@ class Layout:
 
     def root_turns(self, q: np.ndarray) -> np.ndarray:
         """Rotation matrices (d, 3, 3) of the roots."""
-        return rotation.matrix(q[self._roots[0]])
+        return rotation.matrix(q[self.root_orientations])
 
     def with_spins_turned(self, v: np.ndarray, turns: np.ndarray) -> np.ndarray:
         """Give v, or its rate, with the roots' angular part turned by matrices (d, 3, 3)."""

@@ -368,20 +368,20 @@ class Simulation:
             moment[doll] += torque * duration
         return impulse, None if any(load.force.any() for load in loads) else moment
 
-    def _keep_energy(self, start: Coordinates, near: set[tuple[int, int]]) -> None:
+    def _keep_energy(self, start: Coordinates, touched: set[tuple[int, int]]) -> None:
         """Take out energy from nothing; what was in the air keeps its momentum for sure.
 
-        Dolls that may have touched (``near``) share their account: a bounce is over within a step.
+        Dolls that may have ``touched`` share their account: a bounce is over within a step.
         """
         guard = self._guard
-        groups = guard.groups(near)
+        groups = guard.groups(touched)
         surplus = guard.surplus(self._motion, groups)
         if (surplus > 0).any():
             stepper = self._stepper
             # What is tolerated goes with the kinetic energy: once more, with what is left of it.
             for _ in range(2):
                 self._correct(guard.without_surplus(
-                    start, stepper.coordinates, self._motion, surplus, bool(near)))
+                    start, stepper.coordinates, self._motion, surplus, bool(touched)))
                 surplus = guard.surplus(self._motion, groups)
                 if (surplus <= 0).all():
                     break
