@@ -87,6 +87,10 @@ class Reach:
         low, high = state.linear.min(axis=0), state.linear.max(axis=0)
         return float((high - low).max())
 
+    def spin(self, state: State) -> float:
+        """Fastest spin of a bone, rad/s."""
+        return math.sqrt(np.einsum('ij,ij->i', state.angular, state.angular).max())
+
     def strides(self, state: State, duration: float) -> int:
         """Parts of ``duration`` s in each of which no bone passes another's half thickness."""
         return max(1, math.ceil(self.closing(state) * duration / (4 * self._thinnest)))

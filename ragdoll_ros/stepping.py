@@ -7,19 +7,17 @@ and contacts ask for.
 from __future__ import annotations
 
 import bisect
-import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from . import rotation
+from . import compiled, rotation
 from .coordinates import Coordinates
 from .engine.protocol import GROUND, Engine, Load
-from .flight import Path, fly
+from .flight import STIFFEST, Path
 from .mechanics import damping_rate
-from .reach import Reach
 from .scene import Scene
 from .settings import HUMAN, Accuracy
 from .state import State
@@ -43,11 +41,7 @@ MOST_FLIGHTS = 12
 """Runge-Kutta steps in 10 ms at the most: from there on the engine's own cost less."""
 
 FINER = 3
-"""Steps of order 4 that tell the error of one step of a flight."""
-
-STIFFEST = 1.5
-"""Step times the fastest rate at which damping ends a motion: from 2 on, explicit steps make
-energy of it."""
+"""Steps that tell the error of one step of a flight."""
 
 LAG = 0.1
 """Share of a motion that joint damping may take away before the engine hears that it is slower."""
@@ -94,9 +88,8 @@ class Stepper:
                  accuracy: Accuracy) -> None:
         self._accuracy = accuracy
         self.engine = make_engine(scene)
-        self._make_free = functools.partial(make_engine, scene, free=True)
-        self._free = self._make_free() if accuracy.order else None
-        self.reach = Reach(scene)
+        self.dynamics = compiled.dynamics_of(scene, make_engine)
+        self.reach = compiled.reach_of(scene)
         self._layout = self.engine.layout
         counts = np.cumsum([0, *(len(placement.doll.bones) for placement in scene.dolls)])
         self._roots = np.array([start + placement.doll.bones.index(placement.doll.root)
@@ -123,7 +116,9 @@ class Stepper:
         """The step of a flight that is under way: it may lead over many ticks."""
         self._along: float
         """s: where on the path."""
-        self._loaded = False
+        self._counted: int
+        """Steps of the path that were counted."""
+        self._stale = self._loaded = False
         """Whether it is a path under loads, which ends with the piece."""
         self.effort = Effort()
         self.begin()
@@ -138,23 +133,21 @@ class Stepper:
         if accuracy is not self._accuracy:
             self._accuracy, self._path = accuracy, None
 
-    @property
-    def free(self) -> Engine:
-        """The scene without contacts and limits, to be asked for accelerations."""
-        if self._free is None:
-            self._free = self._make_free()
-        return self._free
-
     def look(self) -> None:
         """Read where the engine is."""
         self.state: State
         self.coordinates: Coordinates
-        self.state, self.coordinates = self.engine.look()
+        if self.dynamics.cheap:
+            self.coordinates = self.engine.coordinates()
+            self.state = self.dynamics.state(self.coordinates)
+        else:
+            self.state, self.coordinates = self.engine.look()
         self.touching = self.engine.touching()
 
     def begin(self) -> None:
-        """Start from where the engine is, and forget what was before."""
-        self._stale = self._blocked = False
+        """Start from where all is, and forget what was before."""
+        self.settle()
+        self._blocked = False
         self._path = None
         self._past_at = (None, np.zeros(0))
         self._flown = None
@@ -209,27 +202,25 @@ class Stepper:
     def estimate_error(self) -> float | None:
         """Estimate the error, m, that the last tick added to the worst position.
 
-        By flying it again at order 4 in steps a third as long: the error of that is 81 times
-        smaller at the least. None if the tick was not all flight.
+        By flying it again in steps a third as long: the error of that is 81 times smaller at
+        order 4. None if the tick was not all flight.
         """
         if not self._flown:
             return None
         coordinates, steps = self._departure, FINER * max(1, self.effort.flights)
         for duration, loads in self._flown:
-            coordinates = fly(self._free, coordinates, duration, 4, steps, loads)
-        self._free.place(coordinates)
-        missed = self._free.read().positions - self.state.positions
+            coordinates = self.dynamics.fly(coordinates, duration, steps, loads)
+        missed = self.dynamics.state(coordinates).positions - self.state.positions
         return float(np.linalg.norm(missed, axis=1).max())
 
     def close(self) -> None:
-        """Give both engines back."""
+        """Give the engines back."""
         self.engine.close()
-        if self._free is not None:
-            self._free.close()
+        self.dynamics.close()
 
     def _may_fly(self, duration: float) -> bool:
         """Tell whether nothing touches and no joint presses against its limit."""
-        if (self._free is None or not self.accuracy.order or self.touching or self._blocked
+        if (not self.accuracy.order or self.touching or self._blocked
                 or self.effort.flights >= self._most_flights):
             return False
         past = self._past()
@@ -249,7 +240,8 @@ class Stepper:
             self._path, self._loaded = None, bool(loads)
         parts = self.reach.strides(self.state, duration) if self._solid else 1
         if not self._leads_on(duration):
-            parts = max(parts, math.ceil(duration / self._longest_step()))
+            parts = max(parts, math.ceil(
+                duration / self.dynamics.longest(self.accuracy, self._fastest())))
         if parts > self._most_flights:
             return 0.0
         stretch, flown = duration / parts, 0.0
@@ -257,7 +249,9 @@ class Stepper:
             start, state = self.coordinates, self.state
             self._onward(stretch, duration - flown if loads else self.accuracy.longest, loads)
             begin = self._along
-            ahead = self._path.at(begin + stretch)
+            ahead = self._ahead(begin + stretch)
+            if ahead is None:
+                return flown
             if not self.accuracy.land:
                 past = self._layout.past_limits(ahead.q) > 0
                 if past.any():
@@ -294,13 +288,20 @@ class Stepper:
         """
         if self._leads_on(stretch):
             return
-        path = self._path
+        path, fastest = self._path, self._fastest()
         over = path is not None and self._along > path.duration * (1 - 1e-9)
-        count = max(1, math.floor(min(longest, self._longest_step()) / stretch * (1 + 1e-9)))
-        self._path = Path(self._free, self.coordinates, stretch * count, self.accuracy.order,
-                          loads, after=path if over else None)
-        self._along = 0.0
-        self.effort.flights += 1
+        longest = min(longest, self.dynamics.longest(self.accuracy, fastest))
+        count = max(1, math.floor(longest / stretch * (1 + 1e-9)))
+        self._path = self.dynamics.path(self.coordinates, stretch * count, self.accuracy, fastest,
+                                        loads, path if over else None)
+        self._along, self._counted = 0.0, 0
+
+    def _ahead(self, time: float) -> Coordinates | None:
+        """Tell where the path leads to, and count its steps."""
+        ahead = self._path.at(time)
+        self.effort.flights += self._path.count - self._counted
+        self._counted = self._path.count
+        return ahead
 
     def _land(self, begin: float, stretch: float, least: float, room: float) -> float:
         """Go back along the path to where a limit or the ground is just reached; give the time, s.
@@ -353,18 +354,16 @@ class Stepper:
 
     def _fly_to(self, coordinates: Coordinates) -> None:
         self._set(coordinates)
-        self.touching = self.engine.touching() if self._solid else set()
+        self.touching = self.settle().touching() if self._solid else set()
 
     def _set(self, coordinates: Coordinates) -> None:
-        self.engine.place(coordinates)
-        self._stale = False
-        self.coordinates = coordinates
-        self.state = self.engine.read()
+        self.coordinates, self._stale = coordinates, True
+        self.state = self.dynamics.state(coordinates) if self.dynamics.cheap else (
+            self.settle().read())
 
     def _back_to(self, start: Coordinates, state: State,
                  touching: set[tuple[int, int]]) -> None:
-        self.engine.place(start)
-        self._stale = False
+        self._stale = True
         self.coordinates, self.state, self.touching = start, state, touching
 
     def _room(self, coordinates: Coordinates | None = None, state: State | None = None) -> float:
@@ -373,12 +372,9 @@ class Stepper:
         room = -float(past.max()) if len(past) else math.inf
         return min(room, self.reach.clearance(state or self.state))
 
-    def _longest_step(self) -> float:
-        """Longest step of a flight, s, that speeds and damping allow within a tick."""
-        spin = math.sqrt(np.einsum('ij,ij->i', self.state.angular, self.state.angular).max())
-        rate = max(spin, np.abs(self.coordinates.v[self._layout.limited[1]]).max(initial=0.0))
-        return min(self.accuracy.flight_turn / max(rate, 1e-9),
-                   STIFFEST / max(self._fading, 1e-9))
+    def _fastest(self) -> float:
+        """Fastest turning, rad/s, of a bone or about a limited axis."""
+        return max(self.reach.spin(self.state), np.abs(self.coordinates.v[self._layout.limited[1]]).max(initial=0.0))
 
     def _step(self, duration: float, loads: Sequence[Load]) -> Piece:
         """Take the engine's own step, finer where that overshoots less.
@@ -462,7 +458,7 @@ class Stepper:
         tens = duration / self._span
         if not accuracy.adaptive:
             return max(1, math.ceil(accuracy.contact * tens))
-        spin = math.sqrt(np.einsum('ij,ij->i', state.angular, state.angular).max())
+        spin = self.reach.spin(state)
         need = max(1.0, spin * duration / accuracy.turn, 4.0 * tens if pushed else 0.0,
                    self._fading * duration / STIFFEST)
         speeds = self._layout.limit_speeds(self.coordinates)

@@ -123,7 +123,7 @@ class BulletEngine:
 
     def read(self) -> State:
         """Poses and velocities of all bones."""
-        return _state([row for doll in self._dolls for row in self._rows(doll)])
+        return State.of(np.array([row for doll in self._dolls for row in self._rows(doll)]))
 
     def coordinates(self) -> Coordinates:
         """Generalised coordinates of all dolls."""
@@ -143,7 +143,7 @@ class BulletEngine:
                 q += joint[0]
                 v += joint[1]
             rows += own
-        return _state(rows), Coordinates(np.array(q), np.array(v))
+        return State.of(np.array(rows)), Coordinates(np.array(q), np.array(v))
 
     def place(self, coordinates: Coordinates) -> None:
         """Put all dolls where ``coordinates`` says."""
@@ -442,11 +442,6 @@ def bare_loop(scene: Scene, start: Coordinates,
                                computeForwardKinematics=1, physicsClientId=client)
 
     return tick, engine.close
-
-
-def _state(rows: list[tuple]) -> State:
-    table = np.array(rows)
-    return State(table[:, 0:3], table[:, 3:7], table[:, 7:10], table[:, 10:13])
 
 
 def _list(values: np.ndarray) -> list[float]:

@@ -1,0 +1,61 @@
+"""The sums of every tick as machine code, made by numba where that is installed.
+
+Without it all works as well, by numpy and by asking PyBullet for accelerations, but slower, and
+less accurate in the air. What can be either is made here.
+"""
+from __future__ import annotations
+
+import importlib.util
+import os
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..coordinates import Layout
+    from ..engine.protocol import Engine
+    from ..flight import Dynamics
+    from ..guard import Guard
+    from ..mechanics import Mechanics
+    from ..reach import Reach
+    from ..scene import Scene
+
+SWITCH = 'RAGDOLL_COMPILED'
+"""Variable of the environment that, set to 0, lets numba be."""
+
+READY = os.environ.get(SWITCH, '1') != '0' and importlib.util.find_spec('numba') is not None
+"""Whether compiled code is used."""
+
+
+def dynamics_of(scene: Scene, make_engine: type[Engine]) -> Dynamics:
+    """The equations of motion of a scene in the air."""
+    if READY:
+        from .dynamics import CompiledDynamics
+        return CompiledDynamics(scene)
+    from ..flight import EngineDynamics
+    return EngineDynamics(scene, make_engine)
+
+
+def mechanics_of(scene: Scene) -> Mechanics:
+    """Sums over the bones of each doll."""
+    if READY:
+        from .mechanics import CompiledMechanics
+        return CompiledMechanics(scene)
+    from ..mechanics import Mechanics
+    return Mechanics(scene)
+
+
+def guard_of(scene: Scene, mechanics: Mechanics, layout: Layout) -> Guard:
+    """Who keeps energy and momentum."""
+    if READY:
+        from .mechanics import CompiledGuard
+        return CompiledGuard(scene, mechanics, layout)
+    from ..guard import Guard
+    return Guard(scene, mechanics, layout)
+
+
+def reach_of(scene: Scene) -> Reach:
+    """What bones can reach."""
+    if READY:
+        from .reach import CompiledReach
+        return CompiledReach(scene)
+    from ..reach import Reach
+    return Reach(scene)

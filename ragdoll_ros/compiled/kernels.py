@@ -1,0 +1,605 @@
+"""All that is compiled: vectors, kinematics and dynamics of dolls in the air, steps, sums.
+
+It stands in one file because numba, which keeps its code for the next process, notices a change of
+the file of the function that is called, but not of the files of those that this one calls.
+
+Dynamics: Featherstone's articulated-body algorithm (Rigid Body Dynamics Algorithms, 2008, table
+7.1). All spatial vectors, angular part first, are along the world's axes about a point that stands
+where the doll's root is at that instant: nothing is transformed from bone to bone, and nothing
+loses digits far from the origin. A joint of several axes is a row of hinges with no mass between.
+
+``tree`` is the table of tree.py. q and v are those of Coordinates, but where angular velocities of
+roots are said to be the roots' own they are along the root's axes: so a steady spin hardly changes
+them.
+"""
+from __future__ import annotations
+
+import collections
+import math
+
+import numba
+import numpy as np
+
+from .dop853 import CONTINUED, ERRORS, STAGES
+
+SLOWEST = 0.1
+"""s: an error of 1 in a velocity counts as much as one of this in its coordinate."""
+
+compiled = numba.njit(cache=True, error_model='numpy', nogil=True,
+                      fastmath={'contract', 'nsz', 'arcp'})
+"""Machine code, kept for the next process. Sums stay in their order; a product and a sum may be
+rounded once."""
+
+inlined = numba.njit(inline='always', error_model='numpy', fastmath={'contract', 'nsz', 'arcp'})
+"""The same as a part of what calls it: twice as fast for what is called with many arrays."""
+
+
+@inlined
+def multiply(a: np.ndarray, b: np.ndarray, out: np.ndarray) -> None:
+    """Hamilton product a * b: first b, then a. ``out`` may be one of the two."""
+    x = a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1]
+    y = a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0]
+    z = a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3]
+    w = a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]
+    out[0], out[1], out[2], out[3] = x, y, z, w
+
+
+@inlined
+def rotate(q: np.ndarray, a: np.ndarray, out: np.ndarray) -> None:
+    """The vector a of the body's frame, in the outer frame. ``out`` may be a."""
+    x, y, z, w = q[0], q[1], q[2], q[3]
+    u, v, s = 2 * (y * a[2] - z * a[1]), 2 * (z * a[0] - x * a[2]), 2 * (x * a[1] - y * a[0])
+    out[0], out[1], out[2] = (a[0] + w * u + y * s - z * v, a[1] + w * v + z * u - x * s,
+                              a[2] + w * s + x * v - y * u)
+
+
+@compiled
+def rotate_back(q: np.ndarray, a: np.ndarray, out: np.ndarray) -> None:
+    """The vector a of the outer frame, in the body's. ``out`` may be a."""
+    x, y, z, w = q[0], q[1], q[2], q[3]
+    u, v, s = 2 * (y * a[2] - z * a[1]), 2 * (z * a[0] - x * a[2]), 2 * (x * a[1] - y * a[0])
+    out[0], out[1], out[2] = (a[0] - w * u + y * s - z * v, a[1] - w * v + z * u - x * s,
+                              a[2] - w * s + x * v - y * u)
+
+
+@compiled
+def cross(ax: float, ay: float, az: float, bx: float, by: float,
+          bz: float) -> tuple[float, float, float]:
+    """Cross product of two vectors."""
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@compiled
+def to_matrix(q: np.ndarray, out: np.ndarray) -> None:
+    """Rotation matrix (3, 3) of a quaternion."""
+    x, y, z, w = q[0], q[1], q[2], q[3]
+    out[0, 0] = x * x - y * y - z * z + w * w
+    out[1, 1] = y * y - x * x - z * z + w * w
+    out[2, 2] = z * z - x * x - y * y + w * w
+    out[0, 1], out[1, 0] = 2 * (x * y - z * w), 2 * (x * y + z * w)
+    out[0, 2], out[2, 0] = 2 * (x * z + y * w), 2 * (x * z - y * w)
+    out[1, 2], out[2, 1] = 2 * (y * z - x * w), 2 * (y * z + x * w)
+
+
+@compiled
+def quaternion_rate(q: np.ndarray, w: np.ndarray, out: np.ndarray) -> None:
+    """Rate of change of a quaternion, the angular velocity being along the body's own axes."""
+    x, y, z, s = q[0] / 2, q[1] / 2, q[2] / 2, q[3] / 2
+    out[0] = s * w[0] + y * w[2] - z * w[1]
+    out[1] = s * w[1] + z * w[0] - x * w[2]
+    out[2] = s * w[2] + x * w[1] - y * w[0]
+    out[3] = -x * w[0] - y * w[1] - z * w[2]
+
+
+@compiled
+def solve(a: np.ndarray, b: np.ndarray) -> None:
+    """Put the x of a x = b in b's place, by Cholesky; a is symmetric and positive, and is lost."""
+    n = len(b)
+    for j in range(n):
+        for k in range(j):
+            a[j, j] -= a[j, k] * a[j, k]
+        a[j, j] = math.sqrt(a[j, j])
+        for i in range(j + 1, n):
+            for k in range(j):
+                a[i, j] -= a[i, k] * a[j, k]
+            a[i, j] /= a[j, j]
+    for j in range(n):
+        for k in range(j):
+            b[j] -= a[j, k] * b[k]
+        b[j] /= a[j, j]
+    for j in range(n - 1, -1, -1):
+        for k in range(j + 1, n):
+            b[j] -= a[k, j] * b[k]
+        b[j] /= a[j, j]
+
+
+Work = collections.namedtuple('Work', 'turns centres moves axes inertias biases drifts pulls hand')
+"""Room for n bones and nv velocities: turns (n, 4) from the bind pose, centres of mass (n, 3) from
+the root, spatial velocities (n, 6), motion subspaces (nv, 6), articulated inertias (n, 6, 6), bias
+forces (n, 6), what is left of an axis' acceleration at dv/dt = 0 (nv, 6), and of each axis the
+inertia times it, the inverse of its own part and the force along it (nv, 8). ``hand`` (6, 6)."""
+
+
+@compiled
+def room(bones: int, velocities: int) -> Work:
+    """Room to work in."""
+    return Work(np.empty((bones, 4)), np.empty((bones, 3)), np.empty((bones, 6)),
+                np.empty((velocities, 6)), np.empty((bones, 6, 6)), np.empty((bones, 6)),
+                np.empty((velocities, 6)), np.empty((velocities, 8)), np.empty((6, 6)))
+
+
+@compiled
+def pose(tree: np.ndarray, q: np.ndarray, v: np.ndarray, work: Work) -> None:
+    """Go from the roots to the leaves: turns, centres, velocities and axes."""
+    t, turn_by = work.hand[0], work.hand[1]
+    for i in range(len(tree)):
+        bone, turn, move = tree[i], work.turns[i], work.moves[i]
+        if bone.parent < 0:
+            for k in range(3):
+                turn_by[k] = -bone.bind[k]
+                work.centres[i, k] = 0.0
+                move[3 + k] = v[bone.v + k]
+            turn_by[3] = bone.bind[3]
+            own = q[bone.q + 3:bone.q + 7]
+            multiply(own, turn_by, turn)
+            rotate(own, v[bone.v + 3:bone.v + 6], move[:3])
+            continue
+        up = bone.parent
+        turn[:] = work.turns[up]
+        rotate(turn, bone.before, t)
+        x, y, z = (work.centres[up, 0] + t[0], work.centres[up, 1] + t[1],
+                   work.centres[up, 2] + t[2])
+        if bone.free:
+            # frame * q * frame^-1: the joint's frame is not that of the doll
+            for k in range(3):
+                turn_by[k] = (bone.axes[0, k] * q[bone.q] + bone.axes[1, k] * q[bone.q + 1]
+                              + bone.axes[2, k] * q[bone.q + 2])
+            turn_by[3] = q[bone.q + 3]
+            multiply(turn, turn_by, turn)
+        for k in range(6):
+            move[k] = work.moves[up, k]
+        for d in range(bone.freedoms):
+            axis = work.axes[bone.v + d]
+            rotate(turn, bone.axes[d], axis[:3])
+            axis[3], axis[4], axis[5] = cross(x, y, z, axis[0], axis[1], axis[2])
+            for k in range(6):
+                move[k] += axis[k] * v[bone.v + d]
+            if not bone.free:
+                half = q[bone.q + d] / 2
+                for k in range(3):
+                    turn_by[k] = bone.axes[d, k] * math.sin(half)
+                turn_by[3] = math.cos(half)
+                multiply(turn, turn_by, turn)
+        rotate(turn, bone.after, t)
+        work.centres[i, 0], work.centres[i, 1], work.centres[i, 2] = x + t[0], y + t[1], z + t[2]
+
+
+@compiled
+def accelerations(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray,
+                  v: np.ndarray, work: Work, out: np.ndarray) -> None:
+    """Rates of change (nv,) of v. ``loads`` (m, 11): the bone's place in the scene, force and
+    torque, the force's point on the bone, and 1 if all are along the bone's axes.
+    """
+    pose(tree, q, v, work)
+    for i in range(len(tree)):
+        _inertia(tree[i], work.turns[i], work.centres[i], work.moves[i], work.inertias[i],
+                 work.biases[i], loads, work.hand)
+    for i in range(len(tree) - 1, -1, -1):
+        if tree[i].parent >= 0:
+            _inward(tree[i], i, v, work)
+    for i in range(len(tree)):
+        bone, bias, move = tree[i], work.biases[i], work.moves[i]
+        if bone.parent < 0:
+            for k in range(6):
+                bias[k] = -bias[k]
+            solve(work.inertias[i], bias)
+            x, y, z = cross(move[0], move[1], move[2], move[3], move[4], move[5])
+            out[bone.v] = bias[3] + x + gravity[0]
+            out[bone.v + 1] = bias[4] + y + gravity[1]
+            out[bone.v + 2] = bias[5] + z + gravity[2]
+            rotate_back(q[bone.q + 3:bone.q + 7], bias[:3], out[bone.v + 3:bone.v + 6])
+        else:
+            _outward(bone, i, work, out)
+
+
+@inlined
+def _inertia(bone: np.record, turn: np.ndarray, centre: np.ndarray, move: np.ndarray,
+             inertia: np.ndarray, bias: np.ndarray, loads: np.ndarray, hand: np.ndarray) -> None:
+    """A bone's own inertia, and the force that its motion and loads ask for."""
+    full, turned, t, u = hand[0], hand[1:4], hand[4], hand[5]
+    multiply(turn, bone.bind, full)
+    to_matrix(full, turned)
+    x, y, z, mass = centre[0], centre[1], centre[2], bone.mass
+    far = mass * (x * x + y * y + z * z)
+    for j in range(3):
+        for k in range(j, 3):
+            value = -mass * centre[j] * centre[k] + (far if j == k else 0.0)
+            for e in range(3):
+                value += turned[j, e] * bone.inertia[e] * turned[k, e]
+            inertia[j, k] = inertia[k, j] = value
+            inertia[3 + j, 3 + k] = inertia[3 + k, 3 + j] = mass if j == k else 0.0
+        inertia[j, 3 + j] = inertia[3 + j, j] = 0.0
+    inertia[0, 4] = inertia[4, 0] = -mass * z
+    inertia[0, 5] = inertia[5, 0] = mass * y
+    inertia[1, 3] = inertia[3, 1] = mass * z
+    inertia[1, 5] = inertia[5, 1] = -mass * x
+    inertia[2, 3] = inertia[3, 2] = -mass * y
+    inertia[2, 4] = inertia[4, 2] = mass * x
+    wx, wy, wz, vx, vy, vz = move[0], move[1], move[2], move[3], move[4], move[5]
+    # momentum p, n = I (w, v) and the force (w, v) x* (n, p) that turns it
+    ax, ay, az = cross(wx, wy, wz, x, y, z)
+    px, py, pz = mass * (vx + ax), mass * (vy + ay), mass * (vz + az)
+    ax, ay, az = cross(x, y, z, vx, vy, vz)
+    nx = inertia[0, 0] * wx + inertia[0, 1] * wy + inertia[0, 2] * wz + mass * ax
+    ny = inertia[1, 0] * wx + inertia[1, 1] * wy + inertia[1, 2] * wz + mass * ay
+    nz = inertia[2, 0] * wx + inertia[2, 1] * wy + inertia[2, 2] * wz + mass * az
+    ax, ay, az = cross(vx, vy, vz, px, py, pz)
+    nx, ny, nz = cross(wx, wy, wz, nx, ny, nz)
+    bias[0], bias[1], bias[2] = nx + ax, ny + ay, nz + az
+    bias[3], bias[4], bias[5] = cross(wx, wy, wz, px, py, pz)
+    for i in range(len(loads)):
+        load = loads[i]
+        if load[0] == bone.bone:
+            force, torque = load[1:4], load[4:7]
+            if load[10] > 0:
+                rotate(full, force, t)
+                rotate(full, torque, u)
+                force, torque = t, u
+            ax, ay, az = force[0], force[1], force[2]
+            nx, ny, nz = torque[0], torque[1], torque[2]
+            rotate(full, load[7:10], t)
+            px, py, pz = cross(x + t[0], y + t[1], z + t[2], ax, ay, az)
+            bias[0] -= nx + px
+            bias[1] -= ny + py
+            bias[2] -= nz + pz
+            bias[3] -= ax
+            bias[4] -= ay
+            bias[5] -= az
+
+
+@inlined
+def _inward(bone: np.record, i: int, v: np.ndarray, work: Work) -> None:
+    """Hand a bone's inertia and bias on to its parent, through the axes of its joint."""
+    inertia, bias, carrying = work.inertias[i], work.biases[i], work.hand[0]
+    # what carries an axis moves as the bone does but for that axis and those behind it
+    for k in range(6):
+        carrying[k] = work.moves[bone.parent, k] if bone.free else work.moves[i, k]
+    for d in range(bone.freedoms - 1, -1, -1):
+        at = bone.v + d
+        axis, drift, pull, rate = work.axes[at], work.drifts[at], work.pulls[at], v[at]
+        if not bone.free:
+            for k in range(6):
+                carrying[k] -= axis[k] * rate
+        wx, wy, wz, vx, vy, vz = (carrying[0], carrying[1], carrying[2], carrying[3], carrying[4],
+                                  carrying[5])
+        sx, sy, sz = axis[0] * rate, axis[1] * rate, axis[2] * rate
+        drift[0], drift[1], drift[2] = cross(wx, wy, wz, sx, sy, sz)
+        x, y, z = cross(vx, vy, vz, sx, sy, sz)
+        sx, sy, sz = cross(wx, wy, wz, axis[3] * rate, axis[4] * rate, axis[5] * rate)
+        drift[3], drift[4], drift[5] = x + sx, y + sy, z + sz
+        own, force = 0.0, -bone.damping * rate
+        for j in range(6):
+            value = 0.0
+            for k in range(6):
+                value += inertia[j, k] * axis[k]
+            pull[j] = value
+            own += value * axis[j]
+            force -= axis[j] * bias[j]
+        pull[6], pull[7] = 1 / own, force
+        for j in range(6):
+            share = pull[j] * pull[6]
+            for k in range(j, 6):
+                inertia[j, k] = inertia[k, j] = inertia[j, k] - share * pull[k]
+        for j in range(6):
+            value = bias[j] + pull[j] * pull[6] * force
+            for k in range(6):
+                value += inertia[j, k] * drift[k]
+            bias[j] = value
+    for j in range(6):
+        for k in range(6):
+            work.inertias[bone.parent, j, k] += inertia[j, k]
+        work.biases[bone.parent, j] += bias[j]
+
+
+@inlined
+def _outward(bone: np.record, i: int, work: Work, out: np.ndarray) -> None:
+    """Take a bone's acceleration, in its bias' place, and its joint's from the parent's."""
+    rate = work.biases[i]
+    for k in range(6):
+        rate[k] = work.biases[bone.parent, k]
+    for d in range(bone.freedoms):
+        at = bone.v + d
+        axis, drift, pull = work.axes[at], work.drifts[at], work.pulls[at]
+        left = pull[7]
+        for k in range(6):
+            rate[k] += drift[k]
+            left -= pull[k] * rate[k]
+        out[at] = left * pull[6]
+        for k in range(6):
+            rate[k] += axis[k] * out[at]
+
+
+@compiled
+def rates(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray, v: np.ndarray,
+          work: Work, out: np.ndarray) -> None:
+    """Rates of change (nq + nv,) of q and v."""
+    for i in range(len(tree)):
+        bone = tree[i]
+        at, rate = bone.q, bone.v
+        if bone.parent < 0:
+            for k in range(3):
+                out[at + k] = v[rate + k]
+            at, rate = at + 3, rate + 3
+        if bone.free:
+            quaternion_rate(q[at:at + 4], v[rate:rate + 3], out[at:at + 4])
+        else:
+            for k in range(bone.freedoms):
+                out[at + k] = v[rate + k]
+    accelerations(tree, gravity, loads, q, v, work, out[len(q):])
+
+
+@compiled
+def normalize(tree: np.ndarray, q: np.ndarray) -> None:
+    """Bring all quaternions in q to length one."""
+    for i in range(len(tree)):
+        if tree[i].free:
+            at = tree[i].q + (3 if tree[i].parent < 0 else 0)
+            size = math.sqrt(q[at] ** 2 + q[at + 1] ** 2 + q[at + 2] ** 2 + q[at + 3] ** 2)
+            for k in range(at, at + 4):
+                q[k] /= size
+
+
+@compiled
+def turn_spins(tree: np.ndarray, q: np.ndarray, v: np.ndarray, inward: bool) -> None:
+    """Turn roots' angular velocities in v from the world's axes to their own, or back."""
+    for i in range(len(tree)):
+        if tree[i].parent < 0:
+            turn, spin = q[tree[i].q + 3:tree[i].q + 7], v[tree[i].v + 3:tree[i].v + 6]
+            if inward:
+                rotate_back(turn, spin, spin)
+            else:
+                rotate(turn, spin, spin)
+
+
+@compiled
+def look(tree: np.ndarray, q: np.ndarray, v: np.ndarray, out: np.ndarray) -> None:
+    """Position, orientation, linear and angular velocity (n, 13) of all bones of the scene; roots'
+    angular velocities are along the world's axes, in ``v`` too.
+    """
+    work, own, root = room(len(tree), len(v)), v.copy(), 0
+    turn_spins(tree, q, own, True)
+    pose(tree, q, own, work)
+    for i in range(len(tree)):
+        bone, row, move, centre = tree[i], out[tree[i].bone], work.moves[i], work.centres[i]
+        if bone.parent < 0:
+            root = bone.q
+        multiply(work.turns[i], bone.bind, row[3:7])
+        x, y, z = cross(move[0], move[1], move[2], centre[0], centre[1], centre[2])
+        row[7], row[8], row[9] = move[3] + x, move[4] + y, move[5] + z
+        for k in range(3):
+            row[k] = q[root + k] + centre[k]
+            row[10 + k] = move[k]
+
+
+@compiled
+def step(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray, v: np.ndarray,
+         h: float, known: bool, way: np.ndarray, ends: np.ndarray) -> float:
+    """Go one step of ``h`` s and give the error of its end.
+
+    Puts what leads from the start to anywhere within into ``way`` (8, nq + nv), and into ``ends``
+    the rates of change at both ends; those at the start are there already if ``known``.
+    """
+    nq, size = len(q), len(q) + len(v)
+    work, k, y, start = room(len(tree), len(v)), np.empty((16, size)), np.empty(size), way[0]
+    start[:nq], start[nq:] = q, v
+    normalize(tree, start[:nq])
+    turn_spins(tree, start[:nq], start[nq:], True)
+    if known:
+        k[0] = ends[0]
+    else:
+        rates(tree, gravity, loads, start[:nq], start[nq:], work, k[0])
+    for stage in range(1, 16):
+        _sum(STAGES[stage], stage, k, h, y)
+        for j in range(size):
+            y[j] += start[j]
+        normalize(tree, y[:nq])
+        if stage == 12:
+            way[1] = y
+        rates(tree, gravity, loads, y[:nq], y[nq:], work, k[stage])
+    for j in range(size):
+        way[1, j] -= start[j]
+        way[2, j] = h * k[0, j] - way[1, j]
+        way[3, j] = 2 * way[1, j] - h * (k[12, j] + k[0, j])
+    for row in range(4):
+        _sum(CONTINUED[row], 16, k, h, way[4 + row])
+    ends[0], ends[1] = k[0], k[12]
+    return _error(k, h, nq, y)
+
+
+@compiled
+def _sum(shares: np.ndarray, count: int, k: np.ndarray, h: float, out: np.ndarray) -> None:
+    """Add up the rates of ``count`` stages, times h."""
+    for j in range(len(out)):
+        out[j] = 0.0
+    for stage in range(count):
+        if shares[stage] != 0.0:
+            share = h * shares[stage]
+            for j in range(len(out)):
+                out[j] += share * k[stage, j]
+
+
+@compiled
+def _error(k: np.ndarray, h: float, nq: int, room: np.ndarray) -> float:
+    """The error that DOP853 takes for that of its order 8 (Hairer, Norsett, Wanner, II.10)."""
+    fifth, third = 0.0, 0.0
+    _sum(ERRORS[0], 16, k, h, room)
+    for j in range(len(room)):
+        fifth = max(fifth, abs(room[j]) * (1.0 if j < nq else SLOWEST))
+    _sum(ERRORS[1], 16, k, h, room)
+    for j in range(len(room)):
+        third = max(third, abs(room[j]) * (1.0 if j < nq else SLOWEST))
+    if fifth == 0.0:
+        return 0.0
+    return fifth * fifth / np.sqrt(fifth * fifth + 0.01 * third * third)
+
+
+@compiled
+def within(tree: np.ndarray, way: np.ndarray, share: float, q: np.ndarray, v: np.ndarray) -> None:
+    """Coordinates at a share of the step."""
+    nq, size = len(q), len(q) + len(v)
+    y = np.zeros(size)
+    for row in range(7, 0, -1):
+        factor = share if row % 2 else 1 - share
+        for j in range(size):
+            y[j] = (y[j] + way[row, j]) * factor
+    for j in range(nq):
+        q[j] = y[j] + way[0, j]
+    for j in range(nq, size):
+        v[j - nq] = y[j] + way[0, j]
+    normalize(tree, q)
+    turn_spins(tree, q, v, False)
+
+
+@compiled
+def accelerate(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray,
+               v: np.ndarray, out: np.ndarray) -> None:
+    """Rates of change of v, roots' angular velocities being along the world's axes."""
+    own = v.copy()
+    turn_spins(tree, q, own, True)
+    accelerations(tree, gravity, loads, q, own, room(len(tree), len(v)), out)
+    turn_spins(tree, q, out, False)
+
+
+@compiled
+def motion(masses: np.ndarray, inertias: np.ndarray, doll_of: np.ndarray, gravity: np.ndarray,
+           rows: np.ndarray, out: np.ndarray) -> None:
+    """Sums over each doll (d, 20), in the order of Motion's fields, of bones' ``rows`` (n, 13)."""
+    total, turned, spin = np.zeros(len(out)), np.empty((3, 3)), np.empty(3)
+    out[:] = 0.0
+    for i in range(len(rows)):
+        sums, mass = out[doll_of[i]], masses[i]
+        total[doll_of[i]] += mass
+        for k in range(3):
+            sums[2 + k] += mass * rows[i, k]
+            sums[5 + k] += mass * rows[i, 7 + k]
+    for d in range(len(out)):
+        for k in range(3):
+            out[d, 2 + k] /= total[d]
+    for i in range(len(rows)):
+        sums, mass, row = out[doll_of[i]], masses[i], rows[i]
+        to_matrix(row[3:7], turned)
+        x, y, z = row[0] - sums[2], row[1] - sums[3], row[2] - sums[4]
+        far = mass * (x * x + y * y + z * z)
+        for j in range(3):
+            spin[j] = 0.0
+            for k in range(3):
+                value = 0.0
+                for e in range(3):
+                    value += turned[j, e] * inertias[i, e] * turned[k, e]
+                spin[j] += value * row[10 + k]
+                sums[11 + 3 * j + k] += value - mass * (row[j] - sums[2 + j]) * (
+                    row[k] - sums[2 + k]) + (far if j == k else 0.0)
+        sums[1] += 0.5 * (mass * (row[7] ** 2 + row[8] ** 2 + row[9] ** 2)
+                          + spin[0] * row[10] + spin[1] * row[11] + spin[2] * row[12])
+        x, y, z = cross(x, y, z, row[7], row[8], row[9])
+        sums[8] += spin[0] + mass * x
+        sums[9] += spin[1] + mass * y
+        sums[10] += spin[2] + mass * z
+    for d in range(len(out)):
+        sums = out[d]
+        sums[0] = sums[1] - total[d] * (
+            sums[2] * gravity[0] + sums[3] * gravity[1] + sums[4] * gravity[2])
+
+
+@compiled
+def keep_momentum(masses: np.ndarray, doll_of: np.ndarray, gravity: np.ndarray, duration: float,
+                  given: np.ndarray, turned: bool, touched: np.ndarray, before: np.ndarray,
+                  sums: np.ndarray, rows: np.ndarray) -> None:
+    """Give each doll that is not ``touched`` the momentum and the way that it must have, as one
+    rigid body; see Guard.momentum_due. Changes its ``sums`` (d, 20) and ``rows`` (n, 13).
+
+    ``given`` (d, 6) are impulse and moment of pushes; not ``turned``: the angular momentum stays.
+    """
+    change, inertia, spin = np.empty(9), np.empty((3, 3)), np.empty(3)
+    for d in range(len(sums)):
+        if touched[d]:
+            continue
+        now, old, mass = sums[d], before[d], masses[d]
+        gained = 0.0
+        for k in range(3):
+            due = old[5 + k] + given[d, k] + mass * gravity[k] * duration
+            centre = old[2 + k] + (old[5 + k] + due) * (duration / 2 / mass)
+            change[k] = centre - now[2 + k]
+            change[3 + k] = (due - now[5 + k]) / mass
+            gained += (due + now[5 + k]) * change[3 + k]
+            now[5 + k] = due
+            spin[k] = old[8 + k] + given[d, 3 + k] - now[8 + k] if turned else 0.0
+            change[6 + k] = spin[k]
+            for j in range(3):
+                inertia[j, k] = now[11 + 3 * j + k]
+        if turned:
+            solve(inertia, change[6:9])
+            for k in range(3):
+                gained += (2 * now[8 + k] + spin[k]) * change[6 + k]
+                now[8 + k] += spin[k]
+        for i in range(len(rows)):
+            if doll_of[i] == d:
+                row = rows[i]
+                x, y, z = cross(change[6], change[7], change[8], row[0] - now[2], row[1] - now[3],
+                                row[2] - now[4])
+                row[7] += change[3] + x
+                row[8] += change[4] + y
+                row[9] += change[5] + z
+                for k in range(3):
+                    row[k] += change[k]
+                    row[10 + k] += change[6 + k]
+        for k in range(3):
+            now[2 + k] += change[k]
+        now[1] += gained / 2
+        now[0] = now[1] - mass * (now[2] * gravity[0] + now[3] * gravity[1] + now[4] * gravity[2])
+
+
+@compiled
+def heights(sizes: np.ndarray, normal: np.ndarray, offset: float, rows: np.ndarray,
+            out: np.ndarray) -> float:
+    """Heights (n,) of the bones' lowest points over the ground; gives the least. ``sizes`` (n, 6)
+    are those of Reach.
+    """
+    least, down = math.inf, np.empty(3)
+    for i in range(len(rows)):
+        row, size = rows[i], sizes[i]
+        rotate_back(row[3:7], normal, down)
+        x, y, z = abs(down[0]), abs(down[1]), abs(down[2])
+        out[i] = (row[0] * normal[0] + row[1] * normal[1] + row[2] * normal[2] - offset
+                  - size[0] * x - size[1] * y - (size[2] + size[3]) * z - size[4]
+                  - size[5] * math.sqrt(max(0.0, 1 - z * z)))
+        least = min(least, out[i])
+    return least
+
+
+@compiled
+def falling(radii: np.ndarray, normal: np.ndarray, margin: float, soon: float, rows: np.ndarray,
+            high: np.ndarray) -> float:
+    """Largest speed at which a point of a bone that can reach the ground ``soon`` sinks."""
+    most = 0.0
+    for i in range(len(rows)):
+        row = rows[i]
+        speed = radii[i] * math.sqrt(row[10] ** 2 + row[11] ** 2 + row[12] ** 2) - (
+            row[7] * normal[0] + row[8] * normal[1] + row[9] * normal[2])
+        if high[i] < speed * soon + margin:
+            most = max(most, speed)
+    return most
+
+
+@compiled
+def fastest(rows: np.ndarray) -> tuple[float, float]:
+    """Fastest spin, rad/s, and the largest difference, m/s, of two bones' speeds along an axis."""
+    spin, closing = 0.0, 0.0
+    for i in range(len(rows)):
+        spin = max(spin, rows[i, 10] ** 2 + rows[i, 11] ** 2 + rows[i, 12] ** 2)
+    for k in range(7, 10):
+        low, high = rows[0, k], rows[0, k]
+        for i in range(len(rows)):
+            low, high = min(low, rows[i, k]), max(high, rows[i, k])
+        closing = max(closing, high - low)
+    return math.sqrt(spin), closing
