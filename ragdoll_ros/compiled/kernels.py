@@ -603,3 +603,58 @@ def fastest(rows: np.ndarray) -> tuple[float, float]:
             low, high = min(low, rows[i, k]), max(high, rows[i, k])
         closing = max(closing, high - low)
     return math.sqrt(spin), closing
+
+
+@compiled
+def limits(places: np.ndarray, bounds: np.ndarray, q: np.ndarray, v: np.ndarray,
+           past: np.ndarray, speeds: np.ndarray) -> float:
+    """How far past their limits angles are, and how fast they move toward them; gives the most."""
+    most = -math.inf
+    for i in range(len(past)):
+        angle, rate = q[places[0, i]], v[places[1, i]]
+        upper, lower = angle - bounds[1, i], bounds[0, i] - angle
+        past[i] = max(upper, lower)
+        speeds[i] = rate if upper > lower else -rate
+        most = max(most, past[i])
+    return most
+
+
+@compiled
+def press(past: np.ndarray, speeds: np.ndarray, duration: float, near: float,
+          held: np.ndarray) -> bool:
+    """Whether a joint presses against its limit; see JointLimits."""
+    found = False
+    for i in range(len(past)):
+        ahead = past[i] + speeds[i] * duration
+        held[i] = held[i] and past[i] > -near
+        found |= held[i] or past[i] > near or ahead > near or (past[i] >= -near and speeds[i] > 0)
+    return found
+
+
+@compiled
+def approach(past: np.ndarray, speeds: np.ndarray, soon: float) -> float:
+    """Fastest speed of what reaches its limit soon."""
+    most = 0.0
+    for i in range(len(past)):
+        if past[i] + soon * speeds[i] > 0:
+            most = max(most, speeds[i])
+    return most
+
+
+@compiled
+def near_ground(radii: np.ndarray, margin: float, duration: float, gained: float, first: np.ndarray,
+                rows: np.ndarray, high: np.ndarray, out: np.ndarray) -> bool:
+    """Which dolls (d,), whose bones are those from ``first`` (d + 1,) on, may touch the ground
+    within ``duration`` s, at twice the speed of their fastest point, and ``gained`` m/s.
+    """
+    some = False
+    for d in range(len(out)):
+        speed, low = 0.0, math.inf
+        for i in range(first[d], first[d + 1]):
+            row = rows[i]
+            speed = max(speed, math.sqrt(row[7] ** 2 + row[8] ** 2 + row[9] ** 2)
+                        + radii[i] * math.sqrt(row[10] ** 2 + row[11] ** 2 + row[12] ** 2))
+            low = min(low, high[i])
+        out[d] = low < 2 * duration * (speed + gained) + margin
+        some |= out[d]
+    return some
