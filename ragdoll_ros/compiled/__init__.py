@@ -25,6 +25,9 @@ SWITCH = 'RAGDOLL_COMPILED'
 READY = os.environ.get(SWITCH, '1') != '0' and importlib.util.find_spec('numba') is not None
 """Whether compiled code is used."""
 
+ORDER = 8
+"""Of the method that flies then."""
+
 
 def dynamics_of(scene: Scene, make_engine: type[Engine]) -> Dynamics:
     """The equations of motion of a scene in the air."""

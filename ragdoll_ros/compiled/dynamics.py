@@ -105,7 +105,8 @@ class Step:
 class Path:
     """A flight from ``start`` on, gone step by step as far as it is asked for.
 
-    Steps are as long as their error stays below ``tolerance`` (m or rad), at most ``longest`` s.
+    Steps are as long as their error stays below ``tolerance`` (m or rad), at most ``longest`` s;
+    just that with an infinite tolerance.
     """
 
     duration = math.inf
@@ -114,7 +115,8 @@ class Path:
                  fastest: float, loads: Sequence[Load] = ()) -> None:
         self._dynamics, self._loads = dynamics, _packed(loads)
         self._tolerance, self._longest = tolerance, longest
-        self._try = min(longest, FIRST_TURN / max(fastest, 1e-9))
+        first = longest if math.isinf(tolerance) else FIRST_TURN / max(fastest, 1e-9)
+        self._try = min(longest, first)
         self._steps: list[tuple[float, Step]] = []
         """What was gone, each with its beginning, s, back to what was asked for last."""
         self._end, self._end_at, self._asked = start, 0.0, 0.0
