@@ -237,10 +237,9 @@ class Stepper:
             ahead = self._ahead(begin + stretch)
             if ahead is None:
                 return flown
-            if not self.accuracy.land:
-                if self._limits.furthest(ahead) > 0:
-                    self._limits.hold(ahead)
-                    return flown
+            if not self.accuracy.land and self._limits.furthest(ahead) > 0:
+                self._limits.hold(ahead)
+                return flown
             self._fly_to(ahead)
             room = self._room()
             if room >= 0 and not self.touching:
@@ -301,13 +300,12 @@ class Stepper:
             time = (early * below - late * above) / (below - above)
             coordinates = self._path.at(begin + time)
             if grounded:
-                self._fly_to(coordinates)
+                self._set(coordinates)
                 off = self._room() + LANDED / 2
             else:
                 off = LANDED / 2 - self._limits.furthest(coordinates)
             if abs(off) <= LANDED / 2:
-                if not grounded:
-                    self._fly_to(coordinates)
+                self._fly_to(coordinates)
                 return time
             # Regula falsi, by halves where one end stays (Dowell and Jarratt, BIT 11, 1971).
             if off * below < 0:
@@ -370,9 +368,9 @@ class Stepper:
         self.settle()
         near = self._near(duration, loads)
         start, state, touching = self.coordinates, self.state, self.touching
-        far = self._too_far()
-        bounds = [max(1.0, self.accuracy.creep * part) for part in far]
-        self.engine.be_thorough(max(far) > 1)
+        far, deep = self._too_far()
+        self.engine.be_thorough(far > 1 or deep > 1)
+        far, deep = max(1.0, self.accuracy.creep * far), max(1.0, self.accuracy.creep * deep)
         substeps = self._substeps(duration, bool(loads))
         self._blocked = False
         most = max(1, math.ceil(self.accuracy.most * duration / self._span))
@@ -380,7 +378,8 @@ class Stepper:
         watch = bool(near) and not any(a != b for a, b in touching)
         while True:
             touched = self._run(duration, substeps, loads, watch)
-            past, sunk = np.divide(self._too_far(), bounds)
+            past, sunk = self._too_far()
+            past, sunk = past / far, sunk / deep
             over = max(past, sunk)
             finest = substeps >= most or over > HELPED * last
             if over <= 1 or (finest and (slips or sunk <= max(1.0, past))):
