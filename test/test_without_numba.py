@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -19,7 +20,7 @@ for name in ('flight', 'drop'):
     with Simulation(load_scene(name)) as simulation:
         simulation.grab('hand', 'head')
         simulation.push(Push('torso', force=(100, 0, 50), duration=0.05))
-        for tick in range(40):
+        for tick in range(10):
             if tick == 5:
                 simulation.let_go('hand')
             state = simulation.advance()
@@ -48,6 +49,27 @@ def test_the_switch_turns_it_off():
 @pytest.mark.parametrize('switch', ['', '1'])
 def test_it_does_without_numba(switch):
     assert told(GONE + FALL, RAGDOLL_COMPILED=switch) == 'False False'
+
+
+def test_it_does_with_a_broken_numba(tmp_path):
+    """As where numpy is too new for it: numba is there, and raises ImportError."""
+    (tmp_path / 'numba.py').write_text("raise ImportError('Numba needs NumPy 2.2 or less')\n")
+    code = f'import sys; sys.path.insert(0, {str(tmp_path)!r})\n' + FALL
+    assert told(code, RAGDOLL_COMPILED='1') == 'False False'
+
+
+def test_it_does_where_nothing_can_be_kept(tmp_path):
+    """As for a user without a home, the package being another's: numba finds no place for its
+    cache, and raises RuntimeError. A file stands here where the folders were to be.
+    """
+    pytest.importorskip('numba', reason='numba is not installed')
+    package = tmp_path / 'ragdoll_ros'
+    shutil.copytree(ROOT / 'ragdoll_ros', package, ignore=shutil.ignore_patterns('__pycache__'))
+    (package / 'config').symlink_to(ROOT / 'config')
+    (package / 'compiled' / '__pycache__').write_text('')
+    code = f'import sys; sys.path.insert(0, {str(tmp_path)!r})\n' + FALL
+    told(code, HOME='/dev/null', XDG_CACHE_HOME='/dev/null', PYTHONDONTWRITEBYTECODE='1',
+         RAGDOLL_COMPILED='1')
 
 
 def test_it_is_used_where_it_is():
