@@ -292,7 +292,7 @@ def test_what_takes_too_many_steps_is_no_path(rate):
     scene = scene_of(every_kind())
     path = CompiledDynamics(scene).path(random_coordinates(scene, 0, rate), .05, EXACT, 3 * rate)
     assert path.at(.01) is None
-    assert path.count < 100
+    assert path.count < 1000
 
 
 def test_rounding_does_not_end_a_path():
@@ -320,7 +320,7 @@ def test_what_is_no_number_is_no_path(where):
     start.v[where] = math.nan
     path = CompiledDynamics(scene).path(start, .05, NORMAL, 10.0)
     assert path.at(.01) is None
-    assert path.count < 100
+    assert path.count < 1000
 
 
 @pytest.mark.parametrize('force, damping', [(1e10, 0), (1e200, 0), (0, 1e3), (0, 1e9)])
@@ -336,7 +336,7 @@ def test_a_step_that_breaks_down_is_not_taken(force, damping):
     load = Load(1, np.array([force, 0, 0]), np.zeros(3), np.array([0, .01, 0]))
     path = CompiledDynamics(scene).path(start, .05, NORMAL, .5, [load])
     end = path.at(.01)
-    assert path.count < 100
+    assert path.count < 1000
     assert end is None or np.isfinite(np.concatenate([end.q, end.v])).all()
 
 
