@@ -547,7 +547,7 @@ def tick_by_tick(name, ticks):
             lowest = min(lowest, motion.energy[0])
             rows.append(np.concatenate([state.positions, state.orientations], axis=1).tolist())
             told.append(simulation.measures())
-    told = {'ready': compiled.READY, 'rows': rows, 'excess': excess, 'measures': told}
+    told = {'ready': compiled.ready(), 'rows': rows, 'excess': excess, 'measures': told}
     return told, scene, start
 
 
@@ -572,7 +572,7 @@ def test_a_flight_is_the_same_compiled_or_not(plainly, monkeypatch):
     The plain one errs as it says in each tick, and what it errs grows with the motion; a bone of
     5 cm that twists against its damping errs by 3e-5 rad about its middle.
     """
-    monkeypatch.setattr(compiled, 'READY', True)
+    monkeypatch.setattr(compiled, 'ready', lambda: True)
     (found, scene, start), plain = tick_by_tick('flight', 28), plainly['flight']
     assert all(told['error_trusted'] for told in found['measures'] + plain['measures'])
     assert max(told['error_estimate_m'] for told in found['measures']) < 1e-12
@@ -604,7 +604,7 @@ def test_a_long_tick_is_flown_as_well_as_a_short_one(accuracy, monkeypatch):
 
     The tolerance is each step's; 100 times that is what many, and chaos, may make of it in 0.4 s.
     """
-    monkeypatch.setattr(compiled, 'READY', True)
+    monkeypatch.setattr(compiled, 'ready', lambda: True)
     tolerance = max(resolve_accuracy(accuracy).flight_error, 1e-14)
     for tick in (.01, .1, .2):
         with Simulation(FREE, step=tick, accuracy=accuracy) as simulation:
@@ -618,7 +618,7 @@ def test_a_long_tick_is_flown_as_well_as_a_short_one(accuracy, monkeypatch):
 @pytest.mark.parametrize('ready', [True, False], ids=['compiled', 'plain'])
 def test_a_fall_is_plausible_compiled_or_not(ready, plainly, monkeypatch):
     """Bounds are those of the whole: 0.1 % of the energy, 1 cm, 5 degrees."""
-    monkeypatch.setattr(compiled, 'READY', True)
+    monkeypatch.setattr(compiled, 'ready', lambda: True)
     found = tick_by_tick('fall', 100)[0] if ready else plainly['fall']
     assert np.isfinite(found['rows']).all()
     assert max(found['excess']) < 1e-3

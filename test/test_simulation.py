@@ -500,7 +500,7 @@ def test_the_error_estimate_in_flight_is_that_of_a_far_finer_flight(accuracy):
                 assert figures['error_estimate_m'] < 3e-13
     ratios = np.array(ratios)
     assert trusted >= 10
-    assert compiled.READY or len(ratios) == trusted
+    assert compiled.ready() or len(ratios) == trusted
     if len(ratios):
         assert np.mean((ratios > 1 / 3) & (ratios < 3)) >= 0.9
 

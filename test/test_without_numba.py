@@ -27,7 +27,7 @@ for name in ('flight', 'drop'):
         assert np.isfinite(state.rows).all()
         assert all(np.isfinite(value) for value in simulation.measures().values())
 import sys
-print(compiled.READY, sys.modules.get('numba') is not None)
+print(compiled.ready(), sys.modules.get('numba') is not None)
 """
 GONE = "import sys; sys.modules['numba'] = None\n"
 

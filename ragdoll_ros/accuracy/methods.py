@@ -140,7 +140,7 @@ def ours(accuracy: str | Accuracy, name: str | None = None) -> Method:
     """Our simulation at one of its settings, or with settings of one's own."""
     name = name or f'ours-{accuracy}'
     order = (ACCURACIES[accuracy] if isinstance(accuracy, str) else accuracy).order
-    order = compiled.ORDER if order and compiled.READY else order or 1
+    order = compiled.ORDER if order and compiled.ready() else order or 1
     return Method(name, name.replace('-', ' '), 'ours', functools.partial(
         Ours, accuracy=accuracy), order=order)
 

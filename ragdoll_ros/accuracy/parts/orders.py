@@ -37,7 +37,7 @@ def methods() -> list[Method]:
     mine = [ours(dataclasses.replace(setting, longest=0.0, flight_error=math.inf), f'ours-{name}')
             for name, setting in ACCURACIES.items()]
     # compiled, the settings differ in the steps alone
-    return [*(mine[-1:] if compiled.READY else mine), bullet(1),
+    return [*(mine[-1:] if compiled.ready() else mine), bullet(1),
             *(mujoco(name, 1) for name in ('euler', 'implicitfast', 'rk4'))]
 
 
