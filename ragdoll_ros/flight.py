@@ -17,7 +17,7 @@ from typing import Protocol
 
 import numpy as np
 
-from .coordinates import Coordinates
+from .coordinates import Coordinates, Layout
 from .engine.protocol import Engine, Load
 from .mechanics import damping_rate
 from .scene import Scene
@@ -76,8 +76,9 @@ class EngineDynamics:
 
     keeps_momentum = cheap = False
 
-    def __init__(self, scene: Scene, make_engine: type[Engine]) -> None:
+    def __init__(self, scene: Scene, make_engine: type[Engine], layout: Layout) -> None:
         self._engine: Engine | None = None
+        self._layout = layout
         self._make = functools.partial(make_engine, scene, free=True)
         self._fading = damping_rate(scene)
 
@@ -99,7 +100,7 @@ class EngineDynamics:
 
     def moved(self, coordinates: Coordinates, way: np.ndarray) -> Coordinates:
         """Give the coordinates after a small way (nv,) m and rad in the directions of v."""
-        return self.engine.layout.moved(coordinates, way)
+        return self._layout.moved(coordinates, way)
 
     def longest(self, accuracy: Accuracy, fastest: float) -> float:
         """Longest path, s, that speeds and damping allow."""

@@ -53,13 +53,14 @@ class Accuracy:
     momentum: bool = True
     """Keep the momentum of what is in the air."""
     centred: bool = True
-    """Moves what slides and rolls evenly by the mean of its velocities."""
+    """Move single bodies that slide and roll evenly by the mean of their velocities. Dolls err by
+    blows, not by this."""
     sleep: bool = True
     """Stop the engine when all is at rest."""
 
 
 DRAFT = Accuracy(turn=0.3, limit=0.15, contact=3, settled=2, sink=0.009, most=46, order=3,
-                 flight_turn=0.4, flight_error=1e-9, land=False, redo=math.radians(6))
+                 flight_turn=0.4, flight_error=1e-10, land=False, redo=math.radians(6))
 NORMAL = Accuracy(turn=0.1, limit=0.06, contact=4, settled=3, sink=0.004, most=128, order=4,
                   flight_turn=0.2, flight_error=1e-11, redo=math.radians(2.5))
 EXACT = Accuracy(turn=0.04, limit=0.03, contact=6, settled=4, sink=0.0015, most=256, order=4,

@@ -88,13 +88,14 @@ class Stepper:
                  accuracy: Accuracy) -> None:
         self._accuracy = accuracy
         self.engine = make_engine(scene)
-        self.dynamics = compiled.dynamics_of(scene, make_engine)
+        self.dynamics = compiled.dynamics_of(scene, make_engine, self.engine.layout)
         self.reach = compiled.reach_of(scene)
         self._layout = self.engine.layout
         self._limits = compiled.limits_of(self._layout)
         counts = np.cumsum([0, *(len(placement.doll.bones) for placement in scene.dolls)])
         self._roots = np.array([start + placement.doll.bones.index(placement.doll.root)
                                 for start, placement in zip(counts[:-1], scene.dolls, strict=True)])
+        self._rigid = len(scene.bones) == len(scene.dolls)
         self._solid = bool(scene.ground or scene.self_collision or len(scene.dolls) > 1)
         """Whether anything can touch at all."""
         self._fading = damping_rate(scene)
@@ -396,7 +397,8 @@ class Stepper:
                 substeps, last = min(most, 4 * substeps), over
         if slips:
             self.engine.be_slippery(False)
-        if self.accuracy.centred and touching and self._went_evenly(state, duration):
+        if (self._rigid and self.accuracy.centred and touching
+                and self._went_evenly(state, duration)):
             self._centre(start, duration / substeps)
         return Piece(duration, duration / substeps, touched if watch else near)
 

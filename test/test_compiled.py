@@ -184,7 +184,9 @@ def test_acceleration_is_that_of_jacobians_and_of_the_engine(scene, seed, loaded
     loads = random_loads(scene, seed) if loaded else []
     forces, torques = wrenches(scene, loads, truth(scene, placed))
     found = CompiledDynamics(scene).acceleration(placed, loads)
-    engine = EngineDynamics(scene, BulletEngine)
+    placing = BulletEngine(scene)
+    engine = EngineDynamics(scene, BulletEngine, placing.layout)
+    placing.close()
     asked = engine.acceleration(placed, loads)
     engine.close()
     bone = first = 0

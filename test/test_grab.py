@@ -126,7 +126,7 @@ def test_mobility_is_that_of_a_rigid_body():
     with Simulation(scene) as simulation:
         for _ in range(7):
             state = simulation.advance()
-        dynamics = compiled.dynamics_of(scene, BulletEngine)
+        dynamics = compiled.dynamics_of(scene, BulletEngine, simulation._stepper.engine.layout)
         point = np.array((0.05, -0.1, 0.2))
         got = mobility(dynamics, simulation.coordinates, 0, point)
         dynamics.close()

@@ -41,13 +41,13 @@ def ready() -> bool:
     return True
 
 
-def dynamics_of(scene: Scene, make_engine: type[Engine]) -> Dynamics:
+def dynamics_of(scene: Scene, make_engine: type[Engine], layout: Layout) -> Dynamics:
     """The equations of motion of a scene in the air."""
     if ready():
         from .dynamics import CompiledDynamics
         return CompiledDynamics(scene)
     from ..flight import EngineDynamics
-    return EngineDynamics(scene, make_engine)
+    return EngineDynamics(scene, make_engine, layout)
 
 
 def mechanics_of(scene: Scene) -> Mechanics:
