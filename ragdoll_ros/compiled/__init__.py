@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -21,7 +22,19 @@ if TYPE_CHECKING:
 SWITCH = 'RAGDOLL_COMPILED'
 """Variable of the environment that, set to 0, lets numba be."""
 
-READY = os.environ.get(SWITCH, '1') != '0' and importlib.util.find_spec('numba') is not None
+
+def _ready() -> bool:
+    if os.environ.get(SWITCH, '1') == '0' or importlib.util.find_spec('numba') is None:
+        return False
+    try:
+        from . import cache  # noqa: F401
+    except (ImportError, OSError) as error:  # a numba that is too old for numpy says so this way
+        print(f'Going on without compiled code: {error}', file=sys.stderr)
+        return False
+    return True
+
+
+READY = _ready()
 """Whether compiled code is used."""
 
 

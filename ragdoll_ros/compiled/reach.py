@@ -8,7 +8,7 @@ import numpy as np
 from ..reach import MARGIN, Reach
 from ..scene import Scene
 from ..state import State
-from . import kernels
+from .ready import kernels
 
 
 class CompiledReach(Reach):
