@@ -22,9 +22,6 @@ from .scene import Scene
 from .settings import HUMAN, Accuracy
 from .state import State
 
-AT_LIMIT = 1e-3
-"""rad: a joint as near as this to its limit, and moving toward it, is at the limit."""
-
 SOON = 0.015
 """s ahead that limits and ground are looked for."""
 
@@ -91,6 +88,7 @@ class Stepper:
         self.dynamics = compiled.dynamics_of(scene, make_engine)
         self.reach = compiled.reach_of(scene)
         self._layout = self.engine.layout
+        self._limits = compiled.limits_of(self._layout)
         counts = np.cumsum([0, *(len(placement.doll.bones) for placement in scene.dolls)])
         self._roots = np.array([start + placement.doll.bones.index(placement.doll.root)
                                 for start, placement in zip(counts[:-1], scene.dolls, strict=True)])
@@ -106,8 +104,6 @@ class Stepper:
         """Whether the engine has yet to hear of a shift."""
         self._blocked: bool
         """Whether something that no flight can foresee comes next: bones that meet."""
-        self._held: np.ndarray
-        """(k,) whether a flight ended at this limit and the joint has leaned on it since."""
         self._departure: Coordinates
         """Where the tick began."""
         self._flown: list[tuple[float, Sequence[Load]]] | None
@@ -149,9 +145,8 @@ class Stepper:
         self.settle()
         self._blocked = False
         self._path = None
-        self._past_at = (None, np.zeros(0))
         self._flown = None
-        self._held = np.zeros(len(self._layout.limits[0]), bool)
+        self._limits.forget()
         self.look()
 
     def place(self, coordinates: Coordinates) -> None:
@@ -170,10 +165,9 @@ class Stepper:
             q[layout.root_orientations] = rotation.multiply(turn, q[layout.root_orientations])
         v[layout.root_velocities] = state.linear[self._roots]
         v[layout.root_spins] = state.angular[self._roots]
-        past = self._past_at[1] if self._past_at[0] is self.coordinates else None
+        before = self.coordinates
         self.coordinates, self.state, self._stale = Coordinates(q, v), state, True
-        if past is not None:
-            self._past_at = (self.coordinates, past)
+        self._limits.same(before, self.coordinates)
 
     def settle(self) -> Engine:
         """Give the engine, with the dolls in it where they are."""
@@ -223,16 +217,7 @@ class Stepper:
         if (not self.accuracy.order or self.touching or self._blocked
                 or self.effort.flights >= self._most_flights):
             return False
-        past = self._past()
-        if not len(past):
-            return True
-        speeds = self._layout.limit_speeds(self.coordinates)
-        ahead = past if self.accuracy.land else past + speeds * duration
-        if ahead.max() < -AT_LIMIT:
-            return True
-        self._held &= past > -AT_LIMIT
-        pressing = (past >= -AT_LIMIT) & (speeds > 0)
-        return not (self._held | pressing | (past > AT_LIMIT) | (ahead > AT_LIMIT)).any()
+        return not self._limits.press(self.coordinates, 0.0 if self.accuracy.land else duration)
 
     def _fly(self, duration: float, loads: Sequence[Load]) -> float:
         """Fly up to ``duration`` s; give the time flown, 0 where something comes in between."""
@@ -252,18 +237,16 @@ class Stepper:
             ahead = self._ahead(begin + stretch)
             if ahead is None:
                 return flown
-            if not self.accuracy.land:
-                past = self._layout.past_limits(ahead.q) > 0
-                if past.any():
-                    self._held |= past
-                    return flown
+            if not self.accuracy.land and self._limits.furthest(ahead) > 0:
+                self._limits.hold(ahead)
+                return flown
             self._fly_to(ahead)
             room = self._room()
             if room >= 0 and not self.touching:
                 flown += stretch
                 self._along += stretch
                 continue
-            self._held |= self._past() > 0
+            self._limits.hold(self.coordinates)
             early, least = stretch, self._room(start, state)
             if room < 0:
                 early = self._land(begin, stretch, least, room) if least > 0 else 0.0
@@ -317,13 +300,12 @@ class Stepper:
             time = (early * below - late * above) / (below - above)
             coordinates = self._path.at(begin + time)
             if grounded:
-                self._fly_to(coordinates)
+                self._set(coordinates)
                 off = self._room() + LANDED / 2
             else:
-                off = LANDED / 2 - float(self._layout.past_limits(coordinates.q).max())
+                off = LANDED / 2 - self._limits.furthest(coordinates)
             if abs(off) <= LANDED / 2:
-                if not grounded:
-                    self._fly_to(coordinates)
+                self._fly_to(coordinates)
                 return time
             # Regula falsi, by halves where one end stays (Dowell and Jarratt, BIT 11, 1971).
             if off * below < 0:
@@ -368,13 +350,12 @@ class Stepper:
 
     def _room(self, coordinates: Coordinates | None = None, state: State | None = None) -> float:
         """Room (rad or m) to the nearest limit or the ground; below zero: past it."""
-        past = self._layout.past_limits(coordinates.q) if coordinates else self._past()
-        room = -float(past.max()) if len(past) else math.inf
+        room = -self._limits.furthest(coordinates or self.coordinates)
         return min(room, self.reach.clearance(state or self.state))
 
     def _fastest(self) -> float:
         """Fastest turning, rad/s, of a bone or about a limited axis."""
-        return max(self.reach.spin(self.state), np.abs(self.coordinates.v[self._layout.limited[1]]).max(initial=0.0))
+        return max(self.reach.spin(self.state), self._limits.fastest(self.coordinates))
 
     def _step(self, duration: float, loads: Sequence[Load]) -> Piece:
         """Take the engine's own step, finer where that overshoots less.
@@ -387,9 +368,9 @@ class Stepper:
         self.settle()
         near = self._near(duration, loads)
         start, state, touching = self.coordinates, self.state, self.touching
-        far = self._too_far()
-        bounds = [max(1.0, self.accuracy.creep * part) for part in far]
-        self.engine.be_thorough(max(far) > 1)
+        far, deep = self._too_far()
+        self.engine.be_thorough(far > 1 or deep > 1)
+        far, deep = max(1.0, self.accuracy.creep * far), max(1.0, self.accuracy.creep * deep)
         substeps = self._substeps(duration, bool(loads))
         self._blocked = False
         most = max(1, math.ceil(self.accuracy.most * duration / self._span))
@@ -397,7 +378,8 @@ class Stepper:
         watch = bool(near) and not any(a != b for a, b in touching)
         while True:
             touched = self._run(duration, substeps, loads, watch)
-            past, sunk = np.divide(self._too_far(), bounds)
+            past, sunk = self._too_far()
+            past, sunk = past / far, sunk / deep
             over = max(past, sunk)
             finest = substeps >= most or over > HELPED * last
             if over <= 1 or (finest and (slips or sunk <= max(1.0, past))):
@@ -419,16 +401,9 @@ class Stepper:
         return self.reach.near(self.state, duration, self._gravity + pull / self._lightest,
                                self.touching)
 
-    def _past(self) -> np.ndarray:
-        """Angles (k,) rad by which the limited joints are past their limits now; kept."""
-        if self._past_at[0] is not self.coordinates:
-            past = self._layout.past_limits(self.coordinates.q)
-            self._past_at = (self.coordinates, past)
-        return self._past_at[1]
-
     def _too_far(self) -> tuple[float, float]:
         """Tell how far past a limit and in the ground, in units of what is put up with."""
-        past = float(self._past().max(initial=0.0))
+        past = max(0.0, self._limits.furthest(self.coordinates))
         sunk = -self.reach.clearance(self.state)
         return past / self.accuracy.redo, sunk / self.accuracy.sink
 
@@ -461,11 +436,7 @@ class Stepper:
         spin = self.reach.spin(state)
         need = max(1.0, spin * duration / accuracy.turn, 4.0 * tens if pushed else 0.0,
                    self._fading * duration / STIFFEST)
-        speeds = self._layout.limit_speeds(self.coordinates)
-        if len(speeds):
-            past = self._past()
-            near = speeds[past + SOON * speeds > 0]
-            need = max(need, near.max(initial=0.0) * duration / accuracy.limit)
+        need = max(need, self._limits.approach(self.coordinates, SOON) * duration / accuracy.limit)
         falling = self.reach.falling(state, SOON)
         if self.touching or falling or self._blocked:
             moving = falling > 0.3 or spin > 1.0 or self._blocked

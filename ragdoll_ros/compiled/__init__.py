@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ..engine.protocol import Engine
     from ..flight import Dynamics
     from ..guard import Guard
+    from ..limits import JointLimits
     from ..mechanics import Mechanics
     from ..reach import Reach
     from ..scene import Scene
@@ -63,6 +64,15 @@ def guard_of(scene: Scene, mechanics: Mechanics, layout: Layout) -> Guard:
         return CompiledGuard(scene, mechanics, layout)
     from ..guard import Guard
     return Guard(scene, mechanics, layout)
+
+
+def limits_of(layout: Layout) -> JointLimits:
+    """What joint limits have to say."""
+    if READY:
+        from .limits import CompiledLimits
+        return CompiledLimits(layout)
+    from ..limits import JointLimits
+    return JointLimits(layout)
 
 
 def reach_of(scene: Scene) -> Reach:

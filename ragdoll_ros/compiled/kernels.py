@@ -35,32 +35,20 @@ inlined = numba.njit(inline='always', error_model='numpy', fastmath={'contract',
 """The same as a part of what calls it: twice as fast for what is called with many arrays."""
 
 
-@inlined
-def multiply(a: np.ndarray, b: np.ndarray, out: np.ndarray) -> None:
-    """Hamilton product a * b: first b, then a. ``out`` may be one of the two."""
-    x = a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1]
-    y = a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0]
-    z = a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3]
-    w = a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]
-    out[0], out[1], out[2], out[3] = x, y, z, w
-
-
-@inlined
-def rotate(q: np.ndarray, a: np.ndarray, out: np.ndarray) -> None:
-    """The vector a of the body's frame, in the outer frame. ``out`` may be a."""
-    x, y, z, w = q[0], q[1], q[2], q[3]
-    u, v, s = 2 * (y * a[2] - z * a[1]), 2 * (z * a[0] - x * a[2]), 2 * (x * a[1] - y * a[0])
-    out[0], out[1], out[2] = (a[0] + w * u + y * s - z * v, a[1] + w * v + z * u - x * s,
-                              a[2] + w * s + x * v - y * u)
+@compiled
+def times(ax: float, ay: float, az: float, aw: float, bx: float, by: float, bz: float,
+          bw: float) -> tuple[float, float, float, float]:
+    """Hamilton product a * b of two quaternions: first b, then a."""
+    return (aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz)
 
 
 @compiled
-def rotate_back(q: np.ndarray, a: np.ndarray, out: np.ndarray) -> None:
-    """The vector a of the outer frame, in the body's. ``out`` may be a."""
-    x, y, z, w = q[0], q[1], q[2], q[3]
-    u, v, s = 2 * (y * a[2] - z * a[1]), 2 * (z * a[0] - x * a[2]), 2 * (x * a[1] - y * a[0])
-    out[0], out[1], out[2] = (a[0] - w * u + y * s - z * v, a[1] - w * v + z * u - x * s,
-                              a[2] - w * s + x * v - y * u)
+def turned(x: float, y: float, z: float, w: float, a: float, b: float,
+           c: float) -> tuple[float, float, float]:
+    """The vector (a, b, c) of a body's frame in the outer frame; with -w: the other way."""
+    d, e, f = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+    return a + w * d + y * f - z * e, b + w * e + z * d - x * f, c + w * f + x * e - y * d
 
 
 @compiled
@@ -71,25 +59,14 @@ def cross(ax: float, ay: float, az: float, bx: float, by: float,
 
 
 @compiled
-def to_matrix(q: np.ndarray, out: np.ndarray) -> None:
+def to_matrix(x: float, y: float, z: float, w: float, out: np.ndarray) -> None:
     """Rotation matrix (3, 3) of a quaternion."""
-    x, y, z, w = q[0], q[1], q[2], q[3]
     out[0, 0] = x * x - y * y - z * z + w * w
     out[1, 1] = y * y - x * x - z * z + w * w
     out[2, 2] = z * z - x * x - y * y + w * w
     out[0, 1], out[1, 0] = 2 * (x * y - z * w), 2 * (x * y + z * w)
     out[0, 2], out[2, 0] = 2 * (x * z + y * w), 2 * (x * z - y * w)
     out[1, 2], out[2, 1] = 2 * (y * z - x * w), 2 * (y * z + x * w)
-
-
-@compiled
-def quaternion_rate(q: np.ndarray, w: np.ndarray, out: np.ndarray) -> None:
-    """Rate of change of a quaternion, the angular velocity being along the body's own axes."""
-    x, y, z, s = q[0] / 2, q[1] / 2, q[2] / 2, q[3] / 2
-    out[0] = s * w[0] + y * w[2] - z * w[1]
-    out[1] = s * w[1] + z * w[0] - x * w[2]
-    out[2] = s * w[2] + x * w[1] - y * w[0]
-    out[3] = -x * w[0] - y * w[1] - z * w[2]
 
 
 @compiled
@@ -114,11 +91,11 @@ def solve(a: np.ndarray, b: np.ndarray) -> None:
         b[j] /= a[j, j]
 
 
-Work = collections.namedtuple('Work', 'turns centres moves axes inertias biases drifts pulls hand')
+Work = collections.namedtuple('Work', 'turns centres moves axes inertias biases drifts pulls matrix')
 """Room for n bones and nv velocities: turns (n, 4) from the bind pose, centres of mass (n, 3) from
 the root, spatial velocities (n, 6), motion subspaces (nv, 6), articulated inertias (n, 6, 6), bias
 forces (n, 6), what is left of an axis' acceleration at dv/dt = 0 (nv, 6), and of each axis the
-inertia times it, the inverse of its own part and the force along it (nv, 8). ``hand`` (6, 6)."""
+inertia times it, the inverse of its own part and the force along it (nv, 8). And a matrix (3, 3)."""
 
 
 @compiled
@@ -126,53 +103,51 @@ def room(bones: int, velocities: int) -> Work:
     """Room to work in."""
     return Work(np.empty((bones, 4)), np.empty((bones, 3)), np.empty((bones, 6)),
                 np.empty((velocities, 6)), np.empty((bones, 6, 6)), np.empty((bones, 6)),
-                np.empty((velocities, 6)), np.empty((velocities, 8)), np.empty((6, 6)))
+                np.empty((velocities, 6)), np.empty((velocities, 8)), np.empty((3, 3)))
 
 
 @compiled
 def pose(tree: np.ndarray, q: np.ndarray, v: np.ndarray, work: Work) -> None:
     """Go from the roots to the leaves: turns, centres, velocities and axes."""
-    t, turn_by = work.hand[0], work.hand[1]
+    turns, centres, moves, axes = work.turns, work.centres, work.moves, work.axes
     for i in range(len(tree)):
-        bone, turn, move = tree[i], work.turns[i], work.moves[i]
-        if bone.parent < 0:
-            for k in range(3):
-                turn_by[k] = -bone.bind[k]
-                work.centres[i, k] = 0.0
-                move[3 + k] = v[bone.v + k]
-            turn_by[3] = bone.bind[3]
-            own = q[bone.q + 3:bone.q + 7]
-            multiply(own, turn_by, turn)
-            rotate(own, v[bone.v + 3:bone.v + 6], move[:3])
+        bone = tree[i]
+        at, rate, up = bone.q, bone.v, bone.parent
+        if up < 0:
+            x, y, z, w = q[at + 3], q[at + 4], q[at + 5], q[at + 6]
+            moves[i, 0], moves[i, 1], moves[i, 2] = turned(
+                x, y, z, w, v[rate + 3], v[rate + 4], v[rate + 5])
+            moves[i, 3], moves[i, 4], moves[i, 5] = v[rate], v[rate + 1], v[rate + 2]
+            centres[i, 0] = centres[i, 1] = centres[i, 2] = 0.0
+            turns[i, 0], turns[i, 1], turns[i, 2], turns[i, 3] = times(
+                x, y, z, w, -bone.bind[0], -bone.bind[1], -bone.bind[2], bone.bind[3])
             continue
-        up = bone.parent
-        turn[:] = work.turns[up]
-        rotate(turn, bone.before, t)
-        x, y, z = (work.centres[up, 0] + t[0], work.centres[up, 1] + t[1],
-                   work.centres[up, 2] + t[2])
+        x, y, z, w = turns[up, 0], turns[up, 1], turns[up, 2], turns[up, 3]
+        a, b, c = turned(x, y, z, w, bone.before[0], bone.before[1], bone.before[2])
+        a, b, c = centres[up, 0] + a, centres[up, 1] + b, centres[up, 2] + c
+        for k in range(6):
+            moves[i, k] = moves[up, k]
         if bone.free:
             # frame * q * frame^-1: the joint's frame is not that of the doll
-            for k in range(3):
-                turn_by[k] = (bone.axes[0, k] * q[bone.q] + bone.axes[1, k] * q[bone.q + 1]
-                              + bone.axes[2, k] * q[bone.q + 2])
-            turn_by[3] = q[bone.q + 3]
-            multiply(turn, turn_by, turn)
-        for k in range(6):
-            move[k] = work.moves[up, k]
-        for d in range(bone.freedoms):
-            axis = work.axes[bone.v + d]
-            rotate(turn, bone.axes[d], axis[:3])
-            axis[3], axis[4], axis[5] = cross(x, y, z, axis[0], axis[1], axis[2])
-            for k in range(6):
-                move[k] += axis[k] * v[bone.v + d]
+            d, e, f = q[at], q[at + 1], q[at + 2]
+            x, y, z, w = times(
+                x, y, z, w, bone.axes[0, 0] * d + bone.axes[1, 0] * e + bone.axes[2, 0] * f,
+                bone.axes[0, 1] * d + bone.axes[1, 1] * e + bone.axes[2, 1] * f,
+                bone.axes[0, 2] * d + bone.axes[1, 2] * e + bone.axes[2, 2] * f, q[at + 3])
+        for k in range(bone.freedoms):
+            d, e, f = bone.axes[k, 0], bone.axes[k, 1], bone.axes[k, 2]
+            sx, sy, sz = turned(x, y, z, w, d, e, f)
+            axes[rate, 0], axes[rate, 1], axes[rate, 2] = sx, sy, sz
+            axes[rate, 3], axes[rate, 4], axes[rate, 5] = cross(a, b, c, sx, sy, sz)
+            for j in range(6):
+                moves[i, j] += axes[rate, j] * v[rate]
             if not bone.free:
-                half = q[bone.q + d] / 2
-                for k in range(3):
-                    turn_by[k] = bone.axes[d, k] * math.sin(half)
-                turn_by[3] = math.cos(half)
-                multiply(turn, turn_by, turn)
-        rotate(turn, bone.after, t)
-        work.centres[i, 0], work.centres[i, 1], work.centres[i, 2] = x + t[0], y + t[1], z + t[2]
+                sine, cosine = math.sin(q[at + k] / 2), math.cos(q[at + k] / 2)
+                x, y, z, w = times(x, y, z, w, d * sine, e * sine, f * sine, cosine)
+            rate += 1
+        turns[i, 0], turns[i, 1], turns[i, 2], turns[i, 3] = x, y, z, w
+        d, e, f = turned(x, y, z, w, bone.after[0], bone.after[1], bone.after[2])
+        centres[i, 0], centres[i, 1], centres[i, 2] = a + d, b + e, c + f
 
 
 @compiled
@@ -184,7 +159,7 @@ def accelerations(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: n
     pose(tree, q, v, work)
     for i in range(len(tree)):
         _inertia(tree[i], work.turns[i], work.centres[i], work.moves[i], work.inertias[i],
-                 work.biases[i], loads, work.hand)
+                 work.biases[i], loads, work.matrix)
     for i in range(len(tree) - 1, -1, -1):
         if tree[i].parent >= 0:
             _inward(tree[i], i, v, work)
@@ -194,29 +169,31 @@ def accelerations(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: n
             for k in range(6):
                 bias[k] = -bias[k]
             solve(work.inertias[i], bias)
+            at, rate = bone.q + 3, bone.v
             x, y, z = cross(move[0], move[1], move[2], move[3], move[4], move[5])
-            out[bone.v] = bias[3] + x + gravity[0]
-            out[bone.v + 1] = bias[4] + y + gravity[1]
-            out[bone.v + 2] = bias[5] + z + gravity[2]
-            rotate_back(q[bone.q + 3:bone.q + 7], bias[:3], out[bone.v + 3:bone.v + 6])
+            out[rate] = bias[3] + x + gravity[0]
+            out[rate + 1] = bias[4] + y + gravity[1]
+            out[rate + 2] = bias[5] + z + gravity[2]
+            out[rate + 3], out[rate + 4], out[rate + 5] = turned(
+                q[at], q[at + 1], q[at + 2], -q[at + 3], bias[0], bias[1], bias[2])
         else:
             _outward(bone, i, work, out)
 
 
 @inlined
 def _inertia(bone: np.record, turn: np.ndarray, centre: np.ndarray, move: np.ndarray,
-             inertia: np.ndarray, bias: np.ndarray, loads: np.ndarray, hand: np.ndarray) -> None:
+             inertia: np.ndarray, bias: np.ndarray, loads: np.ndarray, matrix: np.ndarray) -> None:
     """A bone's own inertia, and the force that its motion and loads ask for."""
-    full, turned, t, u = hand[0], hand[1:4], hand[4], hand[5]
-    multiply(turn, bone.bind, full)
-    to_matrix(full, turned)
+    a, b, c, d = times(turn[0], turn[1], turn[2], turn[3], bone.bind[0], bone.bind[1],
+                       bone.bind[2], bone.bind[3])
+    to_matrix(a, b, c, d, matrix)
     x, y, z, mass = centre[0], centre[1], centre[2], bone.mass
     far = mass * (x * x + y * y + z * z)
     for j in range(3):
         for k in range(j, 3):
             value = -mass * centre[j] * centre[k] + (far if j == k else 0.0)
             for e in range(3):
-                value += turned[j, e] * bone.inertia[e] * turned[k, e]
+                value += matrix[j, e] * bone.inertia[e] * matrix[k, e]
             inertia[j, k] = inertia[k, j] = value
             inertia[3 + j, 3 + k] = inertia[3 + k, 3 + j] = mass if j == k else 0.0
         inertia[j, 3 + j] = inertia[3 + j, j] = 0.0
@@ -241,15 +218,12 @@ def _inertia(bone: np.record, turn: np.ndarray, centre: np.ndarray, move: np.nda
     for i in range(len(loads)):
         load = loads[i]
         if load[0] == bone.bone:
-            force, torque = load[1:4], load[4:7]
+            ax, ay, az, nx, ny, nz = load[1], load[2], load[3], load[4], load[5], load[6]
             if load[10] > 0:
-                rotate(full, force, t)
-                rotate(full, torque, u)
-                force, torque = t, u
-            ax, ay, az = force[0], force[1], force[2]
-            nx, ny, nz = torque[0], torque[1], torque[2]
-            rotate(full, load[7:10], t)
-            px, py, pz = cross(x + t[0], y + t[1], z + t[2], ax, ay, az)
+                ax, ay, az = turned(a, b, c, d, ax, ay, az)
+                nx, ny, nz = turned(a, b, c, d, nx, ny, nz)
+            px, py, pz = turned(a, b, c, d, load[7], load[8], load[9])
+            px, py, pz = cross(x + px, y + py, z + pz, ax, ay, az)
             bias[0] -= nx + px
             bias[1] -= ny + py
             bias[2] -= nz + pz
@@ -261,23 +235,22 @@ def _inertia(bone: np.record, turn: np.ndarray, centre: np.ndarray, move: np.nda
 @inlined
 def _inward(bone: np.record, i: int, v: np.ndarray, work: Work) -> None:
     """Hand a bone's inertia and bias on to its parent, through the axes of its joint."""
-    inertia, bias, carrying = work.inertias[i], work.biases[i], work.hand[0]
+    inertia, bias = work.inertias[i], work.biases[i]
     # what carries an axis moves as the bone does but for that axis and those behind it
-    for k in range(6):
-        carrying[k] = work.moves[bone.parent, k] if bone.free else work.moves[i, k]
+    by = bone.parent if bone.free else i
+    wx, wy, wz = work.moves[by, 0], work.moves[by, 1], work.moves[by, 2]
+    vx, vy, vz = work.moves[by, 3], work.moves[by, 4], work.moves[by, 5]
     for d in range(bone.freedoms - 1, -1, -1):
         at = bone.v + d
         axis, drift, pull, rate = work.axes[at], work.drifts[at], work.pulls[at], v[at]
-        if not bone.free:
-            for k in range(6):
-                carrying[k] -= axis[k] * rate
-        wx, wy, wz, vx, vy, vz = (carrying[0], carrying[1], carrying[2], carrying[3], carrying[4],
-                                  carrying[5])
         sx, sy, sz = axis[0] * rate, axis[1] * rate, axis[2] * rate
+        tx, ty, tz = axis[3] * rate, axis[4] * rate, axis[5] * rate
+        if not bone.free:
+            wx, wy, wz, vx, vy, vz = wx - sx, wy - sy, wz - sz, vx - tx, vy - ty, vz - tz
         drift[0], drift[1], drift[2] = cross(wx, wy, wz, sx, sy, sz)
-        x, y, z = cross(vx, vy, vz, sx, sy, sz)
-        sx, sy, sz = cross(wx, wy, wz, axis[3] * rate, axis[4] * rate, axis[5] * rate)
-        drift[3], drift[4], drift[5] = x + sx, y + sy, z + sz
+        sx, sy, sz = cross(vx, vy, vz, sx, sy, sz)
+        tx, ty, tz = cross(wx, wy, wz, tx, ty, tz)
+        drift[3], drift[4], drift[5] = sx + tx, sy + ty, sz + tz
         own, force = 0.0, -bone.damping * rate
         for j in range(6):
             value = 0.0
@@ -328,11 +301,12 @@ def rates(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarra
         bone = tree[i]
         at, rate = bone.q, bone.v
         if bone.parent < 0:
-            for k in range(3):
-                out[at + k] = v[rate + k]
+            out[at], out[at + 1], out[at + 2] = v[rate], v[rate + 1], v[rate + 2]
             at, rate = at + 3, rate + 3
         if bone.free:
-            quaternion_rate(q[at:at + 4], v[rate:rate + 3], out[at:at + 4])
+            out[at], out[at + 1], out[at + 2], out[at + 3] = times(
+                q[at], q[at + 1], q[at + 2], q[at + 3], v[rate] / 2, v[rate + 1] / 2,
+                v[rate + 2] / 2, 0.0)
         else:
             for k in range(bone.freedoms):
                 out[at + k] = v[rate + k]
@@ -355,11 +329,10 @@ def turn_spins(tree: np.ndarray, q: np.ndarray, v: np.ndarray, inward: bool) -> 
     """Turn roots' angular velocities in v from the world's axes to their own, or back."""
     for i in range(len(tree)):
         if tree[i].parent < 0:
-            turn, spin = q[tree[i].q + 3:tree[i].q + 7], v[tree[i].v + 3:tree[i].v + 6]
-            if inward:
-                rotate_back(turn, spin, spin)
-            else:
-                rotate(turn, spin, spin)
+            at, rate = tree[i].q + 3, tree[i].v + 3
+            w = -q[at + 3] if inward else q[at + 3]
+            v[rate], v[rate + 1], v[rate + 2] = turned(
+                q[at], q[at + 1], q[at + 2], w, v[rate], v[rate + 1], v[rate + 2])
 
 
 @compiled
@@ -374,7 +347,9 @@ def look(tree: np.ndarray, q: np.ndarray, v: np.ndarray, out: np.ndarray) -> Non
         bone, row, move, centre = tree[i], out[tree[i].bone], work.moves[i], work.centres[i]
         if bone.parent < 0:
             root = bone.q
-        multiply(work.turns[i], bone.bind, row[3:7])
+        turn, bind = work.turns[i], bone.bind
+        row[3], row[4], row[5], row[6] = times(turn[0], turn[1], turn[2], turn[3], bind[0],
+                                               bind[1], bind[2], bind[3])
         x, y, z = cross(move[0], move[1], move[2], centre[0], centre[1], centre[2])
         row[7], row[8], row[9] = move[3] + x, move[4] + y, move[5] + z
         for k in range(3):
@@ -475,7 +450,7 @@ def accelerate(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.n
 def motion(masses: np.ndarray, inertias: np.ndarray, doll_of: np.ndarray, gravity: np.ndarray,
            rows: np.ndarray, out: np.ndarray) -> None:
     """Sums over each doll (d, 20), in the order of Motion's fields, of bones' ``rows`` (n, 13)."""
-    total, turned, spin = np.zeros(len(out)), np.empty((3, 3)), np.empty(3)
+    total, matrix, spin = np.zeros(len(out)), np.empty((3, 3)), np.empty(3)
     out[:] = 0.0
     for i in range(len(rows)):
         sums, mass = out[doll_of[i]], masses[i]
@@ -488,7 +463,7 @@ def motion(masses: np.ndarray, inertias: np.ndarray, doll_of: np.ndarray, gravit
             out[d, 2 + k] /= total[d]
     for i in range(len(rows)):
         sums, mass, row = out[doll_of[i]], masses[i], rows[i]
-        to_matrix(row[3:7], turned)
+        to_matrix(row[3], row[4], row[5], row[6], matrix)
         x, y, z = row[0] - sums[2], row[1] - sums[3], row[2] - sums[4]
         far = mass * (x * x + y * y + z * z)
         for j in range(3):
@@ -496,7 +471,7 @@ def motion(masses: np.ndarray, inertias: np.ndarray, doll_of: np.ndarray, gravit
             for k in range(3):
                 value = 0.0
                 for e in range(3):
-                    value += turned[j, e] * inertias[i, e] * turned[k, e]
+                    value += matrix[j, e] * inertias[i, e] * matrix[k, e]
                 spin[j] += value * row[10 + k]
                 sums[11 + 3 * j + k] += value - mass * (row[j] - sums[2 + j]) * (
                     row[k] - sums[2 + k]) + (far if j == k else 0.0)
@@ -514,12 +489,12 @@ def motion(masses: np.ndarray, inertias: np.ndarray, doll_of: np.ndarray, gravit
 
 @compiled
 def keep_momentum(masses: np.ndarray, doll_of: np.ndarray, gravity: np.ndarray, duration: float,
-                  given: np.ndarray, turned: bool, touched: np.ndarray, before: np.ndarray,
+                  given: np.ndarray, spun: bool, touched: np.ndarray, before: np.ndarray,
                   sums: np.ndarray, rows: np.ndarray) -> None:
     """Give each doll that is not ``touched`` the momentum and the way that it must have, as one
     rigid body; see Guard.momentum_due. Changes its ``sums`` (d, 20) and ``rows`` (n, 13).
 
-    ``given`` (d, 6) are impulse and moment of pushes; not ``turned``: the angular momentum stays.
+    ``given`` (d, 6) are impulse and moment of pushes; not ``spun``: the angular momentum stays.
     """
     change, inertia, spin = np.empty(9), np.empty((3, 3)), np.empty(3)
     for d in range(len(sums)):
@@ -534,11 +509,11 @@ def keep_momentum(masses: np.ndarray, doll_of: np.ndarray, gravity: np.ndarray, 
             change[3 + k] = (due - now[5 + k]) / mass
             gained += (due + now[5 + k]) * change[3 + k]
             now[5 + k] = due
-            spin[k] = old[8 + k] + given[d, 3 + k] - now[8 + k] if turned else 0.0
+            spin[k] = old[8 + k] + given[d, 3 + k] - now[8 + k] if spun else 0.0
             change[6 + k] = spin[k]
             for j in range(3):
                 inertia[j, k] = now[11 + 3 * j + k]
-        if turned:
+        if spun:
             solve(inertia, change[6:9])
             for k in range(3):
                 gained += (2 * now[8 + k] + spin[k]) * change[6 + k]
@@ -566,11 +541,11 @@ def heights(sizes: np.ndarray, normal: np.ndarray, offset: float, rows: np.ndarr
     """Heights (n,) of the bones' lowest points over the ground; gives the least. ``sizes`` (n, 6)
     are those of Reach.
     """
-    least, down = math.inf, np.empty(3)
+    least = math.inf
     for i in range(len(rows)):
         row, size = rows[i], sizes[i]
-        rotate_back(row[3:7], normal, down)
-        x, y, z = abs(down[0]), abs(down[1]), abs(down[2])
+        x, y, z = turned(row[3], row[4], row[5], -row[6], normal[0], normal[1], normal[2])
+        x, y, z = abs(x), abs(y), abs(z)
         out[i] = (row[0] * normal[0] + row[1] * normal[1] + row[2] * normal[2] - offset
                   - size[0] * x - size[1] * y - (size[2] + size[3]) * z - size[4]
                   - size[5] * math.sqrt(max(0.0, 1 - z * z)))
@@ -604,3 +579,58 @@ def fastest(rows: np.ndarray) -> tuple[float, float]:
             low, high = min(low, rows[i, k]), max(high, rows[i, k])
         closing = max(closing, high - low)
     return math.sqrt(spin), closing
+
+
+@compiled
+def limits(places: np.ndarray, bounds: np.ndarray, q: np.ndarray, v: np.ndarray,
+           past: np.ndarray, speeds: np.ndarray) -> float:
+    """How far past their limits angles are, and how fast they move toward them; gives the most."""
+    most = -math.inf
+    for i in range(len(past)):
+        angle, rate = q[places[0, i]], v[places[1, i]]
+        upper, lower = angle - bounds[1, i], bounds[0, i] - angle
+        past[i] = max(upper, lower)
+        speeds[i] = rate if upper > lower else -rate
+        most = max(most, past[i])
+    return most
+
+
+@compiled
+def press(past: np.ndarray, speeds: np.ndarray, duration: float, near: float,
+          held: np.ndarray) -> bool:
+    """Whether a joint presses against its limit; see JointLimits."""
+    found = False
+    for i in range(len(past)):
+        ahead = past[i] + speeds[i] * duration
+        held[i] = held[i] and past[i] > -near
+        found |= held[i] or past[i] > near or ahead > near or (past[i] >= -near and speeds[i] > 0)
+    return found
+
+
+@compiled
+def approach(past: np.ndarray, speeds: np.ndarray, soon: float) -> float:
+    """Fastest speed of what reaches its limit soon."""
+    most = 0.0
+    for i in range(len(past)):
+        if past[i] + soon * speeds[i] > 0:
+            most = max(most, speeds[i])
+    return most
+
+
+@compiled
+def near_ground(radii: np.ndarray, margin: float, duration: float, gained: float, first: np.ndarray,
+                rows: np.ndarray, high: np.ndarray, out: np.ndarray) -> bool:
+    """Which dolls (d,), whose bones are those from ``first`` (d + 1,) on, may touch the ground
+    within ``duration`` s, at twice the speed of their fastest point, and ``gained`` m/s.
+    """
+    some = False
+    for d in range(len(out)):
+        speed, low = 0.0, math.inf
+        for i in range(first[d], first[d + 1]):
+            row = rows[i]
+            speed = max(speed, math.sqrt(row[7] ** 2 + row[8] ** 2 + row[9] ** 2)
+                        + radii[i] * math.sqrt(row[10] ** 2 + row[11] ** 2 + row[12] ** 2))
+            low = min(low, high[i])
+        out[d] = low < 2 * duration * (speed + gained) + margin
+        some |= out[d]
+    return some

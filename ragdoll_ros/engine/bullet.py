@@ -127,7 +127,17 @@ class BulletEngine:
 
     def coordinates(self) -> Coordinates:
         """Generalised coordinates of all dolls."""
-        return self.look()[1]
+        q: list[float] = []
+        v: list[float] = []
+        for doll in self._dolls:
+            position, orientation = pybullet.getBasePositionAndOrientation(doll.body, self._client)
+            linear, angular = pybullet.getBaseVelocity(doll.body, self._client)
+            q += position + orientation
+            v += linear + angular
+            for joint in self._joints(doll):
+                q += joint[0]
+                v += joint[1]
+        return Coordinates(np.array(q), np.array(v))
 
     def look(self) -> tuple[State, Coordinates]:
         """Both at once, in less time."""
