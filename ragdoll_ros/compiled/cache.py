@@ -15,7 +15,7 @@ from pathlib import Path
 import numba
 from numba.core import event
 
-COMPILING = 'Compiling the dynamics: some 15 s, {}'
+COMPILING = 'Compiling the dynamics: 15 s or more, {}'
 ONCE = 'once'
 EVERY_TIME = ('at every start, as no folder to keep the result in can be written to; the variable '
               'NUMBA_CACHE_DIR may name one')
