@@ -53,6 +53,9 @@ class Dynamics(Protocol):
     def acceleration(self, coordinates: Coordinates, loads: Sequence[Load] = ()) -> np.ndarray:
         """Rates of change of ``coordinates.v``."""
 
+    def moved(self, coordinates: Coordinates, way: np.ndarray) -> Coordinates:
+        """Give the coordinates after a small way (nv,) m and rad in the directions of v."""
+
     def longest(self, accuracy: Accuracy, fastest: float) -> float:
         """Longest path, s, where the fastest bone turns with so many rad/s; infinity: any."""
 
@@ -93,6 +96,10 @@ class EngineDynamics:
     def acceleration(self, coordinates: Coordinates, loads: Sequence[Load] = ()) -> np.ndarray:
         """Rates of change of ``coordinates.v``."""
         return self.engine.acceleration(coordinates, loads)
+
+    def moved(self, coordinates: Coordinates, way: np.ndarray) -> Coordinates:
+        """Give the coordinates after a small way (nv,) m and rad in the directions of v."""
+        return self.engine.layout.moved(coordinates, way)
 
     def longest(self, accuracy: Accuracy, fastest: float) -> float:
         """Longest path, s, that speeds and damping allow."""

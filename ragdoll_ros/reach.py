@@ -87,6 +87,12 @@ class Reach:
         low, high = state.linear.min(axis=0), state.linear.max(axis=0)
         return float((high - low).max())
 
+    def change(self, before: State, after: State) -> float:
+        """Largest change, m/s, of a velocity at a bone's centre or, by turning, at its surface."""
+        turned = np.abs(after.angular - before.angular).max(axis=1)
+        return float(max(np.abs(after.linear - before.linear).max(),
+                         (turned * self._radii).max()))
+
     def spin(self, state: State) -> float:
         """Fastest spin of a bone, rad/s."""
         return math.sqrt(np.einsum('ij,ij->i', state.angular, state.angular).max())

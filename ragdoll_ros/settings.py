@@ -52,6 +52,8 @@ class Accuracy:
     """Take out energy that nothing put in."""
     momentum: bool = True
     """Keep the momentum of what is in the air."""
+    centred: bool = True
+    """Moves what slides and rolls evenly by the mean of its velocities."""
     sleep: bool = True
     """Stop the engine when all is at rest."""
 

@@ -50,6 +50,9 @@ HELPED = 0.98
 """Share of an overshoot that finer steps must come below to be tried once more: where contacts
 press a joint past its limit, they never do."""
 
+EVEN = 3.0
+"""Accelerations up to so many times gravity's are those of an even motion, not of a blow."""
+
 SHORTEST = 1e-7
 """s: a piece of flight shorter than this is not worth its stages."""
 
@@ -393,7 +396,22 @@ class Stepper:
                 substeps, last = min(most, 4 * substeps), over
         if slips:
             self.engine.be_slippery(False)
+        if self.accuracy.centred and touching and self._went_evenly(state, duration):
+            self._centre(start, duration / substeps)
         return Piece(duration, duration / substeps, touched if watch else near)
+
+    def _went_evenly(self, before: State, duration: float) -> bool:
+        """Tell whether nothing was struck: no bone's velocity changed by more than a fall's."""
+        return self.reach.change(before, self.state) < EVEN * self._gravity * duration
+
+    def _centre(self, start: Coordinates, substep: float) -> None:
+        """Take half a substep's change of velocity back out of the way that was gone.
+
+        The engine moves all by the velocity that each substep ends with; by the mean of begin and
+        end (the trapezoidal rule) an even motion is right to order 2.
+        """
+        way = (self.coordinates.v - start.v) * (-substep / 2)
+        self._set(self.dynamics.moved(self.coordinates, way))
 
     def _near(self, duration: float, loads: Sequence[Load]) -> set[tuple[int, int]]:
         """Pairs of dolls, or of a doll and GROUND, that may touch within ``duration`` s."""

@@ -49,6 +49,12 @@ class CompiledDynamics:
                            out)
         return out
 
+    def moved(self, coordinates: Coordinates, way: np.ndarray) -> Coordinates:
+        """Give the coordinates after a small way (nv,) m and rad in the directions of v."""
+        q = coordinates.q.copy()
+        kernels.move(self._tree, q, way)
+        return Coordinates(q, coordinates.v)
+
     def longest(self, accuracy: Accuracy, fastest: float) -> float:
         """Any path will do: it chooses its steps itself."""
         return math.inf

@@ -634,3 +634,40 @@ def near_ground(radii: np.ndarray, margin: float, duration: float, gained: float
         out[d] = low < 2 * duration * (speed + gained) + margin
         some |= out[d]
     return some
+
+
+@compiled
+def change(radii: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
+    """Largest change, m/s, of a velocity at a bone's centre or, by turning, at its surface."""
+    most = 0.0
+    for i in range(len(before)):
+        for k in range(7, 10):
+            most = max(most, abs(after[i, k] - before[i, k]))
+        for k in range(10, 13):
+            most = max(most, abs(after[i, k] - before[i, k]) * radii[i])
+    return most
+
+
+@compiled
+def move(tree: np.ndarray, q: np.ndarray, way: np.ndarray) -> None:
+    """Move q by a small way in the directions of v; roots turn about the world's axes."""
+    for i in range(len(tree)):
+        bone = tree[i]
+        at, rate = bone.q, bone.v
+        if bone.parent < 0:
+            for k in range(3):
+                q[at + k] += way[rate + k]
+            at, rate = at + 3, rate + 3
+        if bone.free:
+            a, b, c = way[rate] / 2, way[rate + 1] / 2, way[rate + 2] / 2
+            size = math.sqrt(1 + a * a + b * b + c * c)
+            a, b, c, d = a / size, b / size, c / size, 1 / size
+            x, y, z, w = q[at], q[at + 1], q[at + 2], q[at + 3]
+            if bone.parent < 0:
+                x, y, z, w = times(a, b, c, d, x, y, z, w)
+            else:
+                x, y, z, w = times(x, y, z, w, a, b, c, d)
+            q[at], q[at + 1], q[at + 2], q[at + 3] = x, y, z, w
+        else:
+            for k in range(bone.freedoms):
+                q[at + k] += way[rate + k]

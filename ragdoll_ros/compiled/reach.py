@@ -67,6 +67,10 @@ class CompiledReach(Reach):
         """Largest difference, m/s, of two bones' speeds along one of the axes."""
         return kernels.fastest(state.rows)[1]
 
+    def change(self, before: State, after: State) -> float:
+        """Largest change, m/s, of a velocity at a bone's centre or, by turning, at its surface."""
+        return kernels.change(self._radii, before.rows, after.rows)
+
     def spin(self, state: State) -> float:
         """Fastest spin of a bone, rad/s."""
         return kernels.fastest(state.rows)[0]
