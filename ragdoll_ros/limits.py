@@ -49,8 +49,6 @@ class JointLimits:
         """Tell whether a joint presses against its limit, or will within ``duration`` s."""
         self._look(coordinates)
         past, ahead = self._past, self._past + self._speeds * duration
-        if not len(past) or ahead.max() < -AT_LIMIT:
-            return False
         self._held &= past > -AT_LIMIT
         pressing = (past >= -AT_LIMIT) & (self._speeds > 0)
         return bool((self._held | pressing | (past > AT_LIMIT) | (ahead > AT_LIMIT)).any())

@@ -35,7 +35,7 @@ class Accuracy:
     flight_turn: float
     """rad that the fastest bone may turn in one such step where nothing is compiled."""
     flight_error: float
-    """m or rad by which a compiled step may err, by its own estimate, which is a bound."""
+    """m or rad by which a compiled step's end may err, by its own estimate."""
     longest: float = 0.05
     """s of flight that are gone through in one step at the most; 0: a tick."""
     land: bool = True

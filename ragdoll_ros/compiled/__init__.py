@@ -5,9 +5,9 @@ less accurate in the air. What can be either is made here.
 """
 from __future__ import annotations
 
-import importlib.util
+import functools
 import os
-import sys
+import warnings
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -23,25 +23,27 @@ if TYPE_CHECKING:
 SWITCH = 'RAGDOLL_COMPILED'
 """Variable of the environment that, set to 0, lets numba be."""
 
+ORDER = 8
+"""Of the method that flies in compiled code."""
 
-def _ready() -> bool:
-    if os.environ.get(SWITCH, '1') == '0' or importlib.util.find_spec('numba') is None:
+
+@functools.cache
+def ready() -> bool:
+    """Tell whether compiled code is used; a numba that does not work is named once."""
+    if os.environ.get(SWITCH, '1') == '0':
         return False
     try:
-        from . import cache  # noqa: F401
-    except (ImportError, OSError) as error:  # a numba that is too old for numpy says so this way
-        print(f'Going on without compiled code: {error}', file=sys.stderr)
+        import numba  # noqa: F401
+    except ImportError as error:
+        if getattr(error, 'name', None) != 'numba':
+            warnings.warn(f'Not compiled, as numba does not work here: {error}', stacklevel=2)
         return False
     return True
 
 
-READY = _ready()
-"""Whether compiled code is used."""
-
-
 def dynamics_of(scene: Scene, make_engine: type[Engine]) -> Dynamics:
     """The equations of motion of a scene in the air."""
-    if READY:
+    if ready():
         from .dynamics import CompiledDynamics
         return CompiledDynamics(scene)
     from ..flight import EngineDynamics
@@ -50,7 +52,7 @@ def dynamics_of(scene: Scene, make_engine: type[Engine]) -> Dynamics:
 
 def mechanics_of(scene: Scene) -> Mechanics:
     """Sums over the bones of each doll."""
-    if READY:
+    if ready():
         from .mechanics import CompiledMechanics
         return CompiledMechanics(scene)
     from ..mechanics import Mechanics
@@ -59,7 +61,7 @@ def mechanics_of(scene: Scene) -> Mechanics:
 
 def guard_of(scene: Scene, mechanics: Mechanics, layout: Layout) -> Guard:
     """Who keeps energy and momentum."""
-    if READY:
+    if ready():
         from .mechanics import CompiledGuard
         return CompiledGuard(scene, mechanics, layout)
     from ..guard import Guard
@@ -68,7 +70,7 @@ def guard_of(scene: Scene, mechanics: Mechanics, layout: Layout) -> Guard:
 
 def limits_of(layout: Layout) -> JointLimits:
     """What joint limits have to say."""
-    if READY:
+    if ready():
         from .limits import CompiledLimits
         return CompiledLimits(layout)
     from ..limits import JointLimits
@@ -77,7 +79,7 @@ def limits_of(layout: Layout) -> JointLimits:
 
 def reach_of(scene: Scene) -> Reach:
     """What bones can reach."""
-    if READY:
+    if ready():
         from .reach import CompiledReach
         return CompiledReach(scene)
     from ..reach import Reach

@@ -8,7 +8,7 @@ import time
 from ..push import Push
 from ..scene_file import load_scene
 from ..simulation import Simulation
-from . import READY, SWITCH
+from . import SWITCH, ready
 
 SCENES = {'drop': 200, 'crowd': 10}
 """Ticks of each: through the air, onto the ground and along it."""
@@ -28,11 +28,11 @@ def main(arguments: list[str] | None = None) -> int:
     argparse.ArgumentParser(
         'python -m ragdoll_ros.compiled', description=__doc__, epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter).parse_args(arguments)
-    if not READY:
+    if not ready():
         print(NOT_READY, file=sys.stderr)
         return 2
     began = time.monotonic()
-    from . import cache, ready  # noqa: F401
+    from . import cache, loaded  # noqa: F401
     with cache.alone():
         for name, ticks in SCENES.items():
             _run(name, ticks)

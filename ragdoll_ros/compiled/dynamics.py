@@ -11,7 +11,7 @@ from ..engine.protocol import Load
 from ..scene import Scene
 from ..settings import Accuracy
 from ..state import State
-from .ready import kernels
+from .loaded import kernels
 from .tree import table
 
 FIRST_TURN = 0.2
@@ -24,7 +24,14 @@ SHORTER, LONGER = 0.2, 2.0
 """Bounds of a step over the one before."""
 
 MOST_TRIES = 40
-"""Steps tried for one instant: more take what the engine does better, or is no motion at all."""
+"""Steps tried in 10 ms: more are for what the engine does better, or for what is no motion."""
+
+USUAL = 0.01
+"""s for which they are counted."""
+
+HELPED = 0.5
+"""Share of a step's error that a shorter one must come below; where it does not, what is left is
+rounding."""
 
 
 class CompiledDynamics:
@@ -105,7 +112,8 @@ class Step:
 class Path:
     """A flight from ``start`` on, gone step by step as far as it is asked for.
 
-    Steps are as long as their error stays below ``tolerance`` (m or rad), at most ``longest`` s.
+    Steps are as long as their error stays below ``tolerance`` (m or rad), at most ``longest`` s;
+    just that with an infinite tolerance.
     """
 
     duration = math.inf
@@ -114,10 +122,13 @@ class Path:
                  fastest: float, loads: Sequence[Load] = ()) -> None:
         self._dynamics, self._loads = dynamics, _packed(loads)
         self._tolerance, self._longest = tolerance, longest
-        self._try = min(longest, FIRST_TURN / max(fastest, 1e-9))
+        first = longest if math.isinf(tolerance) else FIRST_TURN / max(fastest, 1e-9)
+        self._try = min(longest, first)
         self._steps: list[tuple[float, Step]] = []
         """What was gone, each with its beginning, s, back to what was asked for last."""
         self._end, self._end_at, self._asked = start, 0.0, 0.0
+        self._refused: Step | None = None
+        """A step from the end that erred too much."""
         self.count = 0
         """Steps gone, the rejected ones too."""
 
@@ -127,7 +138,7 @@ class Path:
         One may look back, but not to before the time that was the latest when it was asked for
         a later one.
         """
-        most = self.count + MOST_TRIES
+        most = self.count + math.ceil(MOST_TRIES * max(1.0, (time - self._end_at) / USUAL))
         if time > self._asked:
             self._steps = [(begin, step) for begin, step in self._steps
                            if begin + step.duration >= self._asked]
@@ -147,14 +158,16 @@ class Path:
         before = self._steps[-1][1] if self._steps else None
         step = self._dynamics.step(self._end, self._try, self._loads, before)
         self.count += 1
+        if self._refused is not None and HELPED * self._refused.error < step.error < math.inf:
+            step = self._refused
+            self._tolerance = max(self._tolerance, 2 * step.error)
         ratio = step.error / self._tolerance
+        self._refused = step if ratio > 1 else None
         if ratio <= 1:
             self._steps.append((self._end_at, step))
             self._end, self._end_at = step.at(1.0), self._end_at + step.duration
         factor = SAFETY * ratio ** -0.125 if ratio > 0 else LONGER
-        # not a number: far too long
-        factor = min(LONGER, max(SHORTER, factor)) if math.isfinite(ratio) else SHORTER
-        self._try = min(self._longest, self._try * factor)
+        self._try = min(self._longest, step.duration * min(LONGER, max(SHORTER, factor)))
 
 
 def _packed(loads: Sequence[Load]) -> np.ndarray:

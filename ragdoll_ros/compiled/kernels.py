@@ -406,14 +406,20 @@ def _sum(shares: np.ndarray, count: int, k: np.ndarray, h: float, out: np.ndarra
 
 @compiled
 def _error(k: np.ndarray, h: float, nq: int, room: np.ndarray) -> float:
-    """The error that DOP853 takes for that of its order 8 (Hairer, Norsett, Wanner, II.10)."""
-    fifth, third = 0.0, 0.0
+    """The error that DOP853 takes for that of its order 8 (Hairer, Norsett, Wanner, II.10);
+    infinity if a number was none.
+    """
+    fifth, third, all_of_it = 0.0, 0.0, 0.0
     _sum(ERRORS[0], 16, k, h, room)
     for j in range(len(room)):
         fifth = max(fifth, abs(room[j]) * (1.0 if j < nq else SLOWEST))
+        all_of_it += room[j]
     _sum(ERRORS[1], 16, k, h, room)
     for j in range(len(room)):
         third = max(third, abs(room[j]) * (1.0 if j < nq else SLOWEST))
+        all_of_it += room[j]
+    if not math.isfinite(all_of_it):
+        return math.inf
     if fifth == 0.0:
         return 0.0
     return fifth * fifth / np.sqrt(fifth * fifth + 0.01 * third * third)

@@ -92,7 +92,7 @@ class Diagnostics:
         simulation, tally = self.simulation, self._tally
         return {
             **self._last,
-            'compiled': compiled.READY,
+            'compiled': compiled.ready(),
             'simulated_time': simulation.time / SECOND,
             'push': pushes_text(simulation.pushes),
             **self._facts(),
