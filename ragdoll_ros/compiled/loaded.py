@@ -1,4 +1,4 @@
-"""The kernels, ready to be called: loaded, or compiled by one process for all."""
+"""The kernels. What importing them compiles, one process compiles for all that start together."""
 from .cache import alone
 
 with alone():
