@@ -11,7 +11,7 @@ from ..engine.protocol import Load
 from ..scene import Scene
 from ..settings import Accuracy
 from ..state import State
-from . import kernels
+from .loaded import kernels
 from .tree import table
 
 FIRST_TURN = 0.2

@@ -20,12 +20,13 @@ import math
 import numba
 import numpy as np
 
+from .cache import KEPT
 from .dop853 import CONTINUED, ERRORS, STAGES
 
 SLOWEST = 0.1
 """s: an error of 1 in a velocity counts as much as one of this in its coordinate."""
 
-compiled = numba.njit(cache=True, error_model='numpy', nogil=True,
+compiled = numba.njit(cache=KEPT, error_model='numpy', nogil=True,
                       fastmath={'contract', 'nsz', 'arcp'})
 """Machine code, kept for the next process. Sums stay in their order; a product and a sum may be
 rounded once."""

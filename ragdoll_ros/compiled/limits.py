@@ -5,7 +5,7 @@ import numpy as np
 
 from ..coordinates import Coordinates, Layout
 from ..limits import AT_LIMIT, JointLimits
-from . import kernels
+from .loaded import kernels
 
 
 class CompiledLimits(JointLimits):

@@ -6,7 +6,7 @@ import numpy as np
 from ..guard import Guard
 from ..mechanics import Mechanics, Motion
 from ..state import State
-from . import kernels
+from .loaded import kernels
 
 
 class CompiledMechanics(Mechanics):

@@ -9,7 +9,7 @@ from ..engine.protocol import GROUND
 from ..reach import MARGIN, Reach
 from ..scene import Scene
 from ..state import State
-from . import kernels
+from .loaded import kernels
 
 
 class CompiledReach(Reach):
