@@ -1,8 +1,8 @@
 """Flight: motion where nothing touches and no joint is at its limit, by Runge-Kutta.
 
 Where numba is installed, compiled/dynamics.py flies, by a method of order 8. Here is what does
-without: an engine is asked for accelerations alone. Orders 2 (midpoint rule), 3 (Bogacki and Shampine,
-Appl. Math. Lett. 2, 1989) and 4 (Kutta 1901); the engine's own step is of order 1.
+without: an engine is asked for accelerations alone. Orders 2 (midpoint rule), 3 (Bogacki and
+Shampine, Appl. Math. Lett. 2, 1989) and 4 (Kutta 1901); the engine's own step is of order 1.
 Quaternions are integrated as four numbers and brought back to length one after each step,
 which keeps the order (Hairer, Lubich, Wanner: Geometric Numerical Integration, IV.4). Angular
 velocities are integrated along the root's own axes, where a steady spin hardly changes them: a
@@ -61,7 +61,7 @@ class Dynamics(Protocol):
 
     def path(self, start: Coordinates, duration: float, accuracy: Accuracy, fastest: float,
              loads: Sequence[Load] = (), after: Path | None = None) -> Path:
-        """Fly from ``start`` on for ``duration`` s or more, on ``after`` a path that ended there."""
+        """Fly from ``start`` on for ``duration`` s or more, on ``after`` what ended there."""
 
     def fly(self, start: Coordinates, duration: float, steps: int,
             loads: Sequence[Load] = ()) -> Coordinates:

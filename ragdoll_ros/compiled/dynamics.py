@@ -118,8 +118,8 @@ class Path:
 
     duration = math.inf
 
-    def __init__(self, dynamics: CompiledDynamics, start: Coordinates, tolerance: float, longest: float,
-                 fastest: float, loads: Sequence[Load] = ()) -> None:
+    def __init__(self, dynamics: CompiledDynamics, start: Coordinates, tolerance: float,
+                 longest: float, fastest: float, loads: Sequence[Load] = ()) -> None:
         self._dynamics, self._loads = dynamics, _packed(loads)
         self._tolerance, self._longest = tolerance, longest
         first = longest if math.isinf(tolerance) else FIRST_TURN / max(fastest, 1e-9)
@@ -149,9 +149,8 @@ class Path:
             self._go_on()
         if not self._steps:
             return self._end
-        for begin, step in reversed(self._steps):
-            if time >= begin - 1e-12:
-                break
+        begin, step = next(known for known in reversed(self._steps)
+                           if time >= known[0] - 1e-12 or known is self._steps[0])
         return step.at(min(1.0, max(0.0, (time - begin) / step.duration)))
 
     def _go_on(self) -> None:

@@ -16,23 +16,38 @@ from __future__ import annotations
 
 import collections
 import math
+from collections.abc import Callable
 
 import numba
 import numpy as np
 
 from .cache import KEPT
 from .dop853 import CONTINUED, ERRORS, STAGES
+from .tree import RECORD
 
 SLOWEST = 0.1
 """s: an error of 1 in a velocity counts as much as one of this in its coordinate."""
 
-compiled = numba.njit(cache=KEPT, error_model='numpy', nogil=True,
-                      fastmath={'contract', 'nsz', 'arcp'})
-"""Machine code, kept for the next process. Sums stay in their order; a product and a sum may be
-rounded once."""
+MATH = {'contract', 'nsz', 'arcp'}
+"""Freedoms of rounding: a product and a sum may be rounded once. Sums stay in their order."""
 
-inlined = numba.njit(inline='always', error_model='numpy', fastmath={'contract', 'nsz', 'arcp'})
+compiled = numba.njit(error_model='numpy', fastmath=MATH)
+"""Machine code, for what other compiled code calls."""
+
+inlined = numba.njit(inline='always', error_model='numpy', fastmath=MATH)
 """The same as a part of what calls it: twice as fast for what is called with many arrays."""
+
+REAL, YES, TREE = numba.float64, numba.boolean, numba.from_dtype(RECORD)[::1]
+ROW, TABLE, COUNTS, FLAGS = REAL[::1], REAL[:, ::1], numba.int64[::1], YES[::1]
+ANY_ROW = REAL[:]
+
+
+def entry(*types: numba.types.Type) -> Callable[[Callable], Callable]:
+    """Compile what Python calls, for these types of its arguments, when this file is imported.
+
+    The code is kept for the next process, so that no simulation ever waits in its midst.
+    """
+    return numba.njit([types], cache=KEPT, error_model='numpy', nogil=True, fastmath=MATH)
 
 
 @compiled
@@ -91,11 +106,12 @@ def solve(a: np.ndarray, b: np.ndarray) -> None:
         b[j] /= a[j, j]
 
 
-Work = collections.namedtuple('Work', 'turns centres moves axes inertias biases drifts pulls matrix')
+Work = collections.namedtuple(
+    'Work', 'turns centres moves axes inertias biases drifts pulls matrix')
 """Room for n bones and nv velocities: turns (n, 4) from the bind pose, centres of mass (n, 3) from
-the root, spatial velocities (n, 6), motion subspaces (nv, 6), articulated inertias (n, 6, 6), bias
-forces (n, 6), what is left of an axis' acceleration at dv/dt = 0 (nv, 6), and of each axis the
-inertia times it, the inverse of its own part and the force along it (nv, 8). And a matrix (3, 3)."""
+the root, spatial velocities (n, 6), motion subspaces (nv, 6), articulated inertias (n, 6, 6),
+bias forces (n, 6), what is left of an axis' acceleration at dv/dt = 0 (nv, 6), and of each axis the
+inertia times it, the inverse of its own part and the force along it (nv, 8); a matrix (3, 3)."""
 
 
 @compiled
@@ -335,14 +351,14 @@ def turn_spins(tree: np.ndarray, q: np.ndarray, v: np.ndarray, inward: bool) -> 
                 q[at], q[at + 1], q[at + 2], w, v[rate], v[rate + 1], v[rate + 2])
 
 
-@compiled
+@entry(TREE, ANY_ROW, ANY_ROW, TABLE)
 def look(tree: np.ndarray, q: np.ndarray, v: np.ndarray, out: np.ndarray) -> None:
     """Position, orientation, linear and angular velocity (n, 13) of all bones of the scene; roots'
     angular velocities are along the world's axes, in ``v`` too.
     """
-    work, own, root = room(len(tree), len(v)), v.copy(), 0
-    turn_spins(tree, q, own, True)
-    pose(tree, q, own, work)
+    work, own_q, own, root = room(len(tree), len(v)), q.copy(), v.copy(), 0
+    turn_spins(tree, own_q, own, True)
+    pose(tree, own_q, own, work)
     for i in range(len(tree)):
         bone, row, move, centre = tree[i], out[tree[i].bone], work.moves[i], work.centres[i]
         if bone.parent < 0:
@@ -355,41 +371,6 @@ def look(tree: np.ndarray, q: np.ndarray, v: np.ndarray, out: np.ndarray) -> Non
         for k in range(3):
             row[k] = q[root + k] + centre[k]
             row[10 + k] = move[k]
-
-
-@compiled
-def step(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray, v: np.ndarray,
-         h: float, known: bool, way: np.ndarray, ends: np.ndarray) -> float:
-    """Go one step of ``h`` s and give the error of its end.
-
-    Puts what leads from the start to anywhere within into ``way`` (8, nq + nv), and into ``ends``
-    the rates of change at both ends; those at the start are there already if ``known``.
-    """
-    nq, size = len(q), len(q) + len(v)
-    work, k, y, start = room(len(tree), len(v)), np.empty((16, size)), np.empty(size), way[0]
-    start[:nq], start[nq:] = q, v
-    normalize(tree, start[:nq])
-    turn_spins(tree, start[:nq], start[nq:], True)
-    if known:
-        k[0] = ends[0]
-    else:
-        rates(tree, gravity, loads, start[:nq], start[nq:], work, k[0])
-    for stage in range(1, 16):
-        _sum(STAGES[stage], stage, k, h, y)
-        for j in range(size):
-            y[j] += start[j]
-        normalize(tree, y[:nq])
-        if stage == 12:
-            way[1] = y
-        rates(tree, gravity, loads, y[:nq], y[nq:], work, k[stage])
-    for j in range(size):
-        way[1, j] -= start[j]
-        way[2, j] = h * k[0, j] - way[1, j]
-        way[3, j] = 2 * way[1, j] - h * (k[12, j] + k[0, j])
-    for row in range(4):
-        _sum(CONTINUED[row], 16, k, h, way[4 + row])
-    ends[0], ends[1] = k[0], k[12]
-    return _error(k, h, nq, y)
 
 
 @compiled
@@ -425,7 +406,42 @@ def _error(k: np.ndarray, h: float, nq: int, room: np.ndarray) -> float:
     return fifth * fifth / np.sqrt(fifth * fifth + 0.01 * third * third)
 
 
-@compiled
+@entry(TREE, ROW, TABLE, ANY_ROW, ANY_ROW, REAL, YES, TABLE, TABLE)
+def step(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray, v: np.ndarray,
+         h: float, known: bool, way: np.ndarray, ends: np.ndarray) -> float:
+    """Go one step of ``h`` s and give the error of its end.
+
+    Puts what leads from the start to anywhere within into ``way`` (8, nq + nv), and into ``ends``
+    the rates of change at both ends; those at the start are there already if ``known``.
+    """
+    nq, size = len(q), len(q) + len(v)
+    work, k, y, start = room(len(tree), len(v)), np.empty((16, size)), np.empty(size), way[0]
+    start[:nq], start[nq:] = q, v
+    normalize(tree, start[:nq])
+    turn_spins(tree, start[:nq], start[nq:], True)
+    if known:
+        k[0] = ends[0]
+    else:
+        rates(tree, gravity, loads, start[:nq], start[nq:], work, k[0])
+    for stage in range(1, 16):
+        _sum(STAGES[stage], stage, k, h, y)
+        for j in range(size):
+            y[j] += start[j]
+        normalize(tree, y[:nq])
+        if stage == 12:
+            way[1] = y
+        rates(tree, gravity, loads, y[:nq], y[nq:], work, k[stage])
+    for j in range(size):
+        way[1, j] -= start[j]
+        way[2, j] = h * k[0, j] - way[1, j]
+        way[3, j] = 2 * way[1, j] - h * (k[12, j] + k[0, j])
+    for row in range(4):
+        _sum(CONTINUED[row], 16, k, h, way[4 + row])
+    ends[0], ends[1] = k[0], k[12]
+    return _error(k, h, nq, y)
+
+
+@entry(TREE, TABLE, REAL, ROW, ROW)
 def within(tree: np.ndarray, way: np.ndarray, share: float, q: np.ndarray, v: np.ndarray) -> None:
     """Coordinates at a share of the step."""
     nq, size = len(q), len(q) + len(v)
@@ -442,17 +458,17 @@ def within(tree: np.ndarray, way: np.ndarray, share: float, q: np.ndarray, v: np
     turn_spins(tree, q, v, False)
 
 
-@compiled
+@entry(TREE, ROW, TABLE, ANY_ROW, ANY_ROW, ROW)
 def accelerate(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray,
                v: np.ndarray, out: np.ndarray) -> None:
     """Rates of change of v, roots' angular velocities being along the world's axes."""
-    own = v.copy()
-    turn_spins(tree, q, own, True)
-    accelerations(tree, gravity, loads, q, own, room(len(tree), len(v)), out)
-    turn_spins(tree, q, out, False)
+    own_q, own = q.copy(), v.copy()
+    turn_spins(tree, own_q, own, True)
+    accelerations(tree, gravity, loads, own_q, own, room(len(tree), len(v)), out)
+    turn_spins(tree, own_q, out, False)
 
 
-@compiled
+@entry(ROW, TABLE, COUNTS, ROW, TABLE, TABLE)
 def motion(masses: np.ndarray, inertias: np.ndarray, doll_of: np.ndarray, gravity: np.ndarray,
            rows: np.ndarray, out: np.ndarray) -> None:
     """Sums over each doll (d, 20), in the order of Motion's fields, of bones' ``rows`` (n, 13)."""
@@ -493,7 +509,7 @@ def motion(masses: np.ndarray, inertias: np.ndarray, doll_of: np.ndarray, gravit
             sums[2] * gravity[0] + sums[3] * gravity[1] + sums[4] * gravity[2])
 
 
-@compiled
+@entry(ROW, COUNTS, ROW, REAL, TABLE, YES, FLAGS, TABLE, TABLE, TABLE)
 def keep_momentum(masses: np.ndarray, doll_of: np.ndarray, gravity: np.ndarray, duration: float,
                   given: np.ndarray, spun: bool, touched: np.ndarray, before: np.ndarray,
                   sums: np.ndarray, rows: np.ndarray) -> None:
@@ -541,7 +557,7 @@ def keep_momentum(masses: np.ndarray, doll_of: np.ndarray, gravity: np.ndarray, 
         now[0] = now[1] - mass * (now[2] * gravity[0] + now[3] * gravity[1] + now[4] * gravity[2])
 
 
-@compiled
+@entry(TABLE, ROW, REAL, TABLE, ROW)
 def heights(sizes: np.ndarray, normal: np.ndarray, offset: float, rows: np.ndarray,
             out: np.ndarray) -> float:
     """Heights (n,) of the bones' lowest points over the ground; gives the least. ``sizes`` (n, 6)
@@ -559,7 +575,7 @@ def heights(sizes: np.ndarray, normal: np.ndarray, offset: float, rows: np.ndarr
     return least
 
 
-@compiled
+@entry(ROW, ROW, REAL, REAL, TABLE, ROW)
 def falling(radii: np.ndarray, normal: np.ndarray, margin: float, soon: float, rows: np.ndarray,
             high: np.ndarray) -> float:
     """Largest speed at which a point of a bone that can reach the ground ``soon`` sinks."""
@@ -573,7 +589,7 @@ def falling(radii: np.ndarray, normal: np.ndarray, margin: float, soon: float, r
     return most
 
 
-@compiled
+@entry(TABLE)
 def fastest(rows: np.ndarray) -> tuple[float, float]:
     """Fastest spin, rad/s, and the largest difference, m/s, of two bones' speeds along an axis."""
     spin, closing = 0.0, 0.0
@@ -587,7 +603,7 @@ def fastest(rows: np.ndarray) -> tuple[float, float]:
     return math.sqrt(spin), closing
 
 
-@compiled
+@entry(numba.int64[:, ::1], TABLE, ANY_ROW, ANY_ROW, ROW, ROW)
 def limits(places: np.ndarray, bounds: np.ndarray, q: np.ndarray, v: np.ndarray,
            past: np.ndarray, speeds: np.ndarray) -> float:
     """How far past their limits angles are, and how fast they move toward them; gives the most."""
@@ -601,7 +617,7 @@ def limits(places: np.ndarray, bounds: np.ndarray, q: np.ndarray, v: np.ndarray,
     return most
 
 
-@compiled
+@entry(ROW, ROW, REAL, REAL, FLAGS)
 def press(past: np.ndarray, speeds: np.ndarray, duration: float, near: float,
           held: np.ndarray) -> bool:
     """Whether a joint presses against its limit; see JointLimits."""
@@ -613,7 +629,7 @@ def press(past: np.ndarray, speeds: np.ndarray, duration: float, near: float,
     return found
 
 
-@compiled
+@entry(ROW, ROW, REAL)
 def approach(past: np.ndarray, speeds: np.ndarray, soon: float) -> float:
     """Fastest speed of what reaches its limit soon."""
     most = 0.0
@@ -623,7 +639,7 @@ def approach(past: np.ndarray, speeds: np.ndarray, soon: float) -> float:
     return most
 
 
-@compiled
+@entry(ROW, REAL, REAL, REAL, COUNTS, TABLE, ROW, FLAGS)
 def near_ground(radii: np.ndarray, margin: float, duration: float, gained: float, first: np.ndarray,
                 rows: np.ndarray, high: np.ndarray, out: np.ndarray) -> bool:
     """Which dolls (d,), whose bones are those from ``first`` (d + 1,) on, may touch the ground
@@ -642,7 +658,7 @@ def near_ground(radii: np.ndarray, margin: float, duration: float, gained: float
     return some
 
 
-@compiled
+@entry(ROW, TABLE, TABLE)
 def change(radii: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
     """Largest change, m/s, of a velocity at a bone's centre or, by turning, at its surface."""
     most = 0.0
@@ -654,7 +670,7 @@ def change(radii: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
     return most
 
 
-@compiled
+@entry(TREE, ROW, ROW)
 def move(tree: np.ndarray, q: np.ndarray, way: np.ndarray) -> None:
     """Move q by a small way in the directions of v; roots turn about the world's axes."""
     for i in range(len(tree)):
