@@ -25,42 +25,53 @@ the bind pose."""
 
 def table(scene: Scene) -> np.ndarray:
     """Records of all bones of a scene, coordinates in the order of Layout."""
-    records, names, q, v = [], scene.bone_names, 0, 0
+    places = {name: place for place, name in enumerate(scene.bone_names)}
+    records: list[np.ndarray] = []
+    q = v = 0
     for placement in scene.dolls:
-        doll = placement.doll
-        at = {}
+        doll, at = placement.doll, {}
         for joint in (None, *depth_first(doll)):
-            bone = doll.root if joint is None else doll.bone(joint.child)
-            record = np.zeros((), RECORD)
-            at[bone.name] = len(records)
-            record['bone'] = names.index(scene.qualified(placement, bone.name))
+            bone = doll.bone(joint.child) if joint else doll.root
+            record = _joined(doll, joint, at) if joint else _root()
+            record['bone'] = places[scene.qualified(placement, bone.name)]
             record['mass'], record['inertia'] = bone.mass, bone.inertia
             record['bind'], record['q'], record['v'] = bone.orientation, q, v
+            at[bone.name] = len(records)
+            records.append(record)
             if joint is None:
-                record['parent'], record['free'] = -1, 1
                 q, v = q + 7, v + 6
             else:
-                parent = doll.bone(joint.parent)
-                free = joint.kind == 'ball' and not any(joint.limits)
-                record['parent'], record['free'] = at[joint.parent], free
-                record['freedoms'], record['damping'] = joint.freedoms, joint.damping
-                record['before'] = np.subtract(joint.anchor, parent.position)
-                record['after'] = np.subtract(bone.position, joint.anchor)
-                axes = joint.axes
-                if joint.kind == 'ball':
-                    axes = rotation.matrix(joint_frame(joint)).T
-                for row, axis in enumerate(axes):
-                    record['axes'][row] = axis
-                q, v = q + (4 if free else joint.freedoms), v + joint.freedoms
-            records.append(record)
+                q, v = q + (4 if record['free'] else joint.freedoms), v + joint.freedoms
     return np.array(records, RECORD)
+
+
+def _root() -> np.ndarray:
+    record = np.zeros((), RECORD)
+    record['parent'], record['free'] = -1, 1
+    return record
+
+
+def _joined(doll: Ragdoll, joint: Joint, at: dict[str, int]) -> np.ndarray:
+    """What a joint says of its child's record; ``at``: which record is whose."""
+    record = np.zeros((), RECORD)
+    record['parent'] = at[joint.parent]
+    record['free'] = joint.kind == 'ball' and not any(joint.limits)
+    record['freedoms'], record['damping'] = joint.freedoms, joint.damping
+    record['before'] = np.subtract(joint.anchor, doll.bone(joint.parent).position)
+    record['after'] = np.subtract(doll.bone(joint.child).position, joint.anchor)
+    axes = rotation.matrix(joint_frame(joint)).T if joint.kind == 'ball' else joint.axes
+    for row, axis in enumerate(axes):
+        record['axes'][row] = axis
+    return record
 
 
 def depth_first(doll: Ragdoll) -> Iterator[Joint]:
     """All joints, each one's whole branch before the next, as engines count them."""
-    def branch(name: str) -> Iterator[Joint]:
-        for joint in doll.joints:
-            if joint.parent == name:
-                yield joint
-                yield from branch(joint.child)
-    return branch(doll.root.name)
+    below: dict[str, list[Joint]] = {}
+    for joint in reversed(doll.joints):
+        below.setdefault(joint.parent, []).append(joint)
+    waiting = below.pop(doll.root.name, [])
+    while waiting:
+        joint = waiting.pop()
+        yield joint
+        waiting += below.pop(joint.child, [])
