@@ -40,6 +40,9 @@ MOST_FLIGHTS = 12
 FINER = 3
 """Steps that tell the error of one step of a flight."""
 
+ROUNDING = 64 * float(np.finfo(float).eps)
+"""Share of the largest coordinate that a tick's sums may lose to rounding; no error is less."""
+
 LAG = 0.1
 """Share of a motion that joint damping may take away before the engine hears that it is slower."""
 
@@ -209,7 +212,8 @@ class Stepper:
         for duration, loads in self._flown:
             coordinates = self.dynamics.fly(coordinates, duration, steps, loads)
         missed = self.dynamics.state(coordinates).positions - self.state.positions
-        return float(np.linalg.norm(missed, axis=1).max())
+        rounding = ROUNDING * float(np.abs(self.state.positions).max())
+        return max(rounding, float(np.linalg.norm(missed, axis=1).max()))
 
     def close(self) -> None:
         """Give the engines back."""

@@ -197,11 +197,13 @@ def switches(figures: Figures, pictures: Pictures) -> str:
 
 
 def projection(figures: Figures, pictures: Pictures) -> str:
-    """The price of the energy projection in fast flight."""
+    """The price of corrections."""
     if 'projection' not in figures:
         return ''
-    return ('## The price of keeping energy and momentum in flight\n\nWhat the corrections cost '
-            'in time, and what they change in the error, each flight at each setting.\n\n'
+    return ('## The price of keeping energy and momentum\n\nWhat the corrections cost in time, '
+            'and what they change in the error, each motion at each setting. In the air they are '
+            'for what the engine steps; without Runge-Kutta it steps all. What slides or rolls is '
+            'moved by the mean of its velocities (centred).\n\n'
             + table(figures['projection'], (
                 ('motion', 'motion', '{}'), ('accuracy', 'setting', '{}'),
                 ('switched', 'switched off', '{}'), ('cpu_s_per_s', 'CPU ms/s', 'ms'),
