@@ -40,7 +40,7 @@ MOST_FLIGHTS = 12
 FINER = 3
 """Steps that tell the error of one step of a flight."""
 
-ROUNDING = 64 * float(np.finfo(float).eps)
+ROUNDING = 4 * float(np.finfo(float).eps)
 """Share of the largest coordinate that a tick's sums may lose to rounding; no error is less."""
 
 LAG = 0.1
@@ -373,11 +373,10 @@ class Stepper:
         it up (Painleve's paradox, at which an engine's solver never ends): then the ground has no
         friction for this step.
         """
-        self.settle()
         near = self._near(duration, loads)
         start, state, touching = self.coordinates, self.state, self.touching
         far, deep = self._too_far()
-        self.engine.be_thorough(far > 1 or deep > 1)
+        self.settle().be_thorough(far > 1 or deep > 1)
         far, deep = max(1.0, self.accuracy.creep * far), max(1.0, self.accuracy.creep * deep)
         substeps = self._substeps(duration, bool(loads))
         self._blocked = False
@@ -385,6 +384,7 @@ class Stepper:
         coarsest, last, slips = substeps, math.inf, False
         watch = bool(near) and not any(a != b for a, b in touching)
         while True:
+            self.settle()
             touched = self._run(duration, substeps, loads, watch)
             past, sunk = self._too_far()
             past, sunk = past / far, sunk / deep
