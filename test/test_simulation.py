@@ -541,8 +541,27 @@ def test_what_lies_goes_on_lying_where_it_is_put_down(accuracy):
         simulation.place(simulation.coordinates)
         for _ in range(30):
             state, left = simulation.advance(), twin.advance()
-    # It settles anew within some hundredths of a mm.
-    assert np.linalg.norm(state.positions - left.positions, axis=1).max() < 0.0001
+    # It settles anew, as contact points begin anew too, within some tenths of a mm.
+    assert np.linalg.norm(state.positions - left.positions, axis=1).max() < 0.0005
+
+
+def test_a_step_that_is_done_again_begins_where_the_first_one_did():
+    """The doll falls as a whole, whatever its joints do: from a false start it would fall twice."""
+    rng = np.random.default_rng(3)
+    often = dataclasses.replace(NORMAL, order=0, momentum=False, redo=1e-6)
+    mechanics = Mechanics(FLIGHT)
+    with Simulation(FLIGHT, accuracy=often) as simulation:
+        v = np.zeros_like(simulation.coordinates.v)
+        v[:3], v[6:] = (1.0, 2.0, 3.0), rng.uniform(-8, 8, len(v) - 6)
+        simulation.place(Coordinates(simulation.coordinates.q, v))
+        before = mechanics.motion(simulation.state)
+        for _ in range(20):
+            simulation.advance()
+        after = mechanics.motion(simulation.state)
+        assert simulation.measures()['redone_total'] > 10
+    way = before.momentum[0] / mechanics.doll_masses[0] * 0.2
+    # The engine's own error of the momentum, of order 1, is 1 % of the way here.
+    assert after.centre[0] - before.centre[0] == pytest.approx(way, abs=0.03)
 
 
 def on_a_slope(degrees, friction):
