@@ -77,26 +77,18 @@ class EngineDynamics:
     keeps_momentum = cheap = False
 
     def __init__(self, scene: Scene, make_engine: type[Engine], layout: Layout) -> None:
-        self._engine: Engine | None = None
+        self._engine = make_engine(scene, free=True)
         self._layout = layout
-        self._make = functools.partial(make_engine, scene, free=True)
         self._fading = damping_rate(scene)
-
-    @property
-    def engine(self) -> Engine:
-        """Built when it is first needed."""
-        if self._engine is None:
-            self._engine = self._make()
-        return self._engine
 
     def state(self, coordinates: Coordinates) -> State:
         """Poses and velocities of all bones."""
-        self.engine.place(coordinates)
-        return self.engine.read()
+        self._engine.place(coordinates)
+        return self._engine.read()
 
     def acceleration(self, coordinates: Coordinates, loads: Sequence[Load] = ()) -> np.ndarray:
         """Rates of change of ``coordinates.v``."""
-        return self.engine.acceleration(coordinates, loads)
+        return self._engine.acceleration(coordinates, loads)
 
     def moved(self, coordinates: Coordinates, way: np.ndarray) -> Coordinates:
         """Give the coordinates after a small way (nv,) m and rad in the directions of v."""
@@ -109,17 +101,16 @@ class EngineDynamics:
     def path(self, start: Coordinates, duration: float, accuracy: Accuracy, fastest: float,
              loads: Sequence[Load] = (), after: EnginePath | None = None) -> EnginePath:
         """Fly from ``start`` on for ``duration`` s, in one step."""
-        return EnginePath(self.engine, start, duration, accuracy.order, loads, after)
+        return EnginePath(self._engine, start, duration, accuracy.order, loads, after)
 
     def fly(self, start: Coordinates, duration: float, steps: int,
             loads: Sequence[Load] = ()) -> Coordinates:
         """Give the coordinates ``duration`` s later, in equal steps of order 4."""
-        return fly(self.engine, start, duration, 4, steps, loads)
+        return fly(self._engine, start, duration, 4, steps, loads)
 
     def close(self) -> None:
         """Give the engine back."""
-        if self._engine is not None:
-            self._engine.close()
+        self._engine.close()
 
 
 @dataclass(frozen=True)
