@@ -17,9 +17,10 @@ from .precision import motions
 
 NAME = 'orders'
 TICKS = (0.02, 0.01, 0.005, 0.0025, 0.00125)
-FEW_TICKS = {'pendulum_large': (10, 12, 14, 16, 20), 'flight_gentle': (2, 3, 4, 5, 6),
-             'flight_long': (20, 28, 40, 56)}
-"""Ticks to a whole motion for order 8, at which its errors are small but not yet rounding."""
+FEW_TICKS = {'pendulum_large': (10, 16, 20), 'flight_gentle': (2, 4, 5, 7),
+             'flight_long': (32, 40, 50)}
+"""Ticks to a whole motion for order 8, at which its errors are small but not yet rounding: each a
+whole number of nanoseconds long."""
 
 MOTIONS = ('pendulum_large', 'flight_gentle', 'flight_long')
 FLOOR = 1e-11
