@@ -18,7 +18,7 @@ from .precision import motions
 NAME = 'orders'
 TICKS = (0.02, 0.01, 0.005, 0.0025, 0.00125)
 FEW_TICKS = {'pendulum_large': (10, 16, 20), 'flight_gentle': (2, 4, 5, 7),
-             'flight_long': (32, 40, 50)}
+             'flight_long': (16, 20, 25, 32, 40, 50, 64)}
 """Ticks to a whole motion for order 8, at which its errors are small but not yet rounding: each a
 whole number of nanoseconds long."""
 
@@ -26,7 +26,7 @@ MOTIONS = ('pendulum_large', 'flight_gentle', 'flight_long')
 FLOOR = 1e-11
 """Errors below are the reference's or rounding's (a pendulum's root gives way by 2e-11 m)."""
 
-LOW_FLOOR = 5e-14
+LOW_FLOOR = 2e-14
 """The same for what lies above the reference's and the root's share at few ticks."""
 
 CEILING = 0.3
