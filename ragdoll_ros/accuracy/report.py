@@ -32,7 +32,7 @@ Written by `{about['command']}`{' (quick)' if about['quick'] else ''} on {about[
 {about['seconds']:.0f} s; every figure stands in `accuracy.json`.
 Machine: {about['machine']}, {about['cores']} cores, {about['system']}. Python {about['python']}; \
 {versions}.
-The sums of our ticks are {'' if about.get('compiled') else 'not '}compiled (by numba).
+The sums of our ticks are {'compiled by numba' if about.get('compiled') else 'not compiled'}.
 
 CPU times are of the whole tick as Python sees it, reading all poses included: medians, measured \
 one after another in one process. Compare ratios, not times. N is the number of substeps in a tick \
