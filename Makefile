@@ -1,7 +1,7 @@
 # Wants GNU make and a python3 of 3.10 or newer with its venv module; sets up the rest in .venv,
 # with ROS 2 Jazzy from PyPI's wheels, or with the ROS that the shell has sourced.
 PYTHON ?= python3
-EXTRAS := test,report,fit,viewer
+EXTRAS := test,report,fit,viewer,fast
 VENV := .venv
 BIN := $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check
@@ -12,6 +12,7 @@ VERSION := $(shell $(PYTHON) -c 'import sys; v = sys.version_info; \
 	print(("" if v >= (3, 10) else "old-") + "%d.%d" % v[:2])' 2>/dev/null)
 ROS := $(or $(ROS_DISTRO),wheels)
 READY := $(VENV)/ready-$(VERSION)-$(ROS)
+COMPILED := $(VENV)/compiled-$(VERSION)-$(ROS)
 
 ifeq ($(ROS),wheels)
 ROS_EXTRA := ,ros
@@ -19,16 +20,21 @@ else
 VENV_FLAGS := --system-site-packages
 endif
 
-.PHONY: help run test pictures lint slow bench hard report colcon users-versions clean
+.PHONY: help run test plain pictures lint slow bench hard report colcon users-versions clean
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 22
 
-run: $(READY) ## the doll falls, arrow keys push it; SCENE=crowd: another scene
+run: $(COMPILED) ## the doll falls, arrow keys push it; SCENE=crowd: another scene
 	@$(BIN)/python -m ragdoll_ros.ros.run $(SCENE)
 
 # A file's tests stay together: those of one ROS domain, and those that time, go one by one.
-test: $(READY) chromium ## the tests, two minutes on two cores
+test: $(COMPILED) chromium ## the tests, three minutes on two cores
 	@$(BIN)/python -m pytest -n 3 --dist loadfile
+
+# What numpy and PyBullet do where numba is not.
+CORE := simulation grab conventions riders measure references ragdoll
+plain: $(READY) ## the core's tests without compiled code
+	@RAGDOLL_COMPILED=0 $(BIN)/python -m pytest -n 3 --dist loadfile $(CORE:%=test/test_%.py)
 
 # For the tests of the page: of Playwright only the driver comes from PyPI. Where there is none to
 # be had, those tests are skipped and say so.
@@ -41,23 +47,23 @@ chromium:
 	  { $(AS_ROOT) apt-get update && $(AS_ROOT) apt-get install --yes --no-install-recommends \
 	  chromium; } >/dev/null 2>&1 || echo 'That needs root and Debian: apt-get install chromium' >&2; }
 
-pictures: $(READY) chromium ## pictures of the page, into docs/
+pictures: $(COMPILED) chromium ## pictures of the page, into docs/
 	@$(BIN)/python docs/viewer.py docs
 
 lint: $(READY) ## ruff
 	@$(BIN)/python -m ruff check .
 
-slow: $(READY) ## the tests that take minutes
+slow: $(COMPILED) ## the tests that take minutes
 	@$(BIN)/python -m pytest -m slow
 
-bench: $(READY) ## cost of a tick and of its parts, and of the page, 2 min
+bench: $(COMPILED) ## cost of a tick and of its parts, and of the page, 2 min
 	@$(BIN)/python -m ragdoll_ros.ros.bench
 	@$(BIN)/python test/page_cost.py
 
-report: $(READY) ## accuracy against independent references, into docs/, 20 min
+report: $(COMPILED) ## accuracy against independent references, into docs/, 20 min
 	@$(BIN)/python -m ragdoll_ros.accuracy.command --out docs
 
-hard: $(READY) ## hard cases, each with its rule, as a table
+hard: $(COMPILED) ## hard cases, each with its rule, as a table
 	@$(BIN)/python -m ragdoll_ros.accuracy.hard
 
 WORKSPACE := build/colcon
@@ -102,6 +108,11 @@ $(READY): setup.py pyproject.toml
 	@$(if $(VENV_FLAGS),$(PIP) freeze,true) | grep '^numpy==' > $(VENV)/keep.txt || true
 	@$(PIP) install --quiet --only-binary :all: pybullet 2>/dev/null || $(MAKE) pybullet-from-source
 	@$(PIP) install $(BRIEF) --constraint $(VENV)/keep.txt --editable '.[$(EXTRAS)$(ROS_EXTRA)]'
+	@touch $@
+
+# Once, and after a change, with a word on it: else the first programs that need it would.
+$(COMPILED): $(READY) $(wildcard ragdoll_ros/compiled/*.py)
+	@test "$$RAGDOLL_COMPILED" = 0 || $(BIN)/python -m ragdoll_ros.compiled >/dev/null
 	@touch $@
 
 .PHONY: pybullet-from-source

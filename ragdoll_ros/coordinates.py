@@ -105,6 +105,17 @@ class Layout:
         q[at] = rotation.normalized(q[at])
         return q
 
+    def moved(self, coordinates: Coordinates, way: np.ndarray) -> Coordinates:
+        """Give the coordinates after a small way (nv,) m and rad in the directions of v."""
+        q = coordinates.q.copy()
+        q[self._plain[0]] += way[self._plain[1]]
+        at, turn = self._turning
+        turns = rotation.from_rotation_vector(way[turn])
+        roots = len(self.own_q)
+        q[at[:roots]] = rotation.multiply(turns[:roots], q[at[:roots]])
+        q[at[roots:]] = rotation.multiply(q[at[roots:]], turns[roots:])
+        return Coordinates(q, coordinates.v)
+
     def past_limits(self, q: np.ndarray) -> np.ndarray:
         """Angles (k,) rad by which the limited joints are past their limits; negative inside."""
         angles = q[self.limited[0]]

@@ -1,7 +1,8 @@
 """Flight: motion where nothing touches and no joint is at its limit, by Runge-Kutta.
 
-The engine is asked for accelerations alone. Orders 2 (midpoint rule), 3 (Bogacki and Shampine,
-Appl. Math. Lett. 2, 1989) and 4 (Kutta 1901); the engine's own step is of order 1.
+Where numba is installed, compiled/dynamics.py flies, by a method of order 8. Here is what does
+without: an engine is asked for accelerations alone. Orders 2 (midpoint rule), 3 (Bogacki and
+Shampine, Appl. Math. Lett. 2, 1989) and 4 (Kutta 1901); the engine's own step is of order 1.
 Quaternions are integrated as four numbers and brought back to length one after each step,
 which keeps the order (Hairer, Lubich, Wanner: Geometric Numerical Integration, IV.4). Angular
 velocities are integrated along the root's own axes, where a steady spin hardly changes them: a
@@ -12,11 +13,104 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from .coordinates import Coordinates
+from .coordinates import Coordinates, Layout
 from .engine.protocol import Engine, Load
+from .mechanics import damping_rate
+from .scene import Scene
+from .settings import Accuracy
+from .state import State
+
+STIFFEST = 1.5
+"""Step times the fastest rate at which damping ends a motion: from 2 on, explicit steps make
+energy of it."""
+
+
+class Path(Protocol):
+    """A flight under way, ``duration`` s long, in ``count`` steps so far."""
+
+    duration: float
+    count: int
+
+    def at(self, time: float) -> Coordinates | None:
+        """Give the coordinates ``time`` s after the start; None if that takes too many steps."""
+
+
+class Dynamics(Protocol):
+    """The equations of motion of a scene's dolls where nothing touches and no joint has a limit."""
+
+    keeps_momentum: bool
+    """Whether flights keep it to rounding."""
+    cheap: bool
+    """Whether ``state`` costs less than to ask an engine."""
+
+    def state(self, coordinates: Coordinates) -> State:
+        """Poses and velocities of all bones."""
+
+    def acceleration(self, coordinates: Coordinates, loads: Sequence[Load] = ()) -> np.ndarray:
+        """Rates of change of ``coordinates.v``."""
+
+    def moved(self, coordinates: Coordinates, way: np.ndarray) -> Coordinates:
+        """Give the coordinates after a small way (nv,) m and rad in the directions of v."""
+
+    def longest(self, accuracy: Accuracy, fastest: float) -> float:
+        """Longest path, s, where the fastest bone turns with so many rad/s; infinity: any."""
+
+    def path(self, start: Coordinates, duration: float, accuracy: Accuracy, fastest: float,
+             loads: Sequence[Load] = (), after: Path | None = None) -> Path:
+        """Fly from ``start`` on for ``duration`` s or more, on ``after`` what ended there."""
+
+    def fly(self, start: Coordinates, duration: float, steps: int,
+            loads: Sequence[Load] = ()) -> Coordinates:
+        """Give the coordinates ``duration`` s later, in equal steps of the highest order."""
+
+    def close(self) -> None:
+        """Give everything back to the system."""
+
+
+class EngineDynamics:
+    """Accelerations from an engine that holds the scene without contacts and limits."""
+
+    keeps_momentum = cheap = False
+
+    def __init__(self, scene: Scene, make_engine: type[Engine], layout: Layout) -> None:
+        self._engine = make_engine(scene, free=True)
+        self._layout = layout
+        self._fading = damping_rate(scene)
+
+    def state(self, coordinates: Coordinates) -> State:
+        """Poses and velocities of all bones."""
+        self._engine.place(coordinates)
+        return self._engine.read()
+
+    def acceleration(self, coordinates: Coordinates, loads: Sequence[Load] = ()) -> np.ndarray:
+        """Rates of change of ``coordinates.v``."""
+        return self._engine.acceleration(coordinates, loads)
+
+    def moved(self, coordinates: Coordinates, way: np.ndarray) -> Coordinates:
+        """Give the coordinates after a small way (nv,) m and rad in the directions of v."""
+        return self._layout.moved(coordinates, way)
+
+    def longest(self, accuracy: Accuracy, fastest: float) -> float:
+        """Longest path, s, that speeds and damping allow."""
+        return min(accuracy.flight_turn / max(fastest, 1e-9), STIFFEST / max(self._fading, 1e-9))
+
+    def path(self, start: Coordinates, duration: float, accuracy: Accuracy, fastest: float,
+             loads: Sequence[Load] = (), after: EnginePath | None = None) -> EnginePath:
+        """Fly from ``start`` on for ``duration`` s, in one step."""
+        return EnginePath(self._engine, start, duration, accuracy.order, loads, after)
+
+    def fly(self, start: Coordinates, duration: float, steps: int,
+            loads: Sequence[Load] = ()) -> Coordinates:
+        """Give the coordinates ``duration`` s later, in equal steps of order 4."""
+        return fly(self._engine, start, duration, 4, steps, loads)
+
+    def close(self) -> None:
+        """Give the engine back."""
+        self._engine.close()
 
 
 @dataclass(frozen=True)
@@ -34,7 +128,7 @@ TABLEAUS = {tableau.order: tableau for tableau in (
     Tableau(4, nodes=(0, 1 / 2, 1 / 2, 1), weights=(1 / 6, 1 / 3, 1 / 3, 1 / 6)))}
 
 
-class Path:
+class EnginePath:
     """One step of a flight, ``duration`` s long, that tells where it leads at any time within.
 
     In between it is the cubic that has the positions, velocities and accelerations of both ends
@@ -42,8 +136,10 @@ class Path:
     the end has is what the next step begins with: ``after`` hands it on.
     """
 
+    count = 1
+
     def __init__(self, engine: Engine, start: Coordinates, duration: float, order: int,
-                 loads: Sequence[Load] = (), after: Path | None = None) -> None:
+                 loads: Sequence[Load] = (), after: EnginePath | None = None) -> None:
         self._engine, self._loads, self.duration = engine, loads, duration
         layout = engine.layout
         turns = layout.root_turns(start.q).transpose(0, 2, 1)
@@ -82,7 +178,7 @@ def fly(engine: Engine, start: Coordinates, duration: float, order: int, steps: 
     ``engine`` must hold the scene without contacts and limits; where it ends up is undefined.
     """
     for _ in range(steps):
-        start = Path(engine, start, duration / steps, order, loads).end
+        start = EnginePath(engine, start, duration / steps, order, loads).end
     return start
 
 

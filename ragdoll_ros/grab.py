@@ -14,7 +14,8 @@ import numpy as np
 
 from . import faults
 from .coordinates import Coordinates
-from .engine.protocol import Engine, Load
+from .engine.protocol import Load
+from .flight import Dynamics
 from .mechanics import Mechanics, point_motion
 from .ragdoll import Vector
 from .scene import Scene
@@ -147,13 +148,14 @@ class Hands:
         for hand in self._hands.values():
             hand.move(duration)
 
-    def pulls(self, free: Engine, coordinates: Coordinates, state: State,
+    def pulls(self, dynamics: Dynamics, coordinates: Coordinates, state: State,
               duration: float) -> list[Pull]:
-        """Loads of all hands for the next ``duration`` s; ``free``: see mobility()."""
+        """Loads of all hands for the next ``duration`` s; ``dynamics``: see mobility()."""
         for hand in self._hands.values():
             if hand.fresh <= 0:
                 turn = state.turns[hand.bone]
-                hand.mobility = turn.T @ mobility(free, coordinates, hand.bone, hand.point) @ turn
+                hand.mobility = turn.T @ mobility(
+                    dynamics, coordinates, hand.bone, hand.point) @ turn
                 hand.fresh = FRESH
         dolls = [self._doll_of[hand.bone] for hand in self._hands.values()]
         return [self._pull(hand, dolls.count(doll), self._masses[doll], state, duration)
@@ -182,20 +184,21 @@ class Hands:
         return Pull(hand.bone, force, np.zeros(3), hand.point)
 
 
-def mobility(free: Engine, coordinates: Coordinates, bone: int, point: np.ndarray) -> np.ndarray:
+def mobility(dynamics: Dynamics, coordinates: Coordinates, bone: int,
+             point: np.ndarray) -> np.ndarray:
     """Acceleration (3, 3) 1/kg of a point of a bone per force there: W = J H^-1 J^T.
 
     The inverse of the operational space inertia (Khatib 1987), got column by column from the
-    accelerations under unit forces. ``free`` is an engine without contacts and limits, which
-    would take some of it away: a hand that counts on more is the gentler. It is left elsewhere.
+    accelerations under unit forces. ``dynamics`` know no contacts and limits, which would take
+    some of it away: a hand that counts on more is the gentler.
     """
     still = Coordinates(coordinates.q, np.zeros_like(coordinates.v))
-    rest = free.acceleration(still)
+    rest = dynamics.acceleration(still)
     columns = []
     for axis in np.eye(3):
-        gained = free.acceleration(still, [Load(bone, axis, np.zeros(3), point)]) - rest
-        free.place(Coordinates(coordinates.q, gained))
-        columns.append(point_motion(free.read(), bone, point)[1])
+        gained = dynamics.acceleration(still, [Load(bone, axis, np.zeros(3), point)]) - rest
+        moved = dynamics.state(Coordinates(coordinates.q, gained))
+        columns.append(point_motion(moved, bone, point)[1])
     return np.array(columns).T
 
 

@@ -109,6 +109,14 @@ class Guard:
         found[[doll for pair in pairs for doll in pair if doll >= 0]] = True
         return found
 
+    def keep_momentum(self, state: State, before: Motion, after: Motion, duration: float,
+                      impulse: np.ndarray | float = 0.0, moment: np.ndarray | float | None = 0.0,
+                      touched: np.ndarray | None = None
+                      ) -> tuple[State, Motion, np.ndarray | None]:
+        """Give state and motion with the momentum that is due, and how roots were turned for it."""
+        shift, due = self.momentum_due(before, after, duration, impulse, moment, touched)
+        return self._mechanics.shifted(state, after, shift), due, shift.turn
+
     def momentum_due(self, before: Motion, after: Motion, duration: float,
                      impulse: np.ndarray | float = 0.0,
                      moment: np.ndarray | float | None = 0.0,

@@ -5,6 +5,7 @@ Plain sums over rigid bodies, independent of any engine. World frame, SI.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -29,6 +30,20 @@ class Motion:
     """(d, 3) N m s: angular momentum about the doll's own centre of mass."""
     inertia: np.ndarray
     """(d, 3, 3) kg m^2 about that centre, as if the doll's joints were locked in its pose."""
+
+    @classmethod
+    def of(cls, sums: np.ndarray) -> Motion:
+        """From rows (d, 20) of all these."""
+        motion = cls(sums[:, 0], sums[:, 1], sums[:, 2:5], sums[:, 5:8], sums[:, 8:11],
+                     sums[:, 11:20].reshape(-1, 3, 3))
+        motion.__dict__['sums'] = sums
+        return motion
+
+    @cached_property
+    def sums(self) -> np.ndarray:
+        """(d, 20): all these side by side."""
+        return np.concatenate([self.energy[:, None], self.kinetic[:, None], self.centre,
+                               self.momentum, self.spin, self.inertia.reshape(-1, 9)], axis=1)
 
 
 @dataclass(frozen=True)

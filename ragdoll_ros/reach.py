@@ -25,7 +25,7 @@ class Reach:
         self._ground = scene.ground
         self._normal = np.array(scene.ground.normal if scene.ground else (0, 0, 1))
         counts = [len(placement.doll.bones) for placement in scene.dolls]
-        self._bounds = np.cumsum([0, *counts])
+        self._bounds = np.cumsum([0, *counts], dtype=np.int64)
         self._last: tuple[State | None, np.ndarray] = (None, np.zeros(0))
         """The heights told last, and of which state."""
 
@@ -86,6 +86,16 @@ class Reach:
         """Largest difference, m/s, of two bones' speeds along one of the axes."""
         low, high = state.linear.min(axis=0), state.linear.max(axis=0)
         return float((high - low).max())
+
+    def change(self, before: State, after: State) -> float:
+        """Largest change, m/s, of a velocity at a bone's centre or, by turning, at its surface."""
+        turned = np.abs(after.angular - before.angular).max(axis=1)
+        return float(max(np.abs(after.linear - before.linear).max(),
+                         (turned * self._radii).max()))
+
+    def spin(self, state: State) -> float:
+        """Fastest spin of a bone, rad/s."""
+        return math.sqrt(np.einsum('ij,ij->i', state.angular, state.angular).max())
 
     def strides(self, state: State, duration: float) -> int:
         """Parts of ``duration`` s in each of which no bone passes another's half thickness."""

@@ -30,9 +30,12 @@ class Accuracy:
     most: int
     """Most substeps in 10 ms."""
     order: int
-    """Order of the flight's Runge-Kutta method; 0: the engine's own step in flight too."""
+    """Order of the flight's Runge-Kutta method where nothing is compiled, else it is 8; 0: the
+    engine's own step in flight too."""
     flight_turn: float
-    """rad that the fastest bone may turn in one Runge-Kutta step."""
+    """rad that the fastest bone may turn in one such step where nothing is compiled."""
+    flight_error: float
+    """m or rad by which a compiled step's end may err, by its own estimate."""
     longest: float = 0.05
     """s of flight that are gone through in one step at the most; 0: a tick."""
     land: bool = True
@@ -49,16 +52,19 @@ class Accuracy:
     """Take out energy that nothing put in."""
     momentum: bool = True
     """Keep the momentum of what is in the air."""
+    centred: bool = True
+    """Move single bodies that slide and roll evenly by the mean of their velocities. Dolls err by
+    blows, not by this."""
     sleep: bool = True
     """Stop the engine when all is at rest."""
 
 
 DRAFT = Accuracy(turn=0.3, limit=0.15, contact=3, settled=2, sink=0.009, most=46, order=3,
-                 flight_turn=0.4, land=False, redo=math.radians(6))
+                 flight_turn=0.4, flight_error=1e-10, land=False, redo=math.radians(6))
 NORMAL = Accuracy(turn=0.1, limit=0.06, contact=4, settled=3, sink=0.004, most=128, order=4,
-                  flight_turn=0.2, redo=math.radians(2.5))
+                  flight_turn=0.2, flight_error=1e-11, redo=math.radians(2.5))
 EXACT = Accuracy(turn=0.04, limit=0.03, contact=6, settled=4, sink=0.0015, most=256, order=4,
-                 flight_turn=0.1, redo=math.radians(1.5))
+                 flight_turn=0.1, flight_error=1e-13, redo=math.radians(1.5))
 ACCURACIES = {'draft': DRAFT, 'normal': NORMAL, 'exact': EXACT}
 
 

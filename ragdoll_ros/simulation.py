@@ -7,14 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import faults, rotation
+from . import compiled, faults, rotation
 from .coordinates import Coordinates
 from .engine.bullet import BulletEngine
 from .engine.protocol import GROUND, Contact, Engine, Load, pressed
 from .gap import JointGap
 from .grab import EVENLY, Grab, Hands, Pull
-from .guard import Guard
-from .mechanics import Mechanics, Motion
+from .mechanics import Motion
 from .push import Push
 from .rest import Rest
 from .scene import SECOND, STEP_RANGE, Scene
@@ -62,10 +61,10 @@ class Simulation:
                  engine: type[Engine] = BulletEngine) -> None:
         self.scene = scene
         self.step = scene.step if step is None else step
-        self.mechanics = Mechanics(scene)
+        self.mechanics = compiled.mechanics_of(scene)
         self._accuracy = resolve_accuracy(accuracy)
         self._stepper = Stepper(scene, engine, self._accuracy)
-        self._guard = Guard(scene, self.mechanics, self._stepper.engine.layout)
+        self._guard = compiled.guard_of(scene, self.mechanics, self._stepper.engine.layout)
         self._lift_out()
         self._start = (self._stepper.engine.save(), self._stepper.coordinates)
         self._gap = JointGap(scene)
@@ -201,8 +200,9 @@ class Simulation:
         Bones that overlap there do not collide from then on, and what is in the ground is lifted;
         what merely rests on something, up to pressed() deep in it, rests on.
         """
-        stepper, engine = self._stepper, self._stepper.engine
+        stepper = self._stepper
         stepper.place(coordinates)
+        engine = stepper.settle()
         engine.let_overlaps_be()
         stepper.begin()
         self._lift_out()
@@ -310,7 +310,7 @@ class Simulation:
     def _pulled(self, duration: float, loads: list[Load]) -> float:
         """Go through a stretch as short as hands need it; give its length, s."""
         stepper, length = self._stepper, self._hands.stretch(duration)
-        pulls = self._hands.pulls(stepper.free, stepper.coordinates, self._state, length)
+        pulls = self._hands.pulls(stepper.dynamics, stepper.coordinates, self._state, length)
         length = self._piece(length, [*loads, *pulls])
         self._hands.move(length)
         return length
@@ -323,7 +323,7 @@ class Simulation:
         self._see(stepper.state)
         if loads:
             self._enter_work(loads, before, piece)
-        if stepper.accuracy.momentum:
+        if stepper.accuracy.momentum and (piece.substep or not stepper.dynamics.keeps_momentum):
             self._keep_momentum(motion, piece, loads, before)
         if stepper.accuracy.energy:
             self._keep_energy(start, piece.touched)
@@ -351,11 +351,9 @@ class Simulation:
         impulse = moment = 0.0
         if loads:
             impulse, moment = self._given(loads, piece.duration, state)
-        after = self._motion
-        shift, self._motion = self._guard.momentum_due(before, after, piece.duration, impulse,
-                                                       moment, touched)
-        self._state = self.mechanics.shifted(self._state, after, shift)
-        self._stepper.shift(self._state, shift.turn)
+        self._state, self._motion, turn = self._guard.keep_momentum(
+            self._state, before, self._motion, piece.duration, impulse, moment, touched)
+        self._stepper.shift(self._state, turn)
 
     def _given(self, loads: list[Load], duration: float,
                before: State) -> tuple[np.ndarray, np.ndarray | None]:

@@ -26,6 +26,19 @@ class State:
     angular: np.ndarray
     """(n, 3) rad/s, world axes."""
 
+    @classmethod
+    def of(cls, rows: np.ndarray) -> State:
+        """From rows (n, 13) of position, orientation, linear and angular velocity."""
+        state = cls(rows[:, 0:3], rows[:, 3:7], rows[:, 7:10], rows[:, 10:13])
+        state.__dict__['rows'] = rows
+        return state
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """(n, 13): position, orientation, linear and angular velocity side by side."""
+        return np.concatenate([self.positions, self.orientations, self.linear, self.angular],
+                              axis=1)
+
     @cached_property
     def turns(self) -> np.ndarray:
         """(n, 3, 3): the rotation matrices of the orientations."""

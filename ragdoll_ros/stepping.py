@@ -7,25 +7,20 @@ and contacts ask for.
 from __future__ import annotations
 
 import bisect
-import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from . import rotation
+from . import compiled, rotation
 from .coordinates import Coordinates
 from .engine.protocol import GROUND, Engine, Load
-from .flight import Path, fly
+from .flight import STIFFEST, Path
 from .mechanics import damping_rate
-from .reach import Reach
 from .scene import Scene
 from .settings import HUMAN, Accuracy
 from .state import State
-
-AT_LIMIT = 1e-3
-"""rad: a joint as near as this to its limit, and moving toward it, is at the limit."""
 
 SOON = 0.015
 """s ahead that limits and ground are looked for."""
@@ -43,11 +38,10 @@ MOST_FLIGHTS = 12
 """Runge-Kutta steps in 10 ms at the most: from there on the engine's own cost less."""
 
 FINER = 3
-"""Steps of order 4 that tell the error of one step of a flight."""
+"""Steps that tell the error of one step of a flight."""
 
-STIFFEST = 1.5
-"""Step times the fastest rate at which damping ends a motion: from 2 on, explicit steps make
-energy of it."""
+ROUNDING = 4 * float(np.finfo(float).eps)
+"""Share of the largest coordinate that a tick's sums may lose to rounding; no error is less."""
 
 LAG = 0.1
 """Share of a motion that joint damping may take away before the engine hears that it is slower."""
@@ -58,6 +52,9 @@ GRADES = sorted({math.ceil(2 ** (k / 2)) for k in range(40)})
 HELPED = 0.98
 """Share of an overshoot that finer steps must come below to be tried once more: where contacts
 press a joint past its limit, they never do."""
+
+EVEN = 3.0
+"""Accelerations up to so many times gravity's are those of an even motion, not of a blow."""
 
 SHORTEST = 1e-7
 """s: a piece of flight shorter than this is not worth its stages."""
@@ -94,13 +91,14 @@ class Stepper:
                  accuracy: Accuracy) -> None:
         self._accuracy = accuracy
         self.engine = make_engine(scene)
-        self._make_free = functools.partial(make_engine, scene, free=True)
-        self._free = self._make_free() if accuracy.order else None
-        self.reach = Reach(scene)
+        self.dynamics = compiled.dynamics_of(scene, make_engine, self.engine.layout)
+        self.reach = compiled.reach_of(scene)
         self._layout = self.engine.layout
+        self._limits = compiled.limits_of(self._layout)
         counts = np.cumsum([0, *(len(placement.doll.bones) for placement in scene.dolls)])
         self._roots = np.array([start + placement.doll.bones.index(placement.doll.root)
                                 for start, placement in zip(counts[:-1], scene.dolls, strict=True)])
+        self._rigid = len(scene.bones) == len(scene.dolls)
         self._solid = bool(scene.ground or scene.self_collision or len(scene.dolls) > 1)
         """Whether anything can touch at all."""
         self._fading = damping_rate(scene)
@@ -113,8 +111,6 @@ class Stepper:
         """Whether the engine has yet to hear of a shift."""
         self._blocked: bool
         """Whether something that no flight can foresee comes next: bones that meet."""
-        self._held: np.ndarray
-        """(k,) whether a flight ended at this limit and the joint has leaned on it since."""
         self._departure: Coordinates
         """Where the tick began."""
         self._flown: list[tuple[float, Sequence[Load]]] | None
@@ -123,7 +119,9 @@ class Stepper:
         """The step of a flight that is under way: it may lead over many ticks."""
         self._along: float
         """s: where on the path."""
-        self._loaded = False
+        self._counted: int
+        """Steps of the path that were counted."""
+        self._stale = self._loaded = False
         """Whether it is a path under loads, which ends with the piece."""
         self.effort = Effort()
         self.begin()
@@ -138,27 +136,24 @@ class Stepper:
         if accuracy is not self._accuracy:
             self._accuracy, self._path = accuracy, None
 
-    @property
-    def free(self) -> Engine:
-        """The scene without contacts and limits, to be asked for accelerations."""
-        if self._free is None:
-            self._free = self._make_free()
-        return self._free
-
     def look(self) -> None:
         """Read where the engine is."""
         self.state: State
         self.coordinates: Coordinates
-        self.state, self.coordinates = self.engine.look()
+        if self.dynamics.cheap:
+            self.coordinates = self.engine.coordinates()
+            self.state = self.dynamics.state(self.coordinates)
+        else:
+            self.state, self.coordinates = self.engine.look()
         self.touching = self.engine.touching()
 
     def begin(self) -> None:
-        """Start from where the engine is, and forget what was before."""
-        self._stale = self._blocked = False
+        """Start from where all is, and forget what was before."""
+        self.settle()
+        self._blocked = False
         self._path = None
-        self._past_at = (None, np.zeros(0))
         self._flown = None
-        self._held = np.zeros(len(self._layout.limits[0]), bool)
+        self._limits.forget()
         self.look()
 
     def place(self, coordinates: Coordinates) -> None:
@@ -177,10 +172,9 @@ class Stepper:
             q[layout.root_orientations] = rotation.multiply(turn, q[layout.root_orientations])
         v[layout.root_velocities] = state.linear[self._roots]
         v[layout.root_spins] = state.angular[self._roots]
-        past = self._past_at[1] if self._past_at[0] is self.coordinates else None
+        before = self.coordinates
         self.coordinates, self.state, self._stale = Coordinates(q, v), state, True
-        if past is not None:
-            self._past_at = (self.coordinates, past)
+        self._limits.same(before, self.coordinates)
 
     def settle(self) -> Engine:
         """Give the engine, with the dolls in it where they are."""
@@ -209,39 +203,29 @@ class Stepper:
     def estimate_error(self) -> float | None:
         """Estimate the error, m, that the last tick added to the worst position.
 
-        By flying it again at order 4 in steps a third as long: the error of that is 81 times
-        smaller at the least. None if the tick was not all flight.
+        By flying it again in steps a third as long: the error of that is 81 times smaller at
+        order 4. None if the tick was not all flight.
         """
         if not self._flown:
             return None
         coordinates, steps = self._departure, FINER * max(1, self.effort.flights)
         for duration, loads in self._flown:
-            coordinates = fly(self._free, coordinates, duration, 4, steps, loads)
-        self._free.place(coordinates)
-        missed = self._free.read().positions - self.state.positions
-        return float(np.linalg.norm(missed, axis=1).max())
+            coordinates = self.dynamics.fly(coordinates, duration, steps, loads)
+        missed = self.dynamics.state(coordinates).positions - self.state.positions
+        rounding = ROUNDING * float(np.abs(self.state.positions).max())
+        return max(rounding, float(np.linalg.norm(missed, axis=1).max()))
 
     def close(self) -> None:
-        """Give both engines back."""
+        """Give the engines back."""
         self.engine.close()
-        if self._free is not None:
-            self._free.close()
+        self.dynamics.close()
 
     def _may_fly(self, duration: float) -> bool:
         """Tell whether nothing touches and no joint presses against its limit."""
-        if (self._free is None or not self.accuracy.order or self.touching or self._blocked
+        if (not self.accuracy.order or self.touching or self._blocked
                 or self.effort.flights >= self._most_flights):
             return False
-        past = self._past()
-        if not len(past):
-            return True
-        speeds = self._layout.limit_speeds(self.coordinates)
-        ahead = past if self.accuracy.land else past + speeds * duration
-        if ahead.max() < -AT_LIMIT:
-            return True
-        self._held &= past > -AT_LIMIT
-        pressing = (past >= -AT_LIMIT) & (speeds > 0)
-        return not (self._held | pressing | (past > AT_LIMIT) | (ahead > AT_LIMIT)).any()
+        return not self._limits.press(self.coordinates, 0.0 if self.accuracy.land else duration)
 
     def _fly(self, duration: float, loads: Sequence[Load]) -> float:
         """Fly up to ``duration`` s; give the time flown, 0 where something comes in between."""
@@ -249,7 +233,8 @@ class Stepper:
             self._path, self._loaded = None, bool(loads)
         parts = self.reach.strides(self.state, duration) if self._solid else 1
         if not self._leads_on(duration):
-            parts = max(parts, math.ceil(duration / self._longest_step()))
+            parts = max(parts, math.ceil(
+                duration / self.dynamics.longest(self.accuracy, self._fastest())))
         if parts > self._most_flights:
             return 0.0
         stretch, flown = duration / parts, 0.0
@@ -257,19 +242,19 @@ class Stepper:
             start, state = self.coordinates, self.state
             self._onward(stretch, duration - flown if loads else self.accuracy.longest, loads)
             begin = self._along
-            ahead = self._path.at(begin + stretch)
-            if not self.accuracy.land:
-                past = self._layout.past_limits(ahead.q) > 0
-                if past.any():
-                    self._held |= past
-                    return flown
+            ahead = self._ahead(begin + stretch)
+            if ahead is None:
+                return flown
+            if not self.accuracy.land and self._limits.furthest(ahead) > 0:
+                self._limits.hold(ahead)
+                return flown
             self._fly_to(ahead)
             room = self._room()
             if room >= 0 and not self.touching:
                 flown += stretch
                 self._along += stretch
                 continue
-            self._held |= self._past() > 0
+            self._limits.hold(self.coordinates)
             early, least = stretch, self._room(start, state)
             if room < 0:
                 early = self._land(begin, stretch, least, room) if least > 0 else 0.0
@@ -294,13 +279,20 @@ class Stepper:
         """
         if self._leads_on(stretch):
             return
-        path = self._path
+        path, fastest = self._path, self._fastest()
         over = path is not None and self._along > path.duration * (1 - 1e-9)
-        count = max(1, math.floor(min(longest, self._longest_step()) / stretch * (1 + 1e-9)))
-        self._path = Path(self._free, self.coordinates, stretch * count, self.accuracy.order,
-                          loads, after=path if over else None)
-        self._along = 0.0
-        self.effort.flights += 1
+        longest = min(longest, self.dynamics.longest(self.accuracy, fastest))
+        count = max(1, math.floor(longest / stretch * (1 + 1e-9)))
+        self._path = self.dynamics.path(self.coordinates, stretch * count, self.accuracy, fastest,
+                                        loads, path if over else None)
+        self._along, self._counted = 0.0, 0
+
+    def _ahead(self, time: float) -> Coordinates | None:
+        """Tell where the path leads to, and count its steps."""
+        ahead = self._path.at(time)
+        self.effort.flights += self._path.count - self._counted
+        self._counted = self._path.count
+        return ahead
 
     def _land(self, begin: float, stretch: float, least: float, room: float) -> float:
         """Go back along the path to where a limit or the ground is just reached; give the time, s.
@@ -316,13 +308,12 @@ class Stepper:
             time = (early * below - late * above) / (below - above)
             coordinates = self._path.at(begin + time)
             if grounded:
-                self._fly_to(coordinates)
+                self._set(coordinates)
                 off = self._room() + LANDED / 2
             else:
-                off = LANDED / 2 - float(self._layout.past_limits(coordinates.q).max())
+                off = LANDED / 2 - self._limits.furthest(coordinates)
             if abs(off) <= LANDED / 2:
-                if not grounded:
-                    self._fly_to(coordinates)
+                self._fly_to(coordinates)
                 return time
             # Regula falsi, by halves where one end stays (Dowell and Jarratt, BIT 11, 1971).
             if off * below < 0:
@@ -353,32 +344,26 @@ class Stepper:
 
     def _fly_to(self, coordinates: Coordinates) -> None:
         self._set(coordinates)
-        self.touching = self.engine.touching() if self._solid else set()
+        self.touching = self.settle().touching() if self._solid else set()
 
     def _set(self, coordinates: Coordinates) -> None:
-        self.engine.place(coordinates)
-        self._stale = False
-        self.coordinates = coordinates
-        self.state = self.engine.read()
+        self.coordinates, self._stale = coordinates, True
+        self.state = self.dynamics.state(coordinates) if self.dynamics.cheap else (
+            self.settle().read())
 
     def _back_to(self, start: Coordinates, state: State,
                  touching: set[tuple[int, int]]) -> None:
-        self.engine.place(start)
-        self._stale = False
+        self._stale = True
         self.coordinates, self.state, self.touching = start, state, touching
 
     def _room(self, coordinates: Coordinates | None = None, state: State | None = None) -> float:
         """Room (rad or m) to the nearest limit or the ground; below zero: past it."""
-        past = self._layout.past_limits(coordinates.q) if coordinates else self._past()
-        room = -float(past.max()) if len(past) else math.inf
+        room = -self._limits.furthest(coordinates or self.coordinates)
         return min(room, self.reach.clearance(state or self.state))
 
-    def _longest_step(self) -> float:
-        """Longest step of a flight, s, that speeds and damping allow within a tick."""
-        spin = math.sqrt(np.einsum('ij,ij->i', self.state.angular, self.state.angular).max())
-        rate = max(spin, np.abs(self.coordinates.v[self._layout.limited[1]]).max(initial=0.0))
-        return min(self.accuracy.flight_turn / max(rate, 1e-9),
-                   STIFFEST / max(self._fading, 1e-9))
+    def _fastest(self) -> float:
+        """Fastest turning, rad/s, of a bone or about a limited axis."""
+        return max(self.reach.spin(self.state), self._limits.fastest(self.coordinates))
 
     def _step(self, duration: float, loads: Sequence[Load]) -> Piece:
         """Take the engine's own step, finer where that overshoots less.
@@ -388,20 +373,21 @@ class Stepper:
         it up (Painleve's paradox, at which an engine's solver never ends): then the ground has no
         friction for this step.
         """
-        self.settle()
         near = self._near(duration, loads)
         start, state, touching = self.coordinates, self.state, self.touching
-        far = self._too_far()
-        bounds = [max(1.0, self.accuracy.creep * part) for part in far]
-        self.engine.be_thorough(max(far) > 1)
+        far, deep = self._too_far()
+        self.settle().be_thorough(far > 1 or deep > 1)
+        far, deep = max(1.0, self.accuracy.creep * far), max(1.0, self.accuracy.creep * deep)
         substeps = self._substeps(duration, bool(loads))
         self._blocked = False
         most = max(1, math.ceil(self.accuracy.most * duration / self._span))
         coarsest, last, slips = substeps, math.inf, False
         watch = bool(near) and not any(a != b for a, b in touching)
         while True:
+            self.settle()
             touched = self._run(duration, substeps, loads, watch)
-            past, sunk = np.divide(self._too_far(), bounds)
+            past, sunk = self._too_far()
+            past, sunk = past / far, sunk / deep
             over = max(past, sunk)
             finest = substeps >= most or over > HELPED * last
             if over <= 1 or (finest and (slips or sunk <= max(1.0, past))):
@@ -415,7 +401,23 @@ class Stepper:
                 substeps, last = min(most, 4 * substeps), over
         if slips:
             self.engine.be_slippery(False)
+        if (self._rigid and self.accuracy.centred and touching
+                and self._went_evenly(state, duration)):
+            self._centre(start, duration / substeps)
         return Piece(duration, duration / substeps, touched if watch else near)
+
+    def _went_evenly(self, before: State, duration: float) -> bool:
+        """Tell whether nothing was struck: no bone's velocity changed by more than a fall's."""
+        return self.reach.change(before, self.state) < EVEN * self._gravity * duration
+
+    def _centre(self, start: Coordinates, substep: float) -> None:
+        """Take half a substep's change of velocity back out of the way that was gone.
+
+        The engine moves all by the velocity that each substep ends with; by the mean of begin and
+        end (the trapezoidal rule) an even motion is right to order 2.
+        """
+        way = (self.coordinates.v - start.v) * (-substep / 2)
+        self._set(self.dynamics.moved(self.coordinates, way))
 
     def _near(self, duration: float, loads: Sequence[Load]) -> set[tuple[int, int]]:
         """Pairs of dolls, or of a doll and GROUND, that may touch within ``duration`` s."""
@@ -423,16 +425,9 @@ class Stepper:
         return self.reach.near(self.state, duration, self._gravity + pull / self._lightest,
                                self.touching)
 
-    def _past(self) -> np.ndarray:
-        """Angles (k,) rad by which the limited joints are past their limits now; kept."""
-        if self._past_at[0] is not self.coordinates:
-            past = self._layout.past_limits(self.coordinates.q)
-            self._past_at = (self.coordinates, past)
-        return self._past_at[1]
-
     def _too_far(self) -> tuple[float, float]:
         """Tell how far past a limit and in the ground, in units of what is put up with."""
-        past = float(self._past().max(initial=0.0))
+        past = max(0.0, self._limits.furthest(self.coordinates))
         sunk = -self.reach.clearance(self.state)
         return past / self.accuracy.redo, sunk / self.accuracy.sink
 
@@ -462,14 +457,10 @@ class Stepper:
         tens = duration / self._span
         if not accuracy.adaptive:
             return max(1, math.ceil(accuracy.contact * tens))
-        spin = math.sqrt(np.einsum('ij,ij->i', state.angular, state.angular).max())
+        spin = self.reach.spin(state)
         need = max(1.0, spin * duration / accuracy.turn, 4.0 * tens if pushed else 0.0,
                    self._fading * duration / STIFFEST)
-        speeds = self._layout.limit_speeds(self.coordinates)
-        if len(speeds):
-            past = self._past()
-            near = speeds[past + SOON * speeds > 0]
-            need = max(need, near.max(initial=0.0) * duration / accuracy.limit)
+        need = max(need, self._limits.approach(self.coordinates, SOON) * duration / accuracy.limit)
         falling = self.reach.falling(state, SOON)
         if self.touching or falling or self._blocked:
             moving = falling > 0.3 or spin > 1.0 or self._blocked

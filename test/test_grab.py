@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from ragdoll_ros import faults, rotation
+from ragdoll_ros import compiled, faults, rotation
 from ragdoll_ros.engine.bullet import BulletEngine
 from ragdoll_ros.grab import (
     FREQUENCY,
@@ -126,10 +126,10 @@ def test_mobility_is_that_of_a_rigid_body():
     with Simulation(scene) as simulation:
         for _ in range(7):
             state = simulation.advance()
-        free = BulletEngine(scene, free=True)
+        dynamics = compiled.dynamics_of(scene, BulletEngine, simulation._stepper.engine.layout)
         point = np.array((0.05, -0.1, 0.2))
-        got = mobility(free, simulation.coordinates, 0, point)
-        free.close()
+        got = mobility(dynamics, simulation.coordinates, 0, point)
+        dynamics.close()
     turn = rotation.matrix(state.orientations[0])
     arm = turn @ point
     skew = np.cross(np.eye(3), arm)

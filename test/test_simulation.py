@@ -9,10 +9,11 @@ import sys
 import numpy as np
 import pytest
 
-from ragdoll_ros import faults, rotation
+from ragdoll_ros import compiled, faults, rotation
+from ragdoll_ros.accuracy.references.articulated import Articulated
 from ragdoll_ros.coordinates import Coordinates
 from ragdoll_ros.engine.bullet import BulletEngine
-from ragdoll_ros.flight import Path, fly
+from ragdoll_ros.flight import EnginePath, fly
 from ragdoll_ros.gap import JointGap
 from ragdoll_ros.mechanics import Mechanics
 from ragdoll_ros.push import Push
@@ -468,13 +469,17 @@ def test_simulations_leave_nothing_behind(count):
 
 @pytest.mark.parametrize('accuracy', ['draft', 'normal', 'exact'])
 def test_the_error_estimate_in_flight_is_that_of_a_far_finer_flight(accuracy):
-    """True error of a tick: against ten steps of order 4 from the same start."""
+    """True error of a tick: against the equations of motion, at 1e-12, from the same start.
+
+    Compiled, a tick errs by rounding: what is below 1e-13 m can only be told to be that small.
+    """
+    pytest.importorskip('scipy')
     scene = dataclasses.replace(DROP, dolls=(dataclasses.replace(
         DROP.dolls[0], position=(0, 0, 50)),), ground=None)
+    tree = Articulated(scene.dolls[0].doll, scene.gravity)
     rng = np.random.default_rng(3)
-    ratios = []
+    ratios, trusted = [], 0
     with Simulation(scene, accuracy=accuracy) as simulation:
-        free = BulletEngine(scene, free=True)
         start = simulation.coordinates
         q, v = start.q.copy(), rng.normal(size=start.v.shape)
         lower, upper = free_limits()
@@ -486,13 +491,18 @@ def test_the_error_estimate_in_flight_is_that_of_a_far_finer_flight(accuracy):
             figures = simulation.measures()
             if not figures['error_trusted']:
                 continue
-            free.place(fly(free, before, 0.01, 4, 10))
-            error = np.linalg.norm(state.positions - free.read().positions, axis=1).max()
-            ratios.append(figures['error_estimate_m'] / error)
-        free.close()
+            trusted += 1
+            truth = tree.trajectory(before.q, before.v, (0, 0.01)).positions[-1]
+            error = np.linalg.norm(state.positions - truth, axis=1).max()
+            if error > 1e-13:
+                ratios.append(figures['error_estimate_m'] / error)
+            else:
+                assert figures['error_estimate_m'] < 3e-13
     ratios = np.array(ratios)
-    assert len(ratios) >= 10
-    assert np.mean((ratios > 1 / 3) & (ratios < 3)) >= 0.9
+    assert trusted >= 10
+    assert compiled.ready() or len(ratios) == trusted
+    if len(ratios):
+        assert np.mean((ratios > 1 / 3) & (ratios < 3)) >= 0.9
 
 
 def free_limits():
@@ -519,16 +529,39 @@ def test_a_ball_hands_its_momentum_on_to_another(accuracy, apart):
 
 @pytest.mark.parametrize('accuracy', [NORMAL, EXACT])
 def test_what_lies_goes_on_lying_where_it_is_put_down(accuracy):
-    """On the ground, and limbs on each other: that is no fault of the start."""
+    """On the ground, and limbs on each other: that is no fault of the start.
+
+    Joints that sag against their damping go on to, as they do in a twin that is left alone.
+    """
     awake = dataclasses.replace(accuracy, sleep=False)
-    with Simulation(load_scene('drop'), accuracy=awake) as simulation:
+    with Simulation(DROP, accuracy=awake) as simulation, Simulation(DROP, accuracy=awake) as twin:
         for _ in range(600):
-            lying = simulation.advance().positions
+            simulation.advance()
+            twin.advance()
         simulation.place(simulation.coordinates)
         for _ in range(30):
-            state = simulation.advance()
-    # Joints that sag against their damping go on to.
-    assert np.linalg.norm(state.positions - lying, axis=1).max() < 0.0005
+            state, left = simulation.advance(), twin.advance()
+    # It settles anew, as contact points begin anew too, within some tenths of a mm.
+    assert np.linalg.norm(state.positions - left.positions, axis=1).max() < 0.0005
+
+
+def test_a_step_that_is_done_again_begins_where_the_first_one_did():
+    """The doll falls as a whole, whatever its joints do: from a false start it would fall twice."""
+    rng = np.random.default_rng(3)
+    often = dataclasses.replace(NORMAL, order=0, momentum=False, redo=1e-6)
+    mechanics = Mechanics(FLIGHT)
+    with Simulation(FLIGHT, accuracy=often) as simulation:
+        v = np.zeros_like(simulation.coordinates.v)
+        v[:3], v[6:] = (1.0, 2.0, 3.0), rng.uniform(-8, 8, len(v) - 6)
+        simulation.place(Coordinates(simulation.coordinates.q, v))
+        before = mechanics.motion(simulation.state)
+        for _ in range(20):
+            simulation.advance()
+        after = mechanics.motion(simulation.state)
+        assert simulation.measures()['redone_total'] > 10
+    way = before.momentum[0] / mechanics.doll_masses[0] * 0.2
+    # The engine's own error of the momentum, of order 1, is 1 % of the way here.
+    assert after.centre[0] - before.centre[0] == pytest.approx(way, abs=0.03)
 
 
 def on_a_slope(degrees, friction):
@@ -579,7 +612,7 @@ def test_a_path_leads_through_what_it_passes(order):
     start = Coordinates(start.q, rng.normal(size=start.v.shape))
     errors = []
     for length in (0.04, 0.02):
-        path = Path(engine, start, length, order)
+        path = EnginePath(engine, start, length, order)
         missed = [path.at(share * length).q - fly(engine, start, share * length, 4, 40).q
                   for share in (0.2, 0.5, 0.8)]
         errors.append(np.abs(missed).max())

@@ -1,5 +1,6 @@
 #!/bin/sh
 # The tests with the versions of Ubuntu 24.04's apt: Python 3.12, numpy 1.26, setuptools 68.
+# Numba, which apt may lack, is the newest that works with that numpy.
 # PyBullet has no wheel there: it is built here too, from source. Wants c++ and Python's headers.
 set -eu
 python=${1:-python3.12}
@@ -27,8 +28,13 @@ rm -rf "$folder/source" && mkdir "$folder/source"
 (cd "$here" && cp -r setup.py setup.cfg pyproject.toml package.xml config resource ragdoll_ros \
     "$folder/source")
 pip install --no-build-isolation --constraint "$folder/versions.txt" \
-    "$folder/source[ros,report,fit]" pytest
+    "$folder/source[ros,report,fit,fast]" pytest
 "$folder/venv/bin/python" -m pip list |
-    grep -i '^\(numpy\|scipy\|setuptools\|pybullet\|pyyaml\|jsonschema\|ragdoll\)'
+    grep -i '^\(numpy\|numba\|llvmlite\|scipy\|setuptools\|pybullet\|pyyaml\|jsonschema\|ragdoll\)'
 cd "$here"
-PYTHONSAFEPATH=1 AMENT_PREFIX_PATH=$folder/venv "$folder/venv/bin/python" -m pytest
+export PYTHONSAFEPATH=1 AMENT_PREFIX_PATH="$folder/venv"
+"$folder/venv/bin/python" -m ragdoll_ros.compiled
+"$folder/venv/bin/python" -m pytest
+echo "Without compiled code: the core's tests"
+core=$(sed -n 's/^CORE := //p' Makefile)
+RAGDOLL_COMPILED=0 "$folder/venv/bin/python" -m pytest $(printf 'test/test_%s.py ' $core)

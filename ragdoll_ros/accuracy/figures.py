@@ -9,6 +9,8 @@ import os
 import platform
 from pathlib import Path
 
+from .. import compiled
+
 FILE = 'accuracy.json'
 
 
@@ -19,8 +21,9 @@ def about(command: str, seconds: float, quick: bool, starts: int) -> dict[str, o
             'machine': _processor(), 'cores': os.cpu_count(),
             'system': f'{platform.system()} {platform.machine()}',
             'python': platform.python_version(),
+            'compiled': compiled.ready(),
             'versions': {name: _version(name) for name in
-                         ('ragdoll_ros', 'pybullet', 'mujoco', 'numpy', 'scipy')}}
+                         ('ragdoll_ros', 'pybullet', 'mujoco', 'numpy', 'scipy', 'numba')}}
 
 
 def save(data: dict, folder: Path) -> Path:

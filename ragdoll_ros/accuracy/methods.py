@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from .. import faults
+from .. import compiled, faults
 from ..engine.bullet import BulletEngine
 from ..engine.mujoco import MujocoEngine
 from ..engine.protocol import Engine
@@ -139,7 +139,8 @@ def median_run(method: Method, trial: Trial, repeats: int) -> Result:
 def ours(accuracy: str | Accuracy, name: str | None = None) -> Method:
     """Our simulation at one of its settings, or with settings of one's own."""
     name = name or f'ours-{accuracy}'
-    order = ACCURACIES[accuracy].order if isinstance(accuracy, str) else accuracy.order or 1
+    order = (ACCURACIES[accuracy] if isinstance(accuracy, str) else accuracy).order
+    order = compiled.ORDER if order and compiled.ready() else order or 1
     return Method(name, name.replace('-', ' '), 'ours', functools.partial(
         Ours, accuracy=accuracy), order=order)
 

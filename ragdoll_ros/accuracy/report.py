@@ -32,6 +32,7 @@ Written by `{about['command']}`{' (quick)' if about['quick'] else ''} on {about[
 {about['seconds']:.0f} s; every figure stands in `accuracy.json`.
 Machine: {about['machine']}, {about['cores']} cores, {about['system']}. Python {about['python']}; \
 {versions}.
+The sums of our ticks are {'compiled by numba' if about.get('compiled') else 'not compiled'}.
 
 CPU times are of the whole tick as Python sees it, reading all poses included: medians, measured \
 one after another in one process. Compare ratios, not times. N is the number of substeps in a tick \
@@ -197,11 +198,13 @@ def switches(figures: Figures, pictures: Pictures) -> str:
 
 
 def projection(figures: Figures, pictures: Pictures) -> str:
-    """The price of the energy projection in fast flight."""
+    """The price of corrections."""
     if 'projection' not in figures:
         return ''
-    return ('## The price of keeping energy and momentum in flight\n\nWhat the corrections cost '
-            'in time, and what they change in the error, each flight at each setting.\n\n'
+    return ('## The price of keeping energy and momentum\n\nWhat the corrections cost in time, '
+            'and what they change in the error, each motion at each setting. In the air they are '
+            'for what the engine steps; without Runge-Kutta it steps all. What slides or rolls is '
+            'moved by the mean of its velocities (centred).\n\n'
             + table(figures['projection'], (
                 ('motion', 'motion', '{}'), ('accuracy', 'setting', '{}'),
                 ('switched', 'switched off', '{}'), ('cpu_s_per_s', 'CPU ms/s', 'ms'),

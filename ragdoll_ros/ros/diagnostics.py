@@ -9,6 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock
 from rclpy.node import Node
 
+from .. import compiled
 from ..push import Push
 from ..scene import SECOND
 from .messages import to_time
@@ -91,6 +92,7 @@ class Diagnostics:
         simulation, tally = self.simulation, self._tally
         return {
             **self._last,
+            'compiled': compiled.ready(),
             'simulated_time': simulation.time / SECOND,
             'push': pushes_text(simulation.pushes),
             **self._facts(),

@@ -1,0 +1,7 @@
+"""The kernels. What importing them compiles, one process compiles for all that start together."""
+from .cache import alone
+
+with alone():
+    from . import kernels
+
+__all__ = ['kernels']

@@ -1,0 +1,104 @@
+"""Where machine code is kept, what is said about it, and what goes without."""
+import os
+import subprocess
+import sys
+import threading
+import zipfile
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('numba')
+
+from ragdoll_ros.compiled import SWITCH, cache
+
+ROOT = Path(cache.__file__).resolve().parents[2]
+"""Where the package is that is tested: here or installed."""
+
+USE = """
+from ragdoll_ros.scene_file import load_scene
+from ragdoll_ros.simulation import Simulation
+for name, accuracy in (('article', 'draft'), ('flight', 'exact'), ('crowd', 'normal')):
+    with Simulation(load_scene(name), accuracy=accuracy) as simulation:
+        simulation.grab('hand', simulation.scene.bone_names[0])
+        for _ in range(100 if name == 'article' else 20):
+            simulation.advance()
+"""
+READY = 'import ragdoll_ros.compiled as c; print(c.ready())'
+SAMPLE = """
+import numba
+from ragdoll_ros.compiled import cache
+
+@numba.njit(cache=cache.KEPT)
+def double(x):
+    return 2 * x
+
+print(cache.KEPT, double(3), double(1.5))
+"""
+
+
+def run(*arguments, **variables):
+    """Run Python; give the exit code, what it prints, and the lines it says beside that."""
+    done = subprocess.run(
+        [sys.executable, *map(str, arguments)], capture_output=True, text=True, cwd='/',
+        timeout=120,
+        env={**os.environ, 'PYTHONPATH': os.pathsep.join([str(ROOT), *sys.path[1:]]),
+             SWITCH: '1', **{name: str(value) for name, value in variables.items()}})
+    return done.returncode, done.stdout.strip(), done.stderr.splitlines()
+
+
+@pytest.fixture
+def sample(tmp_path):
+    """A program that imports a function to compile as if it were the package's."""
+    (tmp_path / 'sample.py').write_text(SAMPLE)
+    return (f'import ragdoll_ros.compiled as c; c.__path__.append({str(tmp_path)!r}); '
+            'import ragdoll_ros.compiled.sample')
+
+
+def test_compiling_is_said_once_and_loading_is_not(sample, tmp_path):
+    said = [cache.COMPILING.format(cache.ONCE)]
+    assert run('-c', sample, NUMBA_CACHE_DIR=tmp_path / 'kept') == (0, 'True 6 3.0', said)
+    assert run('-c', sample, NUMBA_CACHE_DIR=tmp_path / 'kept') == (0, 'True 6 3.0', [])
+
+
+def test_where_nothing_can_be_kept_it_compiles_all_the_same_and_says_so(sample, tmp_path):
+    """Numba finds no place for code from an archive, as for that of a read-only installation."""
+    archive = tmp_path / 'archive'
+    with zipfile.ZipFile(archive, 'w') as files:
+        for path in ROOT.glob('ragdoll_ros/**/*.py'):
+            files.write(path, path.relative_to(ROOT))
+    paths = os.pathsep.join([str(archive), *sys.path[1:]])
+    code, printed, said = run('-c', sample, PYTHONPATH=paths)
+    assert (code, printed) == (0, 'False 6 3.0')
+    assert said == [cache.COMPILING.format(cache.EVERY_TIME)]
+
+
+def test_one_process_loads_or_compiles_at_a_time(capsys):
+    entered = threading.Event()
+
+    def enter():
+        with cache.alone():
+            entered.set()
+
+    other = threading.Thread(target=enter)
+    with cache.alone():
+        other.start()
+        assert not entered.wait(2 * cache.PATIENCE)
+    assert entered.wait(10)
+    other.join()
+    assert capsys.readouterr().err == cache.WAITING + '\n'
+
+
+def test_the_switch_goes_without():
+    assert run('-c', READY, **{SWITCH: '0'}) == (0, 'False', [])
+    code, _, said = run('-m', 'ragdoll_ros.compiled', **{SWITCH: '0'})
+    assert code == 2 and SWITCH in said[-1]
+
+
+def test_compiling_beforehand_leaves_nothing_to_compile():
+    """What `make` does after it has installed all; the second time it has nothing to do."""
+    run('-m', 'ragdoll_ros.compiled')
+    for arguments in (('-m', 'ragdoll_ros.compiled'), ('-c', USE)):
+        code, printed, said = run(*arguments)
+        assert code == 0 and not any('ompil' in line for line in said), said
+        assert str(cache.FOLDER) in printed or arguments[0] == '-c'

@@ -1,0 +1,77 @@
+"""All works without numba too: where it is missing, broken or switched off."""
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+FALL = """
+import numpy as np
+from ragdoll_ros import compiled
+from ragdoll_ros.push import Push
+from ragdoll_ros.scene_file import load_scene
+from ragdoll_ros.simulation import Simulation
+for name in ('flight', 'drop'):
+    with Simulation(load_scene(name)) as simulation:
+        simulation.grab('hand', 'head')
+        simulation.push(Push('torso', force=(100, 0, 50), duration=0.05))
+        for tick in range(10):
+            if tick == 5:
+                simulation.let_go('hand')
+            state = simulation.advance()
+        assert np.isfinite(state.rows).all()
+        assert all(np.isfinite(value) for value in simulation.measures().values())
+import sys
+print(compiled.ready(), sys.modules.get('numba') is not None)
+"""
+GONE = "import sys; sys.modules['numba'] = None\n"
+
+
+def told(code, **environment):
+    """Last line of what a process of its own prints."""
+    path = os.pathsep.join([str(ROOT), os.environ.get('PYTHONPATH', '')])
+    done = subprocess.run([sys.executable, '-c', code], check=False, capture_output=True, text=True,
+                          env={**os.environ, 'PYTHONPATH': path, **environment})
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()[-1]
+
+
+def test_the_switch_turns_it_off():
+    """And numba is not so much as imported, which takes a third of a second."""
+    assert told(FALL, RAGDOLL_COMPILED='0') == 'False False'
+
+
+@pytest.mark.parametrize('switch', ['', '1'])
+def test_it_does_without_numba(switch):
+    assert told(GONE + FALL, RAGDOLL_COMPILED=switch) == 'False False'
+
+
+def test_it_does_with_a_broken_numba(tmp_path):
+    """As where numpy is too new for it: numba is there, and raises ImportError."""
+    (tmp_path / 'numba.py').write_text("raise ImportError('Numba needs NumPy 2.2 or less')\n")
+    code = f'import sys; sys.path.insert(0, {str(tmp_path)!r})\n' + FALL
+    assert told(code, RAGDOLL_COMPILED='1') == 'False False'
+
+
+def test_it_does_where_nothing_can_be_kept(tmp_path):
+    """As for a user without a home, the package being another's: numba finds no place for its
+    cache, and raises RuntimeError. A file stands here where the folders were to be.
+    """
+    pytest.importorskip('numba', reason='numba is not installed')
+    package = tmp_path / 'ragdoll_ros'
+    shutil.copytree(ROOT / 'ragdoll_ros', package, ignore=shutil.ignore_patterns('__pycache__'))
+    (package / 'config').symlink_to(ROOT / 'config')
+    (package / 'compiled' / '__pycache__').write_text('')
+    code = f'import sys; sys.path.insert(0, {str(tmp_path)!r})\n' + FALL
+    told(code, HOME='/dev/null', XDG_CACHE_HOME='/dev/null', PYTHONDONTWRITEBYTECODE='1',
+         RAGDOLL_COMPILED='1')
+
+
+def test_it_is_used_where_it_is():
+    pytest.importorskip('numba', reason='numba is not installed')
+    assert told(FALL, RAGDOLL_COMPILED='1') == 'True True'
