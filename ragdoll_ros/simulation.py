@@ -201,7 +201,7 @@ class Simulation:
         what merely rests on something, up to pressed() deep in it, rests on.
         """
         stepper = self._stepper
-        stepper.place(coordinates)
+        stepper.place(Coordinates(np.array(coordinates.q, float), np.array(coordinates.v, float)))
         engine = stepper.settle()
         engine.let_overlaps_be()
         stepper.begin()

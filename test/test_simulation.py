@@ -545,6 +545,18 @@ def test_what_lies_goes_on_lying_where_it_is_put_down(accuracy):
     assert np.linalg.norm(state.positions - left.positions, axis=1).max() < 0.0005
 
 
+def test_coordinates_are_taken_as_they_come_and_are_left_to_their_owner():
+    """Single precision, every other of an array, read-only; and what is done to them later."""
+    with Simulation(FLIGHT) as simulation:
+        here = simulation.coordinates
+        wide = np.repeat(here.q, 2).astype(np.float32)
+        still = np.zeros_like(here.v)
+        still.flags.writeable = False
+        begun = simulation.place(Coordinates(wide[::2], still)).positions.copy()
+        wide[:] = 7.0
+        assert simulation.advance().positions == pytest.approx(begun, abs=1e-12)
+
+
 def test_a_step_that_is_done_again_begins_where_the_first_one_did():
     """The doll falls as a whole, whatever its joints do: from a false start it would fall twice."""
     rng = np.random.default_rng(3)
