@@ -15,6 +15,7 @@ from ragdoll_ros.coordinates import Coordinates
 from ragdoll_ros.engine.bullet import BulletEngine
 from ragdoll_ros.flight import EnginePath, fly
 from ragdoll_ros.gap import JointGap
+from ragdoll_ros.guard import Guard
 from ragdoll_ros.mechanics import Mechanics
 from ragdoll_ros.push import Push
 from ragdoll_ros.ragdoll import Bone, Box, Ragdoll, Sphere
@@ -543,6 +544,26 @@ def test_what_lies_goes_on_lying_where_it_is_put_down(accuracy):
             state, left = simulation.advance(), twin.advance()
     # It settles anew, as contact points begin anew too, within some tenths of a mm.
     assert np.linalg.norm(state.positions - left.positions, axis=1).max() < 0.0005
+
+
+def test_a_doll_in_the_air_with_stiff_joints_gives_surplus_energy_from_its_rotation():
+    """Momentum stays, and the axis; from joints that stand still there is nothing to take."""
+    engine, mechanics = BulletEngine(FLIGHT), Mechanics(FLIGHT)
+    guard = Guard(FLIGHT, mechanics, engine.layout)
+    start = engine.coordinates()
+    v = np.zeros_like(start.v)
+    v[:6] = (1.0, 2.0, 3.0, 0.5, -2.0, 4.0)
+    engine.place(Coordinates(start.q, v))
+    before = mechanics.motion(engine.read())
+    guard.open(engine.read())
+    surplus = np.array([2.0])
+    engine.place(guard.without_surplus(start, Coordinates(start.q, v), before, surplus, False))
+    after = mechanics.motion(engine.read())
+    engine.close()
+    assert after.energy[0] == pytest.approx(before.energy[0] - 2.0, abs=1e-9)
+    assert after.momentum[0] == pytest.approx(before.momentum[0], abs=1e-9)
+    assert np.cross(after.spin[0], before.spin[0]) == pytest.approx((0, 0, 0), abs=1e-9)
+    assert guard.account.taken == pytest.approx(2.0, abs=1e-9)
 
 
 def test_coordinates_are_taken_as_they_come_and_are_left_to_their_owner():
