@@ -66,6 +66,8 @@ class Layout:
                 v += 3 if limits is None else 1
             self.own_q.append(slice(q, len(lower)))
             self.own_v.append(slice(first_v, v))
+        self.sizes = (len(lower), v)
+        """Numbers in q and in v."""
         self._plain = (np.array(plain_q), np.array(plain_v))
         self._turning = self._indices(roots + balls)
         self.root_orientations, self.root_spins = self._indices(roots)

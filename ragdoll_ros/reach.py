@@ -97,9 +97,17 @@ class Reach:
         """Fastest spin of a bone, rad/s."""
         return math.sqrt(np.einsum('ij,ij->i', state.angular, state.angular).max())
 
+    def rim(self, state: State) -> float:
+        """Fastest speed, m/s, of a bone's end about its centre."""
+        spins = np.sqrt(np.einsum('ij,ij->i', state.angular, state.angular))
+        return float((self._radii * spins).max())
+
     def strides(self, state: State, duration: float) -> int:
-        """Parts of ``duration`` s in each of which no bone passes another's half thickness."""
-        return max(1, math.ceil(self.closing(state) * duration / (4 * self._thinnest)))
+        """Parts of ``duration`` s in each of which no bone, nor its end that turns, passes through
+        the thinnest.
+        """
+        speed = self.closing(state) + 2 * self.rim(state)
+        return max(1, math.ceil(speed * duration / (4 * self._thinnest)))
 
     def _close(self, positions: np.ndarray, far: np.ndarray) -> set[tuple[int, int]]:
         """Pairs of dolls whose boxes, ``far`` m wider, overlap."""

@@ -70,7 +70,7 @@ class Simulation:
         self._gap = JointGap(scene)
         self._rest = Rest(scene)
         self._riding = riding(scene)
-        self._begin()
+        self.reset()
 
     def __enter__(self) -> Simulation:
         return self
@@ -198,18 +198,22 @@ class Simulation:
         """Put the dolls elsewhere, with other velocities, and take that as the start of all.
 
         Bones that overlap there do not collide from then on, and what is in the ground is lifted;
-        what merely rests on something, up to pressed() deep in it, rests on.
+        what merely rests on something, up to pressed() deep in it, rests on. Raises OutOfRange for
+        coordinates of other lengths than the scene's.
         """
         stepper = self._stepper
-        stepper.place(coordinates)
+        q, v = np.array(coordinates.q, float), np.array(coordinates.v, float)
+        sizes = stepper.engine.layout.sizes
+        if (q.shape, v.shape) != ((sizes[0],), (sizes[1],)):
+            raise faults.OutOfRange('coordinates', (q.shape, v.shape), f'{sizes} numbers')
+        stepper.place(Coordinates(q, v))
         engine = stepper.settle()
         engine.let_overlaps_be()
         stepper.begin()
         self._lift_out()
         engine.forget(self._start[0])
         self._start = (engine.save(), stepper.coordinates)
-        self._begin()
-        return self._state
+        return self.reset()
 
     def reset(self) -> State:
         """Go back to the start, to the bit; pushes that wait are dropped, and hands let go."""

@@ -52,11 +52,11 @@ def work(load: Load, before: State, after: State, piece: Piece) -> float:
     (place, speed), (end, end_speed) = (
         point_motion(state, bone, load.point) for state in (before, after))
     faster, spun = end_speed - speed, after.angular[bone] - before.angular[bone]
-    done = force @ (end - place - piece.substep / 2 * faster)
+    done = force @ (end - place - piece.lag / 2 * faster)
     if torque.any():
         swept = _turned(bone, before, after) + piece.duration ** 2 / 12 * cross(
             before.angular[bone], after.angular[bone])
-        done += torque @ (swept - piece.substep / 2 * spun)
+        done += torque @ (swept - piece.lag / 2 * spun)
     if load.local:
         change = after.turns[bone] - before.turns[bone]
         done += piece.duration / 12 * (change @ load.force @ faster + change @ load.torque @ spun)

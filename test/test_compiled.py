@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import hashlib
 import json
 import math
 import os
@@ -19,6 +20,7 @@ pytest.importorskip('scipy')
 from ragdoll_ros import compiled, rotation
 from ragdoll_ros.accuracy.motions.motion import without_damping, without_limits
 from ragdoll_ros.accuracy.references.articulated import Articulated, depth_first
+from ragdoll_ros.compiled import kernels
 from ragdoll_ros.compiled.dynamics import CompiledDynamics
 from ragdoll_ros.compiled.limits import CompiledLimits
 from ragdoll_ros.compiled.mechanics import CompiledGuard, CompiledMechanics
@@ -633,3 +635,9 @@ def test_a_fall_is_plausible_compiled_or_not(ready, plainly, monkeypatch):
     assert sum(told['flights'] for told in found['measures']) > 3
     assert sum(told['substeps'] for told in found['measures']) > 100
     assert np.array(found['rows'])[-1, :, 2].max() < .5  # it is down
+
+
+def test_the_kernels_name_the_numbers_that_are_frozen_into_them():
+    """Else numba would go on with the old ones after a change, see kernels.py."""
+    source = File(compiled.__file__).with_name('dop853.py').read_bytes()
+    assert hashlib.sha256(source).hexdigest()[:16] == kernels.NUMBERS

@@ -15,9 +15,10 @@ from ragdoll_ros.coordinates import Coordinates
 from ragdoll_ros.engine.bullet import BulletEngine
 from ragdoll_ros.flight import EnginePath, fly
 from ragdoll_ros.gap import JointGap
+from ragdoll_ros.guard import Guard
 from ragdoll_ros.mechanics import Mechanics
 from ragdoll_ros.push import Push
-from ragdoll_ros.ragdoll import Bone, Box, Ragdoll, Sphere
+from ragdoll_ros.ragdoll import Bone, Box, Capsule, Joint, Ragdoll, Sphere
 from ragdoll_ros.reach import Reach
 from ragdoll_ros.scene import NO_SLIP, SECOND, Ground, Material, Placement, Scene, height
 from ragdoll_ros.scene_file import load_scene
@@ -543,6 +544,99 @@ def test_what_lies_goes_on_lying_where_it_is_put_down(accuracy):
             state, left = simulation.advance(), twin.advance()
     # It settles anew, as contact points begin anew too, within some tenths of a mm.
     assert np.linalg.norm(state.positions - left.positions, axis=1).max() < 0.0005
+
+
+def test_a_doll_in_the_air_with_stiff_joints_gives_surplus_energy_from_its_rotation():
+    """Momentum stays, and the axis; from joints that stand still there is nothing to take."""
+    engine, mechanics = BulletEngine(FLIGHT), Mechanics(FLIGHT)
+    guard = Guard(FLIGHT, mechanics, engine.layout)
+    start = engine.coordinates()
+    v = np.zeros_like(start.v)
+    v[:6] = (1.0, 2.0, 3.0, 0.5, -2.0, 4.0)
+    engine.place(Coordinates(start.q, v))
+    before = mechanics.motion(engine.read())
+    guard.open(engine.read())
+    surplus = np.array([2.0])
+    engine.place(guard.without_surplus(start, Coordinates(start.q, v), before, surplus, False))
+    after = mechanics.motion(engine.read())
+    engine.close()
+    assert after.energy[0] == pytest.approx(before.energy[0] - 2.0, abs=1e-9)
+    assert after.momentum[0] == pytest.approx(before.momentum[0], abs=1e-9)
+    assert np.cross(after.spin[0], before.spin[0]) == pytest.approx((0, 0, 0), abs=1e-9)
+    assert guard.account.taken == pytest.approx(2.0, abs=1e-9)
+
+
+@pytest.mark.parametrize('name', ['drop', 'crowd'])
+def test_a_reset_goes_back_to_the_bit_however_dolls_are_turned(name):
+    rng, scene = np.random.default_rng(8), load_scene(name)
+    turned = tuple(dataclasses.replace(
+        placement, orientation=tuple(rng.normal(size=4)), spin=tuple(rng.normal(size=3)))
+        for placement in scene.dolls)
+    with Simulation(dataclasses.replace(scene, dolls=turned)) as simulation:
+        runs = []
+        for _ in range(3):
+            runs.append(np.array([simulation.state.rows, *(
+                simulation.advance().rows for _ in range(60))]))
+            simulation.reset()
+    assert (runs[0] == runs[1]).all() and (runs[1] == runs[2]).all()
+
+
+def test_coordinates_of_another_doll_are_refused():
+    with Simulation(FLIGHT) as simulation, pytest.raises(faults.OutOfRange, match='coordinates'):
+        simulation.place(Coordinates(simulation.coordinates.q, np.zeros(6)))
+
+
+def test_more_joints_than_pybullet_tells_of_are_refused():
+    """Of 128 coordinates at the most: of a chain of 31 free balls it would drop some silently."""
+    balls = tuple(Bone(f'b{k}', Sphere(0.04), 0.1, (0.1 * k, 0.0, 0.0)) for k in range(32))
+    joints = tuple(Joint(f'b{k}', f'b{k + 1}', 'ball', (0.1 * k + 0.05, 0.0, 0.0),
+                         ((1.0, 0.0, 0.0),)) for k in range(31))
+    scene = Scene('chain', (Placement(Ragdoll('chain', balls, joints)),), ground=None)
+    with pytest.raises(faults.OutOfRange, match='at most 128'):
+        Simulation(scene)
+
+
+@pytest.mark.parametrize('accuracy', ['draft', 'normal', 'exact'])
+def test_a_push_along_the_ground_does_its_work(accuracy):
+    """20 N for 1 s on 5 kg without friction: 4 m/s, 2 m, 40 J."""
+    box = Ragdoll('box', (Bone('box', Box((0.4, 0.4, 0.1)), 5.0, (0.0, 0.0, 0.0)),))
+    scene = Scene('ice', (Placement(box, position=(0.0, 0.0, 0.05)),), Ground(),
+                  material=Material(0.0, 0.0, 0.0))
+    with Simulation(scene, accuracy=accuracy) as simulation:
+        simulation.push(Push('box', force=(20.0, 0.0, 0.0), duration=1.0))
+        for _ in range(100):
+            state = simulation.advance()
+        measures = simulation.measures()
+    assert state.linear[0, 0] == pytest.approx(4.0, abs=1e-9)
+    assert state.positions[0, 0] == pytest.approx(2.0, abs=1e-9)
+    assert measures['work_of_pushes_J'] == pytest.approx(40.0, abs=1e-8)
+    # It settles on the ground, which costs some tenths of a mJ.
+    assert -2e-3 < measures['energy_excess_J'] < 1e-9
+
+
+@pytest.mark.parametrize('tick', [0.2, 0.1, 0.05, 0.01])
+def test_what_turns_fast_hits_the_ground_at_long_ticks_too(tick):
+    """A rod of 1 m at 30 rad/s, 0.3 m high: its end is in the ground four times in a tick."""
+    rod = Ragdoll('rod', (Bone('rod', Capsule(0.05, 0.9), 2.0, (0.0, 0.0, 0.0)),))
+    scene = Scene('rod', (Placement(rod, position=(0.0, 0.0, 0.3), velocity=(0.0, 0.0, 3.0),
+                                    orientation=tuple(rotation.from_rpy(0, math.pi / 2, 0)),
+                                    spin=(0.0, 30.0, 0.0)),), Ground(), step=tick)
+    with Simulation(scene) as simulation:
+        for _ in range(round(0.4 / tick)):
+            state = simulation.advance()
+    assert abs(state.angular[0, 1]) < 25
+
+
+def test_coordinates_are_taken_as_they_come_and_are_left_to_their_owner():
+    """Single precision, every other of an array, read-only; and what is done to them later."""
+    with Simulation(FLIGHT) as simulation:
+        here = simulation.coordinates
+        wide = np.repeat(here.q, 2).astype(np.float32)
+        still = np.zeros_like(here.v)
+        still.flags.writeable = False
+        begun = simulation.place(Coordinates(wide[::2], still)).positions.copy()
+        wide[:] = 7.0
+        assert simulation.advance().positions == pytest.approx(begun, abs=1e-12)
 
 
 def test_a_step_that_is_done_again_begins_where_the_first_one_did():

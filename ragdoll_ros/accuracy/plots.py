@@ -167,6 +167,10 @@ def draw_classes(figures: dict[str, list[Row]], plt: object) -> object:
     return figure
 
 
+ROUND_TICKS = (1, 2, 5, 10, 20, 50, 100, 200)
+"""ms, where the axis of ticks is labelled."""
+
+
 def draw_orders(figures: dict[str, list[Row]], plt: object) -> object:
     """Draw errors over the tick."""
     rows = [row for row in figures.get('orders', ()) if 'failed' not in row]
@@ -189,9 +193,8 @@ def draw_orders(figures: dict[str, list[Row]], plt: object) -> object:
             axes.loglog([1e3 * tick for tick in row['ticks_s']],
                         [_number(error) or math.nan for error in row['errors']],
                         marker=mark, color=colour, ms=5, label=text)
-        axes.set(xlabel='tick, ms', ylabel='worst error, m or rad', xlim=(1, 200))
-        ticks = [1e3 * tick for tick in rows[0]['ticks_s']]
-        axes.set_xticks(ticks, [f'{tick:g}' for tick in ticks])
+        axes.set(xlabel='tick, ms', ylabel='worst error, m or rad', xlim=(1, 300))
+        axes.set_xticks(ROUND_TICKS, [f'{tick:g}' for tick in ROUND_TICKS])
         axes.minorticks_off()
         axes.set_title(rows[[r['motion'] for r in rows].index(name)]['title'], loc='left',
                        fontsize=10)

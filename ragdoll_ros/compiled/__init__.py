@@ -33,12 +33,12 @@ def ready() -> bool:
     if os.environ.get(SWITCH, '1') == '0':
         return False
     try:
-        import numba  # noqa: F401
+        import numba
     except ImportError as error:
         if getattr(error, 'name', None) != 'numba':
             warnings.warn(f'Not compiled, as numba does not work here: {error}', stacklevel=2)
         return False
-    return True
+    return not numba.config.DISABLE_JIT
 
 
 def dynamics_of(scene: Scene, make_engine: type[Engine], layout: Layout) -> Dynamics:

@@ -16,7 +16,8 @@ SCENES = {'drop': 200, 'crowd': 10}
 EXAMPLE = """examples:
   python -m ragdoll_ros.compiled
   NUMBA_CACHE_DIR=/var/cache/ragdoll python -m ragdoll_ros.compiled     keeps the result there;
-                                           nodes that are to find it want the same variable
+                                           nodes that are to find it want the same variable,
+                                           and must be able to write there, as numba asks for it
 """
 
 NOT_READY = ("Nothing to compile with: pip install 'ragdoll_ros[fast]' gets numba, and all works "

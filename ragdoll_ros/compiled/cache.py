@@ -5,7 +5,6 @@ Numba keeps it beside the source, or in the user's cache folder where that is no
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
 import sys
 import threading
@@ -51,7 +50,8 @@ class Teller(event.Listener):
 
     def on_start(self, event: event.Event) -> None:
         """Numba begins to compile a function."""
-        if not self.told and event.data['dispatcher'].py_func.__module__.startswith(__package__):
+        module = event.data['dispatcher'].py_func.__module__ or ''
+        if not self.told and module.startswith(__package__):
             self.told = True
             say(COMPILING.format(ONCE if KEPT else EVERY_TIME))
 
@@ -68,7 +68,7 @@ def alone() -> Iterator[None]:
     """
     with contextlib.ExitStack() as stack:
         if FOLDER is not None:
-            with contextlib.suppress(OSError):  # a file system without locks
+            with contextlib.suppress(OSError, ImportError):  # a system without such locks
                 lock = os.open(FOLDER / 'ragdoll_ros.lock', os.O_RDONLY | os.O_CREAT, 0o666)
                 stack.callback(os.close, lock)
                 _wait_for(lock)
@@ -76,6 +76,7 @@ def alone() -> Iterator[None]:
 
 
 def _wait_for(lock: int) -> None:
+    import fcntl
     word = threading.Timer(PATIENCE, say, (WAITING,))
     word.start()
     try:

@@ -65,7 +65,7 @@ class CompiledReach(Reach):
 
     def closing(self, state: State) -> float:
         """Largest difference, m/s, of two bones' speeds along one of the axes."""
-        return kernels.fastest(state.rows)[1]
+        return kernels.fastest(self._radii, state.rows)[1]
 
     def change(self, before: State, after: State) -> float:
         """Largest change, m/s, of a velocity at a bone's centre or, by turning, at its surface."""
@@ -73,4 +73,8 @@ class CompiledReach(Reach):
 
     def spin(self, state: State) -> float:
         """Fastest spin of a bone, rad/s."""
-        return kernels.fastest(state.rows)[0]
+        return kernels.fastest(self._radii, state.rows)[0]
+
+    def rim(self, state: State) -> float:
+        """Fastest speed, m/s, of a bone's end about its centre."""
+        return kernels.fastest(self._radii, state.rows)[2]

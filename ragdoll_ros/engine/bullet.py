@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import pybullet
 
-from .. import rotation
+from .. import faults, rotation
 from ..coordinates import UNLIMITED, Coordinates, Layout
 from ..ragdoll import Box, Ragdoll
 from ..scene import Placement, Scene, grip
@@ -53,6 +53,9 @@ own, as PyBullet holds the impulse of a joint limit to 1000 N m s."""
 
 SLAB = (1e6, 1e6, 10.0)
 """m: half extents of the slab that stands for the ground under boxes."""
+
+MOST_COORDINATES = 128
+"""Numbers in q of one doll: what PyBullet holds in a body's state."""
 
 PROBE_STEP = 2.0 ** -10
 """s: the step that measures accelerations; a power of two, so that dividing by it is exact."""
@@ -313,6 +316,7 @@ class BulletEngine:
             self._doll_of[self._ground] = GROUND
         self._bone_of = {link: bone for bone, link in enumerate(self._links)}
         self.layout = self._lay_out()
+        self._check_sizes()
         self.let_overlaps_be()
         for index, placement in enumerate(self.scene.dolls):
             self._set_in_motion(self._dolls[index].body, placement)
@@ -433,6 +437,14 @@ class BulletEngine:
             dolls.append([None if ball else limits[name] or UNLIMITED
                           for name, ball in zip(names, doll.balls, strict=True)])
         return Layout(dolls)
+
+    def _check_sizes(self) -> None:
+        """Refuse what PyBullet would cut off without a word."""
+        for placement, own in zip(self.scene.dolls, self.layout.own_q, strict=True):
+            count = own.stop - own.start
+            if count > MOST_COORDINATES:
+                raise faults.OutOfRange(f'joints of {placement.name}', count,
+                                        f'at most {MOST_COORDINATES} coordinates, 7 for the root')
 
     def _set_in_motion(self, body: int, placement: Placement) -> None:
         """Give a doll its velocity at the start, as one rigid body about its centre of mass."""
