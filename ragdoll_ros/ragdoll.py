@@ -298,6 +298,11 @@ class Joint:
                 raise faults.WrongAxes(f'limits[{index}]', pair, 'a symmetric pair, [-a, a]')
 
     @property
+    def is_free_ball(self) -> bool:
+        """Whether a quaternion stands for its turn: a ball joint without limits."""
+        return self.kind == 'ball' and not any(self.limits)
+
+    @property
     def freedoms(self) -> int:
         """Number of degrees of freedom."""
         return JOINT_KINDS[self.kind].freedoms
@@ -404,6 +409,18 @@ class Ragdoll:
             for joint in below.get(name, ()):
                 ordered.append(joint)
                 names.append(joint.child)
+        return tuple(ordered)
+
+    def joints_depth_first(self) -> tuple[Joint, ...]:
+        """Give all joints, each one's whole branch before the next, as engines count them."""
+        below: dict[str, list[Joint]] = {}
+        for joint in reversed(self.joints):
+            below.setdefault(joint.parent, []).append(joint)
+        ordered: list[Joint] = []
+        waiting = below.pop(self.root.name, [])
+        while waiting:
+            ordered.append(waiting.pop())
+            waiting += below.pop(ordered[-1].child, [])
         return tuple(ordered)
 
     def replace_bone(self, name: str, **changes: object) -> Ragdoll:

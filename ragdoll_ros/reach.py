@@ -72,8 +72,7 @@ class Reach:
                 return set()
             if any(GROUND in pair for pair in touching):
                 return {(0, GROUND)}
-        speeds = np.sqrt(np.einsum('ij,ij->i', state.linear, state.linear))
-        far = 2 * duration * (speeds + acceleration * duration) + self._radii + MARGIN
+        far = self._far(state, duration, acceleration)
         found = set()
         if self._ground is not None:
             low = state.positions @ self._normal - self._ground.offset < far
@@ -108,6 +107,11 @@ class Reach:
         """
         speed = self.closing(state) + 2 * self.rim(state)
         return max(1, math.ceil(speed * duration / (4 * self._thinnest)))
+
+    def _far(self, state: State, duration: float, acceleration: float) -> np.ndarray:
+        """Radii (n,) m of the spheres that hold what the bones may come to."""
+        speeds = np.sqrt(np.einsum('ij,ij->i', state.linear, state.linear))
+        return 2 * duration * (speeds + acceleration * duration) + self._radii + MARGIN
 
     def _close(self, positions: np.ndarray, far: np.ndarray) -> set[tuple[int, int]]:
         """Pairs of dolls whose boxes, ``far`` m wider, overlap."""

@@ -109,8 +109,8 @@ class Stepper:
         smallest = min(placement.doll.extent for placement in scene.dolls)
         self._span = 0.01 * min(1.0, math.sqrt(smallest / HUMAN))
         """s in which as many substeps are taken as the accuracy says for 10 ms."""
-        self._stale: bool
-        """Whether the engine has yet to hear of a shift."""
+        self._stale = False
+        """Whether the engine has yet to hear of where all is."""
         self._blocked: bool
         """Whether something that no flight can foresee comes next: bones that meet."""
         self._departure: Coordinates
@@ -123,7 +123,7 @@ class Stepper:
         """s: where on the path."""
         self._counted: int
         """Steps of the path that were counted."""
-        self._stale = self._loaded = False
+        self._loaded = False
         """Whether it is a path under loads, which ends with the piece."""
         self.effort = Effort()
         self.begin()

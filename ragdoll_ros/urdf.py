@@ -132,7 +132,7 @@ def _joint(joint: Joint, frames: dict, dialect: str, limited: bool) -> list[str]
              rotation.multiply(turn, joint_frame(joint)))
     if joint.kind == 'fixed':
         return _row(joint, [(joint.child, 'fixed', None, None)], place, dialect)
-    if joint.kind == 'ball' and dialect == 'bullet' and not any(joint.limits):
+    if joint.is_free_ball and dialect == 'bullet':
         row = [(joint.child, 'spherical', (0, 0, 1), None),
                (f'{joint.child}/fixed', 'fixed', None, None)]
         return _row(joint, row, place, dialect)

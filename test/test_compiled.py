@@ -19,7 +19,7 @@ pytest.importorskip('scipy')
 
 from ragdoll_ros import compiled, rotation
 from ragdoll_ros.accuracy.motions.motion import without_damping, without_limits
-from ragdoll_ros.accuracy.references.articulated import Articulated, depth_first
+from ragdoll_ros.accuracy.references.articulated import Articulated
 from ragdoll_ros.compiled import kernels
 from ragdoll_ros.compiled.dynamics import CompiledDynamics
 from ragdoll_ros.compiled.limits import CompiledLimits
@@ -103,7 +103,7 @@ def random_coordinates(scene, seed, speed=3.0, far=0.0):
         q.append(own)
         v.append(rng.normal(size=tree.nv) * speed)
         turns, at = [3], 7
-        for joint in depth_first(placement.doll):
+        for joint in placement.doll.joints_depth_first():
             free = joint.kind == 'ball' and not any(joint.limits)
             turns += [at] if free else []
             at += 4 if free else joint.freedoms

@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip('mujoco')
 
 from ragdoll_ros import faults, rotation
-from ragdoll_ros.accuracy.references.articulated import Articulated, depth_first
+from ragdoll_ros.accuracy.references.articulated import Articulated
 from ragdoll_ros.coordinates import Coordinates
 from ragdoll_ros.engine.bullet import BulletEngine
 from ragdoll_ros.engine.mujoco import MujocoEngine
@@ -57,7 +57,7 @@ def random_coordinates(doll, seed):
     q[3:7] = rotation.normalized(rng.normal(size=4))
     q[7:] += rng.uniform(-.4, .4, size=q.size - 7)
     at = 7
-    for joint in depth_first(doll):
+    for joint in doll.joints_depth_first():
         if joint.kind == 'ball' and not any(joint.limits):
             q[at:at + 4] = rotation.normalized(q[at:at + 4])
             at += 4

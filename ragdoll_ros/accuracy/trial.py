@@ -12,7 +12,7 @@ from ..engine.protocol import Load
 from ..push import Push
 from ..ragdoll import Ragdoll
 from ..scene import Placement, Scene
-from .references.articulated import Articulated, depth_first
+from .references.articulated import Articulated
 
 
 @dataclass(frozen=True)
@@ -67,5 +67,5 @@ def posed(placement: Placement, angles: dict[str, float] | None = None,
 
 def angle_places(doll: Ragdoll) -> dict[str, int]:
     """Place of each joint angle behind the root's coordinates, for dolls without free balls."""
-    names = [name for joint in depth_first(doll) for name in joint.angle_names]
+    names = [name for joint in doll.joints_depth_first() for name in joint.angle_names]
     return {name: place for place, name in enumerate(names)}

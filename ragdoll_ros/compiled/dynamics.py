@@ -74,9 +74,9 @@ class CompiledDynamics:
     def fly(self, start: Coordinates, duration: float, steps: int,
             loads: Sequence[Load] = ()) -> Coordinates:
         """Give the coordinates ``duration`` s later, in equal steps."""
-        known = None
+        known, rows = None, _packed(loads)
         for _ in range(steps):
-            known = self.step(start, duration / steps, _packed(loads), known)
+            known = self.step(start, duration / steps, rows, known)
             start = known.at(1.0)
         return start
 

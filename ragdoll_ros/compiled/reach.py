@@ -59,9 +59,7 @@ class CompiledReach(Reach):
                 found = {(int(doll), GROUND) for doll in np.flatnonzero(low)}
         if len(self._bounds) == 2:
             return found
-        speeds = np.sqrt(np.einsum('ij,ij->i', state.linear, state.linear))
-        far = 2 * duration * (speeds + acceleration * duration) + self._radii + MARGIN
-        return found | self._close(state.positions, far)
+        return found | self._close(state.positions, self._far(state, duration, acceleration))
 
     def closing(self, state: State) -> float:
         """Largest difference, m/s, of two bones' speeds along one of the axes."""

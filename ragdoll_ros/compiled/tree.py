@@ -1,8 +1,6 @@
 """A scene's dolls as one table for compiled code: a record for each bone, parents first."""
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from .. import rotation
@@ -30,7 +28,7 @@ def table(scene: Scene) -> np.ndarray:
     q = v = 0
     for placement in scene.dolls:
         doll, at = placement.doll, {}
-        for joint in (None, *depth_first(doll)):
+        for joint in (None, *doll.joints_depth_first()):
             bone = doll.bone(joint.child) if joint else doll.root
             record = _joined(doll, joint, at) if joint else _root()
             record['bone'] = places[scene.qualified(placement, bone.name)]
@@ -55,7 +53,7 @@ def _joined(doll: Ragdoll, joint: Joint, at: dict[str, int]) -> np.ndarray:
     """What a joint says of its child's record; ``at``: which record is whose."""
     record = np.zeros((), RECORD)
     record['parent'] = at[joint.parent]
-    record['free'] = joint.kind == 'ball' and not any(joint.limits)
+    record['free'] = joint.is_free_ball
     record['freedoms'], record['damping'] = joint.freedoms, joint.damping
     record['before'] = np.subtract(joint.anchor, doll.bone(joint.parent).position)
     record['after'] = np.subtract(doll.bone(joint.child).position, joint.anchor)
@@ -63,15 +61,3 @@ def _joined(doll: Ragdoll, joint: Joint, at: dict[str, int]) -> np.ndarray:
     for row, axis in enumerate(axes):
         record['axes'][row] = axis
     return record
-
-
-def depth_first(doll: Ragdoll) -> Iterator[Joint]:
-    """All joints, each one's whole branch before the next, as engines count them."""
-    below: dict[str, list[Joint]] = {}
-    for joint in reversed(doll.joints):
-        below.setdefault(joint.parent, []).append(joint)
-    waiting = below.pop(doll.root.name, [])
-    while waiting:
-        joint = waiting.pop()
-        yield joint
-        waiting += below.pop(joint.child, [])

@@ -4,7 +4,7 @@ The package works without it: `pip install ragdoll_ros[report]` brings it.
 """
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -212,7 +212,7 @@ class MujocoEngine:
 
     def _place_of(self, placement: Placement, joint: Joint) -> int | list[int]:
         """Where a free ball joint's coordinates begin, or where a joint's angles stand."""
-        if not _is_free_ball(joint):
+        if not joint.is_free_ball:
             return [self._address(placement, name)[0] for name in joint.angle_names]
         iq, iv = self._address(placement, joint.child)
         child = placement.doll.bone(joint.child)
@@ -264,17 +264,10 @@ class MujocoEngine:
             self._stale = False
 
 
-def _is_free_ball(joint: Joint) -> bool:
-    return joint.kind == 'ball' and not any(joint.limits)
-
-
 def _limits(doll: Ragdoll) -> list[Limits | None]:
     """Limits of all joint angles in the order of the coordinates; None for a free ball joint."""
-    def branch(name: str) -> Iterator[Limits | None]:
-        for joint in doll.joints:
-            if joint.parent == name:
-                free = [None] if _is_free_ball(joint) else \
-                    [pair or UNLIMITED for pair in joint.angle_limits]
-                yield from free
-                yield from branch(joint.child)
-    return list(branch(doll.root.name))
+    found: list[Limits | None] = []
+    for joint in doll.joints_depth_first():
+        found += [None] if joint.is_free_ball else [
+            pair or UNLIMITED for pair in joint.angle_limits]
+    return found

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,7 +57,7 @@ class Articulated:
         self._damping = np.zeros(self.nv)
         for joint in doll.joints:
             self._damping[self._v_of[joint.child]] = joint.damping
-        self._ordered = [self._prepared(joint) for joint in depth_first(doll)]
+        self._ordered = [self._prepared(joint) for joint in doll.joints_depth_first()]
 
     def bind(self, position: Sequence[float] = (0, 0, 0),
              orientation: Sequence[float] = rotation.IDENTITY) -> np.ndarray:
@@ -67,7 +67,7 @@ class Articulated:
         q[:3] = position + rotation.rotate(np.array(orientation), root.position)
         q[3:7] = rotation.multiply(orientation, root.orientation)
         for joint in self.doll.joints:
-            if _is_free_ball(joint):
+            if joint.is_free_ball:
                 q[self._q_of[joint.child]] = rotation.IDENTITY
         return q
 
@@ -125,7 +125,7 @@ class Articulated:
         for joint, *_ in self._ordered:
             into, out = self._q_of[joint.child], self._v_of[joint.child]
             rates[into] = _quaternion_rate(q[into], v[out], outer=False) \
-                if _is_free_ball(joint) else v[out]
+                if joint.is_free_ball else v[out]
         return np.concatenate([rates, self.acceleration(q, v, *loads)])
 
     def _prepared(self, joint: Joint) -> tuple:
@@ -154,7 +154,7 @@ class Articulated:
             omega, spin = omegas[parent], spin_drift[parent].copy()
             jw[child] = jw[parent]
             jw[child][:, self._v_of[joint.child]] = axis_columns
-            if _is_free_ball(joint):
+            if joint.is_free_ball:
                 spin += _skew(omega) @ (axis_columns @ rates)
                 omega = omega + axis_columns @ rates
             else:
@@ -174,7 +174,7 @@ class Articulated:
                 q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Child's turn from the bind pose, and the world axes (3, k) of the joint's rates."""
         values = q[self._q_of[joint.child]]
-        if _is_free_ball(joint):
+        if joint.is_free_ball:
             frame = np.column_stack([axis for axis, *_ in axes])
             turn = parent @ frame @ rotation.matrix(rotation.normalized(values)) @ frame.T
             return turn, turn @ frame
@@ -185,24 +185,10 @@ class Articulated:
         return turn, columns
 
 
-def _is_free_ball(joint: Joint) -> bool:
-    return joint.kind == 'ball' and not any(joint.limits)
-
-
-def depth_first(doll: Ragdoll) -> tuple[Joint, ...]:
-    """Give all joints, each one's whole branch before the next, as engines count them."""
-    def branch(name: str) -> Iterator[Joint]:
-        for joint in doll.joints:
-            if joint.parent == name:
-                yield joint
-                yield from branch(joint.child)
-    return tuple(branch(doll.root.name))
-
-
 def _layout(doll: Ragdoll) -> tuple[dict[str, slice], dict[str, slice], int, int]:
     q_of, v_of, nq, nv = {}, {}, 7, 6
-    for joint in depth_first(doll):
-        size = 4 if _is_free_ball(joint) else joint.freedoms
+    for joint in doll.joints_depth_first():
+        size = 4 if joint.is_free_ball else joint.freedoms
         q_of[joint.child], v_of[joint.child] = slice(nq, nq + size), slice(nv, nv + joint.freedoms)
         nq, nv = nq + size, nv + joint.freedoms
     return q_of, v_of, nq, nv
