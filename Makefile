@@ -111,8 +111,8 @@ $(READY): setup.py pyproject.toml
 	@touch $@
 
 # Once, and after a change, with a word on it: else the first programs that need it would.
-$(COMPILED): $(READY) $(wildcard ragdoll_ros/compiled/*.py)
-	@test "$$RAGDOLL_COMPILED" = 0 || $(BIN)/python -m ragdoll_ros.compiled >/dev/null
+$(COMPILED): $(READY) $(wildcard ragdoll_ros/physics/kernels/*.py)
+	@test "$$RAGDOLL_COMPILED" = 0 || $(BIN)/python -m ragdoll_ros.physics.kernels >/dev/null
 	@touch $@
 
 .PHONY: pybullet-from-source

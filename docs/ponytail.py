@@ -12,10 +12,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from ragdoll_ros import rotation
-from ragdoll_ros.scene import SECOND
-from ragdoll_ros.scene_file import load_scene
-from ragdoll_ros.simulation import Simulation
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.model import rotation
+from ragdoll_ros.model.scene import SECOND
+from ragdoll_ros.physics.simulation import Simulation
 
 TIMES = (0.0, 0.28, 0.32, 0.36, 0.42, 0.50, 0.60, 0.75, 0.90, 3.00)
 """s, the pictures; each also shows the tail's way in the 0.12 s before."""

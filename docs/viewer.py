@@ -17,8 +17,8 @@ import browser  # noqa: E402
 import fit_rigs  # noqa: E402
 import numpy as np  # noqa: E402
 
+from ragdoll_ros.files.scene import load_scene  # noqa: E402
 from ragdoll_ros.fit import command as fit  # noqa: E402
-from ragdoll_ros.scene_file import load_scene  # noqa: E402
 
 SIZE = {'width': 1000, 'height': 600}
 

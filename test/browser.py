@@ -17,8 +17,6 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
-from ragdoll_ros.parts import parts_of
-
 PATIENCE = 60.0
 """s that the page may take for anything, on a busy machine without a GPU."""
 
@@ -127,7 +125,7 @@ class View:
         Read from three.js' instances; the page keeps parts of one kind in the scene's order.
         """
         drawn = self.page.evaluate(BODIES)
-        kinds = [part.kind for bone in scene.bones for part in parts_of(bone)]
+        kinds = [part.kind for bone in scene.bones for part in bone.shape.primitives]
         assert len(kinds) == len(scene.bones), 'bones of one part each'
         if {kind: len(matrices) for kind, matrices in drawn.items()} != Counter(kinds):
             return np.full((len(kinds), 3), np.nan)

@@ -22,14 +22,17 @@ from pathlib import Path
 import numpy as np
 from fit_rigs import RIGS, fitted
 
-from ragdoll_ros.mjcf import to_mjcf
-from ragdoll_ros.push import Push
-from ragdoll_ros.ragdoll import Bone, Box, Ragdoll, Sphere
-from ragdoll_ros.scene import Ground, Placement, Scene, above_ground
-from ragdoll_ros.scene_file import load_doll, load_scene, scene_names, scene_text
-from ragdoll_ros.simulation import Simulation
-from ragdoll_ros.swing.chain import Swing, strand
-from ragdoll_ros.urdf import scene_to_urdf, to_urdf
+from ragdoll_ros.files.config import scene_names
+from ragdoll_ros.files.doll import load_doll
+from ragdoll_ros.files.mjcf import to_mjcf
+from ragdoll_ros.files.scene import load_scene, scene_text
+from ragdoll_ros.files.urdf import scene_to_urdf, to_urdf
+from ragdoll_ros.model.push import Push
+from ragdoll_ros.model.ragdoll import Bone, Ragdoll
+from ragdoll_ros.model.scene import Ground, Placement, Scene, above_ground
+from ragdoll_ros.model.shapes import Box, Sphere
+from ragdoll_ros.model.swing import Swing, strand
+from ragdoll_ros.physics.simulation import Simulation
 
 ACCURACIES = ('draft', 'normal', 'exact')
 TICKS = int(os.environ.get('TICKS', '1000'))
@@ -46,7 +49,8 @@ def scenes() -> Iterator[tuple[str, Scene]]:
     yield 'fitted', above_ground(dataclasses.replace(fitted('mixamo').doll, model=None))
     slope = Ground((math.sin(0.3), 0, math.cos(0.3)), 0.1)
     yield 'tilted', Scene('tilted', (Placement(doll, position=(0, 0, 1)),), slope)
-    tail = Swing('tail', 'torso', (-0.05, 0, 0.95), (-1, 0, 0), strand(6, 0.5, 0.1, (0.5, 0.05), 0.4))
+    tail = Swing('tail', 'torso', (-0.05, 0, 0.95), (-1, 0, 0),
+                 strand(6, 0.5, 0.1, (0.5, 0.05), 0.4))
     free = Swing('drop', 'head', (0, 0, 1.6), (0, 0, 1), strand(1, 0.1), mode='free',
                  velocity=(0, 0, 2))
     tailed = dataclasses.replace(doll, swings=(tail, free))

@@ -24,7 +24,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from page_client import PageClient, wait
 from peer import Peer, end, free_domain, kill, start
 
-from ragdoll_ros.scene_file import load_scene, save_scene
+from ragdoll_ros.files.scene import load_scene, save_scene
 
 SECONDS = 10
 """Reports of the node, one a second, that a measurement lasts."""

@@ -17,28 +17,31 @@ import pytest
 pytest.importorskip('numba', reason='numba is not installed: nothing is compiled')
 pytest.importorskip('scipy')
 
-from ragdoll_ros import compiled, rotation
 from ragdoll_ros.accuracy.motions.motion import without_damping, without_limits
 from ragdoll_ros.accuracy.references.articulated import Articulated
-from ragdoll_ros.compiled import kernels
-from ragdoll_ros.compiled.dynamics import CompiledDynamics
-from ragdoll_ros.compiled.limits import CompiledLimits
-from ragdoll_ros.compiled.mechanics import CompiledGuard, CompiledMechanics
-from ragdoll_ros.compiled.reach import CompiledReach
-from ragdoll_ros.coordinates import Coordinates
-from ragdoll_ros.engine.bullet import BulletEngine
-from ragdoll_ros.engine.protocol import GROUND, Load
-from ragdoll_ros.flight import EngineDynamics
-from ragdoll_ros.guard import Guard
-from ragdoll_ros.limits import JointLimits
-from ragdoll_ros.mechanics import Mechanics
-from ragdoll_ros.ragdoll import Bone, Box, Capsule, Cylinder, Joint, Ragdoll, Sphere
-from ragdoll_ros.reach import MARGIN, Reach
-from ragdoll_ros.scene import Ground, Placement, Scene
-from ragdoll_ros.scene_file import load_doll
-from ragdoll_ros.settings import EXACT, NORMAL, resolve_accuracy
-from ragdoll_ros.simulation import Simulation
-from ragdoll_ros.state import State
+from ragdoll_ros.files.doll import load_doll
+from ragdoll_ros.model import rotation
+from ragdoll_ros.model.coordinates import Coordinates
+from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
+from ragdoll_ros.model.scene import Ground, Placement, Scene
+from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Sphere
+from ragdoll_ros.model.state import State
+from ragdoll_ros.physics import backend
+from ragdoll_ros.physics.conservation import CompiledGuard
+from ragdoll_ros.physics.dynamics import CompiledDynamics
+from ragdoll_ros.physics.engine.bullet import BulletEngine
+from ragdoll_ros.physics.engine.protocol import GROUND, Load
+from ragdoll_ros.physics.kernels import SWITCH, kernels
+from ragdoll_ros.physics.limits import CompiledLimits
+from ragdoll_ros.physics.mechanics import CompiledMechanics
+from ragdoll_ros.physics.plain.conservation import Guard
+from ragdoll_ros.physics.plain.flight import EngineDynamics
+from ragdoll_ros.physics.plain.limits import JointLimits
+from ragdoll_ros.physics.plain.mechanics import Mechanics
+from ragdoll_ros.physics.plain.reach import MARGIN, Reach
+from ragdoll_ros.physics.reach import CompiledReach
+from ragdoll_ros.physics.settings import EXACT, NORMAL, resolve_accuracy
+from ragdoll_ros.physics.simulation import Simulation
 
 GRAVITY = (0.3, -0.2, -9.8)
 TURN = tuple(rotation.normalized((.1, .5, -.3, .8)))
@@ -551,7 +554,7 @@ def tick_by_tick(name, ticks):
             lowest = min(lowest, motion.energy[0])
             rows.append(np.concatenate([state.positions, state.orientations], axis=1).tolist())
             told.append(simulation.measures())
-    told = {'ready': compiled.ready(), 'rows': rows, 'excess': excess, 'measures': told}
+    told = {'ready': backend.ready(), 'rows': rows, 'excess': excess, 'measures': told}
     return told, scene, start
 
 
@@ -564,7 +567,7 @@ def plainly():
             'print(json.dumps(runs))')
     path = os.pathsep.join([str(root), str(root / 'test'), os.environ.get('PYTHONPATH', '')])
     done = subprocess.run([sys.executable, '-c', code], check=True, capture_output=True, text=True,
-                          env={**os.environ, compiled.SWITCH: '0', 'PYTHONPATH': path})
+                          env={**os.environ, SWITCH: '0', 'PYTHONPATH': path})
     flight, fall = json.loads(done.stdout.splitlines()[-1])
     assert not flight['ready']
     return {'flight': flight, 'fall': fall}
@@ -576,7 +579,7 @@ def test_a_flight_is_the_same_compiled_or_not(plainly, monkeypatch):
     The plain one errs as it says in each tick, and what it errs grows with the motion; a bone of
     5 cm that twists against its damping errs by 3e-5 rad about its middle.
     """
-    monkeypatch.setattr(compiled, 'ready', lambda: True)
+    monkeypatch.setattr(backend, 'ready', lambda: True)
     (found, scene, start), plain = tick_by_tick('flight', 28), plainly['flight']
     assert all(told['error_trusted'] for told in found['measures'] + plain['measures'])
     assert max(told['error_estimate_m'] for told in found['measures']) < 1e-12
@@ -608,7 +611,7 @@ def test_a_long_tick_is_flown_as_well_as_a_short_one(accuracy, monkeypatch):
 
     The tolerance is each step's; 100 times that is what many, and chaos, may make of it in 0.4 s.
     """
-    monkeypatch.setattr(compiled, 'ready', lambda: True)
+    monkeypatch.setattr(backend, 'ready', lambda: True)
     tolerance = max(resolve_accuracy(accuracy).flight_error, 1e-14)
     for tick in (.01, .1, .2):
         with Simulation(FREE, step=tick, accuracy=accuracy) as simulation:
@@ -622,7 +625,7 @@ def test_a_long_tick_is_flown_as_well_as_a_short_one(accuracy, monkeypatch):
 @pytest.mark.parametrize('ready', [True, False], ids=['compiled', 'plain'])
 def test_a_fall_is_plausible_compiled_or_not(ready, plainly, monkeypatch):
     """Bounds are those of the whole: 0.1 % of the energy, 1 cm, 5 degrees."""
-    monkeypatch.setattr(compiled, 'ready', lambda: True)
+    monkeypatch.setattr(backend, 'ready', lambda: True)
     found = tick_by_tick('fall', 100)[0] if ready else plainly['fall']
     assert np.isfinite(found['rows']).all()
     assert max(found['excess']) < 1e-3
@@ -639,5 +642,5 @@ def test_a_fall_is_plausible_compiled_or_not(ready, plainly, monkeypatch):
 
 def test_the_kernels_name_the_numbers_that_are_frozen_into_them():
     """Else numba would go on with the old ones after a change, see kernels.py."""
-    source = File(compiled.__file__).with_name('dop853.py').read_bytes()
+    source = File(kernels.__file__).with_name('dop853.py').read_bytes()
     assert hashlib.sha256(source).hexdigest()[:16] == kernels.NUMBERS

@@ -10,24 +10,23 @@ import pytest
 
 pytest.importorskip('numba')
 
-from ragdoll_ros.compiled import SWITCH, cache
+from ragdoll_ros.physics.kernels import SWITCH, cache
 
-ROOT = Path(cache.__file__).resolve().parents[2]
+ROOT = Path(cache.__file__).resolve().parents[3]
 """Where the package is that is tested: here or installed."""
 
 USE = """
-from ragdoll_ros.scene_file import load_scene
-from ragdoll_ros.simulation import Simulation
+from ragdoll_ros import Simulation, load_scene
 for name, accuracy in (('article', 'draft'), ('flight', 'exact'), ('crowd', 'normal')):
     with Simulation(load_scene(name), accuracy=accuracy) as simulation:
         simulation.grab('hand', simulation.scene.bone_names[0])
         for _ in range(100 if name == 'article' else 20):
             simulation.advance()
 """
-READY = 'import ragdoll_ros.compiled as c; print(c.ready())'
+READY = 'from ragdoll_ros.physics.kernels import ready; print(ready())'
 SAMPLE = """
 import numba
-from ragdoll_ros.compiled import cache
+from ragdoll_ros.physics.kernels import cache
 
 @numba.njit(cache=cache.KEPT)
 def double(x):
@@ -51,8 +50,8 @@ def run(*arguments, **variables):
 def sample(tmp_path):
     """A program that imports a function to compile as if it were the package's."""
     (tmp_path / 'sample.py').write_text(SAMPLE)
-    return (f'import ragdoll_ros.compiled as c; c.__path__.append({str(tmp_path)!r}); '
-            'import ragdoll_ros.compiled.sample')
+    return (f'import ragdoll_ros.physics.kernels as k; k.__path__.append({str(tmp_path)!r}); '
+            'import ragdoll_ros.physics.kernels.sample')
 
 
 def test_compiling_is_said_once_and_loading_is_not(sample, tmp_path):
@@ -91,14 +90,14 @@ def test_one_process_loads_or_compiles_at_a_time(capsys):
 
 def test_the_switch_goes_without():
     assert run('-c', READY, **{SWITCH: '0'}) == (0, 'False', [])
-    code, _, said = run('-m', 'ragdoll_ros.compiled', **{SWITCH: '0'})
+    code, _, said = run('-m', 'ragdoll_ros.physics.kernels', **{SWITCH: '0'})
     assert code == 2 and SWITCH in said[-1]
 
 
 def test_compiling_beforehand_leaves_nothing_to_compile():
     """What `make` does after it has installed all; the second time it has nothing to do."""
-    run('-m', 'ragdoll_ros.compiled')
-    for arguments in (('-m', 'ragdoll_ros.compiled'), ('-c', USE)):
+    run('-m', 'ragdoll_ros.physics.kernels')
+    for arguments in (('-m', 'ragdoll_ros.physics.kernels'), ('-c', USE)):
         code, printed, said = run(*arguments)
         assert code == 0 and not any('ompil' in line for line in said), said
         assert str(cache.FOLDER) in printed or arguments[0] == '-c'

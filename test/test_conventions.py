@@ -5,11 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from ragdoll_ros import rotation
-from ragdoll_ros.coordinates import Coordinates
-from ragdoll_ros.engine.bullet import BulletEngine
-from ragdoll_ros.scene import Placement
-from ragdoll_ros.scene_file import load_doll, load_scene
+from ragdoll_ros.files.doll import load_doll
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.model import rotation
+from ragdoll_ros.model.coordinates import Coordinates
+from ragdoll_ros.model.scene import Placement
+from ragdoll_ros.physics.engine.bullet import BulletEngine
 
 ARTICLE_CM = {
     # Centres in the article's axes (x left, y up, z forward) and centimetres.

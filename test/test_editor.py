@@ -13,16 +13,17 @@ viser = pytest.importorskip('viser')
 
 from test_fit_broken import BROKEN  # noqa: E402
 
-from ragdoll_ros import faults, rotation  # noqa: E402
-from ragdoll_ros.scene import above_ground  # noqa: E402
-from ragdoll_ros.scene_file import load_doll, load_scene, save_doll, save_scene  # noqa: E402
-from ragdoll_ros.simulation import Simulation  # noqa: E402
+from ragdoll_ros.files.doll import load_doll, save_doll  # noqa: E402
+from ragdoll_ros.files.scene import load_scene, save_scene  # noqa: E402
+from ragdoll_ros.model import errors, rotation  # noqa: E402
+from ragdoll_ros.model.scene import above_ground  # noqa: E402
+from ragdoll_ros.physics.simulation import Simulation  # noqa: E402
 from ragdoll_ros.viewer.editor import changes, folder  # noqa: E402
 from ragdoll_ros.viewer.editor.editor import Editor  # noqa: E402
-from ragdoll_ros.viewer.playback import Playback  # noqa: E402
-from ragdoll_ros.viewer.recording import Recording  # noqa: E402
-from ragdoll_ros.viewer.simulated import Simulated  # noqa: E402
-from ragdoll_ros.viewer.source import Wanted  # noqa: E402
+from ragdoll_ros.viewer.sources.playback import Playback  # noqa: E402
+from ragdoll_ros.viewer.sources.recording import Recording  # noqa: E402
+from ragdoll_ros.viewer.sources.simulated import Simulated  # noqa: E402
+from ragdoll_ros.viewer.sources.source import Wanted  # noqa: E402
 
 DROP = load_scene('drop')
 
@@ -48,7 +49,7 @@ class Desk:
 
     def use(self, scene):
         if self.reason:
-            raise faults.RagdollError(self.reason)
+            raise errors.RagdollError(self.reason)
         self.asked.append(scene)
 
     def bone(self, name):
@@ -407,7 +408,7 @@ def test_what_is_saved_is_called_a_scene(desk):
     """Not a doll, which ragdoll_fit and `doll:` would take."""
     desk.files.save()
     assert load_scene(str(desk.path / 'scene.yaml')) == DROP
-    with pytest.raises(faults.Faults):
+    with pytest.raises(errors.Faults):
         load_doll(str(desk.path / 'scene.yaml'))
 
 
@@ -543,7 +544,7 @@ def test_characters_do_not_overwrite_each_other(desk):
 
 def test_a_limb_moves_with_its_skin(desk):
     """The skin's own bones go with the bodies that carry them; the size is not guessed anew."""
-    from ragdoll_ros.viewer.skin import skin_of
+    from ragdoll_ros.viewer.drawing.skin import skin_of
     desk.files.fit('mixamo.glb', fit_rigs.document(fit_rigs.RIGS['mixamo']).glb())
     before = skin_of(desk.editor.scene.dolls[0].doll)
     desk.editor.select('mixamorig:LeftArm')

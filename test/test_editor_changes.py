@@ -6,13 +6,14 @@ import fit_rigs
 import numpy as np
 import pytest
 
-from ragdoll_ros import faults, rotation
-from ragdoll_ros.ragdoll import JOINT_KINDS, SHAPES
-from ragdoll_ros.riders import Riders
-from ragdoll_ros.scene import above_ground
-from ragdoll_ros.scene_file import load_scene
-from ragdoll_ros.simulation import Simulation
-from ragdoll_ros.state import State
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.model import errors, rotation
+from ragdoll_ros.model.ragdoll import JOINT_KINDS
+from ragdoll_ros.model.scene import above_ground
+from ragdoll_ros.model.shapes import SHAPES
+from ragdoll_ros.model.skeleton import Riders
+from ragdoll_ros.model.state import State
+from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.viewer.editor import changes, growth, mirror, sheet
 from ragdoll_ros.viewer.editor.history import History
 
@@ -58,29 +59,29 @@ def test_only_what_is_asked_for_changes():
 
 
 @pytest.mark.parametrize(('change', 'path', 'kind'), [
-    (lambda: changes.change_bone(DROP, 'head', mass=-1), 'head.mass', faults.NotPositive),
-    (lambda: changes.change_bone(DROP, 'head', mass=math.nan), 'head.mass', faults.NotFinite),
+    (lambda: changes.change_bone(DROP, 'head', mass=-1), 'head.mass', errors.NotPositive),
+    (lambda: changes.change_bone(DROP, 'head', mass=math.nan), 'head.mass', errors.NotFinite),
     (lambda: changes.change_bone(DROP, 'head', restitution=2), 'head.restitution',
-     faults.OutOfRange),
-    (lambda: changes.change_bone(DROP, 'no bone', mass=1), '', faults.UnknownBone),
-    (lambda: changes.set_pose(DROP, 'head', (0, 0, math.inf)), 'head.position', faults.NotFinite),
+     errors.OutOfRange),
+    (lambda: changes.change_bone(DROP, 'no bone', mass=1), '', errors.UnknownBone),
+    (lambda: changes.set_pose(DROP, 'head', (0, 0, math.inf)), 'head.position', errors.NotFinite),
     (lambda: changes.set_pose(DROP, 'head', orientation=(0, 0, 0, 0)), 'head.orientation',
-     faults.NotUnit),
-    (lambda: changes.set_size(DROP, 'head', (0, 1, 1)), 'head.size', faults.NotPositive),
-    (lambda: changes.set_shape(DROP, 'head', 'cone'), 'head.shape', faults.WrongForm),
+     errors.NotUnit),
+    (lambda: changes.set_size(DROP, 'head', (0, 1, 1)), 'head.size', errors.NotPositive),
+    (lambda: changes.set_shape(DROP, 'head', 'cone'), 'head.shape', errors.WrongForm),
     (lambda: changes.set_limits(DROP, 'left_shin', [(30, 10)]),
-     'left_shin.joint.limits_deg[0]', faults.LimitsReversed),
+     'left_shin.joint.limits_deg[0]', errors.LimitsReversed),
     (lambda: changes.set_limits(DROP, 'left_shin', [None, None]), 'left_shin.joint.limits_deg',
-     faults.WrongAxes),
+     errors.WrongAxes),
     (lambda: changes.set_joint_kind(DROP, 'left_shin', 'screw'), 'left_shin.joint.kind',
-     faults.WrongAxes),
+     errors.WrongAxes),
     (lambda: changes.change_joint(DROP, 'left_thigh', axes=((1, 0, 0), (1, 1, 0))),
-     'left_thigh.joint.axes', faults.WrongAxes),
-    (lambda: changes.change_joint(DROP, 'torso', damping=1), 'torso.joint', faults.Detached),
-    (lambda: growth.add_bone(DROP, 'head', 'torso'), 'name', faults.DuplicateName),
-    (lambda: growth.add_bone(DROP, 'head', 'a/b'), 'name', faults.WrongForm),
-    (lambda: growth.remove_limb(DROP, 'torso'), 'torso', faults.Detached),
-    (lambda: mirror.mirrored(DROP, 'head'), 'head.both sides', faults.UnknownBone)])
+     'left_thigh.joint.axes', errors.WrongAxes),
+    (lambda: changes.change_joint(DROP, 'torso', damping=1), 'torso.joint', errors.Detached),
+    (lambda: growth.add_bone(DROP, 'head', 'torso'), 'name', errors.DuplicateName),
+    (lambda: growth.add_bone(DROP, 'head', 'a/b'), 'name', errors.WrongForm),
+    (lambda: growth.remove_limb(DROP, 'torso'), 'torso', errors.Detached),
+    (lambda: mirror.mirrored(DROP, 'head'), 'head.both sides', errors.UnknownBone)])
 def test_what_is_wrong_is_refused_with_its_place(change, path, kind):
     with pytest.raises(kind) as caught:
         change()
@@ -88,7 +89,7 @@ def test_what_is_wrong_is_refused_with_its_place(change, path, kind):
 
 
 def test_reversed_limits_are_told_in_degrees():
-    with pytest.raises(faults.LimitsReversed, match=r'\(30, 10\); expected lower <= upper'):
+    with pytest.raises(errors.LimitsReversed, match=r'\(30, 10\); expected lower <= upper'):
         changes.set_limits(DROP, 'left_shin', [(30, 10)])
 
 
@@ -291,7 +292,7 @@ def test_a_sheet_tells_all_its_faults_at_their_fields():
              'turn': (0.0, math.inf, 0.0), 'friction': 'much', 'restitution': '1.5',
              'rolling_friction': '-1', 'anchor': (math.inf, 0.0, 0.0), 'limits_1': '30, 10',
              'damping': -2.0}
-    with pytest.raises(faults.Faults) as caught:
+    with pytest.raises(errors.Faults) as caught:
         sheet.apply(DROP, 'left_shin', wrong)
     assert {fault.path for fault in caught.value.faults} == set(wrong)
 
@@ -303,7 +304,7 @@ def test_a_sheet_tells_all_its_faults_at_their_fields():
     ({'axis_1': (0.0, 0.0, 0.0)}, 'axis_1', 'not zero'),
     ({'axis_2': (0.0, 1.0, 0.5)}, 'axis_2', 'perpendicular')])
 def test_a_faulty_joint_is_told_at_its_field(wrong, field, words):
-    with pytest.raises(faults.Faults, match=words) as caught:
+    with pytest.raises(errors.Faults, match=words) as caught:
         sheet.apply(DROP, 'left_thigh', wrong)
     assert [fault.path for fault in caught.value.faults] == [field]
 
@@ -330,5 +331,5 @@ def test_whatever_is_typed_is_taken_or_refused(seed):
                 random.choice(numbers))
     try:
         sheet.apply(DROP, name, fields)
-    except faults.Faults as error:
+    except errors.Faults as error:
         assert all(fault.path in fields for fault in error.faults)

@@ -11,10 +11,10 @@ from test_editor import RUBBISH  # noqa: E402
 from test_fit_broken import BROKEN  # noqa: E402
 from viser import _messages  # noqa: E402
 
-from ragdoll_ros.scene_file import load_scene  # noqa: E402
+from ragdoll_ros.files.scene import load_scene  # noqa: E402
 from ragdoll_ros.viewer.editor import changes  # noqa: E402
 from ragdoll_ros.viewer.page import Page  # noqa: E402
-from ragdoll_ros.viewer.simulated import Simulated  # noqa: E402
+from ragdoll_ros.viewer.sources.simulated import Simulated  # noqa: E402
 
 DROP = load_scene('drop')
 

@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from ragdoll_ros.fit.axes import STANDS_OUT, fit_axes, spread
-from ragdoll_ros.fit.shapes import MAKERS, fit_best, fit_shape, outside
-from ragdoll_ros.ragdoll import Box, Capsule, Cylinder, Sphere
+from ragdoll_ros.fit.shapes import MAKERS, fit_best, fit_shape
+from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Sphere
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -106,23 +106,22 @@ SOLIDS = (Sphere(0.2), Box((0.1, 0.2, 0.4)), Cylinder(0.1, 0.5), Capsule(0.1, 0.
 
 @pytest.mark.parametrize('solid', SOLIDS, ids=lambda solid: solid.kind)
 def test_distance_against_the_nearest_of_many_surface_points(solid):
-    from ragdoll_ros.fit.solid import filling, surface
-    corners, triangles = surface(solid)
+    from ragdoll_ros.fit.solid import filling
+    corners, triangles = solid.mesh()
     random = np.random.default_rng(0)
     weights = random.dirichlet((1, 1, 1), size=(len(triangles), 60))
     skin = np.einsum('tsk,tkd->tsd', weights, corners[triangles]).reshape(-1, 3)
     points = random.uniform(-0.5, 0.5, (100, 3))
     nearest = np.linalg.norm(points[:, None] - skin[None], axis=2).min(axis=1)
     # The mesh of 20 corners a circle cuts 1.2 % off the radius; between samples lie 2 cm.
-    assert np.abs(np.abs(outside(solid, points)) - nearest).max() < 0.025
-    assert (outside(solid, filling(solid)) <= 0).all()
-    assert np.abs(outside(solid, corners)).max() < 1e-9
+    assert np.abs(np.abs(solid.signed_distance(points)) - nearest).max() < 0.025
+    assert (solid.signed_distance(filling(solid)) <= 0).all()
+    assert np.abs(solid.signed_distance(corners)).max() < 1e-9
 
 
 @pytest.mark.parametrize('solid', SOLIDS, ids=lambda solid: solid.kind)
 def test_a_solid_is_recognised_by_its_skin(solid):
-    from ragdoll_ros.fit.solid import surface
-    corners, triangles = surface(solid)
+    corners, triangles = solid.mesh()
     weights = np.random.default_rng(1).dirichlet((1, 1, 1), size=(len(triangles), 12))
     points = np.einsum('tsk,tkd->tsd', weights, corners[triangles]).reshape(-1, 3)
     points += (1, 2, 3)

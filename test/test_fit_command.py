@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from fit_rigs import RIGS
 
+from ragdoll_ros.files.doll import load_doll
+from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.fit.command import main
-from ragdoll_ros.scene_file import load_doll, load_scene
 
 
 @pytest.fixture

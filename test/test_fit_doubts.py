@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from fit_rigs import RIGS
 
-from ragdoll_ros import rotation
+from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.doubts import extent, find_doubts
 from ragdoll_ros.fit.pipeline import Options, fit_character
-from ragdoll_ros.ragdoll import Ragdoll
-from ragdoll_ros.scene_file import load_doll
+from ragdoll_ros.model import rotation
+from ragdoll_ros.model.ragdoll import Ragdoll
 
 
 @pytest.fixture

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from fit_rigs import RIGS, fitted
 
-from ragdoll_ros import rotation
 from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.pipeline import fit_character
-from ragdoll_ros.scene import above_ground
-from ragdoll_ros.simulation import Simulation
+from ragdoll_ros.model import rotation
+from ragdoll_ros.model.scene import above_ground
+from ragdoll_ros.physics.simulation import Simulation
 
 QUICK = ('mixamo', 'four_legs_unnamed_centimetres', 'snake', 'star', 'one_bone')
 

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from fit_rigs import HALF, Rig, document, humanoid, limb, matrix
 
+from ragdoll_ros.files.doll import load_doll, save_doll
 from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.command import main
 from ragdoll_ros.fit.pipeline import fit_character
 from ragdoll_ros.fit.report import fit_report
 from ragdoll_ros.fit.spring_bones import Rod, Spring
 from ragdoll_ros.fit.spring_recipe import swing_of
-from ragdoll_ros.scene import above_ground
-from ragdoll_ros.scene_file import load_doll, save_doll
-from ragdoll_ros.simulation import Simulation
-from ragdoll_ros.swing.frames import Frames
-from ragdoll_ros.swing.mount import Mount
-from ragdoll_ros.swing.swings import Swings
+from ragdoll_ros.model.scene import above_ground
+from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.physics.swing.frames import Frames
+from ragdoll_ros.physics.swing.mount import Mount
+from ragdoll_ros.physics.swing.swings import Swings
 
 POINTS = [(0, 1.7, -.1), (0, 1.68, -.25), (.05, 1.5, -.3), (.05, 1.25, -.3)]
 FIRST = 2 + len(humanoid())

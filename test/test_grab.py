@@ -8,21 +8,23 @@ import math
 import numpy as np
 import pytest
 
-from ragdoll_ros import compiled, faults, rotation
-from ragdoll_ros.engine.bullet import BulletEngine
-from ragdoll_ros.grab import (
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.model import errors, rotation
+from ragdoll_ros.model.ragdoll import Bone, Ragdoll
+from ragdoll_ros.model.scene import Placement, Scene
+from ragdoll_ros.model.shapes import Box, Sphere
+from ragdoll_ros.physics import backend
+from ragdoll_ros.physics.engine.bullet import BulletEngine
+from ragdoll_ros.physics.grab import (
     FREQUENCY,
     LARGEST_ACCELERATION,
     LARGEST_PULL,
     MOST_HANDS,
     mobility,
 )
-from ragdoll_ros.mechanics import Mechanics
-from ragdoll_ros.ragdoll import Bone, Box, Ragdoll, Sphere
-from ragdoll_ros.scene import Placement, Scene
-from ragdoll_ros.scene_file import load_scene
-from ragdoll_ros.settings import NORMAL
-from ragdoll_ros.simulation import Simulation
+from ragdoll_ros.physics.plain.mechanics import Mechanics
+from ragdoll_ros.physics.settings import NORMAL
+from ragdoll_ros.physics.simulation import Simulation
 
 DROP, FLIGHT = load_scene('drop'), load_scene('flight')
 BONES = DROP.bone_names
@@ -126,7 +128,7 @@ def test_mobility_is_that_of_a_rigid_body():
     with Simulation(scene) as simulation:
         for _ in range(7):
             state = simulation.advance()
-        dynamics = compiled.dynamics_of(scene, BulletEngine, simulation._stepper.engine.layout)
+        dynamics = backend.dynamics_of(scene, BulletEngine, simulation._stepper.engine.layout)
         point = np.array((0.05, -0.1, 0.2))
         got = mobility(dynamics, simulation.coordinates, 0, point)
         dynamics.close()
@@ -298,7 +300,7 @@ def test_more_hands_than_there_may_be_are_refused():
     with Simulation(DROP) as simulation:
         for number in range(MOST_HANDS):
             simulation.grab(f'hand {number}', 'torso')
-        with pytest.raises(faults.OutOfRange, match='hands'):
+        with pytest.raises(errors.OutOfRange, match='hands'):
             simulation.grab('one more', 'head')
         simulation.grab('hand 3', 'head')
         assert len(simulation.grabs) == MOST_HANDS
@@ -373,16 +375,16 @@ def test_hands_have_names_and_say_what_they_hold():
 
 
 @pytest.mark.parametrize('fault, name, arguments', [
-    (faults.UnknownBone, 'grab', ('hand', 'tail')),
-    (faults.NotFinite, 'grab', ('hand', 'head', (math.nan, 0, 0))),
-    (faults.NotFinite, 'grab', ('hand', 'head', (0, 0, 0), (0, math.inf, 0))),
-    (faults.OutOfRange, 'grab', ('hand', 'head', (0, 0, 5))),
-    (faults.OutOfRange, 'grab', ('hand', 'head', (0, 0))),
-    (faults.OutOfRange, 'grab', ('hand', 'head', (0, 0, 0), (1e300, 0, 0))),
-    (faults.NotFinite, 'drag', ('held', (0, math.nan, 0))),
-    (faults.OutOfRange, 'drag', ('held', (0, 0, -1e9))),
-    (faults.OutOfRange, 'drag', ('held', (0, 0, 1), -1)),
-    (faults.OutOfRange, 'drag', ('held', (0, 0, 1), math.nan))])
+    (errors.UnknownBone, 'grab', ('hand', 'tail')),
+    (errors.NotFinite, 'grab', ('hand', 'head', (math.nan, 0, 0))),
+    (errors.NotFinite, 'grab', ('hand', 'head', (0, 0, 0), (0, math.inf, 0))),
+    (errors.OutOfRange, 'grab', ('hand', 'head', (0, 0, 5))),
+    (errors.OutOfRange, 'grab', ('hand', 'head', (0, 0))),
+    (errors.OutOfRange, 'grab', ('hand', 'head', (0, 0, 0), (1e300, 0, 0))),
+    (errors.NotFinite, 'drag', ('held', (0, math.nan, 0))),
+    (errors.OutOfRange, 'drag', ('held', (0, 0, -1e9))),
+    (errors.OutOfRange, 'drag', ('held', (0, 0, 1), -1)),
+    (errors.OutOfRange, 'drag', ('held', (0, 0, 1), math.nan))])
 def test_rubbish_is_refused_and_moves_nothing(fault, name, arguments):
     with Simulation(DROP) as simulation:
         simulation.grab('held', 'torso')

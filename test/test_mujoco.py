@@ -6,15 +6,16 @@ import pytest
 
 pytest.importorskip('mujoco')
 
-from ragdoll_ros import faults, rotation
 from ragdoll_ros.accuracy.references.articulated import Articulated
-from ragdoll_ros.coordinates import Coordinates
-from ragdoll_ros.engine.bullet import BulletEngine
-from ragdoll_ros.engine.mujoco import MujocoEngine
-from ragdoll_ros.engine.protocol import GROUND, Load
-from ragdoll_ros.ragdoll import Bone, Box, Capsule, Cylinder, Joint, Ragdoll, Sphere
-from ragdoll_ros.scene import Ground, Material, Placement, Scene
-from ragdoll_ros.scene_file import load_doll
+from ragdoll_ros.files.doll import load_doll
+from ragdoll_ros.model import errors, rotation
+from ragdoll_ros.model.coordinates import Coordinates
+from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
+from ragdoll_ros.model.scene import Ground, Material, Placement, Scene
+from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Sphere
+from ragdoll_ros.physics.engine.bullet import BulletEngine
+from ragdoll_ros.physics.engine.mujoco import MujocoEngine
+from ragdoll_ros.physics.engine.protocol import GROUND, Load
 
 GRAVITY = (0.3, -0.2, -9.8)
 ENGINES = [BulletEngine, MujocoEngine]
@@ -195,5 +196,5 @@ def _stepped(engine):
 
 
 def test_an_unknown_integrator_is_named():
-    with pytest.raises(faults.OutOfRange, match='leapfrog'):
+    with pytest.raises(errors.OutOfRange, match='leapfrog'):
         MujocoEngine(flying(load_doll('doll')), integrator='leapfrog')

@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from ragdoll_ros.pacing import MOST_LAG, Pacer
+from ragdoll_ros.physics.pacing import MOST_LAG, Pacer
 
 PERIOD = 10_000_000
 

@@ -21,8 +21,8 @@ ROOT = Path(__file__).resolve().parent.parent
 SETUP = (ROOT / 'setup.py').read_text()
 EXECUTABLES = dict(re.findall(r"'(ragdoll_\w+)': '([\w.]+:main)'", SETUP))
 DEFAULTS_OF_A_SCENE = {'rate', 'real_time_factor', 'pushed_bone'}
-SCENES = ('import pathlib, ragdoll_ros.scene_file as f; '
-          'f.load_scene("drop"); print(f.__file__); print(f.config_folder())')
+SCENES = ('import ragdoll_ros; from ragdoll_ros.files import config; '
+          'ragdoll_ros.load_scene("drop"); print(config.__file__); print(config.config_folder())')
 
 ROSDEP_KEYS = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml', 'scipy': 'python3-scipy',
                'jsonschema': 'python3-jsonschema', 'matplotlib': 'python3-matplotlib',
@@ -213,7 +213,7 @@ def test_scenes_are_found_in_the_prefix_and_without_one(prefix):
     site = site_packages(prefix)
     path = with_ros(site)
     alone = run(sys.executable, '-c', SCENES, PYTHONPATH=path).splitlines()
-    assert alone == [f'{site}/ragdoll_ros/scene_file.py', f'{site}/ragdoll_ros/config']
+    assert alone == [f'{site}/ragdoll_ros/files/config.py', f'{site}/ragdoll_ros/config']
     sourced = run(sys.executable, '-c', SCENES, PYTHONPATH=path, AMENT_PREFIX_PATH=str(prefix))
     assert sourced.splitlines()[1] == f'{prefix}/share/ragdoll_ros/config'
 

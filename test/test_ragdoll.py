@@ -4,8 +4,9 @@ import math
 import numpy as np
 import pytest
 
-from ragdoll_ros import faults
-from ragdoll_ros.ragdoll import Bone, Box, Capsule, Cylinder, Joint, Ragdoll, Sphere
+from ragdoll_ros.model import errors
+from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
+from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Sphere
 
 BALL = Sphere(0.1)
 
@@ -46,30 +47,30 @@ def test_volume_and_inertia_are_those_of_the_uniform_solid(shape):
 
 
 @pytest.mark.parametrize(('make', 'error'), [
-    (lambda: Sphere(0), faults.NotPositive),
-    (lambda: Box((1, -1, 1)), faults.NotPositive),
-    (lambda: Cylinder(math.nan, 1), faults.NotFinite),
-    (lambda: Capsule(1, math.inf), faults.NotFinite),
-    (lambda: bone('a', mass=0), faults.NotPositive),
-    (lambda: bone('world'), faults.DuplicateName),
-    (lambda: bone('a', position=(0, math.nan, 0)), faults.NotFinite),
-    (lambda: bone('a', orientation=(0, 0, 0, 0)), faults.NotUnit),
-    (lambda: hinge('a', 'b', limits=((1, -1),)), faults.LimitsReversed),
-    (lambda: hinge('a', 'b', limits=((0, math.inf),)), faults.NotFinite),
-    (lambda: hinge('a', 'b', axes=()), faults.WrongAxes),
-    (lambda: hinge('a', 'b', axes=((0, 0, 0),)), faults.NotUnit),
-    (lambda: hinge('a', 'b', kind='slider'), faults.WrongAxes),
-    (lambda: hinge('a', 'b', damping=-1), faults.OutOfRange),
-    (lambda: Joint('a', 'b', 'universal', (0, 0, 0), ((1, 0, 0), (1, 1, 0))), faults.WrongAxes),
-    (lambda: Joint('a', 'b', 'ball', (0, 0, 0), ((1, 0, 0),), ((-2, 2), None)), faults.OutOfRange),
-    (lambda: Ragdoll('d', ()), faults.Detached),
-    (lambda: Ragdoll('d', (bone('a'), bone('a'))), faults.DuplicateName),
-    (lambda: Ragdoll('d', (bone('a'), bone('b'))), faults.Detached),
-    (lambda: Ragdoll('d', (bone('a'),), (hinge('a', 'x'),)), faults.UnknownBone),
+    (lambda: Sphere(0), errors.NotPositive),
+    (lambda: Box((1, -1, 1)), errors.NotPositive),
+    (lambda: Cylinder(math.nan, 1), errors.NotFinite),
+    (lambda: Capsule(1, math.inf), errors.NotFinite),
+    (lambda: bone('a', mass=0), errors.NotPositive),
+    (lambda: bone('world'), errors.DuplicateName),
+    (lambda: bone('a', position=(0, math.nan, 0)), errors.NotFinite),
+    (lambda: bone('a', orientation=(0, 0, 0, 0)), errors.NotUnit),
+    (lambda: hinge('a', 'b', limits=((1, -1),)), errors.LimitsReversed),
+    (lambda: hinge('a', 'b', limits=((0, math.inf),)), errors.NotFinite),
+    (lambda: hinge('a', 'b', axes=()), errors.WrongAxes),
+    (lambda: hinge('a', 'b', axes=((0, 0, 0),)), errors.NotUnit),
+    (lambda: hinge('a', 'b', kind='slider'), errors.WrongAxes),
+    (lambda: hinge('a', 'b', damping=-1), errors.OutOfRange),
+    (lambda: Joint('a', 'b', 'universal', (0, 0, 0), ((1, 0, 0), (1, 1, 0))), errors.WrongAxes),
+    (lambda: Joint('a', 'b', 'ball', (0, 0, 0), ((1, 0, 0),), ((-2, 2), None)), errors.OutOfRange),
+    (lambda: Ragdoll('d', ()), errors.Detached),
+    (lambda: Ragdoll('d', (bone('a'), bone('a'))), errors.DuplicateName),
+    (lambda: Ragdoll('d', (bone('a'), bone('b'))), errors.Detached),
+    (lambda: Ragdoll('d', (bone('a'),), (hinge('a', 'x'),)), errors.UnknownBone),
     (lambda: Ragdoll('d', (bone('a'), bone('b'), bone('c')),
-                     (hinge('a', 'c'), hinge('b', 'c'))), faults.ConnectedTwice),
+                     (hinge('a', 'c'), hinge('b', 'c'))), errors.ConnectedTwice),
     (lambda: Ragdoll('d', (bone('a'), bone('b')),
-                     (hinge('a', 'b'), hinge('b', 'a'))), faults.JointCycle),
+                     (hinge('a', 'b'), hinge('b', 'a'))), errors.JointCycle),
 ])
 def test_each_fault_has_a_name(make, error):
     with pytest.raises(error) as caught:

@@ -6,14 +6,15 @@ import pytest
 
 pytest.importorskip('scipy')
 
-from ragdoll_ros import rotation
 from ragdoll_ros.accuracy.motions.motion import without_damping
 from ragdoll_ros.accuracy.references import closed_forms
 from ragdoll_ros.accuracy.references.articulated import Articulated
 from ragdoll_ros.accuracy.references.planar_chain import PlanarChain
 from ragdoll_ros.accuracy.references.tumbling import tumble
-from ragdoll_ros.ragdoll import Bone, Box, Joint, Ragdoll
-from ragdoll_ros.scene_file import load_doll
+from ragdoll_ros.files.doll import load_doll
+from ragdoll_ros.model import rotation
+from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
+from ragdoll_ros.model.shapes import Box
 
 TIMES = np.linspace(0, 1, 6)
 

@@ -12,7 +12,6 @@ from conftest import ROOT
 pytest.importorskip('scipy')
 pytest.importorskip('mujoco')
 
-from ragdoll_ros import rotation
 from ragdoll_ros.accuracy import command, figures, goals, hard, plots, starts, tables
 from ragdoll_ros.accuracy.measure import Measure
 from ragdoll_ros.accuracy.methods import bullet, by_name, median_run, ours, quickstart, run
@@ -25,8 +24,9 @@ from ragdoll_ros.accuracy.report import markdown
 from ragdoll_ros.accuracy.runner import Job, attempt
 from ragdoll_ros.accuracy.trajectory import Trajectory
 from ragdoll_ros.accuracy.trial import Trial
-from ragdoll_ros.mechanics import Mechanics
-from ragdoll_ros.state import State
+from ragdoll_ros.model import rotation
+from ragdoll_ros.model.state import State
+from ragdoll_ros.physics.plain.mechanics import Mechanics
 
 
 def test_the_slope_of_a_power_is_its_order():
@@ -285,7 +285,7 @@ def test_the_quick_report_runs(tmp_path):
 
 def test_ours_is_the_simulation_of_the_node():
     """The method's states are those of a Simulation driven by hand."""
-    from ragdoll_ros.simulation import Simulation
+    from ragdoll_ros.physics.simulation import Simulation
     trial = gentle_flight().trial
     moved = run(ours('normal'), trial).moved
     with Simulation(trial.scene) as simulation:

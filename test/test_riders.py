@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from fit_rigs import RIGS
 
-from ragdoll_ros import faults, rotation
-from ragdoll_ros.ragdoll import Bone, Joint, Ragdoll, Rider, Sphere
-from ragdoll_ros.riders import Riders, rider_names
-from ragdoll_ros.scene import Placement, Scene, above_ground
-from ragdoll_ros.scene_file import build_doll, doll_data, load_doll, save_doll
-from ragdoll_ros.simulation import Simulation
+from ragdoll_ros.files.doll import build_doll, doll_data, load_doll, save_doll
+from ragdoll_ros.model import errors, rotation
+from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, Rider
+from ragdoll_ros.model.scene import Placement, Scene, above_ground
+from ragdoll_ros.model.shapes import Sphere
+from ragdoll_ros.model.skeleton import Riders, rider_names
+from ragdoll_ros.physics.simulation import Simulation
 
 
 @pytest.fixture
@@ -95,9 +96,9 @@ def test_no_riders_give_empty_arrays():
 
 
 def test_wrong_riders_are_refused():
-    with pytest.raises(faults.UnknownBone, match=r'riders\[0\].bone'):
+    with pytest.raises(errors.UnknownBone, match=r'riders\[0\].bone'):
         doll(riders=(Rider('x', 'nobody', (0, 0, 0)),))
-    with pytest.raises(faults.DuplicateName, match=r'riders\[1\].name'):
+    with pytest.raises(errors.DuplicateName, match=r'riders\[1\].name'):
         doll(riders=(Rider('x', 'a', (0, 0, 0)), Rider('x', 'b', (0, 0, 0))))
     data = doll_data(doll())
     data['riders'][0].update(bone='nobody', mass=3)

@@ -14,7 +14,7 @@ from network import Network
 from peer import Peer, end, kill, start
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
-from ragdoll_ros.scene_file import load_scene
+from ragdoll_ros.files.scene import load_scene
 
 SCENE = load_scene('drop')
 START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])

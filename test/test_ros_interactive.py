@@ -17,9 +17,9 @@ from visualization_msgs.msg import (
     Marker,
 )
 
-from ragdoll_ros import rotation
+from ragdoll_ros.model import rotation
+from ragdoll_ros.model.scene import SECOND
 from ragdoll_ros.ros import interactive
-from ragdoll_ros.scene import SECOND
 
 HERE = Pose(position=Point(x=0.0, y=0.0, z=1.0), orientation=Quaternion(w=1.0))
 

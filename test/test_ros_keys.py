@@ -3,7 +3,8 @@ from __future__ import annotations
 
 import pytest
 
-from ragdoll_ros.ros.keys import FIRST, REPEAT, STUCK, Decoder, Held
+from ragdoll_ros.physics.arrow_keys import FIRST, REPEAT, STUCK, Held
+from ragdoll_ros.ros.keys import Decoder
 from ragdoll_ros.ros.teleop import FORCES, total
 
 ARROWS = {'up': b'\x1b[A', 'down': b'\x1b[B', 'right': b'\x1b[C', 'left': b'\x1b[D'}

@@ -9,16 +9,17 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from visualization_msgs.msg import Marker
 
-from ragdoll_ros import rotation
-from ragdoll_ros.push import ARROW, Push
-from ragdoll_ros.ragdoll import Bone, Box, Capsule, Cylinder, Ragdoll, Sphere
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.model import rotation
+from ragdoll_ros.model.push import ARROW, Push
+from ragdoll_ros.model.ragdoll import Bone, Ragdoll
+from ragdoll_ros.model.scene import Placement, Scene
+from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Sphere
+from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.ros.markers import Markers
 from ragdoll_ros.ros.messages import to_joint_state, to_multi_dof, to_pose_array
 from ragdoll_ros.ros.packed import Packed
 from ragdoll_ros.ros.stamps import Stamps
-from ragdoll_ros.scene import Placement, Scene
-from ragdoll_ros.scene_file import load_scene
-from ragdoll_ros.simulation import Simulation
 
 STAMPS = (0, 1, 999_999_999, 1_795_257_907_785_147_064)
 

@@ -21,10 +21,10 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import MarkerArray
 
-from ragdoll_ros.push import Push
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.model.push import Push
+from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.ros.node import RagdollNode
-from ragdoll_ros.scene_file import load_scene
-from ragdoll_ros.simulation import Simulation
 
 SECOND = 1_000_000_000
 

@@ -9,11 +9,11 @@ from rcl_interfaces.msg import ParameterType
 from rclpy.parameter import Parameter
 from std_msgs.msg import String
 
-from ragdoll_ros.faults import Faults, RagdollError
+from ragdoll_ros.files.scene import load_scene, save_scene
+from ragdoll_ros.files.urdf_tree import parse_urdf
+from ragdoll_ros.model.errors import Faults, RagdollError
 from ragdoll_ros.ros.outputs import LATCHED
 from ragdoll_ros.ros.parameters import SPECS, Settings
-from ragdoll_ros.scene_file import load_scene, save_scene
-from ragdoll_ros.urdf_tree import parse_urdf
 
 RANGES = {name: spec.metadata['span'] for name, spec in SPECS.items() if spec.metadata['span']}
 

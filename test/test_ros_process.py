@@ -17,9 +17,9 @@ from std_msgs.msg import Header, String
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import MarkerArray
 
-from ragdoll_ros import compiled
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.physics import kernels
 from ragdoll_ros.ros.diagnostics import BEHIND
-from ragdoll_ros.scene_file import load_scene
 
 SECOND = 1_000_000_000
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -146,7 +146,7 @@ def test_diagnostics_come_each_second_and_add_up(heard, peer):
     assert ('falls behind' in status.message) == behind
     assert 0 < float(values['tick_cost_ms']) <= float(values['tick_cost_max_ms'])
     assert values['push'] == 'none'
-    assert values['compiled'] == str(compiled.ready())
+    assert values['compiled'] == str(kernels.ready())
     assert float(values['joint_gap_m']) < 1e-6
     zero = int(values['stamp_of_zero'])
     time_then = round(float(values['simulated_time']) * SECOND)

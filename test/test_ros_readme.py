@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 import yaml
 
+from ragdoll_ros.files.config import find
+from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.ros.parameters import BONE_NAMES, SPECS
-from ragdoll_ros.scene_file import find, load_scene
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / 'README.md').read_text()

@@ -22,16 +22,16 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
-from ragdoll_ros.ragdoll import Sphere
+from ragdoll_ros.files.scene import load_scene, save_scene
+from ragdoll_ros.files.urdf import scene_to_urdf
+from ragdoll_ros.model.shapes import Sphere
 from ragdoll_ros.ros.messages import to_pose_array
 from ragdoll_ros.ros.packed import poses_in
-from ragdoll_ros.scene_file import load_scene, save_scene
-from ragdoll_ros.urdf import scene_to_urdf
 from ragdoll_ros.viewer.command import free_port, server_at
 from ragdoll_ros.viewer.page import Page
-from ragdoll_ros.viewer.remote import Remote
-from ragdoll_ros.viewer.remote_scene import scene_of_node
-from ragdoll_ros.viewer.source import Wanted
+from ragdoll_ros.viewer.sources.remote import Remote
+from ragdoll_ros.viewer.sources.remote_scene import scene_of_node
+from ragdoll_ros.viewer.sources.source import Wanted
 
 OPEN = Wanted(frames=True)
 

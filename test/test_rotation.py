@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from ragdoll_ros import rotation
+from ragdoll_ros.model import rotation
 
 RANDOM = rotation.normalized(np.random.default_rng(1).normal(size=(50, 4)))
 

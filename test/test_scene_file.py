@@ -5,10 +5,13 @@ import math
 import pytest
 import yaml
 
-from ragdoll_ros import faults
-from ragdoll_ros.engine.bullet import BulletEngine
-from ragdoll_ros.ragdoll import Bone, Box, Capsule, Cylinder, Joint, Ragdoll, Sphere
-from ragdoll_ros.scene_file import load_doll, load_scene, save_doll, save_scene, scene_names
+from ragdoll_ros.files.config import scene_names
+from ragdoll_ros.files.doll import load_doll, save_doll
+from ragdoll_ros.files.scene import load_scene, save_scene
+from ragdoll_ros.model import errors
+from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
+from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Sphere
+from ragdoll_ros.physics.engine.bullet import BulletEngine
 
 FIVE = """
 gravity: [0, 0, -9.8]
@@ -89,7 +92,7 @@ def test_the_path_of_a_character_is_seen_from_its_dolls_file(tmp_path):
     ('friction', -1), ('friction', math.nan), ('rolling_friction', -0.1), ('restitution', 1.5),
     ('color', (1, 0, 0, 2))])
 def test_a_bones_surface_is_checked_without_a_file_too(field, value):
-    with pytest.raises(faults.OutOfRange) as caught:
+    with pytest.raises(errors.OutOfRange) as caught:
         Bone('b', Sphere(0.1), 1, (0, 0, 0), **{field: value})
     assert caught.value.path == field
 
@@ -99,22 +102,22 @@ def test_a_bone_may_not_be_called_as_the_world(tmp_path):
     path = tmp_path / 'doll.yaml'
     path.write_text('bones: [{name: world, mass: 1, position: [0, 0, 0], '
                     'shape: {sphere: {radius: 0.1}}}]')
-    with pytest.raises(faults.Faults, match=r'bones\[0\].name: DuplicateName: .world.; expected'):
+    with pytest.raises(errors.Faults, match=r'bones\[0\].name: DuplicateName: .world.; expected'):
         load_scene(str(path))
 
 
 def test_all_faults_come_at_once_with_their_places(tmp_path):
     path = tmp_path / 'five.yaml'
     path.write_text(FIVE)
-    with pytest.raises(faults.Faults) as caught:
+    with pytest.raises(errors.Faults) as caught:
         load_scene(str(path))
     found = {fault.path: type(fault) for fault in caught.value.faults}
     assert found == {
-        'step': faults.OutOfRange,
-        'dolls[0].doll.bones[0].mass': faults.NotPositive,
-        'dolls[0].doll.bones[1].position': faults.NotFinite,
-        'dolls[0].doll.joints[0].limits_deg[0]': faults.LimitsReversed,
-        'dolls[0].doll.joints[1].child': faults.UnknownBone}
+        'step': errors.OutOfRange,
+        'dolls[0].doll.bones[0].mass': errors.NotPositive,
+        'dolls[0].doll.bones[1].position': errors.NotFinite,
+        'dolls[0].doll.joints[0].limits_deg[0]': errors.LimitsReversed,
+        'dolls[0].doll.joints[1].child': errors.UnknownBone}
     assert str(path) in str(caught.value) and '5 faults' in str(caught.value)
 
 
@@ -124,7 +127,7 @@ def test_all_faults_come_at_once_with_their_places(tmp_path):
 def test_rubbish_is_refused_in_words(tmp_path, text):
     path = tmp_path / 'rubbish.yaml'
     path.write_text(text)
-    with pytest.raises(faults.Faults):
+    with pytest.raises(errors.Faults):
         load_scene(str(path))
 
 
@@ -138,7 +141,7 @@ def test_aliases_of_aliases_do_not_fill_the_memory(tmp_path, use):
         first = name
     path = tmp_path / 'bomb.yaml'
     path.write_text(text + f'bones: [*{first}]\n')
-    with pytest.raises(faults.Faults, match='aliases'):
+    with pytest.raises(errors.Faults, match='aliases'):
         load_scene(str(path))
 
 
@@ -146,12 +149,12 @@ def test_aliases_of_aliases_do_not_fill_the_memory(tmp_path, use):
                                   'bones: ' + '[' * 5000 + ']' * 5000])
 def test_what_is_nested_too_deeply_does_not_end_the_process(tmp_path, text):
     (tmp_path / 'deep.yaml').write_text(text)
-    with pytest.raises(faults.Faults, match='nested too deeply'):
+    with pytest.raises(errors.Faults, match='nested too deeply'):
         load_scene(str(tmp_path / 'deep.yaml'))
 
 
 def test_a_missing_file_names_the_ones_there_are():
-    with pytest.raises(faults.Faults, match='drop'):
+    with pytest.raises(errors.Faults, match='drop'):
         load_scene('no such scene')
 
 
@@ -160,7 +163,7 @@ def test_a_misspelled_key_is_named(tmp_path):
     path = tmp_path / 'ball.yaml'
     path.write_text('bones: [{name: b, shape: {sphere: {radius: 1}}, mass: 1, position: [0, 0, 0], '
                     'colour: [1, 0, 0, 1], masss: 2}]')
-    with pytest.raises(faults.Faults) as caught:
+    with pytest.raises(errors.Faults) as caught:
         load_scene(str(path))
     fault, = caught.value.faults
     assert (fault.path, fault.value) == ('bones[0]', 'colour, masss')

@@ -9,21 +9,23 @@ import sys
 import numpy as np
 import pytest
 
-from ragdoll_ros import compiled, faults, rotation
 from ragdoll_ros.accuracy.references.articulated import Articulated
-from ragdoll_ros.coordinates import Coordinates
-from ragdoll_ros.engine.bullet import BulletEngine
-from ragdoll_ros.flight import EnginePath, fly
-from ragdoll_ros.gap import JointGap
-from ragdoll_ros.guard import Guard
-from ragdoll_ros.mechanics import Mechanics
-from ragdoll_ros.push import Push
-from ragdoll_ros.ragdoll import Bone, Box, Capsule, Joint, Ragdoll, Sphere
-from ragdoll_ros.reach import Reach
-from ragdoll_ros.scene import NO_SLIP, SECOND, Ground, Material, Placement, Scene, height
-from ragdoll_ros.scene_file import load_scene
-from ragdoll_ros.settings import EXACT, NORMAL
-from ragdoll_ros.simulation import MOST_PUSHES, Simulation
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.model import errors, rotation
+from ragdoll_ros.model.coordinates import Coordinates
+from ragdoll_ros.model.push import Push
+from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
+from ragdoll_ros.model.scene import NO_SLIP, SECOND, Ground, Material, Placement, Scene, height
+from ragdoll_ros.model.shapes import Box, Capsule, Sphere
+from ragdoll_ros.physics import kernels
+from ragdoll_ros.physics.engine.bullet import BulletEngine
+from ragdoll_ros.physics.joint_gap import JointGap
+from ragdoll_ros.physics.plain.conservation import Guard
+from ragdoll_ros.physics.plain.flight import EnginePath, fly
+from ragdoll_ros.physics.plain.mechanics import Mechanics
+from ragdoll_ros.physics.plain.reach import Reach
+from ragdoll_ros.physics.settings import EXACT, NORMAL
+from ragdoll_ros.physics.simulation import MOST_PUSHES, Simulation
 
 DROP, FLIGHT = load_scene('drop'), load_scene('flight')
 FIRST_TOUCH = math.sqrt(2 * 0.4 / 9.8)
@@ -357,14 +359,14 @@ def test_a_channels_next_push_takes_the_place_of_the_last():
 
 def test_pushes_on_nothing_in_the_past_or_too_many_are_refused():
     with Simulation(FLIGHT) as simulation:
-        with pytest.raises(faults.UnknownBone, match='torso'):
+        with pytest.raises(errors.UnknownBone, match='torso'):
             simulation.push(Push('tail', force=(1, 0, 0)))
         simulation.advance()
-        with pytest.raises(faults.OutOfRange):
+        with pytest.raises(errors.OutOfRange):
             simulation.push(Push('torso', start=0.0))
         for _ in range(MOST_PUSHES):
             simulation.push(Push('torso', duration=1))
-        with pytest.raises(faults.OutOfRange, match=str(MOST_PUSHES)):
+        with pytest.raises(errors.OutOfRange, match=str(MOST_PUSHES)):
             simulation.push(Push('torso'))
 
 
@@ -372,7 +374,7 @@ def test_pushes_on_nothing_in_the_past_or_too_many_are_refused():
                                      {'force': (1e300, 0, 0)}, {'duration': 0},
                                      {'duration': -1}, {'point': (0, math.nan, 0)}])
 def test_a_push_that_is_rubbish_cannot_be_made(changes):
-    with pytest.raises(faults.Fault):
+    with pytest.raises(errors.Fault):
         Push('torso', **changes)
 
 
@@ -501,7 +503,7 @@ def test_the_error_estimate_in_flight_is_that_of_a_far_finer_flight(accuracy):
                 assert figures['error_estimate_m'] < 3e-13
     ratios = np.array(ratios)
     assert trusted >= 10
-    assert compiled.ready() or len(ratios) == trusted
+    assert kernels.ready() or len(ratios) == trusted
     if len(ratios):
         assert np.mean((ratios > 1 / 3) & (ratios < 3)) >= 0.9
 
@@ -582,7 +584,7 @@ def test_a_reset_goes_back_to_the_bit_however_dolls_are_turned(name):
 
 
 def test_coordinates_of_another_doll_are_refused():
-    with Simulation(FLIGHT) as simulation, pytest.raises(faults.OutOfRange, match='coordinates'):
+    with Simulation(FLIGHT) as simulation, pytest.raises(errors.OutOfRange, match='coordinates'):
         simulation.place(Coordinates(simulation.coordinates.q, np.zeros(6)))
 
 
@@ -592,7 +594,7 @@ def test_more_joints_than_pybullet_tells_of_are_refused():
     joints = tuple(Joint(f'b{k}', f'b{k + 1}', 'ball', (0.1 * k + 0.05, 0.0, 0.0),
                          ((1.0, 0.0, 0.0),)) for k in range(31))
     scene = Scene('chain', (Placement(Ragdoll('chain', balls, joints)),), ground=None)
-    with pytest.raises(faults.OutOfRange, match='at most 128'):
+    with pytest.raises(errors.OutOfRange, match='at most 128'):
         Simulation(scene)
 
 

@@ -8,13 +8,16 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 from scipy.special import ellipj, ellipk
 
-from ragdoll_ros import rotation
-from ragdoll_ros.ragdoll import Bone, Sphere
-from ragdoll_ros.scene_file import load_scene
-from ragdoll_ros.simulation import Simulation
-from ragdoll_ros.swing import Frames, Link, Mount, Swing, Swings, Track, strand
-from ragdoll_ros.swing.cost import tick_cost
-from ragdoll_ros.swing.frames import between
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.model import rotation
+from ragdoll_ros.model.ragdoll import Bone
+from ragdoll_ros.model.shapes import Sphere
+from ragdoll_ros.model.swing import Link, Swing, strand
+from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.physics.swing.bench import tick_cost
+from ragdoll_ros.physics.swing.frames import Frames, Track, between
+from ragdoll_ros.physics.swing.mount import Mount
+from ragdoll_ros.physics.swing.swings import Swings
 
 G = 9.8
 DOWN = (0, 0, -G)

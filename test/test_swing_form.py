@@ -4,11 +4,16 @@ import math
 import numpy as np
 import pytest
 
-from ragdoll_ros import faults, rotation
-from ragdoll_ros.ragdoll import Bone, Ragdoll, Sphere
-from ragdoll_ros.scene import Placement, Scene
-from ragdoll_ros.scene_file import build_doll, doll_data, load_scene, save_scene
-from ragdoll_ros.swing import Frames, Link, Swing, Swings, mounts, strand
+from ragdoll_ros.files.doll import build_doll, doll_data
+from ragdoll_ros.files.scene import load_scene, save_scene
+from ragdoll_ros.model import errors, rotation
+from ragdoll_ros.model.ragdoll import Bone, Ragdoll
+from ragdoll_ros.model.scene import Placement, Scene
+from ragdoll_ros.model.shapes import Sphere
+from ragdoll_ros.model.swing import Link, Swing, strand
+from ragdoll_ros.physics.swing.frames import Frames
+from ragdoll_ros.physics.swing.mount import mounts
+from ragdoll_ros.physics.swing.swings import Swings
 
 TURN = rotation.from_rpy(0.3, 0.2, 0.1)
 HEAD = Bone('head', Sphere(0.1), 5, (0.1, 0, 1), TURN)
@@ -33,11 +38,11 @@ def test_a_scene_adds_swings_to_a_doll_it_names(tmp_path):
     file.write_text('dolls:\n  - doll: doll.yaml\n    swings:\n'
                     '      - {name: a, bone: hed, root: [0, 0, 1], direction: [0, 0, 1],'
                     ' strand: {links: 2, length: 1e-4}}\n')
-    with pytest.raises(faults.Faults) as raised:
+    with pytest.raises(errors.Faults) as raised:
         load_scene(str(file))
     assert {(type(fault), fault.path) for fault in raised.value.faults} == {
-        (faults.UnknownBone, 'dolls[0].swings[0].bone'),
-        (faults.OutOfRange, 'dolls[0].swings[0].strand.length')}
+        (errors.UnknownBone, 'dolls[0].swings[0].bone'),
+        (errors.OutOfRange, 'dolls[0].swings[0].strand.length')}
 
 
 def test_roots_and_directions_are_given_in_the_dolls_frame():
@@ -54,18 +59,18 @@ def test_roots_and_directions_are_given_in_the_dolls_frame():
 
 
 @pytest.mark.parametrize(('changes', 'fault', 'path'), [
-    ({'bone': 'hed'}, faults.UnknownBone, 'swings[0].bone'),
-    ({'direction': [0, 0, 0]}, faults.NotUnit, 'swings[0].direction'),
-    ({'mode': 'wind'}, faults.WrongForm, 'swings[0].mode'),
-    ({'mode': 'pendulum'}, faults.WrongForm, 'swings[0].links[1].stiffness'),
-    ({'velocity': [1, 0, 0]}, faults.WrongForm, 'swings[0].velocity'),
-    ({'root': [0, math.nan, 0]}, faults.NotFinite, 'swings[0].root'),
-    ({'gravity': 11}, faults.OutOfRange, 'swings[0].gravity'),
-    ({'links': []}, faults.WrongForm, 'swings[0].links'),
-    ({'links': [{'length': 0}]}, faults.NotPositive, 'swings[0].links[0].length'),
-    ({'links': [{'length': 1e-4}]}, faults.OutOfRange, 'swings[0].links[0].length'),
-    ({'links': [{'length': 1, 'damping': -1}]}, faults.OutOfRange, 'swings[0].links[0].damping'),
-    ({'strand': {'links': 2, 'length': 1}}, faults.WrongForm, 'swings[0]'),
+    ({'bone': 'hed'}, errors.UnknownBone, 'swings[0].bone'),
+    ({'direction': [0, 0, 0]}, errors.NotUnit, 'swings[0].direction'),
+    ({'mode': 'wind'}, errors.WrongForm, 'swings[0].mode'),
+    ({'mode': 'pendulum'}, errors.WrongForm, 'swings[0].links[1].stiffness'),
+    ({'velocity': [1, 0, 0]}, errors.WrongForm, 'swings[0].velocity'),
+    ({'root': [0, math.nan, 0]}, errors.NotFinite, 'swings[0].root'),
+    ({'gravity': 11}, errors.OutOfRange, 'swings[0].gravity'),
+    ({'links': []}, errors.WrongForm, 'swings[0].links'),
+    ({'links': [{'length': 0}]}, errors.NotPositive, 'swings[0].links[0].length'),
+    ({'links': [{'length': 1e-4}]}, errors.OutOfRange, 'swings[0].links[0].length'),
+    ({'links': [{'length': 1, 'damping': -1}]}, errors.OutOfRange, 'swings[0].links[0].damping'),
+    ({'strand': {'links': 2, 'length': 1}}, errors.WrongForm, 'swings[0]'),
 ])
 def test_what_is_wrong_with_a_swing_is_named(changes, fault, path):
     bones = [{'name': 'head', 'shape': {'sphere': {'radius': 0.1}}, 'mass': 1,
@@ -80,7 +85,7 @@ def test_what_is_wrong_with_a_swing_is_named(changes, fault, path):
 
 def test_two_swings_of_one_name_are_refused():
     swing = Swing('a', 'head', (0, 0, 1), (0, 0, 1), (Link(0.1),))
-    with pytest.raises(faults.DuplicateName):
+    with pytest.raises(errors.DuplicateName):
         Ragdoll('doll', (HEAD,), (), (swing, swing))
 
 

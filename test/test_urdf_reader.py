@@ -5,13 +5,14 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from ragdoll_ros import faults, rotation
-from ragdoll_ros.ragdoll import Bone, Box, Capsule, Cylinder, Joint, Ragdoll, Sphere
-from ragdoll_ros.scene import above_ground
-from ragdoll_ros.scene_file import load_doll
-from ragdoll_ros.simulation import Simulation
-from ragdoll_ros.urdf import to_urdf
-from ragdoll_ros.urdf_reader import doll_from_urdf, read_urdf
+from ragdoll_ros.files.doll import load_doll
+from ragdoll_ros.files.urdf import to_urdf
+from ragdoll_ros.fit.robot import doll_from_urdf, read_urdf
+from ragdoll_ros.model import errors, rotation
+from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
+from ragdoll_ros.model.scene import above_ground
+from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Sphere
+from ragdoll_ros.physics.simulation import Simulation
 
 TURN = rotation.from_rpy(0.3, -0.4, 0.5)
 
@@ -199,21 +200,21 @@ def test_what_is_only_a_mesh_becomes_the_box_of_the_same_inertia(tmp_path):
 
 
 @pytest.mark.parametrize(('text', 'kind'), [
-    ('', faults.Unreadable), ('<robot', faults.Unreadable), ('<sdf/>', faults.WrongForm),
-    ('<!DOCTYPE r [<!ENTITY a "x">]><robot>&a;</robot>', faults.Unreadable),
-    (robot(), faults.Detached), (robot(link('a'), link('a')), faults.DuplicateName),
-    (robot(link('a'), link('b')), faults.Detached),
-    (robot(link('a'), joint('b')), faults.UnknownBone),
-    (robot(link('a'), link('b'), joint('b'), joint('b')), faults.ConnectedTwice),
-    (robot(link('a'), link('b'), joint('b'), joint('a', 'b')), faults.JointCycle),
-    (robot(link('a'), link('b'), joint('b', kind='wobbly')), faults.WrongForm),
-    (robot(link('a'), link('b'), joint('b', axis='0 0 0')), faults.NotUnit),
-    (robot(link('a'), link('b'), joint('b', xyz='0 nan 0')), faults.WrongForm),
-    (robot(link('a'), link('b'), joint('b').replace('"-1"', '"3"')), faults.LimitsReversed),
-    (robot(link('a', '<box size="1 1 -1"/>')), faults.NotPositive),
-    (robot(link('a', '<box size="1 1"/>')), faults.WrongForm),
-    (robot(link('a', '<sphere/>')), faults.WrongForm),
-    (robot(link('a', mass=-1)), faults.OutOfRange), (robot(link('a', '')), faults.WrongForm)])
+    ('', errors.Unreadable), ('<robot', errors.Unreadable), ('<sdf/>', errors.WrongForm),
+    ('<!DOCTYPE r [<!ENTITY a "x">]><robot>&a;</robot>', errors.Unreadable),
+    (robot(), errors.Detached), (robot(link('a'), link('a')), errors.DuplicateName),
+    (robot(link('a'), link('b')), errors.Detached),
+    (robot(link('a'), joint('b')), errors.UnknownBone),
+    (robot(link('a'), link('b'), joint('b'), joint('b')), errors.ConnectedTwice),
+    (robot(link('a'), link('b'), joint('b'), joint('a', 'b')), errors.JointCycle),
+    (robot(link('a'), link('b'), joint('b', kind='wobbly')), errors.WrongForm),
+    (robot(link('a'), link('b'), joint('b', axis='0 0 0')), errors.NotUnit),
+    (robot(link('a'), link('b'), joint('b', xyz='0 nan 0')), errors.WrongForm),
+    (robot(link('a'), link('b'), joint('b').replace('"-1"', '"3"')), errors.LimitsReversed),
+    (robot(link('a', '<box size="1 1 -1"/>')), errors.NotPositive),
+    (robot(link('a', '<box size="1 1"/>')), errors.WrongForm),
+    (robot(link('a', '<sphere/>')), errors.WrongForm),
+    (robot(link('a', mass=-1)), errors.OutOfRange), (robot(link('a', '')), errors.WrongForm)])
 def test_broken_urdf_is_a_named_fault(text, kind):
     with pytest.raises(kind):
         doll_from_urdf(text)
@@ -236,6 +237,6 @@ def test_a_shipped_robot_falls_limp():
                                    '<cylinder radius="1" length="0"/>',
                                    '<capsule radius="0" length="1"/>'])
 def test_a_size_that_cannot_be_is_told_with_its_link(shape):
-    with pytest.raises(faults.NotPositive) as caught:
+    with pytest.raises(errors.NotPositive) as caught:
         doll_from_urdf(f'<robot name="r">{link("forearm", shape)}</robot>')
     assert caught.value.path.startswith('link forearm.')

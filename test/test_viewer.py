@@ -11,16 +11,17 @@ import pytest
 pytest.importorskip('viser')
 from page_client import PageClient, wait
 
-from ragdoll_ros import rotation
-from ragdoll_ros.ragdoll import Bone, Capsule, Joint, Ragdoll, Rider, Sphere
-from ragdoll_ros.scene import Placement, Scene
-from ragdoll_ros.scene_file import load_scene
-from ragdoll_ros.simulation import Simulation
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.model import rotation
+from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, Rider
+from ragdoll_ros.model.scene import Placement, Scene
+from ragdoll_ros.model.shapes import Capsule, Sphere
+from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.viewer.command import free_port, server_at
 from ragdoll_ros.viewer.page import Page
-from ragdoll_ros.viewer.playback import Playback
-from ragdoll_ros.viewer.recording import Recording
-from ragdoll_ros.viewer.simulated import Simulated
+from ragdoll_ros.viewer.sources.playback import Playback
+from ragdoll_ros.viewer.sources.recording import Recording
+from ragdoll_ros.viewer.sources.simulated import Simulated
 
 DROP = load_scene('drop')
 

@@ -11,10 +11,10 @@ import pytest
 from browser import SHARPNESS, SIZE, chromium, opened, serving
 from test_fit_broken import BROKEN
 
-from ragdoll_ros.scene_file import load_scene
-from ragdoll_ros.simulation import Simulation
-from ragdoll_ros.viewer.recording import Recording
-from ragdoll_ros.viewer.recording_file import load_recording, save_recording
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.viewer.sources.recording import Recording
+from ragdoll_ros.viewer.sources.recording_file import load_recording, save_recording
 
 SCENE = load_scene('drop')
 START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])

@@ -11,21 +11,22 @@ pytest.importorskip('viser')
 import fit_rigs
 from fit_rigs import RIGS
 
-from ragdoll_ros import faults, rotation
+from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.pipeline import fit_character
-from ragdoll_ros.push import Push
-from ragdoll_ros.ragdoll import Bone, Box, Joint, Ragdoll, Rider, Sphere
-from ragdoll_ros.riders import Riders
-from ragdoll_ros.scene import Placement, Scene, above_ground
-from ragdoll_ros.scene_file import load_scene
-from ragdoll_ros.simulation import Simulation
-from ragdoll_ros.viewer.limits import PIECES, Limits
-from ragdoll_ros.viewer.marks import arrow_before
-from ragdoll_ros.viewer.meshes import MESHES, ROUND
+from ragdoll_ros.model import errors, rotation
+from ragdoll_ros.model.push import Push
+from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, Rider
+from ragdoll_ros.model.scene import Placement, Scene, above_ground
+from ragdoll_ros.model.shapes import Box, Sphere
+from ragdoll_ros.model.skeleton import Riders
+from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.viewer.drawing.joint_limits import PIECES, Limits
+from ragdoll_ros.viewer.drawing.marks import arrow_before
+from ragdoll_ros.viewer.drawing.meshes import MESHES, ROUND
+from ragdoll_ros.viewer.drawing.skin import Skins, skin_of
 from ragdoll_ros.viewer.pointer import kept_distance, nearest, on_bone
-from ragdoll_ros.viewer.rods import Rods
-from ragdoll_ros.viewer.skin import Skins, skin_of
+from ragdoll_ros.viewer.sources.rods import Rods
 
 CORNERS = ROUND / 2 * np.sin(2 * np.pi / ROUND)
 """Area of the polygon of ROUND corners in a circle of radius 1, which stands for pi."""
@@ -97,7 +98,7 @@ def test_the_last_needle_of_each_joint_moves_with_the_child():
 def test_needles_are_red_at_their_limit():
     import viser
 
-    from ragdoll_ros.viewer.limits import GREEN, RED
+    from ragdoll_ros.viewer.drawing.joint_limits import GREEN, RED
     scene = load_scene('drop')
     server = viser.ViserServer('127.0.0.1', 0, verbose=False)
     limits = Limits(server, scene)
@@ -171,13 +172,13 @@ def test_a_skin_comes_in_the_size_that_its_doll_was_fitted_in(fit, tmp_path):
 def test_a_skin_that_does_not_fit_is_told(fit, tmp_path):
     assert skin_of(fit.doll) is None
     doll = with_model(fit, tmp_path)
-    with pytest.raises(faults.RagdollError, match='riders'):
+    with pytest.raises(errors.RagdollError, match='riders'):
         skin_of(dataclasses.replace(doll, riders=doll.riders[:-1]))
     Path(doll.model).write_bytes(b'rubbish')
-    with pytest.raises(faults.RagdollError, match=Path(doll.model).name):
+    with pytest.raises(errors.RagdollError, match=Path(doll.model).name):
         skin_of(doll)
     Path(doll.model).unlink()
-    with pytest.raises(faults.RagdollError, match=Path(doll.model).name):
+    with pytest.raises(errors.RagdollError, match=Path(doll.model).name):
         skin_of(doll)
 
 

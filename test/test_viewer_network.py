@@ -8,7 +8,7 @@ from network import Network
 from page_client import PageClient, wait
 from test_viewer import DROP, batch_of, served
 
-from ragdoll_ros.viewer.line import PATIENCE, PERIOD
+from ragdoll_ros.viewer.drawing.line import PATIENCE, PERIOD
 
 
 @pytest.fixture

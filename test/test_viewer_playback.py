@@ -4,11 +4,11 @@ import time
 import numpy as np
 import pytest
 
-from ragdoll_ros import faults
-from ragdoll_ros.scene_file import load_scene
-from ragdoll_ros.viewer.playback import Playback
-from ragdoll_ros.viewer.recording import Recording
-from ragdoll_ros.viewer.source import Wanted
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.model import errors
+from ragdoll_ros.viewer.sources.playback import Playback
+from ragdoll_ros.viewer.sources.recording import Recording
+from ragdoll_ros.viewer.sources.source import Wanted
 
 TURNS = np.tile((0, 0, 0, 1.0), (10, 1))
 
@@ -86,7 +86,7 @@ def test_pace_changes_from_here_on(playing):
     while time.monotonic() < before + 0.01:
         pass
     assert 360 + 50 * 0.01 <= playback.frame.time + 1e-9 <= 360 + 50 * (time.monotonic() - before)
-    with pytest.raises(faults.OutOfRange, match='pace'):
+    with pytest.raises(errors.OutOfRange, match='pace'):
         playback.set_pace(0.0)
 
 
@@ -111,7 +111,7 @@ def test_says_where_it_is(playing):
 
 def test_what_cannot_be_is_refused_with_what_can(playing):
     playback, _ = playing
-    with pytest.raises(faults.RagdollError, match='ragdoll_viewer --scene crowd'):
+    with pytest.raises(errors.RagdollError, match='ragdoll_viewer --scene crowd'):
         playback.load('crowd')
-    with pytest.raises(faults.RagdollError, match='ragdoll_viewer --scene'):
+    with pytest.raises(errors.RagdollError, match='ragdoll_viewer --scene'):
         playback.use(load_scene('crowd'))

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from ragdoll_ros import faults, rotation
-from ragdoll_ros.scene import SECOND
-from ragdoll_ros.scene_file import load_scene
-from ragdoll_ros.simulation import Simulation
-from ragdoll_ros.state import State
-from ragdoll_ros.viewer.recording import Pose, Recorder, Recording
-from ragdoll_ros.viewer.recording_file import load_recording, recording_text, save_recording
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.model import errors, rotation
+from ragdoll_ros.model.scene import SECOND
+from ragdoll_ros.model.state import State
+from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.viewer.sources.recording import Pose, Recorder, Recording
+from ragdoll_ros.viewer.sources.recording_file import load_recording, recording_text, save_recording
 
 UNTURNED = np.tile((0, 0, 0, 1.0), (10, 1))
 
@@ -116,7 +116,7 @@ def test_a_single_pose_can_be_played():
 
 
 def test_nothing_taken_is_no_recording():
-    with pytest.raises(faults.OutOfRange, match='at least one pose'):
+    with pytest.raises(errors.OutOfRange, match='at least one pose'):
         Recorder(load_scene('drop')).recording()
 
 
@@ -161,7 +161,7 @@ def test_rubbish_is_refused_where_it_stands(written, spoil, told):
     data = json.loads(written.read_text())
     spoil(data)
     written.write_text(json.dumps(data).replace('"1e999"', '[1e999]'))
-    with pytest.raises(faults.Faults) as caught:
+    with pytest.raises(errors.Faults) as caught:
         load_recording(written)
     assert told in str(caught.value) and 'run.json: 1 fault' in str(caught.value)
 
@@ -169,14 +169,14 @@ def test_rubbish_is_refused_where_it_stands(written, spoil, told):
 @pytest.mark.parametrize('content', [b'', b'{', b'\xff\xfe', b'[' * 100_000, b'[]', b'{}', b'3'])
 def test_a_file_that_is_no_recording_is_refused(tmp_path, content):
     (tmp_path / 'run.json').write_bytes(content)
-    with pytest.raises(faults.Faults, match=r'run\.json: 1 fault'):
+    with pytest.raises(errors.Faults, match=r'run\.json: 1 fault'):
         load_recording(tmp_path / 'run.json')
 
 
 def test_a_missing_file_is_refused(tmp_path):
-    with pytest.raises(faults.Faults, match='No such file'):
+    with pytest.raises(errors.Faults, match='No such file'):
         load_recording(tmp_path / 'nowhere.json')
-    with pytest.raises(faults.Faults, match='directory'):
+    with pytest.raises(errors.Faults, match='directory'):
         load_recording(tmp_path)
 
 
@@ -196,7 +196,7 @@ def panel():
 
 
 def frame(scene, time):
-    from ragdoll_ros.viewer.source import Frame
+    from ragdoll_ros.viewer.sources.source import Frame
     still = np.zeros((len(scene.bones), 3))
     return Frame(scene, time, State(still, np.tile((0, 0, 0, 1.0), (len(still), 1)), still, still))
 

@@ -12,10 +12,8 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 FALL = """
 import numpy as np
-from ragdoll_ros import compiled
-from ragdoll_ros.push import Push
-from ragdoll_ros.scene_file import load_scene
-from ragdoll_ros.simulation import Simulation
+from ragdoll_ros import Push, Simulation, load_scene
+from ragdoll_ros.physics import kernels
 for name in ('flight', 'drop'):
     with Simulation(load_scene(name)) as simulation:
         simulation.grab('hand', 'head')
@@ -27,7 +25,7 @@ for name in ('flight', 'drop'):
         assert np.isfinite(state.rows).all()
         assert all(np.isfinite(value) for value in simulation.measures().values())
 import sys
-print(compiled.ready(), sys.modules.get('numba') is not None)
+print(kernels.ready(), sys.modules.get('numba') is not None)
 """
 GONE = "import sys; sys.modules['numba'] = None\n"
 
@@ -66,7 +64,7 @@ def test_it_does_where_nothing_can_be_kept(tmp_path):
     package = tmp_path / 'ragdoll_ros'
     shutil.copytree(ROOT / 'ragdoll_ros', package, ignore=shutil.ignore_patterns('__pycache__'))
     (package / 'config').symlink_to(ROOT / 'config')
-    (package / 'compiled' / '__pycache__').write_text('')
+    (package / 'physics' / 'kernels' / '__pycache__').write_text('')
     code = f'import sys; sys.path.insert(0, {str(tmp_path)!r})\n' + FALL
     told(code, HOME='/dev/null', XDG_CACHE_HOME='/dev/null', PYTHONDONTWRITEBYTECODE='1',
          RAGDOLL_COMPILED='1')

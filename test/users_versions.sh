@@ -33,7 +33,7 @@ pip install --no-build-isolation --constraint "$folder/versions.txt" \
     grep -i '^\(numpy\|numba\|llvmlite\|scipy\|setuptools\|pybullet\|pyyaml\|jsonschema\|ragdoll\)'
 cd "$here"
 export PYTHONSAFEPATH=1 AMENT_PREFIX_PATH="$folder/venv"
-"$folder/venv/bin/python" -m ragdoll_ros.compiled
+"$folder/venv/bin/python" -m ragdoll_ros.physics.kernels
 "$folder/venv/bin/python" -m pytest
 echo "Without compiled code: the core's tests"
 core=$(sed -n 's/^CORE := //p' Makefile)

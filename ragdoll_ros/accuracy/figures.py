@@ -9,7 +9,7 @@ import os
 import platform
 from pathlib import Path
 
-from .. import compiled
+from ..physics import kernels
 
 FILE = 'accuracy.json'
 
@@ -21,7 +21,7 @@ def about(command: str, seconds: float, quick: bool, starts: int) -> dict[str, o
             'machine': _processor(), 'cores': os.cpu_count(),
             'system': f'{platform.system()} {platform.machine()}',
             'python': platform.python_version(),
-            'compiled': compiled.ready(),
+            'compiled': kernels.ready(),
             'versions': {name: _version(name) for name in
                          ('ragdoll_ros', 'pybullet', 'mujoco', 'numpy', 'scipy', 'numba')}}
 

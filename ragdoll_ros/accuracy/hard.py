@@ -10,12 +10,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..push import Push
-from ..ragdoll import Bone, Ragdoll, Sphere
-from ..scene import Placement
-from ..scene_file import load_scene
-from ..settings import ACCURACIES
-from ..simulation import Simulation
+from ..files.scene import load_scene
+from ..model.push import Push
+from ..model.ragdoll import Bone, Ragdoll
+from ..model.scene import Placement
+from ..model.shapes import Sphere
+from ..physics.settings import ACCURACIES
+from ..physics.simulation import Simulation
 from .hard_cases import SINKING, HardCase, hard_cases
 from .measure import Measure
 from .methods import by_name, run

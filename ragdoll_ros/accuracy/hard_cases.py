@@ -7,11 +7,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from .. import rotation
-from ..push import Push
-from ..ragdoll import Bone, Box, Capsule, Cylinder, Joint, Ragdoll, Sphere
-from ..scene import Placement, above_ground
-from ..scene_file import load_doll, load_scene
+from ..files.doll import load_doll
+from ..files.scene import load_scene
+from ..model import rotation
+from ..model.push import Push
+from ..model.ragdoll import Bone, Joint, Ragdoll
+from ..model.scene import Placement, above_ground
+from ..model.shapes import Box, Capsule, Cylinder, Sphere
 from . import starts
 from .trial import Trial, posed
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import rotation
-from ..ragdoll import Joint
-from ..scene import Placement, Scene
+from ..model import rotation
+from ..model.ragdoll import Joint
+from ..model.scene import Placement, Scene
 from .trajectory import Trajectory
 from .trial import Trial
 

@@ -10,13 +10,14 @@ from typing import Protocol
 
 import numpy as np
 
-from .. import compiled, faults
-from ..engine.bullet import BulletEngine
-from ..engine.mujoco import MujocoEngine
-from ..engine.protocol import Engine
-from ..settings import ACCURACIES, Accuracy
-from ..simulation import Simulation
-from ..state import State
+from ..model import errors
+from ..model.state import State
+from ..physics import kernels
+from ..physics.engine.bullet import BulletEngine
+from ..physics.engine.mujoco import MujocoEngine
+from ..physics.engine.protocol import Engine
+from ..physics.settings import ACCURACIES, Accuracy
+from ..physics.simulation import Simulation
 from .quickstart import STEP as QUICKSTART_STEP
 from .quickstart import Quickstart
 from .trajectory import Trajectory
@@ -140,7 +141,7 @@ def ours(accuracy: str | Accuracy, name: str | None = None) -> Method:
     """Our simulation at one of its settings, or with settings of one's own."""
     name = name or f'ours-{accuracy}'
     order = (ACCURACIES[accuracy] if isinstance(accuracy, str) else accuracy).order
-    order = compiled.ORDER if order and compiled.ready() else order or 1
+    order = kernels.ORDER if order and kernels.ready() else order or 1
     return Method(name, name.replace('-', ' '), 'ours', functools.partial(
         Ours, accuracy=accuracy), order=order)
 
@@ -181,5 +182,5 @@ def by_name(name: str) -> Method:
     """Find a method; OutOfRange names all there are."""
     methods = {method.name: method for method in every_method(range(1, 129))}
     if name not in methods:
-        raise faults.OutOfRange('method', name, 'ours-*, quickstart, bullet-N, mujoco-*-N')
+        raise errors.OutOfRange('method', name, 'ours-*, quickstart, bullet-N, mujoco-*-N')
     return methods[name]

@@ -11,9 +11,9 @@ import tempfile
 import numpy as np
 import pybullet
 
-from ..engine.bullet import BREAKING_DISTANCE
-from ..state import State
-from ..urdf import to_urdf
+from ..files.urdf import to_urdf
+from ..model.state import State
+from ..physics.engine.bullet import BREAKING_DISTANCE
 from .trial import Trial
 
 STEP = 1 / 240

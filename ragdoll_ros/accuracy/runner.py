@@ -9,6 +9,7 @@ import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from ..physics.engine.mujoco import silence_warnings
 from .progress import Progress
 
 WORKERS = 2
@@ -75,9 +76,5 @@ def attempt(job: Job) -> list[Row]:
 
 def prepare() -> None:
     """Keep MuJoCo's warnings about diverging runs off the terminal: the figures tell of them."""
-    try:
-        import mujoco
-    except ImportError:
-        return
-    mujoco.set_mju_user_warning(lambda message: None)
+    silence_warnings()
     os.chdir(tempfile.gettempdir())

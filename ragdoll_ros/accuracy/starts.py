@@ -11,11 +11,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .. import rotation
-from ..coordinates import Coordinates
-from ..push import Push
-from ..scene import Placement, Scene, height
-from ..scene_file import load_scene
+from ..files.scene import load_scene
+from ..model import rotation
+from ..model.coordinates import Coordinates
+from ..model.push import Push
+from ..model.scene import Placement, Scene, height
 from .references.articulated import Articulated
 from .trial import Trial, angle_places, posed
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..state import State
+from ..model.state import State
 
 
 @dataclass(frozen=True)

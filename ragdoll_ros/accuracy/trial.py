@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import rotation
-from ..coordinates import Coordinates
-from ..engine.protocol import Load
-from ..push import Push
-from ..ragdoll import Ragdoll
-from ..scene import Placement, Scene
+from ..model import rotation
+from ..model.coordinates import Coordinates
+from ..model.push import Push
+from ..model.ragdoll import Ragdoll
+from ..model.scene import Placement, Scene
+from ..physics.engine.protocol import Load
 from .references.articulated import Articulated
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import faults
+from ..model import errors
 from .gltf_file import GltfFile, count, item
 
 LARGEST_COUNT = {'SCALAR': 3_000_000}
@@ -26,7 +26,7 @@ def read_floats(file: GltfFile, index: object, kind: str, where: str) -> np.ndar
     values = _read(file, index, kind, where)
     if not np.isfinite(values).all():
         bad = values[~np.isfinite(values)][0]
-        raise faults.NotFinite(where, float(bad), 'finite numbers')
+        raise errors.NotFinite(where, float(bad), 'finite numbers')
     return values.astype(float)
 
 
@@ -34,11 +34,11 @@ def read_indices(file: GltfFile, index: object, kind: str, limit: int, where: st
     """Read an accessor as (count, width) indices, each below ``limit``."""
     values = _read(file, index, kind, where)
     if values.dtype.kind == 'f':
-        raise faults.WrongForm(where, 'floats', 'whole numbers')
+        raise errors.WrongForm(where, 'floats', 'whole numbers')
     values = values.astype(np.int32)
     outside = (values < 0) | (values >= limit)
     if outside.any():
-        raise faults.OutOfRange(where, int(values[outside][0]), f'an index from 0 to {limit - 1}')
+        raise errors.OutOfRange(where, int(values[outside][0]), f'an index from 0 to {limit - 1}')
     return values
 
 
@@ -46,11 +46,11 @@ def _read(file: GltfFile, index: object, kind: str, where: str) -> np.ndarray:
     accessor = item(file.document.accessors, index, where, 'accessors')
     place = f'accessors[{index}]'
     if accessor.type != kind:
-        raise faults.WrongForm(f'{place}.type', accessor.type, kind)
+        raise errors.WrongForm(f'{place}.type', accessor.type, kind)
     number = count(accessor.count, f'{place}.count')
     most = LARGEST_COUNT.get(accessor.type, LARGEST_OTHER)
     if number > most:
-        raise faults.OutOfRange(f'{place}.count', number, f'at most {most}')
+        raise errors.OutOfRange(f'{place}.count', number, f'at most {most}')
     width = WIDTHS[accessor.type]
     if accessor.bufferView is None:
         values = np.zeros((number, width), _dtype(accessor, place))
@@ -67,7 +67,7 @@ def _strided(file: GltfFile, accessor: object, number: int, width: int, place: s
     element = dtype.itemsize * width
     stride = count(view.byteStride or 0, f'{place}.byteStride') or element
     if stride < element or stride > 252:
-        raise faults.OutOfRange(f'bufferViews[{accessor.bufferView}].byteStride', stride,
+        raise errors.OutOfRange(f'bufferViews[{accessor.bufferView}].byteStride', stride,
                                 f'{element} to 252')
     if number == 0:
         return np.zeros((0, width), dtype)
@@ -79,16 +79,16 @@ def _strided(file: GltfFile, accessor: object, number: int, width: int, place: s
 def _substituted(file: GltfFile, accessor: object, values: np.ndarray, place: str) -> np.ndarray:
     sparse, place = accessor.sparse, f'{place}.sparse'
     if sparse.indices is None or sparse.values is None:
-        raise faults.WrongForm(place, None, 'indices and values')
+        raise errors.WrongForm(place, None, 'indices and values')
     number = count(sparse.count, f'{place}.count')
     if number > len(values):
-        raise faults.OutOfRange(f'{place}.count', number, f'at most {len(values)}')
+        raise errors.OutOfRange(f'{place}.count', number, f'at most {len(values)}')
     dtype = _dtype(sparse.indices, f'{place}.indices')
     data = file.read(sparse.indices.bufferView, count(sparse.indices.byteOffset or 0, place),
                      number * dtype.itemsize, f'{place}.indices')
     at = np.frombuffer(data, dtype)
     if dtype.kind != 'u' or (at >= len(values)).any():
-        raise faults.OutOfRange(f'{place}.indices', 'an index', f'from 0 to {len(values) - 1}')
+        raise errors.OutOfRange(f'{place}.indices', 'an index', f'from 0 to {len(values) - 1}')
     data = file.read(sparse.values.bufferView, count(sparse.values.byteOffset or 0, place),
                      number * values.shape[1] * values.itemsize, f'{place}.values')
     values = values.copy()
@@ -100,7 +100,7 @@ def _dtype(accessor: object, place: str) -> np.dtype:
     kind = accessor.componentType
     if not isinstance(kind, int) or kind not in COMPONENTS:
         expected = 'one of ' + ', '.join(map(str, COMPONENTS))
-        raise faults.WrongForm(f'{place}.componentType', kind, expected)
+        raise errors.WrongForm(f'{place}.componentType', kind, expected)
     return COMPONENTS[kind]
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import faults, rotation
-from ..ragdoll import WORLD
+from ..model import errors, rotation
+from ..model.ragdoll import WORLD
 from .gltf_file import GltfFile
 from .names import side_of
 from .nodes import Nodes, read_nodes
@@ -90,13 +90,13 @@ def read_character(path: str | Path, scale: float | None = None) -> Character:
             nodes = read_nodes(file)
             skins = read_skins(file, nodes)
         if len(skins.vertices) == 0:
-            raise faults.WrongForm('meshes', 0, 'a skin with vertices')
+            raise errors.WrongForm('meshes', 0, 'a skin with vertices')
         return _character(file, nodes, skins, scale)
-    except faults.Fault as fault:
-        raise faults.Faults(str(path), [fault]) from None
+    except errors.Fault as fault:
+        raise errors.Faults(str(path), [fault]) from None
     except OSError as error:
-        fault = faults.Unreadable('', error.strerror or str(error), 'a file that can be read')
-        raise faults.Faults(str(path), [fault]) from None
+        fault = errors.Unreadable('', error.strerror or str(error), 'a file that can be read')
+        raise errors.Faults(str(path), [fault]) from None
 
 
 def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) -> Character:
@@ -106,7 +106,7 @@ def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) 
     lookup[joints] = range(len(joints))
     rests = np.stack([skins.rests[node] for node in joints])
     if not np.isfinite(skins.vertices).all() or not np.isfinite(rests).all():
-        raise faults.NotFinite('meshes', 'vertices in the bind pose', 'finite numbers')
+        raise errors.NotFinite('meshes', 'vertices in the bind pose', 'finite numbers')
     names = _bone_names([file.document.nodes[node].name for node in joints])
     notes = list(skins.notes)
     turn = TO_ROS
@@ -187,10 +187,10 @@ def _metres(vertices: np.ndarray, scale: float | None, notes: list[str]) -> floa
     """Metres to one unit; a guess from the size where the user gives none."""
     extent = float(np.ptp(vertices, axis=0).max())
     if scale is not None:
-        faults.check_positive('scale', scale)
+        errors.check_positive('scale', scale)
         return scale
     if not 0 < extent < 1e30:
-        raise faults.OutOfRange('meshes', extent, 'a skin with a size')
+        raise errors.OutOfRange('meshes', extent, 'a skin with a size')
     if extent > LARGEST_METRES:
         metres, unit = (0.01, 'centimetres') if extent <= 1000 else (0.001, 'millimetres')
         if extent * metres > LARGEST_METRES:

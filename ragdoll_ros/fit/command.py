@@ -6,9 +6,9 @@ import dataclasses
 import sys
 from pathlib import Path
 
-from .. import faults
-from ..ragdoll import Ragdoll
-from ..scene_file import load_doll, save_doll
+from ..files.doll import load_doll, save_doll
+from ..model import errors
+from ..model.ragdoll import Ragdoll
 from .character import read_character
 from .pipeline import Fit, Options, fit_character
 from .report import doll_report, fit_report
@@ -38,7 +38,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         _check(options, parser)
         _run(options)
-    except faults.RagdollError as error:
+    except errors.RagdollError as error:
         print(f'ragdoll_fit: {_one_line(error)}', file=sys.stderr)
         return 2
     except OSError as error:
@@ -93,7 +93,7 @@ def _run(options: argparse.Namespace) -> None:
     if options.output:
         save_doll(doll, options.output, f'Fitted to {path.name}\n\n{report}')
     if options.urdf:
-        from ..urdf import to_urdf
+        from ..files.urdf import to_urdf
         Path(options.urdf).write_text(to_urdf(doll, options.dialect), encoding='utf-8')
     if options.picture:
         from .picture import draw
@@ -108,7 +108,7 @@ def _fit(path: Path, options: argparse.Namespace) -> Fit:
 
 
 def _read_robot(path: Path) -> tuple[Ragdoll, str]:
-    from ..urdf_reader import read_urdf
+    from .robot import read_urdf
     doll, notes = read_urdf(path)
     return doll, doll_report(doll, notes)
 
@@ -117,20 +117,20 @@ def _check(options: argparse.Namespace, parser: argparse.ArgumentParser) -> None
     suffix = Path(options.input).suffix.lower()
     for key in FITTING if suffix in (*DOLLS, *ROBOTS) else ():
         if getattr(options, key) != parser.get_default(key):
-            raise faults.WrongForm(f'--{key}', getattr(options, key),
+            raise errors.WrongForm(f'--{key}', getattr(options, key),
                                    f'a .glb or .gltf to fit: what a {suffix} says of bodies stays')
     for key in ('mass', 'scale', 'smallest'):
         if getattr(options, key) is not None:
-            faults.check_positive(f'--{key}', getattr(options, key))
+            errors.check_positive(f'--{key}', getattr(options, key))
     if options.weight is not None:
-        faults.check_range('--weight', options.weight, 0, 1)
+        errors.check_range('--weight', options.weight, 0, 1)
     if options.picture and Path(options.picture).suffix.lower() not in PICTURES:
-        raise faults.WrongForm('--picture', options.picture,
+        raise errors.WrongForm('--picture', options.picture,
                                'a name that ends in ' + ', '.join(PICTURES))
 
 
-def _one_line(error: faults.RagdollError) -> str:
-    if isinstance(error, faults.Faults) and len(error.faults) == 1:
+def _one_line(error: errors.RagdollError) -> str:
+    if isinstance(error, errors.Faults) and len(error.faults) == 1:
         return f'{error.file}: {error.faults[0]}'
     return str(error)
 

@@ -5,8 +5,8 @@ import math
 
 import numpy as np
 
-from .. import rotation
-from ..ragdoll import Joint, Ragdoll
+from ..model import rotation
+from ..model.ragdoll import Joint, Ragdoll
 from .names import roles_of
 
 DENSEST = 3000.0

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 
-from .. import faults
+from ..model import errors
 
 LARGEST_JSON = 32_000_000
 """Bytes of JSON; a character with hundreds of animations has 2 MB."""
@@ -49,7 +49,7 @@ class Buffer:
             file.seek(self.start + offset)
             data = file.read(size)
         if len(data) < size:
-            raise faults.Unreadable(where, f'{len(data)} bytes', f'{size} bytes, file is cut short')
+            raise errors.Unreadable(where, f'{len(data)} bytes', f'{size} bytes, file is cut short')
         return data
 
 
@@ -59,12 +59,12 @@ class GltfFile:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         if not self.path.is_file():
-            raise faults.Unreadable('', str(path), 'a .glb or .gltf file')
+            raise errors.Unreadable('', str(path), 'a .glb or .gltf file')
         self.size = os.stat(self.path).st_size
         with self.path.open('rb') as file:
             binary = file.read(4) == b'glTF'
         if not binary and self.path.suffix.lower() == '.glb':
-            raise faults.Unreadable('byte 0', 'no glTF in front', 'a file that begins with glTF')
+            raise errors.Unreadable('byte 0', 'no glTF in front', 'a file that begins with glTF')
         text, self._chunk = self._read_chunks() if binary else (self._read_text(), None)
         self.json = _parse(text)
         self.document = _typed(self.json)
@@ -76,11 +76,11 @@ class GltfFile:
         place = f'bufferViews[{view_index}]'
         start, length = count(view.byteOffset or 0, place), count(view.byteLength, place)
         if offset < 0 or offset + size > length:
-            raise faults.OutOfRange(where, f'bytes {offset} to {offset + size}',
+            raise errors.OutOfRange(where, f'bytes {offset} to {offset + size}',
                                     f'within the {length} bytes of {place}')
         buffer = self._buffer(view.buffer, place)
         if start + length > buffer.size:
-            raise faults.OutOfRange(place, f'bytes {start} to {start + length}',
+            raise errors.OutOfRange(place, f'bytes {start} to {start + length}',
                                     f'within the {buffer.size} bytes of the buffer')
         return buffer.read(start + offset, size, place)
 
@@ -94,23 +94,23 @@ class GltfFile:
         wanted = count(entry.byteLength, where)
         if entry.uri is None:
             if self._chunk is None:
-                raise faults.WrongForm(where, None, 'a uri, or a binary chunk in the file')
+                raise errors.WrongForm(where, None, 'a uri, or a binary chunk in the file')
             buffer = self._chunk
         elif not isinstance(entry.uri, str):
-            raise faults.WrongForm(f'{where}.uri', entry.uri, 'a text')
+            raise errors.WrongForm(f'{where}.uri', entry.uri, 'a text')
         elif entry.uri.startswith('data:'):
             buffer = _embedded(entry.uri, where)
         else:
             path = _inside(self.path.parent, entry.uri, where)
             buffer = Buffer(path.stat().st_size, path)
         if wanted > buffer.size:
-            raise faults.OutOfRange(f'{where}.byteLength', wanted,
+            raise errors.OutOfRange(f'{where}.byteLength', wanted,
                                     f'at most the {buffer.size} bytes there are')
         return buffer
 
     def _read_text(self) -> bytes:
         if self.size > LARGEST_JSON:
-            raise faults.Unreadable('', f'{self.size} bytes', f'at most {LARGEST_JSON} of JSON')
+            raise errors.Unreadable('', f'{self.size} bytes', f'at most {LARGEST_JSON} of JSON')
         return self.path.read_bytes()
 
     def _read_chunks(self) -> tuple[bytes, Buffer | None]:
@@ -118,18 +118,18 @@ class GltfFile:
         with self.path.open('rb') as file:
             header = file.read(12)
             if len(header) < 12:
-                raise faults.Unreadable('header', f'{len(header)} bytes', '12 bytes of header')
+                raise errors.Unreadable('header', f'{len(header)} bytes', '12 bytes of header')
             _, version, length = struct.unpack('<4sII', header)
             if version != 2:
-                raise faults.WrongForm('header.version', version, '2')
+                raise errors.WrongForm('header.version', version, '2')
             if length > self.size:
-                raise faults.Unreadable('header.length', length,
+                raise errors.Unreadable('header.length', length,
                                         f'at most the {self.size} bytes of the file')
             kind, start, size = self._chunk_head(file, 12)
             if kind != b'JSON':
-                raise faults.WrongForm('byte 16', kind, 'a JSON chunk first')
+                raise errors.WrongForm('byte 16', kind, 'a JSON chunk first')
             if size > LARGEST_JSON:
-                raise faults.Unreadable('byte 12', size, f'at most {LARGEST_JSON} bytes of JSON')
+                raise errors.Unreadable('byte 12', size, f'at most {LARGEST_JSON} bytes of JSON')
             text = file.read(size)
             # Chunks begin on multiples of four bytes.
             after = start + size + -size % 4
@@ -142,10 +142,10 @@ class GltfFile:
     def _chunk_head(self, file: object, at: int) -> tuple[bytes, int, int]:
         head = file.read(8)
         if len(head) < 8:
-            raise faults.Unreadable(f'byte {at}', f'{len(head)} bytes', 'a chunk')
+            raise errors.Unreadable(f'byte {at}', f'{len(head)} bytes', 'a chunk')
         size, kind = struct.unpack('<I4s', head)
         if at + 8 + size > self.size:
-            raise faults.Unreadable(f'byte {at}', f'a chunk of {size} bytes',
+            raise errors.Unreadable(f'byte {at}', f'a chunk of {size} bytes',
                                     f'at most the {self.size - at - 8} bytes that are left')
         return kind, at + 8, size
 
@@ -155,32 +155,32 @@ def item(items: list | None, index: object, where: str, name: str) -> object:
     length = len(items or ())
     if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < length:
         expected = f'an index from 0 to {length - 1} in {name}' if length else f'{name} in the file'
-        raise faults.OutOfRange(where, index, expected)
+        raise errors.OutOfRange(where, index, expected)
     return items[index]
 
 
 def count(value: object, where: str) -> int:
     """Give a number of things or bytes; WrongForm unless it is a whole number from zero on."""
     if not isinstance(value, int) or isinstance(value, bool) or value < 0:
-        raise faults.WrongForm(where, value, 'a whole number, zero or above')
+        raise errors.WrongForm(where, value, 'a whole number, zero or above')
     return value
 
 
 def _parse(text: bytes) -> dict:
     if sum(text.count(mark) for mark in (b',', b'[', b'{')) > LARGEST_STRUCTURE:
-        raise faults.Unreadable('JSON', 'too many entries', f'at most {LARGEST_STRUCTURE}')
+        raise errors.Unreadable('JSON', 'too many entries', f'at most {LARGEST_STRUCTURE}')
     try:
         data = json.loads(text.decode('utf-8').rstrip('\0'))
     except RecursionError:
-        raise faults.Unreadable('JSON', 'nested too deeply', 'a glTF document') from None
+        raise errors.Unreadable('JSON', 'nested too deeply', 'a glTF document') from None
     except ValueError as error:
-        raise faults.Unreadable('JSON', str(error), 'JSON in UTF-8') from None
+        raise errors.Unreadable('JSON', str(error), 'JSON in UTF-8') from None
     if not isinstance(data, dict):
-        raise faults.WrongForm('JSON', data, 'an object with nodes, skins and meshes')
+        raise errors.WrongForm('JSON', data, 'an object with nodes, skins and meshes')
     required = data.get('extensionsRequired')
     for extension in required if isinstance(required, list) else ():
         if extension in UNREADABLE_EXTENSIONS:
-            raise faults.WrongForm('extensionsRequired', extension,
+            raise errors.WrongForm('extensionsRequired', extension,
                                    'an uncompressed file: export it without compression')
     return data
 
@@ -190,7 +190,7 @@ def _typed(data: dict) -> SimpleNamespace:
     try:
         import pygltflib
     except ImportError:
-        raise faults.Unreadable(
+        raise errors.Unreadable(
             '', 'no pygltflib', "pip install 'ragdoll_ros[fit]' to read glTF") from None
     document = SimpleNamespace()
     with warnings.catch_warnings():
@@ -199,7 +199,7 @@ def _typed(data: dict) -> SimpleNamespace:
         for key, kind in TYPES.items():
             entries = data.get(key, [])
             if not isinstance(entries, list):
-                raise faults.WrongForm(key, entries, 'a list of objects')
+                raise errors.WrongForm(key, entries, 'a list of objects')
             setattr(document, key, [_entry(getattr(pygltflib, kind), entry, f'{key}[{index}]')
                                     for index, entry in enumerate(entries)])
     return document
@@ -210,7 +210,7 @@ def _entry(kind: type, entry: object, where: str) -> object:
         return kind.from_dict(entry, infer_missing=True)
     except (TypeError, ValueError, KeyError, AttributeError, OverflowError, RecursionError):
         name = kind.__name__
-        raise faults.WrongForm(where, entry, f'a {name} as glTF 2.0 has it') from None
+        raise errors.WrongForm(where, entry, f'a {name} as glTF 2.0 has it') from None
 
 
 def _embedded(uri: str, where: str) -> Buffer:
@@ -220,7 +220,7 @@ def _embedded(uri: str, where: str) -> Buffer:
             raise ValueError
         data = base64.b64decode(body, validate=True)
     except (binascii.Error, ValueError):
-        raise faults.WrongForm(f'{where}.uri', uri[:40], 'data:...;base64,...') from None
+        raise errors.WrongForm(f'{where}.uri', uri[:40], 'data:...;base64,...') from None
     return Buffer(len(data), data=data)
 
 
@@ -233,7 +233,7 @@ def _inside(folder: Path, uri: str, where: str) -> Path:
     except (ValueError, OSError, RuntimeError):
         inside = there = False
     if not inside:
-        raise faults.Unreadable(f'{where}.uri', uri, f'a file inside {folder}')
+        raise errors.Unreadable(f'{where}.uri', uri, f'a file inside {folder}')
     if not there:
-        raise faults.Unreadable(f'{where}.uri', uri, f'a file that exists in {folder}')
+        raise errors.Unreadable(f'{where}.uri', uri, f'a file that exists in {folder}')
     return path

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..ragdoll import Bone, Joint
+from ..model.ragdoll import Bone, Joint
 
 FORWARD, LEFT, UP = np.eye(3)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import faults, rotation
+from ..model import errors, rotation
 from .gltf_file import GltfFile, item
 
 
@@ -26,7 +26,7 @@ def read_nodes(file: GltfFile) -> Nodes:
         for child in node.children or ():
             item(nodes, child, f'nodes[{index}].children', 'nodes')
             if parents[child] >= 0:
-                raise faults.ConnectedTwice(f'nodes[{index}].children', child,
+                raise errors.ConnectedTwice(f'nodes[{index}].children', child,
                                             'a node that has no parent yet')
             parents[child] = index
     order = [index for index, parent in enumerate(parents) if parent < 0]
@@ -34,7 +34,7 @@ def read_nodes(file: GltfFile) -> Nodes:
         order.extend(nodes[index].children or ())
     if len(order) < len(nodes):
         missing = min(set(range(len(nodes))) - set(order))
-        raise faults.JointCycle(f'nodes[{missing}]', 'a cycle among the nodes',
+        raise errors.JointCycle(f'nodes[{missing}]', 'a cycle among the nodes',
                                 'nodes that form trees')
     worlds = np.zeros((len(nodes), 4, 4))
     for index in order:
@@ -53,7 +53,7 @@ def _local(node: object, where: str) -> np.ndarray:
     if node.rotation is not None:
         turn = _numbers(node.rotation, 4, f'{where}.rotation')
         if np.linalg.norm(turn) < 1e-9:
-            raise faults.NotUnit(f'{where}.rotation', node.rotation, 'a quaternion, not zero')
+            raise errors.NotUnit(f'{where}.rotation', node.rotation, 'a quaternion, not zero')
     matrix[:3, :3] = rotation.matrix(rotation.normalized(turn))
     if node.scale is not None:
         matrix[:3, :3] *= _numbers(node.scale, 3, f'{where}.scale')
@@ -65,9 +65,9 @@ def _local(node: object, where: str) -> np.ndarray:
 def _numbers(values: object, length: int, where: str) -> np.ndarray:
     plain = isinstance(values, list) and len(values) == length
     if not plain or not all(type(value) in (int, float) for value in values):
-        raise faults.WrongForm(where, values, f'{length} numbers')
+        raise errors.WrongForm(where, values, f'{length} numbers')
     numbers = np.array([float(value) for value in values])
     # Products of a few hundred such numbers must stay finite.
     if not (np.abs(numbers) < 1e30).all():
-        raise faults.NotFinite(where, values, f'{length} finite numbers of sensible size')
+        raise errors.NotFinite(where, values, f'{length} finite numbers of sensible size')
     return numbers

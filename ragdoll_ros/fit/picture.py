@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import faults
-from ..ragdoll import Bone, Ragdoll
+from ..model import errors
+from ..model.ragdoll import Bone, Ragdoll
 from .character import Character
-from .solid import placed, surface
+from .solid import placed
 
 COLORS = np.array([[0.90, 0.45, 0.35], [0.35, 0.60, 0.85], [0.50, 0.75, 0.45], [0.95, 0.75, 0.35],
                    [0.65, 0.50, 0.80], [0.45, 0.75, 0.75], [0.85, 0.60, 0.75], [0.70, 0.65, 0.50]])
@@ -28,7 +28,7 @@ def draw(doll: Ragdoll, character: Character | None, path: str | Path) -> None:
         matplotlib.use('Agg')
         from matplotlib import pyplot
     except ImportError:
-        raise faults.Unreadable(
+        raise errors.Unreadable(
             '', 'no matplotlib', "pip install 'ragdoll_ros[fit]' for pictures") from None
     bodies = [(_triangles(bone), COLORS[number % len(COLORS)])
               for number, bone in enumerate(doll.bones)]
@@ -54,7 +54,7 @@ def draw(doll: Ragdoll, character: Character | None, path: str | Path) -> None:
 
 
 def _triangles(bone: Bone) -> np.ndarray:
-    corners, triangles = surface(bone.shape)
+    corners, triangles = bone.shape.mesh()
     return placed(bone, corners)[triangles]
 
 

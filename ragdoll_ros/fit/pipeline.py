@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import faults, rotation
-from ..ragdoll import Bone, Joint, Ragdoll, Rider
-from ..swing.chain import Swing
+from ..model import errors, rotation
+from ..model.ragdoll import Bone, Joint, Ragdoll, Rider
+from ..model.swing import Swing
 from . import masses
 from .axes import Axes, fit_axes
 from .character import Character
@@ -15,7 +15,7 @@ from .groups import Group, group_bones, partner, vertices_by_bone
 from .joints import damped, make_joint
 from .names import roles_of, side_of
 from .refine import refined
-from .shapes import TOLERANCE, Fitted, fit_best, fit_shape, outside
+from .shapes import TOLERANCE, Fitted, fit_best, fit_shape
 from .spring_recipe import swing_of
 
 THINNEST = 0.01
@@ -153,7 +153,7 @@ def _masses(character: Character, groups: list[Group], roles: tuple[str | None, 
         skin = character.volume()
         plausible = 0.3 * sum(volumes) < skin < 1.2 * sum(volumes)
         total = masses.WATER * (skin if plausible else sum(volumes))
-    faults.check_positive('mass', total)
+    errors.check_positive('mass', total)
     if options.masses == 'proportions':
         heads = [group.bone for group in groups]
         shares = masses.by_proportions(volumes, [roles[bone] for bone in heads], [
@@ -170,7 +170,7 @@ def _body(character: Character, group: Group, fitted: Fitted, axes: Axes, mass: 
                 np.round(fitted.centre, DECIMALS) + 0.0, turn + 0.0)
     points = character.vertices[group.vertices[group.vertices < len(character.vertices)]]
     local = rotation.rotate(rotation.inverse(np.array(bone.orientation)), points - bone.position)
-    inside = int(np.count_nonzero(outside(bone.shape, local) <= TOLERANCE)) if len(points) else 0
+    inside = int((bone.shape.signed_distance(local) <= TOLERANCE).sum()) if len(points) else 0
     return BodyFit(bone, tuple(character.bone_names[b] for b in group.bones), roles[group.bone],
                    len(points), inside, axes)
 

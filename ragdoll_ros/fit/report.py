@@ -3,7 +3,8 @@ from __future__ import annotations
 
 import textwrap
 
-from ..ragdoll import Ragdoll, Shape
+from ..model.ragdoll import Ragdoll
+from ..model.shapes import Shape
 from .doubts import extent, find_doubts
 from .pipeline import BodyFit, Fit
 from .shapes import TOLERANCE

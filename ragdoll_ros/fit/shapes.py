@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..ragdoll import Box, Capsule, Cylinder, Shape, Sphere
+from ..model.shapes import Box, Capsule, Cylinder, Shape, Sphere
 
 TOLERANCE = 0.01
 """A vertex this far outside a body, m, still counts as inside."""
@@ -45,7 +45,7 @@ def fit_shape(points: np.ndarray, kind: str, thinnest: float, tolerance: float) 
         points = np.zeros((1, 3))
     tried = []
     for fitted in sorted(MAKERS[kind](points, thinnest), key=lambda fitted: fitted.shape.volume):
-        off = outside(fitted.shape, points - fitted.centre)
+        off = fitted.shape.signed_distance(points - fitted.centre)
         tried.append(replace(fitted, share=np.count_nonzero(off <= tolerance) / len(off)))
         if tried[-1].share >= WANTED:
             return tried[-1]
@@ -63,22 +63,6 @@ def fit_best(clusters: list[np.ndarray], thinnest: float, tolerance: float) -> l
 
     return min(([fit_shape(points, kind, thinnest, tolerance) for points in clusters]
                 for kind in MAKERS), key=badness)
-
-
-def outside(shape: Shape, points: np.ndarray) -> np.ndarray:
-    """Distance (p,) m of points from a shape's surface, its own axes; zero or less inside."""
-    if isinstance(shape, Sphere):
-        return np.linalg.norm(points, axis=1) - shape.radius
-    if isinstance(shape, Capsule):
-        along = np.maximum(np.abs(points[:, 2]) - shape.length / 2, 0)
-        return np.hypot(np.linalg.norm(points[:, :2], axis=1), along) - shape.radius
-    if isinstance(shape, Cylinder):
-        beyond = np.stack([np.linalg.norm(points[:, :2], axis=1) - shape.radius,
-                           np.abs(points[:, 2]) - shape.length / 2], axis=1)
-    else:
-        beyond = np.abs(points) - np.array(shape.half_extents)
-    inside = np.minimum(beyond.max(axis=1), 0)
-    return np.linalg.norm(np.maximum(beyond, 0), axis=1) + inside
 
 
 def _boxes(points: np.ndarray, thinnest: float) -> Iterator[Fitted]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .. import faults
+from ..model import errors
 from .accessors import read_floats, read_indices
 from .gltf_file import GltfFile, item
 from .nodes import Nodes
@@ -43,7 +43,7 @@ class Skins:
         """Take in one more mesh."""
         base, width = len(self.vertices), max(nodes.shape[1], self.nodes.shape[1])
         if base + len(vertices) > LARGEST_SKIN:
-            raise faults.OutOfRange('meshes', base + len(vertices),
+            raise errors.OutOfRange('meshes', base + len(vertices),
                                     f'at most {LARGEST_SKIN} skinned vertices')
         self.vertices = np.concatenate([self.vertices, vertices])
         self.triangles = np.concatenate([self.triangles, triangles + base])
@@ -69,7 +69,7 @@ def read_skins(file: GltfFile, nodes: Nodes) -> Skins:
             where = f'meshes[{node.mesh}].primitives[{number}]'
             _add_primitive(file, skins, primitive, joints, matrices, where)
     if not skins.rests:
-        raise faults.WrongForm('skins', 'no skin that moves a mesh',
+        raise errors.WrongForm('skins', 'no skin that moves a mesh',
                                'a skinned mesh: a node with both mesh and skin')
     if loose:
         skins.notes.append(f'{loose} mesh{"es" * (loose > 1)} without a skin left out')
@@ -81,7 +81,7 @@ def _read_skin(file: GltfFile, nodes: Nodes, index: object) -> tuple[np.ndarray,
     skin = item(file.document.skins, index, 'skin', 'skins')
     where = f'skins[{index}]'
     if not isinstance(skin.joints, list) or not skin.joints:
-        raise faults.WrongForm(f'{where}.joints', skin.joints, 'at least one joint')
+        raise errors.WrongForm(f'{where}.joints', skin.joints, 'at least one joint')
     for joint in skin.joints:
         item(file.document.nodes, joint, f'{where}.joints', 'nodes')
     joints = np.array(skin.joints)
@@ -90,13 +90,13 @@ def _read_skin(file: GltfFile, nodes: Nodes, index: object) -> tuple[np.ndarray,
     where = f'{where}.inverseBindMatrices'
     values = read_floats(file, skin.inverseBindMatrices, 'MAT4', where)
     if len(values) < len(joints):
-        raise faults.OutOfRange(where, len(values), f'{len(joints)} matrices, one for each joint')
+        raise errors.OutOfRange(where, len(values), f'{len(joints)} matrices, one for each joint')
     inverses = values[:len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1).copy()
     # Exact in the specification; what exporters write there is noise.
     inverses[:, 3] = (0, 0, 0, 1)
     singular = np.abs(np.linalg.det(inverses)) < 1e-30
     if singular.any():
-        raise faults.WrongForm(f'{where}[{int(np.argmax(singular))}]', 'a matrix of determinant 0',
+        raise errors.WrongForm(f'{where}[{int(np.argmax(singular))}]', 'a matrix of determinant 0',
                                'matrices that have an inverse')
     return joints, inverses
 
@@ -126,7 +126,7 @@ def _mesh_to_world(skins: Skins, nodes: Nodes, joints: np.ndarray,
     top = min(range(len(joints)), key=lambda k: nodes.order.index(joints[k]))
     size = np.abs(said[top]).max()
     if not np.isfinite(said[top]).all() or not np.abs(np.linalg.det(said[top])) > 1e-30:
-        raise faults.WrongForm('nodes', 'a scale of zero or without end',
+        raise errors.WrongForm('nodes', 'a scale of zero or without end',
                                'nodes that leave the skin a size')
     if np.abs(said - said[top]).max() < 1e-3 * size:
         return said[top]
@@ -153,7 +153,7 @@ def _add_primitive(file: GltfFile, skins: Skins, primitive: object, joints: np.n
     if not isinstance(attributes, dict):
         attributes = getattr(attributes, '__dict__', {})
     if attributes.get('POSITION') is None:
-        raise faults.WrongForm(f'{where}.attributes', sorted(attributes), 'POSITION')
+        raise errors.WrongForm(f'{where}.attributes', sorted(attributes), 'POSITION')
     points = read_floats(file, attributes['POSITION'], 'VEC3', f'{where}.POSITION')
     slots, weights = [], []
     for number in itertools.count():
@@ -167,13 +167,13 @@ def _add_primitive(file: GltfFile, skins: Skins, primitive: object, joints: np.n
         skins.notes.append(f'{where} has no JOINTS_0: left out')
         return
     if any(len(part) != len(points) for part in (*slots, *weights)):
-        raise faults.WrongForm(where, 'attributes of different length', f'{len(points)} of each')
+        raise errors.WrongForm(where, 'attributes of different length', f'{len(points)} of each')
     slot, weight = np.concatenate(slots, axis=1), np.concatenate(weights, axis=1)
     weight = np.maximum(weight, 0)
     # A slot without weight may hold anything.
     used = np.where(weight > 0, slot, 0)
     if (used >= len(joints)).any():
-        raise faults.OutOfRange(f'{where}.JOINTS', int(used.max()),
+        raise errors.OutOfRange(f'{where}.JOINTS', int(used.max()),
                                 f'an index from 0 to {len(joints) - 1} in skins.joints')
     total = weight.sum(axis=1, keepdims=True)
     weight = np.divide(weight, total, out=np.zeros_like(weight), where=total > 0)

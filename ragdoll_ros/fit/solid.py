@@ -3,49 +3,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import rotation
-from ..ragdoll import Bone, Box, Capsule, Cylinder, Shape
-from .shapes import outside
-
-SEGMENTS = 20
-"""Corners of a circle."""
+from ..model import rotation
+from ..model.ragdoll import Bone
+from ..model.shapes import Shape
 
 DEEP = 0.001
 """Bodies overlap where one's point is deeper than this in the other, m."""
-
-
-def surface(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (p, 3) m and triangles (t, 3) of a shape, its own axes, seen from outside."""
-    if isinstance(shape, Box):
-        signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-        quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4],
-                          [1, 5, 7, 3]])
-        triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-        return signs * np.array(shape.half_extents), triangles
-    angles = np.linspace(-np.pi / 2, np.pi / 2, SEGMENTS // 2)
-    radius = shape.radius
-    if isinstance(shape, Cylinder):
-        radii = np.array([0, radius, radius, 0])
-        heights = np.array([-1, -1, 1, 1]) * shape.length / 2
-    else:
-        radii, heights = radius * np.cos(angles), radius * np.sin(angles)
-        if isinstance(shape, Capsule):
-            heights = heights + np.where(angles < 0, -1, 1) * shape.length / 2
-    return _turned(radii, heights)
-
-
-def _turned(radii: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Surface of revolution about z of a profile that runs upwards."""
-    turn = np.linspace(0, 2 * np.pi, SEGMENTS, endpoint=False)
-    circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    rings = np.concatenate([radii[:, None, None] * circle,
-                            np.broadcast_to(heights[:, None, None], (len(radii), SEGMENTS, 1))], 2)
-    index = np.arange(len(radii) * SEGMENTS).reshape(len(radii), SEGMENTS)
-    low, high = index[:-1], index[1:]
-    after_low, after_high = np.roll(low, -1, axis=1), np.roll(high, -1, axis=1)
-    triangles = np.concatenate([np.stack([low, after_low, after_high], -1).reshape(-1, 3),
-                                np.stack([low, after_high, high], -1).reshape(-1, 3)])
-    return rings.reshape(-1, 3), triangles
 
 
 def filling(shape: Shape) -> np.ndarray:
@@ -53,7 +16,7 @@ def filling(shape: Shape) -> np.ndarray:
     ticks = (np.arange(8) + 0.5) / 4 - 1
     lattice = np.stack(np.meshgrid(ticks, ticks, ticks), -1).reshape(-1, 3)
     points = lattice * np.array(shape.half_extents)
-    return points[outside(shape, points) <= 0]
+    return points[shape.signed_distance(points) <= 0]
 
 
 def placed(bone: Bone, points: np.ndarray) -> np.ndarray:
@@ -64,12 +27,12 @@ def placed(bone: Bone, points: np.ndarray) -> np.ndarray:
 def depth_in(bone: Bone, points: np.ndarray) -> np.ndarray:
     """How deep (p,) m points of the doll's frame are in a body; below zero outside."""
     back = rotation.inverse(np.array(bone.orientation))
-    return -outside(bone.shape, rotation.rotate(back, points - np.array(bone.position)))
+    return -bone.shape.signed_distance(rotation.rotate(back, points - np.array(bone.position)))
 
 
 def overlapping_pairs(bones: tuple[Bone, ...]) -> list[tuple[str, str]]:
     """Find the pairs of bodies that overlap in the bind pose."""
-    clouds = [np.concatenate([placed(bone, surface(bone.shape)[0]),
+    clouds = [np.concatenate([placed(bone, bone.shape.mesh()[0]),
                               placed(bone, filling(bone.shape))]) for bone in bones]
     reaches = [float(np.linalg.norm(bone.shape.half_extents)) for bone in bones]
     found = []

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .. import faults
-from ..swing.chain import LENGTHS
+from ..model import errors
+from ..model.swing import LENGTHS
 from .gltf_file import GltfFile, item
 from .nodes import Nodes
 
@@ -86,7 +86,7 @@ def placed(spring: Spring, nodes: Nodes, rests: dict[int, np.ndarray]) -> Spring
         length = float(np.linalg.norm(step))
         points.append(points[-1] + (step / length if length > 0 else (0, -1, 0)) * np.array(TAIL))
     if not np.isfinite(points).all():
-        raise faults.NotFinite(f'spring {spring.name}', 'nodes', 'places that are finite')
+        raise errors.NotFinite(f'spring {spring.name}', 'nodes', 'places that are finite')
     return replace(spring, points=np.array(points))
 
 
@@ -105,14 +105,14 @@ def _spring(file: GltfFile, nodes: Nodes, entry: object, where: str) -> Spring:
     entry = _of(dict, entry, where)
     joints = _of(list, entry.get('joints'), f'{where}.joints')
     if not joints:
-        raise faults.WrongForm(f'{where}.joints', joints, 'at least one joint')
+        raise errors.WrongForm(f'{where}.joints', joints, 'at least one joint')
     chain: list[int] = []
     for number, joint in enumerate(joints):
         place = f'{where}.joints[{number}].node'
         node = _of(dict, joint, f'{where}.joints[{number}]').get('node')
         item(file.document.nodes, node, place, 'nodes')
         if chain and not _below(node, chain[-1], nodes):
-            raise faults.WrongForm(place, node, f'a node below nodes[{chain[-1]}], which is '
+            raise errors.WrongForm(place, node, f'a node below nodes[{chain[-1]}], which is '
                                    'before it in the chain')
         chain.append(node)
     rods = tuple(_rod(joint, f'{where}.joints[{number}]')
@@ -143,12 +143,12 @@ def _rod(data: dict, where: str) -> Rod:
     for key, (default, least, most) in SETTINGS.items():
         value = data.get(key, default)
         if type(value) not in (int, float) or not least <= value <= most:
-            raise faults.OutOfRange(f'{where}.{key}', value, f'a number from {least:g} to {most:g}')
+            raise errors.OutOfRange(f'{where}.{key}', value, f'a number from {least:g} to {most:g}')
         values[key] = float(value)
     way = data.get('gravityDir') or [0, -1, 0]
     if not isinstance(way, list) or len(way) != 3 or not all(
             type(part) in (int, float) and abs(part) < 1e6 for part in way):
-        raise faults.WrongForm(f'{where}.gravityDir', way, '3 numbers')
+        raise errors.WrongForm(f'{where}.gravityDir', way, '3 numbers')
     length = float(np.linalg.norm(way)) or 1.0
     return Rod(values['stiffness'], -values['gravityPower'] * way[1] / length, values['dragForce'])
 
@@ -163,7 +163,7 @@ def _place(node: int, nodes: Nodes, rests: dict[int, np.ndarray]) -> np.ndarray:
     try:
         back = np.linalg.inv(nodes.worlds[bound])
     except np.linalg.LinAlgError:
-        raise faults.WrongForm(f'nodes[{bound}]', 'a scale of zero',
+        raise errors.WrongForm(f'nodes[{bound}]', 'a scale of zero',
                                'nodes that leave a spring its length') from None
     return (rests[bound] @ back @ nodes.worlds[node])[:3, 3]
 
@@ -182,5 +182,5 @@ def _name(file: GltfFile, given: object, node: int) -> str:
 
 def _of(kind: type, value: object, where: str) -> object:
     if not isinstance(value, kind):
-        raise faults.WrongForm(where, value, {dict: 'an object', list: 'a list'}[kind])
+        raise errors.WrongForm(where, value, {dict: 'an object', list: 'a list'}[kind])
     return value

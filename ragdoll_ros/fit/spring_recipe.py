@@ -22,7 +22,7 @@ import math
 
 import numpy as np
 
-from ..swing.chain import LARGEST_SHARE, MOST_DAMPED, Link, Swing
+from ..model.swing import LARGEST_SHARE, MOST_DAMPED, Link, Swing
 from .spring_bones import Rod, Spring
 
 RATE = 60.0

@@ -17,12 +17,12 @@ import rclpy
 from geometry_msgs.msg import PoseArray
 from rclpy.node import Node
 
-from ..engine.bullet import BulletEngine, bare_loop
-from ..scene import Scene
-from ..scene_file import load_scene
-from ..settings import ACCURACIES
-from ..simulation import Simulation
-from ..swing.cost import tick_cost
+from ..files.scene import load_scene
+from ..model.scene import Scene
+from ..physics.engine.bullet import BulletEngine, bare_loop
+from ..physics.settings import ACCURACIES
+from ..physics.simulation import Simulation
+from ..physics.swing.bench import tick_cost
 from .messages import poses_of, to_pose_array
 from .outputs import Outputs
 

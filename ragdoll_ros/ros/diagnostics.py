@@ -9,14 +9,14 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock
 from rclpy.node import Node
 
-from .. import compiled
-from ..push import Push
-from ..scene import SECOND
+from ..model.push import Push
+from ..model.scene import SECOND
+from ..physics import kernels
 from .messages import to_time
 from .tally import Tally
 
 if TYPE_CHECKING:
-    from ..simulation import Simulation
+    from ..physics.simulation import Simulation
 
 PERIOD = 1.0
 """s of the steady clock between two reports."""
@@ -92,7 +92,7 @@ class Diagnostics:
         simulation, tally = self.simulation, self._tally
         return {
             **self._last,
-            'compiled': compiled.ready(),
+            'compiled': kernels.ready(),
             'simulated_time': simulation.time / SECOND,
             'push': pushes_text(simulation.pushes),
             **self._facts(),

@@ -8,10 +8,10 @@ from visualization_msgs.msg import (
     Marker,
 )
 
-from ..parts import PLAIN, Part, parts_of
-from ..ragdoll import Bone
-from ..scene import Scene
-from ..state import State
+from ..model.ragdoll import DEFAULT_COLOR, Bone
+from ..model.scene import Scene
+from ..model.shapes import Primitive
+from ..model.state import State
 from .markers import KINDS, paint, place
 from .messages import to_vector
 
@@ -49,17 +49,17 @@ def _marker(name: str, bone: Bone, frame: str) -> InteractiveMarker:
     control = InteractiveMarkerControl(
         name='drag', interaction_mode=InteractiveMarkerControl.MOVE_3D,
         orientation_mode=InteractiveMarkerControl.INHERIT, always_visible=False,
-        markers=[_ghost(bone, part) for part in parts_of(bone)])
+        markers=[_ghost(bone, part) for part in bone.shape.primitives])
     control.orientation.w = 1.0
     marker = InteractiveMarker(name=name, scale=AXES, controls=[control])
     marker.header.frame_id = frame
     return marker
 
 
-def _ghost(bone: Bone, part: Part) -> Marker:
+def _ghost(bone: Bone, part: Primitive) -> Marker:
     """A part of a bone, relative to it: a frame of its own would be looked up."""
     ghost = Marker(type=KINDS[part.kind], action=Marker.ADD)
     ghost.scale = to_vector([GROWTH * side for side in part.size])
-    place(ghost.pose, list(part.shift), [0.0, 0.0, 0.0, 1.0])
-    paint(ghost, (*(bone.color or PLAIN)[:3], OPACITY))
+    place(ghost.pose, list(part.offset), [0.0, 0.0, 0.0, 1.0])
+    paint(ghost, (*(bone.color or DEFAULT_COLOR)[:3], OPACITY))
     return ghost

@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING
 from geometry_msgs.msg import Twist, Vector3, Wrench, WrenchStamped
 from rclpy.node import Node
 
-from .. import faults
-from ..push import Push
-from ..ragdoll import WORLD, Vector
+from ..model import errors
+from ..model.push import Push
+from ..model.ragdoll import WORLD
+from ..model.vectors import Vector
 from .parameters import Settings
 from .tally import Tally
 
 if TYPE_CHECKING:
-    from ..simulation import Simulation
+    from ..physics.simulation import Simulation
 
 LEVER = 0.1
 """m: a torque may be as strong as the strongest force at this lever."""
@@ -60,7 +61,7 @@ class Inputs:
         local = frame not in (WORLD, settings.frame_id)
         if local and frame not in self.simulation.scene.bone_names:
             expected = ', '.join((WORLD, *self.simulation.scene.bone_names))
-            self._tally.refuse('~/push', faults.UnknownBone(
+            self._tally.refuse('~/push', errors.UnknownBone(
                 'header.frame_id', frame, f'one of {expected}'))
             return
         bone = frame if local else settings.pushed_bone
@@ -79,14 +80,14 @@ class Inputs:
                                      channel)
             else:
                 self.simulation.release(channel)
-        except faults.Fault as fault:
+        except errors.Fault as fault:
             self._tally.refuse(source, fault)
 
     def _limited(self, source: str, name: str, vector: Vector3, scale: float,
                  most: float) -> Vector:
         """Vector times scale, at most ``most`` long; NotFinite if the message is not finite."""
         values = (vector.x, vector.y, vector.z)
-        faults.check_finite(name, values)
+        errors.check_finite(name, values)
         result, length = shortened(values, scale, most)
         if length > most:
             self._tally.clamp(source, f'{name} of {length:g} to max_force, {most:g}')

@@ -33,10 +33,10 @@ from rclpy.node import Node
 from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerUpdate
 from visualization_msgs.srv import GetInteractiveMarkers
 
-from .. import faults, rotation
-from ..grab import EVENLY
-from ..ragdoll import WORLD
-from ..simulation import Simulation
+from ..model import errors, rotation
+from ..model.ragdoll import WORLD
+from ..physics.grab import EVENLY
+from ..physics.simulation import Simulation
 from .handles import Handles
 from .outputs import MARKER_PERIOD
 from .parameters import Settings
@@ -117,7 +117,7 @@ class Interactive:
         """Move a hand as a client wants it; see the table above."""
         try:
             self._take(message)
-        except faults.Fault as fault:
+        except errors.Fault as fault:
             self._tally.refuse(FEEDBACK, fault)
 
     def _take(self, message: InteractiveMarkerFeedback) -> None:
@@ -139,13 +139,13 @@ class Interactive:
         """Refuse what is for no bone, in another frame or of another kind."""
         names, frame = self._handles.names, message.header.frame_id
         if message.marker_name not in names:
-            raise faults.UnknownBone('marker_name', message.marker_name,
+            raise errors.UnknownBone('marker_name', message.marker_name,
                                      f'one of {", ".join(names)}')
         if frame not in (WORLD, self.settings.frame_id):
-            raise faults.OutOfRange('header.frame_id', frame, self.settings.frame_id)
+            raise errors.OutOfRange('header.frame_id', frame, self.settings.frame_id)
         if message.event_type not in (message.KEEP_ALIVE, message.POSE_UPDATE,
                                       message.MOUSE_DOWN, message.MOUSE_UP):
-            raise faults.OutOfRange('event_type', message.event_type,
+            raise errors.OutOfRange('event_type', message.event_type,
                                     'KEEP_ALIVE, POSE_UPDATE, MOUSE_DOWN or MOUSE_UP')
 
     def _grab(self, hand: str, message: InteractiveMarkerFeedback, position: np.ndarray,
@@ -184,7 +184,7 @@ def _pose(pose: Pose) -> tuple[np.ndarray, np.ndarray]:
     """Position (3,) m and orientation (4,) of length one; four zeros stand for no turn."""
     q = pose.orientation
     turn = (q.x, q.y, q.z, q.w)
-    faults.check_finite('pose.orientation', turn)
+    errors.check_finite('pose.orientation', turn)
     length = math.hypot(*turn)
     straight = np.array([0.0, 0.0, 0.0, 1.0])
     return _vector('pose.position', pose.position), (
@@ -193,5 +193,5 @@ def _pose(pose: Pose) -> tuple[np.ndarray, np.ndarray]:
 
 def _vector(name: str, message: object) -> np.ndarray:
     values = (message.x, message.y, message.z)
-    faults.check_finite(name, values)
+    errors.check_finite(name, values)
     return np.array(values)

@@ -7,12 +7,12 @@ import numpy as np
 from geometry_msgs.msg import Pose
 from visualization_msgs.msg import Marker, MarkerArray
 
-from .. import rotation
-from ..parts import PLAIN, parts_of
-from ..push import Push
-from ..scene import Scene
-from ..state import State
-from ..swing.pose import SwingState
+from ..model import rotation
+from ..model.push import Push
+from ..model.ragdoll import DEFAULT_COLOR
+from ..model.scene import Scene
+from ..model.state import State
+from ..physics.swing.pose import SwingState
 from .messages import to_header, to_point, to_vector
 
 RED = (0.9, 0.2, 0.1, 1.0)
@@ -29,9 +29,10 @@ class Markers:
     def __init__(self, scene: Scene, frame: str) -> None:
         self._scene = scene
         self._frame = frame
-        self._parts = [part for bone in scene.bones for part in parts_of(bone)]
-        self._bones = [index for index, bone in enumerate(scene.bones) for _ in parts_of(bone)]
-        self._shifts = np.array([part.shift for part in self._parts])
+        self._parts = [part for bone in scene.bones for part in bone.shape.primitives]
+        self._bones = [index for index, bone in enumerate(scene.bones)
+                       for _ in bone.shape.primitives]
+        self._shifts = np.array([part.offset for part in self._parts])
         self._markers = [self._marker(number) for number in range(len(self._parts))]
         self._arrows = 0
         self._fresh = True
@@ -63,7 +64,7 @@ class Markers:
 
     def _marker(self, number: int) -> Marker:
         part = self._parts[number]
-        color = self._scene.bones[self._bones[number]].color or PLAIN
+        color = self._scene.bones[self._bones[number]].color or DEFAULT_COLOR
         name = self._scene.bone_names[self._bones[number]]
         same = self._bones[:number].count(self._bones[number])
         marker = Marker(ns=name, id=same, type=KINDS[part.kind], action=Marker.ADD)

@@ -12,10 +12,10 @@ from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion, Transform, Twi
 from sensor_msgs.msg import JointState, MultiDOFJointState
 from std_msgs.msg import Header
 
-from .. import rotation
-from ..engine.protocol import Contact
-from ..state import State
-from ..swing.pose import SwingState
+from ..model import rotation
+from ..model.state import State
+from ..physics.engine.protocol import Contact
+from ..physics.swing.pose import SwingState
 
 
 def poses_of(state: State | SwingState) -> np.ndarray:

@@ -14,10 +14,10 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.utilities import remove_ros_args
 
-from .. import faults
-from ..pacing import Pacer
-from ..scene import STEP_RANGE, Scene
-from ..simulation import Simulation
+from ..model import errors
+from ..model.scene import STEP_RANGE, Scene
+from ..physics.pacing import Pacer
+from ..physics.simulation import Simulation
 from .diagnostics import Diagnostics
 from .inputs import Inputs
 from .interactive import Interactive
@@ -75,7 +75,7 @@ class RagdollNode(Node):
         self.interactive = Interactive(self, self.tally, self._now)
         self._diagnostics = Diagnostics(self, self._steady, self.tally, self._facts,
                                         self._wanted_pace, self._time_of_report)
-        Services(self)
+        Services(self, self)
         self.paused = False
         self._use(self.simulation)
         self._outputs.be_clock(self.settings.publish_clock)
@@ -260,7 +260,7 @@ def main(arguments: list[str] | None = None) -> int:
         parser.parse_args(remove_ros_args(arguments)[1:])
         with ros_session(arguments):
             rclpy.spin(RagdollNode())
-    except (faults.RagdollError, ParameterException, InvalidROSArguments) as error:
+    except (errors.RagdollError, ParameterException, InvalidROSArguments) as error:
         print(error, file=sys.stderr)
         return 2
     return 0

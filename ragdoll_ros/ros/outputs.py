@@ -14,9 +14,9 @@ from sensor_msgs.msg import JointState, MultiDOFJointState
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
-from ..scene import Scene
-from ..swing.mount import mounts
-from ..urdf import scene_to_urdf
+from ..files.urdf import scene_to_urdf
+from ..model.scene import Scene
+from ..physics.swing.mount import mounts
 from .markers import Markers
 from .messages import (
     contact_poses,
@@ -30,7 +30,7 @@ from .messages import (
 from .packed import Packed
 
 if TYPE_CHECKING:
-    from ..simulation import Simulation
+    from ..physics.simulation import Simulation
 
 MARKER_PERIOD = 33_000_000
 """ns of the steady clock between two MarkerArrays: as often as a screen can use."""

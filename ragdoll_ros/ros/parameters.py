@@ -10,12 +10,12 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from .. import faults
-from ..faults import RagdollError
-from ..ragdoll import WORLD
-from ..scene import STEP_RANGE, Scene
-from ..scene_file import load_scene
-from ..settings import ACCURACIES
+from ..files.scene import load_scene
+from ..model import errors
+from ..model.errors import RagdollError
+from ..model.ragdoll import WORLD
+from ..model.scene import STEP_RANGE, Scene
+from ..physics.settings import ACCURACIES
 
 
 def _setting(default: object, description: str, span: tuple[float, float] | None = None,
@@ -169,15 +169,15 @@ def brought(scene: Scene) -> dict:
 def check(settings: Settings, scene: Scene) -> None:
     """Raise a RagdollError for what no range can tell."""
     if settings.accuracy not in ACCURACIES:
-        raise faults.OutOfRange('accuracy', settings.accuracy, 'one of ' + ', '.join(ACCURACIES))
+        raise errors.OutOfRange('accuracy', settings.accuracy, 'one of ' + ', '.join(ACCURACIES))
     names = scene.bone_names
     if settings.pushed_bone not in names:
-        raise faults.UnknownBone('pushed_bone', settings.pushed_bone, 'one of ' + ', '.join(names))
+        raise errors.UnknownBone('pushed_bone', settings.pushed_bone, 'one of ' + ', '.join(names))
     frame = settings.frame_id
     if not frame or frame.startswith('/'):
-        raise faults.OutOfRange('frame_id', frame, 'a name without a slash at its beginning')
+        raise errors.OutOfRange('frame_id', frame, 'a name without a slash at its beginning')
     if frame in names:
-        raise faults.DuplicateName('frame_id', frame, 'a name that no bone bears')
+        raise errors.DuplicateName('frame_id', frame, 'a name that no bone bears')
 
 
 def _given(parameters: list[Parameter]) -> dict:

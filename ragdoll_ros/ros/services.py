@@ -1,26 +1,41 @@
 """Services: reset, pause, and step while paused."""
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
+from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
-from ..scene import SECOND
+from ..model.scene import SECOND
+from ..physics.simulation import Simulation
+from .tally import Tally
 
-if TYPE_CHECKING:
-    from .node import RagdollNode
+
+class Steered(Protocol):
+    """What the services steer: the node."""
+
+    simulation: Simulation
+    tally: Tally
+    paused: bool
+
+    def tick(self) -> None:
+        """Go on by one tick and publish."""
+
+    def reset(self) -> None:
+        """Go back to the start, and publish it."""
+
+    def pause(self, wanted: bool) -> None:
+        """Hold the time, or let it go on."""
 
 
 class Services:
     """~/reset, ~/step and ~/pause of a node."""
 
-    def __init__(self, node: RagdollNode) -> None:
-        self._node = node
-        create: Callable = node.create_service
-        create(Trigger, '~/reset', self.reset)
-        create(Trigger, '~/step', self.step)
-        create(SetBool, '~/pause', self.pause)
+    def __init__(self, node: Node, steered: Steered) -> None:
+        self._node = steered
+        node.create_service(Trigger, '~/reset', self.reset)
+        node.create_service(Trigger, '~/step', self.step)
+        node.create_service(SetBool, '~/pause', self.pause)
 
     def reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Go back to the start; what is paused stays paused."""

@@ -7,7 +7,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from sensor_msgs.msg import MultiDOFJointState
 
-from ..scene import SECOND
+from ..model.scene import SECOND
 from .diagnostics import status_name
 
 

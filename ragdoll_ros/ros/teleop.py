@@ -18,8 +18,8 @@ from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 from std_srvs.srv import SetBool, Trigger
 
-from ..arrows import FORCES, total
-from .keys import Held, Keyboard
+from ..physics.arrow_keys import FORCES, Held, total
+from .keys import Keyboard
 from .session import ros_session
 from .status import Status
 

@@ -12,9 +12,9 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 
-from .. import faults
-from ..scene_file import load_scene
-from .source import Source
+from ..files.scene import load_scene
+from ..model import errors
+from .sources.source import Source
 
 PORT = 8080
 LAST_PORT = 65535
@@ -38,19 +38,19 @@ NO_ROS = ("without --scene, ragdoll_viewer listens to a node over ROS 2: source 
           "pip install 'ragdoll_ros[ros]', or name a scene: ragdoll_viewer --scene drop")
 
 
-class NoViser(faults.RagdollError):
+class NoViser(errors.RagdollError):
     """Nothing to serve a page with."""
 
 
-class NoRos(faults.RagdollError):
+class NoRos(errors.RagdollError):
     """No ROS to listen to."""
 
 
-class WrongArguments(faults.RagdollError):
+class WrongArguments(errors.RagdollError):
     """What the command does not take."""
 
 
-class NoPort(faults.RagdollError):
+class NoPort(errors.RagdollError):
     """An address that nothing can be served at."""
 
 
@@ -64,7 +64,7 @@ def main(arguments: list[str] | None = None) -> int:
         signal.signal(sign, lambda *_: stop.set())
     try:
         serve(options, for_ros, stop)
-    except faults.RagdollError as error:
+    except errors.RagdollError as error:
         print(error, file=sys.stderr)
         return 2
     return 0
@@ -128,15 +128,15 @@ def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
     if alone and for_ros:
         raise WrongArguments(f'{" ".join(for_ros)}: not with {alone}, which does without ROS')
     if options.play is not None:
-        from .playback import Playback
-        from .recording_file import load_recording
+        from .sources.playback import Playback
+        from .sources.recording_file import load_recording
         return Playback(load_recording(options.play), Path(options.play).name)
     if options.scene is not None:
         scene = load_scene(options.scene)
-        from .simulated import Simulated
+        from .sources.simulated import Simulated
         return Simulated(scene)
     try:
-        from .remote import Remote
+        from .sources.remote import Remote
     except ImportError as error:
         raise NoRos(f'{error}: {NO_ROS}') from None
     return Remote(for_ros)

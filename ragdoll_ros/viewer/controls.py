@@ -7,11 +7,10 @@ from collections.abc import Callable
 
 import viser
 
-from ..arrows import total
-from ..faults import RagdollError
-from ..ros.keys import Held
-from ..scene_file import scene_names
-from .source import Report, Source
+from ..files.config import scene_names
+from ..model.errors import RagdollError
+from ..physics.arrow_keys import Held, total
+from .sources.source import Report, Source
 
 ARROWS = {'←': 'left', '↑': 'up', '↓': 'down', '→': 'right'}
 """Label of each push: short, so that all stand in one row."""

@@ -8,19 +8,19 @@ from pathlib import Path
 
 import viser
 
-from ..scene import Scene
-from .camera import Follower
+from ..model.scene import Scene
 from .controls import Controls
+from .drawing.camera import Follower
+from .drawing.ground import light
+from .drawing.plots import Plots
+from .drawing.skin import KEEP_PAGE
+from .drawing.stage import Stage
+from .drawing.view import View
 from .editor.editor import Editor
 from .editor.form import RED, colored
-from .ground import light
-from .plots import Plots
 from .pointer import Pointer
 from .recording_panel import RecordingPanel
-from .skin import KEEP_PAGE
-from .source import Frame, Source, Wanted
-from .stage import Stage
-from .view import View
+from .sources.source import Frame, Source, Wanted
 
 PERIOD = 1 / 60
 """s between two drawings at the least."""

@@ -12,13 +12,13 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
-from .. import rotation
-from ..scene import Scene
-from ..state import State
-from .bodies import Bodies
-from .line import is_dead
-from .skin import Skins
-from .source import Frame, Source
+from ..model import rotation
+from ..model.scene import Scene
+from ..model.state import State
+from .drawing.bodies import Bodies
+from .drawing.line import is_dead
+from .drawing.skin import Skins
+from .sources.source import Frame, Source
 
 
 class Pointer:

@@ -7,9 +7,9 @@ import imageio.v3 as iio
 import numpy as np
 import viser
 
-from .recording import Pose, Recorder
-from .recording_file import recording_text
-from .source import Frame
+from .sources.recording import Pose, Recorder
+from .sources.recording_file import recording_text
+from .sources.source import Frame
 
 MOST_NUMBERS = 5_000_000
 """In one recording: 100 MB as JSON; 20 minutes of ten bones at 60 Hz, half a minute of 500."""

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
-from ... import rotation
-from ...ragdoll import Bone, Box, Ragdoll, Sphere
-from ...scene import Ground, Material, Placement, Scene
+from ...model import rotation
+from ...model.ragdoll import Bone, Ragdoll
+from ...model.scene import Ground, Material, Placement, Scene
+from ...model.shapes import Box, Sphere
 from ..references import closed_forms
 from ..trajectory import Trajectory
 from ..trial import Trial, posed

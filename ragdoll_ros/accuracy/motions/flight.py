@@ -6,12 +6,14 @@ import math
 
 import numpy as np
 
-from ... import rotation
-from ...coordinates import Coordinates
-from ...push import Push
-from ...ragdoll import Bone, Box, Joint, Ragdoll
-from ...scene import Placement, Scene
-from ...scene_file import load_doll, load_scene
+from ...files.doll import load_doll
+from ...files.scene import load_scene
+from ...model import rotation
+from ...model.coordinates import Coordinates
+from ...model.push import Push
+from ...model.ragdoll import Bone, Joint, Ragdoll
+from ...model.scene import Placement, Scene
+from ...model.shapes import Box
 from ..references.articulated import Articulated
 from ..references.closed_forms import fall
 from ..references.planar_chain import PlanarChain

@@ -10,9 +10,10 @@ import math
 
 import numpy as np
 
-from ...push import Push
-from ...ragdoll import Bone, Box, Joint, Ragdoll, Sphere
-from ...scene import Placement
+from ...model.push import Push
+from ...model.ragdoll import Bone, Joint, Ragdoll
+from ...model.scene import Placement
+from ...model.shapes import Box, Sphere
 from ..references.closed_forms import pendulum_angle
 from ..references.integration import integrate
 from ..trajectory import Trajectory

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from ...settings import ACCURACIES
+from ...physics.settings import ACCURACIES
 from ..measure import Measure
 from ..methods import Method, bullet, by_name, ours, run
 from ..runner import Job, Options, Row

@@ -8,10 +8,10 @@ from time import process_time
 
 import numpy as np
 
-from ...ragdoll import Ragdoll
-from ...scene import Placement, Scene
-from ...scene_file import load_scene
-from ...simulation import Simulation
+from ...files.scene import load_scene
+from ...model.ragdoll import Ragdoll
+from ...model.scene import Placement, Scene
+from ...physics.simulation import Simulation
 from ..runner import Job, Options, Row
 
 NAME = 'costs'

@@ -6,9 +6,10 @@ import functools
 
 import numpy as np
 
-from ... import rotation
-from ...scene import Placement
-from ...scene_file import load_doll, load_scene
+from ...files.doll import load_doll
+from ...files.scene import load_scene
+from ...model import rotation
+from ...model.scene import Placement
 from ..measure import Measure
 from ..methods import Method, bullet, mujoco, ours, quickstart, run
 from ..motions.motion import alone, without_damping, without_limits

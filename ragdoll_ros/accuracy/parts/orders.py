@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 
-from ... import compiled
-from ...settings import ACCURACIES
+from ...physics import kernels
+from ...physics.settings import ACCURACIES
 from ..measure import compare
 from ..methods import Method, bullet, mujoco, ours, run
 from ..runner import Job, Options, Row
@@ -38,7 +38,7 @@ def methods() -> list[Method]:
     mine = [ours(dataclasses.replace(setting, longest=0.0, flight_error=math.inf), f'ours-{name}')
             for name, setting in ACCURACIES.items()]
     # compiled, the settings differ in the steps alone
-    return [*(mine[-1:] if compiled.ready() else mine), bullet(1),
+    return [*(mine[-1:] if kernels.ready() else mine), bullet(1),
             *(mujoco(name, 1) for name in ('euler', 'implicitfast', 'rk4'))]
 
 
@@ -58,7 +58,7 @@ def measure_all(motion_name: str) -> list[Row]:
     scene = dataclasses.replace(motion.trial.scene, self_collision=False)
     trial = dataclasses.replace(motion.trial, scene=scene)
     for method in methods():
-        errors, high = [], method.order == compiled.ORDER
+        errors, high = [], method.order == kernels.ORDER
         ticks, floor = (few, LOW_FLOOR) if high else (TICKS, FLOOR)
         for tick in ticks:
             result = run(method, trial.with_tick(tick))

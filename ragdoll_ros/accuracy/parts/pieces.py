@@ -11,9 +11,9 @@ import functools
 
 import numpy as np
 
-from ...coordinates import Coordinates
-from ...engine.bullet import BulletEngine
-from ...scene_file import load_scene
+from ...files.scene import load_scene
+from ...model.coordinates import Coordinates
+from ...physics.engine.bullet import BulletEngine
 from ..measure import Measure, compare
 from ..methods import bullet, by_name, mujoco, run
 from ..runner import Job, Options, Row

@@ -4,7 +4,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 
-from ...settings import ACCURACIES
+from ...physics.settings import ACCURACIES
 from ..measure import Measure, compare
 from ..methods import median_run, ours
 from ..runner import Job, Options, Row

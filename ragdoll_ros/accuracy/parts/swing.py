@@ -12,9 +12,13 @@ from time import process_time
 
 import numpy as np
 
-from ... import rotation
-from ...ragdoll import Bone, Sphere
-from ...swing import Frames, Link, Mount, Swing, Swings
+from ...model import rotation
+from ...model.ragdoll import Bone
+from ...model.shapes import Sphere
+from ...model.swing import Link, Swing
+from ...physics.swing.frames import Frames
+from ...physics.swing.mount import Mount
+from ...physics.swing.swings import Swings
 from ..references.closed_forms import pendulum_angle
 from ..runner import Job, Options, Row
 

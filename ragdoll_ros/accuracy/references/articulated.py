@@ -20,10 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ... import rotation
-from ...ragdoll import Joint, Ragdoll
-from ...state import State
-from ...urdf import joint_frame
+from ...model import rotation
+from ...model.ragdoll import Joint, Ragdoll, joint_frame
+from ...model.state import State
 from ..trajectory import Trajectory
 from .integration import integrate
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ... import rotation
+from ...model import rotation
 from .integration import integrate
 
 

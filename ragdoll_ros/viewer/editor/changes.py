@@ -19,20 +19,12 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from ... import faults, rotation
-from ...ragdoll import (
-    JOINT_KINDS,
-    LARGEST_SWING,
-    SHAPES,
-    Bone,
-    Box,
-    Joint,
-    Ragdoll,
-    Shape,
-    Sphere,
-)
-from ...scene import Placement, Scene
-from ...swing.chain import Swing
+from ...model import errors, rotation
+from ...model.ragdoll import JOINT_KINDS, LARGEST_SWING, Bone, Joint, Ragdoll
+from ...model.scene import Placement, Scene
+from ...model.shapes import SHAPES, Box, Shape, Sphere
+from ...model.swing import Swing
+from ...model.vectors import floats
 
 USUAL, USUAL_TWIST = math.radians(45), math.radians(30)
 """Limit of an axis, and twist of a ball, where the joint had none of the kind before."""
@@ -78,7 +70,7 @@ def change_joint(scene: Scene, name: str, **fields: object) -> Scene:
     placement, _ = find(scene, name)
     joint = joint_of(scene, name)
     if joint is None:
-        raise faults.Detached(f'{name}.joint', name, 'a bone with a parent: the root has no joint')
+        raise errors.Detached(f'{name}.joint', name, 'a bone with a parent: the root has no joint')
     with _faults_at(f'{name}.joint'):
         changed = dataclasses.replace(joint, **fields)
     return replace_doll(scene, placement, joints=_swapped(placement.doll.joints, joint, changed))
@@ -90,7 +82,7 @@ def set_limits(scene: Scene, name: str,
     limits = tuple(pair and tuple(math.radians(angle) for angle in pair) for pair in limits_deg)
     try:
         return change_joint(scene, name, limits=limits)
-    except faults.Fault as fault:
+    except errors.Fault as fault:
         path = fault.path.replace('limits', 'limits_deg', 1)
         index = next((k for k in range(len(limits_deg)) if path.endswith(f'[{k}]')), None)
         value = tuple(limits_deg) if index is None else limits_deg[index]
@@ -122,7 +114,7 @@ def set_size(scene: Scene, name: str, half_extents: Sequence[float]) -> Scene:
     """Make a body as large as a box (3,) m along its own axes, from its centre; mass stays."""
     _, bone = find(scene, name)
     with _faults_at(name):
-        faults.check_positive('size', faults.floats(half_extents))
+        errors.check_positive('size', floats(half_extents))
         shape = shape_within(bone.shape.kind, half_extents)
     return change_bone(scene, name, shape=shape)
 
@@ -131,7 +123,7 @@ def set_shape(scene: Scene, name: str, kind: str) -> Scene:
     """Give a body another kind of shape that fills the same box, its long side along z."""
     _, bone = find(scene, name)
     if kind not in SHAPES:
-        raise faults.WrongForm(f'{name}.shape', kind, 'one of ' + ', '.join(SHAPES))
+        raise errors.WrongForm(f'{name}.shape', kind, 'one of ' + ', '.join(SHAPES))
     if kind == bone.shape.kind:
         return scene
     half = np.array(bone.shape.half_extents)
@@ -243,5 +235,5 @@ def _faults_at(place: str) -> Iterator[None]:
     """Tell of what is wrong inside where in the scene it is."""
     try:
         yield
-    except faults.Fault as fault:
+    except errors.Fault as fault:
         raise fault.at(place) from None

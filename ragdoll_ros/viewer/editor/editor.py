@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import viser
 
-from ... import faults
-from ...scene import Scene
+from ...model import errors
+from ...model.scene import Scene
 from . import changes, growth, mirror, sheet
 from .files import Files
 from .folder import Folder
@@ -171,7 +171,7 @@ class Editor:
             if self.panel.both.value:
                 scene = mirror.mirrored(scene, self._chosen(), self.panel.limb.value)
             self.take(scene, what)
-        except faults.RagdollError:
+        except errors.RagdollError:
             self.show_handles()
             raise
 
@@ -183,7 +183,7 @@ class Editor:
                 return
             try:
                 self._run(scene, self.editing)
-            except faults.RagdollError:
+            except errors.RagdollError:
                 back()
                 raise
             with self._showing:
@@ -205,7 +205,7 @@ class Editor:
             self._pause(True)
         try:
             self._use(scene)
-        except faults.RagdollError:
+        except errors.RagdollError:
             with self._showing, suppress(ValueError):
                 self._given.remove(scene)
             if hold and not (stood or self.editing):
@@ -214,7 +214,7 @@ class Editor:
 
     def _chosen(self) -> str:
         if self.bone is None:
-            raise faults.UnknownBone('bone', None, 'one of ' + ', '.join(self.scene.bone_names))
+            raise errors.UnknownBone('bone', None, 'one of ' + ', '.join(self.scene.bone_names))
         return self.bone
 
     def _refresh(self) -> None:
@@ -236,9 +236,9 @@ class Editor:
             self.panel.tell(())
             try:
                 yield
-            except faults.Faults as error:
+            except errors.Faults as error:
                 self.panel.tell(error.faults)
-            except faults.Fault as error:
+            except errors.Fault as error:
                 self.panel.tell([error])
-            except faults.RagdollError as error:
+            except errors.RagdollError as error:
                 self.panel.say(str(error))

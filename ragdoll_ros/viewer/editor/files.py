@@ -8,8 +8,8 @@ from typing import Protocol
 
 import viser
 
-from ... import faults
-from ...scene import Scene
+from ...model import errors
+from ...model.scene import Scene
 from .folder import CHARACTERS, DOLLS, LARGEST_UPLOAD, Folder
 from .form import GREEN, RED, colored
 
@@ -95,7 +95,7 @@ class Files:
         """Do it and say so, or say in words why not."""
         try:
             self._say(action(), GREEN)
-        except faults.RagdollError as error:
+        except errors.RagdollError as error:
             self._say(str(error), RED)
         except OSError as error:
             self._say(f'{error.filename or "file"}: {error.strerror or error}', RED)

@@ -9,9 +9,12 @@ import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from ... import faults, scene_file
-from ...ragdoll import Ragdoll
-from ...scene import Scene, above_ground
+from ...files import yaml_text
+from ...files.config import scene_names
+from ...files.scene import load_scene, save_scene, scene_from, scene_text
+from ...model import errors
+from ...model.ragdoll import Ragdoll
+from ...model.scene import Scene, above_ground
 
 LARGEST_UPLOAD = 100_000_000
 """Bytes: characters with large textures have tens of MB."""
@@ -39,41 +42,41 @@ class Folder:
         except (ValueError, OSError, RuntimeError):
             inside = False
         if not inside or not name.isprintable() or len(path.name.encode()) > 200:
-            raise faults.WrongForm('file', text, f'the name of a file inside {self.path}')
+            raise errors.WrongForm('file', text, f'the name of a file inside {self.path}')
         return path
 
     def save(self, scene: Scene, text: str) -> Path:
         """Write a scene; OSError where that fails."""
         path = self.find(text)
-        scene_file.save_scene(scene, path)
+        save_scene(scene, path)
         return path
 
     def load(self, text: str) -> Scene:
         """Read a scene of this folder, or of config/ by its name alone."""
         name = text.strip().removesuffix('.yaml')
         path = self.find(text)
-        if not path.is_file() and name in scene_file.scene_names():
-            return scene_file.load_scene(name)
-        return scene_file.load_scene(str(path))
+        if not path.is_file() and name in scene_names():
+            return load_scene(name)
+        return load_scene(str(path))
 
     def text(self, scene: Scene) -> bytes:
         """Give a scene's YAML as it would be saved here."""
-        return scene_file.scene_text(scene, self.path).encode()
+        return scene_text(scene, self.path).encode()
 
     def read(self, name: str, content: bytes) -> Scene:
         """Make a scene of a YAML file that was sent, as if it lay here."""
         name = plain(name)
         try:
             _check_size(content)
-            data = scene_file.parse(content)
+            data = yaml_text.parse(content)
             self._check_dolls(data)
             self._check_models(data)
-        except faults.Fault as fault:
-            raise faults.Faults(name, [fault]) from None
+        except errors.Fault as fault:
+            raise errors.Faults(name, [fault]) from None
         try:
-            return scene_file.scene_from(data, self.path / name)
-        except faults.Faults as error:
-            raise faults.Faults(name, error.faults) from None
+            return scene_from(data, self.path / name)
+        except errors.Faults as error:
+            raise errors.Faults(name, error.faults) from None
 
     def fit(self, name: str, content: bytes, progress: Progress) -> Scene:
         """Make a doll of a character that was sent, as ragdoll_fit does; the character stays here.
@@ -84,16 +87,16 @@ class Folder:
         suffix = Path(name).suffix.lower()
         try:
             if suffix not in CHARACTERS:
-                raise faults.WrongForm('', name, 'a name that ends in ' + ', '.join(CHARACTERS))
+                raise errors.WrongForm('', name, 'a name that ends in ' + ', '.join(CHARACTERS))
             _check_size(content)
             with tempfile.TemporaryDirectory() as inbox:
                 path = Path(inbox, name)
                 path.write_bytes(content)
                 doll = _fitted(path, progress)
-        except faults.Fault as fault:
-            raise faults.Faults(name, [fault]) from None
-        except faults.Faults as error:
-            raise faults.Faults(name, [_alone(fault) for fault in error.faults]) from None
+        except errors.Fault as fault:
+            raise errors.Faults(name, [fault]) from None
+        except errors.Faults as error:
+            raise errors.Faults(name, [_alone(fault) for fault in error.faults]) from None
         if suffix != '.urdf':
             progress(0.9, 'keeping the character')
             doll = dataclasses.replace(doll, model=str(self._keep(name, content)))
@@ -102,14 +105,14 @@ class Folder:
     def _check_dolls(self, data: object) -> None:
         """Let what was sent name only dolls that lie here or in config/: no other file is read."""
         for place, source in _dolls_of(data):
-            if not isinstance(source, str) or source in scene_file.scene_names():
+            if not isinstance(source, str) or source in scene_names():
                 continue
             try:
                 found = self.find(source).name
-            except faults.Fault:
+            except errors.Fault:
                 found = ''
             if found not in (source, f'{source}.yaml'):
-                raise faults.Unreadable(place, source,
+                raise errors.Unreadable(place, source,
                                         f'a file of {self.path}, or the doll itself')
 
     def _check_models(self, data: object) -> None:
@@ -123,7 +126,7 @@ class Folder:
             except (ValueError, OSError, RuntimeError):
                 inside = False
             if not inside:
-                raise faults.Unreadable('model', model, f'a file inside {self.path}').at(place)
+                raise errors.Unreadable('model', model, f'a file inside {self.path}').at(place)
 
     def _keep(self, name: str, content: bytes) -> Path:
         """Write a character, under another name where one stands that is another's."""
@@ -137,7 +140,7 @@ class Folder:
                 if path.is_file() and path.read_bytes() == content:
                     return path
             path = Path(self.path, f'{Path(name).stem}_{number}{Path(name).suffix}')
-        raise faults.Unreadable('', name, f'a name that is free in {self.path}')
+        raise errors.Unreadable('', name, f'a name that is free in {self.path}')
 
 
 def _dolls_of(data: object) -> Iterator[tuple[str, object]]:
@@ -158,7 +161,7 @@ def plain(name: str) -> str:
 
 def _check_size(content: bytes) -> None:
     if len(content) > LARGEST_UPLOAD:
-        raise faults.Unreadable('', f'{len(content)} bytes', f'at most {LARGEST_UPLOAD}')
+        raise errors.Unreadable('', f'{len(content)} bytes', f'at most {LARGEST_UPLOAD}')
 
 
 def _fitted(path: Path, progress: Progress) -> Ragdoll:
@@ -167,14 +170,14 @@ def _fitted(path: Path, progress: Progress) -> Ragdoll:
     from ...fit.pipeline import fit_character
     progress(0.1, 'reading')
     if path.suffix.lower() == '.urdf':
-        from ...urdf_reader import read_urdf
+        from ...fit.robot import read_urdf
         return read_urdf(path)[0]
     character = read_character(path)
     progress(0.4, f'fitting {len(character.bone_names)} bones, {len(character.vertices)} vertices')
     return fit_character(character).doll
 
 
-def _alone(fault: faults.Fault) -> faults.Fault:
+def _alone(fault: errors.Fault) -> errors.Fault:
     """Say of a file that points to others that it has to come alone."""
     if fault.path.endswith('.uri') and not str(fault.value).startswith('data:'):
         return type(fault)(fault.path, fault.value,

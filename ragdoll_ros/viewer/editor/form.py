@@ -8,8 +8,9 @@ from typing import Any
 
 import viser
 
-from ... import faults
-from ...ragdoll import JOINT_KINDS, SHAPES
+from ...model import errors
+from ...model.ragdoll import JOINT_KINDS
+from ...model.shapes import SHAPES
 from .sheet import Field, Sheet, Value
 
 RED, GREEN = '#c92a2a', '#2b8a3e'
@@ -72,7 +73,7 @@ class Form:
         """Give what stands in the fields that are shown."""
         return {key: widget.value for key, widget in self._widgets.items() if widget.visible}
 
-    def tell(self, found: Iterable[faults.Fault]) -> None:
+    def tell(self, found: Iterable[errors.Fault]) -> None:
         """Write each fault under the field that its path names; take the others away."""
         said = {fault.path: text_of(fault) for fault in found}
         for key, error in self._errors.items():
@@ -88,7 +89,7 @@ class Form:
             self._on_kind(key, self._widgets[key].value)
 
 
-def text_of(fault: faults.Fault) -> str:
+def text_of(fault: errors.Fault) -> str:
     """Say what is wrong with a field: the value, and what would be right."""
     return str(type(fault)('', fault.value, fault.expected)).removeprefix('file: ')
 

@@ -6,9 +6,9 @@ import re
 
 import numpy as np
 
-from ... import faults, rotation
-from ...ragdoll import Bone, Joint, Ragdoll, Rider
-from ...scene import Scene
+from ...model import errors, rotation
+from ...model.ragdoll import Bone, Joint, Ragdoll, Rider
+from ...model.scene import Scene
 from .changes import USUAL, USUAL_TWIST, find, limb, replace_doll
 
 NAME = re.compile(r'[^\s/][^/\x00-\x1f]{0,99}')
@@ -19,9 +19,9 @@ def add_bone(scene: Scene, parent: str, name: str) -> Scene:
     """Add a bone like ``parent`` where that one ends, on a ball joint; names its fault ``name``."""
     placement, above = find(scene, parent)
     if not NAME.fullmatch(name):
-        raise faults.WrongForm('name', name, 'text without / and control characters')
+        raise errors.WrongForm('name', name, 'text without / and control characters')
     if any(bone.name == name for bone in placement.doll.bones):
-        raise faults.DuplicateName('name', name, 'a name of its own')
+        raise errors.DuplicateName('name', name, 'a name of its own')
     way = _outward(placement.doll, above)
     reach = float(above.shape.reach(rotation.rotate(rotation.inverse(above.orientation), way)))
     bone = dataclasses.replace(above, name=name, position=above.position + 2 * reach * way)
@@ -36,7 +36,7 @@ def remove_limb(scene: Scene, name: str) -> Scene:
     placement, bone = find(scene, name)
     doll = placement.doll
     if bone is doll.root:
-        raise faults.Detached(f'{name}', name, 'a bone with a parent: all hangs from the root')
+        raise errors.Detached(f'{name}', name, 'a bone with a parent: all hangs from the root')
     gone = set(limb(doll, bone.name))
     joint = next(joint for joint in doll.joints if joint.child == bone.name)
     return replace_doll(

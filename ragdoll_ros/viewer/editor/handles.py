@@ -6,11 +6,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import viser
 
-from ... import rotation
-from ...parts import parts_of
-from ...ragdoll import Bone, Joint
-from ...scene import Placement, Scene, height
-from ..meshes import MESHES
+from ...model import rotation
+from ...model.ragdoll import Bone, Joint
+from ...model.scene import Placement, Scene, height
+from ..drawing.meshes import MESHES
 from .changes import find, joint_of
 
 ROOM = '/editor'
@@ -71,10 +70,10 @@ class Handles:
             self._add_size(bone)
 
     def _add_ghost(self, bone: Bone) -> None:
-        for number, part in enumerate(parts_of(bone)):
+        for number, part in enumerate(bone.shape.primitives):
             vertices, faces = MESHES[part.kind]
             self._server.scene.add_mesh_simple(
-                f'{ROOM}/own/ghost_{number}', vertices * part.size * GROWN + part.shift, faces,
+                f'{ROOM}/own/ghost_{number}', vertices * part.size * GROWN + part.offset, faces,
                 color=YELLOW, wireframe=True, cast_shadow=False, receive_shadow=False)
 
     def _add_pivot(self, joint: Joint, bone: Bone) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from ...scene import Scene
+from ...model.scene import Scene
 
 MOST = 500
 """Steps back that are kept. A step shares all that it did not change with the one before."""

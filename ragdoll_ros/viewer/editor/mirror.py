@@ -6,9 +6,10 @@ import re
 
 import numpy as np
 
-from ... import faults
-from ...ragdoll import Bone, Joint, Quaternion, Ragdoll, Vector
-from ...scene import Scene
+from ...model import errors
+from ...model.ragdoll import Bone, Joint, Ragdoll
+from ...model.scene import Scene
+from ...model.vectors import Quaternion, Vector
 from .changes import change_bone, change_joint, find, joint_of, limb, set_pose
 
 OTHER = {'left': 'right', 'right': 'left', 'l': 'r', 'r': 'l', 'lft': 'rgt', 'rgt': 'lft'}
@@ -30,7 +31,7 @@ def partner(scene: Scene, name: str) -> str:
     if swapped == bone.name or swapped not in names:
         swapped = _at_mirrored_place(doll, bone)
     if swapped is None:
-        raise faults.UnknownBone(f'{name}.both sides', name,
+        raise errors.UnknownBone(f'{name}.both sides', name,
                                  'a bone with a partner on the other side')
     return scene.qualified(placement, swapped)
 

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import viser
 
-from ... import faults
+from ...model import errors
 from .form import RED, ROOMY, Form, Quiet, colored
 from .history import History
 from .sheet import BODY, JOINT, Sheet
@@ -98,7 +98,7 @@ class Panel:
         """Give what stands in the fields."""
         return {**self.body.values(), **self.joint.values()}
 
-    def tell(self, found: Iterable[faults.Fault]) -> None:
+    def tell(self, found: Iterable[errors.Fault]) -> None:
         """Write each fault under its field; what belongs to none, under the Update button."""
         found = list(found)
         self.body.tell(found)

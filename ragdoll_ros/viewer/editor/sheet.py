@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ... import faults, rotation
-from ...parts import PLAIN
-from ...ragdoll import JOINT_KINDS, SHAPES, Joint, Shape, unit
-from ...scene import Scene
+from ...model import errors, rotation
+from ...model.ragdoll import DEFAULT_COLOR, JOINT_KINDS, Joint
+from ...model.scene import Scene
+from ...model.shapes import SHAPES, Shape
+from ...model.vectors import unit
 from . import changes
 
 Value = str | float | tuple[float, ...]
@@ -69,7 +70,7 @@ def read(scene: Scene, name: str) -> Sheet:
     _, bone = changes.find(scene, name)
     sheet: Sheet = {'shape': bone.shape.kind, **vars(bone.shape), 'mass': bone.mass,
                     'position': bone.position, 'turn': _degrees(bone.orientation),
-                    'color': tuple(round(255 * part) for part in (bone.color or PLAIN)[:3])}
+                    'color': tuple(round(255 * part) for part in (bone.color or DEFAULT_COLOR)[:3])}
     for key in SURFACE:
         value = getattr(bone, key)
         sheet[key] = '' if value is None else f'{value:.9g}'
@@ -90,10 +91,10 @@ def apply(scene: Scene, name: str, sheet: Mapping[str, Value], limb: bool = Fals
         if any(not _same(key, new.get(key), shown.get(key)) for key in keys):
             try:
                 scene = step(scene, new)
-            except faults.Fault as fault:
+            except errors.Fault as fault:
                 found.append(_at_field(fault, keys))
     if found:
-        raise faults.Faults(name, found)
+        raise errors.Faults(name, found)
     return scene
 
 
@@ -111,7 +112,7 @@ def _body_steps(name: str, limb: bool) -> list[Step]:
 
     def color(scene: Scene, new: Sheet) -> Scene:
         _, old = changes.find(scene, name)
-        opacity = (old.color or PLAIN)[3:]
+        opacity = (old.color or DEFAULT_COLOR)[3:]
         return changes.change_bone(
             scene, name, color=(*(part / 255 for part in new['color']), *opacity))
 
@@ -168,7 +169,7 @@ def _set_axes_and_limits(scene: Scene, name: str, new: Sheet, shown: Sheet) -> S
     limits = tuple(pair and tuple(map(math.radians, pair)) for pair in pairs)
     try:
         return changes.change_joint(scene, name, kind=kind.name, axes=tuple(axes), limits=limits)
-    except faults.Fault as fault:
+    except errors.Fault as fault:
         for number, pair in enumerate(pairs, 1):
             if fault.path.endswith(f'limits[{number - 1}]'):
                 raise type(fault)(f'limits_{number}', pair, fault.expected) from None
@@ -195,7 +196,7 @@ def _pair(key: str, text: str, symmetric: bool) -> tuple[float, float] | None:
     if symmetric and len(numbers) == 1:
         numbers = [-numbers[0], numbers[0]]
     if len(numbers) != 2:
-        raise faults.WrongForm(key, text, 'two angles in degrees, lower and upper, or nothing')
+        raise errors.WrongForm(key, text, 'two angles in degrees, lower and upper, or nothing')
     return numbers[0], numbers[1]
 
 
@@ -203,13 +204,13 @@ def _number_or_none(key: str, text: str) -> float | None:
     try:
         return float(text) if text.strip() else None
     except ValueError:
-        raise faults.WrongForm(key, text, "a number, or nothing for the scene's") from None
+        raise errors.WrongForm(key, text, "a number, or nothing for the scene's") from None
 
 
 def _shape(new: Sheet) -> Shape:
     kind = new['shape']
     for key in SHAPE_FIELDS[kind]:
-        faults.check_positive(key, new[key])
+        errors.check_positive(key, new[key])
     return SHAPES[kind](**{key: new[key] for key in SHAPE_FIELDS[kind]})
 
 
@@ -218,7 +219,7 @@ def _degrees(orientation: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def _quaternion(turn: tuple[float, ...]) -> np.ndarray:
-    faults.check_finite('turn', tuple(turn))
+    errors.check_finite('turn', tuple(turn))
     return rotation.from_rpy(*(math.radians(angle) for angle in turn))
 
 
@@ -237,7 +238,7 @@ def _same(key: str, new: Value | None, shown: Value | None) -> bool:
     return abs(new - shown) <= tolerance
 
 
-def _at_field(fault: faults.Fault, keys: tuple[str, ...]) -> faults.Fault:
+def _at_field(fault: errors.Fault, keys: tuple[str, ...]) -> errors.Fault:
     """Give the fault the key of the field that it belongs to."""
     said = fault.path.rsplit('.', 1)[-1].split('[')[0]
     # Of its axes only that they are not perpendicular is left to the joint to find.

@@ -1,0 +1,1 @@
+"""The model as text and back: YAML with its schema, URDF, MJCF."""

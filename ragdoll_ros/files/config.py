@@ -1,0 +1,37 @@
+"""Where the shipped scenes, dolls and schemas are, and how one is found by its name."""
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+from ..model import errors
+
+
+def config_folder() -> Path:
+    """Folder of the shipped scenes: the checkout's, else the ROS prefix's, else the package's."""
+    package = Path(__file__).resolve().parents[1]
+    candidates = [package.parent / 'config'] if (package.parent / 'package.xml').exists() else []
+    prefixes = filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))
+    candidates += [Path(prefix) / 'share' / 'ragdoll_ros' / 'config' for prefix in prefixes]
+    candidates.append(package / 'config')
+    return next((path for path in candidates if (path / 'scene.schema.json').exists()),
+                candidates[-1])
+
+
+def scene_names() -> list[str]:
+    """Names of the shipped scenes and dolls."""
+    return sorted(path.stem for path in config_folder().glob('*.yaml')
+                  if re.search(r'^(dolls|bones):', path.read_text(), re.MULTILINE))
+
+
+def find(name: str, beside: Path | None = None) -> Path:
+    """Path of a file given by its path (also from ``beside``) or by its name in config/."""
+    choices = [Path(os.path.expanduser(name))]
+    if beside is not None:
+        choices.insert(0, beside / name)
+    choices += [config_folder() / name, config_folder() / f'{name}.yaml']
+    for path in choices:
+        if os.path.isfile(path):
+            return path
+    raise errors.Unreadable('', name, f'a file, or one of {", ".join(scene_names())}')

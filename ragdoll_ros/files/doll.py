@@ -1,0 +1,141 @@
+"""Dolls as YAML files: read, checked with all faults at once, written.
+
+The form is that of config/doll.schema.json.
+"""
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+from ..model.errors import Fault, Faults
+from ..model.ragdoll import Bone, Joint, Ragdoll, Rider, carried_faults, tree_faults
+from ..model.rotation import IDENTITY
+from ..model.shapes import SHAPES, Shape
+from . import config, yaml_text
+from .building import build_each, entries, raise_or_give
+from .schema import schema_faults
+from .swing import swing_data, swing_from
+
+
+def load_doll(name: str) -> Ragdoll:
+    """Read a doll's file; Faults with all that is wrong in it."""
+    try:
+        path = config.find(name)
+        data = yaml_text.read(path)
+    except Fault as fault:
+        raise Faults(str(name), [fault]) from None
+    return raise_or_give(path, *build_doll(data, path))
+
+
+def save_doll(doll: Ragdoll, path: str | Path, head: str = '') -> None:
+    """Write a doll; load_doll gives an equal one back."""
+    text = yaml_text.to_text(doll_data(doll, Path(path).parent), 'doll', head)
+    Path(path).write_text(text, encoding='utf-8')
+
+
+def build_doll(data: object,
+               path: Path = Path('doll')) -> tuple[Ragdoll | None, list[Fault]]:
+    """Make a doll from what the YAML file at ``path`` holds: the doll, or None and every fault."""
+    found = schema_faults('doll', data)
+    if not isinstance(data, dict):
+        return None, found
+    bones = build_each(data, 'bones', _bone, found)
+    joints = build_each(data, 'joints', _joint, found)
+    swings = build_each(data, 'swings', swing_from, found)
+    riders = build_each(data, 'riders', lambda entry: Rider(**entry), found)
+    names = [entry.get('name') for entry in entries(data, 'bones')]
+    edges = [(entry.get('parent'), entry.get('child')) for entry in entries(data, 'joints')]
+    if all(isinstance(text, str) for text in [*names, *sum(edges, ())]):
+        found += tree_faults(names, edges)
+        for key in ('swings', 'riders'):
+            carried = [(entry.get('name'), entry.get('bone')) for entry in entries(data, key)]
+            if all(isinstance(text, str) for text in sum(carried, ())):
+                found += carried_faults(key, names, carried)
+    if found:
+        return None, found
+    model = str(path.parent / data['model']) if 'model' in data else None
+    return Ragdoll(data.get('name', path.stem), tuple(bones), tuple(joints), tuple(swings),
+                   tuple(riders), model), found
+
+
+def doll_data(doll: Ragdoll, folder: Path | None = None) -> dict:
+    """Give a doll as plain lists and numbers, the form of doll.schema.json.
+
+    The path of its character is written as seen from ``folder``, if given.
+    """
+    data = {'name': doll.name, 'bones': [_bone_data(bone) for bone in doll.bones],
+            'joints': [_joint_data(joint) for joint in doll.joints]}
+    if doll.swings:
+        data['swings'] = [swing_data(swing) for swing in doll.swings]
+    if doll.riders:
+        data['riders'] = [_rider_data(rider) for rider in doll.riders]
+    if doll.model is not None:
+        data['model'] = doll.model if folder is None else _seen_from(folder, doll.model)
+    return data
+
+
+def _seen_from(folder: Path, model: str) -> str:
+    """Path of a character as it stands in a file of ``folder``: with slashes, relative."""
+    try:
+        return Path(os.path.relpath(model, folder)).as_posix()
+    except ValueError:
+        # Another drive has no way there.
+        return model
+
+
+def _shape(data: dict) -> Shape:
+    (kind, sizes), = data.items()
+    return SHAPES[kind](**sizes)
+
+
+def _bone(data: dict) -> Bone:
+    fields = dict(data)
+    return Bone(shape=_shape(fields.pop('shape')), **fields)
+
+
+def _joint(data: dict) -> Joint:
+    fields = dict(data)
+    pairs = fields.pop('limits_deg', ())
+    limits = tuple(pair and tuple(math.radians(angle) for angle in pair) for pair in pairs)
+    try:
+        return Joint(limits=limits, **fields)
+    except Fault as fault:
+        if not fault.path.startswith('limits'):
+            raise
+        path = fault.path.replace('limits', 'limits_deg', 1)
+        raise type(fault)(path, pairs, fault.expected) from None
+
+
+def _bone_data(bone: Bone) -> dict:
+    sizes = {key: list(value) if isinstance(value, tuple) else value
+             for key, value in vars(bone.shape).items()}
+    data = {'name': bone.name, 'shape': {bone.shape.kind: sizes}, 'mass': bone.mass,
+            'position': list(bone.position)}
+    if bone.orientation != IDENTITY:
+        data['orientation'] = list(bone.orientation)
+    for key in ('friction', 'rolling_friction', 'restitution'):
+        if getattr(bone, key) is not None:
+            data[key] = getattr(bone, key)
+    if bone.color is not None:
+        data['color'] = list(bone.color)
+    return data
+
+
+def _rider_data(rider: Rider) -> dict:
+    data = {'name': rider.name, 'bone': rider.bone, 'position': list(rider.position)}
+    if rider.orientation != IDENTITY:
+        data['orientation'] = list(rider.orientation)
+    return data
+
+
+def _joint_data(joint: Joint) -> dict:
+    data = {'parent': joint.parent, 'child': joint.child, 'kind': joint.kind,
+            'anchor': list(joint.anchor)}
+    if joint.axes:
+        data['axes'] = [list(axis) for axis in joint.axes]
+        data['limits_deg'] = [pair and [round(math.degrees(angle), 9) for angle in pair]
+                              for pair in joint.limits]
+    if joint.damping:
+        data['damping'] = joint.damping
+    return data

@@ -1,0 +1,158 @@
+"""A scene as an MJCF text for MuJoCo: the same bodies, joints, limits, damping and ground.
+
+A body's frame is that of its bone: origin at the centre of mass, the shape's own axes. MuJoCo
+writes quaternions w, x, y, z. Two hinges in one body turn one after the other, the second axis
+carried along by the first: just what `universal` means.
+
+What MuJoCo cannot say and what stands there instead:
+- a ball joint with limits is three hinges, as in urdf.py;
+- restitution is a spring and a damper in the contact, so it is met only by small steps;
+- friction is finite; a pair has the larger of the two, so each bone gets what it has with the
+  ground, and the ground none.
+"""
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Collection, Iterable
+
+import numpy as np
+
+from ..model import rotation
+from ..model.ragdoll import Bone, Joint, joint_frame
+from ..model.scene import Placement, Scene, grip
+from ..model.shapes import Shape
+
+CONTACT_TIME = 0.02
+"""Time constant of a contact, s: MuJoCo's default."""
+
+
+def to_mjcf(scene: Scene, apart: Collection[frozenset[str]] = ()) -> str:
+    """Write a scene as MJCF.
+
+    ``apart`` lists further pairs of bones (names as in scene.bone_names) that must not collide,
+    beside the pairs that share a joint: those that overlap at the start.
+    """
+    root = ET.Element('mujoco', model=scene.name)
+    ET.SubElement(root, 'compiler', angle='radian', autolimits='true', inertiafromgeom='false')
+    ET.SubElement(root, 'option', timestep=repr(scene.step), gravity=_text(scene.gravity),
+                  cone='elliptic')
+    world = ET.SubElement(root, 'worldbody')
+    if scene.ground is not None:
+        _add_ground(world, scene)
+    for placement in scene.dolls:
+        _add_doll(world, scene, placement)
+    contact = ET.SubElement(root, 'contact')
+    for index, (a, b) in enumerate(sorted(map(sorted, {*_jointed(scene), *apart}))):
+        ET.SubElement(contact, 'exclude', name=f'apart_{index}', body1=a, body2=b)
+    ET.indent(root)
+    return ET.tostring(root, encoding='unicode') + '\n'
+
+
+def damping_ratio(restitution: float) -> float:
+    """Damping ratio of a spring and damper that throw a mass back with ``restitution``.
+
+    A half period of the damped oscillation leaves e = exp(-pi z / sqrt(1 - z^2)) of the speed.
+    """
+    if restitution <= 0:
+        return 1.0
+    log = math.log(restitution)
+    return max(0.01, -log / math.hypot(math.pi, log))
+
+
+def _jointed(scene: Scene) -> set[frozenset[str]]:
+    return {frozenset((scene.qualified(placement, joint.parent),
+                       scene.qualified(placement, joint.child)))
+            for placement in scene.dolls for joint in placement.doll.joints}
+
+
+def _add_ground(world: ET.Element, scene: Scene) -> None:
+    normal = np.array(scene.ground.normal)
+    turn = rotation.shortest_arc(np.array((0.0, 0.0, 1.0)), normal)
+    ET.SubElement(world, 'geom', name='ground', type='plane', size='0 0 1', contype='1',
+                  conaffinity='3', solmix='0', pos=_text(normal * scene.ground.offset),
+                  quat=_quaternion(turn), **_material(scene, None))
+
+
+def _add_doll(world: ET.Element, scene: Scene, placement: Placement) -> None:
+    """Nest the bodies of one doll as its joints do."""
+    doll = placement.doll
+    made = {doll.root.name: _add_bone(world, scene, placement, doll.root,
+                                      *placement.bone_pose(doll.root))}
+    ET.SubElement(made[doll.root.name], 'freejoint',
+                  name=scene.qualified(placement, doll.root.name) + '/free')
+    for joint in doll.joints_from_root():
+        parent, child = doll.bone(joint.parent), doll.bone(joint.child)
+        back = rotation.inverse(parent.orientation)
+        offset = rotation.rotate(back, np.subtract(child.position, parent.position))
+        body = _add_bone(made[parent.name], scene, placement, child, offset,
+                         rotation.multiply(back, child.orientation))
+        for attributes in _joints(joint, child):
+            attributes['name'] = scene.qualified(placement, attributes['name'])
+            ET.SubElement(body, 'joint', attributes)
+        made[child.name] = body
+
+
+def _add_bone(parent: ET.Element, scene: Scene, placement: Placement, bone: Bone,
+              position: np.ndarray, orientation: np.ndarray) -> ET.Element:
+    name = scene.qualified(placement, bone.name)
+    body = ET.SubElement(parent, 'body', name=name, pos=_text(position),
+                         quat=_quaternion(orientation))
+    ET.SubElement(body, 'inertial', pos='0 0 0', mass=repr(bone.mass),
+                  diaginertia=_text(bone.inertia))
+    # bit 0: meets the ground and, with self-collision, each other; bit 1: meets the ground only
+    mask = '1' if scene.self_collision else '2'
+    ET.SubElement(body, 'geom', name=name, type=bone.shape.kind, size=_text(_size(bone.shape)),
+                  contype=mask, conaffinity='1' if scene.self_collision else '0',
+                  **_material(scene, bone))
+    return body
+
+
+def _joints(joint: Joint, child: Bone) -> Iterable[dict[str, str]]:
+    """Attributes of one element for each axis, in the child's frame; none for a fixed joint."""
+    back = rotation.inverse(child.orientation)
+    place = {'pos': _text(rotation.rotate(back, np.subtract(joint.anchor, child.position))),
+             'damping': repr(joint.damping)}
+    axes, limits = joint.axes, joint.angle_limits
+    if joint.kind == 'ball' and not any(limits):
+        yield {'name': joint.child, 'type': 'ball', **place}
+        return
+    if joint.kind == 'ball':
+        axes = rotation.matrix(joint_frame(joint)).T
+    for name, axis, pair in zip(joint.angle_names, axes, limits, strict=True):
+        ranged = {'range': _text(pair)} if pair else {}
+        yield {'name': name, 'type': 'hinge', **place, **ranged,
+               'axis': _text(rotation.rotate(back, axis))}
+
+
+def _size(shape: Shape) -> tuple[float, ...]:
+    """Sizes as MuJoCo wants them: halves, and of what is round about z one radius alone."""
+    if shape.kind == 'box':
+        return shape.half_extents
+    return tuple(size / (2 if key == 'length' else 1) for key, size in vars(shape).items())
+
+
+def _material(scene: Scene, bone: Bone | None) -> dict[str, str]:
+    """Friction and restitution of a bone, or of the ground."""
+    plain = scene.material
+    friction = rolling = 0.0
+    restitution = plain.restitution
+    if bone is not None:
+        own = plain.friction if bone.friction is None else bone.friction
+        friction = math.sqrt(grip(own) * grip(plain.friction))
+        rolling = plain.rolling_friction if bone.rolling_friction is None \
+            else bone.rolling_friction
+        restitution = math.sqrt(restitution * (restitution if bone.restitution is None
+                                               else bone.restitution))
+    return {'friction': _text((friction, 0.0, rolling)),
+            'condim': '6' if rolling else '3',
+            'solref': _text((CONTACT_TIME, damping_ratio(restitution)))}
+
+
+def _quaternion(q: np.ndarray) -> str:
+    x, y, z, w = q
+    return _text((w, x, y, z))
+
+
+def _text(values: Iterable[float]) -> str:
+    return ' '.join(repr(float(value)) for value in values)

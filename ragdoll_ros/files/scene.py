@@ -1,0 +1,121 @@
+"""Scenes as YAML files: found, read, checked with all faults at once, written.
+
+The form is that of config/scene.schema.json.
+"""
+from __future__ import annotations
+
+import functools
+import re
+from pathlib import Path
+
+from ..model.errors import Fault, Faults
+from ..model.ragdoll import Ragdoll
+from ..model.scene import Ground, Material, Placement, Scene, above_ground
+from . import config, yaml_text
+from .building import any_under, attempt, raise_or_give
+from .doll import build_doll, doll_data
+from .schema import schema_faults
+
+
+def load_scene(name: str) -> Scene:
+    """Read a scene, or a doll (then above level ground); Faults with all that is wrong in it."""
+    try:
+        path = config.find(name)
+        data = yaml_text.read(path)
+    except Fault as fault:
+        raise Faults(str(name), [fault]) from None
+    return scene_from(data, path)
+
+
+def scene_from(data: object, path: Path) -> Scene:
+    """Make a scene from what a YAML file at ``path`` holds, a scene or a doll; see load_scene."""
+    if isinstance(data, dict) and 'bones' in data:
+        return above_ground(raise_or_give(path, *build_doll(data, path)))
+    return raise_or_give(path, *build_scene(data, path))
+
+
+def save_scene(scene: Scene, path: str | Path, head: str = '') -> None:
+    """Write a scene with its dolls in it; load_scene gives an equal one back."""
+    Path(path).write_text(scene_text(scene, Path(path).parent, head), encoding='utf-8')
+
+
+def build_scene(data: object, path: Path) -> tuple[Scene | None, list[Fault]]:
+    """Make a scene from what a YAML file holds: the scene, or None and every fault."""
+    found = schema_faults('scene', data)
+    if not isinstance(data, dict):
+        return None, found
+    placements = []
+    entries = data.get('dolls')
+    named = functools.cache(lambda name: _named_doll(name, path))  # a crowd's is read once
+    for index, entry in enumerate(entries if isinstance(entries, list) else ()):
+        where = f'dolls[{index}]'
+        if not isinstance(entry, dict) or 'doll' not in entry:
+            continue
+        source = entry['doll']
+        if isinstance(source, dict):
+            doll, more = build_doll(source, path.with_name('doll'))
+        else:
+            doll, more = named(source) if isinstance(source, str) else (None, [])
+        found += [fault.at(f'{where}.doll') for fault in more]
+        if doll is not None and not any_under(found, where):
+            doll, more = _with_swings(doll, entry, path)
+            found += [fault.at(where) for fault in more]
+        if doll is not None and not any_under(found, where):
+            fields = {'position', 'orientation', 'velocity', 'spin', 'name'} & set(entry)
+            placements.append(attempt(found, where, Placement, doll,
+                                       **{key: entry[key] for key in fields}))
+    parts = {}
+    for key, part in (('ground', Ground), ('material', Material)):
+        if isinstance(data.get(key), dict) and not any_under(found, key):
+            parts[key] = attempt(found, key, part, **data[key])
+    if found:
+        return None, found
+    plain = {key: data[key] for key in ('gravity', 'step', 'pace', 'self_collision')
+             if key in data}
+    scene = attempt(found, '', Scene, data.get('name', path.stem), tuple(placements),
+                     **parts, **plain)
+    return scene, found
+
+
+def scene_data(scene: Scene, folder: Path | None = None) -> dict:
+    """Give a scene as plain lists and numbers, the form of scene.schema.json; see doll_data."""
+    data = {'name': scene.name, 'gravity': list(scene.gravity), 'step': scene.step,
+            'pace': scene.pace, 'self_collision': scene.self_collision,
+            'material': dict(vars(scene.material)), 'ground': None, 'dolls': []}
+    if scene.ground is not None:
+        data['ground'] = {'normal': list(scene.ground.normal), 'offset': scene.ground.offset}
+    for placement in scene.dolls:
+        entry = {'doll': doll_data(placement.doll, folder), 'name': placement.name}
+        for key in ('position', 'orientation', 'velocity', 'spin'):
+            entry[key] = list(getattr(placement, key))
+        data['dolls'].append(entry)
+    return data
+
+
+def scene_text(scene: Scene, folder: Path, head: str = '') -> str:
+    """Give what save_scene writes into a file of ``folder``."""
+    return yaml_text.to_text(scene_data(scene, folder), 'scene', head)
+
+
+def _named_doll(name: str, path: Path) -> tuple[Ragdoll | None, list[Fault]]:
+    """Make the doll a scene names; faults of another file carry its name."""
+    try:
+        file = config.find(name, beside=path.parent)
+        doll, found = build_doll(yaml_text.read(file), file)
+    except Fault as fault:
+        return None, [fault]
+    return doll, [fault.at(f'({file.name})') for fault in found]
+
+
+def _with_swings(doll: Ragdoll, entry: dict, path: Path) -> tuple[Ragdoll | None, list[Fault]]:
+    """Give the doll the swings that its place in the scene adds to its own."""
+    if not entry.get('swings'):
+        return doll, []
+    own = len(doll.swings)
+    data = doll_data(doll)
+    data['swings'] = data.get('swings', []) + entry['swings']
+    dressed, found = build_doll(data, path)
+    shift = re.compile(r'^swings\[(\d+)\]')
+    return dressed, [type(fault)(
+        shift.sub(lambda match: f'swings[{int(match[1]) - own}]', fault.path),
+        fault.value, fault.expected) for fault in found]

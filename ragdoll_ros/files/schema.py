@@ -1,0 +1,56 @@
+"""The JSON schemas of scenes and dolls: what in a file's data is not as they say."""
+from __future__ import annotations
+
+import functools
+import json
+
+import jsonschema
+
+from ..model import errors
+from ..model.errors import Fault
+from .config import config_folder
+
+_NAMED = {'exclusiveMinimum': errors.NotPositive, 'minimum': errors.OutOfRange,
+          'maximum': errors.OutOfRange}
+
+
+def schema_faults(schema: str, data: object) -> list[Fault]:
+    """Find all that the schema ``schema`` ('scene' or 'doll') has against the data."""
+    found = []
+    for error in _validator(schema).iter_errors(data):
+        path = ''
+        for part in error.absolute_path:
+            path += f'[{part}]' if isinstance(part, int) else f'.{part}' if path else str(part)
+        kind = _NAMED.get(error.validator, errors.WrongForm)
+        found.append(kind(path, _wrong(error), _expected(error)))
+    return sorted(found, key=lambda fault: fault.path)
+
+
+def _wrong(error: jsonschema.ValidationError) -> object:
+    """Give what is wrong at the place of an error: of a mapping, the keys that none has."""
+    if error.validator != 'additionalProperties':
+        return error.instance
+    return ', '.join(str(key) for key in error.instance if key not in error.schema['properties'])
+
+
+def _expected(error: jsonschema.ValidationError) -> str:
+    """Say in words what the schema asks for at the place of an error."""
+    about = error.schema.get('description', '')
+    if error.validator == 'required':
+        missing = [key for key in error.validator_value if key not in error.instance]
+        return 'the missing ' + ', '.join(missing)
+    if error.validator == 'additionalProperties':
+        return 'only ' + ', '.join(error.schema['properties'])
+    rule = {'enum': 'one of {}', 'type': 'a {}', 'minItems': 'at least {} items',
+            'maxItems': 'at most {} items', 'exclusiveMinimum': 'above {}',
+            'minimum': '{} or more', 'maximum': '{} or less',
+            'minProperties': 'at least {} key', 'maxProperties': 'at most {} key'}
+    value = error.validator_value
+    value = ' or '.join(map(str, value)) if isinstance(value, list) else value
+    return (rule.get(error.validator, '') .format(value) + (about and f' ({about})')).strip()
+
+
+@functools.cache
+def _validator(name: str) -> jsonschema.Draft7Validator:
+    path = config_folder() / f'{name}.schema.json'
+    return jsonschema.Draft7Validator(json.loads(path.read_text(encoding='utf-8')))

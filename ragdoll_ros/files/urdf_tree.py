@@ -1,0 +1,226 @@
+"""A URDF as it stands: links with their shapes and masses, joints between, each in its place.
+
+Poses are those of the frames, doll's frame (the root link's), at given joint angles. What is no
+part of the motion (transmissions, sensors, colours) is not read.
+"""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from xml.etree import ElementTree
+
+import numpy as np
+
+from ..model import errors, rotation
+from ..model.ragdoll import tree_faults
+from ..model.shapes import SHAPES, Shape
+
+LARGEST_TEXT = 32_000_000
+
+SIZES = {'box': ('size',), 'sphere': ('radius',), 'cylinder': ('radius', 'length'),
+         'capsule': ('radius', 'length')}
+"""What a URDF says of each shape."""
+
+JOINT_TYPES = ('revolute', 'continuous', 'fixed', 'prismatic', 'planar', 'floating', 'spherical')
+
+Pose = tuple[np.ndarray, np.ndarray]
+"""Position (3,) m and orientation (4,)."""
+
+
+@dataclass
+class UrdfLink:
+    """``shapes`` with their poses in the link's frame; ``mass`` kg, zero where none is given."""
+
+    name: str
+    mass: float = 0.0
+    centre: Pose = (np.zeros(3), np.array(rotation.IDENTITY))
+    inertia: np.ndarray | None = None
+    """(3, 3) kg m^2 about the centre of mass, in the axes of ``centre``."""
+    shapes: list[tuple[Shape, Pose]] = field(default_factory=list)
+    meshes: int = 0
+
+
+@dataclass
+class UrdfJoint:
+    """``origin`` is the child's frame in the parent's at angle zero; ``axis`` in the child's."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin: Pose
+    axis: np.ndarray
+    limits: tuple[float, float] | None
+    damping: float
+
+
+@dataclass
+class UrdfTree:
+    """``joints`` by child."""
+
+    name: str
+    links: dict[str, UrdfLink]
+    joints: dict[str, UrdfJoint]
+
+    @property
+    def order(self) -> list[str]:
+        """All links, each parent's before its children's."""
+        names = [name for name in self.links if name not in self.joints]
+        for name in names:
+            names += [child for child, joint in self.joints.items() if joint.parent == name]
+        return names
+
+    def poses(self, angles: dict[str, float]) -> dict[str, Pose]:
+        """Pose of every link's frame at joint angles (rad, by child; zero where not given)."""
+        placed: dict[str, Pose] = {}
+        for name in self.order:
+            joint = self.joints.get(name)
+            if joint is None:
+                placed[name] = (np.zeros(3), np.array(rotation.IDENTITY))
+                continue
+            turn = rotation.from_axis_angle(joint.axis, angles.get(name, 0.0))
+            placed[name] = compose(compose(placed[joint.parent], joint.origin),
+                                   (np.zeros(3), turn))
+        return placed
+
+
+def compose(outer: Pose, inner: Pose) -> Pose:
+    """Pose of something in the frame that ``outer`` stands in, given in outer's own."""
+    return (outer[0] + rotation.rotate(outer[1], inner[0]),
+            rotation.multiply(outer[1], inner[1]))
+
+
+def parse_urdf(text: str) -> UrdfTree:
+    """Read URDF; a Fault where it is no URDF or its links form no tree."""
+    if len(text) > LARGEST_TEXT:
+        raise errors.Unreadable('', f'{len(text)} characters', f'at most {LARGEST_TEXT}')
+    if '<!DOCTYPE' in text or '<!ENTITY' in text:
+        raise errors.Unreadable('', 'a DOCTYPE', 'URDF without entities')
+    try:
+        # Bytes, as a text that names another encoding would be refused.
+        root = ElementTree.fromstring(text.encode('utf-8'))
+    except (ElementTree.ParseError, ValueError, RecursionError) as error:
+        raise errors.Unreadable('', str(error), 'XML: a <robot> (expand a xacro first)') from None
+    if root.tag != 'robot':
+        raise errors.WrongForm('', f'<{root.tag}>', 'a <robot>')
+    links = [_link(element) for element in root.findall('link')]
+    joints = [_joint(element) for element in root.findall('joint')]
+    edges = [(joint.parent, joint.child) for joint in joints]
+    for fault in tree_faults([link.name for link in links], edges):
+        path = fault.path.replace('bones', 'link').replace('joints', 'joint')
+        raise type(fault)(path, fault.value, fault.expected.replace('bone', 'link'))
+    return UrdfTree(root.get('name') or 'robot', {link.name: link for link in links},
+                    {joint.child: joint for joint in joints})
+
+
+def _link(element: ElementTree.Element) -> UrdfLink:
+    link = UrdfLink(_text(element, 'name', 'link'))
+    where = f'link {link.name}'
+    inertial = element.find('inertial')
+    if inertial is not None:
+        mass = inertial.find('mass')
+        link.mass = 0.0 if mass is None else _number(mass, 'value', where)
+        errors.check_range(f'{where}.mass', link.mass, 0, math.inf)
+        link.centre = _pose(inertial, where)
+        link.inertia = _inertia(inertial.find('inertia'), where)
+    # Some describe only what is seen.
+    for part in element.findall('collision') or element.findall('visual'):
+        geometry = part.find('geometry')
+        shape = None if geometry is None else _shape(geometry, where)
+        if shape is None:
+            link.meshes += 1
+        else:
+            link.shapes.append((shape, _pose(part, where)))
+    return link
+
+
+def _joint(element: ElementTree.Element) -> UrdfJoint:
+    name = _text(element, 'name', 'joint')
+    where = f'joint {name}'
+    kind = element.get('type', '')
+    if kind not in JOINT_TYPES:
+        raise errors.WrongForm(f'{where}.type', kind, 'one of ' + ', '.join(JOINT_TYPES))
+    ends = []
+    for end in ('parent', 'child'):
+        found = element.find(end)
+        if found is None:
+            raise errors.WrongForm(where, None, f'a <{end} link="..."/>')
+        ends.append(_text(found, 'link', f'{where}.{end}'))
+    found = element.find('axis')
+    axis = np.array([1.0, 0, 0]) if found is None else _vector(found, 'xyz', where)
+    if np.linalg.norm(axis) < 1e-9:
+        if kind in ('revolute', 'continuous'):
+            raise errors.NotUnit(f'{where}.axis', axis.tolist(), 'a direction, not zero')
+        axis = np.array([1.0, 0, 0])
+    found = element.find('limit')
+    limits = None
+    if kind == 'revolute' and found is not None:
+        limits = (_number(found, 'lower', where, 0.0), _number(found, 'upper', where, 0.0))
+        if limits[0] > limits[1]:
+            raise errors.LimitsReversed(f'{where}.limit', limits, 'lower <= upper')
+    found = element.find('dynamics')
+    damping = 0.0 if found is None else _number(found, 'damping', where, 0.0)
+    return UrdfJoint(name, kind, *ends, _pose(element, where), axis / np.linalg.norm(axis), limits,
+                     max(damping, 0.0))
+
+
+def _shape(geometry: ElementTree.Element, where: str) -> Shape | None:
+    """Give the shape; None for a mesh and whatever else is no plain shape."""
+    for element in geometry:
+        if element.tag in SIZES:
+            sizes = {key: tuple(_vector(element, key, where)) if key == 'size'
+                     else _number(element, key, where) for key in SIZES[element.tag]}
+            try:
+                return SHAPES[element.tag](**sizes)
+            except errors.Fault as fault:
+                raise fault.at(where) from None
+    return None
+
+
+def _inertia(element: ElementTree.Element | None, where: str) -> np.ndarray | None:
+    if element is None:
+        return None
+    xx, xy, xz, yy, yz, zz = (_number(element, key, where, 0.0)
+                              for key in ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz'))
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _pose(element: ElementTree.Element, where: str) -> Pose:
+    origin = element.find('origin')
+    if origin is None:
+        return np.zeros(3), np.array(rotation.IDENTITY)
+    return (_vector(origin, 'xyz', where, (0, 0, 0)),
+            rotation.from_rpy(*_vector(origin, 'rpy', where, (0, 0, 0))))
+
+
+def _text(element: ElementTree.Element, key: str, where: str) -> str:
+    text = element.get(key)
+    if not text:
+        raise errors.WrongForm(where, text, f'a {key}')
+    return text
+
+
+def _number(element: ElementTree.Element, key: str, where: str,
+            default: float | None = None) -> float:
+    if default is not None and element.get(key) is None:
+        return default
+    return float(_numbers(element, key, 1, where)[0])
+
+
+def _vector(element: ElementTree.Element, key: str, where: str,
+            default: tuple | None = None) -> np.ndarray:
+    if default is not None and element.get(key) is None:
+        return np.array(default, float)
+    return _numbers(element, key, 3, where)
+
+
+def _numbers(element: ElementTree.Element, key: str, length: int, where: str) -> np.ndarray:
+    text = element.get(key, '')
+    try:
+        numbers = np.array([float(word) for word in text.split()])
+    except ValueError:
+        numbers = np.zeros(0)
+    if len(numbers) != length or not np.isfinite(numbers).all():
+        what = f'{length} finite numbers' if length > 1 else 'a finite number'
+        raise errors.WrongForm(f'{where}.{element.tag}.{key}', text, what)
+    return numbers

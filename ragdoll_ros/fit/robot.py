@@ -1,0 +1,258 @@
+"""URDF to Ragdoll: a robot that goes limp.
+
+A link with a shape becomes a bone; its joint becomes a hinge, or part of a universal or ball
+joint where links of no shape stand between (as to_urdf writes them). A link without a shape
+rides on its parent and gives it its mass. Every link is a rider, so that its frame can be
+published. Bodies are uniform solids: of a link's inertia its mass remains, and where it has no
+plain shape, the box of the same inertia.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..files.urdf_tree import LARGEST_TEXT, Pose, UrdfJoint, UrdfLink, UrdfTree, compose, parse_urdf
+from ..model import errors, rotation
+from ..model.ragdoll import LARGEST_SWING, WORLD, Bone, Joint, Ragdoll, Rider
+from ..model.shapes import Box, Capsule, Shape
+from .axes import fit_axes
+from .shapes import fit_best
+
+DENSITY = 1000.0
+"""kg/m^3 of a link that moves and has a shape but no mass."""
+
+THINNEST = 0.005
+"""m; of a body that several shapes, or only its inertia, make up."""
+
+SAME_PLACE = 1e-6
+"""m; axes in a row that meet this nearly are one joint."""
+
+
+def doll_from_urdf(text: str) -> Ragdoll:
+    """Make a doll of a robot's description; Fault with what is wrong in it."""
+    return _doll(parse_urdf(text))[0]
+
+
+def read_urdf(path: str | Path) -> tuple[Ragdoll, tuple[str, ...]]:
+    """Read a URDF file: the doll, and notes on what could not be taken over."""
+    path = Path(path)
+    try:
+        if not path.is_file():
+            raise errors.Unreadable('', str(path), 'a URDF file')
+        if path.stat().st_size > LARGEST_TEXT:
+            raise errors.Unreadable('', path.stat().st_size, f'at most {LARGEST_TEXT} bytes')
+        try:
+            text = path.read_text(encoding='utf-8')
+        except UnicodeDecodeError as error:
+            raise errors.Unreadable('', str(error), 'a text in UTF-8') from None
+        doll, notes = _doll(parse_urdf(text))
+        return doll, tuple(notes)
+    except errors.Fault as fault:
+        raise errors.Faults(str(path), [fault]) from None
+
+
+def _doll(tree: UrdfTree) -> tuple[Ragdoll, list[str]]:
+    notes: list[str] = []
+    # Zero may lie outside a joint's limits; the doll starts at the nearest angle inside.
+    angles = {child: float(np.clip(0.0, *joint.limits)) for child, joint in tree.joints.items()
+              if joint.limits}
+    poses = tree.poses(angles)
+    solids = {name: _solid(link, notes) for name, link in tree.links.items()}
+    if not any(solids.values()):
+        raise errors.WrongForm('link', list(tree.links)[:5], 'a link with a shape or an inertia')
+    carriers = _carriers(tree, solids)
+    names = _names([name for name in tree.links if carriers[name] == name], [WORLD])
+    root = next(name for name in tree.order if carriers[name] == name)
+    masses = dict.fromkeys(names, 0.0)
+    for name, link in tree.links.items():
+        masses[carriers[name]] += link.mass
+    bones = []
+    for name, text in names.items():
+        shape, place = solids[name]
+        if masses[name] <= 0:
+            masses[name] = DENSITY * shape.volume
+            notes.append(f'{name} has no mass: that of water is taken, {masses[name]:.3g} kg')
+        position, turn = compose(poses[name], place)
+        bones.append(Bone(text, shape, masses[name], position, turn))
+    joints = [_joint(tree, name, carriers, names, poses, angles, notes)
+              for name in names if name != root]
+    above = root
+    while above in tree.joints:
+        joint, above = tree.joints[above], tree.joints[above].parent
+        if joint.kind not in ('fixed', 'floating'):
+            notes.append(f'{joint.name}: nothing with a shape above it: left out')
+    riders = _riders(poses, carriers, names, bones)
+    return Ragdoll(_plain(tree.name), tuple(bones), tuple(joints), riders=riders), notes
+
+
+def _solid(link: UrdfLink, notes: list[str]) -> tuple[Shape, Pose] | None:
+    """Give a link's one shape and its pose in the link's frame; None if nothing gives one."""
+    if link.meshes and link.shapes:
+        notes.append(f'{link.name}: meshes left out, plain shapes taken')
+    if len(link.shapes) == 1:
+        return link.shapes[0]
+    if link.shapes:
+        return _capsule(link.shapes) or _around(link.shapes)
+    if link.mass <= 0 or (link.inertia is None and not link.meshes):
+        return None
+    box = _same_inertia(link)
+    if box is not None and DENSITY / 50 < link.mass / box[0].volume < DENSITY * 20:
+        if link.meshes:
+            notes.append(f'{link.name}: only meshes; the box of the same inertia is taken')
+        return box
+    if not link.meshes:
+        return None
+    notes.append(f'{link.name}: only meshes and no inertia that could be; a cube of water is taken')
+    return Box(((link.mass / DENSITY) ** (1 / 3),) * 3), link.centre
+
+
+def _capsule(shapes: list[tuple[Shape, Pose]]) -> tuple[Shape, Pose] | None:
+    """A cylinder with a ball of its radius at each end is a capsule: URDF has none."""
+    cylinders = [part for part in shapes if part[0].kind == 'cylinder']
+    balls = [part for part in shapes if part[0].kind == 'sphere']
+    if len(cylinders) != 1 or len(balls) != 2 or len(shapes) != 3:
+        return None
+    barrel, place = cylinders[0]
+    half = rotation.rotate(place[1], np.array([0, 0, barrel.length / 2]))
+    centres = np.stack([centre for _, (centre, _) in balls]) - place[0]
+    fits = any(np.abs(centres - ends).max() < 1e-6 * barrel.length
+               for ends in (np.stack([half, -half]), np.stack([-half, half])))
+    if not fits or any(abs(ball.radius - barrel.radius) > 1e-9 for ball, _ in balls):
+        return None
+    return Capsule(barrel.radius, barrel.length), place
+
+
+def _around(shapes: list[tuple[Shape, Pose]]) -> tuple[Shape, Pose]:
+    """Fit one shape around several."""
+    points = np.concatenate([rotation.rotate(turn, shape.mesh()[0]) + centre
+                             for shape, (centre, turn) in shapes])
+    axes = fit_axes(points, np.ones(len(points)), np.array([0.0, 0.0, 1.0]))
+    local = points @ axes.frame
+    fitted, = fit_best([local], THINNEST, 0.0)
+    return fitted.shape, (axes.frame @ fitted.centre, rotation.from_matrix(axes.frame))
+
+
+def _same_inertia(link: UrdfLink) -> tuple[Shape, Pose] | None:
+    """Give the uniform box of a link's mass and inertia: its edge a^2 = 6 (Iy + Iz - Ix) / m."""
+    if link.inertia is None:
+        return None
+    moments, axes = np.linalg.eigh(link.inertia)
+    squares = 6 * (moments.sum() - 2 * moments) / link.mass
+    if not np.isfinite(squares).all() or squares.max() <= THINNEST ** 2:
+        return None
+    if np.linalg.det(axes) < 0:
+        axes = axes * (1, 1, -1)
+    edges = np.sqrt(np.maximum(squares, THINNEST ** 2))
+    return Box(tuple(edges)), compose(link.centre, (np.zeros(3), rotation.from_matrix(axes)))
+
+
+def _carriers(tree: UrdfTree, solids: dict) -> dict[str, str]:
+    """Body that carries each link: itself where it has one; a bare root rides on its child."""
+    carriers: dict[str, str] = {}
+    for name in tree.order:
+        above = tree.joints[name].parent if name in tree.joints else None
+        own = solids[name] is not None and not (
+            tree.links[name].mass <= 0 and above in carriers and carriers[above] is not None
+            and tree.joints[name].kind == 'fixed')
+        carriers[name] = name if own else carriers.get(above)
+    # Links above the first body, and other branches of them, belong to that body.
+    first = next(name for name in tree.order if carriers[name] == name)
+    return {name: carrier or first for name, carrier in carriers.items()}
+
+
+def _joint(tree: UrdfTree, name: str, carriers: dict[str, str], names: dict[str, str],
+           poses: dict[str, Pose], angles: dict[str, float], notes: list[str]) -> Joint:
+    """Make the joint of a body: the joints in a row from the body that carries its parent."""
+    row = [tree.joints[name]]
+    while row[0].parent in tree.joints and carriers[row[0].parent] != row[0].parent:
+        row.insert(0, tree.joints[row[0].parent])
+    parent, child = names[carriers[row[0].parent]], names[name]
+    anchor = poses[row[0].child][0]
+    for joint in row:
+        if joint.kind in ('prismatic', 'planar'):
+            notes.append(f'{joint.name}: a doll has no {joint.kind} joint: it is fixed')
+        if joint.kind == 'floating':
+            notes.append(f'{joint.name}: no doll has a floating joint: it becomes a ball joint')
+    if any(joint.kind in ('floating', 'spherical') for joint in row):
+        ball = next(joint for joint in row if joint.kind in ('floating', 'spherical'))
+        anchor, turn = poses[ball.child]
+        axis = rotation.rotate(turn, np.array([0.0, 0.0, 1.0]))
+        return Joint(parent, child, 'ball', anchor, (axis,), damping=ball.damping)
+    turning = [joint for joint in row if joint.kind in ('revolute', 'continuous')]
+    return _turning(parent, child, anchor, turning, poses, angles, notes)
+
+
+def _turning(parent: str, child: str, anchor: np.ndarray, row: list[UrdfJoint],
+             poses: dict[str, Pose], angles: dict[str, float], notes: list[str]) -> Joint:
+    """One to three hinges that meet in a point are a hinge, a universal or a ball joint."""
+    if not row:
+        return Joint(parent, child, 'fixed', anchor)
+    places = [poses[joint.child] for joint in row]
+    meeting = [joint for joint, place in zip(row, places, strict=True)
+               if np.linalg.norm(place[0] - places[0][0]) < SAME_PLACE]
+    if len(meeting) < len(row):
+        dropped = [joint.name for joint in row if joint not in meeting]
+        notes.append(f'{", ".join(dropped)}: between links without a shape: fixed')
+    axes = [rotation.rotate(poses[joint.child][1], joint.axis) for joint in meeting]
+    limits = [_limits(joint, angles, notes) for joint in meeting]
+    damping = max(joint.damping for joint in meeting)
+    anchor = places[0][0]
+    if len(meeting) == 1:
+        return Joint(parent, child, 'hinge', anchor, tuple(axes), tuple(limits), damping)
+    if len(meeting) == 2 and abs(axes[0] @ axes[1]) < 1e-6:
+        return Joint(parent, child, 'universal', anchor, tuple(axes), tuple(limits), damping)
+    return Joint(parent, child, 'ball', anchor, (axes[-1],), _cone(limits), damping)
+
+
+def _limits(joint: UrdfJoint, angles: dict[str, float],
+            notes: list[str]) -> tuple[float, float] | None:
+    """Limits from the angle that the joint starts at; None for a turn and more."""
+    if joint.kind == 'revolute' and joint.limits is None:
+        notes.append(f'{joint.name}: a revolute joint without limits turns freely')
+    if joint.limits is None or joint.limits[1] - joint.limits[0] >= 2 * math.pi:
+        return None
+    return tuple(limit - angles[joint.child] for limit in joint.limits)
+
+
+def _cone(limits: list) -> tuple:
+    """Swing and twist that hold the limits of hinges in a row, the last of them the twist."""
+    def symmetric(pairs: list, most: float) -> tuple[float, float] | None:
+        widest = max((max(map(abs, pair)) for pair in pairs if pair), default=0.0)
+        if None in pairs or widest <= 0:
+            return None
+        return -min(widest, most), min(widest, most)
+
+    return symmetric(limits[:-1], LARGEST_SWING), symmetric(limits[-1:], 2 * math.pi)
+
+
+def _riders(poses: dict[str, Pose], carriers: dict[str, str], names: dict[str, str],
+            bones: list[Bone]) -> tuple[Rider, ...]:
+    """Every link's frame, fixed on the body that carries it."""
+    by_name = {bone.name: bone for bone in bones}
+    riders = []
+    for name, text in _names(list(poses)).items():
+        bone = by_name[names[carriers[name]]]
+        back = rotation.inverse(np.array(bone.orientation))
+        riders.append(Rider(text, bone.name,
+                            rotation.rotate(back, poses[name][0] - bone.position),
+                            rotation.multiply(back, poses[name][1])))
+    return tuple(riders)
+
+
+def _names(given: list[str], taken: Sequence[str] = ()) -> dict[str, str]:
+    """Names as a doll takes them, each once, and none of those that are taken."""
+    names: dict[str, str] = {}
+    for name in given:
+        text = _plain(name)
+        while text in names.values() or text in taken:
+            text += '_'
+        names[name] = text
+    return names
+
+
+def _plain(name: str) -> str:
+    text = ''.join(c if c.isprintable() and c != '/' else '_' for c in name).strip()
+    return text[:90] or 'link'

@@ -1,0 +1,124 @@
+"""What can be wrong with a model: one root error, one named error per fault."""
+from __future__ import annotations
+
+import dataclasses
+import math
+
+
+class RagdollError(ValueError):
+    """Root of every error that this package raises on purpose."""
+
+
+class Fault(RagdollError):
+    """One wrong value: where it stands, what it is, what would be right."""
+
+    def __init__(self, path: str, value: object, expected: str) -> None:
+        super().__init__(path, value, expected)
+        self.path = path
+        self.value = value
+        self.expected = expected
+
+    def at(self, prefix: str) -> Fault:
+        """Give the same fault, seen from one level further out."""
+        joint = '' if not self.path or self.path.startswith('[') else '.'
+        return type(self)(f'{prefix}{joint}{self.path}', self.value, self.expected)
+
+    def __str__(self) -> str:
+        value = repr(self.value)
+        shown = value if len(value) <= 60 else value[:57] + '...'
+        return f'{self.path or "file"}: {type(self).__name__}: {shown}; expected {self.expected}'
+
+
+class NotPositive(Fault):
+    """A size, a mass or a duration that is not above zero."""
+
+
+class NotFinite(Fault):
+    """NaN or infinity where a finite number is needed."""
+
+
+class NotUnit(Fault):
+    """A direction or a quaternion of length zero."""
+
+
+class OutOfRange(Fault):
+    """A number outside its range."""
+
+
+class LimitsReversed(Fault):
+    """A lower joint limit above the upper one."""
+
+
+class WrongAxes(Fault):
+    """A joint with another number of axes or limits than its kind has."""
+
+
+class UnknownBone(Fault):
+    """A name that no bone bears."""
+
+
+class DuplicateName(Fault):
+    """A name that two things bear."""
+
+
+class ConnectedTwice(Fault):
+    """A bone that is the child of two joints."""
+
+
+class JointCycle(Fault):
+    """Joints that close a ring."""
+
+
+class Detached(Fault):
+    """A second bone without a parent: not one tree."""
+
+
+class WrongForm(Fault):
+    """A file whose structure is not what the schema says."""
+
+
+class Unreadable(Fault):
+    """A file that is missing, is no YAML, or is no text."""
+
+
+class Faults(RagdollError):
+    """All faults of one file at once."""
+
+    def __init__(self, file: str, faults: list[Fault]) -> None:
+        super().__init__(file, faults)
+        self.file = file
+        self.faults = faults
+
+    def __str__(self) -> str:
+        count = f'{len(self.faults)} fault{"s" * (len(self.faults) != 1)}'
+        return '\n'.join([f'{self.file}: {count}', *(f'  {fault}' for fault in self.faults)])
+
+
+def check_finite(path: str, values: object) -> None:
+    """Raise NotFinite unless every number in ``values`` (a number or a tuple of them) is finite."""
+    numbers = values if isinstance(values, tuple) else (values,)
+    if not all(math.isfinite(number) for number in numbers):
+        raise NotFinite(path, values, 'finite numbers')
+
+
+def check_positive(path: str, values: object) -> None:
+    """Raise NotPositive unless every number in ``values`` is finite and above zero."""
+    numbers = values if isinstance(values, tuple) else (values,)
+    check_finite(path, values)
+    if not all(number > 0 for number in numbers):
+        raise NotPositive(path, values, 'above zero')
+
+
+def check_range(path: str, value: float, lower: float, upper: float) -> None:
+    """Raise OutOfRange unless lower <= value <= upper."""
+    if not lower <= value <= upper:
+        raise OutOfRange(path, value, f'{lower:g} to {upper:g}')
+
+
+def set_fields(instance: object, **values: object) -> None:
+    """Set fields of a frozen dataclass while it is being made."""
+    names = {field.name for field in dataclasses.fields(instance)}
+    for name, value in values.items():
+        if name not in names:
+            raise AttributeError(name)
+        object.__setattr__(instance, name, value)

@@ -1,0 +1,362 @@
+"""What a doll is: bones with shapes and masses, joints between them, one tree.
+
+Frozen data, no behaviour but validation. SI units, radians, REP 103: x forward, y left, z up.
+All positions, axes and orientations are given in the doll's frame in the bind pose, the pose
+in which every joint angle is zero. Quaternions are x, y, z, w.
+"""
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import errors, rotation
+from .errors import set_fields
+from .rotation import IDENTITY
+from .shapes import Shape
+from .swing import Swing
+from .vectors import Quaternion, Vector, floats, unit
+
+Limits = tuple[float, float]
+
+DEFAULT_COLOR = (0.5, 0.64, 0.82, 1.0)
+"""Red, green, blue, opacity of a bone that has no colour of its own."""
+
+WORLD = 'world'
+"""Name of the frame that everything is in; no bone may bear it, for frames are told by names."""
+
+
+@dataclass(frozen=True)
+class Bone:
+    """A rigid body: a uniform solid of ``mass`` kg with its centre of mass at ``position``.
+
+    ``orientation`` turns the shape's own axes into the doll's. ``friction``,
+    ``rolling_friction`` (m) and ``restitution`` override the scene's material; None keeps it.
+    ``color`` is red, green, blue, alpha from 0 to 1.
+    """
+
+    name: str
+    shape: Shape
+    mass: float
+    position: Vector
+    orientation: Quaternion = IDENTITY
+    friction: float | None = None
+    rolling_friction: float | None = None
+    restitution: float | None = None
+    color: tuple[float, float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        set_fields(self, mass=float(self.mass), position=floats(self.position),
+                   orientation=unit('orientation', self.orientation))
+        if self.name == WORLD:
+            raise errors.DuplicateName('name', self.name, "a name other than the world frame's")
+        errors.check_positive('mass', self.mass)
+        errors.check_finite('position', self.position)
+        self._check_surface()
+
+    def _check_surface(self) -> None:
+        for key, most in (('friction', math.inf), ('rolling_friction', math.inf),
+                          ('restitution', 1)):
+            if getattr(self, key) is not None:
+                errors.check_range(key, getattr(self, key), 0, most)
+        if self.color is not None:
+            set_fields(self, color=floats(self.color))
+            for part in self.color:
+                errors.check_range('color', part, 0, 1)
+
+    @property
+    def inertia(self) -> Vector:
+        """Principal moments about the centre of mass along the shape's axes, kg m^2."""
+        return self.shape.inertia(self.mass)
+
+
+LARGEST_SWING = math.radians(85)
+"""Largest swing of a limited ball joint: at 90 degrees its three angles lose a freedom."""
+
+
+@dataclass(frozen=True)
+class JointKind:
+    """How many axes a kind of joint names and how many pairs of limits it takes."""
+
+    name: str
+    axes: int
+    limits: int
+    freedoms: int
+
+
+JOINT_KINDS = {kind.name: kind for kind in (
+    JointKind('ball', axes=1, limits=2, freedoms=3),
+    JointKind('hinge', axes=1, limits=1, freedoms=1),
+    JointKind('universal', axes=2, limits=2, freedoms=2),
+    JointKind('fixed', axes=0, limits=0, freedoms=0))}
+
+
+@dataclass(frozen=True)
+class Joint:
+    """What ties ``child`` to ``parent`` at ``anchor``.
+
+    An angle is that of the child relative to the parent, right-handed about its axis.
+
+    - hinge: one axis, one pair of limits.
+    - universal: the first axis is fixed in the parent, the second in the child; they turn in
+      that order and are perpendicular in the bind pose.
+    - ball: one axis, the twist axis; either free, or limited by a swing (-s, s) about each of
+      two axes across it (a pyramid, as in PhysX; s at most 85 degrees) and a twist (-t, t).
+    - fixed: no axes.
+
+    ``limits`` in rad, None for a free axis; kept to 1e-9 degrees, so that files written in
+    degrees read back to the same bits. ``damping`` is in N m s/rad on each axis.
+    """
+
+    parent: str
+    child: str
+    kind: str
+    anchor: Vector
+    axes: tuple[Vector, ...] = ()
+    limits: tuple[Limits | None, ...] = ()
+    damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.kind not in JOINT_KINDS:
+            raise errors.WrongAxes('kind', self.kind, 'one of ' + ', '.join(JOINT_KINDS))
+        kind = JOINT_KINDS[self.kind]
+        set_fields(self, anchor=floats(self.anchor), damping=float(self.damping),
+                   axes=tuple(unit('axes', axis) for axis in self.axes),
+                   limits=tuple(_angles(pair) for pair in self.limits or (None,) * kind.limits))
+        errors.check_finite('anchor', self.anchor)
+        if len(self.axes) != kind.axes:
+            raise errors.WrongAxes('axes', self.axes, f'{kind.axes} for a {self.kind} joint')
+        if len(self.limits) != kind.limits:
+            raise errors.WrongAxes('limits', self.limits, f'{kind.limits} for a {self.kind} joint')
+        if not 0 <= self.damping < math.inf:
+            raise errors.OutOfRange('damping', self.damping, 'zero or above, finite')
+        self._check_limits()
+        if self.kind == 'universal' and abs(np.dot(*self.axes)) > 1e-6:
+            raise errors.WrongAxes('axes', self.axes, 'two perpendicular axes')
+
+    def _check_limits(self) -> None:
+        for index, pair in enumerate(self.limits):
+            path = f'limits[{index}]'
+            if pair is None:
+                continue
+            errors.check_finite(path, pair)
+            if pair[0] > pair[1]:
+                raise errors.LimitsReversed(path, pair, 'lower <= upper')
+            if max(map(abs, pair)) > 2 * math.pi:
+                raise errors.OutOfRange(path, pair, 'within one turn')
+        if self.kind == 'ball' and any(self.limits):
+            self._check_ball(*self.limits)
+
+    def _check_ball(self, swing: Limits | None, twist: Limits | None) -> None:
+        if swing is None or not 0 < swing[1] <= LARGEST_SWING:
+            raise errors.OutOfRange('limits[0]', swing, 'a swing up to 85 degrees, or no limits')
+        for index, pair in enumerate((swing, twist)):
+            if pair and (pair[0] != -pair[1] or pair[1] <= 0):
+                raise errors.WrongAxes(f'limits[{index}]', pair, 'a symmetric pair, [-a, a]')
+
+    @property
+    def is_free_ball(self) -> bool:
+        """Whether a quaternion stands for its turn: a ball joint without limits."""
+        return self.kind == 'ball' and not any(self.limits)
+
+    @property
+    def freedoms(self) -> int:
+        """Number of degrees of freedom."""
+        return JOINT_KINDS[self.kind].freedoms
+
+    @property
+    def angle_names(self) -> tuple[str, ...]:
+        """Name of each joint angle: the child's, with a suffix where there are several."""
+        suffixes = {'universal': ('_1', '_2'), 'ball': ('_x', '_y', '_z')}
+        count = self.freedoms
+        return tuple(self.child + s for s in suffixes.get(self.kind, ('',) * count))
+
+    @property
+    def angle_limits(self) -> tuple[Limits | None, ...]:
+        """Limits of each angle of angle_names, rad; None where it is free."""
+        if self.kind == 'ball':
+            swing, twist = self.limits
+            return (swing, swing, twist)
+        return self.limits
+
+
+@dataclass(frozen=True)
+class Rider:
+    """A bone of the skin's skeleton, fixed on the body that carries it.
+
+    ``bone`` names the carrying bone of the doll; ``position`` (m) and ``orientation`` are those
+    of the rider in that bone's own frame: its centre of mass and its shape's axes. Riders have
+    no mass and meet nothing; they are there so that a skin can follow (see riders.py). Their
+    names are their own: a rider may be called as the bone that carries it.
+    """
+
+    name: str
+    bone: str
+    position: Vector
+    orientation: Quaternion = IDENTITY
+
+    def __post_init__(self) -> None:
+        set_fields(self, position=floats(self.position),
+                   orientation=unit('orientation', self.orientation))
+        errors.check_finite('position', self.position)
+
+
+@dataclass(frozen=True)
+class Ragdoll:
+    """A tree of bones. ``bones`` fixes the order; one of them, the root, has no parent.
+
+    ``swings`` ride on bones and do not act back on them; ``riders`` are what else moves with the
+    bones, in the order of the skeleton they are of. ``model`` is the path of the character that
+    the riders are of, made absolute; nothing here opens it.
+    """
+
+    name: str
+    bones: tuple[Bone, ...]
+    joints: tuple[Joint, ...] = ()
+    swings: tuple[Swing, ...] = ()
+    riders: tuple[Rider, ...] = ()
+    model: str | None = None
+
+    def __post_init__(self) -> None:
+        set_fields(self, bones=tuple(self.bones), joints=tuple(self.joints),
+                   swings=tuple(self.swings), riders=tuple(self.riders),
+                   model=self.model and os.path.abspath(self.model))
+        names = [bone.name for bone in self.bones]
+        edges = [(joint.parent, joint.child) for joint in self.joints]
+        found = tree_faults(names, edges)
+        for key in ('swings', 'riders'):
+            carried = [(each.name, each.bone) for each in getattr(self, key)]
+            found += carried_faults(key, names, carried)
+        for fault in found:
+            raise fault
+
+    @property
+    def extent(self) -> float:
+        """Longest side, m, of the box around the doll as it is bound, along the world's axes."""
+        positions = np.array([bone.position for bone in self.bones])
+        largest = max(max(bone.shape.half_extents) for bone in self.bones)
+        return float(np.ptp(positions, axis=0).max() + 2 * largest)
+
+    @property
+    def root(self) -> Bone:
+        """The bone without a parent."""
+        children = {joint.child for joint in self.joints}
+        return next(bone for bone in self.bones if bone.name not in children)
+
+    @property
+    def mass(self) -> float:
+        """Total mass, kg."""
+        return sum(bone.mass for bone in self.bones)
+
+    def bone(self, name: str) -> Bone:
+        """Find a bone by its name; UnknownBone if there is none."""
+        for bone in self.bones:
+            if bone.name == name:
+                return bone
+        raise errors.UnknownBone('', name, 'one of ' + ', '.join(b.name for b in self.bones))
+
+    def joints_from_root(self) -> tuple[Joint, ...]:
+        """Give all joints, each parent's before its children's."""
+        below: dict[str, list[Joint]] = {}
+        for joint in self.joints:
+            below.setdefault(joint.parent, []).append(joint)
+        ordered: list[Joint] = []
+        names = [self.root.name]
+        for name in names:
+            for joint in below.get(name, ()):
+                ordered.append(joint)
+                names.append(joint.child)
+        return tuple(ordered)
+
+    def joints_depth_first(self) -> tuple[Joint, ...]:
+        """Give all joints, each one's whole branch before the next, as engines count them."""
+        below: dict[str, list[Joint]] = {}
+        for joint in reversed(self.joints):
+            below.setdefault(joint.parent, []).append(joint)
+        ordered: list[Joint] = []
+        waiting = below.pop(self.root.name, [])
+        while waiting:
+            ordered.append(waiting.pop())
+            waiting += below.pop(ordered[-1].child, [])
+        return tuple(ordered)
+
+    def replace_bone(self, name: str, **changes: object) -> Ragdoll:
+        """Give the same doll with one bone changed."""
+        self.bone(name)
+        bones = tuple(dataclasses.replace(bone, **changes) if bone.name == name else bone
+                      for bone in self.bones)
+        return dataclasses.replace(self, bones=bones)
+
+    def renamed(self, rename: Callable[[str], str]) -> Ragdoll:
+        """Give the same doll with every bone named anew."""
+        bones = tuple(dataclasses.replace(bone, name=rename(bone.name)) for bone in self.bones)
+        joints = tuple(dataclasses.replace(joint, parent=rename(joint.parent),
+                                           child=rename(joint.child)) for joint in self.joints)
+        return dataclasses.replace(self, bones=bones, joints=joints)
+
+
+def tree_faults(names: list[str], edges: list[tuple[str, str]]) -> list[errors.Fault]:
+    """Find all that keeps (parent, child) edges from being one tree over the named bones."""
+    found: list[errors.Fault] = []
+    if not names:
+        found.append(errors.Detached('bones', names, 'at least one bone'))
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            found.append(errors.DuplicateName(f'bones[{index}].name', name, 'a name of its own'))
+    parent_of: dict[str, str] = {}
+    for index, (parent, child) in enumerate(edges):
+        for end, name in (('parent', parent), ('child', child)):
+            if name not in names:
+                expected = 'one of ' + ', '.join(names)
+                found.append(errors.UnknownBone(f'joints[{index}].{end}', name, expected))
+        if child in parent_of:
+            found.append(errors.ConnectedTwice(
+                f'joints[{index}].child', child, 'a bone that has no parent yet'))
+        elif _reaches(parent_of, parent, child):
+            found.append(errors.JointCycle(
+                f'joints[{index}]', f'{parent} -> {child}', 'joints that close no ring'))
+        else:
+            parent_of[child] = parent
+    roots = [name for name in dict.fromkeys(names) if name not in parent_of]
+    if len(roots) > 1 and not found:
+        found.append(errors.Detached('joints', roots, 'one bone alone without a parent'))
+    return found
+
+
+def carried_faults(key: str, names: list[str],
+                   carried: list[tuple[str, str]]) -> list[errors.Fault]:
+    """Find what of (name, carrying bone) rides on no bone or shares a name."""
+    found: list[errors.Fault] = []
+    known, seen = set(names), set()
+    for index, (name, bone) in enumerate(carried):
+        if bone not in known:
+            expected = 'one of ' + ', '.join(names)
+            found.append(errors.UnknownBone(f'{key}[{index}].bone', bone, expected))
+        if name in seen:
+            found.append(errors.DuplicateName(f'{key}[{index}].name', name, 'a name of its own'))
+        seen.add(name)
+    return found
+
+
+def joint_frame(joint: Joint) -> np.ndarray:
+    """Orientation (4,) of a joint's frame in the doll's: of a ball joint, z is the twist axis."""
+    if joint.kind != 'ball':
+        return np.array(rotation.IDENTITY)
+    return rotation.shortest_arc(np.array([0.0, 0.0, 1.0]), np.array(joint.axes[0]))
+
+
+def _reaches(parent_of: dict[str, str], start: str, goal: str) -> bool:
+    """Tell whether ``goal`` is ``start`` itself or one of its ancestors."""
+    while start != goal and start in parent_of:
+        start = parent_of[start]
+    return start == goal
+
+
+def _angles(pair: Limits | None) -> Limits | None:
+    if pair is None:
+        return None
+    return floats(math.radians(round(math.degrees(angle), 9)) for angle in pair)

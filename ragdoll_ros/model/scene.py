@@ -1,0 +1,186 @@
+"""What a scene needs: dolls and where they stand, ground, material, gravity, tick.
+
+Frozen data with validation; reading and writing files is in files/scene.py.
+SI units, world frame: x forward, y left, z up (REP 103). Quaternions are x, y, z, w.
+"""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from . import errors, rotation
+from .errors import set_fields
+from .ragdoll import Bone, Ragdoll
+from .rotation import IDENTITY
+from .vectors import Quaternion, Vector, floats
+
+SECOND = 1_000_000_000
+"""Nanoseconds in a second: time is counted in whole nanoseconds, as in ROS."""
+
+STEP_RANGE = (0.0002, 0.2)
+"""Shortest and longest tick, s."""
+
+NO_SLIP = 0.7
+"""Coefficient that stands for friction without limit: no slip up to 35 degrees. PyBullet's solver
+takes turns between a contact's normal and its friction, and where a larger one pulls the contact
+open (from 4/3 on for a rod, from less for a chain) they swing ever wider: at 10, and now and then
+at 0.8, a sliding contact bore nothing in every solution with an even number of turns."""
+
+LARGEST_FRICTION = 10.0
+"""Coefficient that finite ones are capped at, as PyBullet does."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """Contact of everything with everything, unless a bone has its own.
+
+    ``friction`` is Coulomb's coefficient (infinity: no slip, as far as an engine can: NO_SLIP),
+    ``rolling_friction`` a lever arm in m, ``restitution`` the speed after over the speed
+    before a bounce, which acts above an approach speed of ``restitution_speed`` m/s.
+    """
+
+    friction: float = math.inf
+    rolling_friction: float = 0.0
+    restitution: float = 0.5
+    restitution_speed: float = 0.001
+
+    def __post_init__(self) -> None:
+        errors.check_range('friction', self.friction, 0, math.inf)
+        errors.check_range('rolling_friction', self.rolling_friction, 0, 1e6)
+        errors.check_range('restitution', self.restitution, 0, 1)
+        errors.check_range('restitution_speed', self.restitution_speed, 0, 1e6)
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The plane of points p with normal . p = offset (m); the normal points out of the ground."""
+
+    normal: Vector = (0.0, 0.0, 1.0)
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        normal = floats(self.normal)
+        errors.check_finite('normal', normal)
+        length = math.hypot(*normal)
+        if length < 1e-9:
+            raise errors.NotUnit('normal', normal, 'a direction, not zero')
+        set_fields(self, normal=floats(n / length for n in normal), offset=float(self.offset))
+        errors.check_finite('offset', self.offset)
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A doll in the world: where its frame stands, and how the doll moves at the start.
+
+    ``velocity`` (m/s) is that of its centre of mass, ``spin`` (rad/s) turns it as one rigid
+    body about its centre of mass; both in the world frame.
+    """
+
+    doll: Ragdoll
+    name: str = ''
+    position: Vector = (0.0, 0.0, 0.0)
+    orientation: Quaternion = IDENTITY
+    velocity: Vector = (0.0, 0.0, 0.0)
+    spin: Vector = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for key in ('position', 'velocity', 'spin'):
+            set_fields(self, **{key: floats(getattr(self, key))})
+            errors.check_finite(key, getattr(self, key))
+        orientation = floats(self.orientation)
+        errors.check_finite('orientation', orientation)
+        length = math.hypot(*orientation)
+        if length < 1e-9:
+            raise errors.NotUnit('orientation', orientation, 'a quaternion x, y, z, w, not zero')
+        if abs(length - 1) > 1e-15:
+            orientation = floats(value / length for value in orientation)
+        set_fields(self, orientation=orientation, name=self.name or self.doll.name)
+
+    def bone_pose(self, bone: Bone) -> tuple[np.ndarray, np.ndarray]:
+        """Position (3,) m and orientation (4,) of a bone at the start, world frame."""
+        turn = np.array(self.orientation)
+        position = self.position + rotation.rotate(turn, bone.position)
+        return position, rotation.multiply(turn, bone.orientation)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All that a simulation needs to begin.
+
+    ``step`` is one tick in s, ``pace`` the seconds of the scene for each second on the wall,
+    ``gravity`` in m/s^2. No ground: nothing to fall on, and none in the engine.
+    """
+
+    name: str
+    dolls: tuple[Placement, ...]
+    ground: Ground | None = None
+    material: Material = field(default_factory=Material)
+    gravity: Vector = (0.0, 0.0, -9.8)
+    step: float = 0.01
+    pace: float = 1.0
+    self_collision: bool = True
+
+    def __post_init__(self) -> None:
+        set_fields(self, dolls=tuple(self.dolls), gravity=floats(self.gravity))
+        if not self.dolls:
+            raise errors.WrongForm('dolls', (), 'at least one doll')
+        errors.check_finite('gravity', self.gravity)
+        errors.check_range('step', self.step, *STEP_RANGE)
+        errors.check_positive('pace', self.pace)
+        names = [placement.name for placement in self.dolls]
+        for index, name in enumerate(names):
+            if name in names[:index]:
+                raise errors.DuplicateName(f'dolls[{index}].name', name, 'a name of its own')
+
+    @cached_property
+    def bones(self) -> tuple[Bone, ...]:
+        """Every bone, doll by doll: the order of all arrays."""
+        return tuple(bone for placement in self.dolls for bone in placement.doll.bones)
+
+    @cached_property
+    def bone_names(self) -> tuple[str, ...]:
+        """Name of every bone; with several dolls, doll/bone."""
+        return tuple(self.qualified(placement, bone.name)
+                     for placement in self.dolls for bone in placement.doll.bones)
+
+    @cached_property
+    def angle_names(self) -> tuple[str, ...]:
+        """Name of every joint angle, doll by doll, joint by joint as the doll lists them."""
+        return tuple(self.qualified(placement, name) for placement in self.dolls
+                     for joint in placement.doll.joints for name in joint.angle_names)
+
+    def qualified(self, placement: Placement, name: str) -> str:
+        """Name of a doll's bone or angle that is unique in the scene."""
+        return name if len(self.dolls) == 1 else f'{placement.name}/{name}'
+
+    def bone_index(self, name: str) -> int:
+        """Index of a bone in all arrays; UnknownBone if there is none of that name."""
+        try:
+            return self.bone_names.index(name)
+        except ValueError:
+            expected = 'one of ' + ', '.join(self.bone_names)
+            raise errors.UnknownBone('', name, expected) from None
+
+
+def height(bone: Bone, position: np.ndarray, orientation: np.ndarray, ground: Ground) -> float:
+    """Distance of a bone's lowest point from the ground, m; negative inside it."""
+    normal = np.array(ground.normal)
+    inward = rotation.rotate(rotation.inverse(orientation), -normal)
+    return float(position @ normal - ground.offset - bone.shape.reach(inward))
+
+
+def above_ground(doll: Ragdoll, clearance: float = 0.4) -> Scene:
+    """Give a scene of one doll over level ground, its lowest point ``clearance`` m above it."""
+    ground = Ground()
+    placement = Placement(doll)
+    lowest = min(height(bone, *placement.bone_pose(bone), ground) for bone in doll.bones)
+    lift = round(clearance - lowest, 12)
+    return Scene(doll.name, (Placement(doll, position=(0.0, 0.0, lift)),), ground)
+
+
+def grip(friction: float) -> float:
+    """Give the coefficient of friction that an engine is to work with."""
+    return NO_SLIP if math.isinf(friction) else min(friction, LARGEST_FRICTION)

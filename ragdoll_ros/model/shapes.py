@@ -1,0 +1,284 @@
+"""Shapes of bones: sphere, box, cylinder, capsule; each a uniform solid in its own axes, in m.
+
+A new shape is a class here: what draws, weighs, fits and writes files goes by these methods alone.
+"""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from . import errors
+from .errors import set_fields
+from .vectors import Vector, floats
+
+SEGMENTS = 20
+"""Corners of a circle in a mesh."""
+
+
+class Solid:
+    """What all shapes have in common; each has a ``kind`` and a ``support``."""
+
+    kind: ClassVar[str]
+    support: tuple[float, ...]
+
+    @property
+    def primitives(self) -> tuple[Primitive, ...]:
+        """What it is drawn as."""
+        return (Primitive(self),)
+
+    def reach(self, direction: np.ndarray) -> np.ndarray:
+        """How far (...,) m it extends along unit directions (..., 3) of its own axes."""
+        return support_distance(np.array(self.support), np.asarray(direction, float))
+
+
+@dataclass(frozen=True)
+class Primitive:
+    """A box, cylinder or sphere with its centre at ``offset`` m along the shape's own axes.
+
+    Every viewer knows these three, and every shape is made up of them.
+    """
+
+    shape: Shape
+    offset: Vector = (0.0, 0.0, 0.0)
+
+    @property
+    def kind(self) -> str:
+        """'box', 'cylinder' (along z) or 'sphere'."""
+        return self.shape.kind
+
+    @property
+    def size(self) -> Vector:
+        """Edges, or diameters and length, m."""
+        return floats(2 * half for half in self.shape.half_extents)
+
+
+@dataclass(frozen=True)
+class Sphere(Solid):
+    """A solid ball of ``radius`` m."""
+
+    radius: float
+    kind: ClassVar[str] = 'sphere'
+
+    def __post_init__(self) -> None:
+        errors.check_positive('sphere', self.radius)
+
+    @property
+    def volume(self) -> float:
+        """Volume in m^3."""
+        return 4 / 3 * math.pi * self.radius ** 3
+
+    @property
+    def half_extents(self) -> Vector:
+        """Half the size of the bounding box along the shape's own axes, m."""
+        return (self.radius,) * 3
+
+    @property
+    def support(self) -> tuple[float, ...]:
+        """Terms (6,) m of the support function; see support_distance."""
+        return (0.0, 0.0, 0.0, 0.0, self.radius, 0.0)
+
+    def inertia(self, mass: float) -> Vector:
+        """Principal moments of the uniform solid about its centre, kg m^2."""
+        return (0.4 * mass * self.radius ** 2,) * 3
+
+    def signed_distance(self, points: np.ndarray) -> np.ndarray:
+        """Distance (p,) m of points (p, 3) from the surface; zero or less inside."""
+        return np.linalg.norm(points, axis=1) - self.radius
+
+    def mesh(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (p, 3) m and triangles (t, 3), counter-clockwise as seen from outside."""
+        angles = _half_circle()
+        return _revolved(self.radius * np.cos(angles), self.radius * np.sin(angles))
+
+
+@dataclass(frozen=True)
+class Box(Solid):
+    """A solid box with full edge lengths ``size`` m along its x, y and z."""
+
+    size: Vector
+    kind: ClassVar[str] = 'box'
+
+    def __post_init__(self) -> None:
+        set_fields(self, size=floats(self.size))
+        errors.check_positive('box', self.size)
+
+    @property
+    def volume(self) -> float:
+        """Volume in m^3."""
+        return math.prod(self.size)
+
+    @property
+    def half_extents(self) -> Vector:
+        """Half the edge lengths, m."""
+        return floats(edge / 2 for edge in self.size)
+
+    @property
+    def support(self) -> tuple[float, ...]:
+        """Terms (6,) m of the support function; see support_distance."""
+        return (*self.half_extents, 0.0, 0.0, 0.0)
+
+    def inertia(self, mass: float) -> Vector:
+        """Principal moments of the uniform solid about its centre, kg m^2."""
+        xx, yy, zz = (edge * edge for edge in self.size)
+        return (mass * (yy + zz) / 12, mass * (xx + zz) / 12, mass * (xx + yy) / 12)
+
+    def signed_distance(self, points: np.ndarray) -> np.ndarray:
+        """Distance (p,) m of points (p, 3) from the surface; zero or less inside."""
+        return _beyond_faces(np.abs(points) - np.array(self.half_extents))
+
+    def mesh(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (p, 3) m and triangles (t, 3), counter-clockwise as seen from outside."""
+        signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+        quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4],
+                          [1, 5, 7, 3]])
+        triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+        return signs * np.array(self.half_extents), triangles
+
+
+@dataclass(frozen=True)
+class Cylinder(Solid):
+    """A solid cylinder along its own z: ``radius`` and full ``length``, m."""
+
+    radius: float
+    length: float
+    kind: ClassVar[str] = 'cylinder'
+
+    def __post_init__(self) -> None:
+        errors.check_positive('cylinder', (self.radius, self.length))
+
+    @property
+    def volume(self) -> float:
+        """Volume in m^3."""
+        return math.pi * self.radius ** 2 * self.length
+
+    @property
+    def half_extents(self) -> Vector:
+        """Half the size of the bounding box along the shape's own axes, m."""
+        return (self.radius, self.radius, self.length / 2)
+
+    @property
+    def support(self) -> tuple[float, ...]:
+        """Terms (6,) m of the support function; see support_distance."""
+        return (0.0, 0.0, 0.0, self.length / 2, 0.0, self.radius)
+
+    def inertia(self, mass: float) -> Vector:
+        """Principal moments of the uniform solid about its centre, kg m^2."""
+        across = mass * (3 * self.radius ** 2 + self.length ** 2) / 12
+        return (across, across, mass * self.radius ** 2 / 2)
+
+    def signed_distance(self, points: np.ndarray) -> np.ndarray:
+        """Distance (p,) m of points (p, 3) from the surface; zero or less inside."""
+        return _beyond_faces(np.stack([np.linalg.norm(points[:, :2], axis=1) - self.radius,
+                                       np.abs(points[:, 2]) - self.length / 2], axis=1))
+
+    def mesh(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (p, 3) m and triangles (t, 3), counter-clockwise as seen from outside."""
+        radii = np.array([0, self.radius, self.radius, 0])
+        return _revolved(radii, np.array([-1, -1, 1, 1]) * self.length / 2)
+
+
+@dataclass(frozen=True)
+class Capsule(Solid):
+    """A cylinder along its own z of ``length`` m between two half balls of ``radius`` m.
+
+    The whole is length + 2 radius long, as in MuJoCo, PyBullet and SDF.
+    """
+
+    radius: float
+    length: float
+    kind: ClassVar[str] = 'capsule'
+
+    def __post_init__(self) -> None:
+        errors.check_positive('capsule', (self.radius, self.length))
+
+    @property
+    def volume(self) -> float:
+        """Volume in m^3."""
+        return math.pi * self.radius ** 2 * (self.length + 4 / 3 * self.radius)
+
+    @property
+    def half_extents(self) -> Vector:
+        """Half the size of the bounding box along the shape's own axes, m."""
+        return (self.radius, self.radius, self.length / 2 + self.radius)
+
+    @property
+    def support(self) -> tuple[float, ...]:
+        """Terms (6,) m of the support function; see support_distance."""
+        return (0.0, 0.0, 0.0, self.length / 2, self.radius, 0.0)
+
+    @property
+    def primitives(self) -> tuple[Primitive, ...]:
+        """What it is drawn as: a cylinder between two balls."""
+        end = self.length / 2
+        return (Primitive(Cylinder(self.radius, self.length)),
+                *(Primitive(Sphere(self.radius), (0.0, 0.0, z)) for z in (end, -end)))
+
+    def inertia(self, mass: float) -> Vector:
+        """Principal moments of the uniform solid about its centre, kg m^2.
+
+        The sum of a cylinder and two half balls, each half ball moved by Steiner's theorem
+        from the flat face to the end of the cylinder (centre of mass 3/8 r off the face).
+        """
+        r, length = self.radius, self.length
+        barrel = mass * length / (length + 4 / 3 * r)
+        balls = mass - barrel
+        along = barrel * r * r / 2 + balls * 0.4 * r * r
+        across = (barrel * (3 * r * r + length * length) / 12
+                  + balls * (0.4 * r * r + length * length / 4 + 3 / 8 * length * r))
+        return (across, across, along)
+
+    def signed_distance(self, points: np.ndarray) -> np.ndarray:
+        """Distance (p,) m of points (p, 3) from the surface; zero or less inside."""
+        along = np.maximum(np.abs(points[:, 2]) - self.length / 2, 0)
+        return np.hypot(np.linalg.norm(points[:, :2], axis=1), along) - self.radius
+
+    def mesh(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (p, 3) m and triangles (t, 3), counter-clockwise as seen from outside."""
+        angles = _half_circle()
+        heights = self.radius * np.sin(angles)
+        return _revolved(self.radius * np.cos(angles),
+                         heights + np.where(angles < 0, -1, 1) * self.length / 2)
+
+
+Shape = Sphere | Box | Cylinder | Capsule
+SHAPES: dict[str, type] = {shape.kind: shape for shape in (Sphere, Box, Cylinder, Capsule)}
+
+
+def support_distance(support: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Support function: how far (...,) m shapes extend along unit directions of their own axes.
+
+    ``support`` (..., 6) m are half edges along x, y and z, half the length of an axis along z, a
+    radius all round and one across z; ``direction`` (..., 3).
+    """
+    down = np.abs(direction)
+    across = np.sqrt(np.maximum(0, 1 - down[..., 2] ** 2))
+    edges, along, rounds, rims = (support[..., :3], support[..., 3], support[..., 4],
+                                  support[..., 5])
+    return (edges * down).sum(axis=-1) + along * down[..., 2] + rounds + rims * across
+
+
+def _beyond_faces(beyond: np.ndarray) -> np.ndarray:
+    """Signed distance (p,) from how far beyond each pair of faces points are, (p, k)."""
+    inside = np.minimum(beyond.max(axis=1), 0)
+    return np.linalg.norm(np.maximum(beyond, 0), axis=1) + inside
+
+
+def _half_circle() -> np.ndarray:
+    return np.linspace(-np.pi / 2, np.pi / 2, SEGMENTS // 2)
+
+
+def _revolved(radii: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Surface of revolution about z of a profile that runs upwards."""
+    turn = np.linspace(0, 2 * np.pi, SEGMENTS, endpoint=False)
+    circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    rings = np.concatenate([radii[:, None, None] * circle,
+                            np.broadcast_to(heights[:, None, None], (len(radii), SEGMENTS, 1))], 2)
+    index = np.arange(len(radii) * SEGMENTS).reshape(len(radii), SEGMENTS)
+    low, high = index[:-1], index[1:]
+    after_low, after_high = np.roll(low, -1, axis=1), np.roll(high, -1, axis=1)
+    triangles = np.concatenate([np.stack([low, after_low, after_high], -1).reshape(-1, 3),
+                                np.stack([low, after_high, high], -1).reshape(-1, 3)])
+    return rings.reshape(-1, 3), triangles

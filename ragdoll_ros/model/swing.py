@@ -1,0 +1,111 @@
+"""What a swing is: a chain of point masses on massless rods, rooted at a point of a bone.
+
+Frozen data, no behaviour but validation. SI units. As everywhere in a doll, points and
+directions are given in the doll's frame in the bind pose.
+
+- ``stiffness`` k, N m/rad: the torque on a link is k times the angle between it and its rest
+  direction, along the shortest way back. The rest direction of the first link is fixed in the
+  bone, that of each further one in the link before it.
+- ``damping`` zeta, a ratio: the torque against turning relative to the same frame is
+  2 zeta J sqrt(k/J + share g/reach) times the rate, with J and reach as in swings.py (m l^2
+  and l for a single mass). 1 is critical where gravity pulls along the rest direction, and
+  more than critical elsewhere; 0 loses nothing.
+- ``gravity``: the share of the scene's gravity that acts, 1 as on a real mass, 0 for none;
+  negative values rise.
+
+The bone's own motion always acts in full: a mass keeps its place in the world until its rod,
+its spring and gravity move it.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from . import errors
+from .errors import set_fields
+from .vectors import Vector, floats, unit
+
+MODES = ('spring', 'pendulum', 'free')
+LENGTHS = (1e-3, 1e3)
+"""Shortest and longest rod, m: the shortest still swings slowly enough to be resolved."""
+MASSES = (1e-9, 1e6)
+STIFFEST = 1e15
+MOST_DAMPED = 1e4
+LARGEST_SHARE = 10.0
+
+
+@dataclass(frozen=True)
+class Link:
+    """A massless rod of ``length`` m with a point ``mass`` (kg) at its end.
+
+    ``direction`` is where it points at rest (doll's frame, bind pose); None: as its swing's.
+    """
+
+    length: float
+    mass: float = 1.0
+    stiffness: float = 0.0
+    damping: float = 0.0
+    direction: Vector | None = None
+
+    def __post_init__(self) -> None:
+        set_fields(self, **{key: float(getattr(self, key))
+                            for key in ('length', 'mass', 'stiffness', 'damping')})
+        errors.check_range('length', self.length, *LENGTHS)
+        errors.check_range('mass', self.mass, *MASSES)
+        errors.check_range('stiffness', self.stiffness, 0, STIFFEST)
+        errors.check_range('damping', self.damping, 0, MOST_DAMPED)
+        if self.direction is not None:
+            set_fields(self, direction=unit('direction', self.direction))
+
+
+@dataclass(frozen=True)
+class Swing:
+    """A chain of ``links`` that hangs from the point ``root`` (m) of ``bone``.
+
+    ``mode``: 'spring' (each link is drawn back to its rest direction), 'pendulum' (no springs),
+    'free' (each mass falls as a body by itself, from its place at rest with ``velocity`` m/s,
+    world axes; only then does the velocity count).
+    """
+
+    name: str
+    bone: str
+    root: Vector
+    direction: Vector
+    links: tuple[Link, ...]
+    gravity: float = 1.0
+    mode: str = 'spring'
+    velocity: Vector = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        set_fields(self, root=floats(self.root), direction=unit('direction', self.direction),
+                   links=tuple(self.links), gravity=float(self.gravity),
+                   velocity=floats(self.velocity))
+        errors.check_finite('root', self.root)
+        errors.check_finite('velocity', self.velocity)
+        errors.check_range('gravity', self.gravity, -LARGEST_SHARE, LARGEST_SHARE)
+        if self.mode not in MODES:
+            raise errors.WrongForm('mode', self.mode, 'one of ' + ', '.join(MODES))
+        if not self.links:
+            raise errors.WrongForm('links', (), 'at least one link')
+        for index, link in enumerate(self.links):
+            if self.mode != 'spring' and link.stiffness:
+                raise errors.WrongForm(f'links[{index}].stiffness', link.stiffness,
+                                       f'0 for a {self.mode}, or mode: spring')
+        if self.mode != 'free' and any(self.velocity):
+            raise errors.WrongForm('velocity', self.velocity, 'none, or mode: free')
+
+    def directions(self) -> tuple[Vector, ...]:
+        """Give each link's direction at rest (doll's frame, bind pose)."""
+        return tuple(link.direction or self.direction for link in self.links)
+
+
+def strand(links: int, length: float, mass: float = 0.1,
+           stiffness: float | tuple[float, float] = 0.0, damping: float = 0.0) -> tuple[Link, ...]:
+    """Give ``links`` equal links that share ``length`` m and ``mass`` kg.
+
+    ``stiffness`` (N m/rad) goes linearly from the root's to the tip's; one number is both.
+    """
+    errors.check_range('links', links, 1, 1000)
+    root, tip = stiffness if isinstance(stiffness, (tuple, list)) else (stiffness, stiffness)
+    along = [index / max(links - 1, 1) for index in range(links)]
+    return tuple(Link(length / links, mass / links, root + (tip - root) * part, damping)
+                 for part in along)

@@ -1,0 +1,61 @@
+"""What can be compiled or done by numpy, made here the one way or the other."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .kernels import ready
+
+if TYPE_CHECKING:
+    from ..model.coordinates import Layout
+    from ..model.scene import Scene
+    from .engine.protocol import Engine
+    from .flight import Dynamics
+    from .plain.conservation import Guard
+    from .plain.limits import JointLimits
+    from .plain.mechanics import Mechanics
+    from .plain.reach import Reach
+
+
+def dynamics_of(scene: Scene, make_engine: type[Engine], layout: Layout) -> Dynamics:
+    """The equations of motion of a scene in the air."""
+    if ready():
+        from .dynamics import CompiledDynamics
+        return CompiledDynamics(scene)
+    from .plain.flight import EngineDynamics
+    return EngineDynamics(scene, make_engine, layout)
+
+
+def mechanics_of(scene: Scene) -> Mechanics:
+    """Sums over the bones of each doll."""
+    if ready():
+        from .mechanics import CompiledMechanics
+        return CompiledMechanics(scene)
+    from .plain.mechanics import Mechanics
+    return Mechanics(scene)
+
+
+def guard_of(scene: Scene, mechanics: Mechanics, layout: Layout) -> Guard:
+    """Who keeps energy and momentum."""
+    if ready():
+        from .conservation import CompiledGuard
+        return CompiledGuard(scene, mechanics, layout)
+    from .plain.conservation import Guard
+    return Guard(scene, mechanics, layout)
+
+
+def limits_of(layout: Layout) -> JointLimits:
+    """What joint limits have to say."""
+    if ready():
+        from .limits import CompiledLimits
+        return CompiledLimits(layout)
+    from .plain.limits import JointLimits
+    return JointLimits(layout)
+
+
+def reach_of(scene: Scene) -> Reach:
+    """What bones can reach."""
+    if ready():
+        from .reach import CompiledReach
+        return CompiledReach(scene)
+    from .plain.reach import Reach
+    return Reach(scene)

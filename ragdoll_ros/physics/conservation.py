@@ -1,0 +1,30 @@
+"""Energy and momentum are kept, compiled."""
+from __future__ import annotations
+
+import numpy as np
+
+from ..model.state import State
+from .kernels.loaded import kernels
+from .motion import Motion
+from .plain.conservation import Guard
+
+
+class CompiledGuard(Guard):
+    """Keeps the momentum in one go."""
+
+    def keep_momentum(self, state: State, before: Motion, after: Motion, duration: float,
+                      impulse: np.ndarray | float = 0.0, moment: np.ndarray | float | None = 0.0,
+                      touched: np.ndarray | None = None
+                      ) -> tuple[State, Motion, np.ndarray | None]:
+        """Give state and motion with the momentum that is due."""
+        if self._single.any():
+            return super().keep_momentum(state, before, after, duration, impulse, moment, touched)
+        dolls, given = len(self._single), np.zeros((len(self._single), 6))
+        given[:, :3] = impulse
+        given[:, 3:] = 0.0 if moment is None else moment
+        rows, sums = state.rows.copy(), after.sums.copy()
+        kernels.keep_momentum(
+            self._mechanics.doll_masses, self._mechanics.doll_of, self._gravity, duration, given,
+            moment is not None, np.zeros(dolls, bool) if touched is None else touched,
+            before.sums, sums, rows)
+        return State.of(rows), Motion.of(sums), None

@@ -1,0 +1,33 @@
+"""How far joints come apart: the distance of an anchor as its two bones see it."""
+from __future__ import annotations
+
+import numpy as np
+
+from ..model import rotation
+from ..model.scene import Scene
+from ..model.state import State
+
+
+class JointGap:
+    """Anchors of all j joints of a scene, along the axes of the two bones each ties."""
+
+    def __init__(self, scene: Scene) -> None:
+        bones, points = [], []
+        first = 0
+        for placement in scene.dolls:
+            index = {bone.name: i for i, bone in enumerate(placement.doll.bones)}
+            for joint in placement.doll.joints:
+                pair = [placement.doll.bone(name) for name in (joint.parent, joint.child)]
+                bones.append([first + index[bone.name] for bone in pair])
+                points.append([rotation.rotate(rotation.inverse(bone.orientation),
+                                               np.subtract(joint.anchor, bone.position))
+                               for bone in pair])
+            first += len(index)
+        self._bones = np.array(bones, int).reshape(-1, 2)
+        self._points = np.array(points).reshape(-1, 2, 3)
+
+    def gaps(self, state: State) -> np.ndarray:
+        """Distances (j,) m, joint by joint as the dolls list them."""
+        seen = (state.positions[self._bones]
+                + rotation.rotate(state.orientations[self._bones], self._points))
+        return np.linalg.norm(seen[:, 0] - seen[:, 1], axis=-1)

@@ -1,0 +1,37 @@
+"""Compiles what every simulation calls, so that no program has to do it at its first start."""
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+
+from . import SWITCH, ready
+
+EXAMPLE = """examples:
+  python -m ragdoll_ros.physics.kernels
+  NUMBA_CACHE_DIR=/var/cache/ragdoll python -m ragdoll_ros.physics.kernels  keeps the result there;
+                                           nodes that are to find it want the same variable,
+                                           and must be able to write there, as numba asks for it
+"""
+
+NOT_READY = ("Nothing to compile with: pip install 'ragdoll_ros[fast]' gets numba, and all works "
+             f'without. (Or {SWITCH}=0 is set.)')
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command; the exit code: 2 if nothing can be compiled."""
+    argparse.ArgumentParser(
+        'python -m ragdoll_ros.physics.kernels', description=__doc__, epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter).parse_args(arguments)
+    if not ready():
+        print(NOT_READY, file=sys.stderr)
+        return 2
+    began = time.monotonic()
+    from . import cache, loaded  # noqa: F401  importing compiles
+    kept = f'kept in {cache.FOLDER}' if cache.KEPT else 'kept nowhere'
+    print(f'The dynamics are compiled: {time.monotonic() - began:.1f} s, {kept}')
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Hair, tails and straps: cheap pendulums and springs that ride on bones."""

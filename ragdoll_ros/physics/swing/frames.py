@@ -1,0 +1,148 @@
+"""The motion of the bones that swings ride on: known at ticks, interpolated between them."""
+from __future__ import annotations
+
+import bisect
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model import rotation
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Poses and velocities of n bones at one instant, world frame, float64.
+
+    A point p of a bone is in the world at position + orientation (scale p).
+    """
+
+    positions: np.ndarray
+    """(n, 3) m."""
+    orientations: np.ndarray
+    """(n, 4) unit quaternions x, y, z, w."""
+    linear: np.ndarray
+    """(n, 3) m/s."""
+    angular: np.ndarray
+    """(n, 3) rad/s, world axes."""
+    scales: np.ndarray
+    """(n, 3) factors along the bone's own axes."""
+
+    @classmethod
+    def of(cls, state: object, scales: np.ndarray | None = None) -> Frames:
+        """Give the frames of a State (or of anything with its fields)."""
+        if scales is None:
+            scales = np.ones_like(state.positions)
+        return cls(state.positions, state.orientations, state.linear, state.angular, scales)
+
+    @classmethod
+    def still(cls, count: int = 1) -> Frames:
+        """Give frames that stand at the world's origin."""
+        turns = np.tile(rotation.IDENTITY, (count, 1))
+        zero = np.zeros((count, 3))
+        return cls(zero, turns, zero, zero, np.ones((count, 3)))
+
+
+class Track:
+    """Frames over time: told at ticks, asked between them, as far back as ``memory`` s.
+
+    Called with a time it gives frames on the cubic Hermite path through the two told around it:
+    in position by their velocities; in orientation by a cubic rotation vector whose rates at
+    both ends are the angular velocities there. Fourth order in the ticks' spacing; velocities
+    too are the path's. Of the turns that lead from one orientation to the next it takes the one
+    nearest to what the angular velocities say. Outside of what was told it stands still.
+    """
+
+    def __init__(self, memory: float = 0.02) -> None:
+        self._memory = memory
+        self._times: list[float] = []
+        self._told: list[Frames] = []
+
+    def tell(self, time: float, frames: Frames) -> None:
+        """Add the frames at ``time`` s; a time not later than the last begins a new track."""
+        if self._times and time <= self._times[-1]:
+            self._times.clear()
+            self._told.clear()
+        old = max(bisect.bisect_right(self._times, time - self._memory) - 1, 0)
+        del self._times[:old], self._told[:old]
+        self._times.append(time)
+        self._told.append(frames)
+
+    def __call__(self, time: float) -> Frames:
+        """Give the frames at ``time`` s."""
+        index = bisect.bisect_left(self._times, time)
+        if index == len(self._times):
+            return self._told[-1]
+        if index == 0 or self._times[index] == time:
+            return self._told[index]
+        begin, end = self._times[index - 1], self._times[index]
+        return between(self._told[index - 1], self._told[index], end - begin,
+                       (time - begin) / (end - begin))
+
+
+def between(first: Frames, last: Frames, span: float, part: float) -> Frames:
+    """Frames at ``part`` (0 to 1) of a path of ``span`` s from the one to the other."""
+    positions, linear = _hermite(first.positions, last.positions, first.linear, last.linear,
+                                 span, part)
+    turn = _turn(first, last, span)
+    zero = np.zeros_like(turn)
+    ending = _rate_of_vector(turn, last.angular)
+    vector, rate = _hermite(zero, turn, first.angular, ending, span, part)
+    return Frames(positions, rotation.multiply(rotation.from_rotation_vector(vector),
+                                               first.orientations),
+                  linear, _rate_of_turn(vector, rate),
+                  first.scales + (last.scales - first.scales) * part)
+
+
+def _hermite(a: np.ndarray, b: np.ndarray, a_rate: np.ndarray, b_rate: np.ndarray,
+             span: float, part: float) -> tuple[np.ndarray, np.ndarray]:
+    """Cubic through a and b with these rates, and its rate."""
+    s, change = part, (b - a) / span
+    value = (a + span * s * (a_rate * (1 - s) ** 2 + change * s * (3 - 2 * s)
+                             - b_rate * s * (1 - s)))
+    rate = a_rate * (1 - s) * (1 - 3 * s) + change * 6 * s * (1 - s) + b_rate * s * (3 * s - 2)
+    return value, rate
+
+
+def _turn(first: Frames, last: Frames, span: float) -> np.ndarray:
+    """Rotation vectors (n, 3) from the first orientations to the last, whole turns included."""
+    turn = rotation.multiply(last.orientations, rotation.inverse(first.orientations))
+    vector = rotation.rotation_vector(turn)
+    angle = np.linalg.norm(vector, axis=1, keepdims=True)
+    mean = (first.angular + last.angular) * (span / 2)
+    if not np.any(np.einsum('ij,ij->i', mean, mean) > 1):
+        return vector
+    speed = np.linalg.norm(mean, axis=1, keepdims=True)
+    axis = np.where(angle > 1e-12, vector, mean) / np.where(angle > 1e-12, angle, speed + 1e-300)
+    wanted = np.sum(mean * axis, axis=1, keepdims=True)
+    return axis * (angle + 2 * np.pi * np.round((wanted - angle) / (2 * np.pi)))
+
+
+def _rate_of_turn(vector: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    """Angular velocities of turns by these rotation vectors, which change at these rates.
+
+    The left Jacobian of SO(3): Barfoot, State Estimation for Robotics, 2017, eq. 7.77.
+    """
+    angle = np.linalg.norm(vector, axis=1, keepdims=True)
+    half = angle / 2
+    first = np.sinc(half / np.pi) ** 2 / 2
+    small = angle < 1e-3
+    safe = np.where(small, 1, angle)
+    second = np.where(small, 1 / 6 - angle ** 2 / 120, (safe - np.sin(safe)) / safe ** 3)
+    once = np.cross(vector, rate)
+    return rate + first * once + second * np.cross(vector, once)
+
+
+def _rate_of_vector(vector: np.ndarray, angular: np.ndarray) -> np.ndarray:
+    """Rates of rotation vectors whose turns have these angular velocities.
+
+    The inverse of the above (eq. 7.76); past one and a half turns it is near singular, and the
+    plain angular velocity is taken.
+    """
+    angle = np.linalg.norm(vector, axis=1, keepdims=True)
+    half = angle / 2
+    usable = angle < 1.5 * np.pi
+    safe = np.where((angle > 1e-3) & usable, half, 1)
+    factor = np.where(angle > 1e-3, (1 - safe / np.tan(safe)) / (4 * safe ** 2), 1 / 12)
+    once = np.cross(vector, angular)
+    exact = angular - once / 2 + factor * np.cross(vector, once)
+    return np.where(usable, exact, angular)

@@ -1,0 +1,51 @@
+"""A scene's dolls as one table for compiled code: a record for each bone, parents first."""
+from __future__ import annotations
+
+import numpy as np
+
+from ..model import rotation
+from ..model.ragdoll import Joint, Ragdoll, joint_frame
+from ..model.scene import Scene
+from .kernels.record import RECORD
+
+
+def table(scene: Scene) -> np.ndarray:
+    """Records of all bones of a scene, coordinates in the order of Layout."""
+    places = {name: place for place, name in enumerate(scene.bone_names)}
+    records: list[np.ndarray] = []
+    q = v = 0
+    for placement in scene.dolls:
+        doll, at = placement.doll, {}
+        for joint in (None, *doll.joints_depth_first()):
+            bone = doll.bone(joint.child) if joint else doll.root
+            record = _joined(doll, joint, at) if joint else _root()
+            record['bone'] = places[scene.qualified(placement, bone.name)]
+            record['mass'], record['inertia'] = bone.mass, bone.inertia
+            record['bind'], record['q'], record['v'] = bone.orientation, q, v
+            at[bone.name] = len(records)
+            records.append(record)
+            if joint is None:
+                q, v = q + 7, v + 6
+            else:
+                q, v = q + (4 if record['free'] else joint.freedoms), v + joint.freedoms
+    return np.array(records, RECORD)
+
+
+def _root() -> np.ndarray:
+    record = np.zeros((), RECORD)
+    record['parent'], record['free'] = -1, 1
+    return record
+
+
+def _joined(doll: Ragdoll, joint: Joint, at: dict[str, int]) -> np.ndarray:
+    """What a joint says of its child's record; ``at``: which record is whose."""
+    record = np.zeros((), RECORD)
+    record['parent'] = at[joint.parent]
+    record['free'] = joint.is_free_ball
+    record['freedoms'], record['damping'] = joint.freedoms, joint.damping
+    record['before'] = np.subtract(joint.anchor, doll.bone(joint.parent).position)
+    record['after'] = np.subtract(doll.bone(joint.child).position, joint.anchor)
+    axes = rotation.matrix(joint_frame(joint)).T if joint.kind == 'ball' else joint.axes
+    for row, axis in enumerate(axes):
+        record['axes'][row] = axis
+    return record

@@ -1,0 +1,75 @@
+"""Lines, arrows and points: swings, pushes, hands, contacts."""
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import viser
+
+from ...model import rotation
+from ...model.push import Push
+from ...model.ragdoll import Bone
+from ..sources.source import Frame
+
+BROWN, RED, BLUE, YELLOW = (90, 50, 25), (230, 50, 25), (30, 110, 230), (245, 190, 0)
+ROD = 0.012
+"""m: thickness of a swing's rods."""
+
+
+class Marks:
+    """What is drawn beside the bones; each kind exists from when it is first needed."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        add = server.scene
+        self._makers: dict[str, Callable[[str, np.ndarray], viser.SceneNodeHandle]] = {
+            'rods': lambda name, points: add.add_line_segments(
+                name, points, BROWN, thickness=ROD),
+            'pushes': lambda name, points: add.add_arrows(
+                name, points, RED, shaft_radius=0.02, head_radius=0.05, head_length=0.12),
+            'hands': lambda name, points: add.add_line_segments(
+                name, points, BLUE, thickness=3.0, thickness_units='screen'),
+            'pointers': lambda name, points: add.add_point_cloud(
+                name, points, BLUE, point_size=0.05, point_shape='circle'),
+            'contacts': lambda name, points: add.add_point_cloud(
+                name, points, YELLOW, point_size=0.04, point_shape='circle')}
+        self._handles: dict[str, viser.SceneNodeHandle] = {}
+
+    def show(self, frame: Frame) -> None:
+        """Draw what there is; hide what has gone."""
+        scene, state = frame.scene, frame.state
+        arrows = [arrow_before(scene.bones[bone], push, state.positions[bone],
+                               state.orientations[bone])
+                  for push in frame.pushes if any(push.force)
+                  for bone in (scene.bone_index(push.bone),)]
+        lines = [np.stack([hand.point, hand.target]) for hand in frame.held]
+        self._set('rods', frame.rods)
+        self._set('pushes', arrows)
+        self._set('hands', lines)
+        self._set('pointers', [hand.target for hand in frame.held])
+        self._set('contacts', frame.contacts)
+
+    def _set(self, kind: str, points: object) -> None:
+        handle = self._handles.get(kind)
+        if points is None or not len(points):
+            if handle is not None:
+                handle.visible = False
+            return
+        points = np.asarray(points, np.float32)
+        if handle is None:
+            self._handles[kind] = self._makers[kind](f'/scene/{kind}', points)
+            return
+        handle.points = points
+        handle.visible = True
+
+
+def arrow_before(bone: Bone, push: Push, position: np.ndarray,
+                 orientation: np.ndarray) -> np.ndarray:
+    """Tail and tip (2, 3) m, world frame, of a push's arrow, its tip before the bone, to be seen.
+
+    The bone's centre of mass is at ``position`` (3,) m, its axes at ``orientation`` (4,).
+    """
+    arrow = push.arrow(position, orientation)
+    way = rotation.normalized(arrow[1] - arrow[0])
+    local = rotation.rotate(rotation.inverse(orientation), way)
+    depth = (arrow[1] - position) @ way + bone.shape.reach(local)
+    return arrow - way * depth

@@ -1,0 +1,1 @@
+"""Where the states that the page shows come from."""

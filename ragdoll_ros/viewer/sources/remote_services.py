@@ -1,0 +1,86 @@
+"""Asks a node: its parameters and services, without waiting where nobody has to."""
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+
+from rcl_interfaces.srv import GetParameters, SetParametersAtomically
+from rclpy.client import Client
+from rclpy.node import Node
+from rclpy.parameter import Parameter, parameter_value_to_python
+from std_srvs.srv import SetBool, Trigger
+
+from ...model import errors
+
+PATIENCE = 20.0
+"""s that an answer may take: a large scene is built before the node gives it."""
+
+
+class Refused(errors.RagdollError):
+    """What the node will not do, with its reason; or there is no answer."""
+
+
+class Ask:
+    """The services of the node ``name``. Answers come in the thread that spins ``node``."""
+
+    def __init__(self, node: Node, name: str) -> None:
+        self._name = name
+        self._get = node.create_client(GetParameters, f'{name}/get_parameters')
+        self._set = node.create_client(SetParametersAtomically,
+                                       f'{name}/set_parameters_atomically')
+        self._triggers = {service: node.create_client(Trigger, f'{name}/{service}')
+                          for service in ('reset', 'step')}
+        self._pause = node.create_client(SetBool, f'{name}/pause')
+
+    def trigger(self, service: str) -> None:
+        """Call ``reset`` or ``step``."""
+        self._send(self._triggers[service], Trigger.Request())
+
+    def pause(self, wanted: bool) -> None:
+        """Hold the node's time, or let it go on."""
+        self._send(self._pause, SetBool.Request(data=wanted))
+
+    def parameters(self, names: Sequence[str], take: Callable[[dict], None]) -> bool:
+        """Ask for parameters by name; False if there is no node that could answer."""
+        def answered(answer: GetParameters.Response) -> None:
+            if len(answer.values) == len(names):
+                take({name: parameter_value_to_python(value)
+                      for name, value in zip(names, answer.values, strict=True)})
+        return self._send(self._get, GetParameters.Request(names=list(names)), answered)
+
+    def set(self, name: str, value: object) -> None:
+        """Set a parameter without waiting; a refusal is in the node's diagnostics."""
+        self._send(self._set, self._setting(name, value))
+
+    def set_and_wait(self, name: str, value: object) -> None:
+        """Set a parameter; Refused, with the node's reason, if it will not. Not for callbacks."""
+        answers: list[SetParametersAtomically.Response] = []
+        done = threading.Event()
+
+        def answered(answer: SetParametersAtomically.Response) -> None:
+            answers.append(answer)
+            done.set()
+
+        if not self._send(self._set, self._setting(name, value), answered):
+            raise Refused(f'there is no node `{self._name}` to ask')
+        if not done.wait(PATIENCE):
+            raise Refused(f'the node `{self._name}` does not answer')
+        if not answers[0].result.successful:
+            raise Refused(answers[0].result.reason)
+
+    @staticmethod
+    def _setting(name: str, value: object) -> SetParametersAtomically.Request:
+        return SetParametersAtomically.Request(
+            parameters=[Parameter(name, value=value).to_parameter_msg()])
+
+    def _send(self, client: Client, request: object,
+              take: Callable[[object], None] | None = None) -> bool:
+        if not client.service_is_ready():
+            return False
+        future = client.call_async(request)
+        if take is not None:
+            def answered(done: object) -> None:
+                if done.result() is not None:
+                    take(done.result())
+            future.add_done_callback(answered)
+        return True

@@ -1,0 +1,226 @@
+"""A source of its own: a simulation in this process, in a thread that alone touches it."""
+from __future__ import annotations
+
+import math
+import queue
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+
+import numpy as np
+
+from ...files.scene import load_scene
+from ...model import errors, rotation
+from ...model.push import Push
+from ...model.scene import SECOND, Scene
+from ...model.vectors import Vector
+from ...physics.grab import EVENLY
+from ...physics.pacing import Pacer
+from ...physics.simulation import Simulation
+from .source import PACES, Frame, Held, Report, Wanted
+
+HOLD = 0.6
+"""s of simulated time that a push holds, as the node's cmd_vel_timeout."""
+
+MEASURE_PERIOD = 0.1
+"""s on the wall between two looks at what went wrong so far."""
+
+ENDING = 1.0
+"""s that the thread may take to end."""
+
+PATIENCE = 60.0
+"""s that building a scene may take."""
+
+
+class Simulated:
+    """Steps a scene by the clock on the wall, while a page is open to show it."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._commands: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
+        self._wanted = Wanted()
+        self._frame: Frame | None = None
+        self._report = Report(pace=_pace_of(scene))
+        self._simulation = Simulation(scene)
+        self._pacer = Pacer(1.0, 0)
+        self._next_measure = 0.0
+        self._show()
+        self._restart()
+        self._thread = threading.Thread(target=self._run, name='simulation', daemon=True)
+        self._thread.start()
+
+    @property
+    def frame(self) -> Frame | None:
+        """Where all is after the last tick."""
+        return self._frame
+
+    @property
+    def report(self) -> Report:
+        """How it does."""
+        return self._report
+
+    def want(self, wanted: Wanted) -> None:
+        """Say what is shown; while no page is open, the time stands."""
+        if wanted != self._wanted:
+            self._commands.put(lambda: self._want(wanted))
+
+    def push(self, force: Vector) -> None:
+        """Push the first doll's root."""
+        self._commands.put(lambda: self._push(force))
+
+    def pause(self, wanted: bool) -> None:
+        """Hold the time, or let it go on."""
+        self._commands.put(lambda: self._tell(paused=wanted))
+
+    def step(self) -> None:
+        """Make one tick while paused."""
+        self._commands.put(lambda: self._report.paused and self._tick())
+
+    def reset(self) -> None:
+        """Go back to the start, to the bit."""
+        self._commands.put(self._reset)
+
+    def set_pace(self, pace: float) -> None:
+        """Go faster or slower; OutOfRange."""
+        errors.check_range('pace', pace, *PACES)
+        self._commands.put(lambda: self._tell(pace=pace))
+
+    def load(self, name: str) -> None:
+        """Take a scene from a file; RagdollError with all that is wrong in it."""
+        self.use(load_scene(name))
+
+    def use(self, scene: Scene) -> None:
+        """Start anew with a scene; RagdollError if it can not be simulated."""
+        done: Future[None] = Future()
+
+        def replace() -> None:
+            try:
+                done.set_result(self._replace(scene))
+            except Exception as error:
+                done.set_exception(error)
+
+        self._commands.put(replace)
+        done.result(PATIENCE)
+
+    def grab(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
+        """Let a hand hold a bone at a point."""
+        self._commands.put(lambda: self._pull(hand, bone, point, target))
+
+    def drag(self, hand: str, target: Vector) -> None:
+        """Move a hand."""
+        self._commands.put(lambda: self._simulation.drag(hand, target,
+                                                         EVENLY * self._report.pace))
+
+    def let_go(self, hand: str) -> None:
+        """Open a hand; what it held keeps its speed."""
+        self._commands.put(lambda: self._simulation.let_go(hand))
+
+    def close(self) -> None:
+        """End the thread and give the engine back."""
+        self._commands.put(None)
+        self._thread.join(ENDING)
+        self._simulation.close()
+
+    def _run(self) -> None:
+        while True:
+            try:
+                command = self._commands.get(timeout=self._patience())
+                if command is None:
+                    return
+                self._obey(command)
+            except queue.Empty:
+                if self._pacer.due(time.monotonic_ns()):
+                    self._tick()
+
+    def _obey(self, command: Callable[[], object]) -> None:
+        """Do what a page asks for; what can not be, as the scene has changed, is told."""
+        try:
+            command()
+        except errors.RagdollError as error:
+            self._tell(problem=str(error))
+
+    @property
+    def _goes(self) -> bool:
+        return self._wanted.frames and not self._report.paused
+
+    def _patience(self) -> float | None:
+        """Give the s until the next tick; None while the time stands."""
+        return self._pacer.wait(time.monotonic_ns()) / SECOND if self._goes else None
+
+    def _want(self, wanted: Wanted) -> None:
+        stood, self._wanted = not self._goes, wanted
+        self._show()
+        if stood:
+            self._restart()
+
+    def _tell(self, **changes: object) -> None:
+        """Change the report, and what follows from it."""
+        self._report = Report(**{**vars(self._report), **changes})
+        self._restart()
+
+    def _restart(self) -> None:
+        """Let the time go on from here; nothing is caught up."""
+        self._pacer.period = self._simulation.tick / self._report.pace
+        self._pacer.start(time.monotonic_ns())
+
+    def _push(self, force: Vector) -> None:
+        scene = self._simulation.scene
+        doll = scene.dolls[0]
+        bone = scene.qualified(doll, doll.doll.root.name)
+        self._simulation.push(Push(bone, force, duration=HOLD), 'page')
+        self._show()
+
+    def _pull(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
+        self._simulation.grab(hand, bone, point, target)
+        self._show()
+
+    def _reset(self) -> None:
+        self._simulation.reset()
+        self._show()
+
+    def _replace(self, scene: Scene) -> None:
+        simulation = Simulation(scene)
+        self._simulation.close()
+        self._simulation = simulation
+        self._tell(pace=_pace_of(scene), problem='')
+        self._show()
+
+    def _tick(self) -> None:
+        """Go on by one tick; a state that is not finite is never shown."""
+        try:
+            state = self._simulation.advance()
+            finite = math.isfinite(sum(float(part.sum()) for part in vars(state).values()))
+        except (ArithmeticError, ValueError):
+            finite = False
+        if not finite:
+            self._replace(self._simulation.scene)
+            self._tell(problem='the numbers ran away; the scene was started anew')
+        self._show()
+
+    def _show(self) -> None:
+        simulation, wanted = self._simulation, self._wanted
+        swings = simulation.swings
+        self._frame = Frame(
+            simulation.scene, simulation.time / SECOND, simulation.state, simulation.pushes,
+            held=tuple(self._held()),
+            rods=None if swings is None else np.stack([swings.roots, swings.positions], axis=1),
+            contacts=self._contacts() if wanted.contacts else None,
+            angles=simulation.joint_angles if wanted.angles else None)
+        if time.monotonic() >= self._next_measure:
+            self._next_measure = time.monotonic() + MEASURE_PERIOD
+            self._report = Report(**{**vars(self._report), 'measures': simulation.measures()})
+
+    def _held(self) -> Iterator[Held]:
+        state = self._simulation.state
+        for grab in self._simulation.grabs:
+            bone = self._simulation.scene.bone_index(grab.bone)
+            point = rotation.rotate(state.orientations[bone], np.array(grab.point))
+            yield Held(grab.bone, state.positions[bone] + point, np.array(grab.target))
+
+    def _contacts(self) -> np.ndarray:
+        contacts = self._simulation.contacts
+        return np.array([contact.position for contact in contacts]).reshape(-1, 3)
+
+
+def _pace_of(scene: Scene) -> float:
+    return min(max(scene.pace, PACES[0]), PACES[1])

@@ -1,0 +1,124 @@
+"""What a page shows and steers: one protocol for a doll in this process, a node's, a recording.
+
+A source has its own time and threads. It holds its newest frame ready, and the page takes that
+when it draws; what the page asks for is queued and never blocks, but for `use`.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from ...model.push import Push
+from ...model.scene import Scene
+from ...model.state import State
+from ...model.vectors import Vector
+
+PACES = (0.001, 100.0)
+"""Slowest and fastest, as the node's real_time_factor."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """What a hand holds: the grabbed point and where it is pulled to, (3,) m, world frame."""
+
+    bone: str
+    point: np.ndarray
+    target: np.ndarray
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Everything that moves, at one instant. What was not asked for is None."""
+
+    scene: Scene
+    """What it is of. Another scene, another object."""
+    time: float
+    """s simulated since the start."""
+    state: State
+    """A node tells no velocities with its poses: they are NaN then."""
+    pushes: tuple[Push, ...] = ()
+    held: tuple[Held, ...] = ()
+    rods: np.ndarray | None = None
+    """(m, 2, 3) m: both ends of every rod of the swings."""
+    contacts: np.ndarray | None = None
+    """(c, 3) m: where something touches."""
+    angles: np.ndarray | None = None
+    """(k,) rad, in the order of Scene.angle_names."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """How the source does, besides its frames."""
+
+    problem: str = ''
+    """What is wrong, in words for who looks at the page; empty if nothing is."""
+    note: str = ''
+    """What should be known of what is shown."""
+    paused: bool = False
+    pace: float = 1.0
+    """s simulated for each s on the wall that are asked for."""
+    measures: dict[str, float] = field(default_factory=dict)
+    """As Simulation.measures() has them, no older than a second."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is shown: a source need not work for anything else."""
+
+    frames: bool = False
+    """Whether any page is open."""
+    contacts: bool = False
+    angles: bool = False
+
+
+class Source(Protocol):
+    """Where frames come from and commands go to. All may be called from any thread."""
+
+    @property
+    def frame(self) -> Frame | None:
+        """The newest frame; None before the first. Another instant, another object."""
+
+    @property
+    def report(self) -> Report:
+        """How it does now."""
+
+    def want(self, wanted: Wanted) -> None:
+        """Say what is shown from now on."""
+
+    def push(self, force: Vector) -> None:
+        """Push the pushed bone with a force, N, world axes, for some tenths of a second."""
+
+    def pause(self, wanted: bool) -> None:
+        """Hold the time, or let it go on."""
+
+    def step(self) -> None:
+        """Make one tick while paused."""
+
+    def reset(self) -> None:
+        """Go back to the start."""
+
+    def set_pace(self, pace: float) -> None:
+        """Ask for ``pace`` simulated s for each s on the wall."""
+
+    def load(self, name: str) -> None:
+        """Take another scene, by its name in config/ or its path; waits; RagdollError if not."""
+
+    def use(self, scene: Scene) -> None:
+        """Start anew with a scene; waits until it is so; RagdollError with the reason if not."""
+
+    def grab(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
+        """Let a hand hold a bone at ``point`` (m, from its centre of mass, its axes).
+
+        It is pulled to ``target``, m, world frame.
+        """
+
+    def drag(self, hand: str, target: Vector) -> None:
+        """Pull what the hand holds to ``target``, m, world frame."""
+
+    def let_go(self, hand: str) -> None:
+        """Open a hand; one that holds nothing stays as it is."""
+
+    def close(self) -> None:
+        """End its threads and give everything back."""
