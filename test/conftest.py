@@ -72,7 +72,7 @@ def make_node(ros):
 
 @pytest.fixture
 def broken_scene(tmp_path):
-    """A scene's file with five faults, and a word for each that must be told."""
+    """A scene's file with five errors, and a word for each that must be told."""
     path = tmp_path / 'broken.yaml'
     path.write_text("""name: broken
 gravity: [0, 0]
@@ -82,5 +82,5 @@ ground: {normal: [0, 0, 0]}
 dolls:
   - {doll: nowhere.yaml}
 """)
-    return path, ['broken.yaml: 5 faults', 'gravity', 'step', 'pace', 'ground.normal',
+    return path, ['broken.yaml: 5 errors', 'gravity', 'step', 'pace', 'ground.normal',
                   'dolls[0].doll']

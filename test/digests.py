@@ -101,7 +101,7 @@ def digest_run(scene: Scene, accuracy: str) -> dict[str, str]:
 
 def state_bytes(state: object) -> bytes:
     """All numbers of a state."""
-    parts = (state.positions, state.orientations, state.linear, state.angular)
+    parts = (state.positions, state.orientations, state.linear_velocities, state.angular_velocities)
     return b''.join(np.ascontiguousarray(part).tobytes() for part in parts)
 
 

@@ -21,20 +21,20 @@ from ragdoll_ros.accuracy.motions.motion import without_damping, without_limits
 from ragdoll_ros.accuracy.references.articulated import Articulated
 from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.model import rotation
-from ragdoll_ros.model.coordinates import Coordinates
+from ragdoll_ros.model.coordinates import GeneralizedState
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.scene import Ground, Placement, Scene
 from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Sphere
 from ragdoll_ros.model.state import State
 from ragdoll_ros.physics import backend
-from ragdoll_ros.physics.conservation import CompiledGuard
+from ragdoll_ros.physics.conservation import CompiledProjection
 from ragdoll_ros.physics.dynamics import CompiledDynamics
 from ragdoll_ros.physics.engine.bullet import BulletEngine
-from ragdoll_ros.physics.engine.protocol import GROUND, Load
+from ragdoll_ros.physics.engine.protocol import GROUND, AppliedWrench
 from ragdoll_ros.physics.kernels import SWITCH, kernels
 from ragdoll_ros.physics.limits import CompiledLimits
 from ragdoll_ros.physics.mechanics import CompiledMechanics
-from ragdoll_ros.physics.plain.conservation import Guard
+from ragdoll_ros.physics.plain.conservation import ConservationProjection
 from ragdoll_ros.physics.plain.flight import EngineDynamics
 from ragdoll_ros.physics.plain.limits import JointLimits
 from ragdoll_ros.physics.plain.mechanics import Mechanics
@@ -109,16 +109,16 @@ def random_coordinates(scene, seed, speed=3.0, far=0.0):
         for joint in placement.doll.joints_depth_first():
             free = joint.kind == 'ball' and not any(joint.limits)
             turns += [at] if free else []
-            at += 4 if free else joint.freedoms
+            at += 4 if free else joint.dof
         for at in turns:
             own[at:at + 4] = rotation.normalized(own[at:at + 4])
-    return Coordinates(np.concatenate(q), np.concatenate(v))
+    return GeneralizedState(np.concatenate(q), np.concatenate(v))
 
 
 def random_loads(scene, seed):
     """A push on every other bone, along the world's axes and the bone's in turns."""
     rng = np.random.default_rng(seed)
-    return [Load(bone, *rng.normal(size=(2, 3)) * ((20,), (2,)), rng.normal(size=3) * .1,
+    return [AppliedWrench(bone, *rng.normal(size=(2, 3)) * ((20,), (2,)), rng.normal(size=3) * .1,
                  local=bone % 4 == 0) for bone in range(0, len(scene.bones), 2)]
 
 
@@ -126,7 +126,7 @@ def wrenches(scene, loads, state):
     """Forces and torques (n, 3) on the centres of mass, along the world's axes."""
     forces, torques = np.zeros((2, len(scene.bones), 3))
     for load in loads:
-        turn = state.turns[load.bone]
+        turn = state.rotation_matrices[load.bone]
         force, torque = ((turn @ load.force, turn @ load.torque) if load.local
                          else (load.force, load.torque))
         forces[load.bone] += force
@@ -139,18 +139,21 @@ def apart(state, other):
     return (np.abs(state.positions - other.positions).max(),
             2 * np.abs(rotation.multiply(state.orientations, rotation.inverse(
                 other.orientations))[:, :3]).max(),
-            np.abs(state.linear - other.linear).max(), np.abs(state.angular - other.angular).max())
+            np.abs(state.linear_velocities
+                   - other.linear_velocities).max(), np.abs(state.angular_velocities
+                                                            - other.angular_velocities).max())
 
 
 def truth(scene, coordinates):
     """State as the kinematics of the reference has it."""
     states = [tree.state(q, v) for tree, q, v in each_tree(scene, coordinates)]
     return State(*(np.concatenate([getattr(state, field) for state in states])
-                   for field in ('positions', 'orientations', 'linear', 'angular')))
+                   for field in ('positions', 'orientations', 'linear_velocities',
+                                 'angular_velocities')))
 
 
 def flown(dynamics, start, tolerance, times, loads=(), longest=.05):
-    """Coordinates along a path; asked for every 2 ms, as it goes 40 steps at once at the most."""
+    """States along a path; asked for every 2 ms, as it goes 40 steps at once at the most."""
     accuracy = dataclasses.replace(NORMAL, flight_error=tolerance)
     path = dynamics.path(start, longest, accuracy, 50.0, loads)
     found = []
@@ -340,7 +343,7 @@ def test_a_step_that_breaks_down_is_not_taken(force, damping):
                    (Joint('a', 'b', 'hinge', (.05, 0, 0), ((0, 0, 1),), damping=damping),))
     scene = scene_of(pair)
     start = random_coordinates(scene, 0, .5)
-    load = Load(1, np.array([force, 0, 0]), np.zeros(3), np.array([0, .01, 0]))
+    load = AppliedWrench(1, np.array([force, 0, 0]), np.zeros(3), np.array([0, .01, 0]))
     path = CompiledDynamics(scene).path(start, .05, NORMAL, .5, [load])
     end = path.at(.01)
     assert path.count < 1000
@@ -357,12 +360,13 @@ def test_a_path_keeps_momentum_and_energy(doll):
         _, found = flown(dynamics, start, 1e-13, times[1:])
         motions = [mechanics.motion(dynamics.state(here)) for here in (start, *found)]
         first = motions[0]
-        speeds = np.linalg.norm(dynamics.state(start).linear, axis=1)
+        speeds = np.linalg.norm(dynamics.state(start).linear_velocities, axis=1)
         for time, motion in zip(times, motions, strict=True):
             due = first.momentum[0] + doll.mass * np.array(GRAVITY) * time
             assert np.abs(motion.momentum[0] - due).max() < 1e-12 * (mechanics.masses @ speeds)
-            assert np.abs(motion.spin[0] - first.spin[0]).max() < 1e-12 * np.linalg.norm(
-                first.spin[0])
+            assert np.abs(motion.angular_momentum[0]
+                          - first.angular_momentum[0]).max() < 1e-12 * np.linalg.norm(
+                first.angular_momentum[0])
             assert abs(motion.energy[0] - first.energy[0]) < 1e-12 * first.kinetic[0]
 
 
@@ -376,7 +380,8 @@ def test_damping_only_takes_energy():
     energies = [motion.energy[0] for motion in motions]
     assert np.diff(energies).max() < 0
     assert energies[-1] < energies[0] - .1 * motions[0].kinetic[0]
-    assert motions[-1].spin[0] == pytest.approx(motions[0].spin[0], rel=1e-9)
+    assert motions[-1].angular_momentum[0] == pytest.approx(motions[0].angular_momentum[0],
+                                                            rel=1e-9)
 
 
 def random_state(scene, seed, height=0.0):
@@ -417,14 +422,15 @@ def test_momentum_is_kept_as_by_numpy(scene, moment, touched):
     mechanics, layout, rng = Mechanics(scene), layout_of(scene), np.random.default_rng(4)
     was, little = random_state(scene, 1), 1e-3 * rng.normal(size=(4, len(scene.bones), 1))
     now = State(was.positions + little[0], rotation.normalized(was.orientations + little[1]),
-                was.linear + little[2], was.angular + little[3])
+                was.linear_velocities + little[2], was.angular_velocities + little[3])
     given = rng.normal(size=(2, len(scene.dolls), 3))
     chosen = None if touched is None else np.isin(np.arange(len(scene.dolls)), touched)
     arguments = (.01, *{'none': (given[0], None), 'zero': (), 'given': given}[moment], )
     (found, found_motion, found_turn), (plain, plain_motion, plain_turn) = (
-        guard(scene, sums, layout).keep_momentum(
+        conservation(scene, sums, layout).keep_momentum(
             now, sums.motion(was), sums.motion(now), *arguments, touched=chosen)
-        for guard, sums in ((CompiledGuard, CompiledMechanics(scene)), (Guard, mechanics)))
+        for conservation, sums in ((CompiledProjection, CompiledMechanics(scene)),
+                                   (ConservationProjection, mechanics)))
     assert max(apart(found, plain)) < 1e-12
     assert same(found_motion, plain_motion)
     # A turn by nothing is none; the plain one may tell of it.
@@ -434,7 +440,8 @@ def test_momentum_is_kept_as_by_numpy(scene, moment, touched):
     # And what is told of the motion is that of the bones, where numpy's tells no less.
     told, right = mechanics.motion(found), plain_motion
     assert np.abs(told.momentum - right.momentum).max() < 1e-12 * np.abs(right.momentum).max()
-    assert np.abs(told.spin - right.spin).max() < 1e-12 * np.abs(right.spin).max()
+    assert np.abs(told.angular_momentum
+                  - right.angular_momentum).max() < 1e-12 * np.abs(right.angular_momentum).max()
 
 
 GROUNDS = {'none': None, 'level': Ground(), 'slope': Ground((.3, -.5, .8), -.7)}
@@ -456,8 +463,9 @@ def test_what_bones_can_reach_is_what_numpy_finds(ground, height):
             falls.append(plain.falling(state, soon))
             assert found.falling(state, soon) == pytest.approx(falls[-1], rel=1e-13)
         assert found.closing(state) == pytest.approx(plain.closing(state), rel=1e-14)
-        assert found.spin(state) == pytest.approx(plain.spin(state), rel=1e-14)
-        assert found.strides(state, .01) == plain.strides(state, .01)
+        assert found.max_angular_speed(state) == pytest.approx(plain.max_angular_speed(state),
+                                                               rel=1e-14)
+        assert found.ccd_steps(state, .01) == plain.ccd_steps(state, .01)
         again = random_state(scene, seed + 100, height)
         found.heights(again)
         assert found.clearance(state) == pytest.approx(plain.heights(state).min(), abs=1e-13)
@@ -477,9 +485,10 @@ def test_dolls_that_reach_the_ground_are_near_it(ground):
     found = set()
     for seed in range(20):
         state = random_state(scene, seed, .4 * seed)
-        near = {doll for doll, other in reach.near(state, .02, 9.8, set()) if other == GROUND}
-        speeds = (np.linalg.norm(state.linear, axis=1)
-                  + radii * np.linalg.norm(state.angular, axis=1))
+        near = {doll for doll,
+                other in reach.broadphase_pairs(state, .02, 9.8, set()) if other == GROUND}
+        speeds = (np.linalg.norm(state.linear_velocities, axis=1)
+                  + radii * np.linalg.norm(state.angular_velocities, axis=1))
         for doll in range(3):
             own = mechanics.doll_of == doll
             low, fast = Reach(scene).heights(state)[own].min(), speeds[own].max()
@@ -495,7 +504,8 @@ def test_dolls_are_as_near_to_each_other_as_numpy_finds():
         state = random_state(scene, seed)
         moved = np.repeat([0, 1.5 * seed, 3.0 * seed], np.bincount(Mechanics(scene).doll_of))
         state = dataclasses.replace(state, positions=state.positions + moved[:, None])
-        near = [reach(scene).near(state, .01, 9.8, set()) for reach in (CompiledReach, Reach)]
+        near = [reach(scene).broadphase_pairs(state, .01, 9.8, set()) for reach in (CompiledReach,
+                                                                                    Reach)]
         assert near[0] == near[1]
 
 
@@ -516,9 +526,9 @@ def test_joint_limits_are_told_of_as_by_numpy(scene, duration):
         here.q[layout.limited[0]] = ends + np.where(
             rng.random(len(ends)) < .05, rng.uniform(-3e-3, 3e-3, len(ends)),
             -.2 * np.sign(ends))
-        pressed.append(plain.press(here, duration))
-        assert found.press(here, duration) == pressed[-1]
-        assert found.furthest(here) == plain.furthest(here)
+        pressed.append(plain.is_active(here, duration))
+        assert found.is_active(here, duration) == pressed[-1]
+        assert found.max_violation(here) == plain.max_violation(here)
         assert found.fastest(here) == plain.fastest(here)
         assert found.approach(here, .015) == pytest.approx(plain.approach(here, .015), rel=1e-15)
         if moment % 7 == 0:
@@ -544,7 +554,7 @@ def tick_by_tick(name, ticks):
         start = simulation.coordinates
         if not fall:
             v = np.random.default_rng(7).uniform(-2, 2, start.v.size)
-            start = Coordinates(start.q, v)
+            start = GeneralizedState(start.q, v)
             simulation.place(start)
         lowest = mechanics.energy(simulation.state)[0]
         for _ in range(ticks):
@@ -618,7 +628,7 @@ def test_a_long_tick_is_flown_as_well_as_a_short_one(accuracy, monkeypatch):
             simulation.place(START)
             for _ in range(round(.4 / tick)):
                 state = simulation.advance()
-                assert simulation.effort.substeps == 0
+                assert simulation.stats.substeps == 0
         assert np.abs(state.positions - true_end()).max() < 100 * tolerance
 
 

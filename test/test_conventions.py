@@ -8,7 +8,7 @@ import pytest
 from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import rotation
-from ragdoll_ros.model.coordinates import Coordinates
+from ragdoll_ros.model.coordinates import GeneralizedState
 from ragdoll_ros.model.scene import Placement
 from ragdoll_ros.physics.engine.bullet import BulletEngine
 
@@ -50,7 +50,7 @@ def turned(engine, angles_deg):
     names = scene.angle_names
     for name, angle in angles_deg.items():
         q[7 + names.index(name)] = math.radians(angle)
-    engine.place(Coordinates(q, np.zeros_like(base.v)))
+    engine.place(GeneralizedState(q, np.zeros_like(base.v)))
     return engine.read()
 
 
@@ -64,7 +64,7 @@ def test_the_articles_axes_become_ros_axes(name):
 def test_the_doll_is_the_articles():
     doll = load_doll('doll')
     assert len(doll.bones) == 10 and len(doll.joints) == 9
-    assert sum(joint.freedoms for joint in doll.joints) == 14
+    assert sum(joint.dof for joint in doll.joints) == 14
     assert doll.mass == 55
     assert doll.root.name == 'torso'
 
@@ -123,8 +123,8 @@ def test_velocities_are_of_the_centre_of_mass_in_world_axes():
     engine.close()
     # The doll's mass is symmetric about x = y = 0, so all turns about the z axis.
     expected = np.add(np.cross((0, 0, 2), state.positions), (1, 0, 0))
-    assert state.linear == pytest.approx(expected, abs=1e-12)
-    assert state.angular == pytest.approx(np.tile((0, 0, 2), (10, 1)), abs=1e-12)
+    assert state.linear_velocities == pytest.approx(expected, abs=1e-12)
+    assert state.angular_velocities == pytest.approx(np.tile((0, 0, 2), (10, 1)), abs=1e-12)
 
 
 def test_mirrored_poses_are_mirror_images(engine):

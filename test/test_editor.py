@@ -408,7 +408,7 @@ def test_what_is_saved_is_called_a_scene(desk):
     """Not a doll, which ragdoll_fit and `doll:` would take."""
     desk.files.save()
     assert load_scene(str(desk.path / 'scene.yaml')) == DROP
-    with pytest.raises(errors.Faults):
+    with pytest.raises(errors.ModelErrors):
         load_doll(str(desk.path / 'scene.yaml'))
 
 
@@ -571,7 +571,7 @@ def test_a_broken_character_is_refused_in_one_sentence(desk, name):
         pytest.skip('lies on the disk in that test')
     desk.files.fit(name, BROKEN.get(name, b'\x89PNG'))
     assert folder.plain(name) in desk.said() and 'expected' in desk.said()
-    assert desk.said().count(': 1 fault') == 1
+    assert desk.said().count(': 1 error') == 1
     assert '/tmp' not in desk.said() and not desk.files.progress.visible
     assert desk.editor.scene == DROP and desk.asked == [] and list(desk.path.iterdir()) == []
 

@@ -292,9 +292,9 @@ def test_a_sheet_tells_all_its_faults_at_their_fields():
              'turn': (0.0, math.inf, 0.0), 'friction': 'much', 'restitution': '1.5',
              'rolling_friction': '-1', 'anchor': (math.inf, 0.0, 0.0), 'limits_1': '30, 10',
              'damping': -2.0}
-    with pytest.raises(errors.Faults) as caught:
+    with pytest.raises(errors.ModelErrors) as caught:
         sheet.apply(DROP, 'left_shin', wrong)
-    assert {fault.path for fault in caught.value.faults} == set(wrong)
+    assert {error.path for error in caught.value.errors} == set(wrong)
 
 
 @pytest.mark.parametrize(('wrong', 'field', 'words'), [
@@ -304,9 +304,9 @@ def test_a_sheet_tells_all_its_faults_at_their_fields():
     ({'axis_1': (0.0, 0.0, 0.0)}, 'axis_1', 'not zero'),
     ({'axis_2': (0.0, 1.0, 0.5)}, 'axis_2', 'perpendicular')])
 def test_a_faulty_joint_is_told_at_its_field(wrong, field, words):
-    with pytest.raises(errors.Faults, match=words) as caught:
+    with pytest.raises(errors.ModelErrors, match=words) as caught:
         sheet.apply(DROP, 'left_thigh', wrong)
-    assert [fault.path for fault in caught.value.faults] == [field]
+    assert [error.path for error in caught.value.errors] == [field]
 
 
 def test_a_balls_limits_may_be_typed_as_one_number():
@@ -331,5 +331,5 @@ def test_whatever_is_typed_is_taken_or_refused(seed):
                 random.choice(numbers))
     try:
         sheet.apply(DROP, name, fields)
-    except errors.Faults as error:
-        assert all(fault.path in fields for fault in error.faults)
+    except errors.ModelErrors as error:
+        assert all(error.path in fields for error in error.errors)

@@ -11,7 +11,7 @@ from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.gltf_file import GltfFile
 from ragdoll_ros.fit.nodes import read_nodes
 from ragdoll_ros.fit.pipeline import fit_character
-from ragdoll_ros.model.errors import Faults
+from ragdoll_ros.model.errors import ModelErrors
 
 RIG = RIGS['cmu']
 
@@ -236,5 +236,5 @@ def test_no_pygltflib_is_said(tmp_path, monkeypatch):
     import sys
     path = fit_rigs.write(RIGS['one_bone'], tmp_path)
     monkeypatch.setitem(sys.modules, 'pygltflib', None)
-    with pytest.raises(Faults, match=r'ragdoll_ros\[fit\]'):
+    with pytest.raises(ModelErrors, match=r'ragdoll_ros\[fit\]'):
         read_character(path)

@@ -119,7 +119,7 @@ def test_a_light_doll_is_pulled_gently():
         simulation.drag('hand', (5, 0, 0), 0.0)
         for _ in range(10):
             state = simulation.advance()
-    assert state.linear[0, 0] == pytest.approx(LARGEST_ACCELERATION * 0.1, rel=1e-6)
+    assert state.linear_velocities[0, 0] == pytest.approx(LARGEST_ACCELERATION * 0.1, rel=1e-6)
 
 
 def test_mobility_is_that_of_a_rigid_body():
@@ -275,8 +275,8 @@ def test_what_is_thrown_keeps_its_momentum():
             assert after.momentum[0] == pytest.approx(motion.momentum[0], abs=1e-6)
             # What the stepping takes from the turn in contacts between bones, the guard gives
             # back; what it cannot know it leaves: 1e-3.
-            assert after.spin[0] == pytest.approx(motion.spin[0],
-                                                  abs=1e-3 * np.linalg.norm(motion.spin))
+            assert after.angular_momentum[0] == pytest.approx(
+                motion.angular_momentum[0], abs=1e-3 * np.linalg.norm(motion.angular_momentum))
 
 
 def swung(hands):
@@ -374,7 +374,7 @@ def test_hands_have_names_and_say_what_they_hold():
         assert [grab.target for grab in simulation.grabs] == [(1, 2, 3)]
 
 
-@pytest.mark.parametrize('fault, name, arguments', [
+@pytest.mark.parametrize('error, name, arguments', [
     (errors.UnknownBone, 'grab', ('hand', 'tail')),
     (errors.NotFinite, 'grab', ('hand', 'head', (math.nan, 0, 0))),
     (errors.NotFinite, 'grab', ('hand', 'head', (0, 0, 0), (0, math.inf, 0))),
@@ -385,10 +385,10 @@ def test_hands_have_names_and_say_what_they_hold():
     (errors.OutOfRange, 'drag', ('held', (0, 0, -1e9))),
     (errors.OutOfRange, 'drag', ('held', (0, 0, 1), -1)),
     (errors.OutOfRange, 'drag', ('held', (0, 0, 1), math.nan))])
-def test_rubbish_is_refused_and_moves_nothing(fault, name, arguments):
+def test_rubbish_is_refused_and_moves_nothing(error, name, arguments):
     with Simulation(DROP) as simulation:
         simulation.grab('held', 'torso')
         before = simulation.grabs
-        with pytest.raises(fault):
+        with pytest.raises(error):
             getattr(simulation, name)(*arguments)
         assert simulation.grabs == before

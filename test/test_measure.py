@@ -44,7 +44,7 @@ def test_energy_and_momentum_are_those_of_the_mechanics_module():
     for own, theirs in (
             (measure.energy(moved), [motion.energy[0] for motion in motions]),
             (measure.momentum(moved), [motion.momentum[0] for motion in motions]),
-            (measure.spin(moved), [motion.spin[0] for motion in motions])):
+            (measure.spin(moved), [motion.angular_momentum[0] for motion in motions])):
         assert own == pytest.approx(np.array(theirs), rel=1e-10, abs=1e-10)
 
 
@@ -63,8 +63,8 @@ def test_energy_put_in_by_hand_is_seen():
     scene, _, moved = moving_doll(gravity=(0, 0, 0))
     factor = np.ones((len(moved.times), 1, 1))
     factor[7] = math.sqrt(1.01)
-    faster = dataclasses.replace(moved, linear=moved.linear * factor,
-                                 angular=moved.angular * factor)
+    faster = dataclasses.replace(moved, linear_velocities=moved.linear_velocities * factor,
+                                 angular_velocities=moved.angular_velocities * factor)
     assert Measure(scene).excess(Trial(scene, .2), faster) == pytest.approx(.01, rel=1e-6)
     assert Measure(scene).spin_drift(faster) > 1e-4
 
@@ -119,7 +119,7 @@ def test_sinking_and_settling_of_a_ball():
     moved = Trajectory(times, positions, still, linear, np.zeros((11, 1, 3)))
     assert Measure(scene).sinking(moved) == pytest.approx(.03)
     assert Measure(scene).settled(moved) == pytest.approx(.6)
-    restless = dataclasses.replace(moved, linear=np.ones((11, 1, 3)))
+    restless = dataclasses.replace(moved, linear_velocities=np.ones((11, 1, 3)))
     assert Measure(scene).settled(restless) == math.inf
 
 

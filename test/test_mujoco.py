@@ -9,13 +9,13 @@ pytest.importorskip('mujoco')
 from ragdoll_ros.accuracy.references.articulated import Articulated
 from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.model import errors, rotation
-from ragdoll_ros.model.coordinates import Coordinates
+from ragdoll_ros.model.coordinates import GeneralizedState
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.scene import Ground, Material, Placement, Scene
 from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Sphere
 from ragdoll_ros.physics.engine.bullet import BulletEngine
 from ragdoll_ros.physics.engine.mujoco import MujocoEngine
-from ragdoll_ros.physics.engine.protocol import GROUND, Load
+from ragdoll_ros.physics.engine.protocol import GROUND, AppliedWrench
 
 GRAVITY = (0.3, -0.2, -9.8)
 ENGINES = [BulletEngine, MujocoEngine]
@@ -63,8 +63,8 @@ def random_coordinates(doll, seed):
             q[at:at + 4] = rotation.normalized(q[at:at + 4])
             at += 4
         else:
-            at += joint.freedoms
-    return Coordinates(q, v)
+            at += joint.dof
+    return GeneralizedState(q, v)
 
 
 DOLLS = [default_doll(), every_kind()]
@@ -86,8 +86,8 @@ def test_poses_and_velocities_are_those_of_the_tree(engine, doll, seed):
     state, truth = simulated.read(), Articulated(doll).state(placed.q, placed.v)
     assert np.abs(state.positions - truth.positions).max() < 1e-12
     assert rotation.angle_between(state.orientations, truth.orientations).max() < 1e-7
-    assert np.abs(state.linear - truth.linear).max() < 1e-11
-    assert np.abs(state.angular - truth.angular).max() < 1e-11
+    assert np.abs(state.linear_velocities - truth.linear_velocities).max() < 1e-11
+    assert np.abs(state.angular_velocities - truth.angular_velocities).max() < 1e-11
 
 
 @pytest.mark.parametrize(('doll', 'seed'), EVERY)
@@ -114,14 +114,16 @@ def test_a_push_acts_at_its_point_for_one_step():
     doll = Ragdoll('box', (Bone('box', Box((.1, .2, .3)), 2.0, (0, 0, 0)),))
     engine = MujocoEngine(dataclasses.replace(flying(doll), gravity=(0, 0, 0)))
     force, point = np.array([0, 4.0, 0]), np.array([0, 0, .1])
-    load = Load(0, force, np.array([0, 0, .5]), point)
+    load = AppliedWrench(0, force, np.array([0, 0, .5]), point)
     engine.step(1e-3, 1, [load])
     state = engine.read()
-    assert state.linear[0] == pytest.approx(force * 1e-3 / 2, abs=1e-12)
+    assert state.linear_velocities[0] == pytest.approx(force * 1e-3 / 2, abs=1e-12)
     moment = np.array([0, 0, .5]) + np.cross(point, force)
-    assert state.angular[0] * doll.bones[0].inertia == pytest.approx(moment * 1e-3, abs=1e-8)
+    assert state.angular_velocities[0] * doll.bones[0].inertia == pytest.approx(moment * 1e-3,
+                                                                                abs=1e-8)
     engine.step(1e-3, 1)
-    assert engine.read().linear[0] == pytest.approx(state.linear[0], abs=1e-12)
+    assert engine.read().linear_velocities[0] == pytest.approx(state.linear_velocities[0],
+                                                               abs=1e-12)
 
 
 def test_a_ball_rests_on_a_tilted_ground_and_tells_of_it():
@@ -162,7 +164,7 @@ def test_jointed_and_overlapping_pairs_do_not_collide():
     engine = MujocoEngine(Scene('heap', (Placement(doll),), gravity=(0, 0, 0)))
     engine.step(.5, 500)
     assert not engine.contacts()
-    assert np.abs(engine.read().linear).max() == 0
+    assert np.abs(engine.read().linear_velocities).max() == 0
 
 
 def test_a_snapshot_brings_back_every_bit():

@@ -47,7 +47,7 @@ def test_articulated_agrees_with_lagrange_in_the_plane(links):
     q, v = tree.bind(), np.zeros(tree.nv)
     q[3:7] = rotation.from_axis_angle((0, 0, 1), angles[0])
     q[7:], v[6:], v[5] = np.diff(angles), np.diff(rates), rates[0]
-    v[:2] = -tree.state(q, v).linear.mean(axis=0)[:2]
+    v[:2] = -tree.state(q, v).linear_velocities.mean(axis=0)[:2]
     moved = tree.trajectory(q, v, TIMES)
     assert np.abs(moved.positions[..., :2] - centres).max() < 1e-9
     assert np.abs(moved.positions[..., 2]).max() < 1e-12
@@ -63,7 +63,7 @@ def test_one_link_tumbles_as_euler_says():
     tree = Articulated(doll)
     moved = tree.trajectory(tree.bind(), np.array([0, 0, 0, *omega]), TIMES)
     assert rotation.angle_between(moved.orientations[:, 0], turns).max() < 1e-9
-    assert np.abs(moved.angular[:, 0] - rotation.rotate(turns, body_omega)).max() < 1e-9
+    assert np.abs(moved.angular_velocities[:, 0] - rotation.rotate(turns, body_omega)).max() < 1e-9
 
 
 def test_tumbling_keeps_energy_and_angular_momentum():
@@ -85,10 +85,12 @@ def test_a_doll_in_flight_keeps_momentum_and_energy(seed):
     moved = tree.trajectory(*random_motion(tree, seed), np.linspace(0, .3, 4))
     masses = np.array([bone.mass for bone in doll.bones])
     spins = rotation.rotate(moved.orientations, np.array([b.inertia for b in doll.bones])
-                            * rotation.rotate(rotation.inverse(moved.orientations), moved.angular))
-    linear = masses[:, None] * moved.linear
+                            * rotation.rotate(rotation.inverse(moved.orientations),
+                                              moved.angular_velocities))
+    linear = masses[:, None] * moved.linear_velocities
     angular = (spins + np.cross(moved.positions, linear)).sum(axis=1)
-    energy = ((linear * moved.linear).sum((1, 2)) + (spins * moved.angular).sum((1, 2))) / 2
+    energy = ((linear * moved.linear_velocities).sum((1, 2))
+              + (spins * moved.angular_velocities).sum((1, 2))) / 2
     assert np.ptp(energy) / energy[0] < 1e-9
     assert np.ptp(angular, axis=0).max() / np.linalg.norm(angular[0]) < 1e-9
     assert np.ptp(linear.sum(axis=1), axis=0).max() < 1e-9 * np.abs(linear).sum()
@@ -101,10 +103,10 @@ def test_velocities_are_the_derivatives_of_the_poses():
     h = 1e-4
     moved = tree.trajectory(*random_motion(tree, 9), (0, h, 2 * h))
     speed = (moved.positions[2] - moved.positions[0]) / (2 * h)
-    assert np.abs(speed - moved.linear[1]).max() < 1e-4
+    assert np.abs(speed - moved.linear_velocities[1]).max() < 1e-4
     turned = rotation.multiply(moved.orientations[2], rotation.inverse(moved.orientations[0]))
     turned *= np.sign(turned[:, 3:])
-    assert np.abs(turned[:, :3] * 2 / (2 * h) - moved.angular[1]).max() < 1e-3
+    assert np.abs(turned[:, :3] * 2 / (2 * h) - moved.angular_velocities[1]).max() < 1e-3
 
 
 def test_a_damped_hinge_and_a_wrench_act_as_newton_says():
@@ -116,7 +118,7 @@ def test_a_damped_hinge_and_a_wrench_act_as_newton_says():
     pair = np.array([[0, 0, -1.0], [0, 0, 1.0]])
     moved = tree.trajectory(tree.bind(), np.zeros(7), (0, .02),
                             lambda t, state: (np.zeros((2, 3)), pair))
-    difference = moved.angular[-1, 1, 2] - moved.angular[-1, 0, 2]
+    difference = moved.angular_velocities[-1, 1, 2] - moved.angular_velocities[-1, 0, 2]
     moment = bones[0].inertia[2]
     assert difference == pytest.approx(1 / .5 * -math.expm1(-2 * .5 * .02 / moment), rel=1e-10)
 
@@ -128,7 +130,7 @@ def test_breaks_of_a_push_are_met():
     push = np.array([[3.0, 0, 0]])
     moved = tree.trajectory(tree.bind(), np.zeros(6), TIMES, breaks=(.33,),
                             wrenches=lambda t, _: (push * (t < .33), 0 * push))
-    assert moved.linear[-1, 0, 0] == pytest.approx(3 * .33 / 2, abs=1e-12)
+    assert moved.linear_velocities[-1, 0, 0] == pytest.approx(3 * .33 / 2, abs=1e-12)
 
 
 def test_small_and_large_pendulums():

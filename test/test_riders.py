@@ -8,7 +8,7 @@ from fit_rigs import RIGS
 
 from ragdoll_ros.files.doll import build_doll, doll_data, load_doll, save_doll
 from ragdoll_ros.model import errors, rotation
-from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, Rider
+from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame
 from ragdoll_ros.model.scene import Placement, Scene, above_ground
 from ragdoll_ros.model.shapes import Sphere
 from ragdoll_ros.model.skeleton import Riders, rider_names
@@ -67,7 +67,8 @@ def test_a_skin_follows_by_the_files_own_matrices(fit):
 def doll(**changes):
     bones = (Bone('a', Sphere(0.1), 1, (0, 0, 0)), Bone('b', Sphere(0.1), 1, (0, 0, 1)))
     joints = (Joint('a', 'b', 'fixed', (0, 0, 0.5)),)
-    riders = (Rider('a', 'a', (0, 0, -0.1)), Rider('tip', 'b', (0, 0.1, 0.2), (0, 0, 1, 1)))
+    riders = (SkeletonFrame('a', 'a', (0, 0, -0.1)),
+              SkeletonFrame('tip', 'b', (0, 0.1, 0.2), (0, 0, 1, 1)))
     return dataclasses.replace(Ragdoll('d', bones, joints, riders=riders), **changes)
 
 
@@ -97,11 +98,11 @@ def test_no_riders_give_empty_arrays():
 
 def test_wrong_riders_are_refused():
     with pytest.raises(errors.UnknownBone, match=r'riders\[0\].bone'):
-        doll(riders=(Rider('x', 'nobody', (0, 0, 0)),))
+        doll(riders=(SkeletonFrame('x', 'nobody', (0, 0, 0)),))
     with pytest.raises(errors.DuplicateName, match=r'riders\[1\].name'):
-        doll(riders=(Rider('x', 'a', (0, 0, 0)), Rider('x', 'b', (0, 0, 0))))
+        doll(riders=(SkeletonFrame('x', 'a', (0, 0, 0)), SkeletonFrame('x', 'b', (0, 0, 0))))
     data = doll_data(doll())
     data['riders'][0].update(bone='nobody', mass=3)
     data['riders'][1]['position'] = [0, 0]
     _, found = build_doll(data)
-    assert {fault.path for fault in found} >= {'riders[0].bone', 'riders[0]', 'riders[1].position'}
+    assert {error.path for error in found} >= {'riders[0].bone', 'riders[0]', 'riders[1].position'}

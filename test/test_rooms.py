@@ -1,6 +1,6 @@
 """The rooms of the package and the arrows between them, read from the code's own imports.
 
-An arrow that is not drawn here is a fault of the code, not of the test: see docs/architecture.md.
+An arrow that is not drawn here is an error of the code, not of the test: see docs/architecture.md.
 """
 import ast
 import sys

@@ -11,7 +11,7 @@ from std_msgs.msg import String
 
 from ragdoll_ros.files.scene import load_scene, save_scene
 from ragdoll_ros.files.urdf_tree import parse_urdf
-from ragdoll_ros.model.errors import Faults, RagdollError
+from ragdoll_ros.model.errors import ModelErrors, RagdollError
 from ragdoll_ros.ros.outputs import LATCHED
 from ragdoll_ros.ros.parameters import SPECS, Settings
 
@@ -185,7 +185,7 @@ def test_a_wrong_start_is_refused_with_all_that_is_wrong(make_node, values, word
 
 def test_a_broken_scene_ends_the_start_with_all_its_faults(make_node, broken_scene):
     path, words = broken_scene
-    with pytest.raises(Faults) as caught:
+    with pytest.raises(ModelErrors) as caught:
         make_node(scene=str(path))
     assert all(word in str(caught.value) for word in words)
 

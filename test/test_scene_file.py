@@ -1,4 +1,4 @@
-"""Files: the shipped ones, a round trip, and all faults at once."""
+"""Files: the shipped ones, a round trip, and all errors at once."""
 import dataclasses
 import math
 
@@ -102,23 +102,24 @@ def test_a_bone_may_not_be_called_as_the_world(tmp_path):
     path = tmp_path / 'doll.yaml'
     path.write_text('bones: [{name: world, mass: 1, position: [0, 0, 0], '
                     'shape: {sphere: {radius: 0.1}}}]')
-    with pytest.raises(errors.Faults, match=r'bones\[0\].name: DuplicateName: .world.; expected'):
+    with pytest.raises(errors.ModelErrors,
+                       match=r'bones\[0\].name: DuplicateName: .world.; expected'):
         load_scene(str(path))
 
 
 def test_all_faults_come_at_once_with_their_places(tmp_path):
     path = tmp_path / 'five.yaml'
     path.write_text(FIVE)
-    with pytest.raises(errors.Faults) as caught:
+    with pytest.raises(errors.ModelErrors) as caught:
         load_scene(str(path))
-    found = {fault.path: type(fault) for fault in caught.value.faults}
+    found = {error.path: type(error) for error in caught.value.errors}
     assert found == {
         'step': errors.OutOfRange,
         'dolls[0].doll.bones[0].mass': errors.NotPositive,
         'dolls[0].doll.bones[1].position': errors.NotFinite,
         'dolls[0].doll.joints[0].limits_deg[0]': errors.LimitsReversed,
         'dolls[0].doll.joints[1].child': errors.UnknownBone}
-    assert str(path) in str(caught.value) and '5 faults' in str(caught.value)
+    assert str(path) in str(caught.value) and '5 errors' in str(caught.value)
 
 
 @pytest.mark.parametrize('text', ['', '[1, 2', '\x00', '{a: &a [*a]}', '7', '- x', 'dolls: 3',
@@ -127,7 +128,7 @@ def test_all_faults_come_at_once_with_their_places(tmp_path):
 def test_rubbish_is_refused_in_words(tmp_path, text):
     path = tmp_path / 'rubbish.yaml'
     path.write_text(text)
-    with pytest.raises(errors.Faults):
+    with pytest.raises(errors.ModelErrors):
         load_scene(str(path))
 
 
@@ -141,7 +142,7 @@ def test_aliases_of_aliases_do_not_fill_the_memory(tmp_path, use):
         first = name
     path = tmp_path / 'bomb.yaml'
     path.write_text(text + f'bones: [*{first}]\n')
-    with pytest.raises(errors.Faults, match='aliases'):
+    with pytest.raises(errors.ModelErrors, match='aliases'):
         load_scene(str(path))
 
 
@@ -149,12 +150,12 @@ def test_aliases_of_aliases_do_not_fill_the_memory(tmp_path, use):
                                   'bones: ' + '[' * 5000 + ']' * 5000])
 def test_what_is_nested_too_deeply_does_not_end_the_process(tmp_path, text):
     (tmp_path / 'deep.yaml').write_text(text)
-    with pytest.raises(errors.Faults, match='nested too deeply'):
+    with pytest.raises(errors.ModelErrors, match='nested too deeply'):
         load_scene(str(tmp_path / 'deep.yaml'))
 
 
 def test_a_missing_file_names_the_ones_there_are():
-    with pytest.raises(errors.Faults, match='drop'):
+    with pytest.raises(errors.ModelErrors, match='drop'):
         load_scene('no such scene')
 
 
@@ -163,11 +164,11 @@ def test_a_misspelled_key_is_named(tmp_path):
     path = tmp_path / 'ball.yaml'
     path.write_text('bones: [{name: b, shape: {sphere: {radius: 1}}, mass: 1, position: [0, 0, 0], '
                     'colour: [1, 0, 0, 1], masss: 2}]')
-    with pytest.raises(errors.Faults) as caught:
+    with pytest.raises(errors.ModelErrors) as caught:
         load_scene(str(path))
-    fault, = caught.value.faults
-    assert (fault.path, fault.value) == ('bones[0]', 'colour, masss')
-    assert 'only name, shape, mass' in fault.expected
+    error, = caught.value.errors
+    assert (error.path, error.value) == ('bones[0]', 'colour, masss')
+    assert 'only name, shape, mass' in error.expected
 
 
 def test_numbers_may_be_written_as_1e3(tmp_path):

@@ -173,13 +173,13 @@ def reference(link, motion, end):
         across = rest - (rest @ d) * d
         sin = np.linalg.norm(across)
         arc = across * math.atan2(sin, rest @ d) / sin if sin else across
-        force = (link.stiffness / inertia * arc - c * (u - np.cross(frame.angular[0], d))
+        force = (link.stiffness / inertia * arc - c * (u - np.cross(frame.angular_velocities[0], d))
                  + (np.array(DOWN) - acceleration) / link.length)
         return np.concatenate([u, force - (force @ d) * d - (u @ u) * d])
 
     frame = motion(0)
     d = rotation.rotate(frame.orientations[0], REST)
-    start = np.concatenate([d, np.cross(frame.angular[0], d)])
+    start = np.concatenate([d, np.cross(frame.angular_velocities[0], d)])
     return solve_ivp(rates, (0, end), start, rtol=1e-8, atol=1e-9, method='DOP853').y[:3, -1]
 
 
@@ -444,8 +444,8 @@ def test_frames_between_are_of_fourth_order_and_meet_both_ends():
         errors.append(max(np.abs(made.positions - middle.positions).max(),
                           rotation.angle_between(made.orientations, middle.orientations).max()))
         end = between(first, last, span, 1.0)
-        np.testing.assert_allclose(end.angular, last.angular, atol=1e-9)
-        np.testing.assert_allclose(end.linear, last.linear, atol=1e-9)
+        np.testing.assert_allclose(end.angular_velocities, last.angular_velocities, atol=1e-9)
+        np.testing.assert_allclose(end.linear_velocities, last.linear_velocities, atol=1e-9)
     assert errors[0] / errors[1] > 10
 
 
@@ -456,4 +456,4 @@ def test_a_fast_spin_is_followed_through_more_than_half_a_turn():
     made = between(first, last, 1 / 15, 0.25)
     expected = rotation.from_rotation_vector(spin / 60)
     assert rotation.angle_between(made.orientations[0], expected) < 1e-9
-    np.testing.assert_allclose(made.angular[0], spin, atol=1e-9)
+    np.testing.assert_allclose(made.angular_velocities[0], spin, atol=1e-9)

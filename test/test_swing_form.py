@@ -1,4 +1,4 @@
-"""Swings as data: files, names, faults, the doll's frame."""
+"""Swings as data: files, names, errors, the doll's frame."""
 import math
 
 import numpy as np
@@ -38,9 +38,9 @@ def test_a_scene_adds_swings_to_a_doll_it_names(tmp_path):
     file.write_text('dolls:\n  - doll: doll.yaml\n    swings:\n'
                     '      - {name: a, bone: hed, root: [0, 0, 1], direction: [0, 0, 1],'
                     ' strand: {links: 2, length: 1e-4}}\n')
-    with pytest.raises(errors.Faults) as raised:
+    with pytest.raises(errors.ModelErrors) as raised:
         load_scene(str(file))
-    assert {(type(fault), fault.path) for fault in raised.value.faults} == {
+    assert {(type(error), error.path) for error in raised.value.errors} == {
         (errors.UnknownBone, 'dolls[0].swings[0].bone'),
         (errors.OutOfRange, 'dolls[0].swings[0].strand.length')}
 
@@ -58,7 +58,7 @@ def test_roots_and_directions_are_given_in_the_dolls_frame():
     np.testing.assert_allclose(state.local_orientations, [rotation.IDENTITY], atol=1e-12)
 
 
-@pytest.mark.parametrize(('changes', 'fault', 'path'), [
+@pytest.mark.parametrize(('changes', 'error', 'path'), [
     ({'bone': 'hed'}, errors.UnknownBone, 'swings[0].bone'),
     ({'direction': [0, 0, 0]}, errors.NotUnit, 'swings[0].direction'),
     ({'mode': 'wind'}, errors.WrongForm, 'swings[0].mode'),
@@ -72,7 +72,7 @@ def test_roots_and_directions_are_given_in_the_dolls_frame():
     ({'links': [{'length': 1, 'damping': -1}]}, errors.OutOfRange, 'swings[0].links[0].damping'),
     ({'strand': {'links': 2, 'length': 1}}, errors.WrongForm, 'swings[0]'),
 ])
-def test_what_is_wrong_with_a_swing_is_named(changes, fault, path):
+def test_what_is_wrong_with_a_swing_is_named(changes, error, path):
     bones = [{'name': 'head', 'shape': {'sphere': {'radius': 0.1}}, 'mass': 1,
               'position': [0, 0, 1]}]
     swing = {'name': 'a', 'bone': 'head', 'root': [0, 0, 1], 'direction': [0, 0, 1],
@@ -80,7 +80,7 @@ def test_what_is_wrong_with_a_swing_is_named(changes, fault, path):
     assert build_doll({'bones': bones, 'swings': [swing]})[1] == []
     doll, found = build_doll({'bones': bones, 'swings': [swing | changes]})
     assert doll is None
-    assert [(type(one), one.path) for one in found] == [(fault, path)]
+    assert [(type(one), one.path) for one in found] == [(error, path)]
 
 
 def test_two_swings_of_one_name_are_refused():

@@ -230,7 +230,7 @@ def test_a_shipped_robot_falls_limp():
             state = simulation.advance()
     assert np.isfinite(state.positions).all()
     assert state.positions[:, 2].max() < top - 0.4
-    assert np.abs(state.linear).max() < 0.5
+    assert np.abs(state.linear_velocities).max() < 0.5
 
 
 @pytest.mark.parametrize('shape', ['<box size="1 0 1"/>', '<sphere radius="-1"/>',

@@ -13,7 +13,7 @@ from page_client import PageClient, wait
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import rotation
-from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, Rider
+from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame
 from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.model.shapes import Capsule, Sphere
 from ragdoll_ros.physics.simulation import Simulation
@@ -146,7 +146,7 @@ def test_arrow_keys_push(page, label, axis, sign):
     client.press(command(page, label))
     wait(lambda: page._frame.pushes)
     assert page._frame.pushes[0].force[axis] == 2000 * sign
-    wait(lambda: page._frame.state.linear[0, axis] * sign > 1)
+    wait(lambda: page._frame.state.linear_velocities[0, axis] * sign > 1)
     arrow = wait_for(page, '/scene/pushes')
     assert arrow.visible and np.sign(np.diff(arrow.points[0], axis=0)[0, axis]) == sign
     wait(lambda: not page._frame.pushes and not arrow.visible)
@@ -208,7 +208,7 @@ def test_a_scene_that_is_refused_is_not_chosen(page):
 def test_what_was_sent_is_text_on_the_page(page):
     """A doll's name, which anyone may send, is told with the skin that it has not: as no HTML."""
     placement = DROP.dolls[0]
-    doll = dataclasses.replace(placement.doll, riders=(Rider('r', 'torso', (0, 0, 0)),),
+    doll = dataclasses.replace(placement.doll, riders=(SkeletonFrame('r', 'torso', (0, 0, 0)),),
                                model='nothing.glb')
     page.open()
     page.source.use(dataclasses.replace(DROP, dolls=(

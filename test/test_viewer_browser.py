@@ -329,7 +329,7 @@ def test_rubbish_is_refused_and_a_character_is_fitted(view):
     """What was uploaded is told by its name; the skin is in the page then."""
     view.tab('Edit')
     upload(view, 'Fit a character', 'no_skin.glb', BROKEN['no_skin.glb'])
-    view.see('no_skin.glb: 1 fault')
+    view.see('no_skin.glb: 1 error')
     upload(view, 'Fit a character', 'bird.glb', fit_rigs.document(fit_rigs.RIGS['bird']).glb())
     view.see('fitted bird.glb')
     view.wait(lambda: view.has('/scene/skins/0'))

@@ -16,7 +16,7 @@ from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.pipeline import fit_character
 from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.push import Push
-from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, Rider
+from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame
 from ragdoll_ros.model.scene import Placement, Scene, above_ground
 from ragdoll_ros.model.shapes import Box, Sphere
 from ragdoll_ros.model.skeleton import Riders
@@ -232,7 +232,7 @@ def test_a_character_that_cannot_be_opened_is_told_and_the_doll_shown_without():
     """A path that is too long for the system, or through what is no folder: no error of Python."""
     import viser
     ball = Ragdoll('d', (Bone('b', Sphere(0.1), 1, (0, 0, 0)),),
-                   riders=(Rider('r', 'b', (0, 0, 0)),))
+                   riders=(SkeletonFrame('r', 'b', (0, 0, 0)),))
     dolls = tuple(Placement(dataclasses.replace(ball, model=model), name=name)
                   for name, model in (('long', 'm' * 300), ('through', f'{__file__}/x.glb')))
     server = viser.ViserServer('127.0.0.1', 0, verbose=False)

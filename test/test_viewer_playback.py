@@ -42,7 +42,7 @@ def test_follows_the_clock_on_the_wall(playing):
         frame = playback.frame
         assert before - until <= frame.time <= time.monotonic() - begin
         assert height(frame) == pytest.approx(frame.time, abs=1e-9)
-    assert np.isnan(frame.state.linear).all()  # nobody has recorded velocities
+    assert np.isnan(frame.state.linear_velocities).all()  # nobody has recorded velocities
 
 
 def test_another_instant_is_another_frame(playing):

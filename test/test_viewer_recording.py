@@ -151,7 +151,7 @@ RUBBISH = {
     'rods of no kind': (change('rods', 7), 'rods: WrongForm'),
     'quaternions of another length': (change_first('orientations', [0, 0, 0, 2]),
                                       'orientations: NotUnit'),
-    'a scene with a fault': (lambda data: data['scene'].update(step=-1), 'scene.step: OutOfRange'),
+    'a scene with an error': (lambda data: data['scene'].update(step=-1), 'scene.step: OutOfRange'),
     'a scene of no kind': (change('scene', [1]), 'scene'),
 }
 
@@ -161,22 +161,22 @@ def test_rubbish_is_refused_where_it_stands(written, spoil, told):
     data = json.loads(written.read_text())
     spoil(data)
     written.write_text(json.dumps(data).replace('"1e999"', '[1e999]'))
-    with pytest.raises(errors.Faults) as caught:
+    with pytest.raises(errors.ModelErrors) as caught:
         load_recording(written)
-    assert told in str(caught.value) and 'run.json: 1 fault' in str(caught.value)
+    assert told in str(caught.value) and 'run.json: 1 error' in str(caught.value)
 
 
 @pytest.mark.parametrize('content', [b'', b'{', b'\xff\xfe', b'[' * 100_000, b'[]', b'{}', b'3'])
 def test_a_file_that_is_no_recording_is_refused(tmp_path, content):
     (tmp_path / 'run.json').write_bytes(content)
-    with pytest.raises(errors.Faults, match=r'run\.json: 1 fault'):
+    with pytest.raises(errors.ModelErrors, match=r'run\.json: 1 error'):
         load_recording(tmp_path / 'run.json')
 
 
 def test_a_missing_file_is_refused(tmp_path):
-    with pytest.raises(errors.Faults, match='No such file'):
+    with pytest.raises(errors.ModelErrors, match='No such file'):
         load_recording(tmp_path / 'nowhere.json')
-    with pytest.raises(errors.Faults, match='directory'):
+    with pytest.raises(errors.ModelErrors, match='directory'):
         load_recording(tmp_path)
 
 

@@ -63,16 +63,16 @@ def measure(name: str, method_name: str) -> list[Row]:
     row: Row = {'case': name, 'method': method_name,
                 'cpu_s_per_s': float(result.costs.sum() / trial.duration)}
     if not result.moved.finite:
-        return [{**row, 'faults': ['NaN'], 'passed': False}]
+        return [{**row, 'violations': ['NaN'], 'passed': False}]
     row |= figures(case, trial, result.moved)
-    row['faults'] = faults(case, row)
-    return [{**row, 'passed': not row['faults']}]
+    row['violations'] = violations(case, row)
+    return [{**row, 'passed': not row['violations']}]
 
 
 def figures(case: HardCase, trial: Trial, moved: Trajectory) -> Row:
     """Figures the rules are about."""
     measure = Measure(trial.scene)
-    speeds = np.linalg.norm(moved.linear, axis=-1).max(axis=1)
+    speeds = np.linalg.norm(moved.linear_velocities, axis=-1).max(axis=1)
     energy, work = measure.energy(moved), measure.work(trial, moved)
     lift = (sum(bone.mass for bone in trial.scene.bones) * case.rule.lift_m
             * float(np.linalg.norm(trial.scene.gravity)))
@@ -85,7 +85,7 @@ def figures(case: HardCase, trial: Trial, moved: Trajectory) -> Row:
             'end_m_s': float(speeds[-10:].max()), 'settled_s': measure.settled(moved)}
 
 
-def faults(case: HardCase, row: Row) -> list[str]:
+def violations(case: HardCase, row: Row) -> list[str]:
     """Say what of a case's rule does not hold."""
     rule, found = case.rule, []
     size = max(1.0, case.scale)
@@ -107,7 +107,7 @@ def rest(accuracy: str) -> list[Row]:
     with Simulation(load_scene('drop'), accuracy=accuracy) as simulation:
         settled = math.inf
         for tick in range(60_000):
-            speed = float(np.abs(simulation.advance().linear).max())
+            speed = float(np.abs(simulation.advance().linear_velocities).max())
             if tick == 500:
                 settled = speed
             if tick > 500:
@@ -117,11 +117,11 @@ def rest(accuracy: str) -> list[Row]:
         found += ['does not sleep'] * (not simulation.asleep)
         simulation.push(Push('head', (0.0, 0.0, 300.0), duration=0.1))
         simulation.advance()
-        moved = float(np.abs(simulation.advance().linear).max())
+        moved = float(np.abs(simulation.advance().linear_velocities).max())
         found += ['a push does not wake it'] * (not moved > 0.1)
     found += ['a touch does not wake it'] * (not _wakes_by_touch(accuracy))
     return [{'case': 'rest for 10 min', 'method': f'ours-{accuracy}', 'end_m_s': fastest,
-             'faults': found, 'passed': not found}]
+             'violations': found, 'passed': not found}]
 
 
 def _wakes_by_touch(accuracy: str) -> bool:
@@ -132,11 +132,12 @@ def _wakes_by_touch(accuracy: str) -> bool:
                         spin=(0.0, 12.0, 0.0))
     scene = dataclasses.replace(scene, dolls=(scene.dolls[0], rolling))
     with Simulation(scene, accuracy=accuracy) as simulation:
-        speeds = [float(np.abs(simulation.advance().linear[:-1]).max()) for _ in range(700)]
+        speeds = [float(np.abs(simulation.advance().linear_velocities[:-1]).max())
+                  for _ in range(700)]
     return speeds[450] < REST and max(speeds[451:]) > 0.5
 
 
-COLUMNS = (('case', 'case', '{}'), ('passed', 'holds', '{}'), ('faults', 'what does not', '{}'),
+COLUMNS = (('case', 'case', '{}'), ('passed', 'holds', '{}'), ('violations', 'what does not', '{}'),
            ('excess', 'energy excess', '{:.1e}'), ('overshoot_rad', 'overshoot °', 'deg'),
            ('sinking_m', 'sinking mm', 'mm'), ('gap_m', 'gap m', '{:.0e}'),
            ('fastest_m_s', 'fastest m/s', '{:.1f}'), ('end_m_s', 'at the end m/s', '{:.3f}'))
@@ -150,7 +151,7 @@ def section(rows: list[Row]) -> str:
         if row.get('method') == 'bullet-10':
             continue
         other = others.get(row.get('case'))
-        text = '' if other is None else 'yes' if other['passed'] else ', '.join(other['faults'])
+        text = '' if other is None else 'yes' if other['passed'] else ', '.join(other['violations'])
         shown.append({**row, 'other': text})
     text = table(shown, (*COLUMNS, ('other', 'PyBullet N = 10', '{}')))
     failing = [row['case'] for row in shown if not row.get('passed')]

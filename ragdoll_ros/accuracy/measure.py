@@ -47,8 +47,9 @@ class Measure:
 
     def kinetic(self, moved: Trajectory) -> np.ndarray:
         """Kinetic energy (t,) J."""
-        body = rotation.rotate(rotation.inverse(moved.orientations), moved.angular)
-        return (np.einsum('n,tnd,tnd->t', self._masses, moved.linear, moved.linear)
+        body = rotation.rotate(rotation.inverse(moved.orientations), moved.angular_velocities)
+        return (np.einsum('n,tnd,tnd->t', self._masses, moved.linear_velocities,
+                          moved.linear_velocities)
                 + np.einsum('nd,tnd,tnd->t', self._inertias, body, body)) / 2
 
     def energy(self, moved: Trajectory) -> np.ndarray:
@@ -61,15 +62,15 @@ class Measure:
 
     def momentum(self, moved: Trajectory) -> np.ndarray:
         """Momentum (t, 3) N s."""
-        return np.einsum('n,tnd->td', self._masses, moved.linear)
+        return np.einsum('n,tnd->td', self._masses, moved.linear_velocities)
 
     def spin(self, moved: Trajectory) -> np.ndarray:
         """Angular momentum (t, 3) N m s about the centre of mass of all bones."""
         centre = np.einsum('n,tnd->td', self._masses, moved.positions) / self._masses.sum()
         arms = moved.positions - centre[:, None]
-        body = rotation.rotate(rotation.inverse(moved.orientations), moved.angular)
+        body = rotation.rotate(rotation.inverse(moved.orientations), moved.angular_velocities)
         own = rotation.rotate(moved.orientations, self._inertias * body)
-        return (np.cross(arms, self._masses[:, None] * moved.linear) + own).sum(axis=1)
+        return (np.cross(arms, self._masses[:, None] * moved.linear_velocities) + own).sum(axis=1)
 
     def work(self, trial: Trial, moved: Trajectory) -> np.ndarray:
         """Work (t,) J that the pushes have done so far.
@@ -84,7 +85,7 @@ class Measure:
             acts = (push.start <= middle) & (middle < push.start + push.duration)
             place = moved.positions[:, bone] + rotation.rotate(
                 moved.orientations[:, bone], np.array(push.point))
-            spins, turns = moved.angular[:, bone], moved.orientations[:, bone]
+            spins, turns = moved.angular_velocities[:, bone], moved.orientations[:, bone]
             swept = rotation.rotation_vector(rotation.multiply(
                 turns[1:], rotation.inverse(turns[:-1])))
             swept += np.diff(moved.times)[:, None] ** 2 / 12 * np.cross(spins[:-1], spins[1:])
@@ -112,15 +113,17 @@ class Measure:
             acted = np.clip(moved.times - push.start, 0, push.duration)
             expected = expected + acted[:, None] * push.force
         momentum = self.momentum(moved)
-        scale = np.einsum('n,tn->t', self._masses, np.linalg.norm(moved.linear, axis=-1)).max()
+        scale = np.einsum('n,tn->t', self._masses,
+                          np.linalg.norm(moved.linear_velocities, axis=-1)).max()
         return _share(np.abs(momentum - momentum[0] - expected).max(), scale)
 
     def spin_drift(self, moved: Trajectory) -> float:
         """Worst change of angular momentum about the centre of mass, as a share of sum |L|."""
         spin = self.spin(moved)
-        body = rotation.rotate(rotation.inverse(moved.orientations), moved.angular)
+        body = rotation.rotate(rotation.inverse(moved.orientations), moved.angular_velocities)
         centre = np.einsum('n,tnd->td', self._masses, moved.positions) / self._masses.sum()
-        about = np.cross(moved.positions - centre[:, None], self._masses[:, None] * moved.linear)
+        about = np.cross(moved.positions - centre[:, None],
+                         self._masses[:, None] * moved.linear_velocities)
         scale = (np.linalg.norm(about, axis=-1)
                  + np.linalg.norm(self._inertias * body, axis=-1)).sum(axis=1).max()
         return _share(np.abs(spin - spin[0]).max(), scale)
@@ -169,7 +172,7 @@ class Measure:
 
     def settled(self, moved: Trajectory) -> float:
         """Instant in s after which every bone stays slower than REST_SPEED; infinity: never."""
-        speeds = np.linalg.norm(moved.linear, axis=-1).max(axis=1)
+        speeds = np.linalg.norm(moved.linear_velocities, axis=-1).max(axis=1)
         fast = np.flatnonzero(~(speeds < REST_SPEED))
         if not len(fast):
             return 0.0

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..files.scene import load_scene
 from ..model import rotation
-from ..model.coordinates import Coordinates
+from ..model.coordinates import GeneralizedState
 from ..model.push import Push
 from ..model.scene import Placement, Scene, height
 from .references.articulated import Articulated
@@ -102,7 +102,7 @@ def _let_go(rng: np.random.Generator, fall: float, angles: dict[str, float],
     return Trial(scene, round(duration, 2), start)
 
 
-def lifted(scene: Scene, start: Coordinates, clearance: float) -> Coordinates:
+def lifted(scene: Scene, start: GeneralizedState, clearance: float) -> GeneralizedState:
     """Give the same start with the lowest point of all bones ``clearance`` m above level ground."""
     doll = scene.dolls[0].doll
     state = Articulated(doll).state(start.q, start.v)

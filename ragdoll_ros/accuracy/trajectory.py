@@ -19,24 +19,24 @@ class Trajectory:
     """(t, n, 3) m, of the centres of mass."""
     orientations: np.ndarray
     """(t, n, 4) unit quaternions x, y, z, w, of the shapes' own axes."""
-    linear: np.ndarray
+    linear_velocities: np.ndarray
     """(t, n, 3) m/s."""
-    angular: np.ndarray
+    angular_velocities: np.ndarray
     """(t, n, 3) rad/s, world axes."""
 
     @classmethod
     def of(cls, times: Iterable[float], states: Iterable[State]) -> Trajectory:
         """Stack states, one for each time."""
         states = list(states)
-        fields = ('positions', 'orientations', 'linear', 'angular')
+        fields = ('positions', 'orientations', 'linear_velocities', 'angular_velocities')
         return cls(np.array(list(times), float),
                    *(np.array([getattr(state, field) for state in states], float)
                      for field in fields))
 
     def at(self, index: int) -> State:
         """State at one of the instants."""
-        return State(self.positions[index], self.orientations[index], self.linear[index],
-                     self.angular[index])
+        return State(self.positions[index], self.orientations[index], self.linear_velocities[index],
+                     self.angular_velocities[index])
 
     def part(self, which: slice) -> Trajectory:
         """Give the instants ``which`` names."""

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import rotation
-from ..model.coordinates import Coordinates
+from ..model.coordinates import GeneralizedState
 from ..model.push import Push
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Placement, Scene
-from ..physics.engine.protocol import Load
+from ..physics.engine.protocol import AppliedWrench
 from .references.articulated import Articulated
 
 
@@ -24,7 +24,7 @@ class Trial:
 
     scene: Scene
     duration: float
-    start: Coordinates | None = None
+    start: GeneralizedState | None = None
     pushes: tuple[Push, ...] = ()
 
     def times(self, tick: float | None = None) -> np.ndarray:
@@ -36,17 +36,17 @@ class Trial:
         """Give the same motion in ticks of another length, s."""
         return dataclasses.replace(self, scene=dataclasses.replace(self.scene, step=tick))
 
-    def loads(self, begin: float, end: float) -> list[Load]:
+    def loads(self, begin: float, end: float) -> list[AppliedWrench]:
         """Give the loads of a tick: of all pushes that act in its middle."""
         middle = (begin + end) / 2
-        return [Load(self.scene.bone_index(push.bone), np.array(push.force),
+        return [AppliedWrench(self.scene.bone_index(push.bone), np.array(push.force),
                      np.array(push.torque), np.array(push.point))
                 for push in self.pushes if push.start <= middle < push.start + push.duration]
 
 
 def posed(placement: Placement, angles: dict[str, float] | None = None,
-          rates: dict[str, float] | None = None) -> Coordinates:
-    """Coordinates of one placed doll with some joint angles (rad) and rates (rad/s) set.
+          rates: dict[str, float] | None = None) -> GeneralizedState:
+    """GeneralizedState of one placed doll with some joint angles (rad) and rates (rad/s) set.
 
     The names are those of Joint.angle_names; the root moves as ``placement`` says.
     """
@@ -62,7 +62,7 @@ def posed(placement: Placement, angles: dict[str, float] | None = None,
         q[7 + where[name]] = angle
     for name, rate in (rates or {}).items():
         v[6 + where[name]] = rate
-    return Coordinates(q, v)
+    return GeneralizedState(q, v)
 
 
 def angle_places(doll: Ragdoll) -> dict[str, int]:

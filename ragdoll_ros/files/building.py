@@ -1,25 +1,26 @@
-"""Parts of a model from a file's data, with every fault noted and its place."""
+"""Parts of a model from a file's data, with every error noted and its place."""
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
 from pathlib import Path
 
-from ..model.errors import Fault, Faults
+from ..model.errors import ModelError, ModelErrors
 
 
-def attempt(found: list[Fault], where: str, make: type, *args: object, **kwargs: object) -> object:
-    """Make a part; where that fails, note the fault and give None."""
+def attempt(found: list[ModelError], where: str, make: type, *args: object,
+            **kwargs: object) -> object:
+    """Make a part; where that fails, note the error and give None."""
     try:
         return make(*args, **kwargs)
-    except Fault as fault:
-        found.append(fault.at(where) if where else fault)
+    except ModelError as error:
+        found.append(error.at(where) if where else error)
         return None
 
 
-def any_under(found: list[Fault], where: str) -> bool:
-    """Tell whether a fault is at a place or below it."""
-    return any(re.match(re.escape(where) + r'($|[.\[])', fault.path) for fault in found)
+def any_under(found: list[ModelError], where: str) -> bool:
+    """Tell whether an error is at a place or below it."""
+    return any(re.match(re.escape(where) + r'($|[.\[])', error.path) for error in found)
 
 
 def entries(data: dict, key: str) -> list[dict]:
@@ -28,7 +29,7 @@ def entries(data: dict, key: str) -> list[dict]:
     return [e for e in values if isinstance(e, dict)] if isinstance(values, list) else []
 
 
-def build_each(data: dict, key: str, make: Callable, found: list[Fault]) -> list:
+def build_each(data: dict, key: str, make: Callable, found: list[ModelError]) -> list:
     """Make every entry of a list that the schema has nothing against."""
     made = []
     for index, entry in enumerate(entries(data, key)):
@@ -38,8 +39,8 @@ def build_each(data: dict, key: str, make: Callable, found: list[Fault]) -> list
     return made
 
 
-def raise_or_give(path: Path, made: object, found: list[Fault]) -> object:
-    """Give what was made; Faults with all of them if there are any."""
+def raise_or_give(path: Path, made: object, found: list[ModelError]) -> object:
+    """Give what was made; ModelErrors with all of them if there are any."""
     if found:
-        raise Faults(str(path), found)
+        raise ModelErrors(str(path), found)
     return made

@@ -1,4 +1,4 @@
-"""Dolls as YAML files: read, checked with all faults at once, written.
+"""Dolls as YAML files: read, checked with all errors at once, written.
 
 The form is that of config/doll.schema.json.
 """
@@ -8,23 +8,23 @@ import math
 import os
 from pathlib import Path
 
-from ..model.errors import Fault, Faults
-from ..model.ragdoll import Bone, Joint, Ragdoll, Rider, carried_faults, tree_faults
+from ..model.errors import ModelError, ModelErrors
+from ..model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame, carried_errors, tree_errors
 from ..model.rotation import IDENTITY
 from ..model.shapes import SHAPES, Shape
 from . import config, yaml_text
 from .building import build_each, entries, raise_or_give
-from .schema import schema_faults
+from .schema import schema_errors
 from .swing import swing_data, swing_from
 
 
 def load_doll(name: str) -> Ragdoll:
-    """Read a doll's file; Faults with all that is wrong in it."""
+    """Read a doll's file; ModelErrors with all that is wrong in it."""
     try:
         path = config.find(name)
         data = yaml_text.read(path)
-    except Fault as fault:
-        raise Faults(str(name), [fault]) from None
+    except ModelError as error:
+        raise ModelErrors(str(name), [error]) from None
     return raise_or_give(path, *build_doll(data, path))
 
 
@@ -35,23 +35,23 @@ def save_doll(doll: Ragdoll, path: str | Path, head: str = '') -> None:
 
 
 def build_doll(data: object,
-               path: Path = Path('doll')) -> tuple[Ragdoll | None, list[Fault]]:
-    """Make a doll from what the YAML file at ``path`` holds: the doll, or None and every fault."""
-    found = schema_faults('doll', data)
+               path: Path = Path('doll')) -> tuple[Ragdoll | None, list[ModelError]]:
+    """Make a doll from what the YAML file at ``path`` holds: the doll, or None and every error."""
+    found = schema_errors('doll', data)
     if not isinstance(data, dict):
         return None, found
     bones = build_each(data, 'bones', _bone, found)
     joints = build_each(data, 'joints', _joint, found)
     swings = build_each(data, 'swings', swing_from, found)
-    riders = build_each(data, 'riders', lambda entry: Rider(**entry), found)
+    riders = build_each(data, 'riders', lambda entry: SkeletonFrame(**entry), found)
     names = [entry.get('name') for entry in entries(data, 'bones')]
     edges = [(entry.get('parent'), entry.get('child')) for entry in entries(data, 'joints')]
     if all(isinstance(text, str) for text in [*names, *sum(edges, ())]):
-        found += tree_faults(names, edges)
+        found += tree_errors(names, edges)
         for key in ('swings', 'riders'):
             carried = [(entry.get('name'), entry.get('bone')) for entry in entries(data, key)]
             if all(isinstance(text, str) for text in sum(carried, ())):
-                found += carried_faults(key, names, carried)
+                found += carried_errors(key, names, carried)
     if found:
         return None, found
     model = str(path.parent / data['model']) if 'model' in data else None
@@ -100,11 +100,11 @@ def _joint(data: dict) -> Joint:
     limits = tuple(pair and tuple(math.radians(angle) for angle in pair) for pair in pairs)
     try:
         return Joint(limits=limits, **fields)
-    except Fault as fault:
-        if not fault.path.startswith('limits'):
+    except ModelError as error:
+        if not error.path.startswith('limits'):
             raise
-        path = fault.path.replace('limits', 'limits_deg', 1)
-        raise type(fault)(path, pairs, fault.expected) from None
+        path = error.path.replace('limits', 'limits_deg', 1)
+        raise type(error)(path, pairs, error.expected) from None
 
 
 def _bone_data(bone: Bone) -> dict:
@@ -122,7 +122,7 @@ def _bone_data(bone: Bone) -> dict:
     return data
 
 
-def _rider_data(rider: Rider) -> dict:
+def _rider_data(rider: SkeletonFrame) -> dict:
     data = {'name': rider.name, 'bone': rider.bone, 'position': list(rider.position)}
     if rider.orientation != IDENTITY:
         data['orientation'] = list(rider.orientation)

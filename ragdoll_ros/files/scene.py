@@ -1,4 +1,4 @@
-"""Scenes as YAML files: found, read, checked with all faults at once, written.
+"""Scenes as YAML files: found, read, checked with all errors at once, written.
 
 The form is that of config/scene.schema.json.
 """
@@ -8,22 +8,22 @@ import functools
 import re
 from pathlib import Path
 
-from ..model.errors import Fault, Faults
+from ..model.errors import ModelError, ModelErrors
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Ground, Material, Placement, Scene, above_ground
 from . import config, yaml_text
 from .building import any_under, attempt, raise_or_give
 from .doll import build_doll, doll_data
-from .schema import schema_faults
+from .schema import schema_errors
 
 
 def load_scene(name: str) -> Scene:
-    """Read a scene, or a doll (then above level ground); Faults with all that is wrong in it."""
+    """Read a scene, or a doll (then above level ground); ModelErrors with all that is wrong."""
     try:
         path = config.find(name)
         data = yaml_text.read(path)
-    except Fault as fault:
-        raise Faults(str(name), [fault]) from None
+    except ModelError as error:
+        raise ModelErrors(str(name), [error]) from None
     return scene_from(data, path)
 
 
@@ -39,9 +39,9 @@ def save_scene(scene: Scene, path: str | Path, head: str = '') -> None:
     Path(path).write_text(scene_text(scene, Path(path).parent, head), encoding='utf-8')
 
 
-def build_scene(data: object, path: Path) -> tuple[Scene | None, list[Fault]]:
-    """Make a scene from what a YAML file holds: the scene, or None and every fault."""
-    found = schema_faults('scene', data)
+def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError]]:
+    """Make a scene from what a YAML file holds: the scene, or None and every error."""
+    found = schema_errors('scene', data)
     if not isinstance(data, dict):
         return None, found
     placements = []
@@ -56,10 +56,10 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[Fault]]:
             doll, more = build_doll(source, path.with_name('doll'))
         else:
             doll, more = named(source) if isinstance(source, str) else (None, [])
-        found += [fault.at(f'{where}.doll') for fault in more]
+        found += [error.at(f'{where}.doll') for error in more]
         if doll is not None and not any_under(found, where):
             doll, more = _with_swings(doll, entry, path)
-            found += [fault.at(where) for fault in more]
+            found += [error.at(where) for error in more]
         if doll is not None and not any_under(found, where):
             fields = {'position', 'orientation', 'velocity', 'spin', 'name'} & set(entry)
             placements.append(attempt(found, where, Placement, doll,
@@ -97,17 +97,17 @@ def scene_text(scene: Scene, folder: Path, head: str = '') -> str:
     return yaml_text.to_text(scene_data(scene, folder), 'scene', head)
 
 
-def _named_doll(name: str, path: Path) -> tuple[Ragdoll | None, list[Fault]]:
-    """Make the doll a scene names; faults of another file carry its name."""
+def _named_doll(name: str, path: Path) -> tuple[Ragdoll | None, list[ModelError]]:
+    """Make the doll a scene names; errors of another file carry its name."""
     try:
         file = config.find(name, beside=path.parent)
         doll, found = build_doll(yaml_text.read(file), file)
-    except Fault as fault:
-        return None, [fault]
-    return doll, [fault.at(f'({file.name})') for fault in found]
+    except ModelError as error:
+        return None, [error]
+    return doll, [error.at(f'({file.name})') for error in found]
 
 
-def _with_swings(doll: Ragdoll, entry: dict, path: Path) -> tuple[Ragdoll | None, list[Fault]]:
+def _with_swings(doll: Ragdoll, entry: dict, path: Path) -> tuple[Ragdoll | None, list[ModelError]]:
     """Give the doll the swings that its place in the scene adds to its own."""
     if not entry.get('swings'):
         return doll, []
@@ -116,6 +116,6 @@ def _with_swings(doll: Ragdoll, entry: dict, path: Path) -> tuple[Ragdoll | None
     data['swings'] = data.get('swings', []) + entry['swings']
     dressed, found = build_doll(data, path)
     shift = re.compile(r'^swings\[(\d+)\]')
-    return dressed, [type(fault)(
-        shift.sub(lambda match: f'swings[{int(match[1]) - own}]', fault.path),
-        fault.value, fault.expected) for fault in found]
+    return dressed, [type(error)(
+        shift.sub(lambda match: f'swings[{int(match[1]) - own}]', error.path),
+        error.value, error.expected) for error in found]

@@ -7,14 +7,14 @@ import json
 import jsonschema
 
 from ..model import errors
-from ..model.errors import Fault
+from ..model.errors import ModelError
 from .config import config_folder
 
 _NAMED = {'exclusiveMinimum': errors.NotPositive, 'minimum': errors.OutOfRange,
           'maximum': errors.OutOfRange}
 
 
-def schema_faults(schema: str, data: object) -> list[Fault]:
+def schema_errors(schema: str, data: object) -> list[ModelError]:
     """Find all that the schema ``schema`` ('scene' or 'doll') has against the data."""
     found = []
     for error in _validator(schema).iter_errors(data):
@@ -23,7 +23,7 @@ def schema_faults(schema: str, data: object) -> list[Fault]:
             path += f'[{part}]' if isinstance(part, int) else f'.{part}' if path else str(part)
         kind = _NAMED.get(error.validator, errors.WrongForm)
         found.append(kind(path, _wrong(error), _expected(error)))
-    return sorted(found, key=lambda fault: fault.path)
+    return sorted(found, key=lambda error: error.path)
 
 
 def _wrong(error: jsonschema.ValidationError) -> object:

@@ -3,12 +3,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..model.errors import Fault
+from ..model.errors import ModelError
 from ..model.swing import Link, Swing, strand
 
 
 def swing_from(data: dict) -> Swing:
-    """Make a swing of what a file holds; a Fault tells where in it."""
+    """Make a swing of what a file holds; a ModelError tells where in it."""
     fields = dict(data)
     if 'strand' in fields:
         links = _at('strand', strand, fields.pop('strand'))
@@ -38,5 +38,5 @@ def _link_data(link: Link) -> dict:
 def _at(where: str, make: Callable[..., object], fields: dict) -> object:
     try:
         return make(**fields)
-    except Fault as fault:
-        raise fault.at(where) from None
+    except ModelError as error:
+        raise error.at(where) from None

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ..model import errors, rotation
-from ..model.ragdoll import tree_faults
+from ..model.ragdoll import tree_errors
 from ..model.shapes import SHAPES, Shape
 
 LARGEST_TEXT = 32_000_000
@@ -91,7 +91,7 @@ def compose(outer: Pose, inner: Pose) -> Pose:
 
 
 def parse_urdf(text: str) -> UrdfTree:
-    """Read URDF; a Fault where it is no URDF or its links form no tree."""
+    """Read URDF; a ModelError where it is no URDF or its links form no tree."""
     if len(text) > LARGEST_TEXT:
         raise errors.Unreadable('', f'{len(text)} characters', f'at most {LARGEST_TEXT}')
     if '<!DOCTYPE' in text or '<!ENTITY' in text:
@@ -106,9 +106,9 @@ def parse_urdf(text: str) -> UrdfTree:
     links = [_link(element) for element in root.findall('link')]
     joints = [_joint(element) for element in root.findall('joint')]
     edges = [(joint.parent, joint.child) for joint in joints]
-    for fault in tree_faults([link.name for link in links], edges):
-        path = fault.path.replace('bones', 'link').replace('joints', 'joint')
-        raise type(fault)(path, fault.value, fault.expected.replace('bone', 'link'))
+    for error in tree_errors([link.name for link in links], edges):
+        path = error.path.replace('bones', 'link').replace('joints', 'joint')
+        raise type(error)(path, error.value, error.expected.replace('bone', 'link'))
     return UrdfTree(root.get('name') or 'robot', {link.name: link for link in links},
                     {joint.child: joint for joint in joints})
 
@@ -172,8 +172,8 @@ def _shape(geometry: ElementTree.Element, where: str) -> Shape | None:
                      else _number(element, key, where) for key in SIZES[element.tag]}
             try:
                 return SHAPES[element.tag](**sizes)
-            except errors.Fault as fault:
-                raise fault.at(where) from None
+            except errors.ModelError as error:
+                raise error.at(where) from None
     return None
 
 

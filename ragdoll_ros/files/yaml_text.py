@@ -8,7 +8,7 @@ from pathlib import Path
 import yaml
 
 from ..model import errors
-from ..model.errors import Fault
+from ..model.errors import ModelError
 
 LARGEST_FILE = 32_000_000
 """Bytes; a doll of 10 000 bones takes 3 MB."""
@@ -58,7 +58,7 @@ def parse(content: bytes) -> object:
         raise errors.Unreadable('', f'{len(content)} bytes', f'at most {LARGEST_FILE}')
     try:
         return _construct(content.decode('utf-8'))
-    except Fault:
+    except ModelError:
         raise
     except yaml.YAMLError as error:
         mark = getattr(error, 'problem_mark', None)

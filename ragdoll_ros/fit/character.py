@@ -78,7 +78,7 @@ class Character:
 
 
 def read_character(path: str | Path, scale: float | None = None) -> Character:
-    """Read a .glb or .gltf file; Faults with what keeps it from being a character.
+    """Read a .glb or .gltf file; ModelErrors with what keeps it from being a character.
 
     ``scale``: metres to one unit of the file; None takes 1, or what brings a size that cannot
     be metres back to one that can, with a note.
@@ -92,11 +92,11 @@ def read_character(path: str | Path, scale: float | None = None) -> Character:
         if len(skins.vertices) == 0:
             raise errors.WrongForm('meshes', 0, 'a skin with vertices')
         return _character(file, nodes, skins, scale)
-    except errors.Fault as fault:
-        raise errors.Faults(str(path), [fault]) from None
+    except errors.ModelError as error:
+        raise errors.ModelErrors(str(path), [error]) from None
     except OSError as error:
-        fault = errors.Unreadable('', error.strerror or str(error), 'a file that can be read')
-        raise errors.Faults(str(path), [fault]) from None
+        error = errors.Unreadable('', error.strerror or str(error), 'a file that can be read')
+        raise errors.ModelErrors(str(path), [error]) from None
 
 
 def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) -> Character:

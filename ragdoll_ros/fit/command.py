@@ -130,8 +130,8 @@ def _check(options: argparse.Namespace, parser: argparse.ArgumentParser) -> None
 
 
 def _one_line(error: errors.RagdollError) -> str:
-    if isinstance(error, errors.Faults) and len(error.faults) == 1:
-        return f'{error.file}: {error.faults[0]}'
+    if isinstance(error, errors.ModelErrors) and len(error.errors) == 1:
+        return f'{error.file}: {error.errors[0]}'
     return str(error)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import errors, rotation
-from ..model.ragdoll import Bone, Joint, Ragdoll, Rider
+from ..model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame
 from ..model.swing import Swing
 from . import masses
 from .axes import Axes, fit_axes
@@ -62,7 +62,7 @@ class Fit:
 
 
 def fit_character(character: Character, options: Options | None = None) -> Fit:
-    """Make a doll of a character; Fault where an option is out of range."""
+    """Make a doll of a character; ModelError where an option is out of range."""
     options = options or Options()
     given, character = character, refined(character)
     roles = roles_of(character.bone_names, character.parents)
@@ -213,7 +213,8 @@ def _carriers(groups: list[Group], bodies: list[BodyFit]) -> dict[int, Bone]:
             for bone in group.bones}
 
 
-def _riders(character: Character, groups: list[Group], bodies: list[BodyFit]) -> tuple[Rider, ...]:
+def _riders(character: Character, groups: list[Group],
+            bodies: list[BodyFit]) -> tuple[SkeletonFrame, ...]:
     """Every bone of the skeleton, fixed on the body that carries it, the skeleton's order."""
     carrier = _carriers(groups, bodies)
     riders = []
@@ -222,6 +223,6 @@ def _riders(character: Character, groups: list[Group], bodies: list[BodyFit]) ->
         back = rotation.inverse(np.array(body.orientation))
         position = rotation.rotate(back, character.positions[index] - body.position)
         turn = rotation.multiply(back, character.orientations[index])
-        riders.append(Rider(name, body.name, np.round(position, 12) + 0.0,
+        riders.append(SkeletonFrame(name, body.name, np.round(position, 12) + 0.0,
                             np.round(turn, 12) + 0.0))
     return tuple(riders)

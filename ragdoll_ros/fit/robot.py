@@ -16,7 +16,7 @@ import numpy as np
 
 from ..files.urdf_tree import LARGEST_TEXT, Pose, UrdfJoint, UrdfLink, UrdfTree, compose, parse_urdf
 from ..model import errors, rotation
-from ..model.ragdoll import LARGEST_SWING, WORLD, Bone, Joint, Ragdoll, Rider
+from ..model.ragdoll import LARGEST_SWING, WORLD, Bone, Joint, Ragdoll, SkeletonFrame
 from ..model.shapes import Box, Capsule, Shape
 from .axes import fit_axes
 from .shapes import fit_best
@@ -32,7 +32,7 @@ SAME_PLACE = 1e-6
 
 
 def doll_from_urdf(text: str) -> Ragdoll:
-    """Make a doll of a robot's description; Fault with what is wrong in it."""
+    """Make a doll of a robot's description; ModelError with what is wrong in it."""
     return _doll(parse_urdf(text))[0]
 
 
@@ -50,8 +50,8 @@ def read_urdf(path: str | Path) -> tuple[Ragdoll, tuple[str, ...]]:
             raise errors.Unreadable('', str(error), 'a text in UTF-8') from None
         doll, notes = _doll(parse_urdf(text))
         return doll, tuple(notes)
-    except errors.Fault as fault:
-        raise errors.Faults(str(path), [fault]) from None
+    except errors.ModelError as error:
+        raise errors.ModelErrors(str(path), [error]) from None
 
 
 def _doll(tree: UrdfTree) -> tuple[Ragdoll, list[str]]:
@@ -229,14 +229,14 @@ def _cone(limits: list) -> tuple:
 
 
 def _riders(poses: dict[str, Pose], carriers: dict[str, str], names: dict[str, str],
-            bones: list[Bone]) -> tuple[Rider, ...]:
+            bones: list[Bone]) -> tuple[SkeletonFrame, ...]:
     """Every link's frame, fixed on the body that carries it."""
     by_name = {bone.name: bone for bone in bones}
     riders = []
     for name, text in _names(list(poses)).items():
         bone = by_name[names[carriers[name]]]
         back = rotation.inverse(np.array(bone.orientation))
-        riders.append(Rider(text, bone.name,
+        riders.append(SkeletonFrame(text, bone.name,
                             rotation.rotate(back, poses[name][0] - bone.position),
                             rotation.multiply(back, poses[name][1])))
     return tuple(riders)

@@ -49,7 +49,7 @@ class Spring:
 
 
 def read_springs(file: GltfFile, nodes: Nodes, notes: list[str]) -> list[Spring]:
-    """Read all springs, without places; a Fault names what is broken, a note what is left out."""
+    """Read all springs, without places; a ModelError names what is broken, a note the rest."""
     extensions = file.json.get('extensions')
     extensions = extensions if isinstance(extensions, dict) else {}
     found: list[Spring] = []

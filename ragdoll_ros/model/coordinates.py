@@ -14,8 +14,8 @@ UNLIMITED: Limits = (-math.inf, math.inf)
 
 
 @dataclass(frozen=True)
-class Coordinates:
-    """Coordinates and velocities of all dolls, one behind the other (Featherstone's q and q').
+class GeneralizedState:
+    """GeneralizedState and velocities of all dolls, one behind the other (Featherstone's q and q').
 
     For each doll ``q`` holds the root's position (3) m and orientation (4), then the joints'
     from root to leaf: one angle (rad) an axis, a quaternion (4) for a free ball joint, which
@@ -28,7 +28,7 @@ class Coordinates:
     v: np.ndarray
 
 
-class Layout:
+class DofLayout:
     """Where in q and v what stands.
 
     ``dolls`` gives for each doll its joints in the engine's order: a pair of limits (rad) for
@@ -107,7 +107,8 @@ class Layout:
         q[at] = rotation.normalized(q[at])
         return q
 
-    def moved(self, coordinates: Coordinates, way: np.ndarray) -> Coordinates:
+    def integrate_configuration(self, coordinates: GeneralizedState,
+                                way: np.ndarray) -> GeneralizedState:
         """Give the coordinates after a small way (nv,) m and rad in the directions of v."""
         q = coordinates.q.copy()
         q[self._plain[0]] += way[self._plain[1]]
@@ -116,14 +117,14 @@ class Layout:
         roots = len(self.own_q)
         q[at[:roots]] = rotation.multiply(turns[:roots], q[at[:roots]])
         q[at[roots:]] = rotation.multiply(q[at[roots:]], turns[roots:])
-        return Coordinates(q, coordinates.v)
+        return GeneralizedState(q, coordinates.v)
 
     def past_limits(self, q: np.ndarray) -> np.ndarray:
         """Angles (k,) rad by which the limited joints are past their limits; negative inside."""
         angles = q[self.limited[0]]
         return np.maximum(angles - self.limits[1], self.limits[0] - angles)
 
-    def limit_speeds(self, coordinates: Coordinates) -> np.ndarray:
+    def limit_speeds(self, coordinates: GeneralizedState) -> np.ndarray:
         """Rates (k,) rad/s at which the limited joints move toward their nearer limit."""
         angles, rates = coordinates.q[self.limited[0]], coordinates.v[self.limited[1]]
         return np.where(angles - self.limits[1] > self.limits[0] - angles, rates, -rates)

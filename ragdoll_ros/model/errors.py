@@ -1,4 +1,4 @@
-"""What can be wrong with a model: one root error, one named error per fault."""
+"""What can be wrong with a model: one root, and a named error for each kind."""
 from __future__ import annotations
 
 import dataclasses
@@ -9,7 +9,7 @@ class RagdollError(ValueError):
     """Root of every error that this package raises on purpose."""
 
 
-class Fault(RagdollError):
+class ModelError(RagdollError):
     """One wrong value: where it stands, what it is, what would be right."""
 
     def __init__(self, path: str, value: object, expected: str) -> None:
@@ -18,8 +18,8 @@ class Fault(RagdollError):
         self.value = value
         self.expected = expected
 
-    def at(self, prefix: str) -> Fault:
-        """Give the same fault, seen from one level further out."""
+    def at(self, prefix: str) -> ModelError:
+        """Give the same error, seen from one level further out."""
         joint = '' if not self.path or self.path.startswith('[') else '.'
         return type(self)(f'{prefix}{joint}{self.path}', self.value, self.expected)
 
@@ -29,69 +29,69 @@ class Fault(RagdollError):
         return f'{self.path or "file"}: {type(self).__name__}: {shown}; expected {self.expected}'
 
 
-class NotPositive(Fault):
+class NotPositive(ModelError):
     """A size, a mass or a duration that is not above zero."""
 
 
-class NotFinite(Fault):
+class NotFinite(ModelError):
     """NaN or infinity where a finite number is needed."""
 
 
-class NotUnit(Fault):
+class NotUnit(ModelError):
     """A direction or a quaternion of length zero."""
 
 
-class OutOfRange(Fault):
+class OutOfRange(ModelError):
     """A number outside its range."""
 
 
-class LimitsReversed(Fault):
+class LimitsReversed(ModelError):
     """A lower joint limit above the upper one."""
 
 
-class WrongAxes(Fault):
+class WrongAxes(ModelError):
     """A joint with another number of axes or limits than its kind has."""
 
 
-class UnknownBone(Fault):
+class UnknownBone(ModelError):
     """A name that no bone bears."""
 
 
-class DuplicateName(Fault):
+class DuplicateName(ModelError):
     """A name that two things bear."""
 
 
-class ConnectedTwice(Fault):
+class ConnectedTwice(ModelError):
     """A bone that is the child of two joints."""
 
 
-class JointCycle(Fault):
+class JointCycle(ModelError):
     """Joints that close a ring."""
 
 
-class Detached(Fault):
+class Detached(ModelError):
     """A second bone without a parent: not one tree."""
 
 
-class WrongForm(Fault):
+class WrongForm(ModelError):
     """A file whose structure is not what the schema says."""
 
 
-class Unreadable(Fault):
+class Unreadable(ModelError):
     """A file that is missing, is no YAML, or is no text."""
 
 
-class Faults(RagdollError):
-    """All faults of one file at once."""
+class ModelErrors(RagdollError):
+    """All errors of one file at once."""
 
-    def __init__(self, file: str, faults: list[Fault]) -> None:
-        super().__init__(file, faults)
+    def __init__(self, file: str, errors: list[ModelError]) -> None:
+        super().__init__(file, errors)
         self.file = file
-        self.faults = faults
+        self.errors = errors
 
     def __str__(self) -> str:
-        count = f'{len(self.faults)} fault{"s" * (len(self.faults) != 1)}'
-        return '\n'.join([f'{self.file}: {count}', *(f'  {fault}' for fault in self.faults)])
+        count = f'{len(self.errors)} error{"s" * (len(self.errors) != 1)}'
+        return '\n'.join([f'{self.file}: {count}', *(f'  {error}' for error in self.errors)])
 
 
 def check_finite(path: str, values: object) -> None:

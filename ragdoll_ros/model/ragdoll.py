@@ -85,14 +85,14 @@ class JointKind:
     name: str
     axes: int
     limits: int
-    freedoms: int
+    dof: int
 
 
 JOINT_KINDS = {kind.name: kind for kind in (
-    JointKind('ball', axes=1, limits=2, freedoms=3),
-    JointKind('hinge', axes=1, limits=1, freedoms=1),
-    JointKind('universal', axes=2, limits=2, freedoms=2),
-    JointKind('fixed', axes=0, limits=0, freedoms=0))}
+    JointKind('ball', axes=1, limits=2, dof=3),
+    JointKind('hinge', axes=1, limits=1, dof=1),
+    JointKind('universal', axes=2, limits=2, dof=2),
+    JointKind('fixed', axes=0, limits=0, dof=0))}
 
 
 @dataclass(frozen=True)
@@ -164,15 +164,15 @@ class Joint:
         return self.kind == 'ball' and not any(self.limits)
 
     @property
-    def freedoms(self) -> int:
+    def dof(self) -> int:
         """Number of degrees of freedom."""
-        return JOINT_KINDS[self.kind].freedoms
+        return JOINT_KINDS[self.kind].dof
 
     @property
     def angle_names(self) -> tuple[str, ...]:
         """Name of each joint angle: the child's, with a suffix where there are several."""
         suffixes = {'universal': ('_1', '_2'), 'ball': ('_x', '_y', '_z')}
-        count = self.freedoms
+        count = self.dof
         return tuple(self.child + s for s in suffixes.get(self.kind, ('',) * count))
 
     @property
@@ -185,7 +185,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Rider:
+class SkeletonFrame:
     """A bone of the skin's skeleton, fixed on the body that carries it.
 
     ``bone`` names the carrying bone of the doll; ``position`` (m) and ``orientation`` are those
@@ -218,7 +218,7 @@ class Ragdoll:
     bones: tuple[Bone, ...]
     joints: tuple[Joint, ...] = ()
     swings: tuple[Swing, ...] = ()
-    riders: tuple[Rider, ...] = ()
+    riders: tuple[SkeletonFrame, ...] = ()
     model: str | None = None
 
     def __post_init__(self) -> None:
@@ -227,12 +227,12 @@ class Ragdoll:
                    model=self.model and os.path.abspath(self.model))
         names = [bone.name for bone in self.bones]
         edges = [(joint.parent, joint.child) for joint in self.joints]
-        found = tree_faults(names, edges)
+        found = tree_errors(names, edges)
         for key in ('swings', 'riders'):
             carried = [(each.name, each.bone) for each in getattr(self, key)]
-            found += carried_faults(key, names, carried)
-        for fault in found:
-            raise fault
+            found += carried_errors(key, names, carried)
+        for error in found:
+            raise error
 
     @property
     def extent(self) -> float:
@@ -299,9 +299,9 @@ class Ragdoll:
         return dataclasses.replace(self, bones=bones, joints=joints)
 
 
-def tree_faults(names: list[str], edges: list[tuple[str, str]]) -> list[errors.Fault]:
+def tree_errors(names: list[str], edges: list[tuple[str, str]]) -> list[errors.ModelError]:
     """Find all that keeps (parent, child) edges from being one tree over the named bones."""
-    found: list[errors.Fault] = []
+    found: list[errors.ModelError] = []
     if not names:
         found.append(errors.Detached('bones', names, 'at least one bone'))
     for index, name in enumerate(names):
@@ -327,10 +327,10 @@ def tree_faults(names: list[str], edges: list[tuple[str, str]]) -> list[errors.F
     return found
 
 
-def carried_faults(key: str, names: list[str],
-                   carried: list[tuple[str, str]]) -> list[errors.Fault]:
+def carried_errors(key: str, names: list[str],
+                   carried: list[tuple[str, str]]) -> list[errors.ModelError]:
     """Find what of (name, carrying bone) rides on no bone or shares a name."""
-    found: list[errors.Fault] = []
+    found: list[errors.ModelError] = []
     known, seen = set(names), set()
     for index, (name, bone) in enumerate(carried):
         if bone not in known:

@@ -21,9 +21,9 @@ class State:
     """(n, 3) m."""
     orientations: np.ndarray
     """(n, 4) unit quaternions x, y, z, w."""
-    linear: np.ndarray
+    linear_velocities: np.ndarray
     """(n, 3) m/s, of the centre of mass."""
-    angular: np.ndarray
+    angular_velocities: np.ndarray
     """(n, 3) rad/s, world axes."""
 
     @classmethod
@@ -36,10 +36,11 @@ class State:
     @cached_property
     def rows(self) -> np.ndarray:
         """(n, 13): position, orientation, linear and angular velocity side by side."""
-        return np.concatenate([self.positions, self.orientations, self.linear, self.angular],
+        return np.concatenate([self.positions, self.orientations, self.linear_velocities,
+                               self.angular_velocities],
                               axis=1)
 
     @cached_property
-    def turns(self) -> np.ndarray:
+    def rotation_matrices(self) -> np.ndarray:
         """(n, 3, 3): the rotation matrices of the orientations."""
         return rotation.matrix(self.orientations)

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 from .kernels import ready
 
 if TYPE_CHECKING:
-    from ..model.coordinates import Layout
+    from ..model.coordinates import DofLayout
     from ..model.scene import Scene
     from .engine.protocol import Engine
     from .flight import Dynamics
-    from .plain.conservation import Guard
+    from .plain.conservation import ConservationProjection
     from .plain.limits import JointLimits
     from .plain.mechanics import Mechanics
     from .plain.reach import Reach
 
 
-def dynamics_of(scene: Scene, make_engine: type[Engine], layout: Layout) -> Dynamics:
+def dynamics_of(scene: Scene, make_engine: type[Engine], layout: DofLayout) -> Dynamics:
     """The equations of motion of a scene in the air."""
     if ready():
         from .dynamics import CompiledDynamics
@@ -34,16 +34,17 @@ def mechanics_of(scene: Scene) -> Mechanics:
     return Mechanics(scene)
 
 
-def guard_of(scene: Scene, mechanics: Mechanics, layout: Layout) -> Guard:
+def conservation_of(scene: Scene, mechanics: Mechanics,
+                    layout: DofLayout) -> ConservationProjection:
     """Who keeps energy and momentum."""
     if ready():
-        from .conservation import CompiledGuard
-        return CompiledGuard(scene, mechanics, layout)
-    from .plain.conservation import Guard
-    return Guard(scene, mechanics, layout)
+        from .conservation import CompiledProjection
+        return CompiledProjection(scene, mechanics, layout)
+    from .plain.conservation import ConservationProjection
+    return ConservationProjection(scene, mechanics, layout)
 
 
-def limits_of(layout: Layout) -> JointLimits:
+def limits_of(layout: DofLayout) -> JointLimits:
     """What joint limits have to say."""
     if ready():
         from .limits import CompiledLimits

@@ -6,10 +6,10 @@ import numpy as np
 from ..model.state import State
 from .kernels.loaded import kernels
 from .motion import Motion
-from .plain.conservation import Guard
+from .plain.conservation import ConservationProjection
 
 
-class CompiledGuard(Guard):
+class CompiledProjection(ConservationProjection):
     """Keeps the momentum in one go."""
 
     def keep_momentum(self, state: State, before: Motion, after: Motion, duration: float,

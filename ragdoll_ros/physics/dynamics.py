@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..model.coordinates import Coordinates
+from ..model.coordinates import GeneralizedState
 from ..model.scene import Scene
 from ..model.state import State
-from .engine.protocol import Load
+from .engine.protocol import AppliedWrench
 from .kernels.loaded import kernels
 from .settings import Accuracy
 from .tree import table
@@ -43,36 +43,38 @@ class CompiledDynamics:
         self._tree = table(scene)
         self._gravity = np.array(scene.gravity, float)
 
-    def state(self, coordinates: Coordinates) -> State:
+    def state(self, coordinates: GeneralizedState) -> State:
         """Poses and velocities of all bones."""
         rows = np.empty((len(self._tree), 13))
-        kernels.look(self._tree, coordinates.q, coordinates.v, rows)
+        kernels.forward_kinematics(self._tree, coordinates.q, coordinates.v, rows)
         return State.of(rows)
 
-    def acceleration(self, coordinates: Coordinates, loads: Sequence[Load] = ()) -> np.ndarray:
+    def acceleration(self, coordinates: GeneralizedState,
+                     loads: Sequence[AppliedWrench] = ()) -> np.ndarray:
         """Rates of change of ``coordinates.v``."""
         out = np.empty_like(coordinates.v)
         kernels.accelerate(self._tree, self._gravity, _packed(loads), coordinates.q, coordinates.v,
                            out)
         return out
 
-    def moved(self, coordinates: Coordinates, way: np.ndarray) -> Coordinates:
+    def integrate_configuration(self, coordinates: GeneralizedState,
+                                way: np.ndarray) -> GeneralizedState:
         """Give the coordinates after a small way (nv,) m and rad in the directions of v."""
         q = coordinates.q.copy()
-        kernels.move(self._tree, q, way)
-        return Coordinates(q, coordinates.v)
+        kernels.integrate_configuration(self._tree, q, way)
+        return GeneralizedState(q, coordinates.v)
 
     def longest(self, accuracy: Accuracy, fastest: float) -> float:
         """Any path will do: it chooses its steps itself."""
         return math.inf
 
-    def path(self, start: Coordinates, duration: float, accuracy: Accuracy, fastest: float,
-             loads: Sequence[Load] = (), after: Path | None = None) -> Path:
+    def path(self, start: GeneralizedState, duration: float, accuracy: Accuracy, fastest: float,
+             loads: Sequence[AppliedWrench] = (), after: Path | None = None) -> Path:
         """Fly from ``start`` on without end, in steps of ``duration`` s at the most."""
         return Path(self, start, accuracy.flight_error, duration, fastest, loads)
 
-    def fly(self, start: Coordinates, duration: float, steps: int,
-            loads: Sequence[Load] = ()) -> Coordinates:
+    def fly(self, start: GeneralizedState, duration: float, steps: int,
+            loads: Sequence[AppliedWrench] = ()) -> GeneralizedState:
         """Give the coordinates ``duration`` s later, in equal steps."""
         known, rows = None, _packed(loads)
         for _ in range(steps):
@@ -83,7 +85,7 @@ class CompiledDynamics:
     def close(self) -> None:
         """Nothing to give back: the memory goes with the object."""
 
-    def step(self, start: Coordinates, duration: float, loads: np.ndarray,
+    def step(self, start: GeneralizedState, duration: float, loads: np.ndarray,
              before: Step | None = None) -> Step:
         """Go one step, from where the step ``before`` ended, if any."""
         return Step(self._tree, self._gravity, start, duration, loads, before)
@@ -92,7 +94,8 @@ class CompiledDynamics:
 class Step:
     """One step of a flight, ``duration`` s long; ``error``, m or rad: of its end, by DOP853."""
 
-    def __init__(self, tree: np.ndarray, gravity: np.ndarray, start: Coordinates, duration: float,
+    def __init__(self, tree: np.ndarray, gravity: np.ndarray, start: GeneralizedState,
+                 duration: float,
                  loads: np.ndarray, before: Step | None = None) -> None:
         self.duration = duration
         self._tree, self._sizes = tree, (len(start.q), len(start.v))
@@ -102,11 +105,11 @@ class Step:
         self.error = kernels.step(tree, gravity, loads, start.q, start.v, duration,
                                   before is not None, self._way, self._rates)
 
-    def at(self, share: float) -> Coordinates:
+    def at(self, share: float) -> GeneralizedState:
         """Give the coordinates after a share of the step."""
         q, v = np.empty(self._sizes[0]), np.empty(self._sizes[1])
         kernels.within(self._tree, self._way, share, q, v)
-        return Coordinates(q, v)
+        return GeneralizedState(q, v)
 
 
 class Path:
@@ -118,8 +121,8 @@ class Path:
 
     duration = math.inf
 
-    def __init__(self, dynamics: CompiledDynamics, start: Coordinates, tolerance: float,
-                 longest: float, fastest: float, loads: Sequence[Load] = ()) -> None:
+    def __init__(self, dynamics: CompiledDynamics, start: GeneralizedState, tolerance: float,
+                 longest: float, fastest: float, loads: Sequence[AppliedWrench] = ()) -> None:
         self._dynamics, self._loads = dynamics, _packed(loads)
         self._tolerance, self._longest = tolerance, longest
         first = longest if math.isinf(tolerance) else FIRST_TURN / max(fastest, 1e-9)
@@ -132,7 +135,7 @@ class Path:
         self.count = 0
         """Steps gone, the rejected ones too."""
 
-    def at(self, time: float) -> Coordinates | None:
+    def at(self, time: float) -> GeneralizedState | None:
         """Give the coordinates ``time`` s after the start; None if that takes too many steps.
 
         One may look back, but not to before the time that was the latest when it was asked for
@@ -169,7 +172,7 @@ class Path:
         self._try = min(self._longest, step.duration * min(LONGER, max(SHORTER, factor)))
 
 
-def _packed(loads: Sequence[Load]) -> np.ndarray:
+def _packed(loads: Sequence[AppliedWrench]) -> np.ndarray:
     """Loads as a table (m, 11) for compiled code."""
     rows = np.empty((len(loads), 11))
     for row, load in zip(rows, loads, strict=True):

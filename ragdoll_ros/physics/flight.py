@@ -6,9 +6,9 @@ from typing import Protocol
 
 import numpy as np
 
-from ..model.coordinates import Coordinates
+from ..model.coordinates import GeneralizedState
 from ..model.state import State
-from .engine.protocol import Load
+from .engine.protocol import AppliedWrench
 from .settings import Accuracy
 
 STIFFEST = 1.5
@@ -22,7 +22,7 @@ class Path(Protocol):
     duration: float
     count: int
 
-    def at(self, time: float) -> Coordinates | None:
+    def at(self, time: float) -> GeneralizedState | None:
         """Give the coordinates ``time`` s after the start; None if that takes too many steps."""
 
 
@@ -34,24 +34,26 @@ class Dynamics(Protocol):
     cheap: bool
     """Whether ``state`` costs less than to ask an engine."""
 
-    def state(self, coordinates: Coordinates) -> State:
+    def state(self, coordinates: GeneralizedState) -> State:
         """Poses and velocities of all bones."""
 
-    def acceleration(self, coordinates: Coordinates, loads: Sequence[Load] = ()) -> np.ndarray:
+    def acceleration(self, coordinates: GeneralizedState,
+                     loads: Sequence[AppliedWrench] = ()) -> np.ndarray:
         """Rates of change of ``coordinates.v``."""
 
-    def moved(self, coordinates: Coordinates, way: np.ndarray) -> Coordinates:
+    def integrate_configuration(self, coordinates: GeneralizedState,
+                                way: np.ndarray) -> GeneralizedState:
         """Give the coordinates after a small way (nv,) m and rad in the directions of v."""
 
     def longest(self, accuracy: Accuracy, fastest: float) -> float:
         """Longest path, s, where the fastest bone turns with so many rad/s; infinity: any."""
 
-    def path(self, start: Coordinates, duration: float, accuracy: Accuracy, fastest: float,
-             loads: Sequence[Load] = (), after: Path | None = None) -> Path:
+    def path(self, start: GeneralizedState, duration: float, accuracy: Accuracy, fastest: float,
+             loads: Sequence[AppliedWrench] = (), after: Path | None = None) -> Path:
         """Fly from ``start`` on for ``duration`` s or more, on ``after`` what ended there."""
 
-    def fly(self, start: Coordinates, duration: float, steps: int,
-            loads: Sequence[Load] = ()) -> Coordinates:
+    def fly(self, start: GeneralizedState, duration: float, steps: int,
+            loads: Sequence[AppliedWrench] = ()) -> GeneralizedState:
         """Give the coordinates ``duration`` s later, in equal steps of the highest order."""
 
     def close(self) -> None:

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import errors
-from ..model.coordinates import Coordinates
+from ..model.coordinates import GeneralizedState
 from ..model.scene import Scene
 from ..model.state import State
 from ..model.vectors import Vector, floats
-from .engine.protocol import Load
+from .engine.protocol import AppliedWrench
 from .flight import Dynamics
 from .motion import point_motion
 from .plain.mechanics import Mechanics
@@ -63,7 +63,7 @@ class Grab:
     target: Vector
 
 
-class Pull(Load):
+class Pull(AppliedWrench):
     """The load of a hand."""
 
 
@@ -149,12 +149,12 @@ class Hands:
         for hand in self._hands.values():
             hand.move(duration)
 
-    def pulls(self, dynamics: Dynamics, coordinates: Coordinates, state: State,
+    def pulls(self, dynamics: Dynamics, coordinates: GeneralizedState, state: State,
               duration: float) -> list[Pull]:
         """Loads of all hands for the next ``duration`` s; ``dynamics``: see mobility()."""
         for hand in self._hands.values():
             if hand.fresh <= 0:
-                turn = state.turns[hand.bone]
+                turn = state.rotation_matrices[hand.bone]
                 hand.mobility = turn.T @ mobility(
                     dynamics, coordinates, hand.bone, hand.point) @ turn
                 hand.fresh = FRESH
@@ -171,7 +171,7 @@ class Hands:
         number, as their pulls add up.
         """
         stiffness, damping = mass * FREQUENCY ** 2, 2 * mass * FREQUENCY
-        turn = state.turns[hand.bone]
+        turn = state.rotation_matrices[hand.bone]
         place, velocity = point_motion(state, hand.bone, hand.point)
         velocity = velocity + h * self._gravity
         end = hand.after(h)
@@ -185,7 +185,7 @@ class Hands:
         return Pull(hand.bone, force, np.zeros(3), hand.point)
 
 
-def mobility(dynamics: Dynamics, coordinates: Coordinates, bone: int,
+def mobility(dynamics: Dynamics, coordinates: GeneralizedState, bone: int,
              point: np.ndarray) -> np.ndarray:
     """Acceleration (3, 3) 1/kg of a point of a bone per force there: W = J H^-1 J^T.
 
@@ -193,12 +193,13 @@ def mobility(dynamics: Dynamics, coordinates: Coordinates, bone: int,
     accelerations under unit forces. ``dynamics`` know no contacts and limits, which would take
     some of it away: a hand that counts on more is the gentler.
     """
-    still = Coordinates(coordinates.q, np.zeros_like(coordinates.v))
+    still = GeneralizedState(coordinates.q, np.zeros_like(coordinates.v))
     rest = dynamics.acceleration(still)
     columns = []
     for axis in np.eye(3):
-        gained = dynamics.acceleration(still, [Load(bone, axis, np.zeros(3), point)]) - rest
-        moved = dynamics.state(Coordinates(coordinates.q, gained))
+        gained = dynamics.acceleration(still,
+                                       [AppliedWrench(bone, axis, np.zeros(3), point)]) - rest
+        moved = dynamics.state(GeneralizedState(coordinates.q, gained))
         columns.append(point_motion(moved, bone, point)[1])
     return np.array(columns).T
 

@@ -23,7 +23,7 @@ class Motion:
     """(d, 3) m: centre of mass."""
     momentum: np.ndarray
     """(d, 3) N s."""
-    spin: np.ndarray
+    angular_momentum: np.ndarray
     """(d, 3) N m s: angular momentum about the doll's own centre of mass."""
     inertia: np.ndarray
     """(d, 3, 3) kg m^2 about that centre, as if the doll's joints were locked in its pose."""
@@ -40,7 +40,8 @@ class Motion:
     def sums(self) -> np.ndarray:
         """(d, 20): all these side by side."""
         return np.concatenate([self.energy[:, None], self.kinetic[:, None], self.centre,
-                               self.momentum, self.spin, self.inertia.reshape(-1, 9)], axis=1)
+                               self.momentum, self.angular_momentum,
+                               self.inertia.reshape(-1, 9)], axis=1)
 
 
 @dataclass(frozen=True)
@@ -50,13 +51,13 @@ class Shift:
     What is a single body may be turned before.
     """
 
-    way: np.ndarray
+    displacement: np.ndarray
     """(d, 3) m."""
-    linear: np.ndarray
+    velocity: np.ndarray
     """(d, 3) m/s, of the centres of mass."""
-    spin: np.ndarray
+    angular_velocity: np.ndarray
     """(d, 3) rad/s about the centres of mass."""
-    turn: np.ndarray | None = None
+    rotation: np.ndarray | None = None
     """(d, 4) quaternions, no turn for dolls of several bones; None: no turn at all."""
 
 
@@ -83,10 +84,10 @@ def damping_rate(scene: Scene) -> float:
 def point_motion(state: State, bone: int, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Position (3,) m and velocity (3,) m/s of a point of a bone, given along its axes."""
     if not point.any():
-        return state.positions[bone], state.linear[bone]
-    arm = state.turns[bone] @ point
+        return state.positions[bone], state.linear_velocities[bone]
+    arm = state.rotation_matrices[bone] @ point
     return (state.positions[bone] + arm,
-            state.linear[bone] + cross(state.angular[bone], arm))
+            state.linear_velocities[bone] + cross(state.angular_velocities[bone], arm))
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -44,7 +44,7 @@ class CompiledReach(Reach):
         return kernels.falling(self._radii, self._normal, MARGIN, soon, state.rows,
                                self.heights(state))
 
-    def near(self, state: State, duration: float, acceleration: float,
+    def broadphase_pairs(self, state: State, duration: float, acceleration: float,
              touching: set[tuple[int, int]]) -> set[tuple[int, int]]:
         """Pairs of dolls that may touch within ``duration`` s; GROUND stands for the ground.
 
@@ -69,10 +69,10 @@ class CompiledReach(Reach):
         """Largest change, m/s, of a velocity at a bone's centre or, by turning, at its surface."""
         return kernels.change(self._radii, before.rows, after.rows)
 
-    def spin(self, state: State) -> float:
+    def max_angular_speed(self, state: State) -> float:
         """Fastest spin of a bone, rad/s."""
         return kernels.fastest(self._radii, state.rows)[0]
 
-    def rim(self, state: State) -> float:
+    def max_tip_speed(self, state: State) -> float:
         """Fastest speed, m/s, of a bone's end about its centre."""
         return kernels.fastest(self._radii, state.rows)[2]

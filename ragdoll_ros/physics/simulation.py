@@ -8,21 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import errors, rotation
-from ..model.coordinates import Coordinates
+from ..model.coordinates import GeneralizedState
 from ..model.push import Push
 from ..model.scene import SECOND, STEP_RANGE, Scene
 from ..model.state import State
 from . import backend
 from .engine.bullet import BulletEngine
-from .engine.protocol import GROUND, Contact, Engine, Load, pressed
+from .engine.protocol import GROUND, AppliedWrench, Contact, Engine, pressed
 from .grab import EVENLY, Grab, Hands, Pull
 from .joint_gap import JointGap
 from .motion import Motion
 from .settings import Accuracy, firm, resolve_accuracy
-from .sleeping import Rest
-from .stepping import Effort, Piece, Stepper
+from .sleeping import SleepDetector
+from .stepping import Stepper, StepResult, StepStats
 from .swing.pose import SwingState
-from .swing.simulation import riding
+from .swing.simulation import swing_simulation
 from .work import longest_stretch, mean_load, work
 
 MOST_PUSHES = 1000
@@ -47,7 +47,7 @@ class _Active:
     start: int
     end: int
     channel: str | None
-    load: Load | None = None
+    load: AppliedWrench | None = None
 
 
 class Simulation:
@@ -65,12 +65,13 @@ class Simulation:
         self.mechanics = backend.mechanics_of(scene)
         self._accuracy = resolve_accuracy(accuracy)
         self._stepper = Stepper(scene, engine, self._accuracy)
-        self._guard = backend.guard_of(scene, self.mechanics, self._stepper.engine.layout)
+        self._conservation = backend.conservation_of(scene, self.mechanics,
+                                                     self._stepper.engine.layout)
         self._lift_out()
         self._start = (self._stepper.engine.save(), self._stepper.coordinates)
         self._gap = JointGap(scene)
-        self._rest = Rest(scene)
-        self._riding = riding(scene)
+        self._rest = SleepDetector(scene)
+        self._swings = swing_simulation(scene)
         self.reset()
 
     def __enter__(self) -> Simulation:
@@ -87,12 +88,12 @@ class Simulation:
     @property
     def swings(self) -> SwingState | None:
         """All masses of the scene's swings now; None for a scene without swings."""
-        return self._riding and self._riding.state
+        return self._swings and self._swings.state
 
     @property
     def swing_names(self) -> list[str]:
         """Name of each mass of the swings, in their order."""
-        return self._riding.names if self._riding else []
+        return self._swings.names if self._swings else []
 
     @property
     def step(self) -> float:
@@ -128,17 +129,17 @@ class Simulation:
     @property
     def contacts(self) -> list[Contact]:
         """What touches now."""
-        return self._stepper.settle().contacts()
+        return self._stepper.sync_engine().contacts()
 
     @property
-    def coordinates(self) -> Coordinates:
+    def coordinates(self) -> GeneralizedState:
         """Generalised coordinates of all dolls now."""
         return self._stepper.coordinates
 
     @property
     def joint_angles(self) -> np.ndarray:
         """All joint angles, rad, in the order of Scene.angle_names."""
-        return self._stepper.settle().joint_angles()
+        return self._stepper.sync_engine().joint_angles()
 
     def push(self, push: Push, channel: str | None = None) -> None:
         """Let a push act from its start on; on a ``channel`` it takes the place of the last.
@@ -184,18 +185,18 @@ class Simulation:
     def advance(self) -> State:
         """Go on by one tick."""
         self._stepper.begin_tick(self.step)
-        self.effort = self._stepper.effort
+        self.stats = self._stepper.stats
         end = self.time + self.tick
         while self.time < end:
-            self._go(min(end, self._next_change()))
-        self._redone += self.effort.redone
+            self._advance_until(min(end, self._next_change()))
+        self._redone += self.stats.redone
         self._queue = [active for active in self._queue if active.end > self.time]
         self._fall_asleep()
-        if self._riding:
-            self._riding.follow(self.time, self._state)
+        if self._swings:
+            self._swings.follow(self.time, self._state)
         return self._state
 
-    def place(self, coordinates: Coordinates) -> State:
+    def place(self, coordinates: GeneralizedState) -> State:
         """Put the dolls elsewhere, with other velocities, and take that as the start of all.
 
         Bones that overlap there do not collide from then on, and what is in the ground is lifted;
@@ -207,9 +208,9 @@ class Simulation:
         sizes = stepper.engine.layout.sizes
         if (q.shape, v.shape) != ((sizes[0],), (sizes[1],)):
             raise errors.OutOfRange('coordinates', (q.shape, v.shape), f'{sizes} numbers')
-        stepper.place(Coordinates(q, v))
-        engine = stepper.settle()
-        engine.let_overlaps_be()
+        stepper.place(GeneralizedState(q, v))
+        engine = stepper.sync_engine()
+        engine.exclude_initial_penetrations()
         stepper.begin()
         self._lift_out()
         engine.forget(self._start[0])
@@ -227,14 +228,15 @@ class Simulation:
 
     def measures(self) -> dict[str, float]:
         """Tell what went wrong so far, and what the last tick took: names end in their units."""
-        stepper, guard = self._stepper, self._guard
+        stepper, conservation = self._stepper, self._conservation
         sunk = -float(stepper.reach.heights(self._state).min())
         error = 0.0 if self.asleep else stepper.estimate_error()
         return {
-            'energy_excess_J': float((self._motion.energy - guard.start - guard.worked).sum()),
-            'energy_projected_J': float(guard.account.taken),
-            'stopped_total': guard.account.stops,
-            'work_of_pushes_J': float(guard.worked.sum()) - self._grabbed,
+            'energy_excess_J': float((self._motion.energy - conservation.start
+                                      - conservation.worked).sum()),
+            'energy_projected_J': float(conservation.budget.taken),
+            'stopped_total': conservation.budget.stops,
+            'work_of_pushes_J': float(conservation.worked.sum()) - self._grabbed,
             'work_of_grabs_J': self._grabbed,
             'error_estimate_m': error or 0.0,
             'error_trusted': float(error is not None),
@@ -242,8 +244,8 @@ class Simulation:
             'limit_overshoot_rad': float(
                 stepper.engine.layout.past_limits(self.coordinates.q).max(initial=0.0)),
             'sinking_m': max(0.0, sunk),
-            'flights': self.effort.flights,
-            'substeps': self.effort.substeps,
+            'flights': self.stats.flights,
+            'substeps': self.stats.substeps,
             'redone_total': self._redone,
             'asleep': float(self.asleep)}
 
@@ -274,22 +276,22 @@ class Simulation:
         """J: work of hands since the start."""
         self._state = self._stepper.state
         self._motion = self.mechanics.motion(self._state)
-        self._guard.open(self._state)
+        self._conservation.open(self._state)
         self._rest.disturb()
         self._redone = 0
         self.asleep = False
         """Whether all is at rest and the engine stands."""
-        self.effort = Effort()
+        self.stats = StepStats()
         """What the last tick took."""
-        if self._riding:
-            self._riding.begin(self.time, self._state)
+        if self._swings:
+            self._swings.begin(self.time, self._state)
 
     def _next_change(self) -> int:
         """Instant, ns, at which the next push begins or ends."""
         times = [time for active in self._queue for time in (active.start, active.end)]
         return min((time for time in times if time > self.time), default=self.time + self.tick)
 
-    def _go(self, end: int) -> None:
+    def _advance_until(self, end: int) -> None:
         """Go on to an instant between which no push begins or ends."""
         loads = [self._load(active) for active in self._queue
                  if active.start <= self.time < active.end]
@@ -300,7 +302,7 @@ class Simulation:
             self._thrown_until = end + THROWN
         thrown = self.time < self._thrown_until
         self._stepper.accuracy = firm(self._accuracy) if thrown else self._accuracy
-        go = self._pulled if self._hands else self._piece
+        substep = self._pulled if self._hands else self._substep
         remaining = (end - self.time) / SECOND
         least = LEAST_SHARE * remaining
         while remaining > 1e-12 and not self.asleep:
@@ -309,23 +311,23 @@ class Simulation:
                 length = min(length, max(least, min(
                     longest_stretch(load, self._state, self.mechanics.inertias[load.bone])
                     for load in loads)))
-            remaining -= go(length, loads)
+            remaining -= substep(length, loads)
         self.time = end
 
-    def _pulled(self, duration: float, loads: list[Load]) -> float:
+    def _pulled(self, duration: float, loads: list[AppliedWrench]) -> float:
         """Go through a stretch as short as hands need it; give its length, s."""
         stepper, length = self._stepper, self._hands.stretch(duration)
         pulls = self._hands.pulls(stepper.dynamics, stepper.coordinates, self._state, length)
-        length = self._piece(length, [*loads, *pulls])
+        length = self._substep(length, [*loads, *pulls])
         self._hands.move(length)
         return length
 
-    def _piece(self, duration: float, loads: list[Load]) -> float:
+    def _substep(self, duration: float, loads: list[AppliedWrench]) -> float:
         """Go through one stretch of motion and see to what must be kept; give its length, s."""
         stepper, before, motion = self._stepper, self._state, self._motion
         start = stepper.coordinates
-        piece = stepper.go(duration, loads)
-        self._see(stepper.state)
+        piece = stepper.step(duration, loads)
+        self._update_state(stepper.state)
         if loads:
             self._enter_work(loads, before, piece)
         if stepper.accuracy.momentum and (piece.substep or not stepper.dynamics.keeps_momentum):
@@ -334,21 +336,21 @@ class Simulation:
             self._keep_energy(start, piece.touched)
         return piece.duration
 
-    def _see(self, state: State) -> None:
+    def _update_state(self, state: State) -> None:
         self._state = state
         self._motion = self.mechanics.motion(state)
 
-    def _correct(self, coordinates: Coordinates) -> None:
+    def _correct(self, coordinates: GeneralizedState) -> None:
         self._stepper.place(coordinates)
-        self._see(self._stepper.state)
+        self._update_state(self._stepper.state)
 
-    def _keep_momentum(self, before: Motion, piece: Piece, loads: list[Load],
+    def _keep_momentum(self, before: Motion, piece: StepResult, loads: list[AppliedWrench],
                        state: State) -> None:
         """Give dolls that touched nothing outside themselves the momentum that they must have.
 
         What loads that turn with a bone give in a flight, nobody knows better than the flight.
         """
-        touched = self._guard.touched(piece.touched) if piece.touched else None
+        touched = self._conservation.touched(piece.touched) if piece.touched else None
         if touched is not None and touched.all():
             return
         if not piece.substep and any(load.local for load in loads):
@@ -356,11 +358,11 @@ class Simulation:
         impulse = moment = 0.0
         if loads:
             impulse, moment = self._given(loads, piece.duration, state)
-        self._state, self._motion, turn = self._guard.keep_momentum(
+        self._state, self._motion, turn = self._conservation.keep_momentum(
             self._state, before, self._motion, piece.duration, impulse, moment, touched)
         self._stepper.shift(self._state, turn)
 
-    def _given(self, loads: list[Load], duration: float,
+    def _given(self, loads: list[AppliedWrench], duration: float,
                before: State) -> tuple[np.ndarray, np.ndarray | None]:
         """Impulse (d, 3) N s and moment (d, 3) N m s of loads; no moment where a force has one."""
         impulse, moment = np.zeros((2, len(self.scene.dolls), 3))
@@ -371,38 +373,38 @@ class Simulation:
             moment[doll] += torque * duration
         return impulse, None if any(load.force.any() for load in loads) else moment
 
-    def _keep_energy(self, start: Coordinates, touched: set[tuple[int, int]]) -> None:
+    def _keep_energy(self, start: GeneralizedState, touched: set[tuple[int, int]]) -> None:
         """Take out energy from nothing; what was in the air keeps its momentum for sure.
 
-        Dolls that may have ``touched`` share their account: a bounce is over within a step.
+        Dolls that may have ``touched`` share their budget: a bounce is over within a step.
         """
-        guard = self._guard
-        groups = guard.groups(touched)
-        surplus = guard.surplus(self._motion, groups)
+        conservation = self._conservation
+        groups = conservation.groups(touched)
+        surplus = conservation.surplus(self._motion, groups)
         if (surplus > 0).any():
             stepper = self._stepper
             # What is tolerated goes with the kinetic energy: once more, with what is left of it.
             for _ in range(2):
-                self._correct(guard.without_surplus(
+                self._correct(conservation.without_surplus(
                     start, stepper.coordinates, self._motion, surplus, bool(touched)))
-                surplus = guard.surplus(self._motion, groups)
+                surplus = conservation.surplus(self._motion, groups)
                 if (surplus <= 0).all():
                     break
-            burst = guard.burst(self._motion, groups)
+            burst = conservation.burst(self._motion, groups)
             if burst.any():
-                self._correct(guard.stopped(start, stepper.coordinates, burst))
-        guard.settle(self._motion.energy, groups)
+                self._correct(conservation.stopped(start, stepper.coordinates, burst))
+        conservation.close_step(self._motion.energy, groups)
 
-    def _enter_work(self, loads: list[Load], before: State, piece: Piece) -> None:
+    def _enter_work(self, loads: list[AppliedWrench], before: State, piece: StepResult) -> None:
         done = np.zeros(len(self.scene.dolls))
         for load in loads:
             joules = work(load, before, self._state, piece)
             done[self.mechanics.doll_of[load.bone]] += joules
             if isinstance(load, Pull):
                 self._grabbed += joules
-        self._guard.add_work(done)
+        self._conservation.add_work(done)
 
-    def _load(self, active: _Active) -> Load:
+    def _load(self, active: _Active) -> AppliedWrench:
         """Give a push's load; its point is tied to the bone when the push begins."""
         if active.load is None:
             push = active.push
@@ -410,7 +412,8 @@ class Simulation:
             if not push.local:
                 turn = self._state.orientations[active.bone]
                 point = rotation.rotate(rotation.inverse(turn), point)
-            active.load = Load(active.bone, np.array(push.force), np.array(push.torque), point,
+            active.load = AppliedWrench(active.bone, np.array(push.force), np.array(push.torque),
+                                        point,
                                push.local)
         return active.load
 
@@ -420,9 +423,10 @@ class Simulation:
             return
         if self._queue or self._hands:
             self._rest.disturb()
-        elif (self._rest.has_come(self._state, self._motion.kinetic, self.tick)
+        elif (self._rest.update(self._state, self._motion.kinetic, self.tick)
                 and any(GROUND in pair for pair in self._stepper.touching)):
             coordinates = self._stepper.coordinates
             self._correct(dataclasses.replace(coordinates, v=np.zeros_like(coordinates.v)))
-            self._guard.settle(self._motion.energy, self._guard.groups(self._stepper.touching))
+            self._conservation.close_step(self._motion.energy,
+                                          self._conservation.groups(self._stepper.touching))
             self.asleep = True

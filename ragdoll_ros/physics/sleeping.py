@@ -1,4 +1,4 @@
-"""Rest: when a scene may sleep, because nothing has moved for a while."""
+"""SleepDetector: when a scene may sleep, because nothing has moved for a while."""
 from __future__ import annotations
 
 import math
@@ -28,7 +28,7 @@ EARTH = 9.8
 """m/s^2: gravity for which the three above were measured."""
 
 
-class Rest:
+class SleepDetector:
     """Watches the bones of a scene, tick by tick."""
 
     def __init__(self, scene: Scene) -> None:
@@ -50,7 +50,7 @@ class Rest:
         self._still = 0
         """ns for which all have been still."""
 
-    def has_come(self, state: State, kinetic: np.ndarray, tick: int) -> bool:
+    def update(self, state: State, kinetic: np.ndarray, tick: int) -> bool:
         """Tell whether all have been still for long enough, after one more tick (ns).
 
         ``kinetic`` (d,) J are the dolls' energies of motion.
@@ -71,5 +71,6 @@ class Rest:
     def _moves(self, state: State, kinetic: np.ndarray) -> bool:
         """Tell whether any bone is faster than still; in most ticks the energies say so."""
         return bool((kinetic > self._most).any()
-                    or np.abs(state.linear).max() > self._speed
-                    or (np.abs(state.angular).max(axis=1) * self._sizes).max() > self._speed)
+                    or np.abs(state.linear_velocities).max() > self._speed
+                    or (np.abs(state.angular_velocities).max(axis=1)
+                        * self._sizes).max() > self._speed)

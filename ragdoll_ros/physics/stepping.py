@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import rotation
-from ..model.coordinates import Coordinates
+from ..model.coordinates import GeneralizedState
 from ..model.scene import Scene
 from ..model.state import State
 from . import backend
-from .engine.protocol import GROUND, Engine, Load
+from .engine.protocol import GROUND, AppliedWrench, Engine
 from .flight import STIFFEST, Path
 from .motion import damping_rate
 from .settings import HUMAN, Accuracy
@@ -52,7 +52,7 @@ GRADES = sorted({math.ceil(2 ** (k / 2)) for k in range(40)})
 
 HELPED = 0.98
 """Share of an overshoot that finer steps must come below to be tried once more: where contacts
-press a joint past its limit, they never do."""
+is_active a joint past its limit, they never do."""
 
 EVEN = 3.0
 """Accelerations up to so many times gravity's are those of an even motion, not of a blow."""
@@ -62,7 +62,7 @@ SHORTEST = 1e-7
 
 
 @dataclass
-class Effort:
+class StepStats:
     """What a tick took."""
 
     flights: int = 0
@@ -74,7 +74,7 @@ class Effort:
 
 
 @dataclass(frozen=True)
-class Piece:
+class StepResult:
     """A stretch of motion that is done: how long, and how fine the engine's substeps were."""
 
     duration: float
@@ -104,7 +104,7 @@ class Stepper:
         self._rigid = len(scene.bones) == len(scene.dolls)
         self._solid = bool(scene.ground or scene.self_collision or len(scene.dolls) > 1)
         """Whether anything can touch at all."""
-        self._fading = damping_rate(scene)
+        self._damping_rate = damping_rate(scene)
         self._gravity = math.hypot(*scene.gravity)
         self._lightest = min(bone.mass for bone in scene.bones)
         smallest = min(placement.doll.extent for placement in scene.dolls)
@@ -114,9 +114,9 @@ class Stepper:
         """Whether the engine has yet to hear of where all is."""
         self._blocked: bool
         """Whether something that no flight can foresee comes next: bones that meet."""
-        self._departure: Coordinates
+        self._departure: GeneralizedState
         """Where the tick began."""
-        self._flown: list[tuple[float, Sequence[Load]]] | None
+        self._flown: list[tuple[float, Sequence[AppliedWrench]]] | None
         """Durations, s, and loads of the tick's flights; None: it was not all flight."""
         self._path: Path | None
         """The step of a flight that is under way: it may lead over many ticks."""
@@ -126,7 +126,7 @@ class Stepper:
         """Steps of the path that were counted."""
         self._loaded = False
         """Whether it is a path under loads, which ends with the piece."""
-        self.effort = Effort()
+        self.stats = StepStats()
         self.begin()
 
     @property
@@ -139,27 +139,27 @@ class Stepper:
         if accuracy is not self._accuracy:
             self._accuracy, self._path = accuracy, None
 
-    def look(self) -> None:
+    def update_state(self) -> None:
         """Read where the engine is."""
         self.state: State
-        self.coordinates: Coordinates
+        self.coordinates: GeneralizedState
         if self.dynamics.cheap:
             self.coordinates = self.engine.coordinates()
             self.state = self.dynamics.state(self.coordinates)
         else:
-            self.state, self.coordinates = self.engine.look()
+            self.state, self.coordinates = self.engine.get_state()
         self.touching = self.engine.touching()
 
     def begin(self) -> None:
         """Start from where all is, and forget what was before."""
-        self.settle()
+        self.sync_engine()
         self._blocked = False
         self._path = None
         self._flown = None
         self._limits.forget()
-        self.look()
+        self.update_state()
 
-    def place(self, coordinates: Coordinates) -> None:
+    def place(self, coordinates: GeneralizedState) -> None:
         """Put the scene elsewhere; what touches stays as it was."""
         self._path = None
         self._set(coordinates)
@@ -173,13 +173,13 @@ class Stepper:
         q[layout.root_positions] = state.positions[self._roots]
         if turn is not None:
             q[layout.root_orientations] = rotation.multiply(turn, q[layout.root_orientations])
-        v[layout.root_velocities] = state.linear[self._roots]
-        v[layout.root_spins] = state.angular[self._roots]
+        v[layout.root_velocities] = state.linear_velocities[self._roots]
+        v[layout.root_spins] = state.angular_velocities[self._roots]
         before = self.coordinates
-        self.coordinates, self.state, self._stale = Coordinates(q, v), state, True
+        self.coordinates, self.state, self._stale = GeneralizedState(q, v), state, True
         self._limits.same(before, self.coordinates)
 
-    def settle(self) -> Engine:
+    def sync_engine(self) -> Engine:
         """Give the engine, with the dolls in it where they are."""
         if self._stale:
             self.engine.place(self.coordinates)
@@ -188,20 +188,20 @@ class Stepper:
 
     def begin_tick(self, tick: float) -> None:
         """Count efforts, and note what is flown, from here on, for ``tick`` s."""
-        self.effort = Effort()
+        self.stats = StepStats()
         self._most_flights = math.ceil(MOST_FLIGHTS * max(1.0, tick / self._span))
         self._departure, self._flown = self.coordinates, []
 
-    def go(self, duration: float, loads: Sequence[Load]) -> Piece:
+    def step(self, duration: float, loads: Sequence[AppliedWrench]) -> StepResult:
         """Move on by ``duration`` s, or by less: up to the next touch or limit in a flight."""
         if self._may_fly(duration):
             flown = self._fly(duration, loads)
             if flown > 0:
                 if self._flown is not None:
                     self._flown.append((flown, loads))
-                return Piece(flown, 0.0, set())
+                return StepResult(flown, 0.0, set())
         self._path = self._flown = None
-        return self._step(duration, loads)
+        return self._engine_step(duration, loads)
 
     def estimate_error(self) -> float | None:
         """Estimate the error, m, that the last tick added to the worst position.
@@ -211,7 +211,7 @@ class Stepper:
         """
         if not self._flown:
             return None
-        coordinates, steps = self._departure, FINER * max(1, self.effort.flights)
+        coordinates, steps = self._departure, FINER * max(1, self.stats.flights)
         for duration, loads in self._flown:
             coordinates = self.dynamics.fly(coordinates, duration, steps, loads)
         missed = self.dynamics.state(coordinates).positions - self.state.positions
@@ -226,15 +226,15 @@ class Stepper:
     def _may_fly(self, duration: float) -> bool:
         """Tell whether nothing touches and no joint presses against its limit."""
         if (not self.accuracy.order or self.touching or self._blocked
-                or self.effort.flights >= self._most_flights):
+                or self.stats.flights >= self._most_flights):
             return False
-        return not self._limits.press(self.coordinates, 0.0 if self.accuracy.land else duration)
+        return not self._limits.is_active(self.coordinates, 0.0 if self.accuracy.land else duration)
 
-    def _fly(self, duration: float, loads: Sequence[Load]) -> float:
+    def _fly(self, duration: float, loads: Sequence[AppliedWrench]) -> float:
         """Fly up to ``duration`` s; give the time flown, 0 where something comes in between."""
         if loads or self._loaded:
             self._path, self._loaded = None, bool(loads)
-        parts = self.reach.strides(self.state, duration) if self._solid else 1
+        parts = self.reach.ccd_steps(self.state, duration) if self._solid else 1
         if not self._leads_on(duration):
             parts = max(parts, math.ceil(
                 duration / self.dynamics.longest(self.accuracy, self._fastest())))
@@ -249,7 +249,7 @@ class Stepper:
             if ahead is None:
                 self._path = None
                 return flown
-            if not self.accuracy.land and self._limits.furthest(ahead) > 0:
+            if not self.accuracy.land and self._limits.max_violation(ahead) > 0:
                 self._limits.hold(ahead)
                 return flown
             self._fly_to(ahead)
@@ -261,8 +261,8 @@ class Stepper:
             self._limits.hold(self.coordinates)
             early, least = stretch, self._room(start, state)
             if room < 0:
-                early = self._land(begin, stretch, least, room) if least > 0 else 0.0
-            early = self._meet(begin, early)
+                early = self._find_event_time(begin, stretch, least, room) if least > 0 else 0.0
+            early = self._bisect_collision(begin, early)
             self._path = None
             if early > SHORTEST:
                 return flown + early
@@ -276,7 +276,7 @@ class Stepper:
         path = self._path
         return path is not None and self._along + stretch <= path.duration * (1 + 1e-9)
 
-    def _onward(self, stretch: float, longest: float, loads: Sequence[Load]) -> None:
+    def _onward(self, stretch: float, longest: float, loads: Sequence[AppliedWrench]) -> None:
         """See that the path leads on from here by ``stretch`` s at the least.
 
         A new one is as many stretches long as speeds allow, and fit into ``longest`` s.
@@ -291,14 +291,14 @@ class Stepper:
                                         loads, path if over else None)
         self._along, self._counted = 0.0, 0
 
-    def _ahead(self, time: float) -> Coordinates | None:
+    def _ahead(self, time: float) -> GeneralizedState | None:
         """Tell where the path leads to, and count its steps."""
         ahead = self._path.at(time)
-        self.effort.flights += self._path.count - self._counted
+        self.stats.flights += self._path.count - self._counted
         self._counted = self._path.count
         return ahead
 
-    def _land(self, begin: float, stretch: float, least: float, room: float) -> float:
+    def _find_event_time(self, begin: float, stretch: float, least: float, room: float) -> float:
         """Go back along the path to where a limit or the ground is just reached; give the time, s.
 
         ``least`` > 0 > ``room`` (rad or m) are there where the stretch begins and ends. The end is
@@ -315,7 +315,7 @@ class Stepper:
                 self._set(coordinates)
                 off = self._room() + LANDED / 2
             else:
-                off = LANDED / 2 - self._limits.furthest(coordinates)
+                off = LANDED / 2 - self._limits.max_violation(coordinates)
             if abs(off) <= LANDED / 2:
                 self._fly_to(coordinates)
                 return time
@@ -327,7 +327,7 @@ class Stepper:
             late, below = time, off
         return 0.0
 
-    def _meet(self, begin: float, late: float) -> float:
+    def _bisect_collision(self, begin: float, late: float) -> float:
         """Go back along the path to where bones begin to touch, if they do; give the time, s.
 
         By bisection, down to a depth that the engine's way of pushing bones apart, depth over
@@ -346,30 +346,31 @@ class Stepper:
         self._fly_to(self._path.at(begin + late))
         return late
 
-    def _fly_to(self, coordinates: Coordinates) -> None:
+    def _fly_to(self, coordinates: GeneralizedState) -> None:
         self._set(coordinates)
-        self.touching = self.settle().touching() if self._solid else set()
+        self.touching = self.sync_engine().touching() if self._solid else set()
 
-    def _set(self, coordinates: Coordinates) -> None:
+    def _set(self, coordinates: GeneralizedState) -> None:
         self.coordinates, self._stale = coordinates, True
         self.state = self.dynamics.state(coordinates) if self.dynamics.cheap else (
-            self.settle().read())
+            self.sync_engine().read())
 
-    def _back_to(self, start: Coordinates, state: State,
+    def _back_to(self, start: GeneralizedState, state: State,
                  touching: set[tuple[int, int]]) -> None:
         self._stale = True
         self.coordinates, self.state, self.touching = start, state, touching
 
-    def _room(self, coordinates: Coordinates | None = None, state: State | None = None) -> float:
+    def _room(self, coordinates: GeneralizedState | None = None,
+              state: State | None = None) -> float:
         """Room (rad or m) to the nearest limit or the ground; below zero: past it."""
-        room = -self._limits.furthest(coordinates or self.coordinates)
+        room = -self._limits.max_violation(coordinates or self.coordinates)
         return min(room, self.reach.clearance(state or self.state))
 
     def _fastest(self) -> float:
         """Fastest turning, rad/s, of a bone or about a limited axis."""
-        return max(self.reach.spin(self.state), self._limits.fastest(self.coordinates))
+        return max(self.reach.max_angular_speed(self.state), self._limits.fastest(self.coordinates))
 
-    def _step(self, duration: float, loads: Sequence[Load]) -> Piece:
+    def _engine_step(self, duration: float, loads: Sequence[AppliedWrench]) -> StepResult:
         """Take the engine's own step, finer where that overshoots less.
 
         What is too far already at its start is jammed: that takes a solver more turns. Where a
@@ -380,7 +381,7 @@ class Stepper:
         near = self._near(duration, loads)
         start, state, touching = self.coordinates, self.state, self.touching
         far, deep = self._too_far()
-        self.settle().be_thorough(far > 1 or deep > 1)
+        self.sync_engine().set_solver_iterations(far > 1 or deep > 1)
         far, deep = max(1.0, self.accuracy.creep * far), max(1.0, self.accuracy.creep * deep)
         substeps = self._substeps(duration, bool(loads))
         self._blocked = False
@@ -388,7 +389,7 @@ class Stepper:
         coarsest, last, slips = substeps, math.inf, False
         watch = bool(near) and not any(a != b for a, b in touching)
         while True:
-            self.settle()
+            self.sync_engine()
             touched = self._run(duration, substeps, loads, watch)
             past, sunk = self._too_far()
             past, sunk = past / far, sunk / deep
@@ -397,53 +398,54 @@ class Stepper:
             if over <= 1 or (finest and (slips or sunk <= max(1.0, past))):
                 break
             self._back_to(start, state, touching)
-            self.effort.redone += 1
+            self.stats.redone += 1
             if finest:
-                self.engine.be_slippery(True)
+                self.engine.set_ground_friction(True)
                 substeps, last, slips = coarsest, math.inf, True
             else:
                 substeps, last = min(most, 4 * substeps), over
         if slips:
-            self.engine.be_slippery(False)
+            self.engine.set_ground_friction(False)
         substep = lag = duration / substeps
         if (self._rigid and self.accuracy.centred and touching
                 and self._went_evenly(state, duration)):
             self._centre(start, substep)
             lag = 0.0
-        return Piece(duration, substep, touched if watch else near, lag)
+        return StepResult(duration, substep, touched if watch else near, lag)
 
     def _went_evenly(self, before: State, duration: float) -> bool:
         """Tell whether nothing was struck: no bone's velocity changed by more than a fall's."""
         return self.reach.change(before, self.state) < EVEN * self._gravity * duration
 
-    def _centre(self, start: Coordinates, substep: float) -> None:
+    def _centre(self, start: GeneralizedState, substep: float) -> None:
         """Take half a substep's change of velocity back out of the way that was gone.
 
         The engine moves all by the velocity that each substep ends with; by the mean of begin and
         end (the trapezoidal rule) an even motion is right to order 2.
         """
         way = (self.coordinates.v - start.v) * (-substep / 2)
-        self._set(self.dynamics.moved(self.coordinates, way))
+        self._set(self.dynamics.integrate_configuration(self.coordinates, way))
 
-    def _near(self, duration: float, loads: Sequence[Load]) -> set[tuple[int, int]]:
+    def _near(self, duration: float, loads: Sequence[AppliedWrench]) -> set[tuple[int, int]]:
         """Pairs of dolls, or of a doll and GROUND, that may touch within ``duration`` s."""
         pull = max((math.hypot(*load.force) for load in loads), default=0.0)
-        return self.reach.near(self.state, duration, self._gravity + pull / self._lightest,
+        return self.reach.broadphase_pairs(self.state, duration,
+                                           self._gravity + pull / self._lightest,
                                self.touching)
 
     def _too_far(self) -> tuple[float, float]:
         """Tell how far past a limit and in the ground, in units of what is put up with."""
-        past = max(0.0, self._limits.furthest(self.coordinates))
+        past = max(0.0, self._limits.max_violation(self.coordinates))
         sunk = -self.reach.clearance(self.state)
         return past / self.accuracy.redo, sunk / self.accuracy.sink
 
-    def _run(self, duration: float, substeps: int, loads: Sequence[Load],
+    def _run(self, duration: float, substeps: int, loads: Sequence[AppliedWrench],
              watch: bool) -> set[tuple[int, int]]:
         """Let the engine go; what changes with the motion is looked at again now and then.
 
         Gives the pairs that touched in one of the substeps, if these are to be watched.
         """
-        calls = math.ceil(self._fading * duration / LAG)
+        calls = math.ceil(self._damping_rate * duration / LAG)
         if watch or any(load.local or load.point.any() for load in loads):
             calls = substeps
         calls = max(1, min(calls, substeps))
@@ -453,8 +455,8 @@ class Stepper:
             self.engine.step(duration * share / substeps, share, loads)
             if watch:
                 touched |= self.engine.touched()
-        self.effort.substeps += substeps
-        self.look()
+        self.stats.substeps += substeps
+        self.update_state()
         return {(a, b) for a, b in touched if a != b}
 
     def _substeps(self, duration: float, pushed: bool) -> int:
@@ -463,9 +465,9 @@ class Stepper:
         tens = duration / self._span
         if not accuracy.adaptive:
             return max(1, math.ceil(accuracy.contact * tens))
-        spin = self.reach.spin(state)
+        spin = self.reach.max_angular_speed(state)
         need = max(1.0, spin * duration / accuracy.turn, 4.0 * tens if pushed else 0.0,
-                   self._fading * duration / STIFFEST)
+                   self._damping_rate * duration / STIFFEST)
         need = max(need, self._limits.approach(self.coordinates, SOON) * duration / accuracy.limit)
         falling = self.reach.falling(state, SOON)
         if self.touching or falling or self._blocked:

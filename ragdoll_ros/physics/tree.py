@@ -10,7 +10,7 @@ from .kernels.record import RECORD
 
 
 def table(scene: Scene) -> np.ndarray:
-    """Records of all bones of a scene, coordinates in the order of Layout."""
+    """Records of all bones of a scene, coordinates in the order of DofLayout."""
     places = {name: place for place, name in enumerate(scene.bone_names)}
     records: list[np.ndarray] = []
     q = v = 0
@@ -27,7 +27,7 @@ def table(scene: Scene) -> np.ndarray:
             if joint is None:
                 q, v = q + 7, v + 6
             else:
-                q, v = q + (4 if record['free'] else joint.freedoms), v + joint.freedoms
+                q, v = q + (4 if record['free'] else joint.dof), v + joint.dof
     return np.array(records, RECORD)
 
 
@@ -42,7 +42,7 @@ def _joined(doll: Ragdoll, joint: Joint, at: dict[str, int]) -> np.ndarray:
     record = np.zeros((), RECORD)
     record['parent'] = at[joint.parent]
     record['free'] = joint.is_free_ball
-    record['freedoms'], record['damping'] = joint.freedoms, joint.damping
+    record['dof'], record['damping'] = joint.dof, joint.damping
     record['before'] = np.subtract(joint.anchor, doll.bone(joint.parent).position)
     record['after'] = np.subtract(doll.bone(joint.child).position, joint.anchor)
     axes = rotation.matrix(joint_frame(joint)).T if joint.kind == 'ball' else joint.axes

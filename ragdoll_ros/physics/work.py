@@ -7,15 +7,15 @@ import numpy as np
 
 from ..model import rotation
 from ..model.state import State
-from .engine.protocol import Load
+from .engine.protocol import AppliedWrench
 from .motion import cross, point_motion
-from .stepping import Piece
+from .stepping import StepResult
 
 STEADY = 0.2
 """rad that a bone may turn while a torque, or a force along its axes, is entered as one."""
 
 
-def longest_stretch(load: Load, state: State, inertia: np.ndarray) -> float:
+def longest_stretch(load: AppliedWrench, state: State, inertia: np.ndarray) -> float:
     """Time, s, in which a bone that a torque or a load along its own axes pushes turns by STEADY.
 
     At the least: w t + a t^2 / 2, where a is what the bone alone, of principal moments
@@ -23,22 +23,23 @@ def longest_stretch(load: Load, state: State, inertia: np.ndarray) -> float:
     """
     if not (load.local or load.torque.any()):
         return math.inf
-    spin = math.hypot(*state.angular[load.bone])
+    spin = math.hypot(*state.angular_velocities[load.bone])
     force, arm, torque = (math.hypot(*vector) for vector in (load.force, load.point, load.torque))
     gain = (torque + force * arm) / inertia.min()
     root = math.sqrt(spin * spin + 2 * gain * STEADY)
     return 2 * STEADY / (spin + root) if root > 0 else math.inf
 
 
-def mean_load(load: Load, before: State, after: State) -> tuple[np.ndarray, np.ndarray]:
+def mean_load(load: AppliedWrench, before: State, after: State) -> tuple[np.ndarray, np.ndarray]:
     """Force (3,) N and torque (3,) N m in world axes; of a local load over a steady turn."""
     if not load.local:
         return load.force, load.torque
-    turn = rotation.mean_of_turn(_turned(load.bone, before, after)) @ before.turns[load.bone]
+    turn = rotation.mean_of_turn(_turned(load.bone, before,
+                                         after)) @ before.rotation_matrices[load.bone]
     return turn @ load.force, turn @ load.torque
 
 
-def work(load: Load, before: State, after: State, piece: Piece) -> float:
+def work(load: AppliedWrench, before: State, after: State, piece: StepResult) -> float:
     """Work, J: of the force along its point's way, and of the torque through its bone's turn.
 
     A step that takes the velocity first (semi-implicit Euler, a substep h long) moves a point by
@@ -51,14 +52,15 @@ def work(load: Load, before: State, after: State, piece: Piece) -> float:
     force, torque = mean_load(load, before, after)
     (place, speed), (end, end_speed) = (
         point_motion(state, bone, load.point) for state in (before, after))
-    faster, spun = end_speed - speed, after.angular[bone] - before.angular[bone]
+    faster = end_speed - speed
+    spun = after.angular_velocities[bone] - before.angular_velocities[bone]
     done = force @ (end - place - piece.lag / 2 * faster)
     if torque.any():
         swept = _turned(bone, before, after) + piece.duration ** 2 / 12 * cross(
-            before.angular[bone], after.angular[bone])
+            before.angular_velocities[bone], after.angular_velocities[bone])
         done += torque @ (swept - piece.lag / 2 * spun)
     if load.local:
-        change = after.turns[bone] - before.turns[bone]
+        change = after.rotation_matrices[bone] - before.rotation_matrices[bone]
         done += piece.duration / 12 * (change @ load.force @ faster + change @ load.torque @ spun)
     return float(done)
 

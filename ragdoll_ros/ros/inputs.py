@@ -80,8 +80,8 @@ class Inputs:
                                      channel)
             else:
                 self.simulation.release(channel)
-        except errors.Fault as fault:
-            self._tally.refuse(source, fault)
+        except errors.ModelError as error:
+            self._tally.refuse(source, error)
 
     def _limited(self, source: str, name: str, vector: Vector3, scale: float,
                  most: float) -> Vector:

@@ -117,8 +117,8 @@ class Interactive:
         """Move a hand as a client wants it; see the table above."""
         try:
             self._take(message)
-        except errors.Fault as fault:
-            self._tally.refuse(FEEDBACK, fault)
+        except errors.ModelError as error:
+            self._tally.refuse(FEEDBACK, error)
 
     def _take(self, message: InteractiveMarkerFeedback) -> None:
         self._check(message)

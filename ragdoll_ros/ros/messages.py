@@ -32,7 +32,7 @@ def contact_poses(contacts: Sequence[Contact]) -> np.ndarray:
 
 def twists_of(state: State) -> np.ndarray:
     """Twists (n, 6) in the world frame: linear m/s, angular rad/s."""
-    return np.concatenate([state.linear, state.angular], axis=1)
+    return np.concatenate([state.linear_velocities, state.angular_velocities], axis=1)
 
 
 def to_time(nanoseconds: int) -> Time:

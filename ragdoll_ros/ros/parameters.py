@@ -19,11 +19,11 @@ from ..physics.settings import ACCURACIES
 
 
 def _setting(default: object, description: str, span: tuple[float, float] | None = None,
-             constraints: str = '', brought: Callable | None = None) -> object:
-    """A parameter; ``brought`` gives the default that a scene brings along."""
+             constraints: str = '', scene_default: Callable | None = None) -> object:
+    """A parameter; ``scene_default`` gives the default that a scene brings along."""
     return dataclasses.field(default=default, metadata={
         'description': description, 'span': span, 'constraints': constraints,
-        'brought': brought})
+        'scene_default': scene_default})
 
 
 @dataclass(frozen=True)
@@ -35,13 +35,13 @@ class Settings:
         constraints='a file, or the name of a shipped one; set again, it is read again')
     rate: float = _setting(
         100.0, 'Ticks, and messages, in a second of simulated time, Hz',
-        (1 / STEP_RANGE[1], 1 / STEP_RANGE[0]), brought=lambda scene: 1 / scene.step)
+        (1 / STEP_RANGE[1], 1 / STEP_RANGE[0]), scene_default=lambda scene: 1 / scene.step)
     real_time_factor: float = _setting(
         1.0, 'Seconds simulated in each second on the wall', (0.001, 100.0),
-        brought=lambda scene: min(max(scene.pace, 0.001), 100.0))
+        scene_default=lambda scene: min(max(scene.pace, 0.001), 100.0))
     pushed_bone: str = _setting(
         '', 'Bone that ~/force and cmd_vel push', constraints='one of bone_names',
-        brought=lambda scene: scene.qualified(scene.dolls[0], scene.dolls[0].doll.root.name))
+        scene_default=lambda scene: scene.qualified(scene.dolls[0], scene.dolls[0].doll.root.name))
     push_timeout: float = _setting(
         0.1, 'Simulated time that a push lasts unless the next one comes first, s', (0.001, 60.0))
     cmd_vel_timeout: float = _setting(
@@ -82,7 +82,7 @@ class Parameters:
         found: list[str] = []
         self._declare('scene', found)
         self.scene = load_scene(self.settings.scene)
-        for name, default in brought(self.scene).items():
+        for name, default in scene_default(self.scene).items():
             self.settings = dataclasses.replace(self.settings, **{name: default})
         for name in SPECS:
             if name != 'scene':
@@ -147,8 +147,8 @@ class Parameters:
 
     def _brought_by(self, scene: Scene) -> dict:
         """Values that change because they were those of the scene before."""
-        before = brought(self.scene)
-        return {name: value for name, value in brought(scene).items()
+        before = scene_default(self.scene)
+        return {name: value for name, value in scene_default(scene).items()
                 if getattr(self.settings, name) == before[name]}
 
     def _set_bone_names(self) -> None:
@@ -160,10 +160,10 @@ class Parameters:
         descriptor.read_only = True
 
 
-def brought(scene: Scene) -> dict:
+def scene_default(scene: Scene) -> dict:
     """Defaults that a scene brings along."""
-    return {name: spec.metadata['brought'](scene) for name, spec in SPECS.items()
-            if spec.metadata['brought']}
+    return {name: spec.metadata['scene_default'](scene) for name, spec in SPECS.items()
+            if spec.metadata['scene_default']}
 
 
 def check(settings: Settings, scene: Scene) -> None:

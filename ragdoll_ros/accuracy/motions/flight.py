@@ -9,7 +9,7 @@ import numpy as np
 from ...files.doll import load_doll
 from ...files.scene import load_scene
 from ...model import rotation
-from ...model.coordinates import Coordinates
+from ...model.coordinates import GeneralizedState
 from ...model.push import Push
 from ...model.ragdoll import Bone, Joint, Ragdoll
 from ...model.scene import Placement, Scene
@@ -91,7 +91,7 @@ def chain(links: int, length: float = 0.2, mass: float = 1.0) -> Motion:
     start = posed(Placement(doll), dict(zip(names, np.diff(angles), strict=True)),
                   dict(zip(names, np.diff(rates), strict=True)))
     start.v[5] = rates[0]
-    start.v[:3] = -Articulated(doll).state(start.q, start.v).linear.mean(axis=0)
+    start.v[:3] = -Articulated(doll).state(start.q, start.v).linear_velocities.mean(axis=0)
 
     def truth(times: np.ndarray) -> Trajectory:
         centres, phi = planar.motion(angles, rates, times)
@@ -153,7 +153,7 @@ def _inside_limits(doll: Ragdoll, speed: float, seed: int) -> tuple[dict, dict]:
 
 def _articulated(trial: Trial) -> object:
     """Truth from the equations of motion, with the trial's pushes."""
-    start: Coordinates = trial.start
+    start: GeneralizedState = trial.start
     tree = Articulated(trial.scene.dolls[0].doll, trial.scene.gravity)
     breaks = sorted({time for push in trial.pushes
                      for time in (push.start, push.start + push.duration)})

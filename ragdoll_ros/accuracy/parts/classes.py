@@ -90,7 +90,7 @@ def _worst(measure: Measure, start: object, moved: Trajectory) -> dict[str, floa
                               'settled_s'), math.inf)
     return {'excess': measure.excess(start, moved), 'overshoot_rad': measure.overshoot(moved),
             'sinking_m': measure.sinking(moved), 'gap_m': measure.gap(moved),
-            'speed_m_s': float(np.linalg.norm(moved.linear, axis=-1).max()),
+            'speed_m_s': float(np.linalg.norm(moved.linear_velocities, axis=-1).max()),
             'settled_s': measure.settled(moved)}
 
 

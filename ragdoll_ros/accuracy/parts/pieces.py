@@ -12,7 +12,7 @@ import functools
 import numpy as np
 
 from ...files.scene import load_scene
-from ...model.coordinates import Coordinates
+from ...model.coordinates import GeneralizedState
 from ...physics.engine.bullet import BulletEngine
 from ..measure import Measure, compare
 from ..methods import bullet, by_name, mujoco, run
@@ -47,7 +47,7 @@ def beginnings(count: int) -> list[Trial]:
     for tick in range(wanted[-1] + 1):
         if tick in wanted:
             here = engine.coordinates()
-            found.append(Trial(scene, LENGTH, Coordinates(here.q, here.v)))
+            found.append(Trial(scene, LENGTH, GeneralizedState(here.q, here.v)))
         engine.step(scene.step, FINE)
     engine.close()
     return found

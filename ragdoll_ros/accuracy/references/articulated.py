@@ -1,6 +1,6 @@
 """The motion of a doll in flight, from the equations of motion, independent of any engine.
 
-Coordinates are those of the tree, so a joint cannot open. With J the Jacobians of all centres
+GeneralizedState are those of the tree, so a joint cannot open. With J the Jacobians of all centres
 of mass, Jw of all angular velocities, and a0, alpha0 the accelerations that are left when dv/dt
 vanishes (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 3):
 
@@ -9,7 +9,7 @@ vanishes (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 3):
 
 integrated by DOP853 (Hairer, Norsett, Wanner) at 1e-12. Limits and contacts are not in it.
 
-Coordinates are laid out as in coordinates.py, the joints depth first.
+GeneralizedState are laid out as in coordinates.py, the joints depth first.
 """
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Articulated:
 
     def bind(self, position: Sequence[float] = (0, 0, 0),
              orientation: Sequence[float] = rotation.IDENTITY) -> np.ndarray:
-        """Coordinates q of the bind pose with the doll's frame at a place and turn."""
+        """GeneralizedState q of the bind pose with the doll's frame at a place and turn."""
         q = np.zeros(self.nq)
         root = self.doll.root
         q[:3] = position + rotation.rotate(np.array(orientation), root.position)
@@ -187,9 +187,9 @@ class Articulated:
 def _layout(doll: Ragdoll) -> tuple[dict[str, slice], dict[str, slice], int, int]:
     q_of, v_of, nq, nv = {}, {}, 7, 6
     for joint in doll.joints_depth_first():
-        size = 4 if joint.is_free_ball else joint.freedoms
-        q_of[joint.child], v_of[joint.child] = slice(nq, nq + size), slice(nv, nv + joint.freedoms)
-        nq, nv = nq + size, nv + joint.freedoms
+        size = 4 if joint.is_free_ball else joint.dof
+        q_of[joint.child], v_of[joint.child] = slice(nq, nq + size), slice(nv, nv + joint.dof)
+        nq, nv = nq + size, nv + joint.dof
     return q_of, v_of, nq, nv
 
 

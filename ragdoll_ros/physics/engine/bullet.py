@@ -18,11 +18,11 @@ import pybullet
 
 from ...files.urdf import to_urdf
 from ...model import errors, rotation
-from ...model.coordinates import UNLIMITED, Coordinates, Layout
+from ...model.coordinates import UNLIMITED, DofLayout, GeneralizedState
 from ...model.ragdoll import Ragdoll
 from ...model.scene import Placement, Scene, grip
 from ...model.state import State
-from .protocol import GROUND, Contact, Load, pressed
+from .protocol import GROUND, AppliedWrench, Contact, pressed
 
 BREAKING_DISTANCE = 2e-3
 """m at which a contact point is let go. A gap is room to move in within a substep, so that it eats
@@ -101,7 +101,7 @@ class BulletEngine:
             self.close()
             raise
 
-    def step(self, duration: float, substeps: int, loads: Sequence[Load] = ()) -> None:
+    def step(self, duration: float, substeps: int, loads: Sequence[AppliedWrench] = ()) -> None:
         """Go on by ``duration`` s in equal substeps, under ``loads`` that do not turn."""
         timing = (duration, substeps)
         if timing != self._timing:
@@ -117,7 +117,8 @@ class BulletEngine:
             self._apply(load)
         pybullet.stepSimulation(physicsClientId=self._client)
 
-    def acceleration(self, coordinates: Coordinates, loads: Sequence[Load] = ()) -> np.ndarray:
+    def acceleration(self, coordinates: GeneralizedState,
+                     loads: Sequence[AppliedWrench] = ()) -> np.ndarray:
         """Rates of change of ``coordinates.v``, from one small step.
 
         PyBullet's step takes v to v + a h with a from where the step begins, so the quotient is
@@ -131,7 +132,7 @@ class BulletEngine:
         """Poses and velocities of all bones."""
         return State.of(np.array([row for doll in self._dolls for row in self._rows(doll)]))
 
-    def coordinates(self) -> Coordinates:
+    def coordinates(self) -> GeneralizedState:
         """Generalised coordinates of all dolls."""
         q: list[float] = []
         v: list[float] = []
@@ -143,9 +144,9 @@ class BulletEngine:
             for joint in self._joints(doll):
                 q += joint[0]
                 v += joint[1]
-        return Coordinates(np.array(q), np.array(v))
+        return GeneralizedState(np.array(q), np.array(v))
 
-    def look(self) -> tuple[State, Coordinates]:
+    def get_state(self) -> tuple[State, GeneralizedState]:
         """Both at once, in less time."""
         rows: list[tuple] = []
         q: list[float] = []
@@ -159,9 +160,9 @@ class BulletEngine:
                 q += joint[0]
                 v += joint[1]
             rows += own
-        return State.of(np.array(rows)), Coordinates(np.array(q), np.array(v))
+        return State.of(np.array(rows)), GeneralizedState(np.array(q), np.array(v))
 
-    def place(self, coordinates: Coordinates) -> None:
+    def place(self, coordinates: GeneralizedState) -> None:
         """Put all dolls where ``coordinates`` says."""
         q, v = coordinates.q.tolist(), coordinates.v.tolist()
         i = j = 0
@@ -204,7 +205,7 @@ class BulletEngine:
         points = pybullet.getContactPoints(physicsClientId=self._client)
         return {(self._doll_of[point[1]], self._doll_of[point[2]]) for point in points}
 
-    def be_thorough(self, wanted: bool) -> None:
+    def set_solver_iterations(self, wanted: bool) -> None:
         """Solve contacts that bear on each other, or as fast as is enough for others."""
         if wanted is not self._thorough:
             self._thorough = wanted
@@ -212,13 +213,13 @@ class BulletEngine:
                 numSolverIterations=THOROUGH_ITERATIONS if wanted else SOLVER_ITERATIONS,
                 physicsClientId=self._client)
 
-    def be_slippery(self, wanted: bool) -> None:
+    def set_ground_friction(self, wanted: bool) -> None:
         """Take the ground's friction away, or give it back."""
         friction = 0.0 if wanted else math.sqrt(grip(self.scene.material.friction))
         pybullet.changeDynamics(self._ground, -1, lateralFriction=friction,
                                 physicsClientId=self._client)
 
-    def let_overlaps_be(self) -> None:
+    def exclude_initial_penetrations(self) -> None:
         """Let bones of one doll that overlap by more than pressed() now collide no more."""
         depth = pressed(self.scene)
         pybullet.performCollisionDetection(physicsClientId=self._client)
@@ -285,7 +286,7 @@ class BulletEngine:
                 v += joint[1]
         return np.array(v)
 
-    def _apply(self, load: Load) -> None:
+    def _apply(self, load: AppliedWrench) -> None:
         body, link = self._links[load.bone]
         if link < 0:
             position, orientation = pybullet.getBasePositionAndOrientation(body, self._client)
@@ -317,7 +318,7 @@ class BulletEngine:
         self._bone_of = {link: bone for bone, link in enumerate(self._links)}
         self.layout = self._lay_out()
         self._check_sizes()
-        self.let_overlaps_be()
+        self.exclude_initial_penetrations()
         for index, placement in enumerate(self.scene.dolls):
             self._set_in_motion(self._dolls[index].body, placement)
 
@@ -391,7 +392,7 @@ class BulletEngine:
         if self._free:
             for link in range(-1, pybullet.getNumJoints(body, self._client)):
                 pybullet.setCollisionFilterGroupMask(body, link, 0, 0, self._client)
-        self._let_neighbours_be(doll, body, links)
+        self._exclude_adjacent_bodies(doll, body, links)
         return _Doll(body, order, [link for link in order if link >= 0], order.index(-1),
                      joints, balls, [(4, 3) if ball else (1, 1) for ball in balls], angles)
 
@@ -421,13 +422,13 @@ class BulletEngine:
             rollingFriction=rolling / (2 * sliding) if sliding else 0.0, spinningFriction=0,
             restitution=math.sqrt(restitution), physicsClientId=self._client)
 
-    def _let_neighbours_be(self, doll: Ragdoll, body: int, links: dict[str, int]) -> None:
+    def _exclude_adjacent_bodies(self, doll: Ragdoll, body: int, links: dict[str, int]) -> None:
         """Bones that share a joint do not collide."""
         for joint in doll.joints:
             pybullet.setCollisionFilterPair(body, body, links[joint.parent], links[joint.child],
                                             0, physicsClientId=self._client)
 
-    def _lay_out(self) -> Layout:
+    def _lay_out(self) -> DofLayout:
         """Say where in the coordinates which joint's angle and limit stands."""
         dolls = []
         for doll, placement in zip(self._dolls, self.scene.dolls, strict=True):
@@ -436,7 +437,7 @@ class BulletEngine:
             names = list(doll.angles)
             dolls.append([None if ball else limits[name] or UNLIMITED
                           for name, ball in zip(names, doll.balls, strict=True)])
-        return Layout(dolls)
+        return DofLayout(dolls)
 
     def _check_sizes(self) -> None:
         """Refuse what PyBullet would cut off without a word."""
@@ -458,7 +459,7 @@ class BulletEngine:
                                    physicsClientId=self._client)
 
 
-def bare_loop(scene: Scene, start: Coordinates,
+def bare_loop(scene: Scene, start: GeneralizedState,
               substeps: int) -> tuple[Callable[[], None], Callable[[], None]]:
     """Give the least that can be done in a tick, as a yardstick, and what ends it.
 

@@ -11,11 +11,11 @@ import numpy as np
 
 from ...files.mjcf import to_mjcf
 from ...model import errors, rotation
-from ...model.coordinates import UNLIMITED, Coordinates, Layout
+from ...model.coordinates import UNLIMITED, DofLayout, GeneralizedState
 from ...model.ragdoll import Joint, Limits, Ragdoll, joint_frame
 from ...model.scene import Placement, Scene
 from ...model.state import State
-from .protocol import GROUND, Contact, Load, pressed
+from .protocol import GROUND, AppliedWrench, Contact, pressed
 
 INTEGRATORS = ('euler', 'implicitfast', 'rk4')
 """Order 1 with implicit joint damping; order 1, implicit in all velocities; order 4."""
@@ -47,9 +47,9 @@ class MujocoEngine:
         self._apart: set[frozenset[str]] = set()
         self._build()
         self._set_in_motion()
-        self.let_overlaps_be()
+        self.exclude_initial_penetrations()
 
-    def step(self, duration: float, substeps: int, loads: Sequence[Load] = ()) -> None:
+    def step(self, duration: float, substeps: int, loads: Sequence[AppliedWrench] = ()) -> None:
         """Go on by ``duration`` s in equal substeps, under ``loads`` that do not turn."""
         self._model.opt.timestep = duration / substeps
         self._apply(loads)
@@ -57,7 +57,8 @@ class MujocoEngine:
         self._data.xfrc_applied[:] = 0
         self._stale = True
 
-    def acceleration(self, coordinates: Coordinates, loads: Sequence[Load] = ()) -> np.ndarray:
+    def acceleration(self, coordinates: GeneralizedState,
+                     loads: Sequence[AppliedWrench] = ()) -> np.ndarray:
         """Rates of change of ``coordinates.v`` where nothing touches and no limit is reached."""
         self.place(coordinates)
         self._apply(loads)
@@ -78,7 +79,7 @@ class MujocoEngine:
         return State(data.xipos[bodies].copy(), data.xquat[bodies][:, [1, 2, 3, 0]],
                      data.cvel[bodies, 3:] + np.cross(angular, arms), angular)
 
-    def coordinates(self) -> Coordinates:
+    def coordinates(self) -> GeneralizedState:
         """Generalised coordinates of all dolls."""
         q = self._data.qpos.copy()
         for iq, _ in self._roots:
@@ -86,13 +87,13 @@ class MujocoEngine:
         for iq, _, seat in self._balls:
             turn = rotation.multiply(seat, q[iq:iq + 4][XYZW])
             q[iq:iq + 4] = rotation.multiply(turn, rotation.inverse(seat))
-        return Coordinates(q, self._outwards(self._data.qpos, self._data.qvel))
+        return GeneralizedState(q, self._outwards(self._data.qpos, self._data.qvel))
 
-    def look(self) -> tuple[State, Coordinates]:
+    def get_state(self) -> tuple[State, GeneralizedState]:
         """Both at once."""
         return self.read(), self.coordinates()
 
-    def place(self, coordinates: Coordinates) -> None:
+    def place(self, coordinates: GeneralizedState) -> None:
         """Put all dolls where ``coordinates`` says."""
         q, v = coordinates.q.copy(), coordinates.v.copy()
         for iq, iv in self._roots:
@@ -127,13 +128,13 @@ class MujocoEngine:
             return set()
         return {tuple(pair) for pair in self._doll_of[self._data.contact.geom].tolist()}
 
-    def be_thorough(self, wanted: bool) -> None:
+    def set_solver_iterations(self, wanted: bool) -> None:
         """Nothing to do: this solver goes on until it has an answer."""
 
-    def be_slippery(self, wanted: bool) -> None:
+    def set_ground_friction(self, wanted: bool) -> None:
         """Nothing to do: this solver finds an answer with any friction."""
 
-    def let_overlaps_be(self) -> None:
+    def exclude_initial_penetrations(self) -> None:
         """Let bones of one doll that overlap by more than pressed() now collide no more."""
         self._refresh()
         self._mujoco.mj_collision(self._model, self._data)
@@ -207,7 +208,7 @@ class MujocoEngine:
             self._roots.append(self._address(placement, doll.root.name + '/free'))
             self._angles += [self._place_of(placement, joint) for joint in doll.joints]
             dolls.append(_limits(doll))
-        self.layout = Layout(dolls)
+        self.layout = DofLayout(dolls)
         self._stale = True
 
     def _place_of(self, placement: Placement, joint: Joint) -> int | list[int]:
@@ -235,7 +236,7 @@ class MujocoEngine:
             start.v[iv + 3:iv + 6] = placement.spin
         self.place(start)
 
-    def _apply(self, loads: Sequence[Load]) -> None:
+    def _apply(self, loads: Sequence[AppliedWrench]) -> None:
         for load in loads:
             self._refresh()
             body = self._bodies[load.bone]

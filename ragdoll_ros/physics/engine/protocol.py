@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ...model.coordinates import Coordinates, Layout
+from ...model.coordinates import DofLayout, GeneralizedState
 from ...model.scene import Scene
 from ...model.state import State
 
@@ -36,7 +36,7 @@ class Contact:
 
 
 @dataclass(frozen=True)
-class Load:
+class AppliedWrench:
     """A force (3,) N and a torque (3,) N m on a bone, for one step.
 
     ``point`` (3,) m is where the force attacks, from the bone's centre of mass along the bone's
@@ -54,26 +54,27 @@ class Engine(Protocol):
     """A scene in motion. ``free``: nothing touches and no joint has a limit."""
 
     scene: Scene
-    layout: Layout
+    layout: DofLayout
 
     def __init__(self, scene: Scene, free: bool = False) -> None: ...
 
-    def step(self, duration: float, substeps: int, loads: Sequence[Load] = ()) -> None:
+    def step(self, duration: float, substeps: int, loads: Sequence[AppliedWrench] = ()) -> None:
         """Go on by ``duration`` s in equal substeps, under ``loads`` that do not turn."""
 
-    def acceleration(self, coordinates: Coordinates, loads: Sequence[Load] = ()) -> np.ndarray:
+    def acceleration(self, coordinates: GeneralizedState,
+                     loads: Sequence[AppliedWrench] = ()) -> np.ndarray:
         """Rates of change of ``coordinates.v``; leaves the engine in no state to go on from."""
 
     def read(self) -> State:
         """Poses and velocities of all bones."""
 
-    def coordinates(self) -> Coordinates:
+    def coordinates(self) -> GeneralizedState:
         """Generalised coordinates of all dolls."""
 
-    def look(self) -> tuple[State, Coordinates]:
+    def get_state(self) -> tuple[State, GeneralizedState]:
         """Both at once, as after each step."""
 
-    def place(self, coordinates: Coordinates) -> None:
+    def place(self, coordinates: GeneralizedState) -> None:
         """Put all dolls where ``coordinates`` says."""
 
     def joint_angles(self) -> np.ndarray:
@@ -85,13 +86,13 @@ class Engine(Protocol):
     def touched(self) -> set[tuple[int, int]]:
         """Pairs of dolls that touched in the last substep, as it saw them."""
 
-    def be_thorough(self, wanted: bool) -> None:
+    def set_solver_iterations(self, wanted: bool) -> None:
         """Solve contacts that bear on each other, or as fast as is enough for others."""
 
-    def be_slippery(self, wanted: bool) -> None:
+    def set_ground_friction(self, wanted: bool) -> None:
         """Take the ground's friction away, or give it back."""
 
-    def let_overlaps_be(self) -> None:
+    def exclude_initial_penetrations(self) -> None:
         """Let bones of one doll that overlap by more than pressed() now collide no more."""
 
     def contacts(self) -> list[Contact]:

@@ -9,9 +9,9 @@ Dynamics: Featherstone's articulated-body algorithm (Rigid Body Dynamics Algorit
 where the doll's root is at that instant: nothing is transformed from bone to bone, and nothing
 loses digits far from the origin. A joint of several axes is a row of hinges with no mass between.
 
-``tree`` is the table of tree.py. q and v are those of Coordinates, but where angular velocities of
-roots are said to be the roots' own they are along the root's axes: so a steady spin hardly changes
-them.
+``tree`` is the table of tree.py. q and v are those of GeneralizedState, but where angular
+velocities of roots are said to be the roots' own they are along the root's axes: so a steady spin
+hardly changes them.
 """
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ def pose(tree: np.ndarray, q: np.ndarray, v: np.ndarray, work: Work) -> None:
                 x, y, z, w, bone.axes[0, 0] * d + bone.axes[1, 0] * e + bone.axes[2, 0] * f,
                 bone.axes[0, 1] * d + bone.axes[1, 1] * e + bone.axes[2, 1] * f,
                 bone.axes[0, 2] * d + bone.axes[1, 2] * e + bone.axes[2, 2] * f, q[at + 3])
-        for k in range(bone.freedoms):
+        for k in range(bone.dof):
             d, e, f = bone.axes[k, 0], bone.axes[k, 1], bone.axes[k, 2]
             sx, sy, sz = turned(x, y, z, w, d, e, f)
             axes[rate, 0], axes[rate, 1], axes[rate, 2] = sx, sy, sz
@@ -182,7 +182,7 @@ def accelerations(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: n
                  work.biases[i], loads, work.matrix)
     for i in range(len(tree) - 1, -1, -1):
         if tree[i].parent >= 0:
-            _inward(tree[i], i, v, work)
+            aba_backward(tree[i], i, v, work)
     for i in range(len(tree)):
         bone, bias, move = tree[i], work.biases[i], work.moves[i]
         if bone.parent < 0:
@@ -197,7 +197,7 @@ def accelerations(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: n
             out[rate + 3], out[rate + 4], out[rate + 5] = turned(
                 q[at], q[at + 1], q[at + 2], -q[at + 3], bias[0], bias[1], bias[2])
         else:
-            _outward(bone, i, work, out)
+            aba_forward(bone, i, work, out)
 
 
 @inlined
@@ -253,14 +253,14 @@ def _inertia(bone: np.record, turn: np.ndarray, centre: np.ndarray, move: np.nda
 
 
 @inlined
-def _inward(bone: np.record, i: int, v: np.ndarray, work: Work) -> None:
+def aba_backward(bone: np.record, i: int, v: np.ndarray, work: Work) -> None:
     """Hand a bone's inertia and bias on to its parent, through the axes of its joint."""
     inertia, bias = work.inertias[i], work.biases[i]
     # what carries an axis moves as the bone does but for that axis and those behind it
     by = bone.parent if bone.free else i
     wx, wy, wz = work.moves[by, 0], work.moves[by, 1], work.moves[by, 2]
     vx, vy, vz = work.moves[by, 3], work.moves[by, 4], work.moves[by, 5]
-    for d in range(bone.freedoms - 1, -1, -1):
+    for d in range(bone.dof - 1, -1, -1):
         at = bone.v + d
         axis, drift, pull, rate = work.axes[at], work.drifts[at], work.pulls[at], v[at]
         sx, sy, sz = axis[0] * rate, axis[1] * rate, axis[2] * rate
@@ -296,12 +296,12 @@ def _inward(bone: np.record, i: int, v: np.ndarray, work: Work) -> None:
 
 
 @inlined
-def _outward(bone: np.record, i: int, work: Work, out: np.ndarray) -> None:
+def aba_forward(bone: np.record, i: int, work: Work, out: np.ndarray) -> None:
     """Take a bone's acceleration, in its bias' place, and its joint's from the parent's."""
     rate = work.biases[i]
     for k in range(6):
         rate[k] = work.biases[bone.parent, k]
-    for d in range(bone.freedoms):
+    for d in range(bone.dof):
         at = bone.v + d
         axis, drift, pull = work.axes[at], work.drifts[at], work.pulls[at]
         left = pull[7]
@@ -328,7 +328,7 @@ def rates(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarra
                 q[at], q[at + 1], q[at + 2], q[at + 3], v[rate] / 2, v[rate + 1] / 2,
                 v[rate + 2] / 2, 0.0)
         else:
-            for k in range(bone.freedoms):
+            for k in range(bone.dof):
                 out[at + k] = v[rate + k]
     accelerations(tree, gravity, loads, q, v, work, out[len(q):])
 
@@ -356,7 +356,7 @@ def turn_spins(tree: np.ndarray, q: np.ndarray, v: np.ndarray, inward: bool) -> 
 
 
 @entry(TREE, ANY_ROW, ANY_ROW, TABLE)
-def look(tree: np.ndarray, q: np.ndarray, v: np.ndarray, out: np.ndarray) -> None:
+def forward_kinematics(tree: np.ndarray, q: np.ndarray, v: np.ndarray, out: np.ndarray) -> None:
     """Position, orientation, linear and angular velocity (n, 13) of all bones of the scene; roots'
     angular velocities are along the world's axes, in ``v`` too.
     """
@@ -447,7 +447,7 @@ def step(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray
 
 @entry(TREE, TABLE, REAL, ROW, ROW)
 def within(tree: np.ndarray, way: np.ndarray, share: float, q: np.ndarray, v: np.ndarray) -> None:
-    """Coordinates at a share of the step."""
+    """GeneralizedState at a share of the step."""
     nq, size = len(q), len(q) + len(v)
     y = np.zeros(size)
     for row in range(7, 0, -1):
@@ -518,7 +518,8 @@ def keep_momentum(masses: np.ndarray, doll_of: np.ndarray, gravity: np.ndarray, 
                   given: np.ndarray, spun: bool, touched: np.ndarray, before: np.ndarray,
                   sums: np.ndarray, rows: np.ndarray) -> None:
     """Give each doll that is not ``touched`` the momentum and the way that it must have, as one
-    rigid body; see Guard.momentum_due. Changes its ``sums`` (d, 20) and ``rows`` (n, 13).
+    rigid body; see ConservationProjection.momentum_due. Changes its ``sums`` (d, 20) and ``rows``
+    (n, 13).
 
     ``given`` (d, 6) are impulse and moment of pushes; not ``spun``: the angular momentum stays.
     """
@@ -625,7 +626,7 @@ def limits(places: np.ndarray, bounds: np.ndarray, q: np.ndarray, v: np.ndarray,
 
 
 @entry(ROW, ROW, REAL, REAL, FLAGS)
-def press(past: np.ndarray, speeds: np.ndarray, duration: float, near: float,
+def is_active(past: np.ndarray, speeds: np.ndarray, duration: float, near: float,
           held: np.ndarray) -> bool:
     """Whether a joint presses against its limit; see JointLimits."""
     found = False
@@ -678,7 +679,7 @@ def change(radii: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
 
 
 @entry(TREE, ROW, ROW)
-def move(tree: np.ndarray, q: np.ndarray, way: np.ndarray) -> None:
+def integrate_configuration(tree: np.ndarray, q: np.ndarray, way: np.ndarray) -> None:
     """Move q by a small way in the directions of v; roots turn about the world's axes."""
     for i in range(len(tree)):
         bone = tree[i]
@@ -698,5 +699,5 @@ def move(tree: np.ndarray, q: np.ndarray, way: np.ndarray) -> None:
                 x, y, z, w = times(x, y, z, w, a, b, c, d)
             q[at], q[at + 1], q[at + 2], q[at + 3] = x, y, z, w
         else:
-            for k in range(bone.freedoms):
+            for k in range(bone.dof):
                 q[at + k] += way[rate + k]

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import rotation
-from ...model.coordinates import Coordinates, Layout
+from ...model.coordinates import DofLayout, GeneralizedState
 from ...model.scene import Scene
 from ...model.state import State
 from ..motion import Motion, Shift, cross
 from .mechanics import Mechanics
 
 TOLERANCE = 5e-4
-"""Energy above the account, as a share of the doll's energy, that is left alone: half of the
+"""Energy above the budget, as a share of the doll's energy, that is left alone: half of the
 0.1 % that is promised."""
 
 BURST = 0.02
@@ -31,7 +31,7 @@ LARGEST_TURN = 0.01
 
 
 @dataclass
-class Account:
+class EnergyBudget:
     """What each of d dolls may have."""
 
     energy: np.ndarray
@@ -44,10 +44,10 @@ class Account:
     """Times that a doll was stopped where it stood, as no less would do."""
 
 
-class Guard:
-    """Keeps the account of all dolls of a scene."""
+class ConservationProjection:
+    """Keeps the budget of all dolls of a scene."""
 
-    def __init__(self, scene: Scene, mechanics: Mechanics, layout: Layout) -> None:
+    def __init__(self, scene: Scene, mechanics: Mechanics, layout: DofLayout) -> None:
         self._mechanics = mechanics
         self._layout = layout
         self._gravity = np.array(scene.gravity)
@@ -58,9 +58,9 @@ class Guard:
         self._single = np.array([len(placement.doll.bones) == 1 for placement in scene.dolls])
 
     def open(self, state: State) -> None:
-        """Start the account anew from a state."""
+        """Start the budget anew from a state."""
         energy = self._mechanics.energy(state)
-        self.account = Account(energy, np.zeros_like(energy))
+        self.budget = EnergyBudget(energy, np.zeros_like(energy))
         self.start = energy.copy()
         """(d,) J at the start."""
         self.worked = np.zeros_like(energy)
@@ -68,9 +68,9 @@ class Guard:
 
     def add_work(self, work: np.ndarray) -> None:
         """Enter work (d,) J that pushes did."""
-        self.account.energy += work
+        self.budget.energy += work
         self.worked += work
-        self.account.put_in += np.abs(work)
+        self.budget.put_in += np.abs(work)
 
     def surplus(self, motion: Motion, groups: np.ndarray) -> np.ndarray:
         """Energy (d,) J that each doll must lose; zero or below: none.
@@ -78,21 +78,21 @@ class Guard:
         Dolls of one group (``groups`` (d,): a number for each doll) may touch and so share their
         energy; what is too much is taken from each in proportion to its kinetic energy.
         """
-        account = self.account
-        allowed = account.energy + TOLERANCE * (motion.kinetic + self._fall + account.put_in)
+        budget = self.budget
+        allowed = budget.energy + TOLERANCE * (motion.kinetic + self._fall + budget.put_in)
         if groups is self._own_groups:
             return motion.energy - allowed
         kinetic = np.bincount(groups, motion.kinetic)[groups]
         share = motion.kinetic / np.where(kinetic > 0, kinetic, 1)
         return np.bincount(groups, motion.energy - allowed)[groups] * share
 
-    def settle(self, energy: np.ndarray, groups: np.ndarray) -> None:
+    def close_step(self, energy: np.ndarray, groups: np.ndarray) -> None:
         """Close a step: what a group has lost it has lost for good."""
-        account = self.account
+        budget = self.budget
         if groups is not self._own_groups:
-            excess = np.maximum(0, np.bincount(groups, energy - account.energy))
-            account.energy = energy - (excess / np.maximum(1, np.bincount(groups)))[groups]
-        np.minimum(account.energy, energy, out=account.energy)
+            excess = np.maximum(0, np.bincount(groups, energy - budget.energy))
+            budget.energy = energy - (excess / np.maximum(1, np.bincount(groups)))[groups]
+        np.minimum(budget.energy, energy, out=budget.energy)
 
     def groups(self, pairs: set[tuple[int, int]]) -> np.ndarray:
         """Number (d,) of the group that each doll is in, the dolls of a pair being in one."""
@@ -116,7 +116,7 @@ class Guard:
                       ) -> tuple[State, Motion, np.ndarray | None]:
         """Give state and motion with the momentum that is due, and how roots were turned for it."""
         shift, due = self.momentum_due(before, after, duration, impulse, moment, touched)
-        return self._mechanics.shifted(state, after, shift), due, shift.turn
+        return self._mechanics.shifted(state, after, shift), due, shift.rotation
 
     def momentum_due(self, before: Motion, after: Motion, duration: float,
                      impulse: np.ndarray | float = 0.0,
@@ -139,11 +139,11 @@ class Guard:
             centre = np.where(touched[:, None], after.centre, centre)
         linear = (momentum - after.momentum) / masses
         gained = (momentum + after.momentum) * linear
-        spin, inertia, turn = after.spin, after.inertia, None
+        spin, inertia, turn = after.angular_momentum, after.inertia, None
         if moment is None:
             moment, turned = spin, np.zeros_like(linear)
         else:
-            moment = before.spin + moment
+            moment = before.angular_momentum + moment
             if touched is not None:
                 moment = np.where(touched[:, None], spin, moment)
             turn = self._aligning(spin, moment)
@@ -172,8 +172,9 @@ class Guard:
         small = self._single & ((sines ** 2).sum(axis=1) < LARGEST_TURN ** 2)
         return rotation.from_rotation_vector(np.where(small[:, None], sines, 0.0))
 
-    def without_surplus(self, before: Coordinates, coordinates: Coordinates, motion: Motion,
-                        surplus: np.ndarray, touched: bool) -> Coordinates:
+    def without_surplus(self, before: GeneralizedState, coordinates: GeneralizedState,
+                        motion: Motion,
+                        surplus: np.ndarray, touched: bool) -> GeneralizedState:
         """Take ``surplus`` (d,) J out of the dolls' motion.
 
         Each doll keeps its momentum and angular momentum: of its motion only what it does
@@ -188,36 +189,37 @@ class Guard:
         for doll in np.flatnonzero(surplus > 0):
             centre = motion.centre[doll]
             linear = motion.momentum[doll] / self._mechanics.doll_masses[doll]
-            spin = np.linalg.solve(motion.inertia[doll], motion.spin[doll])
-            rigid = 0.5 * (motion.momentum[doll] @ linear + motion.spin[doll] @ spin)
+            spin = np.linalg.solve(motion.inertia[doll], motion.angular_momentum[doll])
+            rigid = 0.5 * (motion.momentum[doll] @ linear + motion.angular_momentum[doll] @ spin)
             inner = max(0.0, motion.kinetic[doll] - rigid)
             scale = math.sqrt(max(0.0, 1 - surplus[doll] / inner)) if inner > 0 else 0.0
-            rest, turning = surplus[doll] - inner, 0.5 * (motion.spin[doll] @ spin)
+            rest, turning = surplus[doll] - inner, 0.5 * (motion.angular_momentum[doll] @ spin)
             if rest > 0 and not touched and turning > 0:
                 spin = spin * math.sqrt(max(0.0, 1 - rest / turning))
-                self.account.taken += min(rest, turning)
+                self.budget.taken += min(rest, turning)
             self._scale(v, doll, coordinates.q, centre, linear, spin, scale)
-            self.account.taken += min(surplus[doll], inner)
+            self.budget.taken += min(surplus[doll], inner)
             if rest > 0 and touched:
                 v[layout.own_v[doll]] *= math.sqrt(max(0.0, 1 - rest / rigid)) if rigid > 0 else 0
-                self.account.taken += min(rest, rigid)
+                self.budget.taken += min(rest, rigid)
                 if rest > rigid:
                     q[layout.own_q[doll]] = before.q[layout.own_q[doll]]
-        return Coordinates(q, v)
+        return GeneralizedState(q, v)
 
     def burst(self, motion: Motion, groups: np.ndarray) -> np.ndarray:
         """Tell which dolls (d,) have far more than they may even after a correction."""
-        scale = motion.kinetic + self._fall + self.account.put_in
+        scale = motion.kinetic + self._fall + self.budget.put_in
         return self.surplus(motion, groups) > BURST * scale
 
-    def stopped(self, start: Coordinates, end: Coordinates, burst: np.ndarray) -> Coordinates:
+    def stopped(self, start: GeneralizedState, end: GeneralizedState,
+                burst: np.ndarray) -> GeneralizedState:
         """Give ``end`` with the dolls that have ``burst`` (d,) at rest where they were."""
         q, v = end.q.copy(), end.v.copy()
         for doll in np.flatnonzero(burst):
             q[self._layout.own_q[doll]] = start.q[self._layout.own_q[doll]]
             v[self._layout.own_v[doll]] = 0.0
-            self.account.stops += 1
-        return Coordinates(q, v)
+            self.budget.stops += 1
+        return GeneralizedState(q, v)
 
     def _scale(self, v: np.ndarray, doll: int, q: np.ndarray, centre: np.ndarray,
                linear: np.ndarray, spin: np.ndarray, scale: float) -> None:

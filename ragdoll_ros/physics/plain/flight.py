@@ -16,10 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...model.coordinates import Coordinates, Layout
+from ...model.coordinates import DofLayout, GeneralizedState
 from ...model.scene import Scene
 from ...model.state import State
-from ..engine.protocol import Engine, Load
+from ..engine.protocol import AppliedWrench, Engine
 from ..flight import STIFFEST
 from ..motion import damping_rate
 from ..settings import Accuracy
@@ -30,35 +30,38 @@ class EngineDynamics:
 
     keeps_momentum = cheap = False
 
-    def __init__(self, scene: Scene, make_engine: type[Engine], layout: Layout) -> None:
+    def __init__(self, scene: Scene, make_engine: type[Engine], layout: DofLayout) -> None:
         self._engine = make_engine(scene, free=True)
         self._layout = layout
-        self._fading = damping_rate(scene)
+        self._damping_rate = damping_rate(scene)
 
-    def state(self, coordinates: Coordinates) -> State:
+    def state(self, coordinates: GeneralizedState) -> State:
         """Poses and velocities of all bones."""
         self._engine.place(coordinates)
         return self._engine.read()
 
-    def acceleration(self, coordinates: Coordinates, loads: Sequence[Load] = ()) -> np.ndarray:
+    def acceleration(self, coordinates: GeneralizedState,
+                     loads: Sequence[AppliedWrench] = ()) -> np.ndarray:
         """Rates of change of ``coordinates.v``."""
         return self._engine.acceleration(coordinates, loads)
 
-    def moved(self, coordinates: Coordinates, way: np.ndarray) -> Coordinates:
+    def integrate_configuration(self, coordinates: GeneralizedState,
+                                way: np.ndarray) -> GeneralizedState:
         """Give the coordinates after a small way (nv,) m and rad in the directions of v."""
-        return self._layout.moved(coordinates, way)
+        return self._layout.integrate_configuration(coordinates, way)
 
     def longest(self, accuracy: Accuracy, fastest: float) -> float:
         """Longest path, s, that speeds and damping allow."""
-        return min(accuracy.flight_turn / max(fastest, 1e-9), STIFFEST / max(self._fading, 1e-9))
+        return min(accuracy.flight_turn / max(fastest, 1e-9),
+                   STIFFEST / max(self._damping_rate, 1e-9))
 
-    def path(self, start: Coordinates, duration: float, accuracy: Accuracy, fastest: float,
-             loads: Sequence[Load] = (), after: EnginePath | None = None) -> EnginePath:
+    def path(self, start: GeneralizedState, duration: float, accuracy: Accuracy, fastest: float,
+             loads: Sequence[AppliedWrench] = (), after: EnginePath | None = None) -> EnginePath:
         """Fly from ``start`` on for ``duration`` s, in one step."""
         return EnginePath(self._engine, start, duration, accuracy.order, loads, after)
 
-    def fly(self, start: Coordinates, duration: float, steps: int,
-            loads: Sequence[Load] = ()) -> Coordinates:
+    def fly(self, start: GeneralizedState, duration: float, steps: int,
+            loads: Sequence[AppliedWrench] = ()) -> GeneralizedState:
         """Give the coordinates ``duration`` s later, in equal steps of order 4."""
         return fly(self._engine, start, duration, 4, steps, loads)
 
@@ -92,8 +95,8 @@ class EnginePath:
 
     count = 1
 
-    def __init__(self, engine: Engine, start: Coordinates, duration: float, order: int,
-                 loads: Sequence[Load] = (), after: EnginePath | None = None) -> None:
+    def __init__(self, engine: Engine, start: GeneralizedState, duration: float, order: int,
+                 loads: Sequence[AppliedWrench] = (), after: EnginePath | None = None) -> None:
         self._engine, self._loads, self.duration = engine, loads, duration
         layout = engine.layout
         turns = layout.root_turns(start.q).transpose(0, 2, 1)
@@ -103,7 +106,7 @@ class EnginePath:
         self._end = _step(engine, self._start, self._rates, duration, TABLEAUS[order], loads)
         self.end = self._outward(*self._end)
 
-    def at(self, time: float) -> Coordinates:
+    def at(self, time: float) -> GeneralizedState:
         """Give the coordinates ``time`` s after the start."""
         s = time / self.duration
         if s > 1 - 1e-12:
@@ -120,13 +123,13 @@ class EnginePath:
         """Rates of change of q and v at the end."""
         return _rates(self._engine, *self._end, self._loads)
 
-    def _outward(self, q: np.ndarray, v: np.ndarray) -> Coordinates:
+    def _outward(self, q: np.ndarray, v: np.ndarray) -> GeneralizedState:
         layout = self._engine.layout
-        return Coordinates(q, layout.with_spins_turned(v, layout.root_turns(q)))
+        return GeneralizedState(q, layout.with_spins_turned(v, layout.root_turns(q)))
 
 
-def fly(engine: Engine, start: Coordinates, duration: float, order: int, steps: int = 1,
-        loads: Sequence[Load] = ()) -> Coordinates:
+def fly(engine: Engine, start: GeneralizedState, duration: float, order: int, steps: int = 1,
+        loads: Sequence[AppliedWrench] = ()) -> GeneralizedState:
     """Give the coordinates ``duration`` s later, in equal steps of a method of this order.
 
     ``engine`` must hold the scene without contacts and limits; where it ends up is undefined.
@@ -138,7 +141,7 @@ def fly(engine: Engine, start: Coordinates, duration: float, order: int, steps: 
 
 def _step(engine: Engine, start: tuple[np.ndarray, np.ndarray],
           rates: tuple[np.ndarray, np.ndarray], h: float, method: Tableau,
-          loads: Sequence[Load]) -> tuple[np.ndarray, np.ndarray]:
+          loads: Sequence[AppliedWrench]) -> tuple[np.ndarray, np.ndarray]:
     q, v = start
     rate_q, rate_v = rates
     sum_q, sum_v = method.weights[0] * rate_q, method.weights[0] * rate_v
@@ -150,7 +153,7 @@ def _step(engine: Engine, start: tuple[np.ndarray, np.ndarray],
 
 
 def _rates(engine: Engine, q: np.ndarray, v: np.ndarray,
-           loads: Sequence[Load]) -> tuple[np.ndarray, np.ndarray]:
+           loads: Sequence[AppliedWrench]) -> tuple[np.ndarray, np.ndarray]:
     """Rates of change of q and v, roots' spins along their own axes: w' = R^T w'_world.
 
     A stage's quaternions are brought to length one: its rates are those of a turn, not of a turn
@@ -159,5 +162,5 @@ def _rates(engine: Engine, q: np.ndarray, v: np.ndarray,
     layout = engine.layout
     q = layout.normalized(q)
     turns = layout.root_turns(q)
-    rates = engine.acceleration(Coordinates(q, layout.with_spins_turned(v, turns)), loads)
+    rates = engine.acceleration(GeneralizedState(q, layout.with_spins_turned(v, turns)), loads)
     return layout.derivative(q, v), layout.with_spins_turned(rates, turns.transpose(0, 2, 1))

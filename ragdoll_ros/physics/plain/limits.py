@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from ...model.coordinates import Coordinates, Layout
+from ...model.coordinates import DofLayout, GeneralizedState
 
 AT_LIMIT = 1e-3
 """rad: a joint as near as this to its limit, and moving toward it, is at the limit."""
@@ -14,7 +14,7 @@ AT_LIMIT = 1e-3
 class JointLimits:
     """What the limits of all k limited angles have to say."""
 
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, layout: DofLayout) -> None:
         self._layout = layout
         self.forget()
 
@@ -22,17 +22,17 @@ class JointLimits:
         """Begin anew."""
         self._held = np.zeros(len(self._layout.limits[0]), bool)
         """(k,) whether a flight ended at this limit and the joint has leaned on it since."""
-        self._known: Coordinates | None = None
+        self._known: GeneralizedState | None = None
         """What was looked at last, with what was seen."""
         self._past = self._speeds = np.zeros(0)
         self._most = -math.inf
 
-    def same(self, old: Coordinates, new: Coordinates) -> None:
+    def same(self, old: GeneralizedState, new: GeneralizedState) -> None:
         """Take note that the joints stand and move alike in both."""
         if self._known is old:
             self._known = new
 
-    def furthest(self, coordinates: Coordinates) -> float:
+    def max_violation(self, coordinates: GeneralizedState) -> float:
         """Angle, rad, by which the joint is past its limit that is so most; minus infinity: none.
 
         Negative: so far from it.
@@ -40,12 +40,12 @@ class JointLimits:
         self._look(coordinates)
         return self._most
 
-    def hold(self, coordinates: Coordinates) -> None:
+    def hold(self, coordinates: GeneralizedState) -> None:
         """Remember which joints are past their limits: until they leave, no flight begins."""
         self._look(coordinates)
         self._held |= self._past > 0
 
-    def press(self, coordinates: Coordinates, duration: float) -> bool:
+    def is_active(self, coordinates: GeneralizedState, duration: float) -> bool:
         """Tell whether a joint presses against its limit, or will within ``duration`` s."""
         self._look(coordinates)
         past, ahead = self._past, self._past + self._speeds * duration
@@ -53,17 +53,17 @@ class JointLimits:
         pressing = (past >= -AT_LIMIT) & (self._speeds > 0)
         return bool((self._held | pressing | (past > AT_LIMIT) | (ahead > AT_LIMIT)).any())
 
-    def approach(self, coordinates: Coordinates, soon: float) -> float:
+    def approach(self, coordinates: GeneralizedState, soon: float) -> float:
         """Fastest speed, rad/s, at which a joint moves that reaches its limit within ``soon`` s."""
         self._look(coordinates)
         near = self._speeds[self._past + soon * self._speeds > 0]
         return float(near.max(initial=0.0))
 
-    def fastest(self, coordinates: Coordinates) -> float:
+    def fastest(self, coordinates: GeneralizedState) -> float:
         """Fastest speed, rad/s, of a limited joint."""
         return float(np.abs(coordinates.v[self._layout.limited[1]]).max(initial=0.0))
 
-    def _look(self, coordinates: Coordinates) -> None:
+    def _look(self, coordinates: GeneralizedState) -> None:
         if self._known is not coordinates:
             self._past = self._layout.past_limits(coordinates.q)
             self._speeds = self._layout.limit_speeds(coordinates)

@@ -34,33 +34,35 @@ class Mechanics:
 
     def motion(self, state: State) -> Motion:
         """All sums at once: of each bone as a point at its centre of mass, plus its own turning."""
-        count, turns = len(self.masses), state.turns
+        count, turns = len(self.masses), state.rotation_matrices
         inertias = np.matmul(turns * self.inertias[:, None, :], turns.transpose(0, 2, 1))
-        spins = np.matmul(inertias, state.angular[:, :, None])[:, :, 0]
-        energies = (spins * state.angular).sum(axis=1, keepdims=True) / 2
+        spins = np.matmul(inertias, state.angular_velocities[:, :, None])[:, :, 0]
+        energies = (spins * state.angular_velocities).sum(axis=1, keepdims=True) / 2
         own = np.concatenate([energies, spins, inertias.reshape(count, 9)], axis=1)
         centre = self._weights @ state.positions / self.doll_masses[:, None]
-        point = np.concatenate([state.positions - centre[self.doll_of], state.linear], axis=1)
+        point = np.concatenate([state.positions - centre[self.doll_of], state.linear_velocities],
+                               axis=1)
         squares = (point[:, :, None] * point[:, None, :]).reshape(count, 36)
         sums = self._members @ own + self._weights @ squares @ self._of_points
         kinetic = sums[:, 0]
         return Motion(kinetic - self.doll_masses * (centre @ self.gravity), kinetic, centre,
-                      self._weights @ state.linear, sums[:, 1:4], sums[:, 4:].reshape(-1, 3, 3))
+                      self._weights @ state.linear_velocities, sums[:, 1:4],
+                      sums[:, 4:].reshape(-1, 3, 3))
 
     def shifted(self, state: State, motion: Motion, shift: Shift) -> State:
         """Give the state after each doll is moved on and set in motion as one rigid body."""
-        orientations, angular = state.orientations, state.angular
-        if shift.turn is not None:
-            turns = shift.turn[self.doll_of]
+        orientations, angular = state.orientations, state.angular_velocities
+        if shift.rotation is not None:
+            turns = shift.rotation[self.doll_of]
             orientations = rotation.multiply(turns, orientations)
             angular = rotation.rotate(turns, angular)
-        rows = (shift.way, shift.linear, shift.spin, motion.centre,
-                (shift.spin @ _CROSS).reshape(-1, 3, 3))
-        if len(shift.way) > 1:
+        rows = (shift.displacement, shift.velocity, shift.angular_velocity, motion.centre,
+                (shift.angular_velocity @ _CROSS).reshape(-1, 3, 3))
+        if len(shift.displacement) > 1:
             rows = tuple(row[self.doll_of] for row in rows)
         way, linear, spin, centre, turning = rows
         turned = np.matmul((state.positions - centre)[:, None, :], turning)[:, 0]
-        return State(state.positions + way, orientations, state.linear + linear + turned,
+        return State(state.positions + way, orientations, state.linear_velocities + linear + turned,
                      angular + spin)
 
 

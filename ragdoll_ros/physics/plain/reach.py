@@ -34,7 +34,7 @@ class Reach:
         if self._ground is None:
             return np.full(len(self._radii), math.inf)
         if self._last[0] is not state:
-            reach = support_distance(self._sizes, self._normal @ state.turns)
+            reach = support_distance(self._sizes, self._normal @ state.rotation_matrices)
             self._last = (state, state.positions @ self._normal - self._ground.offset - reach)
         return self._last[1]
 
@@ -49,14 +49,14 @@ class Reach:
         """Largest speed, m/s, at which any point of a bone that can reach the ground sinks."""
         if self._ground is None:
             return 0.0
-        spins = np.sqrt(np.einsum('ij,ij->i', state.angular, state.angular))
-        speeds = self._radii * spins - state.linear @ self._normal
+        spins = np.sqrt(np.einsum('ij,ij->i', state.angular_velocities, state.angular_velocities))
+        speeds = self._radii * spins - state.linear_velocities @ self._normal
         lowest = state.positions @ self._normal - self._ground.offset - self._radii
         if (lowest > speeds * soon + MARGIN).all():
             return 0.0
         return float(speeds[self.heights(state) < speeds * soon + MARGIN].max(initial=0.0))
 
-    def near(self, state: State, duration: float, acceleration: float,
+    def broadphase_pairs(self, state: State, duration: float, acceleration: float,
              touching: set[tuple[int, int]]) -> set[tuple[int, int]]:
         """Pairs of dolls that may touch within ``duration`` s; GROUND stands for the ground.
 
@@ -80,34 +80,35 @@ class Reach:
 
     def closing(self, state: State) -> float:
         """Largest difference, m/s, of two bones' speeds along one of the axes."""
-        low, high = state.linear.min(axis=0), state.linear.max(axis=0)
+        low, high = state.linear_velocities.min(axis=0), state.linear_velocities.max(axis=0)
         return float((high - low).max())
 
     def change(self, before: State, after: State) -> float:
         """Largest change, m/s, of a velocity at a bone's centre or, by turning, at its surface."""
-        turned = np.abs(after.angular - before.angular).max(axis=1)
-        return float(max(np.abs(after.linear - before.linear).max(),
+        turned = np.abs(after.angular_velocities - before.angular_velocities).max(axis=1)
+        return float(max(np.abs(after.linear_velocities - before.linear_velocities).max(),
                          (turned * self._radii).max()))
 
-    def spin(self, state: State) -> float:
+    def max_angular_speed(self, state: State) -> float:
         """Fastest spin of a bone, rad/s."""
-        return math.sqrt(np.einsum('ij,ij->i', state.angular, state.angular).max())
+        return math.sqrt(np.einsum('ij,ij->i', state.angular_velocities,
+                                   state.angular_velocities).max())
 
-    def rim(self, state: State) -> float:
+    def max_tip_speed(self, state: State) -> float:
         """Fastest speed, m/s, of a bone's end about its centre."""
-        spins = np.sqrt(np.einsum('ij,ij->i', state.angular, state.angular))
+        spins = np.sqrt(np.einsum('ij,ij->i', state.angular_velocities, state.angular_velocities))
         return float((self._radii * spins).max())
 
-    def strides(self, state: State, duration: float) -> int:
+    def ccd_steps(self, state: State, duration: float) -> int:
         """Parts of ``duration`` s in each of which no bone, nor its end that turns, passes through
         the thinnest.
         """
-        speed = self.closing(state) + 2 * self.rim(state)
+        speed = self.closing(state) + 2 * self.max_tip_speed(state)
         return max(1, math.ceil(speed * duration / (4 * self._thinnest)))
 
     def _far(self, state: State, duration: float, acceleration: float) -> np.ndarray:
         """Radii (n,) m of the spheres that hold what the bones may come to."""
-        speeds = np.sqrt(np.einsum('ij,ij->i', state.linear, state.linear))
+        speeds = np.sqrt(np.einsum('ij,ij->i', state.linear_velocities, state.linear_velocities))
         return 2 * duration * (speeds + acceleration * duration) + self._radii + MARGIN
 
     def _close(self, positions: np.ndarray, far: np.ndarray) -> set[tuple[int, int]]:

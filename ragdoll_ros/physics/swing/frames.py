@@ -20,9 +20,9 @@ class Frames:
     """(n, 3) m."""
     orientations: np.ndarray
     """(n, 4) unit quaternions x, y, z, w."""
-    linear: np.ndarray
+    linear_velocities: np.ndarray
     """(n, 3) m/s."""
-    angular: np.ndarray
+    angular_velocities: np.ndarray
     """(n, 3) rad/s, world axes."""
     scales: np.ndarray
     """(n, 3) factors along the bone's own axes."""
@@ -32,7 +32,8 @@ class Frames:
         """Give the frames of a State (or of anything with its fields)."""
         if scales is None:
             scales = np.ones_like(state.positions)
-        return cls(state.positions, state.orientations, state.linear, state.angular, scales)
+        return cls(state.positions, state.orientations, state.linear_velocities,
+                   state.angular_velocities, scales)
 
     @classmethod
     def still(cls, count: int = 1) -> Frames:
@@ -81,12 +82,13 @@ class Track:
 
 def between(first: Frames, last: Frames, span: float, part: float) -> Frames:
     """Frames at ``part`` (0 to 1) of a path of ``span`` s from the one to the other."""
-    positions, linear = _hermite(first.positions, last.positions, first.linear, last.linear,
+    positions, linear = _hermite(first.positions, last.positions, first.linear_velocities,
+                                 last.linear_velocities,
                                  span, part)
     turn = _turn(first, last, span)
     zero = np.zeros_like(turn)
-    ending = _rate_of_vector(turn, last.angular)
-    vector, rate = _hermite(zero, turn, first.angular, ending, span, part)
+    ending = _rate_of_vector(turn, last.angular_velocities)
+    vector, rate = _hermite(zero, turn, first.angular_velocities, ending, span, part)
     return Frames(positions, rotation.multiply(rotation.from_rotation_vector(vector),
                                                first.orientations),
                   linear, _rate_of_turn(vector, rate),
@@ -108,7 +110,7 @@ def _turn(first: Frames, last: Frames, span: float) -> np.ndarray:
     turn = rotation.multiply(last.orientations, rotation.inverse(first.orientations))
     vector = rotation.rotation_vector(turn)
     angle = np.linalg.norm(vector, axis=1, keepdims=True)
-    mean = (first.angular + last.angular) * (span / 2)
+    mean = (first.angular_velocities + last.angular_velocities) * (span / 2)
     if not np.any(np.einsum('ij,ij->i', mean, mean) > 1):
         return vector
     speed = np.linalg.norm(mean, axis=1, keepdims=True)

@@ -71,7 +71,8 @@ class Roots:
     def seat(self, frames: Frames) -> Seat:
         """Give what the roots do while the bones are at these frames."""
         axes = rotation.matrix(frames.orientations).transpose(2, 1, 0).reshape(9, -1)
-        rows = np.concatenate([axes, frames.positions.T, frames.linear.T, frames.angular.T,
+        rows = np.concatenate([axes, frames.positions.T, frames.linear_velocities.T,
+                               frames.angular_velocities.T,
                                frames.scales.T]).take(self.bone, axis=1)
         axes, spin = rows[:9].reshape(3, 3, -1), rows[15:18]
         arm = np.einsum('jin,jn->in', axes, self.place * rows[18:])

@@ -13,7 +13,7 @@ from .pose import SwingState
 from .swings import Swings
 
 
-class Riding:
+class SwingSimulation:
     """Follows the states of a scene, tick by tick, with all its swings."""
 
     def __init__(self, scene: Scene) -> None:
@@ -43,11 +43,12 @@ class Riding:
     def _tell(self, time: int, state: State) -> None:
         bones = self._bones
         self._track.tell(time / SECOND, Frames(
-            state.positions[bones], state.orientations[bones], state.linear[bones],
-            state.angular[bones], np.ones((len(bones), 3))))
+            state.positions[bones], state.orientations[bones], state.linear_velocities[bones],
+            state.angular_velocities[bones], np.ones((len(bones), 3))))
 
 
-def riding(scene: Scene) -> Riding | None:
+def swing_simulation(scene: Scene) -> SwingSimulation | None:
     """Give what lets a scene's swings follow, or None for a scene without any."""
-    return Riding(scene) if any(placement.doll.swings for placement in scene.dolls) else None
+    return SwingSimulation(scene) if any(placement.doll.swings
+                                         for placement in scene.dolls) else None
 

@@ -49,8 +49,8 @@ class Limits:
                 parents.append(first + doll.bones.index(parent))
                 anchors.append(rotation.rotate(back, np.subtract(joint.anchor, parent.position)))
                 axes.append(turned)
-                numbers.append([angle + k if k < joint.freedoms else -1 for k in range(DEPTH)])
-                angle += joint.freedoms
+                numbers.append([angle + k if k < joint.dof else -1 for k in range(DEPTH)])
+                angle += joint.dof
             first += len(doll.bones)
         self._parents, self._anchors = np.array(parents, int), np.array(anchors)
         self._axes, self._numbers = np.array(axes), np.array(numbers, int)

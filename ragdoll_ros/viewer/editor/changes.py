@@ -1,6 +1,6 @@
-"""Changes of one bone or of its joint: each takes a scene and gives another, or a Fault.
+"""Changes of one bone or of its joint: each takes a scene and gives another, or a ModelError.
 
-Bones go by their names in the scene (``Scene.bone_names``). A fault's path begins with that name:
+Bones go by their names in the scene (``Scene.bone_names``). An error's path begins with that name:
 ``left shin.mass``, ``left shin.joint.limits_deg[0]``. What the dataclasses check is checked here
 by making them.
 
@@ -82,11 +82,11 @@ def set_limits(scene: Scene, name: str,
     limits = tuple(pair and tuple(math.radians(angle) for angle in pair) for pair in limits_deg)
     try:
         return change_joint(scene, name, limits=limits)
-    except errors.Fault as fault:
-        path = fault.path.replace('limits', 'limits_deg', 1)
+    except errors.ModelError as error:
+        path = error.path.replace('limits', 'limits_deg', 1)
         index = next((k for k in range(len(limits_deg)) if path.endswith(f'[{k}]')), None)
         value = tuple(limits_deg) if index is None else limits_deg[index]
-        raise type(fault)(path, value, fault.expected) from None
+        raise type(error)(path, value, error.expected) from None
 
 
 def set_pose(scene: Scene, name: str, position: Sequence[float] | None = None,
@@ -235,5 +235,5 @@ def _faults_at(place: str) -> Iterator[None]:
     """Tell of what is wrong inside where in the scene it is."""
     try:
         yield
-    except errors.Fault as fault:
-        raise fault.at(place) from None
+    except errors.ModelError as error:
+        raise error.at(place) from None

@@ -236,9 +236,9 @@ class Editor:
             self.panel.tell(())
             try:
                 yield
-            except errors.Faults as error:
-                self.panel.tell(error.faults)
-            except errors.Fault as error:
+            except errors.ModelErrors as error:
+                self.panel.tell(error.errors)
+            except errors.ModelError as error:
                 self.panel.tell([error])
             except errors.RagdollError as error:
                 self.panel.say(str(error))

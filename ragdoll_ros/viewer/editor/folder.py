@@ -1,6 +1,6 @@
 """Where the page's files live: scenes are saved into one folder, and nothing leaves or leads out.
 
-Whoever reaches the page may send anything: all is refused with a Fault or Faults in words.
+Whoever reaches the page may send anything: what cannot be is refused with a ModelError in words.
 """
 from __future__ import annotations
 
@@ -71,12 +71,12 @@ class Folder:
             data = yaml_text.parse(content)
             self._check_dolls(data)
             self._check_models(data)
-        except errors.Fault as fault:
-            raise errors.Faults(name, [fault]) from None
+        except errors.ModelError as error:
+            raise errors.ModelErrors(name, [error]) from None
         try:
             return scene_from(data, self.path / name)
-        except errors.Faults as error:
-            raise errors.Faults(name, error.faults) from None
+        except errors.ModelErrors as error:
+            raise errors.ModelErrors(name, error.errors) from None
 
     def fit(self, name: str, content: bytes, progress: Progress) -> Scene:
         """Make a doll of a character that was sent, as ragdoll_fit does; the character stays here.
@@ -93,10 +93,10 @@ class Folder:
                 path = Path(inbox, name)
                 path.write_bytes(content)
                 doll = _fitted(path, progress)
-        except errors.Fault as fault:
-            raise errors.Faults(name, [fault]) from None
-        except errors.Faults as error:
-            raise errors.Faults(name, [_alone(fault) for fault in error.faults]) from None
+        except errors.ModelError as error:
+            raise errors.ModelErrors(name, [error]) from None
+        except errors.ModelErrors as error:
+            raise errors.ModelErrors(name, [_alone(error) for error in error.errors]) from None
         if suffix != '.urdf':
             progress(0.9, 'keeping the character')
             doll = dataclasses.replace(doll, model=str(self._keep(name, content)))
@@ -109,7 +109,7 @@ class Folder:
                 continue
             try:
                 found = self.find(source).name
-            except errors.Fault:
+            except errors.ModelError:
                 found = ''
             if found not in (source, f'{source}.yaml'):
                 raise errors.Unreadable(place, source,
@@ -177,9 +177,9 @@ def _fitted(path: Path, progress: Progress) -> Ragdoll:
     return fit_character(character).doll
 
 
-def _alone(fault: errors.Fault) -> errors.Fault:
+def _alone(error: errors.ModelError) -> errors.ModelError:
     """Say of a file that points to others that it has to come alone."""
-    if fault.path.endswith('.uri') and not str(fault.value).startswith('data:'):
-        return type(fault)(fault.path, fault.value,
+    if error.path.endswith('.uri') and not str(error.value).startswith('data:'):
+        return type(error)(error.path, error.value,
                            'all in one file: export it as .glb, or with its buffers embedded')
-    return fault
+    return error

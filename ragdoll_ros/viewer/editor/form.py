@@ -73,9 +73,9 @@ class Form:
         """Give what stands in the fields that are shown."""
         return {key: widget.value for key, widget in self._widgets.items() if widget.visible}
 
-    def tell(self, found: Iterable[errors.Fault]) -> None:
-        """Write each fault under the field that its path names; take the others away."""
-        said = {fault.path: text_of(fault) for fault in found}
+    def tell(self, found: Iterable[errors.ModelError]) -> None:
+        """Write each error under the field that its path names; take the others away."""
+        said = {error.path: text_of(error) for error in found}
         for key, error in self._errors.items():
             error.content = colored(said.get(key, ''), RED)
             error.visible = key in said
@@ -89,9 +89,9 @@ class Form:
             self._on_kind(key, self._widgets[key].value)
 
 
-def text_of(fault: errors.Fault) -> str:
+def text_of(error: errors.ModelError) -> str:
     """Say what is wrong with a field: the value, and what would be right."""
-    return str(type(fault)('', fault.value, fault.expected)).removeprefix('file: ')
+    return str(type(error)('', error.value, error.expected)).removeprefix('file: ')
 
 
 def colored(text: str, color: str) -> str:

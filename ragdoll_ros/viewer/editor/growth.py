@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from ...model import errors, rotation
-from ...model.ragdoll import Bone, Joint, Ragdoll, Rider
+from ...model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame
 from ...model.scene import Scene
 from .changes import USUAL, USUAL_TWIST, find, limb, replace_doll
 
@@ -16,7 +16,7 @@ NAME = re.compile(r'[^\s/][^/\x00-\x1f]{0,99}')
 
 
 def add_bone(scene: Scene, parent: str, name: str) -> Scene:
-    """Add a bone like ``parent`` where that one ends, on a ball joint; names its fault ``name``."""
+    """Add a bone like ``parent`` where that one ends, on a ball joint; names its error ``name``."""
     placement, above = find(scene, parent)
     if not NAME.fullmatch(name):
         raise errors.WrongForm('name', name, 'text without / and control characters')
@@ -48,7 +48,7 @@ def remove_limb(scene: Scene, name: str) -> Scene:
                      if rider.bone in gone else rider for rider in doll.riders))
 
 
-def _carried(rider: Rider, old: Bone, new: Bone) -> Rider:
+def _carried(rider: SkeletonFrame, old: Bone, new: Bone) -> SkeletonFrame:
     """Give a rider to another bone: where it is in the bind pose, it stays."""
     back = rotation.inverse(new.orientation)
     place = old.position + rotation.rotate(old.orientation, rider.position)

@@ -98,13 +98,13 @@ class Panel:
         """Give what stands in the fields."""
         return {**self.body.values(), **self.joint.values()}
 
-    def tell(self, found: Iterable[errors.Fault]) -> None:
-        """Write each fault under its field; what belongs to none, under the Update button."""
+    def tell(self, found: Iterable[errors.ModelError]) -> None:
+        """Write each error under its field; what belongs to none, under the Update button."""
         found = list(found)
         self.body.tell(found)
         self.joint.tell(found)
         keys = {field.key for field in (*BODY, *JOINT)}
-        self.say('\n'.join(str(fault) for fault in found if fault.path not in keys))
+        self.say('\n'.join(str(error) for error in found if error.path not in keys))
 
     def say(self, text: str) -> None:
         """Write under the Update button why something was refused; nothing: take that away."""

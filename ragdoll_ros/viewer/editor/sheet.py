@@ -1,4 +1,4 @@
-"""A bone and its joint as the fields of a form, and back: with units, texts and all faults.
+"""A bone and its joint as the fields of a form, and back: with units, texts and all errors.
 
 Lengths in m, masses in kg, angles in degrees. A field that still holds what ``read`` gave leaves
 the scene as it is, to the bit: what a form shows is rounded.
@@ -81,7 +81,7 @@ def read(scene: Scene, name: str) -> Sheet:
 def apply(scene: Scene, name: str, sheet: Mapping[str, Value], limb: bool = False) -> Scene:
     """Give the scene with a bone and its joint as the sheet has them.
 
-    Raises Faults with all that is wrong, the path of each the key of its field. ``limb``: see
+    Raises ModelErrors with all that is wrong, the path of each the key of its field. ``limb``: see
     changes.py; the joint's own fields are set after the move.
     """
     shown, found = read(scene, name), []
@@ -91,10 +91,10 @@ def apply(scene: Scene, name: str, sheet: Mapping[str, Value], limb: bool = Fals
         if any(not _same(key, new.get(key), shown.get(key)) for key in keys):
             try:
                 scene = step(scene, new)
-            except errors.Fault as fault:
-                found.append(_at_field(fault, keys))
+            except errors.ModelError as error:
+                found.append(_at_field(error, keys))
     if found:
-        raise errors.Faults(name, found)
+        raise errors.ModelErrors(name, found)
     return scene
 
 
@@ -169,10 +169,10 @@ def _set_axes_and_limits(scene: Scene, name: str, new: Sheet, shown: Sheet) -> S
     limits = tuple(pair and tuple(map(math.radians, pair)) for pair in pairs)
     try:
         return changes.change_joint(scene, name, kind=kind.name, axes=tuple(axes), limits=limits)
-    except errors.Fault as fault:
+    except errors.ModelError as error:
         for number, pair in enumerate(pairs, 1):
-            if fault.path.endswith(f'limits[{number - 1}]'):
-                raise type(fault)(f'limits_{number}', pair, fault.expected) from None
+            if error.path.endswith(f'limits[{number - 1}]'):
+                raise type(error)(f'limits_{number}', pair, error.expected) from None
         raise
 
 
@@ -238,10 +238,10 @@ def _same(key: str, new: Value | None, shown: Value | None) -> bool:
     return abs(new - shown) <= tolerance
 
 
-def _at_field(fault: errors.Fault, keys: tuple[str, ...]) -> errors.Fault:
-    """Give the fault the key of the field that it belongs to."""
-    said = fault.path.rsplit('.', 1)[-1].split('[')[0]
+def _at_field(error: errors.ModelError, keys: tuple[str, ...]) -> errors.ModelError:
+    """Give the error the key of the field that it belongs to."""
+    said = error.path.rsplit('.', 1)[-1].split('[')[0]
     # Of its axes only that they are not perpendicular is left to the joint to find.
     said = 'axis_2' if said == 'axes' else said
     key = said if said in keys else keys[0]
-    return type(fault)(key, fault.value, fault.expected)
+    return type(error)(key, error.value, error.expected)

@@ -23,7 +23,7 @@ class Pose:
 
 @dataclass(frozen=True)
 class Recording:
-    """Poses of a scene's n bones at k >= 1 instants; raises a Fault for arrays that do not fit."""
+    """Poses of a scene's n bones at k >= 1 instants; a ModelError for arrays that do not fit."""
 
     scene: Scene
     times: np.ndarray
@@ -125,7 +125,7 @@ class Recorder:
 
 
 def _check(key: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
-    """Raise a Fault unless an array has this shape and finite numbers alone."""
+    """Raise a ModelError unless an array has this shape and finite numbers alone."""
     if array.shape != shape:
         raise errors.WrongForm(key, array.shape, f'the shape {shape}')
     if not np.isfinite(array).all():

@@ -25,7 +25,7 @@ import numpy as np
 
 from ...files.scene import build_scene, scene_data
 from ...model import errors
-from ...model.errors import Fault, Faults
+from ...model.errors import ModelError, ModelErrors
 from .recording import Recording
 
 FORMAT = 'ragdoll_ros recording'
@@ -55,12 +55,12 @@ def save_recording(recording: Recording, path: str | Path) -> None:
 
 
 def load_recording(path: str | Path) -> Recording:
-    """Read a recording; Faults with the file's name and what is wrong in it."""
+    """Read a recording; ModelErrors with the file's name and what is wrong in it."""
     path = Path(path)
     try:
         return _recording(_read(path), path)
-    except Fault as fault:
-        raise Faults(str(path), [fault]) from None
+    except ModelError as error:
+        raise ModelErrors(str(path), [error]) from None
 
 
 def _read(path: Path) -> dict:
@@ -92,7 +92,7 @@ def _recording(data: dict, path: Path) -> Recording:
         raise errors.WrongForm('', odd, 'the keys ' + ', '.join(KEYS))
     scene, found = build_scene(_with_infinity(data['scene']), path)
     if found:
-        raise Faults(str(path), [fault.at('scene') for fault in found])
+        raise ModelErrors(str(path), [error.at('scene') for error in found])
     if data['names'] != list(scene.bone_names):
         raise errors.UnknownBone('names', data['names'],
                                  "the scene's bones, " + ', '.join(scene.bone_names))
