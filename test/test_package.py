@@ -28,7 +28,7 @@ ROSDEP_KEYS = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml', 'scipy': 'pytho
                'jsonschema': 'python3-jsonschema', 'matplotlib': 'python3-matplotlib',
                'mpl_toolkits': 'python3-matplotlib', 'pybullet': 'python3-pybullet-pip'}
 NO_ROSDEP_KEY = {'imageio', 'mujoco', 'numba', 'pygltflib', 'viser'}
-"""Needed by extras only, or with a key that may lead nowhere; the README says how to get them."""
+"""Needed by extras only, or with a key that may lead nowhere; docs/ says how to get them."""
 
 COUNT_POSES = """
 import rclpy
@@ -142,21 +142,21 @@ def test_manifest_names_what_the_package_imports():
     assert {ROSDEP_KEYS.get(module, module) for module in used} <= declared
 
 
-def test_readme_says_how_to_get_what_rosdep_does_not_know():
+def test_docs_say_how_to_get_what_rosdep_does_not_know():
     """By an extra for an environment of one's own; and for ROS's Python, which Ubuntu guards.
 
     PEP 668: pip refuses to touch that one without a word of consent.
     """
-    readme = (ROOT / 'README.md').read_text()
-    named = {extra for text in re.findall(r"pip install '\.\[(.*?)\]'", readme)
+    pages = '\n'.join(path.read_text() for path in (ROOT / 'README.md', *ROOT.glob('docs/*.md')))
+    named = {extra for text in re.findall(r"pip install '\.\[(.*?)\]'", pages)
              for extra in text.split(',')}
     extras = dict(re.findall(r"'(\w+)': \[(.*?)\]", SETUP, re.S))
     got = {module for extra in named for module in re.findall(r"'(\w[\w-]*)", extras[extra])}
     assert got >= NO_ROSDEP_KEY
-    workspace = readme.split('## With ROS 2 Jazzy\n')[1].split('\n## ')[0]
+    guide = (ROOT / 'docs/ros.md').read_text()
     command = 'PIP_BREAK_SYSTEM_PACKAGES=1 pip install viser'
-    assert command in workspace and command in NO_VISER
-    assert 'PIP_BREAK_SYSTEM_PACKAGES=1 pip install numba' in workspace
+    assert command in guide and command in NO_VISER
+    assert 'PIP_BREAK_SYSTEM_PACKAGES=1 pip install numba' in guide
 
 
 @pytest.mark.skipif(shutil.which('make') is None, reason='no make')

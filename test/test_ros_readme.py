@@ -1,19 +1,21 @@
-"""README.md says what is: its messages can be sent, its tables are complete, its scene loads."""
+"""README.md and docs/ say what the node is: messages can be sent, tables are complete."""
 import importlib
 import re
 from pathlib import Path
 
 import pytest
 import yaml
-
-from ragdoll_ros.files.config import find
-from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.ros.parameters import BONE_NAMES, SPECS
+from diagnostic_msgs.msg import DiagnosticArray
 
 ROOT = Path(__file__).resolve().parent.parent
-README = (ROOT / 'README.md').read_text()
-SENT = re.findall(r"ros2 (?:topic pub --once|service call) (\S+) (\w+)/(msg|srv)/(\w+)"
-                  r"(?: *\\?\n? *'(.*)')?", README)
+PAGES = [(ROOT / 'README.md').read_text(), *(path.read_text() for path in ROOT.glob('docs/*.md'))]
+TEXT = re.sub(r' *\\\n *', ' ', '\n'.join(PAGES))
+REFERENCE = (ROOT / 'docs/reference.md').read_text()
+SENT = sorted(set(re.findall(r'^ros2 (?:topic pub --once|service call) (\S+) (\w+)/(msg|srv)/(\w+)'
+                             r"(?: '(.*)')?$", TEXT, re.M)))
+
+ROS_OWN = re.compile('use_sim_time$|start_type_description_service$|qos_overrides')
+"""Parameters that rclpy declares for every node."""
 
 
 def topics_and_services(node):
@@ -22,6 +24,16 @@ def topics_and_services(node):
     return [*node.get_publisher_names_and_types_by_node(name, namespace),
             *node.get_subscriber_names_and_types_by_node(name, namespace),
             *node.get_service_names_and_types_by_node(name, namespace)]
+
+
+def directions(node):
+    """Give (name, direction, type) of all that a node offers."""
+    name, namespace = node.get_name(), node.get_namespace()
+    ways = {'out': node.get_publisher_names_and_types_by_node,
+            'in': node.get_subscriber_names_and_types_by_node,
+            'service': node.get_service_names_and_types_by_node}
+    return {(topic, way, re.sub('/(msg|srv)/', '/', kind)) for way, ask in ways.items()
+            for topic, kinds in ask(name, namespace) for kind in kinds}
 
 
 def fill(message, values):
@@ -33,14 +45,21 @@ def fill(message, values):
 
 
 def table(title):
-    """First two cells of each row of the table below a title."""
-    section = README.split(f'## {title}\n')[1].split('\n## ')[0]
-    return re.findall(r'^\| (`.*?) \| (.*?) \|', section, re.M)
+    """Cells of each row of the table below a title of docs/reference.md."""
+    section = REFERENCE.split(f'## {title}\n')[1].split('\n## ')[0]
+    return [[cell.strip() for cell in line.strip('|').split(' | ')]
+            for line in re.findall(r'^\| `.*\|$', section, re.M)]
 
 
-def test_readme_has_seven_lines_to_copy():
-    """Else the next test may have nothing to look at."""
-    assert len(SENT) == README.count('ros2 topic pub') + README.count('ros2 service call') == 7
+def parameters(node):
+    return {name: parameter.value for name, parameter in node.get_parameters_by_prefix('').items()
+            if not ROS_OWN.match(name)}
+
+
+def test_every_line_to_copy_is_looked_at():
+    """Else the next test may pass one over."""
+    count = len(set(re.findall('^ros2 (?:topic pub|service call) .*$', TEXT, re.M)))
+    assert len(SENT) == count > 0
 
 
 @pytest.mark.parametrize(('target', 'package', 'kind', 'name', 'text'), SENT)
@@ -50,36 +69,53 @@ def test_line_to_copy_is_a_message_the_node_takes(make_node, target, package, ki
     assert (target, [f'{package}/{kind}/{name}']) in topics_and_services(make_node())
 
 
-def test_tables_name_all_that_the_node_has(make_node):
-    told = {'/' + name.replace('~', 'ragdoll').lstrip('/')
-            for cell, _ in table('Topics and services') for name in re.findall('`(.*?)`', cell)}
+def test_table_has_all_topics_and_services_of_the_node(make_node):
+    told = {('/' + name.strip('`').replace('~', 'ragdoll').lstrip('/'), way, kind)
+            for name, way, kind, *_ in table('Topics and services')}
     own = re.compile('/ragdoll/(describe|get|list|set)_|/(rosout|parameter_events)$')
-    offered = {name for name, _ in topics_and_services(make_node(publish_clock=True,
-                                                                     scene='ponytail'))}
-    assert told == {name for name in offered if not own.search(name)}
+    offered = {row for row in directions(make_node(publish_clock=True, scene='ponytail'))
+               if not own.search(row[0])}
+    assert told == offered
 
 
-def test_table_of_parameters_is_complete_with_defaults(make_node):
-    told = {name: default for cell, default in table('Parameters')
-            for name, default in zip(re.findall('`(.*?)`', cell), default.split(', '),
-                                     strict=False)}
-    assert set(told) == {*SPECS, BONE_NAMES}
-    settings = make_node().settings
+def test_table_has_all_parameters_with_their_defaults(make_node):
+    told = {name.strip('`'): default for name, default, *_ in table('Parameters')}
+    declared = parameters(make_node())
+    assert set(told) == set(declared)
     for name, default in told.items():
         if not default.startswith('the '):
-            assert yaml.safe_load(default.strip('`')) == getattr(settings, name), name
+            assert yaml.safe_load(default.strip('`')) == declared[name], name
 
 
-def test_scene_of_the_readme_loads(tmp_path):
-    text = re.search(r'(?:^    .*\n)+', README.split('no\nmore than\n')[1], re.M)[0]
-    (tmp_path / 'mine.yaml').write_text(re.sub('^    ', '', text, flags=re.M))
-    scene = load_scene(str(tmp_path / 'mine.yaml'))
-    assert scene.ground is not None and scene.dolls[0].spin == (0, 2, 0)
+def test_table_has_the_ranges_of_the_parameters(make_node):
+    node = make_node()
+    for name, _, told, *_ in table('Parameters'):
+        for span in node.describe_parameter(name.strip('`')).floating_point_range:
+            lower, upper = map(float, told.split(' to '))
+            assert (span.from_value, span.to_value) == (lower, upper), name
 
 
-def test_scenes_and_files_that_are_named_exist():
-    section = README.split('## Scenes\n')[1]
-    for name in re.findall(r'`(\w+)` \(', section):
-        assert find(name).is_file()
-    for path in re.findall(r'share ragdoll_ros\)/(\S+)', README):
-        assert (ROOT / path).is_file()
+def test_parameters_that_lines_to_copy_set_exist(make_node):
+    named = set(re.findall(r'-p (\w+):=', TEXT))
+    named |= set(re.findall(r'^ros2 param \w+ /ragdoll (\w+)', TEXT, re.M))
+    assert named and named <= set(parameters(make_node()))
+
+
+def test_table_has_all_values_of_the_diagnostics(make_node, peer):
+    node = make_node()
+    got = peer.collect(DiagnosticArray, '/diagnostics')
+    peer.executor_.add_node(node)
+    try:
+        peer.wait(lambda: got)
+    finally:
+        peer.executor_.remove_node(node)
+    status = got[0][1].status[0]
+    told = {key for keys, *_ in table('Diagnostics') for key in re.findall('`(.*?)`', keys)}
+    measures = set(node.simulation.measures())
+    assert status.name in REFERENCE
+    assert told == {pair.key for pair in status.values} - measures
+
+
+def test_files_that_lines_to_copy_name_exist():
+    named = re.findall(r'share ragdoll_ros\)/(\S+)', TEXT)
+    assert named and all((ROOT / path).is_file() for path in named)
