@@ -98,9 +98,9 @@ class Stepper:
         self.reach = backend.reach_of(scene)
         self._layout = self.engine.layout
         self._limits = backend.limits_of(self._layout)
-        counts = np.cumsum([0, *(len(placement.doll.bones) for placement in scene.dolls)])
-        self._roots = np.array([start + placement.doll.bones.index(placement.doll.root)
-                                for start, placement in zip(counts[:-1], scene.dolls, strict=True)])
+        self._roots = np.array([
+            own.start + placement.doll.bones.index(placement.doll.root)
+            for own, placement in zip(scene.bone_slices, scene.dolls, strict=True)])
         self._rigid = len(scene.bones) == len(scene.dolls)
         self._solid = bool(scene.ground or scene.self_collision or len(scene.dolls) > 1)
         """Whether anything can touch at all."""

@@ -83,20 +83,176 @@ class _Doll:
     """Place of each joint in ``joints`` by the name of its angle."""
 
 
+class _World:
+    """The scene in a client of PyBullet: ground and dolls, as they stand and move at the start."""
+
+    def __init__(self, scene: Scene, free: bool, client: int) -> None:
+        self.scene, self._free, self._client = scene, free, client
+        self.unit = _unit_of_mass(scene)
+        """kg that the engine takes for one."""
+        pybullet.setPhysicsEngineParameter(
+            numSolverIterations=SOLVER_ITERATIONS, contactBreakingThreshold=BREAKING_DISTANCE,
+            deterministicOverlappingPairs=1, enableFileCaching=0, useSplitImpulse=0, contactSlop=0,
+            physicsClientId=client)
+        pybullet.setGravity(*scene.gravity, physicsClientId=client)
+        self.ground = self._add_ground()
+        self.dolls = [self._add_doll(placement) for placement in scene.dolls]
+        self.layout = self._lay_out()
+        self._check_sizes()
+
+    def set_in_motion(self) -> None:
+        """Give each doll its velocity at the start, as one rigid body about its centre of mass."""
+        for doll, placement in zip(self.dolls, self.scene.dolls, strict=True):
+            self._set_in_motion(doll.body, placement)
+
+    def _add_ground(self) -> int | None:
+        if self.scene.ground is None or self._free:
+            return None
+        ground = self.scene.ground
+        if _slab_is_better(self.scene):
+            shape = pybullet.createCollisionShape(
+                pybullet.GEOM_BOX, halfExtents=SLAB, physicsClientId=self._client)
+            turn = rotation.shortest_arc(np.array([0.0, 0.0, 1.0]), np.array(ground.normal))
+            depth = SLAB[2]
+        else:
+            shape = pybullet.createCollisionShape(
+                pybullet.GEOM_PLANE, planeNormal=ground.normal, physicsClientId=self._client)
+            turn, depth = rotation.IDENTITY, 0.0
+        place = [n * (ground.offset - depth) for n in ground.normal]
+        body = pybullet.createMultiBody(0, shape, -1, place, _list(turn),
+                                        physicsClientId=self._client)
+        self._set_material(body, -1, None, None, None)
+        return body
+
+    def _add_doll(self, placement: Placement) -> _Doll:
+        doll = self._weighed(placement.doll)
+        collide = self.scene.self_collision and not self._free
+        flags = _FLAGS | (pybullet.URDF_USE_SELF_COLLISION if collide else 0)
+        position, orientation = placement.bone_pose(doll.root)
+        orientation = np.array(placement.orientation)
+        with tempfile.TemporaryDirectory(prefix='ragdoll_ros_') as folder:
+            path = os.path.join(folder, 'doll.urdf')
+            with open(path, 'w', encoding='utf-8') as file:
+                file.write(to_urdf(doll, 'bullet', limited=not self._free))
+            body = pybullet.loadURDF(path, _list(position), _list(orientation), flags=flags,
+                                     physicsClientId=self._client)
+        return self._set_up(doll, body)
+
+    def _weighed(self, doll: Ragdoll) -> Ragdoll:
+        """Give the doll with its masses, and what goes with them, in the engine's unit."""
+        if self.unit == 1:
+            return doll
+        return dataclasses.replace(
+            doll,
+            bones=tuple(dataclasses.replace(bone, mass=bone.mass / self.unit)
+                        for bone in doll.bones),
+            joints=tuple(dataclasses.replace(joint, damping=joint.damping / self.unit)
+                         for joint in doll.joints))
+
+    def _set_up(self, doll: Ragdoll, body: int) -> _Doll:
+        """Find links and joints by name, and switch off what PyBullet switches on."""
+        links, joints, balls, angles = {doll.root.name: -1}, [], [], {}
+        damping = {name: joint.damping for joint in doll.joints for name in joint.angle_names}
+        for index in range(pybullet.getNumJoints(body, self._client)):
+            info = pybullet.getJointInfo(body, index, self._client)
+            name, kind, link = info[1].decode(), info[2], info[12].decode()
+            links[link] = index
+            if kind == pybullet.JOINT_FIXED:
+                continue
+            angles[name] = len(joints)
+            joints.append(index)
+            balls.append(kind == pybullet.JOINT_SPHERICAL)
+            self._free_joint(body, index, balls[-1])
+            loss = damping.get(name, damping.get(f'{name}_x', 0.0))
+            pybullet.changeDynamics(body, index, jointDamping=loss, physicsClientId=self._client)
+        for link in range(-1, pybullet.getNumJoints(body, self._client)):
+            pybullet.changeDynamics(
+                body, link, linearDamping=0, angularDamping=0, maxJointVelocity=LARGEST_RATE,
+                physicsClientId=self._client)
+        order = [links[bone.name] for bone in doll.bones]
+        for bone, link in zip(doll.bones, order, strict=True):
+            self._set_material(body, link, bone.friction, bone.rolling_friction, bone.restitution)
+        if self._free:
+            for link in range(-1, pybullet.getNumJoints(body, self._client)):
+                pybullet.setCollisionFilterGroupMask(body, link, 0, 0, self._client)
+        self._exclude_adjacent_bodies(doll, body, links)
+        return _Doll(body, order, [link for link in order if link >= 0], order.index(-1),
+                     joints, balls, [(4, 3) if ball else (1, 1) for ball in balls], angles)
+
+    def _free_joint(self, body: int, joint: int, ball: bool) -> None:
+        """Take PyBullet's default motor off a joint."""
+        if ball:
+            pybullet.setJointMotorControlMultiDof(
+                body, joint, pybullet.POSITION_CONTROL, targetPosition=[0, 0, 0, 1],
+                positionGain=0, velocityGain=0, force=[0, 0, 0], physicsClientId=self._client)
+        else:
+            pybullet.setJointMotorControl2(body, joint, pybullet.VELOCITY_CONTROL, force=0,
+                                           physicsClientId=self._client)
+
+    def _set_material(self, body: int, link: int, friction: float | None,
+                      rolling: float | None, restitution: float | None) -> None:
+        """Set a link's part of a contact: PyBullet multiplies the two parts, so take roots.
+
+        For rolling it adds each one's lever arm times the other's friction.
+        """
+        material = self.scene.material
+        friction = material.friction if friction is None else friction
+        rolling = material.rolling_friction if rolling is None else rolling
+        restitution = material.restitution if restitution is None else restitution
+        sliding = math.sqrt(grip(friction))
+        pybullet.changeDynamics(
+            body, link, lateralFriction=sliding,
+            rollingFriction=rolling / (2 * sliding) if sliding else 0.0, spinningFriction=0,
+            restitution=math.sqrt(restitution), physicsClientId=self._client)
+
+    def _exclude_adjacent_bodies(self, doll: Ragdoll, body: int, links: dict[str, int]) -> None:
+        """Bones that share a joint do not collide."""
+        for joint in doll.joints:
+            pybullet.setCollisionFilterPair(body, body, links[joint.parent], links[joint.child],
+                                            0, physicsClientId=self._client)
+
+    def _lay_out(self) -> DofLayout:
+        """Say where in the coordinates which joint's angle and limit stands."""
+        dolls = []
+        for doll, placement in zip(self.dolls, self.scene.dolls, strict=True):
+            limits = {name: pair for joint in placement.doll.joints
+                      for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
+            names = list(doll.angles)
+            dolls.append([None if ball else limits[name] or UNLIMITED
+                          for name, ball in zip(names, doll.balls, strict=True)])
+        return DofLayout(dolls)
+
+    def _check_sizes(self) -> None:
+        """Refuse what PyBullet would cut off without a word."""
+        for placement, own in zip(self.scene.dolls, self.layout.own_q, strict=True):
+            count = own.stop - own.start
+            if count > MOST_COORDINATES:
+                raise errors.OutOfRange(f'joints of {placement.name}', count,
+                                        f'at most {MOST_COORDINATES} coordinates, 7 for the root')
+
+    def _set_in_motion(self, body: int, placement: Placement) -> None:
+        if not any(placement.velocity + placement.spin):
+            return
+        doll = placement.doll
+        centre = sum(bone.mass * np.array(bone.position) for bone in doll.bones) / doll.mass
+        arm = rotation.rotate(placement.orientation, doll.root.position - centre)
+        velocity = placement.velocity + np.cross(placement.spin, arm)
+        pybullet.resetBaseVelocity(body, _list(velocity), placement.spin,
+                                   physicsClientId=self._client)
+
+
 class BulletEngine:
     """A scene in PyBullet. Runs in a client of its own, so that many can live side by side."""
 
     def __init__(self, scene: Scene, free: bool = False) -> None:
         self.scene = scene
-        self._free = free
         self._client = pybullet.connect(pybullet.DIRECT)
         self._timing: tuple[float, int] | None = None
         self._thorough = False
         self._gravity = math.hypot(*scene.gravity)
         self._least_bounce = max(LEAST_BOUNCE, scene.material.restitution_speed)
-        self._unit = _unit_of_mass(scene)
         try:
-            self._build()
+            self._take(_World(scene, free, self._client))
         except BaseException:
             self.close()
             raise
@@ -257,6 +413,18 @@ class BulletEngine:
             pybullet.disconnect(self._client)
             self._client = -1
 
+    def _take(self, world: _World) -> None:
+        """Note what the world holds, and let it begin."""
+        self._unit, self._ground, self._dolls = world.unit, world.ground, world.dolls
+        self.layout = world.layout
+        self._links = [(doll.body, link) for doll in self._dolls for link in doll.links]
+        self._doll_of = {doll.body: index for index, doll in enumerate(self._dolls)}
+        if self._ground is not None:
+            self._doll_of[self._ground] = GROUND
+        self._bone_of = {link: bone for bone, link in enumerate(self._links)}
+        self.exclude_initial_penetrations()
+        world.set_in_motion()
+
     def _rows(self, doll: _Doll) -> list[tuple]:
         """Position, orientation, linear and angular velocity of each bone."""
         bones = []
@@ -302,161 +470,6 @@ class BulletEngine:
                                     pybullet.WORLD_FRAME, physicsClientId=self._client)
         pybullet.applyExternalTorque(body, link, _list(torque), pybullet.WORLD_FRAME,
                                      physicsClientId=self._client)
-
-    def _build(self) -> None:
-        pybullet.setPhysicsEngineParameter(
-            numSolverIterations=SOLVER_ITERATIONS, contactBreakingThreshold=BREAKING_DISTANCE,
-            deterministicOverlappingPairs=1, enableFileCaching=0, useSplitImpulse=0, contactSlop=0,
-            physicsClientId=self._client)
-        pybullet.setGravity(*self.scene.gravity, physicsClientId=self._client)
-        self._ground = self._add_ground()
-        self._dolls = [self._add_doll(placement) for placement in self.scene.dolls]
-        self._links = [(doll.body, link) for doll in self._dolls for link in doll.links]
-        self._doll_of = {doll.body: index for index, doll in enumerate(self._dolls)}
-        if self._ground is not None:
-            self._doll_of[self._ground] = GROUND
-        self._bone_of = {link: bone for bone, link in enumerate(self._links)}
-        self.layout = self._lay_out()
-        self._check_sizes()
-        self.exclude_initial_penetrations()
-        for index, placement in enumerate(self.scene.dolls):
-            self._set_in_motion(self._dolls[index].body, placement)
-
-    def _add_ground(self) -> int | None:
-        if self.scene.ground is None or self._free:
-            return None
-        ground = self.scene.ground
-        if _slab_is_better(self.scene):
-            shape = pybullet.createCollisionShape(
-                pybullet.GEOM_BOX, halfExtents=SLAB, physicsClientId=self._client)
-            turn = rotation.shortest_arc(np.array([0.0, 0.0, 1.0]), np.array(ground.normal))
-            depth = SLAB[2]
-        else:
-            shape = pybullet.createCollisionShape(
-                pybullet.GEOM_PLANE, planeNormal=ground.normal, physicsClientId=self._client)
-            turn, depth = rotation.IDENTITY, 0.0
-        place = [n * (ground.offset - depth) for n in ground.normal]
-        body = pybullet.createMultiBody(0, shape, -1, place, _list(turn),
-                                        physicsClientId=self._client)
-        self._set_material(body, -1, None, None, None)
-        return body
-
-    def _add_doll(self, placement: Placement) -> _Doll:
-        doll = self._weighed(placement.doll)
-        collide = self.scene.self_collision and not self._free
-        flags = _FLAGS | (pybullet.URDF_USE_SELF_COLLISION if collide else 0)
-        position, orientation = placement.bone_pose(doll.root)
-        orientation = np.array(placement.orientation)
-        with tempfile.TemporaryDirectory(prefix='ragdoll_ros_') as folder:
-            path = os.path.join(folder, 'doll.urdf')
-            with open(path, 'w', encoding='utf-8') as file:
-                file.write(to_urdf(doll, 'bullet', limited=not self._free))
-            body = pybullet.loadURDF(path, _list(position), _list(orientation), flags=flags,
-                                     physicsClientId=self._client)
-        return self._set_up(doll, body)
-
-    def _weighed(self, doll: Ragdoll) -> Ragdoll:
-        """Give the doll with its masses, and what goes with them, in the engine's unit."""
-        if self._unit == 1:
-            return doll
-        return dataclasses.replace(
-            doll,
-            bones=tuple(dataclasses.replace(bone, mass=bone.mass / self._unit)
-                        for bone in doll.bones),
-            joints=tuple(dataclasses.replace(joint, damping=joint.damping / self._unit)
-                         for joint in doll.joints))
-
-    def _set_up(self, doll: Ragdoll, body: int) -> _Doll:
-        """Find links and joints by name, and switch off what PyBullet switches on."""
-        links, joints, balls, angles = {doll.root.name: -1}, [], [], {}
-        damping = {name: joint.damping for joint in doll.joints for name in joint.angle_names}
-        for index in range(pybullet.getNumJoints(body, self._client)):
-            info = pybullet.getJointInfo(body, index, self._client)
-            name, kind, link = info[1].decode(), info[2], info[12].decode()
-            links[link] = index
-            if kind == pybullet.JOINT_FIXED:
-                continue
-            angles[name] = len(joints)
-            joints.append(index)
-            balls.append(kind == pybullet.JOINT_SPHERICAL)
-            self._free_joint(body, index, balls[-1])
-            loss = damping.get(name, damping.get(f'{name}_x', 0.0))
-            pybullet.changeDynamics(body, index, jointDamping=loss, physicsClientId=self._client)
-        for link in range(-1, pybullet.getNumJoints(body, self._client)):
-            pybullet.changeDynamics(
-                body, link, linearDamping=0, angularDamping=0, maxJointVelocity=LARGEST_RATE,
-                physicsClientId=self._client)
-        order = [links[bone.name] for bone in doll.bones]
-        for bone, link in zip(doll.bones, order, strict=True):
-            self._set_material(body, link, bone.friction, bone.rolling_friction, bone.restitution)
-        if self._free:
-            for link in range(-1, pybullet.getNumJoints(body, self._client)):
-                pybullet.setCollisionFilterGroupMask(body, link, 0, 0, self._client)
-        self._exclude_adjacent_bodies(doll, body, links)
-        return _Doll(body, order, [link for link in order if link >= 0], order.index(-1),
-                     joints, balls, [(4, 3) if ball else (1, 1) for ball in balls], angles)
-
-    def _free_joint(self, body: int, joint: int, ball: bool) -> None:
-        """Take PyBullet's default motor off a joint."""
-        if ball:
-            pybullet.setJointMotorControlMultiDof(
-                body, joint, pybullet.POSITION_CONTROL, targetPosition=[0, 0, 0, 1],
-                positionGain=0, velocityGain=0, force=[0, 0, 0], physicsClientId=self._client)
-        else:
-            pybullet.setJointMotorControl2(body, joint, pybullet.VELOCITY_CONTROL, force=0,
-                                           physicsClientId=self._client)
-
-    def _set_material(self, body: int, link: int, friction: float | None,
-                      rolling: float | None, restitution: float | None) -> None:
-        """Set a link's part of a contact: PyBullet multiplies the two parts, so take roots.
-
-        For rolling it adds each one's lever arm times the other's friction.
-        """
-        material = self.scene.material
-        friction = material.friction if friction is None else friction
-        rolling = material.rolling_friction if rolling is None else rolling
-        restitution = material.restitution if restitution is None else restitution
-        sliding = math.sqrt(grip(friction))
-        pybullet.changeDynamics(
-            body, link, lateralFriction=sliding,
-            rollingFriction=rolling / (2 * sliding) if sliding else 0.0, spinningFriction=0,
-            restitution=math.sqrt(restitution), physicsClientId=self._client)
-
-    def _exclude_adjacent_bodies(self, doll: Ragdoll, body: int, links: dict[str, int]) -> None:
-        """Bones that share a joint do not collide."""
-        for joint in doll.joints:
-            pybullet.setCollisionFilterPair(body, body, links[joint.parent], links[joint.child],
-                                            0, physicsClientId=self._client)
-
-    def _lay_out(self) -> DofLayout:
-        """Say where in the coordinates which joint's angle and limit stands."""
-        dolls = []
-        for doll, placement in zip(self._dolls, self.scene.dolls, strict=True):
-            limits = {name: pair for joint in placement.doll.joints
-                      for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
-            names = list(doll.angles)
-            dolls.append([None if ball else limits[name] or UNLIMITED
-                          for name, ball in zip(names, doll.balls, strict=True)])
-        return DofLayout(dolls)
-
-    def _check_sizes(self) -> None:
-        """Refuse what PyBullet would cut off without a word."""
-        for placement, own in zip(self.scene.dolls, self.layout.own_q, strict=True):
-            count = own.stop - own.start
-            if count > MOST_COORDINATES:
-                raise errors.OutOfRange(f'joints of {placement.name}', count,
-                                        f'at most {MOST_COORDINATES} coordinates, 7 for the root')
-
-    def _set_in_motion(self, body: int, placement: Placement) -> None:
-        """Give a doll its velocity at the start, as one rigid body about its centre of mass."""
-        if not any(placement.velocity + placement.spin):
-            return
-        doll = placement.doll
-        centre = sum(bone.mass * np.array(bone.position) for bone in doll.bones) / doll.mass
-        arm = rotation.rotate(placement.orientation, doll.root.position - centre)
-        velocity = placement.velocity + np.cross(placement.spin, arm)
-        pybullet.resetBaseVelocity(body, _list(velocity), placement.spin,
-                                   physicsClientId=self._client)
 
 
 def bare_loop(scene: Scene, start: GeneralizedState,

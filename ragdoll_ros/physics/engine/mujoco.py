@@ -199,8 +199,7 @@ class MujocoEngine:
         self._bone_of = {self._model.geom(name).id: bone
                          for bone, name in enumerate(self.scene.bone_names)}
         self._doll_of = np.full(self._model.ngeom, GROUND)
-        counts = [len(placement.doll.bones) for placement in self.scene.dolls]
-        self._doll_of[list(self._bone_of)] = np.repeat(np.arange(len(counts)), counts)
+        self._doll_of[list(self._bone_of)] = self.scene.doll_of_bone
         self._roots, self._balls, self._angles = [], [], []
         dolls = []
         for placement in self.scene.dolls:

@@ -20,10 +20,8 @@ class Mechanics:
         self.masses = np.array([bone.mass for bone in bones])
         self.inertias = np.array([bone.inertia for bone in bones])
         self.gravity = np.array(scene.gravity)
-        counts = [len(placement.doll.bones) for placement in scene.dolls]
-        self.starts = np.cumsum([0, *counts[:-1]])
-        self.doll_of = np.repeat(np.arange(len(counts)), counts)
-        self._members = (self.doll_of == np.arange(len(counts))[:, None]).astype(float)
+        self.doll_of = scene.doll_of_bone
+        self._members = (self.doll_of == np.arange(len(scene.dolls))[:, None]).astype(float)
         self._weights = self._members * self.masses
         self.doll_masses = self._weights.sum(axis=1)
         self._of_points = _sums_of_points()
