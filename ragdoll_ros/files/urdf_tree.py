@@ -165,7 +165,7 @@ def _joint(element: ElementTree.Element) -> UrdfJoint:
 
 
 def _shape(geometry: ElementTree.Element, where: str) -> Shape | None:
-    """Give the shape; None for a mesh and whatever else is no plain shape."""
+    """The shape; None for a mesh and whatever else is no plain shape."""
     for element in geometry:
         if element.tag in SIZES:
             sizes = {key: tuple(_vector(element, key, where)) if key == 'size'

@@ -186,7 +186,7 @@ def height(bone: Bone, position: np.ndarray, orientation: np.ndarray, ground: Gr
 
 
 def above_ground(doll: Ragdoll, clearance: float = 0.4) -> Scene:
-    """Give a scene of one doll over level ground, its lowest point ``clearance`` m above it."""
+    """A scene of one doll over level ground, its lowest point ``clearance`` m above it."""
     ground = Ground()
     placement = Placement(doll)
     lowest = min(height(bone, *placement.bone_pose(bone), ground) for bone in doll.bones)
@@ -195,5 +195,5 @@ def above_ground(doll: Ragdoll, clearance: float = 0.4) -> Scene:
 
 
 def grip(friction: float) -> float:
-    """Give the coefficient of friction that an engine is to work with."""
+    """The coefficient of friction that an engine is to work with."""
     return NO_SLIP if math.isinf(friction) else min(friction, LARGEST_FRICTION)

@@ -16,7 +16,7 @@ class CompiledProjection(ConservationProjection):
                       impulse: np.ndarray | float = 0.0, moment: np.ndarray | float | None = 0.0,
                       touched: np.ndarray | None = None
                       ) -> tuple[State, Motion, np.ndarray | None]:
-        """Give state and motion with the momentum that is due."""
+        """State and motion with the momentum that is due."""
         if self._single.any():
             return super().keep_momentum(state, before, after, duration, impulse, moment, touched)
         dolls, given = len(self._single), np.zeros((len(self._single), 6))

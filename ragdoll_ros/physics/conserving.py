@@ -94,7 +94,7 @@ class ConservingStepper:
 
     def _keep_momentum(self, before: Motion, result: StepResult, loads: list[AppliedWrench],
                        state: State) -> None:
-        """Give dolls that touched nothing outside themselves the momentum that they must have.
+        """Project dolls that touched nothing outside themselves onto their due momentum.
 
         What loads that turn with a bone give in a flight, nobody knows better than the flight.
         """

@@ -58,10 +58,10 @@ class CompiledDynamics:
         return out
 
     def integrate_configuration(self, coordinates: GeneralizedState,
-                                way: np.ndarray) -> GeneralizedState:
-        """Give the coordinates after a small way (nv,) m and rad in the directions of v."""
+                                displacement: np.ndarray) -> GeneralizedState:
+        """The coordinates after a small displacement (nv,), m and rad along the directions of v."""
         q = coordinates.q.copy()
-        kernels.integrate_configuration(self._tree, q, way)
+        kernels.integrate_configuration(self._tree, q, displacement)
         return GeneralizedState(q, coordinates.v)
 
     def longest(self, accuracy: Accuracy, fastest: float) -> float:
@@ -75,7 +75,7 @@ class CompiledDynamics:
 
     def fly(self, start: GeneralizedState, duration: float, steps: int,
             loads: Sequence[AppliedWrench] = ()) -> GeneralizedState:
-        """Give the coordinates ``duration`` s later, in equal steps."""
+        """The coordinates ``duration`` s later, in equal steps."""
         known, rows = None, _packed(loads)
         for _ in range(steps):
             known = self.step(start, duration / steps, rows, known)
@@ -106,7 +106,7 @@ class Step:
                                   before is not None, self._way, self._rates)
 
     def at(self, share: float) -> GeneralizedState:
-        """Give the coordinates after a share of the step."""
+        """The coordinates after a share of the step."""
         q, v = np.empty(self._sizes[0]), np.empty(self._sizes[1])
         kernels.within(self._tree, self._way, share, q, v)
         return GeneralizedState(q, v)
@@ -136,7 +136,7 @@ class Path:
         """Steps gone, the rejected ones too."""
 
     def at(self, time: float) -> GeneralizedState | None:
-        """Give the coordinates ``time`` s after the start; None if that takes too many steps.
+        """The coordinates ``time`` s after the start; None if that takes too many steps.
 
         One may look back, but not to before the time that was the latest when it was asked for
         a later one.

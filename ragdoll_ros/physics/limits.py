@@ -17,7 +17,7 @@ class CompiledLimits(JointLimits):
         self._bounds = np.stack(layout.limits).astype(float)
 
     def is_active(self, coordinates: GeneralizedState, duration: float) -> bool:
-        """Tell whether a joint presses against its limit, or will within ``duration`` s."""
+        """Whether a joint presses against its limit, or will within ``duration`` s."""
         self._look(coordinates)
         return kernels.is_active(self._past, self._speeds, duration, AT_LIMIT, self._held)
 

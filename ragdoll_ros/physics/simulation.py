@@ -228,7 +228,7 @@ class Simulation:
             'asleep': float(self.asleep)}
 
     def close(self) -> None:
-        """Give the engine back; a second time does nothing."""
+        """Release the engine; a second time does nothing."""
         self._stepper.close()
 
     def _advance_until(self, end: int) -> None:

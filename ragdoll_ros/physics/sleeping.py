@@ -51,7 +51,7 @@ class SleepDetector:
         """ns for which all have been still."""
 
     def update(self, state: State, kinetic: np.ndarray, tick: int) -> bool:
-        """Tell whether all have been still for long enough, after one more tick (ns).
+        """Whether all have been still for long enough, after one more tick (ns).
 
         ``kinetic`` (d,) J are the dolls' energies of motion.
         """
@@ -69,7 +69,7 @@ class SleepDetector:
         return bool(max(way, (turn * self._sizes).max()) < self._way)
 
     def _moves(self, state: State, kinetic: np.ndarray) -> bool:
-        """Tell whether any bone is faster than still; in most ticks the energies say so."""
+        """Whether any bone is faster than still; in most ticks the energies say so."""
         return bool((kinetic > self._most).any()
                     or np.abs(state.linear_velocities).max() > self._speed
                     or (np.abs(state.angular_velocities).max(axis=1)

@@ -180,7 +180,7 @@ class Stepper:
         self._limits.same(before, self.coordinates)
 
     def sync_engine(self) -> Engine:
-        """Give the engine, with the dolls in it where they are."""
+        """The engine, with the dolls in it where they are."""
         if self._stale:
             self.engine.place(self.coordinates)
             self._stale = False
@@ -219,12 +219,12 @@ class Stepper:
         return max(rounding, float(np.linalg.norm(missed, axis=1).max()))
 
     def close(self) -> None:
-        """Give the engines back."""
+        """Release the engines."""
         self.engine.close()
         self.dynamics.close()
 
     def _may_fly(self, duration: float) -> bool:
-        """Tell whether nothing touches and no joint presses against its limit."""
+        """Whether nothing touches and no joint presses against its limit."""
         if (not self.accuracy.order or self.touching or self._blocked
                 or self.stats.flights >= self._most_flights):
             return False
@@ -272,7 +272,7 @@ class Stepper:
         return duration
 
     def _leads_on(self, stretch: float) -> bool:
-        """Tell whether a path is under way that leads on by ``stretch`` s."""
+        """Whether a path is under way that leads on by ``stretch`` s."""
         path = self._path
         return path is not None and self._along + stretch <= path.duration * (1 + 1e-9)
 
@@ -292,7 +292,7 @@ class Stepper:
         self._along, self._counted = 0.0, 0
 
     def _ahead(self, time: float) -> GeneralizedState | None:
-        """Tell where the path leads to, and count its steps."""
+        """Where the path leads to; its steps are counted."""
         ahead = self._path.at(time)
         self.stats.flights += self._path.count - self._counted
         self._counted = self._path.count
@@ -414,7 +414,7 @@ class Stepper:
         return StepResult(duration, substep, touched if watch else near, lag)
 
     def _went_evenly(self, before: State, duration: float) -> bool:
-        """Tell whether nothing was struck: no bone's velocity changed by more than a fall's."""
+        """Whether nothing was struck: no bone's velocity changed by more than a fall's."""
         return self.reach.change(before, self.state) < EVEN * self._gravity * duration
 
     def _centre(self, start: GeneralizedState, substep: float) -> None:
@@ -434,7 +434,7 @@ class Stepper:
                                self.touching)
 
     def _too_far(self) -> tuple[float, float]:
-        """Tell how far past a limit and in the ground, in units of what is put up with."""
+        """How far past a limit and in the ground, in units of what is put up with."""
         past = max(0.0, self._limits.max_violation(self.coordinates))
         sunk = -self.reach.clearance(self.state)
         return past / self.accuracy.redo, sunk / self.accuracy.sink

@@ -101,7 +101,7 @@ class _World:
         self._check_sizes()
 
     def set_in_motion(self) -> None:
-        """Give each doll its velocity at the start, as one rigid body about its centre of mass."""
+        """Set each doll in motion as at the start, as one rigid body about its centre of mass."""
         for doll, placement in zip(self.dolls, self.scene.dolls, strict=True):
             self._set_in_motion(doll.body, placement)
 
@@ -139,7 +139,7 @@ class _World:
         return self._set_up(doll, body)
 
     def _weighed(self, doll: Ragdoll) -> Ragdoll:
-        """Give the doll with its masses, and what goes with them, in the engine's unit."""
+        """The doll with its masses, and what goes with them, in the engine's unit."""
         if self.unit == 1:
             return doll
         return dataclasses.replace(
@@ -396,7 +396,7 @@ class BulletEngine:
         return found
 
     def save(self) -> int:
-        """Give a snapshot that restore brings back to the bit."""
+        """A snapshot that restore brings back to the bit."""
         return pybullet.saveState(self._client)
 
     def restore(self, snapshot: int) -> None:
@@ -404,11 +404,11 @@ class BulletEngine:
         pybullet.restoreState(stateId=snapshot, physicsClientId=self._client)
 
     def forget(self, snapshot: int) -> None:
-        """Give back what a snapshot holds."""
+        """Release what a snapshot holds."""
         pybullet.removeState(snapshot, physicsClientId=self._client)
 
     def close(self) -> None:
-        """Give everything back to the system; a second time does nothing."""
+        """Release everything; a second time does nothing."""
         if self._client >= 0:
             pybullet.disconnect(self._client)
             self._client = -1
@@ -474,7 +474,7 @@ class BulletEngine:
 
 def bare_loop(scene: Scene, start: GeneralizedState,
               substeps: int) -> tuple[Callable[[], None], Callable[[], None]]:
-    """Give the least that can be done in a tick, as a yardstick, and what ends it.
+    """The least that can be done in a tick, as a yardstick, and what ends it.
 
     It steps at a fixed length and reads the links once, with no thought for energy or limits.
     """
@@ -496,7 +496,7 @@ def _list(values: np.ndarray) -> list[float]:
 
 
 def _slab_is_better(scene: Scene) -> bool:
-    """Tell whether a slab stands for the ground: where single boxes slide and tumble.
+    """Whether a slab stands for the ground: where single boxes slide and tumble.
 
     Against a plane PyBullet finds one corner in a step, so that a sliding box rocks and sinks, and
     its way is off by ten times as much. Dolls of several bones are no better off on a slab, and
@@ -507,6 +507,6 @@ def _slab_is_better(scene: Scene) -> bool:
 
 
 def _unit_of_mass(scene: Scene) -> float:
-    """Give the kg that the engine takes for one: 1, or a power of two for giants."""
+    """The kg that the engine takes for one: 1, or a power of two for giants."""
     largest = max(bone.mass * max(bone.shape.half_extents) ** 2 for bone in scene.bones)
     return 2.0 ** max(0, math.ceil(math.log2(largest / HEAVIEST)))

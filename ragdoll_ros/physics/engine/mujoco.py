@@ -168,7 +168,7 @@ class MujocoEngine:
         return found
 
     def save(self) -> object:
-        """Give a snapshot that restore brings back to the bit."""
+        """A snapshot that restore brings back to the bit."""
         kind = self._mujoco.mjtState.mjSTATE_INTEGRATION
         state = np.empty(self._mujoco.mj_stateSize(self._model, kind))
         self._mujoco.mj_getState(self._model, self._data, state, kind)
@@ -225,7 +225,7 @@ class MujocoEngine:
         return int(joint.qposadr[0]), int(joint.dofadr[0])
 
     def _set_in_motion(self) -> None:
-        """Give each doll its velocity at the start, as one rigid body about its centre of mass."""
+        """Set each doll in motion as at the start, as one rigid body about its centre of mass."""
         start = self.coordinates()
         for placement, (_, iv) in zip(self.scene.dolls, self._roots, strict=True):
             doll = placement.doll

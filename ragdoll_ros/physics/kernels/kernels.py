@@ -517,7 +517,7 @@ def motion(masses: np.ndarray, inertias: np.ndarray, doll_of: np.ndarray, gravit
 def keep_momentum(masses: np.ndarray, doll_of: np.ndarray, gravity: np.ndarray, duration: float,
                   given: np.ndarray, spun: bool, touched: np.ndarray, before: np.ndarray,
                   sums: np.ndarray, rows: np.ndarray) -> None:
-    """Give each doll that is not ``touched`` the momentum and the way that it must have, as one
+    """Project each doll that is not ``touched`` onto its due momentum and displacement, as one
     rigid body; see ConservationProjection.momentum_due. Changes its ``sums`` (d, 20) and ``rows``
     (n, 13).
 

@@ -46,9 +46,9 @@ class EngineDynamics:
         return self._engine.acceleration(coordinates, loads)
 
     def integrate_configuration(self, coordinates: GeneralizedState,
-                                way: np.ndarray) -> GeneralizedState:
-        """Give the coordinates after a small way (nv,) m and rad in the directions of v."""
-        return self._layout.integrate_configuration(coordinates, way)
+                                displacement: np.ndarray) -> GeneralizedState:
+        """The coordinates after a small displacement (nv,), m and rad along the directions of v."""
+        return self._layout.integrate_configuration(coordinates, displacement)
 
     def longest(self, accuracy: Accuracy, fastest: float) -> float:
         """Longest path, s, that speeds and damping allow."""
@@ -62,11 +62,11 @@ class EngineDynamics:
 
     def fly(self, start: GeneralizedState, duration: float, steps: int,
             loads: Sequence[AppliedWrench] = ()) -> GeneralizedState:
-        """Give the coordinates ``duration`` s later, in equal steps of order 4."""
+        """The coordinates ``duration`` s later, in equal steps of order 4."""
         return fly(self._engine, start, duration, 4, steps, loads)
 
     def close(self) -> None:
-        """Give the engine back."""
+        """Release the engine."""
         self._engine.close()
 
 
@@ -107,7 +107,7 @@ class EnginePath:
         self.end = self._outward(*self._end)
 
     def at(self, time: float) -> GeneralizedState:
-        """Give the coordinates ``time`` s after the start."""
+        """The coordinates ``time`` s after the start."""
         s = time / self.duration
         if s > 1 - 1e-12:
             return self.end
@@ -130,7 +130,7 @@ class EnginePath:
 
 def fly(engine: Engine, start: GeneralizedState, duration: float, order: int, steps: int = 1,
         loads: Sequence[AppliedWrench] = ()) -> GeneralizedState:
-    """Give the coordinates ``duration`` s later, in equal steps of a method of this order.
+    """The coordinates ``duration`` s later, in equal steps of a method of this order.
 
     ``engine`` must hold the scene without contacts and limits; where it ends up is undefined.
     """

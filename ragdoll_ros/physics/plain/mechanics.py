@@ -48,7 +48,7 @@ class Mechanics:
                       sums[:, 4:].reshape(-1, 3, 3))
 
     def shifted(self, state: State, motion: Motion, shift: Shift) -> State:
-        """Give the state after each doll is moved on and set in motion as one rigid body."""
+        """The state after each doll is moved on and set in motion as one rigid body."""
         orientations, angular = state.orientations, state.angular_velocities
         if shift.rotation is not None:
             turns = shift.rotation[self.doll_of]

@@ -15,7 +15,7 @@ from .swings import Swings
 
 def tick_cost(count: int = 1000, links: int = 1, bones: int = 10, tick: float = 0.01,
               ticks: int = 200) -> float:
-    """Give the median time in s of a tick with ``count`` swings of ``links`` damped springs.
+    """The median time in s of a tick with ``count`` swings of ``links`` damped springs.
 
     The bones shake and turn at 3 Hz. A tick is all of it: the bones' frames told, the swings
     moved, every mass's place in the world read.

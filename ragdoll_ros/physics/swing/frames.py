@@ -29,7 +29,7 @@ class Frames:
 
     @classmethod
     def of(cls, state: object, scales: np.ndarray | None = None) -> Frames:
-        """Give the frames of a State (or of anything with its fields)."""
+        """The frames of a State (or of anything with its fields)."""
         if scales is None:
             scales = np.ones_like(state.positions)
         return cls(state.positions, state.orientations, state.linear_velocities,
@@ -37,7 +37,7 @@ class Frames:
 
     @classmethod
     def still(cls, count: int = 1) -> Frames:
-        """Give frames that stand at the world's origin."""
+        """Frames that stand at the world's origin."""
         turns = np.tile(rotation.IDENTITY, (count, 1))
         zero = np.zeros((count, 3))
         return cls(zero, turns, zero, zero, np.ones((count, 3)))
@@ -69,7 +69,7 @@ class Track:
         self._told.append(frames)
 
     def __call__(self, time: float) -> Frames:
-        """Give the frames at ``time`` s."""
+        """The frames at ``time`` s."""
         index = bisect.bisect_left(self._times, time)
         if index == len(self._times):
             return self._told[-1]

@@ -64,12 +64,12 @@ class Roots:
 
     @classmethod
     def of(cls, mounted: Sequence[Mount]) -> Roots:
-        """Give the roots of mounted swings."""
+        """The roots of mounted swings."""
         place = np.array([mount.root for mount in mounted], float).reshape(-1, 3).T
         return cls(np.array([mount.bone for mount in mounted], int), np.ascontiguousarray(place))
 
     def seat(self, frames: Frames) -> Seat:
-        """Give what the roots do while the bones are at these frames."""
+        """What the roots do while the bones are at these frames."""
         axes = rotation.matrix(frames.orientations).transpose(2, 1, 0).reshape(9, -1)
         rows = np.concatenate([axes, frames.positions.T, frames.linear_velocities.T,
                                frames.angular_velocities.T,
@@ -80,7 +80,7 @@ class Roots:
 
 
 def levels(mounted: Sequence[Mount], gravity: np.ndarray) -> list[Level]:
-    """Give the links of chains level by level; ``mounted`` has the longest chains first.
+    """The links of chains level by level; ``mounted`` has the longest chains first.
 
     Level i holds link i of the first so many swings that have one.
     """

@@ -27,7 +27,7 @@ class Order:
 
     @classmethod
     def of(cls, mounted: Sequence[Mount], chains: Sequence[Mount]) -> Order:
-        """Give the order for mounted swings, of which ``chains`` are not free."""
+        """The order for mounted swings, of which ``chains`` are not free."""
         begins, count = {}, 0
         for mount in mounted:
             begins[id(mount)] = count
@@ -45,7 +45,7 @@ class Order:
         return np.array_equal(self.chained, np.arange(len(self.bone)))
 
     def gather(self, chained: Sequence[np.ndarray], free: np.ndarray) -> np.ndarray:
-        """Give one row for each mass from the levels' columns and the free masses' rows."""
+        """One row for each mass from the levels' columns and the free masses' rows."""
         if len(chained) == 1 and self.plain:
             return chained[0].T
         out = np.empty((len(self.bone), free.shape[1]))

@@ -48,7 +48,7 @@ class SwingSimulation:
 
 
 def swing_simulation(scene: Scene) -> SwingSimulation | None:
-    """Give what lets a scene's swings follow, or None for a scene without any."""
+    """What lets a scene's swings follow, or None for a scene without any."""
     return SwingSimulation(scene) if any(placement.doll.swings
                                          for placement in scene.dolls) else None
 

@@ -63,7 +63,7 @@ class Swings:
         self._begin: float | None = None
 
     def evaluate(self, time: float) -> SwingState:
-        """Give all masses at ``time`` s.
+        """All masses at ``time`` s.
 
         The first call, and one for an earlier time than the last, starts from rest: every
         link in its rest direction, still in its bone's frame.
@@ -146,7 +146,7 @@ class Swings:
         return then
 
     def _factors(self, h: float) -> list[Step]:
-        """Give each level's factors for a step; those in use are kept."""
+        """Each level's factors for a step; those in use are kept."""
         if h not in self._steps:
             if len(self._steps) >= MOST_PARTS:
                 self._steps.clear()
@@ -182,7 +182,7 @@ class _Free:
         self._from = frames.positions[self._bone] + arm + rod
 
     def at(self, time: float) -> Flight:
-        """Give the masses at ``time`` s."""
+        """The masses at ``time`` s."""
         if not len(self._bone):
             return _NOTHING
         t = time - self._begin
@@ -206,7 +206,7 @@ def _parts(forces: tuple[np.ndarray, np.ndarray], h: float) -> int:
 
 
 def _first(seat: Seat, count: int) -> Seat:
-    """Give the first so many of the seats."""
+    """The first so many of the seats."""
     if seat.point.shape[1] == count:
         return seat
     return Seat(seat.point[:, :count], seat.velocity[:, :count], seat.axes[:, :, :count],
