@@ -205,7 +205,7 @@ class SkeletonFrame:
         errors.check_finite('position', self.position)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Ragdoll:
     """A tree of bones. ``bones`` fixes the order; one of them, the root, has no parent.
 
@@ -251,6 +251,10 @@ class Ragdoll:
     def mass(self) -> float:
         """Total mass, kg."""
         return sum(bone.mass for bone in self.bones)
+
+    def __repr__(self) -> str:
+        return (f'Ragdoll {self.name!r}: {len(self.bones)} bones, {len(self.joints)} joints, '
+                f'{sum(joint.dof for joint in self.joints)} degrees of freedom, {self.mass:.4g} kg')
 
     def bone(self, name: str) -> Bone:
         """Find a bone by its name; UnknownBone if there is none."""

@@ -107,7 +107,7 @@ class Placement:
         return position, rotation.multiply(turn, bone.orientation)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Scene:
     """All that a simulation needs to begin.
 
@@ -164,6 +164,12 @@ class Scene:
         """Name of every joint angle, doll by doll, joint by joint as the doll lists them."""
         return tuple(self.qualified(placement, name) for placement in self.dolls
                      for joint in placement.doll.joints for name in joint.angle_names)
+
+    def __repr__(self) -> str:
+        ground = 'over the ground' if self.ground else 'without ground'
+        dolls = ', '.join(f'{placement.name!r} of {len(placement.doll.bones)} bones'
+                          for placement in self.dolls[:3]) + ', ...' * (len(self.dolls) > 3)
+        return f'Scene {self.name!r}: {dolls}; {ground}, tick {self.step:g} s'
 
     def qualified(self, placement: Placement, name: str) -> str:
         """Name of a doll's bone or angle that is unique in the scene."""

@@ -4,6 +4,7 @@ A new shape is a class here: what draws, weighs, fits and writes files goes by t
 """
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from typing import ClassVar
@@ -245,6 +246,9 @@ class Capsule(Solid):
 
 Shape = Sphere | Box | Cylinder | Capsule
 SHAPES: dict[str, type] = {shape.kind: shape for shape in (Sphere, Box, Cylinder, Capsule)}
+SIZES = {kind: tuple(field.name for field in dataclasses.fields(shape))
+         for kind, shape in SHAPES.items()}
+"""Names of the sizes of each kind of shape."""
 
 
 def support_distance(support: np.ndarray, direction: np.ndarray) -> np.ndarray:
