@@ -99,16 +99,17 @@ class Step:
                  loads: np.ndarray, before: Step | None = None) -> None:
         self.duration = duration
         self._tree, self._sizes = tree, (len(start.q), len(start.v))
-        self._way, self._rates = np.empty((8, sum(self._sizes))), np.empty((2, sum(self._sizes)))
+        self._dense = np.empty((8, sum(self._sizes)))
+        self._rates = np.empty((2, sum(self._sizes)))
         if before is not None:
             self._rates[0] = before._rates[1]
         self.error = kernels.step(tree, gravity, loads, start.q, start.v, duration,
-                                  before is not None, self._way, self._rates)
+                                  before is not None, self._dense, self._rates)
 
     def at(self, share: float) -> GeneralizedState:
         """The coordinates after a share of the step."""
         q, v = np.empty(self._sizes[0]), np.empty(self._sizes[1])
-        kernels.within(self._tree, self._way, share, q, v)
+        kernels.interpolate(self._tree, self._dense, share, q, v)
         return GeneralizedState(q, v)
 
 

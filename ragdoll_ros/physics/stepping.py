@@ -84,7 +84,7 @@ class StepResult:
     touched: set[tuple[int, int]]
     """Pairs of dolls, or of a doll and GROUND, that touched or may have."""
     lag: float = 0.0
-    """s: of which each way was gone with the velocity at the end, not with the mean one."""
+    """s: for which bones moved with the velocity at the end, not with the mean one."""
 
 
 class Stepper:
@@ -418,13 +418,13 @@ class Stepper:
         return self.reach.change(before, self.state) < EVEN * self._gravity * duration
 
     def _centre(self, start: GeneralizedState, substep: float) -> None:
-        """Take half a substep's change of velocity back out of the way that was gone.
+        """Take half a substep's change of velocity back out of the displacement.
 
         The engine moves all by the velocity that each substep ends with; by the mean of begin and
         end (the trapezoidal rule) an even motion is right to order 2.
         """
-        way = (self.coordinates.v - start.v) * (-substep / 2)
-        self._set(self.dynamics.integrate_configuration(self.coordinates, way))
+        back = (self.coordinates.v - start.v) * (-substep / 2)
+        self._set(self.dynamics.integrate_configuration(self.coordinates, back))
 
     def _near(self, duration: float, loads: Sequence[AppliedWrench]) -> set[tuple[int, int]]:
         """Pairs of dolls, or of a doll and GROUND, that may touch within ``duration`` s."""

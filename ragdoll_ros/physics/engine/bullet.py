@@ -499,8 +499,8 @@ def _slab_is_better(scene: Scene) -> bool:
     """Whether a slab stands for the ground: where single boxes slide and tumble.
 
     Against a plane PyBullet finds one corner in a step, so that a sliding box rocks and sinks, and
-    its way is off by ten times as much. Dolls of several bones are no better off on a slab, and
-    jam sooner.
+    its displacement is off by ten times as much. Dolls of several bones are no better off on a
+    slab, and jam sooner.
     """
     return (all(len(placement.doll.bones) == 1 for placement in scene.dolls)
             and any(bone.shape.kind == 'box' for bone in scene.bones))

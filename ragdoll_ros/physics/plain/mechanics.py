@@ -58,10 +58,11 @@ class Mechanics:
                 (shift.angular_velocity @ _CROSS).reshape(-1, 3, 3))
         if len(shift.displacement) > 1:
             rows = tuple(row[self.doll_of] for row in rows)
-        way, linear, spin, centre, turning = rows
+        displacement, linear, angular_velocity, centre, turning = rows
         turned = np.matmul((state.positions - centre)[:, None, :], turning)[:, 0]
-        return State(state.positions + way, orientations, state.linear_velocities + linear + turned,
-                     angular + spin)
+        return State(state.positions + displacement, orientations,
+                     state.linear_velocities + linear + turned,
+                     angular + angular_velocity)
 
 
 _CROSS = np.array([[0, 0, 0, 0, 0, 1, 0, -1, 0], [0, 0, -1, 0, 0, 0, 1, 0, 0],
