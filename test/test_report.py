@@ -190,10 +190,24 @@ def test_a_method_beaten_in_speed_and_error_is_not_on_the_front():
     assert held == {'ours-draft': False, 'ours-exact': True}
 
 
-def test_json_has_neither_nan_nor_infinity(tmp_path):
-    figures.save({'a': [math.nan, math.inf, 1 / 3, True]}, tmp_path)
-    text = (tmp_path / figures.FILE).read_text()
-    assert json.loads(text, parse_constant=pytest.fail)['a'] == [None, 'inf', .333333, True]
+def test_json_has_neither_nan_nor_infinity_and_a_line_for_each_row(tmp_path):
+    rows = [{'a': [math.nan, math.inf, 1 / 3, True]}, {'b': 'e²'}]
+    figures.save({'about': {'quick': True}, 'figures': {'one': rows, 'two': [{}]}}, tmp_path)
+    text = (tmp_path / figures.FILE).read_text(encoding='utf-8')
+    assert json.loads(text, parse_constant=pytest.fail) == figures.load(tmp_path) == {
+        'about': {'quick': True},
+        'figures': {'one': [{'a': [None, 'inf', .333333, True]}, {'b': 'e²'}], 'two': [{}]}}
+    assert sum(line.startswith('{') and line.rstrip(',').endswith('}')
+               for line in text.splitlines()[2:-1]) == 3
+
+
+@pytest.mark.parametrize('folder', ['docs', 'docs/starts'])
+def test_the_published_page_is_what_the_published_figures_give(folder):
+    """Also after a key or a column has been renamed: figures of older versions stay readable."""
+    docs = ROOT / folder
+    pictures = {path.stem.removeprefix('accuracy_'): path.name
+                for path in docs.glob('accuracy_*.png')}
+    assert markdown(figures.load(docs), pictures) == (docs / 'accuracy.md').read_text('utf-8')
 
 
 def test_tables_write_what_exploded_and_what_failed():

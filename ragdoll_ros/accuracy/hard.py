@@ -63,10 +63,10 @@ def measure(name: str, method_name: str) -> list[Row]:
     row: Row = {'case': name, 'method': method_name,
                 'cpu_s_per_s': float(result.costs.sum() / trial.duration)}
     if not result.moved.finite:
-        return [{**row, 'violations': ['NaN'], 'passed': False}]
+        return [{**row, 'faults': ['NaN'], 'passed': False}]
     row |= figures(case, trial, result.moved)
-    row['violations'] = violations(case, row)
-    return [{**row, 'passed': not row['violations']}]
+    row['faults'] = violations(case, row)
+    return [{**row, 'passed': not row['faults']}]
 
 
 def figures(case: HardCase, trial: Trial, moved: Trajectory) -> Row:
@@ -121,7 +121,7 @@ def rest(accuracy: str) -> list[Row]:
         found += ['a push does not wake it'] * (not moved > 0.1)
     found += ['a touch does not wake it'] * (not _wakes_by_touch(accuracy))
     return [{'case': 'rest for 10 min', 'method': f'ours-{accuracy}', 'end_m_s': fastest,
-             'violations': found, 'passed': not found}]
+             'faults': found, 'passed': not found}]
 
 
 def _wakes_by_touch(accuracy: str) -> bool:
@@ -137,7 +137,7 @@ def _wakes_by_touch(accuracy: str) -> bool:
     return speeds[450] < REST and max(speeds[451:]) > 0.5
 
 
-COLUMNS = (('case', 'case', '{}'), ('passed', 'holds', '{}'), ('violations', 'what does not', '{}'),
+COLUMNS = (('case', 'case', '{}'), ('passed', 'holds', '{}'), ('faults', 'what does not', '{}'),
            ('excess', 'energy excess', '{:.1e}'), ('overshoot_rad', 'overshoot °', 'deg'),
            ('sinking_m', 'sinking mm', 'mm'), ('gap_m', 'gap m', '{:.0e}'),
            ('fastest_m_s', 'fastest m/s', '{:.1f}'), ('end_m_s', 'at the end m/s', '{:.3f}'))
@@ -151,7 +151,7 @@ def section(rows: list[Row]) -> str:
         if row.get('method') == 'bullet-10':
             continue
         other = others.get(row.get('case'))
-        text = '' if other is None else 'yes' if other['passed'] else ', '.join(other['violations'])
+        text = '' if other is None else 'yes' if other['passed'] else ', '.join(other['faults'])
         shown.append({**row, 'other': text})
     text = table(shown, (*COLUMNS, ('other', 'PyBullet N = 10', '{}')))
     failing = [row['case'] for row in shown if not row.get('passed')]
