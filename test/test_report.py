@@ -13,11 +13,13 @@ pytest.importorskip('scipy')
 pytest.importorskip('mujoco')
 
 from ragdoll_ros.accuracy import command, figures, goals, hard, plots, starts, tables
+from ragdoll_ros.accuracy.hard_cases import hard_cases
 from ragdoll_ros.accuracy.measure import Measure
 from ragdoll_ros.accuracy.methods import bullet, by_name, median_run, ours, quickstart, run
 from ragdoll_ros.accuracy.motions.flight import free_fall, gentle_flight, tumbling_box
 from ragdoll_ros.accuracy.motions.mechanisms import OMEGA, swing
 from ragdoll_ros.accuracy.parts import classes, orders
+from ragdoll_ros.accuracy.parts.hard import violations
 from ragdoll_ros.accuracy.references.articulated import Articulated
 from ragdoll_ros.accuracy.references.tumbling import tumble
 from ragdoll_ros.accuracy.report import markdown
@@ -271,12 +273,12 @@ def test_an_unknown_hard_case_or_method_is_named(capsys):
 
 def test_a_hard_case_is_held_against_its_rule():
     """A limit passed by 7 degrees, at rest, whole: one error."""
-    case = hard.hard_cases()[0]
+    case = hard_cases()[0]
     good = {'excess': 0.0, 'gap_m': 0.0, 'overshoot_rad': 0.0, 'sinking_m': 0.0,
             'end_sinking_m': 0.0, 'fastest_m_s': 5.0, 'end_m_s': 0.0}
-    assert hard.violations(case, good) == []
-    assert hard.violations(case, {**good, 'overshoot_rad': math.radians(7)}) == ['overshoot']
-    assert 'energy from nothing' in hard.violations(case, {**good, 'excess': math.nan})
+    assert violations(case, good) == []
+    assert violations(case, {**good, 'overshoot_rad': math.radians(7)}) == ['overshoot']
+    assert 'energy from nothing' in violations(case, {**good, 'excess': math.nan})
 
 
 @pytest.mark.parametrize(('name', 'number'), [

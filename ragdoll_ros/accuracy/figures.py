@@ -13,6 +13,12 @@ from ..physics import kernels
 
 FILE = 'accuracy.json'
 
+Row = dict[str, object]
+"""One result: figures by their names, which end in their units."""
+
+Figures = dict[str, list[Row]]
+"""The rows of each part."""
+
 
 def about(command: str, seconds: float, quick: bool, starts: int) -> dict[str, object]:
     """Versions, machine, date: what a reader needs to compare the figures with his own."""
@@ -42,6 +48,11 @@ def save(data: dict, folder: Path) -> Path:
 def load(folder: Path) -> dict:
     """What save() wrote: 'about' and, under 'figures', the rows of each part."""
     return json.loads((folder / FILE).read_text(encoding='utf-8'))
+
+
+def number(value: object) -> float:
+    """A figure of the JSON, in which infinity is the text 'inf' and NaN is null."""
+    return math.nan if value is None else float(value)
 
 
 def _line(value: object) -> str:
