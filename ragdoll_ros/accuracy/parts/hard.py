@@ -49,27 +49,27 @@ def measure(name: str, method_name: str) -> list[Row]:
     result = run(by_name(method_name), trial)
     row: Row = {'case': name, 'method': method_name,
                 'cpu_s_per_s': float(result.costs.sum() / trial.duration)}
-    if not result.moved.finite:
+    if not result.trajectory.finite:
         return [{**row, 'faults': ['NaN'], 'passed': False}]
-    row |= figures(case, trial, result.moved)
+    row |= figures(case, trial, result.trajectory)
     row['faults'] = violations(case, row)
     return [{**row, 'passed': not row['faults']}]
 
 
-def figures(case: HardCase, trial: Trial, moved: Trajectory) -> Row:
+def figures(case: HardCase, trial: Trial, trajectory: Trajectory) -> Row:
     """Figures the rules are about; names end in their units."""
     measure = Measure(trial.scene)
-    speeds = np.linalg.norm(moved.linear_velocities, axis=-1).max(axis=1)
-    energy, work = measure.energy(moved), measure.work(trial, moved)
+    speeds = np.linalg.norm(trajectory.linear_velocities, axis=-1).max(axis=1)
+    energy, work = measure.energy(trajectory), measure.work(trial, trajectory)
     lift = (sum(bone.mass for bone in trial.scene.bones) * case.rule.lift_m
             * float(np.linalg.norm(trial.scene.gravity)))
     own = np.maximum.accumulate(energy[0] + work + lift)
     return {'excess': float(((energy - energy[0] - work - lift) / own).max()),
-            'gap_m': measure.gap(moved), 'overshoot_rad': measure.overshoot(moved),
-            'sinking_m': measure.sinking(moved),
-            'end_sinking_m': measure.sinking(moved.part(slice(-1, None))),
+            'gap_m': measure.joint_gap(trajectory), 'overshoot_rad': measure.overshoot(trajectory),
+            'sinking_m': measure.sinking(trajectory),
+            'end_sinking_m': measure.sinking(trajectory.part(slice(-1, None))),
             'fastest_m_s': float(speeds.max()),
-            'end_m_s': float(speeds[-10:].max()), 'settled_s': measure.settled(moved)}
+            'end_m_s': float(speeds[-10:].max()), 'settled_s': measure.settling_time(trajectory)}
 
 
 def violations(case: HardCase, row: Row) -> list[str]:
@@ -104,8 +104,8 @@ def rest(accuracy: str) -> list[Row]:
         found += ['does not sleep'] * (not simulation.asleep)
         simulation.push(Push('head', (0.0, 0.0, 300.0), duration=0.1))
         simulation.advance()
-        moved = float(np.abs(simulation.advance().linear_velocities).max())
-        found += ['a push does not wake it'] * (not moved > 0.1)
+        speed = float(np.abs(simulation.advance().linear_velocities).max())
+        found += ['a push does not wake it'] * (not speed > 0.1)
     found += ['a touch does not wake it'] * (not _wakes_by_touch(accuracy))
     return [{'case': RESTING, 'method': f'ours-{accuracy}', 'end_m_s': fastest,
              'faults': found, 'passed': not found}]
