@@ -241,6 +241,17 @@ def test_a_job_that_fails_says_where():
     assert found['at'].startswith('test_report.py')
 
 
+def test_a_failed_job_is_told_beside_the_rows_of_the_others():
+    """In a section that makes tables out of its rows as in one that shows them as they are."""
+    failed = {'failed': 'E: x', 'job': 'j', 'at': 'f.py:1'}
+    case = {'case': 'fall', 'method': 'ours-normal', 'passed': False, 'faults': ['gap']}
+    page = markdown({'about': figures.about('', 1.0, True, 2), 'figures': {
+        'hard': [case, failed], 'costs': [failed, {'scene': 'empty', 'tick_s': 1e-6}]}}, {})
+    assert page.count('| j | **failed**: E: x (f.py:1) |') == 2
+    assert '| fall | **no** | gap |' in page and '- **fall** fails: no reason' in page
+    assert '| empty | 1 |' in page
+
+
 @pytest.mark.slow
 def test_page_and_pictures_come_from_the_json_alone(tmp_path):
     pytest.importorskip('matplotlib')

@@ -7,6 +7,7 @@ import json
 import math
 import os
 import platform
+from collections.abc import Iterable
 from pathlib import Path
 
 from ..physics import kernels
@@ -53,6 +54,11 @@ def load(folder: Path) -> dict:
 def number(value: object) -> float:
     """A figure of the JSON, in which infinity is the text 'inf' and NaN is null."""
     return math.nan if value is None else float(value)
+
+
+def sound(rows: Iterable[Row]) -> list[Row]:
+    """The rows of jobs that did not fail."""
+    return [row for row in rows if 'failed' not in row]
 
 
 def _line(value: object) -> str:

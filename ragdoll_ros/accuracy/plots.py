@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .figures import Figures, Row, number
+from .figures import Figures, Row, number, sound
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -104,7 +104,7 @@ def draw_drop(figures: Figures, plt: object) -> object:
 
 def draw_precision(figures: Figures, plt: object) -> object:
     """Error over CPU time for every motion: lower left is better."""
-    rows = [row for row in figures.get('precision', ()) if 'failed' not in row]
+    rows = sound(figures.get('precision', ()))
     names = list(dict.fromkeys(row['motion'] for row in rows))
     if not names:
         return None
@@ -125,7 +125,7 @@ def draw_precision(figures: Figures, plt: object) -> object:
 
 def draw_pieces(figures: Figures, plt: object) -> object:
     """The same for short pieces through contacts."""
-    rows = [row for row in figures.get('pieces', ()) if 'failed' not in row]
+    rows = sound(figures.get('pieces', ()))
     if not rows:
         return None
     figure, axes = plt.subplots(figsize=(7.5, 4.2))
@@ -138,7 +138,7 @@ def draw_pieces(figures: Figures, plt: object) -> object:
 
 def draw_classes(figures: Figures, plt: object) -> object:
     """The worst energy from nothing in each class of starts."""
-    rows = [row for row in figures.get('classes', ()) if 'failed' not in row]
+    rows = sound(figures.get('classes', ()))
     classes = list(dict.fromkeys(row['class'] for row in rows))
     shown = (('ours-draft', '#9dbbe8', 'ours draft'), ('ours-normal', BLUE, 'ours normal'),
              ('ours-exact', '#0c2d66', 'ours exact'), ('bullet-10', ORANGE, 'PyBullet N = 10'),
@@ -173,7 +173,7 @@ ROUND_TICKS = (1, 2, 5, 10, 20, 50, 100, 200)
 
 def draw_orders(figures: Figures, plt: object) -> object:
     """Errors over the tick."""
-    rows = [row for row in figures.get('orders', ()) if 'failed' not in row]
+    rows = sound(figures.get('orders', ()))
     names = list(dict.fromkeys(row['motion'] for row in rows))
     if not names:
         return None

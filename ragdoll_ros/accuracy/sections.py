@@ -4,7 +4,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from .figures import Row, number
+from .figures import Row, number, sound
 from .hard_cases import hard_cases
 from .tables import Column, table
 
@@ -37,9 +37,8 @@ class Section:
         """The blocks of the rows alone; jobs that failed say so."""
         if self.body is None:
             return [table(rows, self.columns)] if self.columns else []
-        sound = [row for row in rows if 'failed' not in row]
-        failed = [row for row in rows if 'failed' in row]
-        return [*(self.body(sound) if sound else ()),
+        good, failed = sound(rows), [row for row in rows if 'failed' in row]
+        return [*(self.body(good) if good else ()),
                 *([table(failed, (('job', 'failed jobs', '{}'),))] if failed else ())]
 
 

@@ -28,6 +28,7 @@ EXCESS, GAP, REST = 1e-3, 1e-3, 0.05
 QUICK_CASES = ('mass ratio 1:100', 'start in a self-overlap', 'limits of 2°', 'scale 0.01',
                'hits the ground at 100 m/s', 'spin 20 rad/s', 'limit slams')
 
+
 def jobs(options: Options, accuracy: str = 'normal') -> list[Job]:
     """Every case at a setting, and beside it PyBullet at N = 10."""
     made = []
@@ -43,7 +44,7 @@ def jobs(options: Options, accuracy: str = 'normal') -> list[Job]:
 
 
 def measure(name: str, method_name: str) -> list[Row]:
-    """A case run by a method: one row, with what of its rule does not hold under 'faults'."""
+    """A case run by a method: one row. What of its rule does not hold is its published 'faults'."""
     case = next(case for case in hard_cases() if case.name == name)
     trial = case.make()
     result = run(by_name(method_name), trial)
