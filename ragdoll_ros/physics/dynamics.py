@@ -44,14 +44,12 @@ class CompiledDynamics:
         self._gravity = np.array(scene.gravity, float)
 
     def state(self, coordinates: GeneralizedState) -> State:
-        """Poses and velocities of all bones."""
         rows = np.empty((len(self._tree), 13))
         kernels.forward_kinematics(self._tree, coordinates.q, coordinates.v, rows)
         return State.of(rows)
 
     def acceleration(self, coordinates: GeneralizedState,
                      loads: Sequence[AppliedWrench] = ()) -> np.ndarray:
-        """Rates of change of ``coordinates.v``."""
         out = np.empty_like(coordinates.v)
         kernels.accelerate(self._tree, self._gravity, _packed(loads), coordinates.q, coordinates.v,
                            out)
@@ -59,7 +57,6 @@ class CompiledDynamics:
 
     def integrate_configuration(self, coordinates: GeneralizedState,
                                 displacement: np.ndarray) -> GeneralizedState:
-        """The coordinates after a small displacement (nv,), m and rad along the directions of v."""
         q = coordinates.q.copy()
         kernels.integrate_configuration(self._tree, q, displacement)
         return GeneralizedState(q, coordinates.v)

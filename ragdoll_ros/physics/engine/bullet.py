@@ -258,7 +258,6 @@ class BulletEngine:
             raise
 
     def step(self, duration: float, substeps: int, loads: Sequence[AppliedWrench] = ()) -> None:
-        """Go on by ``duration`` s in equal substeps, under ``loads`` that do not turn."""
         timing = (duration, substeps)
         if timing != self._timing:
             pybullet.setPhysicsEngineParameter(
@@ -285,11 +284,9 @@ class BulletEngine:
         return (self._velocities() - coordinates.v) / PROBE_STEP
 
     def read(self) -> State:
-        """Poses and velocities of all bones."""
         return State.of(np.array([row for doll in self._dolls for row in self._rows(doll)]))
 
     def coordinates(self) -> GeneralizedState:
-        """Generalised coordinates of all dolls."""
         q: list[float] = []
         v: list[float] = []
         for doll in self._dolls:
@@ -319,7 +316,6 @@ class BulletEngine:
         return State.of(np.array(rows)), GeneralizedState(np.array(q), np.array(v))
 
     def place(self, coordinates: GeneralizedState) -> None:
-        """Put all dolls where ``coordinates`` says."""
         q, v = coordinates.q.tolist(), coordinates.v.tolist()
         i = j = 0
         for doll in self._dolls:
@@ -340,7 +336,6 @@ class BulletEngine:
                     doll.body, doll.joints, values, rates, physicsClientId=self._client)
 
     def joint_angles(self) -> np.ndarray:
-        """All joint angles in rad, in the order of Scene.angle_names."""
         values = []
         for doll, placement in zip(self._dolls, self.scene.dolls, strict=True):
             states = self._joints(doll)
@@ -357,12 +352,10 @@ class BulletEngine:
         return self.touched()
 
     def touched(self) -> set[tuple[int, int]]:
-        """Pairs of dolls that touched in the last substep, as it saw them."""
         points = pybullet.getContactPoints(physicsClientId=self._client)
         return {(self._doll_of[point[1]], self._doll_of[point[2]]) for point in points}
 
     def set_solver_iterations(self, wanted: bool) -> None:
-        """Solve contacts that bear on each other, or as fast as is enough for others."""
         if wanted is not self._thorough:
             self._thorough = wanted
             pybullet.setPhysicsEngineParameter(
@@ -370,13 +363,11 @@ class BulletEngine:
                 physicsClientId=self._client)
 
     def set_ground_friction(self, wanted: bool) -> None:
-        """Take the ground's friction away, or give it back."""
         friction = 0.0 if wanted else math.sqrt(grip(self.scene.material.friction))
         pybullet.changeDynamics(self._ground, -1, lateralFriction=friction,
                                 physicsClientId=self._client)
 
     def exclude_initial_penetrations(self) -> None:
-        """Let bones of one doll that overlap by more than pressed() now collide no more."""
         depth = pressed(self.scene)
         pybullet.performCollisionDetection(physicsClientId=self._client)
         for point in pybullet.getContactPoints(physicsClientId=self._client):
@@ -384,7 +375,6 @@ class BulletEngine:
                 pybullet.setCollisionFilterPair(*point[1:5], 0, physicsClientId=self._client)
 
     def contacts(self) -> list[Contact]:
-        """What touches at the end of the last substep."""
         found = []
         for point in pybullet.getContactPoints(physicsClientId=self._client):
             a, b = self._bone_of.get(point[1:4:2]), self._bone_of.get(point[2:5:2])
@@ -396,19 +386,15 @@ class BulletEngine:
         return found
 
     def save(self) -> int:
-        """A snapshot that restore brings back to the bit."""
         return pybullet.saveState(self._client)
 
     def restore(self, snapshot: int) -> None:
-        """Go back to a snapshot."""
         pybullet.restoreState(stateId=snapshot, physicsClientId=self._client)
 
     def forget(self, snapshot: int) -> None:
-        """Release what a snapshot holds."""
         pybullet.removeState(snapshot, physicsClientId=self._client)
 
     def close(self) -> None:
-        """Release everything; a second time does nothing."""
         if self._client >= 0:
             pybullet.disconnect(self._client)
             self._client = -1

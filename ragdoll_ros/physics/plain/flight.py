@@ -36,18 +36,15 @@ class EngineDynamics:
         self._damping_rate = damping_rate(scene)
 
     def state(self, coordinates: GeneralizedState) -> State:
-        """Poses and velocities of all bones."""
         self._engine.place(coordinates)
         return self._engine.read()
 
     def acceleration(self, coordinates: GeneralizedState,
                      loads: Sequence[AppliedWrench] = ()) -> np.ndarray:
-        """Rates of change of ``coordinates.v``."""
         return self._engine.acceleration(coordinates, loads)
 
     def integrate_configuration(self, coordinates: GeneralizedState,
                                 displacement: np.ndarray) -> GeneralizedState:
-        """The coordinates after a small displacement (nv,), m and rad along the directions of v."""
         return self._layout.integrate_configuration(coordinates, displacement)
 
     def longest(self, accuracy: Accuracy, fastest: float) -> float:
@@ -66,7 +63,6 @@ class EngineDynamics:
         return fly(self._engine, start, duration, 4, steps, loads)
 
     def close(self) -> None:
-        """Release the engine."""
         self._engine.close()
 
 
