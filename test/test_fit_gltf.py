@@ -11,7 +11,6 @@ from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.gltf_file import GltfFile
 from ragdoll_ros.fit.nodes import read_nodes
 from ragdoll_ros.fit.pipeline import fit_character
-from ragdoll_ros.model.errors import ModelErrors
 
 RIG = RIGS['cmu']
 
@@ -230,11 +229,3 @@ def test_a_matrix_is_the_same_as_translation_rotation_scale(tmp_path):
     path.write_bytes(made.glb())
     worlds = read_nodes(GltfFile(path)).worlds
     assert np.allclose(worlds[-1], worlds[-2], atol=1e-12)
-
-
-def test_no_pygltflib_is_said(tmp_path, monkeypatch):
-    import sys
-    path = fit_rigs.write(RIGS['one_bone'], tmp_path)
-    monkeypatch.setitem(sys.modules, 'pygltflib', None)
-    with pytest.raises(ModelErrors, match=r'ragdoll_ros\[fit\]'):
-        read_character(path)

@@ -107,7 +107,7 @@ def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) 
     rests = np.stack([skins.rests[node] for node in joints])
     if not np.isfinite(skins.vertices).all() or not np.isfinite(rests).all():
         raise errors.NotFinite('meshes', 'vertices in the bind pose', 'finite numbers')
-    names = _bone_names([file.document.nodes[node].name for node in joints])
+    names = _bone_names([file.json['nodes'][node].get('name') for node in joints])
     notes = list(skins.notes)
     turn = TO_ROS
     positions, vertices = rests[:, :3, 3] @ turn.T, skins.vertices @ turn.T

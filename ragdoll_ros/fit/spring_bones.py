@@ -12,11 +12,14 @@ import numpy as np
 
 from ..model import errors
 from ..model.swing import LENGTHS
-from .gltf_file import GltfFile, item
+from .gltf_file import GltfFile, nested, objects
 from .nodes import Nodes
 
 TAIL = 0.07
 """m: VRM 0.x lets the last node of a chain end so far on, in line."""
+
+SPRINGS, GROUPS = 'extensions.VRMC_springBone', 'extensions.VRM.secondaryAnimation'
+"""Where VRM 1.0 and VRM 0.x keep them."""
 
 SETTINGS = {'stiffness': (1.0, 0.0, 1e6), 'gravityPower': (0.0, -1e6, 1e6),
             'dragForce': (0.5, 0.0, 1.0)}
@@ -50,19 +53,16 @@ class Spring:
 
 def read_springs(file: GltfFile, nodes: Nodes, notes: list[str]) -> list[Spring]:
     """Read all springs, without places; a ModelError names what is broken, a note the rest."""
-    extensions = file.json.get('extensions')
-    extensions = extensions if isinstance(extensions, dict) else {}
+    extensions = nested(file.json, 'extensions', dict, '')
     found: list[Spring] = []
     if 'VRMC_springBone' in extensions:
-        where = 'extensions.VRMC_springBone'
-        data = _of(dict, extensions['VRMC_springBone'], where)
-        for number, entry in enumerate(_of(list, data.get('springs', []), f'{where}.springs')):
+        data, where = nested(extensions, 'VRMC_springBone', dict, 'extensions'), SPRINGS
+        for number, entry in enumerate(objects(data, 'springs', where)):
             found.append(_spring(file, nodes, entry, f'{where}.springs[{number}]'))
-    elif isinstance(extensions.get('VRM'), dict) and 'secondaryAnimation' in extensions['VRM']:
-        where = 'extensions.VRM.secondaryAnimation'
-        data = _of(dict, extensions['VRM']['secondaryAnimation'], where)
-        for number, entry in enumerate(_of(list, data.get('boneGroups', []),
-                                           f'{where}.boneGroups')):
+    else:
+        vrm, where = nested(extensions, 'VRM', dict, 'extensions'), GROUPS
+        data = nested(vrm, 'secondaryAnimation', dict, 'extensions.VRM')
+        for number, entry in enumerate(objects(data, 'boneGroups', where)):
             found += _group(file, nodes, entry, f'{where}.boneGroups[{number}]')
         found.sort(key=lambda spring: nodes.order.index(spring.nodes[0]))
     springs, taken = [], set()
@@ -101,16 +101,14 @@ def without_short_rods(spring: Spring, notes: list[str]) -> Spring:
                    rods=tuple(rod for rod, keep in zip(spring.rods, long, strict=True) if keep))
 
 
-def _spring(file: GltfFile, nodes: Nodes, entry: object, where: str) -> Spring:
-    entry = _of(dict, entry, where)
-    joints = _of(list, entry.get('joints'), f'{where}.joints')
+def _spring(file: GltfFile, nodes: Nodes, entry: dict, where: str) -> Spring:
+    joints = objects(entry, 'joints', where)
     if not joints:
         raise errors.WrongForm(f'{where}.joints', joints, 'at least one joint')
     chain: list[int] = []
     for number, joint in enumerate(joints):
-        place = f'{where}.joints[{number}].node'
-        node = _of(dict, joint, f'{where}.joints[{number}]').get('node')
-        item(file.document.nodes, node, place, 'nodes')
+        place, node = f'{where}.joints[{number}].node', joint.get('node')
+        file.entry('nodes', node, place)
         if chain and not _below(node, chain[-1], nodes):
             raise errors.WrongForm(place, node, f'a node below nodes[{chain[-1]}], which is '
                                    'before it in the chain')
@@ -120,20 +118,20 @@ def _spring(file: GltfFile, nodes: Nodes, entry: object, where: str) -> Spring:
     return Spring(_name(file, entry.get('name'), chain[0]), tuple(chain), rods)
 
 
-def _group(file: GltfFile, nodes: Nodes, entry: object, where: str) -> list[Spring]:
-    """Give the springs of a group of VRM 0.x: one from each root down its first children."""
+def _group(file: GltfFile, nodes: Nodes, entry: dict, where: str) -> list[Spring]:
+    """Springs of a group of VRM 0.x: one from each root down its first children."""
     # The misspelt key is the format's own.
-    entry = {'stiffness': 1.0, **_of(dict, entry, where)}
+    entry = {'stiffness': 1.0, **entry}
     entry['stiffness'] = entry.get('stiffiness', entry['stiffness'])
     way = entry.get('gravityDir')
     entry['gravityDir'] = [way.get(axis) for axis in 'xyz'] if isinstance(way, dict) else way
     rod = _rod(entry, where)
     springs = []
-    for root in _of(list, entry.get('bones', []), f'{where}.bones'):
-        item(file.document.nodes, root, f'{where}.bones', 'nodes')
+    for root in nested(entry, 'bones', list, where):
+        file.entry('nodes', root, f'{where}.bones')
         chain = [root]
-        while file.document.nodes[chain[-1]].children:
-            chain.append(file.document.nodes[chain[-1]].children[0])
+        while nodes.children[chain[-1]]:
+            chain.append(nodes.children[chain[-1]][0])
         springs.append(Spring(_name(file, None, root), tuple(chain), (rod,) * len(chain)))
     return springs
 
@@ -176,11 +174,5 @@ def _below(node: int, above: int, nodes: Nodes) -> bool:
 
 
 def _name(file: GltfFile, given: object, node: int) -> str:
-    given = given or file.document.nodes[node].name
+    given = given or file.json['nodes'][node].get('name')
     return given if given and isinstance(given, str) else f'spring_{node}'
-
-
-def _of(kind: type, value: object, where: str) -> object:
-    if not isinstance(value, kind):
-        raise errors.WrongForm(where, value, {dict: 'an object', list: 'a list'}[kind])
-    return value
