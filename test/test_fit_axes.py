@@ -106,7 +106,7 @@ SOLIDS = (Sphere(0.2), Box((0.1, 0.2, 0.4)), Cylinder(0.1, 0.5), Capsule(0.1, 0.
 
 @pytest.mark.parametrize('solid', SOLIDS, ids=lambda solid: solid.kind)
 def test_distance_against_the_nearest_of_many_surface_points(solid):
-    from ragdoll_ros.fit.solid import filling
+    from ragdoll_ros.fit.overlap import filling
     corners, triangles = solid.mesh()
     random = np.random.default_rng(0)
     weights = random.dirichlet((1, 1, 1), size=(len(triangles), 60))

@@ -6,8 +6,8 @@ from fit_rigs import RIGS, fitted
 
 from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.doubts import find_doubts
+from ragdoll_ros.fit.overlap import covered
 from ragdoll_ros.fit.pipeline import Options, fit_character
-from ragdoll_ros.fit.solid import covered
 
 HUMANOIDS = ('mixamo', 'unreal', 'vrm', 'cmu', 'makehuman', 'unnamed', 'z_up', 'scaled_nodes')
 

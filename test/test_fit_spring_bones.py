@@ -147,7 +147,7 @@ def still(swing):
 
 def single(rod, length=.12):
     spring = Spring('s', (0, 1), (rod,), np.array([[0.0, 0, 0], [length, 0, 0]]))
-    return swing_of(spring, 's', 'b', 1.0)[0]
+    return swing_of(spring, 'b', 1.0)[0]
 
 
 @pytest.mark.parametrize(('stiffness', 'drag'), [(1, .4), (4, .1), (.3, .7), (1, .05)])

@@ -1,8 +1,12 @@
-"""Which bones of a skeleton become one body: small ones are merged into their parents."""
+"""Which bones of a skeleton become one rigid body: small ones are merged into their parents.
+
+The vertices that a bone moves are its cluster. A group is the bones that become one body, with
+their clusters.
+"""
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +18,7 @@ SMALLEST = 0.055
 """A cluster shorter than this share of the whole character gets no body of its own."""
 
 FEWEST = 4
-"""Vertices that a body needs."""
+"""Vertices of a cluster that has a size."""
 
 PAIRED = 0.02
 """Two bones are a left and a right one if one mirrored is this near to the other, of the whole."""
@@ -22,19 +26,29 @@ PAIRED = 0.02
 
 @dataclass
 class Group:
-    """One body: its topmost bone, where its joint is and after which it is named, and the rest."""
+    """Bones that become one body; all by their index in the character."""
 
     bone: int
+    """The topmost, at whose root the body's joint is; the root group's: the one with most skin."""
+    bones: list[int]
+    """All of them."""
+    vertices: np.ndarray
+    """(p,) of their clusters."""
     parent: int = -1
     """Index of the parent's group, -1 for the root."""
-    bones: list[int] = field(default_factory=list)
-    vertices: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    name: str = ''
+    """Of ``bone``, and so of the body."""
+    role: str | None = None
+    """Of ``bone``; see roles_of."""
     tied: bool = False
     """Whether no bone joins it to its parent, so that it is tied to it rigidly."""
 
 
 def vertices_by_bone(character: Character, share: float | None = None) -> list[np.ndarray]:
-    """Indices of the vertices of each bone: of those it moves most, or by at least ``share``."""
+    """Cluster of each bone: indices (p,) of the vertices that it moves most.
+
+    With a ``share``: of all that it moves by at least this skin weight, 0 to 1.
+    """
     count = len(character.bone_names)
     same = character.bones[:, :, None] == character.bones[:, None, :]
     totals = np.einsum('vij,vj->vi', same, character.weights)
@@ -54,14 +68,16 @@ def vertices_by_bone(character: Character, share: float | None = None) -> list[n
 def group_bones(character: Character, roles: tuple[str | None, ...], clusters: list[np.ndarray],
                 smallest: float | None = None,
                 swinging: frozenset[int] = frozenset()) -> list[Group]:
-    """Merge bones into bodies, parents first; ``smallest`` in m, None: a share of the whole.
+    """Groups of a character's bones, parents first.
 
-    Bones that are ``swinging`` have no body: they ride on their parents', without their skin.
+    ``roles`` and ``clusters`` are each bone's. A bone whose cluster is shorter than ``smallest``
+    m (None: SMALLEST of the character) goes into its parent's group; so do a further piece of a
+    limb, a finger, and a bone that is ``swinging``, which does so without its cluster.
     """
     clusters = [np.zeros(0, np.int64) if bone in swinging else cluster
                 for bone, cluster in enumerate(clusters)]
     smallest = SMALLEST * character.extent if smallest is None else smallest
-    held = [Group(bone, bones=[bone], vertices=cluster) for bone, cluster in enumerate(clusters)]
+    held = [Group(bone, [bone], cluster) for bone, cluster in enumerate(clusters)]
     parents = character.parents
     into = list(range(len(held)))
     for level in reversed(_levels(parents)):
@@ -82,7 +98,10 @@ def group_bones(character: Character, roles: tuple[str | None, ...], clusters: l
     root = held[heads[0]]
     # Without a joint, the root may as well be called by the bone that gave it its skin.
     root.bone = max(root.bones, key=lambda bone: len(clusters[bone]))
-    return [held[bone] for bone in heads]
+    groups = [held[bone] for bone in heads]
+    for group in groups:
+        group.name, group.role = character.bone_names[group.bone], roles[group.bone]
+    return groups
 
 
 def cluster_size(character: Character, vertices: np.ndarray) -> float:

@@ -6,9 +6,9 @@ import textwrap
 from ..model.ragdoll import Ragdoll
 from ..model.shapes import Shape
 from .doubts import extent, find_doubts
+from .overlap import covered, overlapping_pairs, shared_volume
 from .pipeline import BodyFit, Fit
 from .shapes import TOLERANCE
-from .solid import covered, overlapping_pairs, shared_volume
 
 
 def fit_report(fit: Fit) -> str:

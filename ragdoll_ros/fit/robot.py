@@ -19,6 +19,7 @@ from ..model import errors, rotation
 from ..model.ragdoll import LARGEST_SWING, WORLD, Bone, Joint, Ragdoll, SkeletonFrame
 from ..model.shapes import Box, Capsule, Shape
 from .axes import fit_axes
+from .frames import pose_in_body
 from .shapes import fit_best
 
 DENSITY = 1000.0
@@ -235,10 +236,7 @@ def _riders(poses: dict[str, Pose], carriers: dict[str, str], names: dict[str, s
     riders = []
     for name, text in _names(list(poses)).items():
         bone = by_name[names[carriers[name]]]
-        back = rotation.inverse(np.array(bone.orientation))
-        riders.append(SkeletonFrame(text, bone.name,
-                            rotation.rotate(back, poses[name][0] - bone.position),
-                            rotation.multiply(back, poses[name][1])))
+        riders.append(SkeletonFrame(text, bone.name, *pose_in_body(bone, *poses[name])))
     return tuple(riders)
 
 

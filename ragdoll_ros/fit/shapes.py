@@ -11,6 +11,9 @@ from ..model.shapes import Box, Capsule, Cylinder, Shape, Sphere
 TOLERANCE = 0.01
 """A vertex this far outside a body, m, still counts as inside."""
 
+DECIMALS = 10
+"""Decimals of m that a doll's numbers keep: below every figure of merit, above the noise."""
+
 WANTED = 0.95
 """Share of a cluster's vertices that its body should hold."""
 
