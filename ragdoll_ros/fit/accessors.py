@@ -13,7 +13,7 @@ LARGEST_COUNT = {'SCALAR': 3_000_000}
 """Elements in one array, by type: a skin of a million triangles has three million indices."""
 
 LARGEST_OTHER = 500_000
-"""The same for every other type: vertices."""
+"""Elements of every other type: vertices."""
 
 COMPONENTS = {5120: np.dtype('<i1'), 5121: np.dtype('<u1'), 5122: np.dtype('<i2'),
               5123: np.dtype('<u2'), 5125: np.dtype('<u4'), 5126: np.dtype('<f4')}
@@ -22,7 +22,11 @@ WIDTHS = {'SCALAR': 1, 'VEC3': 3, 'VEC4': 4, 'MAT4': 16}
 
 
 def read_floats(file: GltfFile, index: object, kind: str, where: str) -> np.ndarray:
-    """Read an accessor as (count, width) float64; NotFinite where a number is not finite."""
+    """Values (count, width) float64 of the accessor at an index, of type ``kind`` ('VEC3', ...).
+
+    NotFinite where one is not finite, else a ModelError about what is broken, at ``where`` or in
+    the accessor.
+    """
     values = _read(file, index, kind, where)
     if not np.isfinite(values).all():
         bad = values[~np.isfinite(values)][0]
@@ -31,7 +35,10 @@ def read_floats(file: GltfFile, index: object, kind: str, where: str) -> np.ndar
 
 
 def read_indices(file: GltfFile, index: object, kind: str, limit: int, where: str) -> np.ndarray:
-    """Read an accessor as (count, width) indices, each below ``limit``."""
+    """Values (count, width) int32 of the accessor at an index, each from 0 to below ``limit``.
+
+    WrongForm where they are floats, OutOfRange for one outside; else as read_floats.
+    """
     values = _read(file, index, kind, where)
     if values.dtype.kind == 'f':
         raise errors.WrongForm(where, 'floats', 'whole numbers')

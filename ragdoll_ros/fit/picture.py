@@ -19,9 +19,10 @@ FEWER = 30_000
 
 
 def draw(doll: Ragdoll, character: Character | None, path: str | Path) -> None:
-    """Write skin, both, and bodies side by side, seen from ahead and to the left.
+    """Write a picture of skin, both, and bodies side by side, seen from ahead and to the left.
 
-    Without a character there is no skin to show, only the bodies.
+    Without a character: of the bodies alone. Unreadable where matplotlib is missing, OSError
+    where the picture cannot be written.
     """
     try:
         import matplotlib

@@ -26,9 +26,9 @@ LARGEST_SKIN = 500_000
 
 @dataclass
 class Skins:
-    """All skinned meshes, the file's axes and units.
+    """All skinned meshes in the bind pose, the file's axes and units.
 
-    ``rests`` maps a node to its matrix (4, 4) in the bind pose; ``vertices`` (v, 3),
+    ``rests`` has the matrix (4, 4) of each joint's node, by the node's index; ``vertices`` (v, 3),
     ``triangles`` (t, 3), ``nodes`` (v, k) the node of each influence, ``weights`` (v, k).
     """
 
@@ -41,7 +41,7 @@ class Skins:
 
     def add(self, vertices: np.ndarray, triangles: np.ndarray, nodes: np.ndarray,
             weights: np.ndarray) -> None:
-        """Take in one more mesh."""
+        """Append a mesh, its ``triangles`` by its own vertices; OutOfRange for too many."""
         base, width = len(self.vertices), max(nodes.shape[1], self.nodes.shape[1])
         if base + len(vertices) > LARGEST_SKIN:
             raise errors.OutOfRange('meshes', base + len(vertices),
@@ -53,7 +53,7 @@ class Skins:
 
 
 def read_skins(file: GltfFile, nodes: Nodes) -> Skins:
-    """Read every mesh that a skin moves; WrongForm where the file has none."""
+    """Every mesh that a skin moves; WrongForm where the file has none, ModelError where broken."""
     skins = Skins()
     loose = 0
     for index, node in enumerate(file.json['nodes']):
@@ -121,7 +121,7 @@ def _mesh_to_world(skins: Skins, nodes: Nodes, joints: np.ndarray,
     """Matrix (4, 4) that takes a mesh in its bind pose to the world.
 
     Every joint says world_j M_j. They agree when the nodes stand in the bind pose. If not, the
-    topmost joint's word is taken, turned to the nearest of the 24 upright poses: a hip in the
+    topmost joint's is taken, rotated to the nearest of the 24 upright orientations: a hip in the
     middle of a step is a few degrees off, a change of axes is a multiple of 90.
     """
     said = nodes.worlds[joints] @ inverses
@@ -141,12 +141,12 @@ def _mesh_to_world(skins: Skins, nodes: Nodes, joints: np.ndarray,
     return matrix
 
 
-def _nearest_upright(turn: np.ndarray) -> np.ndarray:
+def _nearest_upright(matrix: np.ndarray) -> np.ndarray:
     """Of the 24 rotations that map axes to axes, the one nearest to a matrix (3, 3)."""
     permutations = [np.eye(3)[list(p)] for p in itertools.permutations(range(3))]
     signs = [np.diag(s) for s in itertools.product((1.0, -1.0), repeat=3)]
     proper = [p @ s for p in permutations for s in signs if np.linalg.det(p @ s) > 0]
-    return max(proper, key=lambda candidate: float(np.sum(candidate * turn)))
+    return max(proper, key=lambda candidate: float(np.sum(candidate * matrix)))
 
 
 def _add_primitive(file: GltfFile, skins: Skins, primitive: dict, joints: np.ndarray,

@@ -28,23 +28,25 @@ SETTINGS = {'stiffness': (1.0, 0.0, 1e6), 'gravityPower': (0.0, -1e6, 1e6),
 
 @dataclass(frozen=True)
 class Rod:
-    """VRM's numbers of one rod: units of the file a second, and ``drag`` a share a frame."""
+    """VRM's numbers of one rod."""
 
     stiffness: float
+    """Units of the file a second."""
     gravity: float
-    """Downwards."""
+    """Units of the file a second, downwards."""
     drag: float
+    """Share a frame, 0 to 1."""
 
 
 @dataclass(frozen=True)
 class Spring:
-    """A chain: ``nodes`` (n) of the file, their places in the bind pose, ``rods`` from each on."""
+    """A chain of the file's ``nodes`` (n) and the ``rods`` from each to the next."""
 
     name: str
     nodes: tuple[int, ...]
     rods: tuple[Rod, ...]
     points: np.ndarray | None = None
-    """(rods + 1, 3): the file's axes and units; a character's are in its own frame, m."""
+    """(rods + 1, 3) of the nodes, bind pose: the file's axes and units; a character's in m."""
     carrier: int = -1
     """The character's bone above the first node."""
     bones: tuple[int, ...] = ()
@@ -52,7 +54,7 @@ class Spring:
 
 
 def read_springs(file: GltfFile, nodes: Nodes, notes: list[str]) -> list[Spring]:
-    """Read all springs, without places; a ModelError names what is broken, a note the rest."""
+    """All springs, without points; a ModelError for what is broken, a note on what is left out."""
     extensions = nested(file.json, 'extensions', dict, '')
     found: list[Spring] = []
     if 'VRMC_springBone' in extensions:
@@ -78,7 +80,11 @@ def read_springs(file: GltfFile, nodes: Nodes, notes: list[str]) -> list[Spring]
 
 
 def placed(spring: Spring, nodes: Nodes, rests: dict[int, np.ndarray]) -> Spring:
-    """Give a spring its points in the bind pose; what no skin binds stands as its nodes do."""
+    """The spring with its points in the bind pose, ``rests`` of the nodes that a skin binds.
+
+    Other nodes stand to the nearest of these above them as the file's nodes do. NotFinite or
+    WrongForm where that leaves no place.
+    """
     points = [_place(node, nodes, rests) for node in spring.nodes]
     if len(points) == len(spring.rods):
         above = nodes.parents[spring.nodes[-1]]
@@ -91,7 +97,7 @@ def placed(spring: Spring, nodes: Nodes, rests: dict[int, np.ndarray]) -> Spring
 
 
 def without_short_rods(spring: Spring, notes: list[str]) -> Spring:
-    """Leave out rods too short to swing (points in m): their ends are one point."""
+    """The spring (points in m) without rods too short to swing: their ends become one point."""
     lengths = np.linalg.norm(np.diff(spring.points, axis=0), axis=1)
     long = lengths >= LENGTHS[0]
     if long.all():
@@ -123,8 +129,8 @@ def _group(file: GltfFile, nodes: Nodes, entry: dict, where: str) -> list[Spring
     # The misspelt key is the format's own.
     entry = {'stiffness': 1.0, **entry}
     entry['stiffness'] = entry.get('stiffiness', entry['stiffness'])
-    way = entry.get('gravityDir')
-    entry['gravityDir'] = [way.get(axis) for axis in 'xyz'] if isinstance(way, dict) else way
+    down = entry.get('gravityDir')
+    entry['gravityDir'] = [down.get(axis) for axis in 'xyz'] if isinstance(down, dict) else down
     rod = _rod(entry, where)
     springs = []
     for root in nested(entry, 'bones', list, where):
@@ -143,16 +149,16 @@ def _rod(data: dict, where: str) -> Rod:
         if type(value) not in (int, float) or not least <= value <= most:
             raise errors.OutOfRange(f'{where}.{key}', value, f'a number from {least:g} to {most:g}')
         values[key] = float(value)
-    way = data.get('gravityDir') or [0, -1, 0]
-    if not isinstance(way, list) or len(way) != 3 or not all(
-            type(part) in (int, float) and abs(part) < 1e6 for part in way):
-        raise errors.WrongForm(f'{where}.gravityDir', way, '3 numbers')
-    length = float(np.linalg.norm(way)) or 1.0
-    return Rod(values['stiffness'], -values['gravityPower'] * way[1] / length, values['dragForce'])
+    down = data.get('gravityDir') or [0, -1, 0]
+    if not isinstance(down, list) or len(down) != 3 or not all(
+            type(part) in (int, float) and abs(part) < 1e6 for part in down):
+        raise errors.WrongForm(f'{where}.gravityDir', down, '3 numbers')
+    length = float(np.linalg.norm(down)) or 1.0
+    return Rod(values['stiffness'], -values['gravityPower'] * down[1] / length, values['dragForce'])
 
 
 def _place(node: int, nodes: Nodes, rests: dict[int, np.ndarray]) -> np.ndarray:
-    """Point (3,) of a node where the nearest bound one at or above it puts it."""
+    """Point (3,) of a node, as it stands to the nearest node at or above it that a skin binds."""
     bound = node
     while bound >= 0 and bound not in rests:
         bound = nodes.parents[bound]

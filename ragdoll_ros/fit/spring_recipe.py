@@ -47,7 +47,7 @@ def swing_of(spring: Spring, bone: str, metres: float) -> tuple[Swing, bool]:
     steps = np.diff(spring.points, axis=0)
     lengths = np.linalg.norm(steps, axis=1)
     masses = DENSITY * lengths
-    rates = [rates_of(rod, length, metres) for rod, length in zip(spring.rods, lengths,
+    rates = [_rates(rod, length, metres) for rod, length in zip(spring.rods, lengths,
                                                                   strict=True)]
     carried = [_carried(lengths[index:], masses[index:]) for index in range(len(lengths))]
     reaches = [inertia / lever for inertia, lever in carried]
@@ -67,7 +67,7 @@ def swing_of(spring: Spring, bone: str, metres: float) -> tuple[Swing, bool]:
     return swing, share != wanted
 
 
-def rates_of(rod: Rod, length: float, metres: float = 1.0) -> tuple[float, float]:
+def _rates(rod: Rod, length: float, metres: float = 1.0) -> tuple[float, float]:
     """k/J, 1/s^2, and the damping coefficient, 1/s, of a rod of ``length`` m at RATE.
 
     The product and minus the sum of log(z) RATE for both roots z; ``metres`` as in swing_of.
