@@ -9,11 +9,8 @@ import numpy as np
 from ..model import errors
 from .gltf_file import GltfFile, count, nested
 
-LARGEST_COUNT = {'SCALAR': 3_000_000}
-"""Elements in one array, by type: a skin of a million triangles has three million indices."""
-
-LARGEST_OTHER = 500_000
-"""Elements of every other type: vertices."""
+LARGEST_SCALARS, LARGEST_VECTORS = 3_000_000, 500_000
+"""Elements in one array: a skin of a million triangles has three million indices."""
 
 COMPONENTS = {5120: np.dtype('<i1'), 5121: np.dtype('<u1'), 5122: np.dtype('<i2'),
               5123: np.dtype('<u2'), 5125: np.dtype('<u4'), 5126: np.dtype('<f4')}
@@ -55,7 +52,7 @@ def _read(file: GltfFile, index: object, kind: str, where: str) -> np.ndarray:
     if accessor.get('type') != kind:
         raise errors.WrongForm(f'{place}.type', accessor.get('type'), kind)
     number = count(accessor, 'count', place)
-    most = LARGEST_COUNT.get(kind, LARGEST_OTHER)
+    most = LARGEST_SCALARS if kind == 'SCALAR' else LARGEST_VECTORS
     if number > most:
         raise errors.OutOfRange(f'{place}.count', number, f'at most {most}')
     if accessor.get('bufferView') is None:

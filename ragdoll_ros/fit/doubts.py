@@ -44,21 +44,16 @@ def _size(doll: Ragdoll) -> list[str]:
 
 
 def _densities(doll: Ragdoll) -> list[str]:
-    found = []
-    for bone in doll.bones:
-        density = bone.mass / bone.shape.volume
-        if density > DENSEST:
-            found.append(f'{bone.name}: a density of {density:.0f} kg/m^3, over {DENSEST:.0f}')
-    return found
+    densities = {bone.name: bone.mass / bone.shape.volume for bone in doll.bones}
+    return [f'{name}: a density of {density:.0f} kg/m^3, over {DENSEST:.0f}'
+            for name, density in densities.items() if density > DENSEST]
 
 
 def _bends(doll: Ragdoll) -> list[str]:
-    names = tuple(bone.name for bone in doll.bones)
-    above = {joint.child: names.index(joint.parent) for joint in doll.joints}
-    order = (doll.root.name, *(joint.child for joint in doll.joints_from_root()))
-    place = {name: index for index, name in enumerate(order)}
-    parents = tuple(place[names[above[name]]] if name in above else -1 for name in order)
-    roles = dict(zip(order, roles_of(order, parents), strict=True))
+    joints = doll.joints_from_root()
+    names = (doll.root.name, *(joint.child for joint in joints))
+    parents = (-1, *(names.index(joint.parent) for joint in joints))
+    roles = dict(zip(names, roles_of(names, parents), strict=True))
     found = []
     for joint in doll.joints:
         if roles[joint.child] in BENDS and joint.kind in ('hinge', 'universal'):

@@ -112,7 +112,7 @@ def _folding(above: np.ndarray | None, along: np.ndarray,
              toward: np.ndarray) -> tuple[np.ndarray, tuple[float, float]]:
     """Axis and limits of a hinge that takes ``along`` toward a direction.
 
-    Bent that way in the bind pose already, it turns about the axis of that bend and stops
+    Bent that way in the bind pose already, it rotates about the axis of that bend and stops
     where it is straight.
     """
     axis = _across(along, toward)
@@ -124,7 +124,7 @@ def _folding(above: np.ndarray | None, along: np.ndarray,
 
 
 def _across(along: np.ndarray, toward: np.ndarray) -> np.ndarray:
-    """Axis about which ``along`` turns toward a direction; toward up where it points there."""
+    """Unit axis of the rotation of ``along`` toward a direction; toward up where it is that one."""
     axis = np.cross(along, toward)
     if np.linalg.norm(axis) < 0.3:
         axis = np.cross(along, UP if abs(along @ UP) < 0.9 else LEFT)

@@ -93,8 +93,8 @@ def _doll(tree: UrdfTree) -> tuple[Ragdoll, list[str]]:
         joint, above = tree.joints[above], tree.joints[above].parent
         if joint.kind not in ('fixed', 'floating'):
             notes.append(f'{joint.name}: nothing with a shape above it: left out')
-    riders = _riders(poses, carriers, names, bones)
-    return Ragdoll(plain_name(tree.name, 'link'), tuple(bones), tuple(joints), riders=riders), notes
+    frames = _frames(poses, carriers, names, bones)
+    return Ragdoll(plain_name(tree.name, 'link'), tuple(bones), tuple(joints), riders=frames), notes
 
 
 def _solid(link: UrdfLink, notes: list[str]) -> tuple[Shape, Pose] | None:
@@ -218,7 +218,7 @@ def _turning(parent: str, child: str, anchor: np.ndarray, row: list[UrdfJoint],
 
 def _limits(joint: UrdfJoint, angles: dict[str, float],
             notes: list[str]) -> tuple[float, float] | None:
-    """Limits from the angle that the joint starts at; None for a turn and more."""
+    """Limits from the angle that the joint starts at; None for a full circle and more."""
     if joint.kind == 'revolute' and joint.limits is None:
         notes.append(f'{joint.name}: a revolute joint without limits turns freely')
     if joint.limits is None or joint.limits[1] - joint.limits[0] >= 2 * math.pi:
@@ -237,15 +237,13 @@ def _cone(limits: list) -> tuple:
     return symmetric(limits[:-1], LARGEST_SWING), symmetric(limits[-1:], 2 * math.pi)
 
 
-def _riders(poses: dict[str, Pose], carriers: dict[str, str], names: dict[str, str],
+def _frames(poses: dict[str, Pose], carriers: dict[str, str], names: dict[str, str],
             bones: list[Bone]) -> tuple[SkeletonFrame, ...]:
     """Every link's frame, fixed on the body that carries it."""
     by_name = {bone.name: bone for bone in bones}
-    riders = []
-    for name, text in _names(list(poses)).items():
-        bone = by_name[names[carriers[name]]]
-        riders.append(SkeletonFrame(text, bone.name, *pose_in_body(bone, *poses[name])))
-    return tuple(riders)
+    carried = {name: by_name[names[carriers[name]]] for name in poses}
+    return tuple(SkeletonFrame(text, carried[name].name, *pose_in_body(carried[name], *poses[name]))
+                 for name, text in _names(list(poses)).items())
 
 
 def _names(given: list[str], taken: Sequence[str] = ()) -> dict[str, str]:

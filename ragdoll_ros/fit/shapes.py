@@ -89,7 +89,7 @@ def _cylinders(points: np.ndarray, thinnest: float) -> Iterator[Fitted]:
         radial = np.linalg.norm((points - centre)[:, :2], axis=1)
         for radius in np.quantile(radial, QUANTILES):
             for low, high in ends.T:
-                middle = np.array([centre[0], centre[1], (low + high) / 2])
+                middle = np.array([*centre[:2], (low + high) / 2])
                 yield Fitted(Cylinder(max(radius, thinnest / 2), max(high - low, thinnest)), middle)
 
 
@@ -103,7 +103,7 @@ def _capsules(points: np.ndarray, thinnest: float) -> Iterator[Fitted]:
         highs = np.quantile(points[:, 2] - domes, 1 - END_CUTS, axis=1)
         for radius, *ends in zip(radii, lows.T, highs.T, strict=True):
             for low, high in zip(*ends, strict=True):
-                middle = np.array([centre[0], centre[1], (low + high) / 2])
+                middle = np.array([*centre[:2], (low + high) / 2])
                 yield Fitted(Capsule(radius, max(high - low, thinnest / 2)), middle)
 
 
