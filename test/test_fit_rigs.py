@@ -90,7 +90,7 @@ def test_mirrored_limbs_get_mirrored_bodies(name):
 @pytest.mark.parametrize('shape', ['box', 'sphere', 'capsule', 'cylinder'])
 @pytest.mark.parametrize('orientation', ['bone', 'principal'])
 def test_every_shape_and_orientation_by_choice(shape, orientation):
-    character = fitted('cmu').character
+    character = fitted('four_legs').character
     fit = fit_character(character, Options(shape=shape, orientation=orientation))
     assert {bone.shape.kind for bone in fit.doll.bones} == {shape}
     if orientation == 'bone':
