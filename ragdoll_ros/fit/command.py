@@ -10,7 +10,7 @@ from ..files.doll import load_doll, save_doll
 from ..files.urdf import to_urdf
 from ..model import errors
 from .character import read_character
-from .pipeline import Fit, Options, fit_character
+from .pipeline import Options, fit_character
 from .report import doll_report, fit_report
 from .robot import read_urdf
 
@@ -88,7 +88,9 @@ def _run(options: argparse.Namespace) -> None:
         doll, notes = read_urdf(path)
         report = doll_report(doll, notes)
     else:
-        fit = _fit(path, options)
+        fit = fit_character(read_character(path, options.scale), Options(
+            options.shape, options.orientation, options.weight, options.smallest, options.mass,
+            options.masses))
         doll, report = dataclasses.replace(fit.doll, model=str(path)), fit_report(fit)
     print(report)
     if options.output:
@@ -98,13 +100,6 @@ def _run(options: argparse.Namespace) -> None:
     if options.picture:
         from .picture import draw
         draw(doll, fit.character if fit else None, options.picture)
-
-
-def _fit(path: Path, options: argparse.Namespace) -> Fit:
-    character = read_character(path, options.scale)
-    return fit_character(character, Options(
-        options.shape, options.orientation, options.weight, options.smallest, options.mass,
-        options.masses))
 
 
 def _check(options: argparse.Namespace, parser: argparse.ArgumentParser) -> None:

@@ -18,9 +18,6 @@ from .nodes import Nodes
 TAIL = 0.07
 """m: VRM 0.x lets the last node of a chain end so far on, in line."""
 
-SPRINGS, GROUPS = 'extensions.VRMC_springBone', 'extensions.VRM.secondaryAnimation'
-"""Where VRM 1.0 and VRM 0.x keep them."""
-
 SETTINGS = {'stiffness': (1.0, 0.0, 1e6), 'gravityPower': (0.0, -1e6, 1e6),
             'dragForce': (0.5, 0.0, 1.0)}
 """Default (the specification's), least and most."""
@@ -58,12 +55,14 @@ def read_springs(file: GltfFile, nodes: Nodes, notes: list[str]) -> list[Spring]
     extensions = nested(file.json, 'extensions', dict, '')
     found: list[Spring] = []
     if 'VRMC_springBone' in extensions:
-        data, where = nested(extensions, 'VRMC_springBone', dict, 'extensions'), SPRINGS
+        where = 'extensions.VRMC_springBone'
+        data = nested(extensions, 'VRMC_springBone', dict, 'extensions')
         for number, entry in enumerate(objects(data, 'springs', where)):
             found.append(_spring(file, nodes, entry, f'{where}.springs[{number}]'))
     else:
-        vrm, where = nested(extensions, 'VRM', dict, 'extensions'), GROUPS
-        data = nested(vrm, 'secondaryAnimation', dict, 'extensions.VRM')
+        where = 'extensions.VRM.secondaryAnimation'
+        data = nested(nested(extensions, 'VRM', dict, 'extensions'), 'secondaryAnimation', dict,
+                      'extensions.VRM')
         for number, entry in enumerate(objects(data, 'boneGroups', where)):
             found += _group(file, nodes, entry, f'{where}.boneGroups[{number}]')
         found.sort(key=lambda spring: nodes.order.index(spring.nodes[0]))
