@@ -11,6 +11,7 @@ import yaml
 
 viser = pytest.importorskip('viser')
 
+from page_client import wait  # noqa: E402
 from test_fit_broken import BROKEN  # noqa: E402
 
 from ragdoll_ros.files.doll import load_doll, save_doll  # noqa: E402
@@ -44,7 +45,7 @@ class Desk:
         self.asked = []
         self.reason = ''
         self.path = path
-        self.editor = Editor(server, DROP, self.use, lambda held: self.asked.append(held), path)
+        self.editor = Editor(server, DROP, lambda scene: self.use(scene), self.asked.append, path)
         self.panel, self.files = self.editor.panel, self.editor.files
 
     def use(self, scene):
@@ -356,13 +357,10 @@ def test_many_at_once_leave_one_consistent_history(desk):
     """Viser calls from 32 threads: each update is a step, none is lost, all can be undone."""
     desk.editor.select('head')
 
-    def edit(mass):
-        desk.editor._change(lambda: changes.change_bone(desk.editor.scene, 'head', mass=mass), 'm')
-
     def work(number):
         for k in range(20):
-            with desk.editor._acting:
-                edit(1.0 + number + k / 100)
+            mass = 1.0 + number + k / 100
+            desk.editor.take(changes.change_bone(DROP, 'head', mass=mass), 'm')
             desk.editor.select('torso' if k % 2 else 'head')
 
     threads = [threading.Thread(target=work, args=(number,)) for number in range(4)]
@@ -582,9 +580,14 @@ def test_a_gltf_in_pieces_is_told_to_come_in_one(desk):
 
 
 def test_one_character_at_a_time(desk):
-    with desk.files._fitting:
+    """One that comes while another is being fitted is refused; the next is looked at."""
+    def use(scene):
         desk.files.fit('x.glb', b'')
-        assert 'another character is being fitted' in desk.said()
+        desk.asked.append(desk.said())
+
+    desk.use = use
+    desk.files.fit('rig.glb', fit_rigs.document(fit_rigs.RIGS['one_bone']).glb())
+    assert ['another character is being fitted' in said for said in desk.asked] == [True]
     desk.files.fit('x.glb', b'')
     assert 'expected' in desk.said()
 
@@ -623,10 +626,3 @@ def test_on_a_running_simulation(server, tmp_path):
         wait(lambda: source.frame.state.positions[head][2] < 1.4)
     finally:
         source.close()
-
-
-def wait(condition):
-    end = time.monotonic() + 10
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.005)

@@ -46,13 +46,15 @@ class Page:
         self.selectors: list[Callable[[str], None]] = []
         """Called with the name of a bone that is clicked on: the editor, say."""
         self.editor: Editor | None = None
+        self.frame: Frame | None = None
+        """What is shown; None before the first."""
+        self.stage: Stage | None = None
+        """All that is drawn of the scene that is shown; None before the first frame."""
         self._folder = folder
-        self._frame: Frame | None = None
-        self._stage: Stage | None = None
         light(server)
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         server.gui.add_html(KEEP_PAGE)
-        self._problem = server.gui.add_html('')
+        self.problem = server.gui.add_html('')
         self.tabs = server.gui.add_tab_group()
         with self.tabs.add_tab('Play'):
             self.controls = Controls(server, source)
@@ -60,9 +62,9 @@ class Page:
             self.listeners.append(RecordingPanel(server).take)
         self._edit_tab = self.tabs.add_tab('Edit')
         with self.tabs.add_tab('Plots'):
-            self._plots = Plots(server)
+            self.plots = Plots(server)
         self._follower = Follower(server)
-        self._pointer = Pointer(lambda: self.source, lambda: self._frame, self._select)
+        self._pointer = Pointer(lambda: self.source, lambda: self.frame, self._select)
 
     def play(self, source: Source) -> None:
         """Show another source from now on; the last one is left open."""
@@ -84,14 +86,15 @@ class Page:
         self.source.want(self.view.wanted if is_open else Wanted())
         if is_open:
             frame, report = self.source.frame, self.source.report
-            if frame is not None and frame is not self._frame:
+            if frame is not None and frame is not self.frame:
                 self._draw(frame)
             if frame is not None:
                 now = time.monotonic()
-                self._plots.show(frame, report, now)
-                self._follower.follow(frame, now, self.view.follow)
-            if self._stage is not None:
-                self._stage.be_visible(bones=self.view.bones, skins=self.view.skin)
+                self.plots.show(frame, report, now)
+                self._follower.follow(frame, now, self.view.follow.value)
+            if self.stage is not None:
+                self.stage.be_visible(bones=self.view.bones.value,
+                                      skins=self.view.skin.value)
             if self.editor is not None:
                 self.editor.take_note(report.paused)
             self._tell(report.problem, report.note)
@@ -99,16 +102,16 @@ class Page:
         return is_open
 
     def _draw(self, frame: Frame) -> None:
-        new = self._stage is None or frame.scene is not self._stage.scene
+        new = self.stage is None or frame.scene is not self.stage.scene
         if new:
-            self._stage = Stage(self.server, frame)
-            self._pointer.attach(self._stage.bodies, self._stage.skins)
+            self.stage = Stage(self.server, frame)
+            self._pointer.attach(self.stage.bodies, self.stage.skins)
             self.controls.show_scene(frame.scene.name)
-            self.view.show_scene(has_skin=bool(self._stage.skins.handles))
+            self.view.show_scene(has_skin=bool(self.stage.skins.handles))
             self._edit(frame.scene)
-        self._frame = frame
+        self.frame = frame
         with self.server.atomic():
-            self._stage.show(frame)
+            self.stage.show(frame)
         # Else viser waits for more to send along, up to its own 60th of a second.
         self.server.flush()
         for listener in self.listeners:
@@ -130,6 +133,6 @@ class Page:
             selector(bone)
 
     def _tell(self, problem: str, note: str) -> None:
-        notes = [note, *(self._stage.skins.notes if self._stage is not None else ())]
-        self._problem.content = colored(problem, RED) + ''.join(colored(each, GREY)
+        notes = [note, *(self.stage.skins.notes if self.stage is not None else ())]
+        self.problem.content = colored(problem, RED) + ''.join(colored(each, GREY)
                                                                 for each in notes)

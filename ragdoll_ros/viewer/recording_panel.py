@@ -29,23 +29,24 @@ class RecordingPanel:
     """
 
     def __init__(self, server: viser.ViserServer) -> None:
-        self._recorder: Recorder | None = None
+        self.recorder: Recorder | None = None
+        """What has been taken; None before a recording begins."""
         self._ended = False
         self._lock = threading.Lock()
         with server.gui.add_folder('Recording', expand_by_default=False):
-            self._button = server.gui.add_button(
+            self.button = server.gui.add_button(
                 RECORD, icon=viser.Icon.PLAYER_RECORD,
                 hint='Poses of all bones as run.json; ragdoll_viewer --play run.json shows them')
             picture = server.gui.add_button('Picture', icon=viser.Icon.CAMERA,
                                             hint='This view as ragdoll.png')
         self._frame: Frame | None = None
-        self._button.on_click(self._clicked)
+        self.button.on_click(lambda event: self.toggle(event.client))
         picture.on_click(_send_picture)
 
     @property
     def recording(self) -> bool:
         """Whether poses are being taken."""
-        return self._recorder is not None and not self._ended
+        return self.recorder is not None and not self._ended
 
     def take(self, frame: Frame) -> None:
         """Tell what is shown.
@@ -58,7 +59,7 @@ class RecordingPanel:
             self._record(frame)
 
     def _record(self, frame: Frame) -> None:
-        recorder = self._recorder
+        recorder = self.recorder
         if recorder is None or self._ended:
             return
         if recorder.scene is not frame.scene:
@@ -73,25 +74,22 @@ class RecordingPanel:
     def _end(self, label: str) -> None:
         """Take no more, and let the button tell why."""
         self._ended = True
-        self._button.label = label
+        self.button.label = label
 
-    def _clicked(self, event: viser.GuiEvent) -> None:
+    def toggle(self, client: viser.ClientHandle | None) -> None:
+        """Begin to record; else end the recording and send it to the page that asked."""
         with self._lock:
-            recorder, self._recorder = self._recorder, None
+            recorder, self.recorder = self.recorder, None
             self._ended = False
             if recorder is None and self._frame is not None:
-                self._recorder = Recorder(self._frame.scene)
-                self._button.label = STOP
+                self.recorder = Recorder(self._frame.scene)
+                self.button.label = STOP
                 self._record(self._frame)
             else:
-                self._button.label = RECORD
-        if recorder is not None and event.client is not None:
-            _send_run(recorder, event.client)
-
-
-def _send_run(recorder: Recorder, client: viser.ClientHandle) -> None:
-    text = recording_text(recorder.recording())
-    client.send_file_download('run.json', text.encode(), save_immediately=True)
+                self.button.label = RECORD
+        if recorder is not None and client is not None:
+            text = recording_text(recorder.recording())
+            client.send_file_download('run.json', text.encode(), save_immediately=True)
 
 
 def _send_picture(event: viser.GuiEvent) -> None:

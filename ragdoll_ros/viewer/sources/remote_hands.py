@@ -12,6 +12,8 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
 from ...model import rotation
+from ...model.scene import Scene
+from ...model.state import State
 from .source import Frame, Held
 
 
@@ -75,9 +77,9 @@ class RemoteHands:
         for hand, held in list(self._hands.items()):
             self._send(hand, held, InteractiveMarkerFeedback.KEEP_ALIVE)
 
-    def held(self, frame: Frame) -> tuple[Held, ...]:
+    def held(self, scene: Scene, state: State) -> tuple[Held, ...]:
         """What the hands hold now."""
-        names, state = frame.scene.bone_names, frame.state
+        names = scene.bone_names
         return tuple(Held(
             hand.bone, state.positions[bone] + rotation.rotate(
                 state.orientations[bone], hand.local), hand.target)
