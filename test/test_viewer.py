@@ -164,18 +164,15 @@ def test_another_scene_by_the_dropdown(page):
     assert rods.shape == (8, 2, 3) and np.allclose(rods[1:, 0], rods[:-1, 1])
 
 
-def test_a_scene_that_is_refused_is_not_chosen(page):
+def test_a_scene_that_is_refused_is_not_chosen():
     """The list goes on naming the scene that is shown, and the page that chose is told why."""
-    client = page.open()
-    wait(lambda: page.controls.scene.value == 'drop')
-    state, simulated = page.source.frame.state, page.source
-    page.play(Playback(Recording(DROP, np.zeros(1), state.positions[None],
-                                 state.orientations[None])))
-    simulated.close()
-    handle, seen = page.controls.scene, []
-    handle.on_update(lambda event: seen.append(handle.value))
-    client.update(handle, 'crowd')
-    wait(lambda: 'crowd' in seen and handle.value == 'drop')
+    unturned = np.tile((0, 0, 0, 1.0), (1, 10, 1))
+    with served(Playback(Recording(DROP, np.zeros(1), np.zeros((1, 10, 3)), unturned))) as page:
+        client, handle, seen = page.open(), page.controls.scene, []
+        wait(lambda: handle.value == 'drop')
+        handle.on_update(lambda event: seen.append(handle.value))
+        client.update(handle, 'crowd')
+        wait(lambda: 'crowd' in seen and handle.value == 'drop')
 
 
 def test_what_was_sent_is_text_on_the_page(page):

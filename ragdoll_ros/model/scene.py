@@ -5,6 +5,7 @@ SI units, world frame: x forward, y left, z up (REP 103). Quaternions are x, y, 
 """
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -145,6 +146,12 @@ class Scene:
         """Name of every bone; with several dolls, doll/bone."""
         return tuple(self.qualified(placement, bone.name)
                      for placement in self.dolls for bone in placement.doll.bones)
+
+    @cached_property
+    def bone_slices(self) -> tuple[slice, ...]:
+        """What of all bone arrays is each doll's, in the order of ``dolls``."""
+        ends = list(itertools.accumulate(len(placement.doll.bones) for placement in self.dolls))
+        return tuple(map(slice, [0, *ends[:-1]], ends))
 
     @cached_property
     def angle_names(self) -> tuple[str, ...]:

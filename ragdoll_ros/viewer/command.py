@@ -71,7 +71,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def parser() -> argparse.ArgumentParser:
-    """Say what the command takes."""
+    """Options of the command."""
     parser = argparse.ArgumentParser(
         'ragdoll_viewer', description=__doc__, epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -143,7 +143,7 @@ def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
 
 
 def free_port(host: str, wanted: int | None) -> int:
-    """Give the wanted port, or the first free one from PORT on; NoPort if there is none."""
+    """The wanted port, or the first free one from PORT on; NoPort if there is none."""
     reason = ''
     for port in (wanted,) if wanted is not None else range(PORT, PORT + 100):
         try:
@@ -160,7 +160,7 @@ def free_port(host: str, wanted: int | None) -> int:
 
 @contextlib.contextmanager
 def server_at(host: str, port: int) -> Iterator[object]:
-    """Have viser's server, without its own words on standard output.
+    """Viser's server, without its own words on standard output.
 
     At the end it would wait 6 s for each connection on which nothing was asked yet, such as a
     browser keeps in reserve: it is left to itself then.
@@ -178,7 +178,7 @@ def server_at(host: str, port: int) -> Iterator[object]:
 
 
 def shown(host: str) -> str:
-    """Give the name by which this machine's browser reaches a host."""
+    """Name by which this machine's browser reaches a host."""
     return {'0.0.0.0': '127.0.0.1', '::': '[::1]'}.get(host, f'[{host}]' if ':' in host else host)
 
 

@@ -33,13 +33,13 @@ KEEP_KEYS = """<img src="data:," style="display:none" onerror="
       if (event.detail && (!typed || event.target.closest('[role=option]'))) at?.blur();
     });
   }">"""
-"""Keeps arrow keys from viser's camera, which would turn with each push; commands still get them:
+"""Keeps arrow keys from viser's camera, which would rotate with each push; commands still get them:
 they listen where this does, the camera further out. What was clicked gives the keys back, or
 Space would press it again, a checkbox keep all keys; but for a field in which one types."""
 
 
 class Controls:
-    """The panel's first tab. ``source`` may be another one later."""
+    """The panel's first tab."""
 
     def __init__(self, server: viser.ViserServer, source: Source) -> None:
         self.source = source
@@ -85,7 +85,7 @@ class Controls:
         self.source.step()
 
     def show(self, report: Report) -> None:
-        """Let the panel tell how the source is."""
+        """Show how the source does."""
         if report.paused != self._shown.paused:
             self.pause.label = 'Go on' if report.paused else 'Pause'
             self.pause.icon = 'player-play' if report.paused else 'player-pause'
@@ -95,7 +95,7 @@ class Controls:
         self._shown = report
 
     def show_scene(self, name: str) -> None:
-        """Let the panel tell which scene it is.
+        """Show which scene it is.
 
         It is written where `_choose` reads it, in viser's thread: written from another one, it
         could come between a choice that arrives at this moment and its reading, and win.

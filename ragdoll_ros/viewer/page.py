@@ -3,7 +3,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import viser
@@ -41,10 +40,6 @@ class Page:
                  folder: str | Path = '.') -> None:
         self.server = server
         self.source = source
-        self.listeners: list[Callable[[Frame], None]] = []
-        """Called with each frame that is drawn, in the drawing thread: a recorder, say."""
-        self.selectors: list[Callable[[str], None]] = []
-        """Called with the name of a bone that is clicked on: the editor, say."""
         self.editor: Editor | None = None
         self.frame: Frame | None = None
         """What is shown; None before the first."""
@@ -59,17 +54,12 @@ class Page:
         with self.tabs.add_tab('Play'):
             self.controls = Controls(server, source)
             self.view = View(server)
-            self.listeners.append(RecordingPanel(server).take)
+            self._recording = RecordingPanel(server)
         self._edit_tab = self.tabs.add_tab('Edit')
         with self.tabs.add_tab('Plots'):
             self.plots = Plots(server)
         self._follower = Follower(server)
-        self._pointer = Pointer(lambda: self.source, lambda: self.frame, self._select)
-
-    def play(self, source: Source) -> None:
-        """Show another source from now on; the last one is left open."""
-        self.source.want(Wanted())
-        self.source = self.controls.source = source
+        self._pointer = Pointer(source, lambda: self.frame, self._select)
 
     def run(self, stop: threading.Event) -> None:
         """Draw until told to stop."""
@@ -81,7 +71,7 @@ class Page:
         self.source.want(Wanted())
 
     def update(self) -> bool:
-        """Draw what has changed; tell whether any page is open."""
+        """Draw what has changed; returns whether any page is open."""
         is_open = bool(self.server.get_clients())
         self.source.want(self.view.wanted if is_open else Wanted())
         if is_open:
@@ -114,23 +104,21 @@ class Page:
             self.stage.show(frame)
         # Else viser waits for more to send along, up to its own 60th of a second.
         self.server.flush()
-        for listener in self.listeners:
-            listener(frame)
+        self._recording.take(frame)
 
     def _edit(self, scene: Scene) -> None:
-        """Let the scene be edited."""
+        """Hand the scene to the editor, which the first one makes."""
         if self.editor is not None:
             self.editor.show(scene)
             return
         with self._edit_tab:
-            self.editor = Editor(self.server, scene, lambda scene: self.source.use(scene),
-                                 lambda wanted: self.source.pause(wanted), self._folder)
-        self.selectors.append(self.editor.select)
+            self.editor = Editor(self.server, scene, self.source.use, self.source.pause,
+                                 self._folder)
         self.controls.before_step = self.editor.leave
 
     def _select(self, bone: str) -> None:
-        for selector in self.selectors:
-            selector(bone)
+        if self.editor is not None:
+            self.editor.select(bone)
 
     def _tell(self, problem: str, note: str) -> None:
         notes = [note, *(self.stage.skins.notes if self.stage is not None else ())]

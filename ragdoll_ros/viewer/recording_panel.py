@@ -23,7 +23,7 @@ ELSEWHERE, FULL = 'Download (scene has changed)', 'Download (recording is full)'
 
 
 class RecordingPanel:
-    """Two buttons in the page's panel; what is shown is told by take(), from any thread.
+    """Two buttons in the page's panel; take() is told what is shown, from any thread.
 
     All pages share one recording: whoever stops it gets it.
     """
@@ -49,7 +49,7 @@ class RecordingPanel:
         return self.recorder is not None and not self._ended
 
     def take(self, frame: Frame) -> None:
-        """Tell what is shown.
+        """Take note of what is shown.
 
         Another scene, or as much as one recording may hold, ends what is being taken; it waits
         for its download.
@@ -72,7 +72,7 @@ class RecordingPanel:
             self._end(FULL)
 
     def _end(self, label: str) -> None:
-        """Take no more, and let the button tell why."""
+        """Take no more; the button says why."""
         self._ended = True
         self.button.label = label
 

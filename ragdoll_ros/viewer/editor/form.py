@@ -70,7 +70,7 @@ class Form:
                     widget.value = sheet[key]
 
     def values(self) -> Sheet:
-        """Give what stands in the fields that are shown."""
+        """What stands in the fields that are shown."""
         return {key: widget.value for key, widget in self._widgets.items() if widget.visible}
 
     def tell(self, found: Iterable[errors.ModelError]) -> None:
@@ -81,7 +81,7 @@ class Form:
             error.visible = key in said
 
     def errors(self) -> dict[str, str]:
-        """Give what is written under the fields."""
+        """What is written under the fields, by key."""
         return {key: error.content for key, error in self._errors.items() if error.visible}
 
     def _chosen(self, key: str) -> None:
@@ -90,12 +90,12 @@ class Form:
 
 
 def text_of(error: errors.ModelError) -> str:
-    """Say what is wrong with a field: the value, and what would be right."""
+    """What is wrong with a field: the value, and what would be right."""
     return str(type(error)('', error.value, error.expected)).removeprefix('file: ')
 
 
 def colored(text: str, color: str) -> str:
-    """Give a text as HTML in a colour. What users send stands in it: nothing of it is HTML."""
+    """A text as HTML in a colour. What users send stands in it: nothing of it is HTML."""
     lines = '<br>'.join(html.escape(line) for line in text.splitlines())
     return (f'<div style="color: {color}; font-size: 0.85em; overflow-wrap: anywhere; '
             f'padding: 0 1em 0.4em">{lines}</div>') if text else ''

@@ -22,7 +22,7 @@ GUESSED = ('The shapes are those of `robot_description`, as the scene `{}` is no
 
 def scene_of_node(name: str, names: Sequence[str], description: str,
                   frame: str = WORLD) -> tuple[Scene, str]:
-    """Give the scene of a node and what should be known of it, '' if nothing.
+    """The scene of a node, and what should be known of it, '' if nothing.
 
     ``name`` is the node's parameter `scene`, ``names`` its `bone_names`, ``description`` the URDF
     that it publishes, ``frame`` its `frame_id`. A scene that is loaded here is the node's if it
