@@ -70,7 +70,7 @@ def far(view, bodies, distance):
     return (np.linalg.norm(view.bodies(SCENE) - bodies, axis=1) > distance).all()
 
 
-def test_sees_ten_bodies_fall(view, states):
+def test_sees_ten_bodies_fall(states, view):
     """All move, and what is drawn is a tick of the fall as a simulation here has it.
 
     A page gets numbers of 32 bits: 1e-6 m at 2 m.
