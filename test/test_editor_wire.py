@@ -5,7 +5,7 @@ import pytest
 viser = pytest.importorskip('viser')
 
 from page_client import PageClient, batch_of, served, wait  # noqa: E402
-from test_editor import RUBBISH  # noqa: E402
+from test_editor import RUBBISH, errors_in  # noqa: E402
 from test_fit_broken import BROKEN  # noqa: E402
 from viser import _messages  # noqa: E402
 
@@ -91,9 +91,9 @@ def test_a_bone_is_clicked_dragged_typed_and_undone(page, browser):
     settled(editor)
     browser.update(editor.panel.joint['limits_1'], '100, -5')
     browser.press_button(editor.panel.update)
-    wait(lambda: 'limits_1' in editor.panel.errors())
+    wait(lambda: 'limits_1' in errors_in(editor.panel))
     browser.press(page, 'Undo')
-    wait(lambda: editor.scene == moved and not editor.panel.errors())
+    wait(lambda: editor.scene == moved and not errors_in(editor.panel))
     browser.press(page, 'Undo')
     wait(lambda: editor.scene == DROP and page.source.frame.scene is editor.scene)
     browser.press(page, 'Edit, or drop it')

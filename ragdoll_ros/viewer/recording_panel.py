@@ -60,7 +60,7 @@ class RecordingPanel:
 
     def _record(self, frame: Frame) -> None:
         recorder = self.recorder
-        if recorder is None or self._ended:
+        if not self.recording:
             return
         if recorder.scene is not frame.scene:
             self._end(ELSEWHERE)

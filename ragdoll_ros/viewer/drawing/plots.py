@@ -41,7 +41,7 @@ class Plots:
         """Take a frame and a report at ``now`` s of a steady clock; draws at a modest rate."""
         if now < self._next:
             return
-        if frame.scene is not self._scene or frame.time < self._last[0]:
+        if frame.scene != self._scene or frame.time < self._last[0]:
             self._begin(frame)
         elif now - self._last[1] < 2 * PERIOD:
             pace = (frame.time - self._last[0]) / (now - self._last[1])

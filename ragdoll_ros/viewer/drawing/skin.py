@@ -16,7 +16,8 @@ import viser
 from ...fit.character import Character, read_character
 from ...model import errors, rotation
 from ...model.ragdoll import Ragdoll
-from ...model.scene import Scene
+from ...model.scene import Placement, Scene
+from ...model.skeleton import Riders
 from ...model.state import State
 from .bodies import WXYZ
 
@@ -112,8 +113,6 @@ def _size(doll: Ragdoll, character: Character) -> float:
 
     Not how far apart they stand: limbs may have been moved.
     """
-    from ...model.scene import Placement
-    from ...model.skeleton import Riders
     poses = State(np.array([bone.position for bone in doll.bones]),
                   np.array([bone.orientation for bone in doll.bones]),
                   np.zeros((0, 3)), np.zeros((0, 3)))

@@ -47,12 +47,13 @@ class Form:
     def __init__(self, gui: viser.GuiApi, fields: Sequence[Field],
                  on_kind: Callable[[str, str], None]) -> None:
         self._widgets: dict[str, Any] = {}
-        self._errors: dict[str, viser.GuiHtmlHandle] = {}
+        self.errors: dict[str, viser.GuiHtmlHandle] = {}
+        """What is written under the fields, seen where something is wrong."""
         self._on_kind = on_kind
         self._filling = Quiet()
         for field in fields:
             widget = self._widgets[field.key] = _widget(gui, field)
-            self._errors[field.key] = gui.add_html('', visible=False)
+            self.errors[field.key] = gui.add_html('', visible=False)
             if field.widget in ('shape', 'joint'):
                 widget.on_update(lambda event, key=field.key: self._chosen(key))
 
@@ -76,13 +77,9 @@ class Form:
     def tell(self, found: Iterable[errors.ModelError]) -> None:
         """Write each error under the field that its path names; take the others away."""
         said = {error.path: text_of(error) for error in found}
-        for key, error in self._errors.items():
+        for key, error in self.errors.items():
             error.content = colored(said.get(key, ''), RED)
             error.visible = key in said
-
-    def errors(self) -> dict[str, str]:
-        """What is written under the fields, by key."""
-        return {key: error.content for key, error in self._errors.items() if error.visible}
 
     def _chosen(self, key: str) -> None:
         if not self._filling.now:

@@ -7,9 +7,9 @@ import re
 import numpy as np
 
 from ...model import errors, rotation
-from ...model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame
+from ...model.ragdoll import Bone, Joint, SkeletonFrame
 from ...model.scene import Scene
-from .changes import USUAL, USUAL_TWIST, find, limb, replace_doll
+from .changes import USUAL, USUAL_TWIST, find, joint_of, limb, replace_doll
 
 NAME = re.compile(r'[^\s/][^/\x00-\x1f]{0,99}')
 """What config/doll.schema.json takes for a name."""
@@ -22,7 +22,7 @@ def add_bone(scene: Scene, parent: str, name: str) -> Scene:
         raise errors.WrongForm('name', name, 'text without / and control characters')
     if any(bone.name == name for bone in placement.doll.bones):
         raise errors.DuplicateName('name', name, 'a name of its own')
-    outward = _outward(placement.doll, above)
+    outward = _outward(above, joint_of(scene, parent))
     reach = float(above.shape.reach(rotation.rotate(rotation.inverse(above.orientation), outward)))
     bone = dataclasses.replace(above, name=name, position=above.position + 2 * reach * outward)
     joint = Joint(above.name, name, 'ball', above.position + reach * outward, (outward,),
@@ -34,11 +34,10 @@ def add_bone(scene: Scene, parent: str, name: str) -> Scene:
 def remove_limb(scene: Scene, name: str) -> Scene:
     """Take off a bone and all that hangs from it, with its swings; its skin goes to the parent."""
     placement, bone = find(scene, name)
-    doll = placement.doll
-    if bone is doll.root:
-        raise errors.Detached(f'{name}', name, 'a bone with a parent: all hangs from the root')
+    doll, joint = placement.doll, joint_of(scene, name)
+    if joint is None:
+        raise errors.Detached(name, name, 'a bone with a parent: all hangs from the root')
     gone = set(limb(doll, bone.name))
-    joint = next(joint for joint in doll.joints if joint.child == bone.name)
     return replace_doll(
         scene, placement,
         bones=tuple(bone for bone in doll.bones if bone.name not in gone),
@@ -58,9 +57,8 @@ def _carried(rider: SkeletonFrame, old: Bone, new: Bone) -> SkeletonFrame:
         position=rotation.rotate(back, position - np.array(new.position)))
 
 
-def _outward(doll: Ragdoll, bone: Bone) -> np.ndarray:
+def _outward(bone: Bone, joint: Joint | None) -> np.ndarray:
     """Unit direction (3,) from where a bone hangs to its middle; up for the root."""
-    joint = next((joint for joint in doll.joints if joint.child == bone.name), None)
     outward = np.subtract(bone.position, joint.anchor) if joint else np.zeros(3)
     length = np.linalg.norm(outward)
     return outward / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])

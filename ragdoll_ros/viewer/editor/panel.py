@@ -110,10 +110,6 @@ class Panel:
         """Write under the Update button why something was refused; nothing: take that away."""
         self.said.content = colored(text, RED)
 
-    def errors(self) -> dict[str, str]:
-        """What is written under the fields, by key."""
-        return {**self.body.errors(), **self.joint.errors()}
-
     def show_history(self, history: History) -> None:
         """Label the buttons with what they would undo and redo."""
         for button, word, what in ((self.undo, 'Undo', history.undoes),

@@ -129,18 +129,15 @@ def _body_steps(name: str, limb: bool) -> list[Step]:
 
 
 def _joint_steps(name: str, shown: Sheet) -> list[Step]:
-    def axes_and_limits(scene: Scene, new: Sheet) -> Scene:
-        return _set_axes_and_limits(scene, name, new, shown)
-
     def anchor(scene: Scene, new: Sheet) -> Scene:
         old = changes.joint_of(scene, name).anchor
         return changes.change_joint(scene, name, anchor=_near(new['anchor'], old))
 
-    def damping(scene: Scene, new: Sheet) -> Scene:
-        return changes.change_joint(scene, name, damping=new['damping'])
-
-    return [(('kind', 'axis_1', 'axis_2', 'limits_1', 'limits_2'), axes_and_limits),
-            (('anchor',), anchor), (('damping',), damping)]
+    return [(('kind', 'axis_1', 'axis_2', 'limits_1', 'limits_2'),
+             lambda scene, new: _set_axes_and_limits(scene, name, new, shown)),
+            (('anchor',), anchor),
+            (('damping',), lambda scene, new: changes.change_joint(
+                scene, name, damping=new['damping']))]
 
 
 def _read_joint(joint: Joint) -> Sheet:

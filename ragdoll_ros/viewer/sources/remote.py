@@ -224,13 +224,10 @@ class Remote:
                 values = {pair.key: pair.value for pair in status.values}
                 self._told = told(self._told, values)
                 with contextlib.suppress(KeyError, ValueError):
-                    self._take_time(int(values['stamp_of_zero']), float(values['simulated_time']))
-
-    def _take_time(self, zero: int, simulated: float) -> None:
-        """Take the stamp of time zero, ns, and the time, s, which goes back at a new start."""
-        if simulated < self._simulated:
-            self._hands.forget()
-        self._frames.zero, self._simulated = zero, simulated
+                    zero, simulated = int(values['stamp_of_zero']), float(values['simulated_time'])
+                    if simulated < self._simulated:
+                        self._hands.forget()
+                    self._frames.zero, self._simulated = zero, simulated
 
     def _stay_in_touch(self) -> None:
         """Hold on with the hands, and learn what is not known; called again and again."""

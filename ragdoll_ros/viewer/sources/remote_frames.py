@@ -34,10 +34,6 @@ class Topic(NamedTuple):
     raw: bool = True
 
 
-def _poses(data: bytes, _: Scene | None) -> tuple[int, np.ndarray]:
-    return poses_in(data)
-
-
 def _positions(data: bytes, _: Scene | None) -> np.ndarray:
     return poses_in(data)[1][:, :3]
 
@@ -48,7 +44,7 @@ def _angles(message: JointState, scene: Scene | None) -> np.ndarray:
     return np.array(message.position)
 
 
-TOPICS = {'poses': Topic(PoseArray, '{}/poses', _poses, LATCHED),
+TOPICS = {'poses': Topic(PoseArray, '{}/poses', lambda data, _: poses_in(data), LATCHED),
           'contacts': Topic(PoseArray, '{}/contacts', _positions),
           'swings': Topic(PoseArray, '{}/swings', _positions),
           'angles': Topic(JointState, 'joint_states', _angles, raw=False)}
