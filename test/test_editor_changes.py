@@ -288,7 +288,7 @@ def test_a_number_that_is_shown_rounded_stays_as_it_is():
     assert bone_of(sheet.apply(third, 'head', fields), 'head').position == (1 / 3, 2 / 3, 1.6)
 
 
-def test_a_sheet_tells_all_its_faults_at_their_fields():
+def test_a_sheet_tells_all_its_errors_at_their_fields():
     wrong = {'mass': -1.0, 'size': (0.1, 0.0, 0.1), 'position': (0.0, math.nan, 0.0),
              'turn': (0.0, math.inf, 0.0), 'friction': 'much', 'restitution': '1.5',
              'rolling_friction': '-1', 'anchor': (math.inf, 0.0, 0.0), 'limits_1': '30, 10',
