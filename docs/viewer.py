@@ -26,14 +26,14 @@ ASIDE = 0.31
 """m to the doll's left for each m away at which the camera looks: the doll is beside the panel."""
 
 
-def camera(away: float, high: float, at: float, turn: float = -0.2) -> str:
-    """Give the part of an address for a camera before the doll.
+def camera(away: float, high: float, at: float, azimuth: float = -0.2) -> str:
+    """Part of an address that places a camera before the doll.
 
-    It stands ``away`` m from the doll and ``high`` m above the ground, ``turn`` rad to the doll's
-    left, and looks at the height ``at``, m.
+    It stands ``away`` m from the doll and ``high`` m above the ground, ``azimuth`` rad to the
+    doll's left, and looks at the height ``at``, m.
     """
-    ahead, left = np.array((np.cos(turn), np.sin(turn))), np.array((-np.sin(turn), np.cos(turn)))
-    eye, look = away * ahead, ASIDE * away * left
+    cos, sin = np.cos(azimuth), np.sin(azimuth)
+    eye, look = away * np.array((cos, sin)), ASIDE * away * np.array((-sin, cos))
     return (f'?initialCameraPosition={eye[0]:.3f},{eye[1]:.3f},{high}'
             f'&initialCameraLookAt={look[0]:.3f},{look[1]:.3f},{at}')
 
@@ -53,7 +53,7 @@ def page(context: browser.BrowserContext, scene: str, seen_from: str) -> Iterato
 
 
 def shot(view: browser.View) -> bytes:
-    """Give what the page shows, as PNG, once its pictures have come to rest."""
+    """What the page shows, as PNG, once its pictures have come to rest."""
     last = b''
     while (picture := view.page.screenshot()) != last:
         last = picture
@@ -98,7 +98,7 @@ def grab(context: browser.BrowserContext, folder: Path) -> None:
 
 def edit(context: browser.BrowserContext, folder: Path) -> None:
     """The editor with a chosen thigh in its bind pose."""
-    with page(context, 'drop', camera(2.2, 1.3, 0.85, turn=0.5)) as view:
+    with page(context, 'drop', camera(2.2, 1.3, 0.85, azimuth=0.5)) as view:
         view.tab('Edit')
         view.press('Edit')
         view.button('Drop it').wait_for()

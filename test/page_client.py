@@ -4,11 +4,16 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
+from contextlib import contextmanager
 
 import msgspec
+import numpy as np
 import viser
 import websockets
 from viser import _messages
+
+from ragdoll_ros.viewer.command import free_port, server_at
+from ragdoll_ros.viewer.page import Page
 
 PATIENCE = 60.0
 
@@ -50,8 +55,10 @@ class PageClient:
         """Change a value in the panel."""
         self.send(_messages.GuiUpdateMessage(handle._impl.uuid, {'value': value}))
 
-    def press(self, command):
-        """Press a command's hotkey."""
+    def press(self, page, label):
+        """Press the hotkey of a page's command."""
+        commands = page.server.gui._command_handle_from_uuid.values()
+        command, = (command for command in commands if command.label == label)
         self.send(_messages.CommandTriggerMessage(command._impl.uuid))
 
     def drop(self):
@@ -90,3 +97,37 @@ def wait(condition, timeout=PATIENCE):
     while not condition():
         assert time.monotonic() < end, 'not in time'
         time.sleep(0.005)
+
+
+@contextmanager
+def served(source, folder='.'):
+    """A page of a source, drawn by a thread; its clients and the source are closed at the end."""
+    stop = threading.Event()
+    with server_at('127.0.0.1', free_port('127.0.0.1', 0)) as server:
+        page = Page(server, source, folder)
+        page.clients = []
+
+        def client(kind=PageClient, **camera):
+            page.clients.append(kind(server.get_port(), **camera))
+            return page.clients[-1]
+
+        page.open = client
+        thread = threading.Thread(target=page.run, args=(stop,))
+        thread.start()
+        try:
+            yield page
+        finally:
+            for each in page.clients:
+                each.close()
+            stop.set()
+            thread.join()
+            source.close()
+
+
+def batch_of(page, bone):
+    """Name of the node that a bone is drawn in, its number there, and its place (3,) m."""
+    index = page.stage.scene.bone_index(bone)
+    for batch in page.stage.bodies.batches:
+        for number in np.flatnonzero(batch.bones == index):
+            return batch.handle.name, int(number), page.frame.state.positions[index]
+    raise AssertionError(bone)

@@ -11,6 +11,7 @@ import yaml
 
 viser = pytest.importorskip('viser')
 
+from page_client import wait  # noqa: E402
 from test_fit_broken import BROKEN  # noqa: E402
 
 from ragdoll_ros.files.doll import load_doll, save_doll  # noqa: E402
@@ -44,7 +45,7 @@ class Desk:
         self.asked = []
         self.reason = ''
         self.path = path
-        self.editor = Editor(server, DROP, self.use, lambda held: self.asked.append(held), path)
+        self.editor = Editor(server, DROP, lambda scene: self.use(scene), self.asked.append, path)
         self.panel, self.files = self.editor.panel, self.editor.files
 
     def use(self, scene):
@@ -57,6 +58,12 @@ class Desk:
 
     def said(self):
         return html.unescape(self.files.said.content)
+
+
+def errors_in(panel):
+    """What is seen below the fields, by their keys."""
+    return {key: said.content for form in (panel.body, panel.joint)
+            for key, said in form.errors.items() if said.visible}
 
 
 @pytest.fixture
@@ -97,7 +104,7 @@ def test_a_faulty_value_is_refused_where_it_stands_and_stays(desk):
     desk.panel.joint['limits_1'].value = '30, 10'
     desk.panel.joint['anchor'].value = (0.0, 0.1, 0.6)
     desk.editor.update()
-    errors = desk.panel.errors()
+    errors = errors_in(desk.panel)
     assert set(errors) == {'mass', 'friction', 'limits_1'}
     assert '-3.0; expected above zero' in errors['mass']
     assert '(30.0, 10.0); expected lower &lt;= upper' in errors['limits_1']
@@ -109,7 +116,7 @@ def test_a_faulty_value_is_refused_where_it_stands_and_stays(desk):
     desk.panel.body['friction'].value = ''
     desk.panel.joint['limits_1'].value = '10, 30'
     desk.editor.update()
-    assert desk.panel.errors() == {}
+    assert errors_in(desk.panel) == {}
     assert desk.bone('left_shin').mass == 3
     assert changes.joint_of(desk.editor.scene, 'left_shin').anchor == (0, 0.1, 0.6)
 
@@ -356,13 +363,10 @@ def test_many_at_once_leave_one_consistent_history(desk):
     """Viser calls from 32 threads: each update is a step, none is lost, all can be undone."""
     desk.editor.select('head')
 
-    def edit(mass):
-        desk.editor._change(lambda: changes.change_bone(desk.editor.scene, 'head', mass=mass), 'm')
-
     def work(number):
         for k in range(20):
-            with desk.editor._acting:
-                edit(1.0 + number + k / 100)
+            mass = 1.0 + number + k / 100
+            desk.editor.take(changes.change_bone(DROP, 'head', mass=mass), 'm')
             desk.editor.select('torso' if k % 2 else 'head')
 
     threads = [threading.Thread(target=work, args=(number,)) for number in range(4)]
@@ -582,9 +586,14 @@ def test_a_gltf_in_pieces_is_told_to_come_in_one(desk):
 
 
 def test_one_character_at_a_time(desk):
-    with desk.files._fitting:
+    """One that comes while another is being fitted is refused; the next is looked at."""
+    def use(scene):
         desk.files.fit('x.glb', b'')
-        assert 'another character is being fitted' in desk.said()
+        desk.asked.append(desk.said())
+
+    desk.use = use
+    desk.files.fit('rig.glb', fit_rigs.document(fit_rigs.RIGS['one_bone']).glb())
+    assert ['another character is being fitted' in said for said in desk.asked] == [True]
     desk.files.fit('x.glb', b'')
     assert 'expected' in desk.said()
 
@@ -623,10 +632,3 @@ def test_on_a_running_simulation(server, tmp_path):
         wait(lambda: source.frame.state.positions[head][2] < 1.4)
     finally:
         source.close()
-
-
-def wait(condition):
-    end = time.monotonic() + 10
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.005)

@@ -69,10 +69,10 @@ def test_only_what_is_asked_for_changes():
      errors.NotUnit),
     (lambda: changes.set_size(DROP, 'head', (0, 1, 1)), 'head.size', errors.NotPositive),
     (lambda: changes.set_shape(DROP, 'head', 'cone'), 'head.shape', errors.WrongForm),
-    (lambda: changes.set_limits(DROP, 'left_shin', [(30, 10)]),
-     'left_shin.joint.limits_deg[0]', errors.LimitsReversed),
-    (lambda: changes.set_limits(DROP, 'left_shin', [None, None]), 'left_shin.joint.limits_deg',
-     errors.WrongAxes),
+    (lambda: changes.change_joint(DROP, 'left_shin', limits=((0.3, 0.1),)),
+     'left_shin.joint.limits[0]', errors.LimitsReversed),
+    (lambda: changes.change_joint(DROP, 'left_shin', limits=(None, None)),
+     'left_shin.joint.limits', errors.WrongAxes),
     (lambda: changes.set_joint_kind(DROP, 'left_shin', 'screw'), 'left_shin.joint.kind',
      errors.WrongAxes),
     (lambda: changes.change_joint(DROP, 'left_thigh', axes=((1, 0, 0), (1, 1, 0))),
@@ -89,8 +89,8 @@ def test_what_is_wrong_is_refused_with_its_place(change, path, kind):
 
 
 def test_reversed_limits_are_told_in_degrees():
-    with pytest.raises(errors.LimitsReversed, match=r'\(30, 10\); expected lower <= upper'):
-        changes.set_limits(DROP, 'left_shin', [(30, 10)])
+    with pytest.raises(errors.ModelErrors, match=r'\(30.0, 10.0\); expected lower <= upper'):
+        sheet.apply(DROP, 'left_shin', {'limits_1': '30, 10'})
 
 
 def test_a_body_that_moves_leaves_pivots_neighbours_and_skin(fitted):
@@ -190,7 +190,8 @@ def test_a_mirrored_edit_is_the_mirror_image(kind):
     scene = changes.set_joint_kind(DROP, name, kind)
     axes = (rotation.rotate(TURN, np.eye(3)[:len(changes.joint_of(scene, name).axes)]))
     scene = changes.change_joint(scene, name, axes=tuple(axes), anchor=(0.01, 0.08, 0.87))
-    scene = changes.set_limits(scene, name, [(-10, 70), (-30, 50)][:len(axes)])
+    limits = np.radians([(-10, 70), (-30, 50)][:len(axes)])
+    scene = changes.change_joint(scene, name, limits=tuple(map(tuple, limits.tolist())))
     scene = changes.change_bone(changes.set_pose(scene, name, (0.1, 0.2, 0.7), TURN), name, mass=9)
     scene = mirror.mirrored(scene, name)
     here, there = bone_of(scene, name), bone_of(scene, other)
@@ -287,7 +288,7 @@ def test_a_number_that_is_shown_rounded_stays_as_it_is():
     assert bone_of(sheet.apply(third, 'head', fields), 'head').position == (1 / 3, 2 / 3, 1.6)
 
 
-def test_a_sheet_tells_all_its_faults_at_their_fields():
+def test_a_sheet_tells_all_its_errors_at_their_fields():
     wrong = {'mass': -1.0, 'size': (0.1, 0.0, 0.1), 'position': (0.0, math.nan, 0.0),
              'turn': (0.0, math.inf, 0.0), 'friction': 'much', 'restitution': '1.5',
              'rolling_friction': '-1', 'anchor': (math.inf, 0.0, 0.0), 'limits_1': '30, 10',

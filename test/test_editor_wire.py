@@ -1,19 +1,16 @@
 """The editor as an open page speaks to it: clicks, drags, typed values and files over the wire."""
-import threading
-
 import fit_rigs
 import pytest
 
 viser = pytest.importorskip('viser')
 
-from page_client import PageClient, wait  # noqa: E402
-from test_editor import RUBBISH  # noqa: E402
+from page_client import PageClient, batch_of, served, wait  # noqa: E402
+from test_editor import RUBBISH, errors_in  # noqa: E402
 from test_fit_broken import BROKEN  # noqa: E402
 from viser import _messages  # noqa: E402
 
 from ragdoll_ros.files.scene import load_scene  # noqa: E402
 from ragdoll_ros.viewer.editor import changes  # noqa: E402
-from ragdoll_ros.viewer.page import Page  # noqa: E402
 from ragdoll_ros.viewer.sources.simulated import Simulated  # noqa: E402
 
 DROP = load_scene('drop')
@@ -24,11 +21,9 @@ class Browser(PageClient):
 
     def click_body(self, page, bone):
         """Click where the page draws a bone."""
-        index = DROP.bone_index(bone)
-        batch, = (batch for batch in page._stage.bodies.batches if index in batch.bones)
+        node, number, _ = batch_of(page, bone)
         self.send(_messages.SceneNodeClickMessage(
-            batch.handle.name, list(batch.bones).index(index), (4.0, 0.0, 1.0), (-1.0, 0.0, 0.0),
-            (0.5, 0.5), None))
+            node, number, (4.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.5, 0.5), None))
 
     def press_button(self, button):
         self.update(button, True)
@@ -54,40 +49,26 @@ class Browser(PageClient):
 
 @pytest.fixture
 def page(tmp_path):
-    server = viser.ViserServer('127.0.0.1', 0, verbose=False)
-    source = Simulated(DROP)
-    page = Page(server, source, tmp_path)
-    stop = threading.Event()
-    thread = threading.Thread(target=page.run, args=(stop,), daemon=True)
-    thread.start()
-    yield page
-    stop.set()
-    thread.join(10)
-    server.stop()
-    source.close()
+    with served(Simulated(DROP), tmp_path) as page:
+        yield page
 
 
 @pytest.fixture
 def browser(page):
-    browser = Browser(page.server.get_port())
+    browser = page.open(Browser)
     # The first frame is drawn: by then, clicks are listened to.
-    wait(lambda: page._frame is not None)
-    yield browser
-    browser.close()
+    wait(lambda: page.frame is not None)
+    return browser
 
 
 def settled(editor):
     """Wait until what the editor has begun is done: it fills in the fields last.
 
-    A person does not type into them in the few ms between.
+    A person does not type into them in the few ms between. Neither asks for anything; each waits
+    for its turn.
     """
-    with editor._acting, editor._showing:
-        pass
-
-
-def command(page, label):
-    return next(each for each in page.server.gui._command_handle_from_uuid.values()
-                if each.label == label)
+    editor.redo()
+    editor.select(editor.bone)
 
 
 def test_a_bone_is_clicked_dragged_typed_and_undone(page, browser):
@@ -110,20 +91,21 @@ def test_a_bone_is_clicked_dragged_typed_and_undone(page, browser):
     settled(editor)
     browser.update(editor.panel.joint['limits_1'], '100, -5')
     browser.press_button(editor.panel.update)
-    wait(lambda: 'limits_1' in editor.panel.errors())
-    browser.press(command(page, 'Undo'))
-    wait(lambda: editor.scene == moved and not editor.panel.errors())
-    browser.press(command(page, 'Undo'))
+    wait(lambda: 'limits_1' in errors_in(editor.panel))
+    browser.press(page, 'Undo')
+    wait(lambda: editor.scene == moved and not errors_in(editor.panel))
+    browser.press(page, 'Undo')
     wait(lambda: editor.scene == DROP and page.source.frame.scene is editor.scene)
-    browser.press(command(page, 'Edit, or drop it'))
+    browser.press(page, 'Edit, or drop it')
     wait(lambda: page.source.frame.time > 0.05 and editor.handles.body is None)
 
 
 def test_editing_ends_where_the_page_goes_on(page, browser):
     page.editor.select('head')
     browser.press_button(page.editor.panel.edit)
-    wait(lambda: page.editor.handles.body is not None and page.editor._stood)
-    browser.press_button(page.controls._pause)
+    wait(lambda: page.editor.handles.body is not None
+         and page.controls.pause.label == 'Go on')
+    browser.press_button(page.controls.pause)
     wait(lambda: page.editor.handles.body is None)
     assert not page.editor.editing
 
@@ -132,17 +114,17 @@ def test_a_step_ends_editing(page, browser):
     """The doll leaves its bind pose by one tick, without handles in the air; it stays paused."""
     page.editor.select('head')
     browser.press_button(page.editor.panel.edit)
-    wait(lambda: page.editor.handles.body is not None and page._frame.time == 0)
-    browser.press(command(page, 'Step'))
-    wait(lambda: page._frame.time > 0)
+    wait(lambda: page.editor.handles.body is not None and page.frame.time == 0)
+    browser.press(page, 'Step')
+    wait(lambda: page.frame.time > 0)
     assert page.editor.handles.body is None and not page.editor.editing
-    assert page.source.report.paused and page._frame.time == pytest.approx(0.01)
+    assert page.source.report.paused and page.frame.time == pytest.approx(0.01)
 
 
 def test_a_scene_from_elsewhere_can_be_undone(page, browser):
     page.source.load('crowd')
     wait(lambda: page.editor.scene.name == 'crowd')
-    browser.press(command(page, 'Undo'))
+    browser.press(page, 'Undo')
     wait(lambda: page.source.frame.scene == DROP)
 
 
@@ -152,14 +134,14 @@ def test_a_character_is_uploaded_and_its_skin_shown(page, browser):
     made.view(bytes(3_000_000))
     browser.upload(page.editor.files.fit_button, 'vrm.glb', made.glb())
     wait(lambda: page.editor.scene.dolls[0].doll.model is not None)
-    wait(lambda: page._stage.scene is page.editor.scene and page._stage.skins.handles)
-    assert page._stage.skins.notes == []
+    wait(lambda: page.stage.scene is page.editor.scene and page.stage.skins.handles)
+    assert page.stage.skins.notes == []
 
 
 def test_rubbish_leaves_the_page_as_it_was(page, browser):
     """The doll falls on meanwhile, in the same process."""
     files = page.editor.files
-    wait(lambda: page._frame is not None)
+    wait(lambda: page.frame is not None)
     for number, (name, content) in enumerate([*list(BROKEN.items())[::8], *RUBBISH.items()]):
         button = (files.fit_button, files.upload_button)[number % 2]
         before = page.source.frame.time

@@ -49,20 +49,12 @@ def browser():
 
 
 @pytest.fixture(scope='module')
-def node(ros):
-    """The node as it runs now: a list, whose last one may be replaced."""
-    nodes = [start('node')]
-    yield nodes
-    assert end(nodes[-1], signal.SIGINT)[0] == 0
-
-
-@pytest.fixture(scope='module')
-def view(browser, node, listener, heard):
-    """A page on a node of the default scene, each a process of its own.
+def view(browser, listener, heard):
+    """A page on the node of the default scene that `make run` starts, with its viewer.
 
     The listener hears both from here on: that takes seconds where the machine is busy.
     """
-    with serving('--port', '0') as url, opened(browser, url, SCENE) as view:
+    with serving(module='ragdoll_ros.ros.run') as url, opened(browser, url, SCENE) as view:
         view.wait(lambda: all(topic.get_publisher_count() for topic in listener.subscriptions))
         yield view
 
@@ -77,11 +69,10 @@ def falls(view):
     return (np.linalg.norm(view.bodies(SCENE) - START, axis=1) > 0.1).all()
 
 
-def test_what_make_run_starts_shows_ten_bodies_that_fall(browser, ros):
-    with (serving(module='ragdoll_ros.ros.run') as url, opened(browser, url, SCENE) as view):
-        view.hold_at(SCENE, START)
-        view.key(' ')
-        view.wait(lambda: falls(view))
+def test_what_make_run_starts_shows_ten_bodies_that_fall(view):
+    view.hold_at(SCENE, START)
+    view.key(' ')
+    view.wait(lambda: falls(view))
 
 
 def test_a_dragged_body_follows_within_200_ms(view, heard):
@@ -163,15 +154,21 @@ def test_a_page_that_goes_asks_nothing_of_the_node_and_may_come_back(view, heard
 
 
 @pytest.mark.slow  # test_ros_viewer.py kills and starts nodes under a page without a browser
-def test_goes_on_with_a_node_that_was_killed_and_started_again(view, node):
-    kill(node[0])
-    view.see('has been silent for')
-    node.append(start('node'))
-    view.button('Pause').wait_for()
-    view.hold_at(SCENE, START)
-    view.key(' ')
-    view.wait(lambda: falls(view))
-    assert not view.page.get_by_text('has been silent for').count()
+def test_goes_on_with_a_node_that_was_killed_and_started_again(browser, ros):
+    """Beside the one that `make run` has started: in a namespace of its own."""
+    there = ('--ros-args', '-r', '__ns:=/stage')
+    node = start('node', *there)
+    with serving('--port', '0', *there) as url, opened(browser, url, SCENE) as view:
+        view.hold_at(SCENE, START)
+        kill(node)
+        view.see('has been silent for')
+        node = start('node', *there)
+        view.button('Pause').wait_for()
+        view.hold_at(SCENE, START)
+        view.key(' ')
+        view.wait(lambda: falls(view))
+        assert not view.page.get_by_text('has been silent for').count()
+        assert end(node, signal.SIGINT)[0] == 0
 
 
 def stamp(message):

@@ -4,8 +4,8 @@ from __future__ import annotations
 import dataclasses
 import os
 import signal
+import subprocess
 import sys
-import threading
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip('viser')
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion, Vector3, Wrench
-from page_client import PageClient, wait
+from page_client import served, wait
 from peer import STARTED, end, kill, start
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
@@ -27,8 +27,7 @@ from ragdoll_ros.files.urdf import scene_to_urdf
 from ragdoll_ros.model.shapes import Sphere
 from ragdoll_ros.ros.messages import to_pose_array
 from ragdoll_ros.ros.packed import poses_in
-from ragdoll_ros.viewer.command import free_port, server_at
-from ragdoll_ros.viewer.page import Page
+from ragdoll_ros.viewer.sources import remote as remote_source
 from ragdoll_ros.viewer.sources.remote import Remote
 from ragdoll_ros.viewer.sources.remote_scene import scene_of_node
 from ragdoll_ros.viewer.sources.source import Wanted
@@ -110,6 +109,26 @@ def test_bytes_that_are_no_poses_are_a_value_error():
             poses_in(wrong)
 
 
+def test_the_viewer_leaves_at_a_signal(no_node):
+    """Without any node: it waits for one, and ends within 2 s."""
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'ragdoll_ros.viewer.command', '--port', '0'],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
+    assert 'The page is at' in process.stdout.readline()
+    code, seconds = end(process, signal.SIGTERM)
+    assert code == 0 and seconds < 2 and 'Traceback' not in process.stderr_text
+
+
+def test_no_node_is_said_and_heals_by_itself(no_node, nodes, remote):
+    remote.want(OPEN)
+    wait(lambda: 'no node' in remote.report.problem and 'ragdoll_node' in remote.report.problem)
+    with pytest.raises(ValueError, match='no node'):
+        remote.load('drop')
+    nodes.append(start('node'))
+    seen(remote)
+    assert not remote.report.problem
+
+
 def test_shows_what_the_node_publishes(node, remote, peer):
     """The poses are those of ~/poses, with their scene and their time since the start."""
     remote.want(OPEN)
@@ -186,11 +205,11 @@ def test_steers_the_node(node, remote):
 
 
 def test_pushes_of_others_are_shown(node, remote, peer):
-    """2000 N on ~/force for 0.1 s of simulated time, at a tenth of real time."""
+    """2000 N on ~/force for 0.1 s of simulated time, at two fifths of real time."""
     remote.want(OPEN)
     seen(remote)
-    remote.set_pace(0.1)
-    wait(lambda: remote.report.pace == 0.1)
+    remote.set_pace(0.4)
+    wait(lambda: remote.report.pace == 0.4)
     sender = peer.sender(Wrench, 'ragdoll/force')
     peer.wait(lambda: sender.get_subscription_count() == 2)
 
@@ -235,6 +254,12 @@ def test_a_hand_rests_also_where_ros_time_stands(node, peer):
         remote.close()
 
 
+def zero_of(reports):
+    """Stamp of time zero, ns, as the node has reported it last."""
+    values = {pair.key: pair.value for pair in reports[-1][1].status[0].values}
+    return int(values['stamp_of_zero'])
+
+
 def test_a_pause_opens_no_hand(node, remote, peer):
     """The node's stamps are set to ROS time as it goes on; the page's time goes on as the doll's.
 
@@ -248,9 +273,11 @@ def test_a_pause_opens_no_hand(node, remote, peer):
     wait(lambda: remote.frame.held)
     remote.pause(True)
     wait(lambda: remote.report.paused)
-    before, stamp = remote.frame.time, remote._zero
+    reports = peer.collect(DiagnosticArray, '/diagnostics')
+    peer.wait(lambda: reports)
+    before, stamp = remote.frame.time, zero_of(reports)
     remote.pause(False)
-    wait(lambda: remote._zero > stamp)
+    peer.wait(lambda: zero_of(reports) > stamp)
     # The picture at hand may be one that came before the stamps were set.
     wait(lambda: before < remote.frame.time < before + 0.1)
     assert remote.frame.held
@@ -283,28 +310,12 @@ def test_uses_an_edited_scene_or_says_why_not(node, remote, tmp_path):
     assert remote.frame.scene.name == 'heavier'
 
 
-def test_no_node_is_said_and_heals_by_itself(no_node, remote):
-    remote.want(OPEN)
-    wait(lambda: 'no node' in remote.report.problem and 'ragdoll_node' in remote.report.problem)
-    with pytest.raises(ValueError, match='no node'):
-        remote.load('drop')
-    start('node')
-    seen(remote)
-    assert not remote.report.problem
-
-
-def test_a_scene_that_is_not_here_is_shown_by_its_urdf(no_node, remote, tmp_path):
+def test_a_scene_that_is_not_here_is_shown_by_its_urdf(node, remote, peer, tmp_path):
     """The file is another one by now: what the node took is what is shown."""
-    path = tmp_path / 'mine.yaml'
-    scene = load_scene('crowd')
+    path, scene = tmp_path / 'mine.yaml', load_scene('crowd')
     save_scene(scene, path)
-    start('node', '--ros-args', '-p', f'scene:={path}')
-    remote.want(OPEN)
-    seen(remote, 'crowd')
-    remote.want(Wanted())
-    wait(lambda: not remote._subscriptions)
+    assert set_parameters(peer, scene=str(path))
     save_scene(load_scene('drop'), path)
-    remote._forget()
     remote.want(OPEN)
     wait(lambda: remote.frame is not None)
     assert 'robot_description' in remote.report.note
@@ -330,24 +341,14 @@ def test_shapes_and_axes_from_a_urdf_are_the_scenes(name):
 @pytest.fixture
 def page(ros):
     """The whole way: DDS, page, websocket, one page that is open."""
-    source, stop = Remote([]), threading.Event()
-    with server_at('127.0.0.1', free_port('127.0.0.1', 0)) as server:
-        page = Page(server, source)
-        thread = threading.Thread(target=page.run, args=(stop,))
-        thread.start()
-        page.client = PageClient(server.get_port())
-        try:
-            yield page
-        finally:
-            page.client.close()
-            stop.set()
-            thread.join()
-            source.close()
+    with served(Remote([])) as page:
+        page.open()
+        yield page
 
 
 def drawn(page, scene):
     """Whether every bone of the scene is drawn, where the node has it."""
-    stage, frame = page._stage, page._frame
+    stage, frame = page.stage, page.frame
     if stage is None or stage.scene != scene or frame.scene is not stage.scene:
         return False
     return all(np.abs(batch.handle.batched_positions
@@ -358,34 +359,12 @@ def drawn(page, scene):
 
 
 def test_the_page_draws_the_node(node, page):
-    wait(lambda: page._frame is not None)
-    before = page._frame.time
-    wait(lambda: page._frame.time > before + 0.1)
+    wait(lambda: page.frame is not None)
+    before = page.frame.time
+    wait(lambda: page.frame.time > before + 0.1)
     page.source.pause(True)
-    wait(lambda: page.source.report.paused and page._frame is page.source.frame)
+    wait(lambda: page.source.report.paused and page.frame is page.source.frame)
     assert drawn(page, load_scene('drop'))
-
-
-def test_an_open_page_follows_a_node_that_comes_back_with_another_scene(node, page, peer):
-    """Killed while a hand of the page holds a bone that is not there any more then.
-
-    The new node hears nothing of that bone, of which it would have to warn.
-    """
-    wait(lambda: page._frame is not None)
-    page.source.grab('page 0', 'head', (0.0, 0.0, 0.0), (0.0, 0.0, 2.0))
-    wait(lambda: page._frame.held)
-    kill(node)
-    wait(lambda: 'silent' in page._problem.content)
-    start('node', '--ros-args', '-p', 'scene:=crowd')
-    wait(lambda: page._stage.scene == load_scene('crowd'))
-    wait(lambda: not page._problem.content)
-    page.source.pause(True)
-    wait(lambda: page.source.report.paused)
-    wait(lambda: drawn(page, load_scene('crowd')))
-    assert not page._frame.held
-    reports = peer.collect(DiagnosticArray, '/diagnostics')
-    peer.wait(lambda: len(reports) > 1)
-    assert {pair.key: pair.value for pair in reports[-1][1].status[0].values}['refused'] == '0'
 
 
 def test_an_open_page_follows_the_scene_that_others_set(node, page, peer, broken_scene, tmp_path):
@@ -398,32 +377,46 @@ def test_an_open_page_follows_the_scene_that_others_set(node, page, peer, broken
         page.source.drag('page 0', (0.0, 0.0, 2.0))
         return taken
 
-    wait(lambda: page._frame is not None)
+    wait(lambda: page.frame is not None)
     larger = load_scene('drop')
     doll = larger.dolls[0].doll.replace_bone('head', shape=Sphere(0.15))
     larger = dataclasses.replace(larger, dolls=(
         dataclasses.replace(larger.dolls[0], doll=doll),))
     save_scene(larger, tmp_path / 'larger.yaml')
     for name in ('crowd', 'drop', tmp_path / 'larger.yaml', 'ponytail'):
-        page.source.grab('page 0', page._frame.scene.bone_names[1], (0.0,) * 3, (0.0, 0.0, 2.0))
+        page.source.grab('page 0', page.frame.scene.bone_names[1], (0.0,) * 3, (0.0, 0.0, 2.0))
         assert set_scene(name)
-        wait(lambda name=name: page._stage.scene == load_scene(str(name)))
-        before = page._frame.time
-        wait(lambda before=before: page._frame.time != before)
+        wait(lambda name=name: page.stage.scene == load_scene(str(name)))
+        before = page.frame.time
+        wait(lambda before=before: page.frame.time != before)
     assert not set_scene(broken_scene[0])
-    before = page._frame.time
-    wait(lambda: page._frame.time > before + 0.1)
+    before = page.frame.time
+    wait(lambda: page.frame.time > before + 0.1)
     page.source.pause(True)
     wait(lambda: page.source.report.paused)
     wait(lambda: drawn(page, load_scene('ponytail')))
 
 
-def test_the_viewer_leaves_at_a_signal(no_node):
-    """Without any node: it waits for one, and ends within 2 s."""
-    import subprocess
-    process = subprocess.Popen(
-        [sys.executable, '-m', 'ragdoll_ros.viewer.command', '--port', '0'],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
-    assert 'The page is at' in process.stdout.readline()
-    code, seconds = end(process, signal.SIGTERM)
-    assert code == 0 and seconds < 2 and 'Traceback' not in process.stderr_text
+def test_an_open_page_follows_a_node_that_comes_back_with_another_scene(
+        node, page, peer, monkeypatch):
+    """Killed while a hand of the page holds a bone that is not there any more then.
+
+    The new node hears nothing of that bone, of which it would have to warn. A node is silent after
+    1.5 s in place of 3: it reports once a second.
+    """
+    monkeypatch.setattr(remote_source, 'SILENCE', 1.5)
+    wait(lambda: page.frame is not None)
+    page.source.grab('page 0', 'head', (0.0, 0.0, 0.0), (0.0, 0.0, 2.0))
+    wait(lambda: page.frame.held)
+    kill(node)
+    wait(lambda: 'silent' in page.problem.content)
+    start('node', '--ros-args', '-p', 'scene:=crowd')
+    wait(lambda: page.stage.scene == load_scene('crowd'))
+    wait(lambda: not page.problem.content)
+    page.source.pause(True)
+    wait(lambda: page.source.report.paused)
+    wait(lambda: drawn(page, load_scene('crowd')))
+    assert not page.frame.held
+    reports = peer.collect(DiagnosticArray, '/diagnostics')
+    peer.wait(lambda: len(reports) > 1)
+    assert {pair.key: pair.value for pair in reports[-1][1].status[0].values}['refused'] == '0'

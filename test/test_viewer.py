@@ -2,14 +2,13 @@
 from __future__ import annotations
 
 import dataclasses
-import threading
-from contextlib import contextmanager
+import time
 
 import numpy as np
 import pytest
 
 pytest.importorskip('viser')
-from page_client import PageClient, wait
+from page_client import batch_of, served, wait
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import rotation
@@ -17,49 +16,23 @@ from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame
 from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.model.shapes import Capsule, Sphere
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.viewer.command import free_port, server_at
-from ragdoll_ros.viewer.page import Page
 from ragdoll_ros.viewer.sources.playback import Playback
 from ragdoll_ros.viewer.sources.recording import Recording
 from ragdoll_ros.viewer.sources.simulated import Simulated
+from ragdoll_ros.viewer.sources.source import Wanted
 
 DROP = load_scene('drop')
 
 
-@contextmanager
-def served(scene, folder='.'):
-    """A page of a scene, drawn by a thread; its clients are closed at the end."""
-    source, stop = Simulated(scene), threading.Event()
-    with server_at('127.0.0.1', free_port('127.0.0.1', 0)) as server:
-        page = Page(server, source, folder)
-        page.clients = []
-
-        def client(**camera):
-            page.clients.append(PageClient(server.get_port(), **camera))
-            return page.clients[-1]
-
-        page.open = client
-        thread = threading.Thread(target=page.run, args=(stop,))
-        thread.start()
-        try:
-            yield page
-        finally:
-            for each in page.clients:
-                each.close()
-            stop.set()
-            thread.join()
-            source.close()
-
-
 @pytest.fixture
 def page():
-    with served(DROP) as page:
+    with served(Simulated(DROP)) as page:
         yield page
 
 
 def drawn(page):
     """Places (p, 3) m of all parts that are drawn, and which bone each is of."""
-    batches = page._stage.bodies.batches
+    batches = page.stage.bodies.batches
     return (np.concatenate([batch.handle.batched_positions for batch in batches]),
             np.concatenate([batch.bones for batch in batches]))
 
@@ -67,13 +40,8 @@ def drawn(page):
 def paused(page):
     """Hold the time; give the frame that is drawn then."""
     page.source.pause(True)
-    wait(lambda: page.source.report.paused and page._frame is page.source.frame)
-    return page._frame
-
-
-def command(page, label):
-    return next(handle for handle in page.server.gui._command_handle_from_uuid.values()
-                if handle.label == label)
+    wait(lambda: page.source.report.paused and page.frame is page.source.frame)
+    return page.frame
 
 
 def test_what_is_drawn_is_the_simulation(page):
@@ -82,7 +50,7 @@ def test_what_is_drawn_is_the_simulation(page):
     A page gets numbers of 32 bits: 1e-6 m at 2 m.
     """
     page.open()
-    wait(lambda: page._frame and page._frame.time > 0.3)
+    wait(lambda: page.frame and page.frame.time > 0.3)
     frame = paused(page)
     with Simulation(DROP) as twin:
         while twin.time < round(frame.time * 1e9):
@@ -96,17 +64,25 @@ def test_a_capsule_is_a_cylinder_between_two_balls():
     """Their ends are where the shape's are, along the bone's own z."""
     turn = rotation.from_axis_angle((1, 2, 3), 0.7)
     bone = Bone('b', Capsule(0.1, 0.6), 1, (0, 0, 1), turn, color=(1, 0.5, 0, 1))
-    with served(Scene('s', (Placement(Ragdoll('d', (bone,))),), gravity=(0, 0, 0))) as page:
+    scene = Scene('s', (Placement(Ragdoll('d', (bone,))),), gravity=(0, 0, 0))
+    with served(Simulated(scene)) as page:
         page.open()
-        wait(lambda: page._stage)
+        wait(lambda: page.stage)
         batches = {batch.handle.name.split('/')[-1]: batch.handle
-                   for batch in page._stage.bodies.batches}
+                   for batch in page.stage.bodies.batches}
         assert set(batches) == {'cylinder', 'sphere'}
         along = rotation.rotate(turn, np.array([0, 0, 0.3]))
         ends = batches['sphere'].batched_positions
         assert np.abs(ends - np.stack([along, -along]) - (0, 0, 1)).max() < 1e-6
         assert np.allclose(batches['cylinder'].batched_scales, [(0.2, 0.2, 0.6)])
         assert batches['sphere'].batched_colors.tolist() == [[255, 128, 0]] * 2
+
+
+def stands(source):
+    """Whether the time stands for 0.1 s; a tick would be due within 10 ms."""
+    frame, since = source.frame, time.monotonic()
+    wait(lambda: source.frame is not frame or time.monotonic() > since + 0.1)
+    return source.frame is frame
 
 
 def test_time_stands_while_no_page_is_open(page):
@@ -116,11 +92,8 @@ def test_time_stands_while_no_page_is_open(page):
     assert before.time < 0.1
     wait(lambda: page.source.frame.time > 0.1)
     first.close()
-    wait(lambda: not page.source._wanted.frames)
+    wait(lambda: stands(page.source))
     stood = page.source.frame
-    # A tick would be due within 10 ms.
-    page.source._thread.join(0.1)
-    assert page.source.frame is stood
     page.open()
     wait(lambda: page.source.frame.time > stood.time)
 
@@ -128,13 +101,13 @@ def test_time_stands_while_no_page_is_open(page):
 def test_nothing_is_sent_while_nothing_moves():
     """A scene at rest in free space: the page gets its plots' points alone, four a second."""
     still = load_scene('flight')
-    with served(still) as page:
+    with served(Simulated(still)) as page:
         client = page.open()
-        wait(lambda: page._frame and page._frame.time > 1.0)
-        before, since = client.windows, page._frame.time
-        wait(lambda: page._frame.time > since + 1.0)
-        # 100 frames in this second would be some 60 windows.
-        assert client.windows - before < 15
+        wait(lambda: page.frame and page.frame.time > 0.3)
+        before, since = client.windows, page.frame.time
+        wait(lambda: page.frame.time > since + 0.5)
+        # 50 frames in this half of a second would be some 30 windows.
+        assert client.windows - before < 8
 
 
 @pytest.mark.parametrize(('label', 'axis', 'sign'), [
@@ -142,67 +115,64 @@ def test_nothing_is_sent_while_nothing_moves():
 def test_arrow_keys_push(page, label, axis, sign):
     """2000 N on 55 kg: 1 m/s in 28 ms. The arrow is there while the push is, and gone after."""
     client = page.open()
-    wait(lambda: page._frame)
-    client.press(command(page, label))
-    wait(lambda: page._frame.pushes)
-    assert page._frame.pushes[0].force[axis] == 2000 * sign
-    wait(lambda: page._frame.state.linear_velocities[0, axis] * sign > 1)
+    wait(lambda: page.frame)
+    client.press(page, label)
+    wait(lambda: page.frame.pushes)
+    assert page.frame.pushes[0].force[axis] == 2000 * sign
+    wait(lambda: page.frame.state.linear_velocities[0, axis] * sign > 1)
     arrow = wait_for(page, '/scene/pushes')
     assert arrow.visible and np.sign(np.diff(arrow.points[0], axis=0)[0, axis]) == sign
-    wait(lambda: not page._frame.pushes and not arrow.visible)
+    wait(lambda: not page.frame.pushes and not arrow.visible)
 
 
 def test_arrows_pressed_together_add_up(page):
     client = page.open()
-    wait(lambda: page._frame)
-    client.press(command(page, 'Push up'))
-    client.press(command(page, 'Push left'))
-    wait(lambda: page._frame.pushes and page._frame.pushes[0].force == (-2000, -2000, 2))
+    wait(lambda: page.frame)
+    client.press(page, 'Push up')
+    client.press(page, 'Push left')
+    wait(lambda: page.frame.pushes and page.frame.pushes[0].force == (-2000, -2000, 2))
 
 
 def test_pause_step_reset_and_pace(page):
     client = page.open()
-    wait(lambda: page._frame and page._frame.time > 0.2)
-    client.press(command(page, 'Pause, or go on'))
+    wait(lambda: page.frame and page.frame.time > 0.2)
+    client.press(page, 'Pause, or go on')
     wait(lambda: page.source.report.paused)
     held = paused(page).time
-    client.press(command(page, 'Step'))
-    wait(lambda: page._frame.time > held)
-    assert page._frame.time == pytest.approx(held + 0.01)
-    client.press(command(page, 'Reset'))
-    wait(lambda: page._frame.time == 0)
-    client.update(page.controls._pace, 0.5)
+    client.press(page, 'Step')
+    wait(lambda: page.frame.time > held)
+    assert page.frame.time == pytest.approx(held + 0.01)
+    client.press(page, 'Reset')
+    wait(lambda: page.frame.time == 0)
+    client.update(page.controls.pace, 0.5)
     wait(lambda: page.source.report.pace == 0.5)
-    client.press(command(page, 'Pause, or go on'))
-    wait(lambda: page._frame.time > 0)
+    client.press(page, 'Pause, or go on')
+    wait(lambda: page.frame.time > 0)
 
 
 def test_another_scene_by_the_dropdown(page):
     """Ten dolls, 100 bones, in as many batches as one; then the old stage is gone."""
     client = page.open()
-    wait(lambda: page._stage)
-    client.update(page.controls._scene, 'crowd')
-    wait(lambda: len(page._stage.scene.bones) == 100)
+    wait(lambda: page.stage)
+    client.update(page.controls.scene, 'crowd')
+    wait(lambda: len(page.stage.scene.bones) == 100)
     _, bones = drawn(page)
-    assert sorted(bones) == list(range(100)) and len(page._stage.bodies.batches) == 2
-    client.update(page.controls._scene, 'ponytail')
-    wait(lambda: page._stage.scene.name == 'ponytail')
+    assert sorted(bones) == list(range(100)) and len(page.stage.bodies.batches) == 2
+    client.update(page.controls.scene, 'ponytail')
+    wait(lambda: page.stage.scene.name == 'ponytail')
     rods = wait_for(page, '/scene/rods').points
     assert rods.shape == (8, 2, 3) and np.allclose(rods[1:, 0], rods[:-1, 1])
 
 
-def test_a_scene_that_is_refused_is_not_chosen(page):
+def test_a_scene_that_is_refused_is_not_chosen():
     """The list goes on naming the scene that is shown, and the page that chose is told why."""
-    client = page.open()
-    wait(lambda: page.controls._scene.value == 'drop')
-    state, simulated = page.source.frame.state, page.source
-    page.play(Playback(Recording(DROP, np.zeros(1), state.positions[None],
-                                 state.orientations[None])))
-    simulated.close()
-    handle, seen = page.controls._scene, []
-    handle.on_update(lambda event: seen.append(handle.value))
-    client.update(handle, 'crowd')
-    wait(lambda: 'crowd' in seen and handle.value == 'drop')
+    unturned = np.tile((0, 0, 0, 1.0), (1, 10, 1))
+    with served(Playback(Recording(DROP, np.zeros(1), np.zeros((1, 10, 3)), unturned))) as page:
+        client, handle, seen = page.open(), page.controls.scene, []
+        wait(lambda: handle.value == 'drop')
+        handle.on_update(lambda event: seen.append(handle.value))
+        client.update(handle, 'crowd')
+        wait(lambda: 'crowd' in seen and handle.value == 'drop')
 
 
 def test_what_was_sent_is_text_on_the_page(page):
@@ -213,8 +183,8 @@ def test_what_was_sent_is_text_on_the_page(page):
     page.open()
     page.source.use(dataclasses.replace(DROP, dolls=(
         dataclasses.replace(placement, doll=doll, name='<iframe srcdoc=x>'),)))
-    wait(lambda: 'no skin for &lt;iframe srcdoc=x&gt;' in page._problem.content)
-    assert '<iframe' not in page._problem.content
+    wait(lambda: 'no skin for &lt;iframe srcdoc=x&gt;' in page.problem.content)
+    assert '<iframe' not in page.problem.content
 
 
 def wait_for(page, name):
@@ -224,88 +194,78 @@ def wait_for(page, name):
 
 def test_what_cannot_be_used_is_refused_and_the_old_goes_on(page, broken_scene):
     page.open()
-    wait(lambda: page._frame)
+    wait(lambda: page.frame)
     path, words = broken_scene
     with pytest.raises(ValueError) as error:
         page.source.load(str(path))
     assert all(word in str(error.value) for word in words)
-    before = page._frame.time
-    wait(lambda: page._frame.time > before)
-
-
-def batch_of(page, bone):
-    """Name of the node that a bone is drawn in, its number there, and its place (3,) m."""
-    index = page._stage.scene.bone_index(bone)
-    for batch in page._stage.bodies.batches:
-        for number in np.flatnonzero(batch.bones == index):
-            return batch.handle.name, int(number), page._frame.state.positions[index]
-    raise AssertionError(bone)
+    before = page.frame.time
+    wait(lambda: page.frame.time > before)
 
 
 def test_a_dragged_bone_follows_at_the_distance_it_had(page):
     """The target is as far from the eye as the grabbed point was, in the pointer's direction."""
     eye = np.array([3.0, 1.0, 1.5])
     client = page.open(position=tuple(eye))
-    wait(lambda: page._frame)
+    wait(lambda: page.frame)
     frame = paused(page)
     node, number, place = batch_of(page, 'left_forearm')
     client.drag(node, 'start', place, place, number)
-    wait(lambda: page.source._simulation.grabs)
+    wait(lambda: page.source.frame.held)
     pointer = np.add(place, (0.0, 0.4, 0.5))
     client.drag(node, 'update', place, pointer, number)
     distance = np.linalg.norm(place - eye)
     target = eye + (pointer - eye) / np.linalg.norm(pointer - eye) * distance
-    wait(lambda: np.allclose(page.source._simulation.grabs[0].target, target))
-    assert page.source._simulation.grabs[0].bone == 'left_forearm'
     page.source.pause(False)
+    wait(lambda: page.frame.held and np.allclose(page.frame.held[0].target, target))
+    assert page.frame.held[0].bone == 'left_forearm'
     bone = frame.scene.bone_index('left_forearm')
-    wait(lambda: np.linalg.norm(page._frame.state.positions[bone] - target) < 0.05)
-    assert page._frame.held[0].bone == 'left_forearm'
+    wait(lambda: np.linalg.norm(page.frame.state.positions[bone] - target) < 0.05)
     # Drawn as a line while it is held.
     assert wait_for(page, '/scene/hands').visible
     client.drag(node, 'end', place, pointer, number)
-    wait(lambda: not page._frame.held)
+    wait(lambda: not page.frame.held)
 
 
 def test_a_point_that_has_moved_on_is_taken_at_the_edge(page):
     """The page shows the past: what was aimed at lies within the bone's box."""
     client = page.open()
-    wait(lambda: page._frame)
+    wait(lambda: page.frame)
     paused(page)
     node, number, place = batch_of(page, 'head')
     client.drag(node, 'start', np.add(place, (0.5, 0, 0)), place, number)
-    wait(lambda: page.source._simulation.grabs)
-    assert np.linalg.norm(page.source._simulation.grabs[0].point) == pytest.approx(0.1)
+    wait(lambda: page.source.frame.held)
+    assert np.linalg.norm(page.source.frame.held[0].point - place) == pytest.approx(0.1)
 
 
 def test_a_page_that_vanishes_lets_go(page):
     """A closed laptop: no end of the drag, no goodbye. The other page goes on."""
     stays, goes = page.open(), page.open()
-    wait(lambda: page._frame and len(page.server.get_clients()) == 2)
+    wait(lambda: page.frame and len(page.server.get_clients()) == 2)
     node, number, place = batch_of(page, 'head')
     goes.drag(node, 'start', place, place, number)
-    wait(lambda: page._frame.held)
+    wait(lambda: page.frame.held)
     goes.drop()
     page.clients.remove(goes)
-    wait(lambda: not page._frame.held and len(page.server.get_clients()) == 1)
+    wait(lambda: not page.frame.held and len(page.server.get_clients()) == 1)
     before = stays.windows
     wait(lambda: stays.windows > before)
 
 
 def test_two_pages_have_a_hand_each(page):
     clients = [page.open(), page.open()]
-    wait(lambda: page._frame and len(page.server.get_clients()) == 2)
+    wait(lambda: page.frame and len(page.server.get_clients()) == 2)
     for client, bone in zip(clients, ('left_forearm', 'right_forearm'), strict=True):
         node, number, place = batch_of(page, bone)
         client.drag(node, 'start', place, place, number)
-    wait(lambda: len(page._frame.held) == 2)
+    wait(lambda: len(page.frame.held) == 2)
 
 
 @pytest.mark.filterwarnings('ignore')
 @pytest.mark.parametrize('data', [b'', b'\xff\x00garbage', b'\x81\xa4type\xa7Nothing'])
 def test_garbage_on_the_socket_hurts_nobody_else(page, data, caplog):
     stays, bad = page.open(), page.open()
-    wait(lambda: page._frame and len(page.server.get_clients()) == 2)
+    wait(lambda: page.frame and len(page.server.get_clients()) == 2)
     bad.send_bytes(data)
     before = stays.windows
     wait(lambda: stays.windows > before + 3)
@@ -315,23 +275,23 @@ def test_garbage_on_the_socket_hurts_nobody_else(page, data, caplog):
 @pytest.mark.parametrize('number', [np.nan, np.inf, 1e300])
 def test_a_pointer_that_points_nowhere_moves_nothing(page, phase, number):
     client = page.open()
-    wait(lambda: page._frame)
+    wait(lambda: page.frame)
     node, bone, place = batch_of(page, 'head')
     if phase == 'update':
         client.drag(node, 'start', place, place, bone)
-        wait(lambda: page._frame.held)
+        wait(lambda: page.frame.held)
     client.drag(node, phase, place if phase == 'update' else (number,) * 3, (number,) * 3, bone)
     client.drag(node, 'end', place, place, bone)
-    since = page._frame.time
-    wait(lambda: not page._frame.held and page._frame.time > since + 0.1)
-    assert np.isfinite(page._frame.state.positions).all()
-    assert np.abs(page._frame.state.positions).max() < 10
+    since = page.frame.time
+    wait(lambda: not page.frame.held and page.frame.time > since + 0.1)
+    assert np.isfinite(page.frame.state.positions).all()
+    assert np.abs(page.frame.state.positions).max() < 10
 
 
 def test_a_click_chooses_the_bone_for_the_editor(page):
     from viser import _messages
     client = page.open()
-    wait(lambda: page._frame)
+    wait(lambda: page.frame)
     node, number, _ = batch_of(page, 'right_shin')
     client.send(_messages.SceneNodeClickMessage(
         name=node, instance_index=number, ray_origin=(4.0, 0.0, 1.0),
@@ -342,22 +302,22 @@ def test_a_click_chooses_the_bone_for_the_editor(page):
 def test_contacts_on_demand(page):
     """At rest the doll touches the ground: the points are at its height, within its margin."""
     client = page.open()
-    wait(lambda: page._frame)
+    wait(lambda: page.frame)
     assert page.server.scene.get_handle_by_name('/scene/contacts') is None
-    client.update(page.view._contacts, True)
-    wait(lambda: page._frame.contacts is not None and len(page._frame.contacts) > 3)
+    client.update(page.view.contacts, True)
+    wait(lambda: page.frame.contacts is not None and len(page.frame.contacts) > 3)
     points = wait_for(page, '/scene/contacts').points
     # Bones of the doll touch each other as well, above the ground.
     assert points[:, 2].min() == pytest.approx(0, abs=0.01)
-    client.update(page.view._contacts, False)
-    wait(lambda: page._frame.contacts is None)
+    client.update(page.view.contacts, False)
+    wait(lambda: page.frame.contacts is None)
     wait(lambda: not page.server.scene.get_handle_by_name('/scene/contacts').visible)
 
 
 def test_the_camera_is_told_on_demand_what_to_follow(page):
     """The centre of mass, which a hand that holds something stops; test_viewer_browser looks."""
     client = page.open()
-    wait(lambda: page._frame)
+    wait(lambda: page.frame)
     masses = np.array([bone.mass for bone in DROP.bones])
 
     def followed():
@@ -367,37 +327,38 @@ def test_the_camera_is_told_on_demand_what_to_follow(page):
         return np.allclose(followed().position, place, rtol=0, atol=1e-6)
 
     def centre():
-        return masses @ page._frame.state.positions / masses.sum()
+        return masses @ page.frame.state.positions / masses.sum()
 
     paused(page)
     begin = centre()
     assert followed() is None
-    client.update(page.view._follow, True)
+    client.update(page.view.follow, True)
     wait(lambda: followed() and is_at(begin))
     node, number, place = batch_of(page, 'head')
     client.drag(node, 'start', place, place, number)
     client.drag(node, 'update', place, np.add(place, (0, 0, 1)), number)
-    wait(lambda: page._frame.held)
+    wait(lambda: page.frame.held)
     page.source.pause(False)
     wait(lambda: centre()[2] - begin[2] > 0.5)
     assert is_at(begin)
     client.drag(node, 'end', place, place, number)
-    wait(lambda: not page._frame.held and is_at(centre()))
-    client.update(page.view._follow, False)
+    wait(lambda: not page.frame.held and is_at(centre()))
+    client.update(page.view.follow, False)
     wait(lambda: followed() is None)
 
 
 def test_plots_tell_energy_gap_and_pace(page):
     client = page.open()
-    wait(lambda: page._frame)
-    client.press(command(page, 'Push up'))
-    wait(lambda: len(page._plots._pace._rows) > 3 and len(page._plots._energy._rows) > 3)
-    _, energy, put_in = page._plots._energy._handle.data
+    wait(lambda: page.frame)
+    client.press(page, 'Push up')
+    wait(lambda: min(len(plot.handle.data[0]) for plot in (
+        page.plots.pace, page.plots.energy)) > 3)
+    _, energy, put_in = page.plots.energy.handle.data
     # The doll never has more than was put in: a thousandth for rounding.
     assert put_in.max() > 10 and (energy <= put_in * 1.001 + 1e-6).all()
-    _, gap = page._plots._gap._handle.data
+    _, gap = page.plots.gap.handle.data
     assert 0 <= gap.max() < 50
-    _, pace, wanted = page._plots._pace._handle.data
+    _, pace, wanted = page.plots.pace.handle.data
     assert wanted.tolist() == [1.0] * len(wanted) and 0 < np.median(pace) < 2
 
 
@@ -412,7 +373,7 @@ def test_numbers_that_run_away_are_never_drawn():
         source = Simulated(wild)
     except (ValueError, ArithmeticError):
         pytest.skip('the simulation refuses it at once')
-    source.want(dataclasses.replace(source._wanted, frames=True))
+    source.want(Wanted(frames=True))
     wait(lambda: source.report.problem)
     assert all(np.isfinite(part).all() for part in vars(source.frame.state).values()) or \
         source.frame.time == 0

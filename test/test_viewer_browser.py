@@ -14,7 +14,7 @@ from test_fit_broken import BROKEN
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.viewer.sources.recording import Recording
-from ragdoll_ros.viewer.sources.recording_file import load_recording, save_recording
+from ragdoll_ros.viewer.sources.recording_file import load_recording, recording_text
 
 SCENE = load_scene('drop')
 START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])
@@ -70,7 +70,7 @@ def far(view, bodies, distance):
     return (np.linalg.norm(view.bodies(SCENE) - bodies, axis=1) > distance).all()
 
 
-def test_sees_ten_bodies_fall(view, states):
+def test_sees_ten_bodies_fall(states, view):
     """All move, and what is drawn is a tick of the fall as a simulation here has it.
 
     A page gets numbers of 32 bits: 1e-6 m at 2 m.
@@ -176,7 +176,7 @@ def test_a_run_is_played_back(browser, states, tmp_path):
     recording = Recording(SCENE, np.array((0, 10, 20)) * SCENE.step,
                           np.array([state.positions for state in made]),
                           np.array([state.orientations for state in made]))
-    save_recording(recording, tmp_path / 'run.json')
+    (tmp_path / 'run.json').write_text(recording_text(recording))
     with (serving('--port', '0', '--play', str(tmp_path / 'run.json')) as url,
           opened(browser, url, SCENE) as page):
         page.wait(lambda: abs(page.bodies(SCENE) - recording.positions[-1]).max() < 1e-6)

@@ -102,7 +102,7 @@ def test_a_wrong_option_ends_the_process_with_two():
     assert done.returncode == 2 and '--nonsense' in done.stderr and 'Traceback' not in done.stderr
 
 
-def test_a_broken_scene_is_refused_with_all_its_faults(broken_scene):
+def test_a_broken_scene_is_refused_with_all_its_errors(broken_scene):
     path, words = broken_scene
     done = run('--scene', str(path))
     assert done.returncode == 2 and all(word in done.stderr for word in words)

@@ -63,6 +63,11 @@ def all_kinds():
     return Ragdoll('d', bones, joints)
 
 
+def drawn(server):
+    """Lines of all dials."""
+    return server.scene.get_handle_by_name('/scene/limits')
+
+
 def test_the_last_needle_of_each_joint_moves_with_the_child():
     """All angles of a joint turn the child: so does the needle of its last angle.
 
@@ -77,13 +82,13 @@ def test_the_last_needle_of_each_joint_moves_with_the_child():
     with Simulation(scene) as simulation:
         begin = simulation.state
         limits.show(begin, simulation.joint_angles)
-        first = limits._handle.points.copy()
+        first = drawn(server).points.copy()
         for _ in range(30):
             state = simulation.advance()
         assert np.abs(simulation.joint_angles).max() > 0.2
         limits.show(state, simulation.joint_angles)
-    needles, before = limits._handle.points[-6:], first[-6:]
-    assert len(limits._handle.points) == 6 * (PIECES + 1)
+    needles, before = drawn(server).points[-6:], first[-6:]
+    assert len(drawn(server).points) == 6 * (PIECES + 1)
     for child, row in (('b', 0), ('c', 2), ('d', 5)):
         index = scene.bone_index(child)
         local = rotation.rotate(rotation.inverse(begin.orientations[index]),
@@ -91,7 +96,7 @@ def test_the_last_needle_of_each_joint_moves_with_the_child():
         carried = state.positions[index] + rotation.rotate(state.orientations[index], local)
         assert np.abs(carried - needles[row]).max() < 1e-4
     limits.show(state, None)
-    assert not limits._handle.visible
+    assert not drawn(server).visible
     server.stop()
 
 
@@ -109,7 +114,7 @@ def test_needles_are_red_at_their_limit():
     angles = np.array([(low + high) / 2 for low, high in pairs])
     angles[3] = pairs[3][1] + 0.1
     limits.show(state, angles)
-    colors = limits._handle.colors[-len(angles):, 0].tolist()
+    colors = drawn(server).colors[-len(angles):, 0].tolist()
     assert [tuple(color) for color in colors] == [
         RED if k == 3 else GREEN for k in range(len(angles))]
     server.stop()

@@ -5,15 +5,21 @@ import pytest
 
 pytest.importorskip('viser')
 from network import Network
-from page_client import PageClient, wait
-from test_viewer import DROP, batch_of, served
+from page_client import PageClient, batch_of, served, wait
 
-from ragdoll_ros.viewer.drawing.line import PATIENCE, PERIOD
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.viewer.drawing import line
+from ragdoll_ros.viewer.sources.simulated import Simulated
+
+PERIOD, PATIENCE = 0.1, 0.9
+"""s between two questions, and for an answer, in place of half a second and 2.5 s."""
 
 
 @pytest.fixture
-def page():
-    with served(DROP) as page:
+def page(monkeypatch):
+    monkeypatch.setattr(line, 'PERIOD', PERIOD)
+    monkeypatch.setattr(line, 'PATIENCE', PATIENCE)
+    with served(Simulated(load_scene('drop'))) as page:
         yield page
 
 
@@ -28,10 +34,10 @@ def holding(page, network):
     """A page behind the network whose pointer holds the head."""
     client = PageClient(network.port)
     page.clients.append(client)
-    wait(lambda: page._frame and page.server.get_clients())
+    wait(lambda: page.frame and page.server.get_clients())
     node, number, place = batch_of(page, 'head')
     client.drag(node, 'start', place, place, number)
-    wait(lambda: page._frame.held)
+    wait(lambda: page.frame.held)
     return client
 
 
@@ -42,19 +48,19 @@ def test_a_pointer_that_rests_holds_on_and_a_line_that_goes_silent_lets_go(page,
     """
     stays = page.open()
     holding(page, network)
-    since = page._frame.time
-    wait(lambda: page._frame.time > since + PERIOD + PATIENCE + 0.5)
-    assert page._frame.held
+    since = page.frame.time
+    wait(lambda: page.frame.time > since + PERIOD + PATIENCE + 0.5)
+    assert page.frame.held
     network.go_silent()
-    wait(lambda: not page._frame.held, timeout=PERIOD + PATIENCE + 10)
-    before, since = stays.windows, page._frame.time
-    wait(lambda: stays.windows > before and page._frame.time > since)
+    wait(lambda: not page.frame.held, timeout=PERIOD + PATIENCE + 10)
+    before, since = stays.windows, page.frame.time
+    wait(lambda: stays.windows > before and page.frame.time > since)
 
 
 def test_a_line_that_is_cut_lets_go_and_the_page_may_come_back(page, network):
     client = holding(page, network)
     network.cut()
-    wait(lambda: not page.source._simulation.grabs and not page.server.get_clients())
+    wait(lambda: not page.source.frame.held and not page.server.get_clients())
     client.close()
     network.come_back()
     holding(page, network)

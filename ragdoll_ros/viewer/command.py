@@ -38,20 +38,8 @@ NO_ROS = ("without --scene, ragdoll_viewer listens to a node over ROS 2: source 
           "pip install 'ragdoll_ros[ros]', or name a scene: ragdoll_viewer --scene drop")
 
 
-class NoViser(errors.RagdollError):
-    """Nothing to serve a page with."""
-
-
-class NoRos(errors.RagdollError):
-    """No ROS to listen to."""
-
-
-class WrongArguments(errors.RagdollError):
-    """What the command does not take."""
-
-
-class NoPort(errors.RagdollError):
-    """An address that nothing can be served at."""
+class CannotServe(errors.RagdollError):
+    """No page can be served as asked: with what would be right."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -71,7 +59,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def parser() -> argparse.ArgumentParser:
-    """Say what the command takes."""
+    """Options of the command."""
     parser = argparse.ArgumentParser(
         'ragdoll_viewer', description=__doc__, epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -99,7 +87,7 @@ def port(text: str) -> int:
 def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event) -> None:
     """Serve the page until told to stop; RagdollError if it cannot be."""
     if not os.access(options.folder, os.W_OK | os.X_OK) or not os.path.isdir(options.folder):
-        raise WrongArguments(f'--folder {options.folder}: expected a folder that can be written to')
+        raise CannotServe(f'--folder {options.folder}: expected a folder that can be written to')
     number = free_port(options.host, options.port)
     source = make_source(options, for_ros)
     try:
@@ -113,11 +101,11 @@ def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event
 
 
 def page_class() -> type:
-    """Import what takes longest, only once all else is as it should be; NoViser without it."""
+    """Import what takes longest, only once all else is as it should be; CannotServe without it."""
     try:
         import viser  # noqa: F401
     except ImportError:
-        raise NoViser(NO_VISER) from None
+        raise CannotServe(NO_VISER) from None
     from .page import Page
     return Page
 
@@ -126,7 +114,7 @@ def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
     """Simulate a scene here, play a run, or listen to a node; RagdollError if that cannot be."""
     alone = next((f'--{key}' for key in ('scene', 'play') if getattr(options, key) is not None), '')
     if alone and for_ros:
-        raise WrongArguments(f'{" ".join(for_ros)}: not with {alone}, which does without ROS')
+        raise CannotServe(f'{" ".join(for_ros)}: not with {alone}, which does without ROS')
     if options.play is not None:
         from .sources.playback import Playback
         from .sources.recording_file import load_recording
@@ -138,12 +126,12 @@ def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
     try:
         from .sources.remote import Remote
     except ImportError as error:
-        raise NoRos(f'{error}: {NO_ROS}') from None
+        raise CannotServe(f'{error}: {NO_ROS}') from None
     return Remote(for_ros)
 
 
 def free_port(host: str, wanted: int | None) -> int:
-    """Give the wanted port, or the first free one from PORT on; NoPort if there is none."""
+    """The wanted port, or the first free one from PORT on; CannotServe if there is none."""
     reason = ''
     for port in (wanted,) if wanted is not None else range(PORT, PORT + 100):
         try:
@@ -154,13 +142,13 @@ def free_port(host: str, wanted: int | None) -> int:
                 return port
         except OSError as error:
             reason = error.strerror or str(error)
-    raise NoPort(f'--host {host} --port {wanted or PORT}: {reason}; expected an address of this '
-                 'machine and a free port from 1024 to 65535')
+    raise CannotServe(f'--host {host} --port {wanted or PORT}: {reason}; expected an address of '
+                      'this machine and a free port from 1024 to 65535')
 
 
 @contextlib.contextmanager
 def server_at(host: str, port: int) -> Iterator[object]:
-    """Have viser's server, without its own words on standard output.
+    """Viser's server, without its own words on standard output.
 
     At the end it would wait 6 s for each connection on which nothing was asked yet, such as a
     browser keeps in reserve: it is left to itself then.
@@ -178,7 +166,7 @@ def server_at(host: str, port: int) -> Iterator[object]:
 
 
 def shown(host: str) -> str:
-    """Give the name by which this machine's browser reaches a host."""
+    """Name by which this machine's browser reaches a host."""
     return {'0.0.0.0': '127.0.0.1', '::': '[::1]'}.get(host, f'[{host}]' if ':' in host else host)
 
 

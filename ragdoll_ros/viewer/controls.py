@@ -33,13 +33,13 @@ KEEP_KEYS = """<img src="data:," style="display:none" onerror="
       if (event.detail && (!typed || event.target.closest('[role=option]'))) at?.blur();
     });
   }">"""
-"""Keeps arrow keys from viser's camera, which would turn with each push; commands still get them:
+"""Keeps arrow keys from viser's camera, which would rotate with each push; commands still get them:
 they listen where this does, the camera further out. What was clicked gives the keys back, or
 Space would press it again, a checkbox keep all keys; but for a field in which one types."""
 
 
 class Controls:
-    """The panel's first tab. ``source`` may be another one later."""
+    """The panel's first tab."""
 
     def __init__(self, server: viser.ViserServer, source: Source) -> None:
         self.source = source
@@ -54,20 +54,19 @@ class Controls:
         pushes = gui.add_button_group(
             'Push', tuple(ARROWS), hint='2000 N, as seen from in front of the doll: left, away, '
             'toward you, right; arrow keys do the same')
-        self._pause = gui.add_button('Pause', icon='player-pause', hint='Space')
-        self._step = gui.add_button('Step', icon='player-track-next', disabled=True,
-                                    hint='N; while paused; ends editing')
+        self.pause = gui.add_button('Pause', icon='player-pause', hint='Space')
+        self.step_button = gui.add_button('Step', icon='player-track-next', disabled=True,
+                                          hint='N; while paused; ends editing')
         reset = gui.add_button('Reset', icon='player-skip-back', hint='R')
-        self._pace = gui.add_slider('Pace', *PACES, step=0.05, initial_value=1.0,
-                                    hint='simulated seconds for each second on the wall')
-        self._scene = gui.add_dropdown('Scene', (OTHER, *scene_names()),
-                                        initial_value=OTHER)
+        self.pace = gui.add_slider('Pace', *PACES, step=0.05, initial_value=1.0,
+                                   hint='simulated seconds for each second on the wall')
+        self.scene = gui.add_dropdown('Scene', (OTHER, *scene_names()), initial_value=OTHER)
         pushes.on_click(lambda event: self.push(ARROWS[event.target.value]))
-        self._pause.on_click(lambda _: self.toggle_pause())
-        self._step.on_click(lambda _: self.step())
+        self.pause.on_click(lambda _: self.toggle_pause())
+        self.step_button.on_click(lambda _: self.step())
         reset.on_click(lambda _: self.source.reset())
-        self._pace.on_update(lambda event: event.client and self._set_pace())
-        self._scene.on_update(self._choose)
+        self.pace.on_update(lambda event: event.client and self.source.set_pace(self.pace.value))
+        self.scene.on_update(self._choose)
         self._add_keys(gui)
 
     def push(self, arrow: str) -> None:
@@ -86,26 +85,23 @@ class Controls:
         self.source.step()
 
     def show(self, report: Report) -> None:
-        """Let the panel tell how the source is."""
+        """Show how the source does."""
         if report.paused != self._shown.paused:
-            self._pause.label = 'Go on' if report.paused else 'Pause'
-            self._pause.icon = 'player-play' if report.paused else 'player-pause'
-            self._step.disabled = not report.paused
+            self.pause.label = 'Go on' if report.paused else 'Pause'
+            self.pause.icon = 'player-play' if report.paused else 'player-pause'
+            self.step_button.disabled = not report.paused
         if report.pace != self._shown.pace:
-            self._pace.value = min(max(report.pace, PACES[0]), PACES[1])
+            self.pace.value = min(max(report.pace, PACES[0]), PACES[1])
         self._shown = report
 
     def show_scene(self, name: str) -> None:
-        """Let the panel tell which scene it is.
+        """Show which scene it is.
 
         It is written where `_choose` reads it, in viser's thread: written from another one, it
         could come between a choice that arrives at this moment and its reading, and win.
         """
-        self._scene_shown = shown = name if name in self._scene.options else OTHER
-        self._loop.call_soon_threadsafe(setattr, self._scene, 'value', shown)
-
-    def _set_pace(self) -> None:
-        self.source.set_pace(self._pace.value)
+        self._scene_shown = shown = name if name in self.scene.options else OTHER
+        self._loop.call_soon_threadsafe(setattr, self.scene, 'value', shown)
 
     async def _choose(self, event: viser.GuiEvent) -> None:
         """Load the chosen scene; at once, before the page tells of the one that is shown."""

@@ -3,7 +3,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import viser
@@ -41,33 +40,26 @@ class Page:
                  folder: str | Path = '.') -> None:
         self.server = server
         self.source = source
-        self.listeners: list[Callable[[Frame], None]] = []
-        """Called with each frame that is drawn, in the drawing thread: a recorder, say."""
-        self.selectors: list[Callable[[str], None]] = []
-        """Called with the name of a bone that is clicked on: the editor, say."""
         self.editor: Editor | None = None
+        self.frame: Frame | None = None
+        """What is shown; None before the first."""
+        self.stage: Stage | None = None
+        """All that is drawn of the scene that is shown; None before the first frame."""
         self._folder = folder
-        self._frame: Frame | None = None
-        self._stage: Stage | None = None
         light(server)
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         server.gui.add_html(KEEP_PAGE)
-        self._problem = server.gui.add_html('')
+        self.problem = server.gui.add_html('')
         self.tabs = server.gui.add_tab_group()
         with self.tabs.add_tab('Play'):
             self.controls = Controls(server, source)
             self.view = View(server)
-            self.listeners.append(RecordingPanel(server).take)
+            self._recording = RecordingPanel(server)
         self._edit_tab = self.tabs.add_tab('Edit')
         with self.tabs.add_tab('Plots'):
-            self._plots = Plots(server)
+            self.plots = Plots(server)
         self._follower = Follower(server)
-        self._pointer = Pointer(lambda: self.source, lambda: self._frame, self._select)
-
-    def play(self, source: Source) -> None:
-        """Show another source from now on; the last one is left open."""
-        self.source.want(Wanted())
-        self.source = self.controls.source = source
+        self._pointer = Pointer(source, lambda: self.frame, self._select)
 
     def run(self, stop: threading.Event) -> None:
         """Draw until told to stop."""
@@ -79,19 +71,20 @@ class Page:
         self.source.want(Wanted())
 
     def update(self) -> bool:
-        """Draw what has changed; tell whether any page is open."""
+        """Draw what has changed; returns whether any page is open."""
         is_open = bool(self.server.get_clients())
         self.source.want(self.view.wanted if is_open else Wanted())
         if is_open:
             frame, report = self.source.frame, self.source.report
-            if frame is not None and frame is not self._frame:
+            if frame is not None and frame is not self.frame:
                 self._draw(frame)
             if frame is not None:
                 now = time.monotonic()
-                self._plots.show(frame, report, now)
-                self._follower.follow(frame, now, self.view.follow)
-            if self._stage is not None:
-                self._stage.be_visible(bones=self.view.bones, skins=self.view.skin)
+                self.plots.show(frame, report, now)
+                self._follower.follow(frame, now, self.view.follow.value)
+            if self.stage is not None:
+                self.stage.be_visible(bones=self.view.bones.value,
+                                      skins=self.view.skin.value)
             if self.editor is not None:
                 self.editor.take_note(report.paused)
             self._tell(report.problem, report.note)
@@ -99,37 +92,35 @@ class Page:
         return is_open
 
     def _draw(self, frame: Frame) -> None:
-        new = self._stage is None or frame.scene is not self._stage.scene
+        new = self.stage is None or frame.scene is not self.stage.scene
         if new:
-            self._stage = Stage(self.server, frame)
-            self._pointer.attach(self._stage.bodies, self._stage.skins)
+            self.stage = Stage(self.server, frame)
+            self._pointer.attach(self.stage.bodies, self.stage.skins)
             self.controls.show_scene(frame.scene.name)
-            self.view.show_scene(has_skin=bool(self._stage.skins.handles))
+            self.view.show_scene(has_skin=bool(self.stage.skins.handles))
             self._edit(frame.scene)
-        self._frame = frame
+        self.frame = frame
         with self.server.atomic():
-            self._stage.show(frame)
+            self.stage.show(frame)
         # Else viser waits for more to send along, up to its own 60th of a second.
         self.server.flush()
-        for listener in self.listeners:
-            listener(frame)
+        self._recording.take(frame)
 
     def _edit(self, scene: Scene) -> None:
-        """Let the scene be edited."""
+        """Hand the scene to the editor, which the first one makes."""
         if self.editor is not None:
             self.editor.show(scene)
             return
         with self._edit_tab:
-            self.editor = Editor(self.server, scene, lambda scene: self.source.use(scene),
-                                 lambda wanted: self.source.pause(wanted), self._folder)
-        self.selectors.append(self.editor.select)
+            self.editor = Editor(self.server, scene, self.source.use, self.source.pause,
+                                 self._folder)
         self.controls.before_step = self.editor.leave
 
     def _select(self, bone: str) -> None:
-        for selector in self.selectors:
-            selector(bone)
+        if self.editor is not None:
+            self.editor.select(bone)
 
     def _tell(self, problem: str, note: str) -> None:
-        notes = [note, *(self._stage.skins.notes if self._stage is not None else ())]
-        self._problem.content = colored(problem, RED) + ''.join(colored(each, GREY)
+        notes = [note, *(self.stage.skins.notes if self.stage is not None else ())]
+        self.problem.content = colored(problem, RED) + ''.join(colored(each, GREY)
                                                                 for each in notes)

@@ -27,14 +27,14 @@ class Pointer:
     Viser's callbacks are coroutines here: they run in order, and nothing in them waits.
     """
 
-    def __init__(self, source: Callable[[], Source], shown: Callable[[], Frame | None],
+    def __init__(self, source: Source, shown: Callable[[], Frame | None],
                  select: Callable[[str], None]) -> None:
         self._source, self._shown, self._select = source, shown, select
         self._distances: dict[int, float] = {}
         self._watches: dict[int, asyncio.Task] = {}
 
     def attach(self, bodies: Bodies, skins: Skins) -> None:
-        """Let the bodies and skins of a new scene be taken."""
+        """Listen to drags and clicks on the bodies and skins of a new scene."""
         for batch in bodies.batches:
             self._listen(batch.handle,
                          lambda index, _, bones=batch.bones: int(bones[index or 0]))
@@ -54,9 +54,9 @@ class Pointer:
             frame = self._shown()
             if frame is None:
                 return
-            eye, way = np.array(event.ray_origin), np.array(event.ray_direction)
-            index = event.instance_index
-            bone = bone_of(index, eye + way * self._depth(eye, way))
+            eye, direction = np.array(event.ray_origin), np.array(event.ray_direction)
+            point = eye + direction * self._depth(eye, direction)
+            bone = bone_of(event.instance_index, point)
             self._select(frame.scene.bone_names[bone])
 
         handle.on_drag('left')(dragged)
@@ -69,12 +69,12 @@ class Pointer:
         eye = event.client.camera.position
         self._distances[event.client_id] = float(np.linalg.norm(point - eye))
         local = on_bone(frame.scene, frame.state, bone, point)
-        self._source().grab(_hand(event), frame.scene.bone_names[bone], tuple(local.tolist()),
+        self._source.grab(_hand(event), frame.scene.bone_names[bone], tuple(local.tolist()),
                             self._target(event))
         self._watch(event)
 
     def _watch(self, event: viser.SceneNodeDragEvent) -> None:
-        """Let go if the page's line dies before it says that it lets go."""
+        """Open the hand if the page's line dies before it says so."""
         async def watch() -> None:
             await is_dead(event.client)
             self._let_go(event)
@@ -89,14 +89,14 @@ class Pointer:
 
     def _let_go(self, event: viser.SceneNodeDragEvent) -> None:
         if self._distances.pop(event.client_id, None) is not None:
-            self._source().let_go(_hand(event))
+            self._source.let_go(_hand(event))
 
     def _drag(self, event: viser.SceneNodeDragEvent) -> None:
         if event.phase == 'end':
             self._unwatch(event)
             self._let_go(event)
         else:
-            self._source().drag(_hand(event), self._target(event))
+            self._source.drag(_hand(event), self._target(event))
 
     def _target(self, event: viser.SceneNodeDragEvent) -> tuple[float, ...]:
         target = kept_distance(event.client.camera.position, np.array(event.end_position),
@@ -107,11 +107,11 @@ class Pointer:
         frame = self._shown()
         return nearest(frame.scene, frame.state, point)
 
-    def _depth(self, eye: np.ndarray, way: np.ndarray) -> float:
+    def _depth(self, eye: np.ndarray, direction: np.ndarray) -> float:
         """Distance, m, at which a ray comes nearest to a bone's centre, the nearest such bone."""
         offsets = self._shown().state.positions - eye
-        along = offsets @ way
-        aside = np.linalg.norm(offsets - along[:, None] * way, axis=1)
+        along = offsets @ direction
+        aside = np.linalg.norm(offsets - along[:, None] * direction, axis=1)
         return float(along[np.argmin(aside)])
 
 

@@ -23,32 +23,33 @@ ELSEWHERE, FULL = 'Download (scene has changed)', 'Download (recording is full)'
 
 
 class RecordingPanel:
-    """Two buttons in the page's panel; what is shown is told by take(), from any thread.
+    """Two buttons in the page's panel; take() is told what is shown, from any thread.
 
     All pages share one recording: whoever stops it gets it.
     """
 
     def __init__(self, server: viser.ViserServer) -> None:
-        self._recorder: Recorder | None = None
+        self.recorder: Recorder | None = None
+        """What has been taken; None before a recording begins."""
         self._ended = False
         self._lock = threading.Lock()
         with server.gui.add_folder('Recording', expand_by_default=False):
-            self._button = server.gui.add_button(
+            self.button = server.gui.add_button(
                 RECORD, icon=viser.Icon.PLAYER_RECORD,
                 hint='Poses of all bones as run.json; ragdoll_viewer --play run.json shows them')
             picture = server.gui.add_button('Picture', icon=viser.Icon.CAMERA,
                                             hint='This view as ragdoll.png')
         self._frame: Frame | None = None
-        self._button.on_click(self._clicked)
+        self.button.on_click(lambda event: self.toggle(event.client))
         picture.on_click(_send_picture)
 
     @property
     def recording(self) -> bool:
         """Whether poses are being taken."""
-        return self._recorder is not None and not self._ended
+        return self.recorder is not None and not self._ended
 
     def take(self, frame: Frame) -> None:
-        """Tell what is shown.
+        """Take note of what is shown.
 
         Another scene, or as much as one recording may hold, ends what is being taken; it waits
         for its download.
@@ -58,8 +59,8 @@ class RecordingPanel:
             self._record(frame)
 
     def _record(self, frame: Frame) -> None:
-        recorder = self._recorder
-        if recorder is None or self._ended:
+        recorder = self.recorder
+        if not self.recording:
             return
         if recorder.scene is not frame.scene:
             self._end(ELSEWHERE)
@@ -71,27 +72,24 @@ class RecordingPanel:
             self._end(FULL)
 
     def _end(self, label: str) -> None:
-        """Take no more, and let the button tell why."""
+        """Take no more; the button says why."""
         self._ended = True
-        self._button.label = label
+        self.button.label = label
 
-    def _clicked(self, event: viser.GuiEvent) -> None:
+    def toggle(self, client: viser.ClientHandle | None) -> None:
+        """Begin to record; else end the recording and send it to the page that asked."""
         with self._lock:
-            recorder, self._recorder = self._recorder, None
+            recorder, self.recorder = self.recorder, None
             self._ended = False
             if recorder is None and self._frame is not None:
-                self._recorder = Recorder(self._frame.scene)
-                self._button.label = STOP
+                self.recorder = Recorder(self._frame.scene)
+                self.button.label = STOP
                 self._record(self._frame)
             else:
-                self._button.label = RECORD
-        if recorder is not None and event.client is not None:
-            _send_run(recorder, event.client)
-
-
-def _send_run(recorder: Recorder, client: viser.ClientHandle) -> None:
-    text = recording_text(recorder.recording())
-    client.send_file_download('run.json', text.encode(), save_immediately=True)
+                self.button.label = RECORD
+        if recorder is not None and client is not None:
+            text = recording_text(recorder.recording())
+            client.send_file_download('run.json', text.encode(), save_immediately=True)
 
 
 def _send_picture(event: viser.GuiEvent) -> None:

@@ -21,11 +21,11 @@ WXYZ = [3, 0, 1, 2]
 
 @dataclass(frozen=True)
 class Batch:
-    """Parts of one kind: which bone each is of, and its shift (m, bone axes)."""
+    """Parts of one kind: which bone each is of, and its offset from that (p, 3) m, bone axes."""
 
     handle: viser.BatchedMeshHandle
     bones: np.ndarray
-    shifts: np.ndarray
+    offsets: np.ndarray
 
 
 class Bodies:
@@ -41,20 +41,20 @@ class Bodies:
             if not mine:
                 continue
             bones = np.array([index for index, _ in mine])
-            shifts = np.array([part.offset for _, part in mine])
-            positions, turns = _placed(state, bones, shifts)
+            offsets = np.array([part.offset for _, part in mine])
+            positions, wxyzs = _placed(state, bones, offsets)
             handle = server.scene.add_batched_meshes_simple(
-                f'/scene/bodies/{kind}', vertices, faces, turns, positions,
+                f'/scene/bodies/{kind}', vertices, faces, wxyzs, positions,
                 batched_scales=np.array([part.size for _, part in mine]),
                 batched_colors=np.round(colors[bones] * 255).astype(np.uint8), lod='off')
-            self.batches.append(Batch(handle, bones, shifts))
+            self.batches.append(Batch(handle, bones, offsets))
 
     def show(self, state: State) -> None:
         """Draw all where they are now."""
         for batch in self.batches:
-            positions, turns = _placed(state, batch.bones, batch.shifts)
+            positions, wxyzs = _placed(state, batch.bones, batch.offsets)
             batch.handle.batched_positions = positions
-            batch.handle.batched_wxyzs = turns
+            batch.handle.batched_wxyzs = wxyzs
 
     def be_visible(self, wanted: bool, glass: bool) -> None:
         """Show the bones, as of glass if so wished, or hide them."""
@@ -64,10 +64,10 @@ class Bodies:
 
 
 def _placed(state: State, bones: np.ndarray,
-            shifts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions (p, 3) m and orientations (p, 4) w, x, y, z of parts, float32."""
-    turns = state.orientations[bones]
+    orientations = state.orientations[bones]
     positions = state.positions[bones]
-    if shifts.any():
-        positions = positions + rotation.rotate(turns, shifts)
-    return positions.astype(np.float32), turns[:, WXYZ].astype(np.float32)
+    if offsets.any():
+        positions = positions + rotation.rotate(orientations, offsets)
+    return positions.astype(np.float32), orientations[:, WXYZ].astype(np.float32)

@@ -32,7 +32,7 @@ FOLLOW = f"""<img src="data:," style="display:none" onerror="
     requestAnimationFrame(() => follow(at));
   }})(null)">"""
 """Lets a page's camera look at the node, if there is one, from the side and distance it has. The
-page itself does so: what the server knows of a camera is late, and would undo its turns."""
+page itself does so: what the server knows of a camera is late, and would undo its rotation."""
 
 
 class Follower:
@@ -56,9 +56,9 @@ class Follower:
             self._node = None
         elif wanted and now >= self._next and not frame.held:
             self._next = now + PERIOD
-            bones = frame.scene.dolls[0].doll.bones
-            centre = np.average(frame.state.positions[:len(bones)], axis=0,
-                                weights=[bone.mass for bone in bones])
+            part = frame.scene.bone_slices[0]
+            centre = np.average(frame.state.positions[part], axis=0,
+                                weights=[bone.mass for bone in frame.scene.bones[part]])
             if self._node is None:
                 self._node = self._server.scene.add_frame(NODE, show_axes=False)
             self._node.position = centre

@@ -26,38 +26,38 @@ SIZES = (0.04, 0.15)
 class Limits:
     """Dials of all limited angles of a scene.
 
-    A joint's angles turn one after the other, each about an axis that the ones before have
-    turned; all is kept along the axes of the parent bone.
+    A joint's angles are rotations one after the other, each about an axis that the ones before
+    have rotated; all is kept along the axes of the parent bone.
     """
 
     def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
         self._server = server
         self._handle: viser.LineSegmentsHandle | None = None
         parents, anchors, axes, numbers, dials = [], [], [], [], []
-        first = angle = 0
-        for placement in scene.dolls:
+        angle = 0
+        for placement, part in zip(scene.dolls, scene.bone_slices, strict=True):
             doll = placement.doll
             for joint in doll.joints:
                 parent = doll.bone(joint.parent)
-                back = rotation.inverse(parent.orientation)
-                turned = rotation.rotate(back, _axes(joint))
+                into_parent = rotation.inverse(parent.orientation)
+                local_axes = rotation.rotate(into_parent, _axes(joint))
                 for depth, pair in enumerate(joint.angle_limits):
                     if pair:
-                        needle = rotation.rotate(back, _needle(doll, joint, depth))
+                        needle = rotation.rotate(into_parent, _needle(doll, joint, depth))
                         dials.append((len(parents), depth, angle + depth, pair,
-                                      _arc(turned[depth], needle, pair), needle))
-                parents.append(first + doll.bones.index(parent))
-                anchors.append(rotation.rotate(back, np.subtract(joint.anchor, parent.position)))
-                axes.append(turned)
+                                      _arc(local_axes[depth], needle, pair), needle))
+                parents.append(part.start + doll.bones.index(parent))
+                anchors.append(rotation.rotate(into_parent,
+                                               np.subtract(joint.anchor, parent.position)))
+                axes.append(local_axes)
                 numbers.append([angle + k if k < joint.dof else -1 for k in range(DEPTH)])
                 angle += joint.dof
-            first += len(doll.bones)
         self._parents, self._anchors = np.array(parents, int), np.array(anchors)
         self._axes, self._numbers = np.array(axes), np.array(numbers, int)
+        self._some = bool(dials)
         if dials:
             self._joints, self._depths, self._angles, self._pairs, self._arcs, self._needles = (
                 np.array(column) for column in zip(*dials, strict=True))
-        self._some = bool(dials)
 
     def show(self, state: State, angles: np.ndarray | None) -> None:
         """Draw the dials for all joint angles (k,) rad; None hides them."""
@@ -75,18 +75,18 @@ class Limits:
 
     def _lines(self, state: State, angles: np.ndarray) -> np.ndarray:
         """Both ends (l, 2, 3) m of all lines, needles last, world frame."""
-        turns = [state.orientations[self._parents]]
-        places = state.positions[self._parents] + rotation.rotate(turns[0], self._anchors)
+        frames = [state.orientations[self._parents]]
+        centres = state.positions[self._parents] + rotation.rotate(frames[0], self._anchors)
         padded = np.append(angles, 0.0)
         for depth in range(DEPTH):
             vectors = self._axes[:, depth] * padded[self._numbers[:, depth], None]
-            turns.append(rotation.multiply(turns[-1], rotation.from_rotation_vector(vectors)))
-        turns, places = np.array(turns), places[self._joints]
-        arcs = places[:, None] + rotation.rotate(
-            turns[self._depths, self._joints][:, None], self._arcs)
-        tips = places + rotation.rotate(turns[self._depths + 1, self._joints], self._needles)
+            frames.append(rotation.multiply(frames[-1], rotation.from_rotation_vector(vectors)))
+        frames, centres = np.array(frames), centres[self._joints]
+        arcs = centres[:, None] + rotation.rotate(
+            frames[self._depths, self._joints][:, None], self._arcs)
+        tips = centres + rotation.rotate(frames[self._depths + 1, self._joints], self._needles)
         lines = np.stack([arcs[:, :-1], arcs[:, 1:]], axis=2).reshape(-1, 2, 3)
-        return np.concatenate([lines, np.stack([places, tips], axis=1)]).astype(np.float32)
+        return np.concatenate([lines, np.stack([centres, tips], axis=1)]).astype(np.float32)
 
     def _colors(self, angles: np.ndarray) -> np.ndarray:
         values = angles[self._angles]

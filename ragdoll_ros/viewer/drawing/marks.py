@@ -69,7 +69,7 @@ def arrow_before(bone: Bone, push: Push, position: np.ndarray,
     The bone's centre of mass is at ``position`` (3,) m, its axes at ``orientation`` (4,).
     """
     arrow = push.arrow(position, orientation)
-    way = rotation.normalized(arrow[1] - arrow[0])
-    local = rotation.rotate(rotation.inverse(orientation), way)
-    depth = (arrow[1] - position) @ way + bone.shape.reach(local)
-    return arrow - way * depth
+    direction = rotation.normalized(arrow[1] - arrow[0])
+    local = rotation.rotate(rotation.inverse(orientation), direction)
+    depth = (arrow[1] - position) @ direction + bone.shape.reach(local)
+    return arrow - direction * depth

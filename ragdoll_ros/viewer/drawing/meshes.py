@@ -28,8 +28,8 @@ def box() -> Mesh:
 
 def cylinder() -> Mesh:
     """1 m across and 1 m long."""
-    turn = np.arange(ROUND) * 2 * np.pi / ROUND
-    ring = np.stack([np.cos(turn), np.sin(turn), np.zeros(ROUND)], axis=1) / 2
+    angle = np.arange(ROUND) * 2 * np.pi / ROUND
+    ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(ROUND)], axis=1) / 2
     up = np.array([0, 0, 0.5])
     low, high = ring - up, ring + up
     at, after = np.arange(ROUND), (np.arange(ROUND) + 1) % ROUND
@@ -44,9 +44,9 @@ def ball() -> Mesh:
     """1 m across."""
     rows = ROUND // 2
     tilt = np.arange(rows + 1)[:, None] * np.pi / rows
-    turn = np.arange(ROUND)[None] * 2 * np.pi / ROUND
+    angle = np.arange(ROUND)[None] * 2 * np.pi / ROUND
     points = np.stack(np.broadcast_arrays(
-        np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)), axis=-1) / 2
+        np.sin(tilt) * np.cos(angle), np.sin(tilt) * np.sin(angle), np.cos(tilt)), axis=-1) / 2
     row, at = (index.ravel() for index in np.mgrid[:rows, :ROUND])
     after = (at + 1) % ROUND
     a, b, c, d = (r * ROUND + p for r, p in ((row, at), (row + 1, at), (row + 1, after),

@@ -27,10 +27,10 @@ class Plots:
     """Three plots over simulated time."""
 
     def __init__(self, server: viser.ViserServer) -> None:
-        self._energy = _Plot(server, 'Energy since the start, J', (
+        self.energy = _Plot(server, 'Energy since the start, J', (
             ('doll', 'crimson'), ('put in by pushes and grabs', 'royalblue')))
-        self._gap = _Plot(server, 'Joint gap, µm', (('largest', 'darkorange'),))
-        self._pace = _Plot(server, 'Pace, simulated s each s', (
+        self.gap = _Plot(server, 'Joint gap, µm', (('largest', 'darkorange'),))
+        self.pace = _Plot(server, 'Pace, simulated s each s', (
             ('is', 'seagreen'), ('asked for', 'silver')))
         self._scene: object = None
         self._next = 0.0
@@ -41,25 +41,25 @@ class Plots:
         """Take a frame and a report at ``now`` s of a steady clock; draws at a modest rate."""
         if now < self._next:
             return
-        if frame.scene is not self._scene or frame.time < self._last[0]:
+        if frame.scene != self._scene or frame.time < self._last[0]:
             self._begin(frame)
         elif now - self._last[1] < 2 * PERIOD:
             pace = (frame.time - self._last[0]) / (now - self._last[1])
-            self._pace.add(frame.time, pace, 0.0 if report.paused else report.pace)
+            self.pace.add(frame.time, pace, 0.0 if report.paused else report.pace)
         self._next, self._last = now + PERIOD, (frame.time, now)
         # Without what is less than a nanometre: rounding, which would fill the plot.
         gap = 1e6 * self._gaps.gaps(frame.state).max(initial=0.0)
-        self._gap.add(frame.time, round(float(gap), 3))
+        self.gap.add(frame.time, round(float(gap), 3))
         measures = report.measures
         if measures and measures is not self._measured:
             self._measured = measures
             put_in = measures['work_of_pushes_J'] + measures.get('work_of_grabs_J', 0.0)
-            self._energy.add(frame.time, put_in + measures['energy_excess_J'], put_in)
+            self.energy.add(frame.time, put_in + measures['energy_excess_J'], put_in)
 
     def _begin(self, frame: Frame) -> None:
         self._scene = frame.scene
         self._gaps = JointGap(frame.scene)
-        for plot in (self._energy, self._gap, self._pace):
+        for plot in (self.energy, self.gap, self.pace):
             plot.clear()
 
 
@@ -72,7 +72,7 @@ class _Plot:
         self._width = 1 + len(lines)
         series = (uplot.Series(label='s'), *(
             uplot.Series(label=label, stroke=color, width=2) for label, color in lines))
-        self._handle = server.gui.add_uplot(
+        self.handle = server.gui.add_uplot(
             self._data(), series, title=title, height=HEIGHT, padding=PADDING,
             scales={'x': uplot.Scale(time=False)})
 
@@ -81,12 +81,12 @@ class _Plot:
         if not np.isfinite(row).all() or (self._rows and row[0] <= self._rows[-1][0]):
             return
         self._rows.append(row)
-        self._handle.data = self._data()
+        self.handle.data = self._data()
 
     def clear(self) -> None:
         """Begin anew."""
         self._rows.clear()
-        self._handle.data = self._data()
+        self.handle.data = self._data()
 
     def _data(self) -> tuple[np.ndarray, ...]:
         rows = np.array(self._rows, float).reshape(-1, self._width)

@@ -16,7 +16,8 @@ import viser
 from ...fit.character import Character, read_character
 from ...model import errors, rotation
 from ...model.ragdoll import Ragdoll
-from ...model.scene import Scene
+from ...model.scene import Placement, Scene
+from ...model.skeleton import Riders
 from ...model.state import State
 from .bodies import WXYZ
 
@@ -56,7 +57,7 @@ class Skin:
 
 
 def skin_of(doll: Ragdoll) -> Skin | None:
-    """Read the skin of a doll; None if it names no character, RagdollError if it does not fit."""
+    """Skin of a doll; None if it names no character, RagdollError if it does not fit."""
     if doll.model is None or not doll.riders:
         return None
     character = _read(doll.model)
@@ -102,9 +103,9 @@ def _bound(doll: Ragdoll, character: Character,
     carried = [riders[doll.bones[index].name] for index in bones]
     back = rotation.inverse(np.array([rider.orientation for rider in carried]))
     at = [place[rider.name] for rider in carried]
-    turns = rotation.multiply(character.orientations[at], back)
+    orientations = rotation.multiply(character.orientations[at], back)
     local = np.array([rider.position for rider in carried])
-    return character.positions[at] - rotation.rotate(turns, local), turns
+    return character.positions[at] - rotation.rotate(orientations, local), orientations
 
 
 def _size(doll: Ragdoll, character: Character) -> float:
@@ -112,8 +113,6 @@ def _size(doll: Ragdoll, character: Character) -> float:
 
     Not how far apart they stand: limbs may have been moved.
     """
-    from ...model.scene import Placement
-    from ...model.skeleton import Riders
     poses = State(np.array([bone.position for bone in doll.bones]),
                   np.array([bone.orientation for bone in doll.bones]),
                   np.zeros((0, 3)), np.zeros((0, 3)))
@@ -139,8 +138,8 @@ class Skins:
         self.notes: list[str] = []
         self.handles: list[viser.MeshSkinnedHandle] = []
         self._bones: list[np.ndarray] = []
-        first = 0
-        for number, placement in enumerate(scene.dolls):
+        for number, (placement, part) in enumerate(
+                zip(scene.dolls, scene.bone_slices, strict=True)):
             try:
                 skin = skin_of(placement.doll)
             except errors.RagdollError as error:
@@ -148,16 +147,15 @@ class Skins:
                 skin = None
             if skin is not None:
                 self._add(server, f'/scene/skins/{number}', skin)
-                self._bones.append(first + skin.bones)
-            first += len(placement.doll.bones)
+                self._bones.append(part.start + skin.bones)
 
     def show(self, state: State) -> None:
-        """Let all skins follow."""
+        """Draw all skins where their bones are now."""
         for handle, bones in zip(self.handles, self._bones, strict=True):
             positions = state.positions[bones].tolist()
-            turns = state.orientations[bones][:, WXYZ].tolist()
-            for bone, position, turn in zip(handle.bones, positions, turns, strict=True):
-                bone.position, bone.wxyz = tuple(position), tuple(turn)
+            wxyzs = state.orientations[bones][:, WXYZ].tolist()
+            for bone, position, wxyz in zip(handle.bones, positions, wxyzs, strict=True):
+                bone.position, bone.wxyz = tuple(position), tuple(wxyz)
 
     def be_visible(self, wanted: bool) -> None:
         """Show the skins, or hide them."""

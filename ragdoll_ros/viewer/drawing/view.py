@@ -11,40 +11,25 @@ class View:
 
     def __init__(self, server: viser.ViserServer) -> None:
         with server.gui.add_folder('Show'):
-            self._follow = server.gui.add_checkbox(
+            self.follow = server.gui.add_checkbox(
                 'Follow', initial_value=False, hint='the camera goes where the doll goes')
-            self._contacts = server.gui.add_checkbox(
+            self.contacts = server.gui.add_checkbox(
                 'Contacts', initial_value=False, hint='where something touches, yellow')
-            self._limits = server.gui.add_checkbox(
+            self.limits = server.gui.add_checkbox(
                 'Joint limits', initial_value=False,
                 hint='an arc for what a joint may do; its needle is red at the end')
-            self._skin = server.gui.add_checkbox(
+            self.skin = server.gui.add_checkbox(
                 'Skin', initial_value=True, visible=False,
                 hint="the fitted character's skin, following the bones")
-            self._bones = server.gui.add_checkbox(
+            self.bones = server.gui.add_checkbox(
                 'Bones', initial_value=False, visible=False,
                 hint='the bodies that move the skin, as of glass')
 
     def show_scene(self, has_skin: bool) -> None:
         """Offer what there is to show."""
-        self._skin.visible = self._bones.visible = has_skin
+        self.skin.visible = self.bones.visible = has_skin
 
     @property
     def wanted(self) -> Wanted:
         """What a source must give while a page is open."""
-        return Wanted(True, self._contacts.value, self._limits.value)
-
-    @property
-    def follow(self) -> bool:
-        """Whether the camera follows."""
-        return self._follow.value
-
-    @property
-    def skin(self) -> bool:
-        """Whether skins are shown."""
-        return self._skin.value
-
-    @property
-    def bones(self) -> bool:
-        """Whether bones are shown though there is a skin."""
-        return self._bones.value
+        return Wanted(True, self.contacts.value, self.limits.value)

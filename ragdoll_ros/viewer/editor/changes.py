@@ -4,7 +4,7 @@ Bones go by their names in the scene (``Scene.bone_names``). An error's path beg
 ``left shin.mass``, ``left shin.joint.limits_deg[0]``. What the dataclasses check is checked here
 by making them.
 
-What belongs together stays together. A body that is moved, turned or given another shape leaves
+What belongs together stays together. A body that is moved, rotated or given another shape leaves
 all else of the doll where it is in the bind pose: the pivots, its neighbours, and the skeleton of
 the skin, as an editor of a fitted doll moves bodies under a skin that stays. With ``limb`` the
 body takes along all that hangs from it, with its own joint, axes, swings and skin: one rigid
@@ -31,23 +31,21 @@ USUAL, USUAL_TWIST = math.radians(45), math.radians(30)
 
 
 def find(scene: Scene, name: str) -> tuple[Placement, Bone]:
-    """Give the doll that holds a bone, and the bone; UnknownBone if there is none."""
+    """The doll that holds a bone, and the bone; UnknownBone if there is none."""
     index = scene.bone_index(name)
-    for placement in scene.dolls:
-        if index < len(placement.doll.bones):
-            return placement, placement.doll.bones[index]
-        index -= len(placement.doll.bones)
-    raise AssertionError(name)
+    return next((placement, scene.bones[index])
+                for placement, part in zip(scene.dolls, scene.bone_slices, strict=True)
+                if index < part.stop)
 
 
 def joint_of(scene: Scene, name: str) -> Joint | None:
-    """Give the joint that ties a bone to its parent, None for a root."""
+    """Joint between a bone and its parent, None for a root."""
     placement, bone = find(scene, name)
     return next((joint for joint in placement.doll.joints if joint.child == bone.name), None)
 
 
 def replace_doll(scene: Scene, placement: Placement, **fields: object) -> Scene:
-    """Give the scene with parts of one doll replaced."""
+    """The scene with fields of one doll replaced."""
     doll = dataclasses.replace(placement.doll, **fields)
     return dataclasses.replace(scene, dolls=tuple(
         dataclasses.replace(placement, doll=doll) if each is placement else each
@@ -57,10 +55,10 @@ def replace_doll(scene: Scene, placement: Placement, **fields: object) -> Scene:
 def change_bone(scene: Scene, name: str, **fields: object) -> Scene:
     """Set fields of a bone: mass, friction, color, ...; a new size keeps the mass.
 
-    Inertia follows, as a bone is a uniform solid. To move or turn one, see ``set_pose``.
+    Inertia follows, as a bone is a uniform solid. To move or rotate one, see ``set_pose``.
     """
     placement, bone = find(scene, name)
-    with _faults_at(name):
+    with _errors_at(name):
         changed = dataclasses.replace(bone, **fields)
     return replace_doll(scene, placement, bones=_swapped(placement.doll.bones, bone, changed))
 
@@ -71,22 +69,9 @@ def change_joint(scene: Scene, name: str, **fields: object) -> Scene:
     joint = joint_of(scene, name)
     if joint is None:
         raise errors.Detached(f'{name}.joint', name, 'a bone with a parent: the root has no joint')
-    with _faults_at(f'{name}.joint'):
+    with _errors_at(f'{name}.joint'):
         changed = dataclasses.replace(joint, **fields)
     return replace_doll(scene, placement, joints=_swapped(placement.doll.joints, joint, changed))
-
-
-def set_limits(scene: Scene, name: str,
-               limits_deg: Sequence[tuple[float, float] | None]) -> Scene:
-    """Set the limits of a bone's joint, a pair in degrees for each axis, None for a free one."""
-    limits = tuple(pair and tuple(math.radians(angle) for angle in pair) for pair in limits_deg)
-    try:
-        return change_joint(scene, name, limits=limits)
-    except errors.ModelError as error:
-        path = error.path.replace('limits', 'limits_deg', 1)
-        index = next((k for k in range(len(limits_deg)) if path.endswith(f'[{k}]')), None)
-        value = tuple(limits_deg) if index is None else limits_deg[index]
-        raise type(error)(path, value, error.expected) from None
 
 
 def set_pose(scene: Scene, name: str, position: Sequence[float] | None = None,
@@ -94,17 +79,17 @@ def set_pose(scene: Scene, name: str, position: Sequence[float] | None = None,
     """Place a body: centre of mass (m) and quaternion, doll's frame, bind pose; None stays."""
     placement, bone = find(scene, name)
     fields = {'position': position, 'orientation': orientation}
-    with _faults_at(name):
+    with _errors_at(name):
         moved = dataclasses.replace(
             bone, **{key: value for key, value in fields.items() if value is not None})
     if limb:
         return _move_limb(scene, placement, bone, moved)
     back = rotation.inverse(moved.orientation)
-    turn = rotation.multiply(back, bone.orientation)
+    rotated = rotation.multiply(back, bone.orientation)
     shift = rotation.rotate(back, np.subtract(bone.position, moved.position))
     riders = tuple(
-        dataclasses.replace(rider, position=shift + rotation.rotate(turn, rider.position),
-                            orientation=rotation.multiply(turn, rider.orientation))
+        dataclasses.replace(rider, position=shift + rotation.rotate(rotated, rider.position),
+                            orientation=rotation.multiply(rotated, rider.orientation))
         if rider.bone == bone.name else rider for rider in placement.doll.riders)
     return replace_doll(scene, placement, riders=riders,
                         bones=_swapped(placement.doll.bones, bone, moved))
@@ -113,14 +98,14 @@ def set_pose(scene: Scene, name: str, position: Sequence[float] | None = None,
 def set_size(scene: Scene, name: str, half_extents: Sequence[float]) -> Scene:
     """Make a body as large as a box (3,) m along its own axes, from its centre; mass stays."""
     _, bone = find(scene, name)
-    with _faults_at(name):
+    with _errors_at(name):
         errors.check_positive('size', floats(half_extents))
         shape = shape_within(bone.shape.kind, half_extents)
     return change_bone(scene, name, shape=shape)
 
 
 def set_shape(scene: Scene, name: str, kind: str) -> Scene:
-    """Give a body another kind of shape that fills the same box, its long side along z."""
+    """Make a body another kind of shape that fills the same box, its long side along z."""
     _, bone = find(scene, name)
     if kind not in SHAPES:
         raise errors.WrongForm(f'{name}.shape', kind, 'one of ' + ', '.join(SHAPES))
@@ -129,16 +114,16 @@ def set_shape(scene: Scene, name: str, kind: str) -> Scene:
     half = np.array(bone.shape.half_extents)
     longest = int(np.argmax(half))
     if kind in ('cylinder', 'capsule') and half[longest] > half[2] * (1 + 1e-9):
-        # A turn by 120 degrees that brings the long side onto z keeps the axes right-handed.
+        # A rotation by 120 degrees that brings the long side onto z keeps the axes right-handed.
         cycle = np.roll(np.eye(3), 2 - longest, axis=1).T
-        turn = rotation.multiply(bone.orientation, rotation.from_matrix(cycle.T))
-        scene = set_pose(scene, name, orientation=turn)
+        orientation = rotation.multiply(bone.orientation, rotation.from_matrix(cycle.T))
+        scene = set_pose(scene, name, orientation=orientation)
         half = cycle @ half
     return change_bone(scene, name, shape=shape_within(kind, half))
 
 
 def shape_within(kind: str, half_extents: Sequence[float]) -> Shape:
-    """Make the shape of a kind that fits a box with half edges (3,) m; round ones by the mean."""
+    """Shape of a kind that fits a box with half edges (3,) m; round ones by the mean."""
     x, y, z = (float(edge) for edge in half_extents)
     if kind == 'box':
         return Box((2 * x, 2 * y, 2 * z))
@@ -171,7 +156,7 @@ def set_joint_kind(scene: Scene, name: str, kind: str) -> Scene:
 
 
 def limb(doll: Ragdoll, root: str) -> tuple[str, ...]:
-    """Give the name of a bone and of all that hangs from it, parents first."""
+    """Names of a bone and of all that hangs from it, parents first."""
     names = [root]
     for name in names:
         names += [joint.child for joint in doll.joints if joint.parent == name]
@@ -179,7 +164,7 @@ def limb(doll: Ragdoll, root: str) -> tuple[str, ...]:
 
 
 def _axes(joint: Joint, bone: Bone) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Axes (3,) for a joint of any kind: to turn about, one across it, and along the bone."""
+    """Axes (3,) for a joint of any kind: to rotate about, one across it, and along the bone."""
     along = np.subtract(bone.position, joint.anchor)
     length = np.linalg.norm(along)
     along = along / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
@@ -198,16 +183,16 @@ def _axes(joint: Joint, bone: Bone) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def _move_limb(scene: Scene, placement: Placement, bone: Bone, moved: Bone) -> Scene:
-    """Take the rigid motion that brings ``bone`` to ``moved`` to all that hangs from it."""
+    """The scene with all that hangs from ``bone`` moved rigidly as that moves to ``moved``."""
     doll = placement.doll
-    turn = rotation.multiply(moved.orientation, rotation.inverse(bone.orientation))
+    rotated = rotation.multiply(moved.orientation, rotation.inverse(bone.orientation))
     names = set(limb(doll, bone.name))
 
     def point(p: Sequence[float]) -> np.ndarray:
-        return moved.position + rotation.rotate(turn, np.subtract(p, bone.position))
+        return moved.position + rotation.rotate(rotated, np.subtract(p, bone.position))
 
     def direction(v: Sequence[float]) -> np.ndarray:
-        return rotation.rotate(turn, v)
+        return rotation.rotate(rotated, v)
 
     def swung(swing: Swing) -> Swing:
         links = tuple(dataclasses.replace(link, direction=direction(link.direction))
@@ -216,7 +201,8 @@ def _move_limb(scene: Scene, placement: Placement, bone: Bone, moved: Bone) -> S
                                    direction=direction(swing.direction))
 
     bones = tuple(dataclasses.replace(
-        each, position=point(each.position), orientation=rotation.multiply(turn, each.orientation))
+        each, position=point(each.position),
+        orientation=rotation.multiply(rotated, each.orientation))
         if each.name in names else each for each in doll.bones)
     joints = tuple(dataclasses.replace(
         joint, anchor=point(joint.anchor), axes=tuple(direction(axis) for axis in joint.axes))
@@ -231,8 +217,8 @@ def _swapped(items: tuple, old: object, new: object) -> tuple:
 
 
 @contextmanager
-def _faults_at(place: str) -> Iterator[None]:
-    """Tell of what is wrong inside where in the scene it is."""
+def _errors_at(place: str) -> Iterator[None]:
+    """Errors from within have their place in the scene before their path."""
     try:
         yield
     except errors.ModelError as error:

@@ -196,7 +196,7 @@ class Editor:
             self.show_handles()
 
     def _run(self, scene: Scene, hold: bool) -> None:
-        """Let the page start anew with a scene; one that it refuses was never shown."""
+        """Have the page start anew with a scene; one that it refuses was never shown."""
         with self._showing:
             self._given.append(scene)
         stood = self._stood

@@ -60,11 +60,11 @@ class Folder:
         return load_scene(str(path))
 
     def text(self, scene: Scene) -> bytes:
-        """Give a scene's YAML as it would be saved here."""
+        """A scene's YAML as it would be saved here."""
         return scene_text(scene, self.path).encode()
 
     def read(self, name: str, content: bytes) -> Scene:
-        """Make a scene of a YAML file that was sent, as if it lay here."""
+        """Scene of a YAML file that was sent, as if it lay here."""
         name = plain(name)
         try:
             _check_size(content)
@@ -79,9 +79,9 @@ class Folder:
             raise errors.ModelErrors(name, error.errors) from None
 
     def fit(self, name: str, content: bytes, progress: Progress) -> Scene:
-        """Make a doll of a character that was sent, as ragdoll_fit does; the character stays here.
+        """Scene of a doll that is fitted, as ragdoll_fit does, to a character that was sent.
 
-        The doll hangs above level ground and names its character.
+        The doll hangs above level ground; its character stays here, and it names that.
         """
         name = plain(name)
         suffix = Path(name).suffix.lower()
@@ -103,7 +103,7 @@ class Folder:
         return above_ground(doll)
 
     def _check_dolls(self, data: object) -> None:
-        """Let what was sent name only dolls that lie here or in config/: no other file is read."""
+        """Refuse dolls that lie neither here nor in config/: no other file is read."""
         for place, source in _dolls_of(data):
             if not isinstance(source, str) or source in scene_names():
                 continue
@@ -116,7 +116,7 @@ class Folder:
                                         f'a file of {self.path}, or the doll itself')
 
     def _check_models(self, data: object) -> None:
-        """Let the dolls that were sent name only characters that lie here."""
+        """Refuse characters that do not lie here."""
         for place, doll in [('', data), *_dolls_of(data)]:
             model = doll.get('model') if isinstance(doll, dict) else None
             if not isinstance(model, str):
@@ -144,7 +144,7 @@ class Folder:
 
 
 def _dolls_of(data: object) -> Iterator[tuple[str, object]]:
-    """Give the place and the value of each ``doll`` in what may be a scene."""
+    """Place and value of each ``doll`` in what may be a scene."""
     dolls = data.get('dolls') if isinstance(data, dict) else None
     for index, entry in enumerate(dolls if isinstance(dolls, list) else ()):
         if isinstance(entry, dict):
@@ -152,7 +152,7 @@ def _dolls_of(data: object) -> Iterator[tuple[str, object]]:
 
 
 def plain(name: str) -> str:
-    """Give a file's name without folders and without what is no letter, digit, dot or dash."""
+    """A file's name without folders and without what is no letter, digit, dot or dash."""
     name = name.replace('\\', '/').rsplit('/', 1)[-1]
     stem, dot, suffix = ''.join(c if c.isalnum() or c in '._- ' else '_' for c in name)[-90:] \
         .strip().rpartition('.')
@@ -178,7 +178,7 @@ def _fitted(path: Path, progress: Progress) -> Ragdoll:
 
 
 def _alone(error: errors.ModelError) -> errors.ModelError:
-    """Say of a file that points to others that it has to come alone."""
+    """The error, saying of a file that points to others that it has to come alone."""
     if error.path.endswith('.uri') and not str(error.value).startswith('data:'):
         return type(error)(error.path, error.value,
                            'all in one file: export it as .glb, or with its buffers embedded')

@@ -47,12 +47,13 @@ class Form:
     def __init__(self, gui: viser.GuiApi, fields: Sequence[Field],
                  on_kind: Callable[[str, str], None]) -> None:
         self._widgets: dict[str, Any] = {}
-        self._errors: dict[str, viser.GuiHtmlHandle] = {}
+        self.errors: dict[str, viser.GuiHtmlHandle] = {}
+        """What is written under the fields, seen where something is wrong."""
         self._on_kind = on_kind
         self._filling = Quiet()
         for field in fields:
             widget = self._widgets[field.key] = _widget(gui, field)
-            self._errors[field.key] = gui.add_html('', visible=False)
+            self.errors[field.key] = gui.add_html('', visible=False)
             if field.widget in ('shape', 'joint'):
                 widget.on_update(lambda event, key=field.key: self._chosen(key))
 
@@ -70,19 +71,15 @@ class Form:
                     widget.value = sheet[key]
 
     def values(self) -> Sheet:
-        """Give what stands in the fields that are shown."""
+        """What stands in the fields that are shown."""
         return {key: widget.value for key, widget in self._widgets.items() if widget.visible}
 
     def tell(self, found: Iterable[errors.ModelError]) -> None:
         """Write each error under the field that its path names; take the others away."""
         said = {error.path: text_of(error) for error in found}
-        for key, error in self._errors.items():
+        for key, error in self.errors.items():
             error.content = colored(said.get(key, ''), RED)
             error.visible = key in said
-
-    def errors(self) -> dict[str, str]:
-        """Give what is written under the fields."""
-        return {key: error.content for key, error in self._errors.items() if error.visible}
 
     def _chosen(self, key: str) -> None:
         if not self._filling.now:
@@ -90,12 +87,12 @@ class Form:
 
 
 def text_of(error: errors.ModelError) -> str:
-    """Say what is wrong with a field: the value, and what would be right."""
+    """What is wrong with a field: the value, and what would be right."""
     return str(type(error)('', error.value, error.expected)).removeprefix('file: ')
 
 
 def colored(text: str, color: str) -> str:
-    """Give a text as HTML in a colour. What users send stands in it: nothing of it is HTML."""
+    """A text as HTML in a colour. What users send stands in it: nothing of it is HTML."""
     lines = '<br>'.join(html.escape(line) for line in text.splitlines())
     return (f'<div style="color: {color}; font-size: 0.85em; overflow-wrap: anywhere; '
             f'padding: 0 1em 0.4em">{lines}</div>') if text else ''

@@ -1,4 +1,4 @@
-"""Handles in the scene that move, turn and resize a body where it stands in the bind pose."""
+"""Handles in the scene that move, rotate and resize a body where it stands in the bind pose."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
@@ -9,6 +9,7 @@ import viser
 from ...model import rotation
 from ...model.ragdoll import Bone, Joint
 from ...model.scene import Placement, Scene, height
+from ..drawing.bodies import WXYZ
 from ..drawing.meshes import MESHES
 from .changes import find, joint_of
 
@@ -24,7 +25,8 @@ SIZING = {'box': (True, True, True), 'sphere': (True, False, False),
           'cylinder': (True, False, True), 'capsule': (True, False, True)}
 """Along which of its own axes a shape of each kind can be drawn out."""
 
-WXYZ, XYZW = [3, 0, 1, 2], [1, 2, 3, 0]
+XYZW = [1, 2, 3, 0]
+"""Our order of a quaternion, from viser's."""
 
 STILL = 1e-6
 """m, and rad: what a drag moves less than this, it has not moved."""
@@ -52,7 +54,7 @@ class Handles:
         self.body = self.size = None
 
     def show(self, scene: Scene, name: str, limb: bool) -> None:
-        """Put handles on a bone; with ``limb`` it turns about its joint, not its own centre."""
+        """Put handles on a bone; with ``limb`` it rotates about its joint, not its own centre."""
         self.hide()
         (placement, bone), joint = find(scene, name), joint_of(scene, name)
         at = joint.anchor if limb and joint else bone.position
@@ -100,13 +102,13 @@ class Handles:
 
         @body.on_update
         def _(event: viser.TransformControlsEvent) -> None:
-            turn = rotation.normalized(np.array(body.wxyz)[XYZW])
-            position = np.array(body.position) + rotation.rotate(turn, arm)
-            own.position, own.wxyz = position, _wxyz(turn)
+            orientation = rotation.normalized(np.array(body.wxyz)[XYZW])
+            position = np.array(body.position) + rotation.rotate(orientation, arm)
+            own.position, own.wxyz = position, _wxyz(orientation)
             if event.phase == 'end':
-                if rotation.angle_between(turn, bone.orientation) < STILL:
-                    turn = np.array(bone.orientation)
-                self._on_pose(_unless_still(position, bone.position), turn)
+                if rotation.angle_between(orientation, bone.orientation) < STILL:
+                    orientation = np.array(bone.orientation)
+                self._on_pose(_unless_still(position, bone.position), orientation)
 
     def _add_size(self, bone: Bone) -> None:
         active = SIZING[bone.shape.kind]

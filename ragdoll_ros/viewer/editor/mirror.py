@@ -20,7 +20,7 @@ NEAR = 0.05
 
 
 def partner(scene: Scene, name: str) -> str:
-    """Give the name of the bone on the other side; UnknownBone if there is none.
+    """Name of the bone on the other side; UnknownBone if there is none.
 
     By its name (left, right, L, R); else the one that stands where this one's mirror image does.
     """
@@ -40,8 +40,8 @@ def mirrored(scene: Scene, name: str, whole_limb: bool = False) -> Scene:
     """Make the bone on the other side (and its limb) and its joint the mirror image of this one.
 
     The mirror is the plane through the middle of the doll's root that faces its left. What the
-    two are named, their colours and what they hang from stay, and which way a partner's joint axis
-    points; swings are not mirrored.
+    two are named, their colours and what they hang from stay, and to which side a partner's joint
+    axis points; swings are not mirrored.
     """
     placement, bone = find(scene, name)
     names = limb(placement.doll, bone.name) if whole_limb else (bone.name,)
@@ -54,7 +54,7 @@ def mirrored(scene: Scene, name: str, whole_limb: bool = False) -> Scene:
 
 def _copied_over(scene: Scene, name: str, other: str, middle: float) -> Scene:
     (_, bone), joint = find(scene, name), joint_of(scene, name)
-    scene = set_pose(scene, other, _point(bone.position, middle), _turn(bone.orientation))
+    scene = set_pose(scene, other, _point(bone.position, middle), _orientation(bone.orientation))
     kept = {key: getattr(bone, key) for key in (
         'shape', 'mass', 'friction', 'rolling_friction', 'restitution')}
     scene = change_bone(scene, other, **kept)
@@ -66,7 +66,7 @@ def _copied_over(scene: Scene, name: str, other: str, middle: float) -> Scene:
 
 
 def _axes_and_limits(joint: Joint, theirs: Joint) -> dict[str, tuple]:
-    """Mirror axes and limits. The image of a turn by t about a is one by -t about a's image."""
+    """Mirror axes and limits. The image of a rotation by t about a is one by -t about a's image."""
     axes, limits = [], list(joint.limits)
     for index, axis in enumerate(joint.axes):
         image = np.array(axis) * (1, -1, 1)
@@ -84,8 +84,8 @@ def _point(point: Vector, middle: float) -> Vector:
     return (point[0], 2 * middle - point[1], point[2])
 
 
-def _turn(q: Quaternion) -> Quaternion:
-    """S R S with S = diag(1, -1, 1): the mirrored turn; all shapes are symmetric under S."""
+def _orientation(q: Quaternion) -> Quaternion:
+    """S R S with S = diag(1, -1, 1): the mirrored rotation; all shapes are symmetric under S."""
     return (-q[0], q[1], -q[2], q[3])
 
 

@@ -95,7 +95,7 @@ class Panel:
         self.joint.fill(sheet or {})
 
     def values(self) -> Sheet:
-        """Give what stands in the fields."""
+        """What stands in the fields."""
         return {**self.body.values(), **self.joint.values()}
 
     def tell(self, found: Iterable[errors.ModelError]) -> None:
@@ -110,19 +110,15 @@ class Panel:
         """Write under the Update button why something was refused; nothing: take that away."""
         self.said.content = colored(text, RED)
 
-    def errors(self) -> dict[str, str]:
-        """Give what is written under the fields."""
-        return {**self.body.errors(), **self.joint.errors()}
-
     def show_history(self, history: History) -> None:
-        """Let the buttons tell what they would do."""
+        """Label the buttons with what they would undo and redo."""
         for button, word, what in ((self.undo, 'Undo', history.undoes),
                                    (self.redo, 'Redo', history.redoes)):
             button.disabled = not what
             button.label = f'{word}: {what}' if what else word
 
     def show_editing(self, editing: bool) -> None:
-        """Let the button tell what it would do."""
+        """Label the button with what it would do."""
         self.edit.label = 'Drop it' if editing else 'Edit'
         self.edit.icon = 'arrow-big-down-lines' if editing else 'pencil'
 

@@ -66,7 +66,7 @@ JOINT = (
 
 
 def read(scene: Scene, name: str) -> Sheet:
-    """Give the fields that a bone and its joint have; UnknownBone if there is no such bone."""
+    """Fields of a bone and its joint; UnknownBone if there is no such bone."""
     _, bone = changes.find(scene, name)
     sheet: Sheet = {'shape': bone.shape.kind, **vars(bone.shape), 'mass': bone.mass,
                     'position': bone.position, 'turn': _degrees(bone.orientation),
@@ -79,7 +79,7 @@ def read(scene: Scene, name: str) -> Sheet:
 
 
 def apply(scene: Scene, name: str, sheet: Mapping[str, Value], limb: bool = False) -> Scene:
-    """Give the scene with a bone and its joint as the sheet has them.
+    """The scene with a bone and its joint as the sheet has them.
 
     Raises ModelErrors with all that is wrong, the path of each the key of its field. ``limb``: see
     changes.py; the joint's own fields are set after the move.
@@ -107,7 +107,7 @@ def _body_steps(name: str, limb: bool) -> list[Step]:
         _, bone = changes.find(scene, name)
         return changes.set_pose(scene, name, _near(new['position'], bone.position), limb=limb)
 
-    def turn(scene: Scene, new: Sheet) -> Scene:
+    def orientation(scene: Scene, new: Sheet) -> Scene:
         return changes.set_pose(scene, name, orientation=_quaternion(new['turn']), limb=limb)
 
     def color(scene: Scene, new: Sheet) -> Scene:
@@ -122,25 +122,22 @@ def _body_steps(name: str, limb: bool) -> list[Step]:
 
     return [bone('shape', 'size', 'radius', 'length', shape=_shape),
             bone('mass', mass=lambda new: new['mass']),
-            (('position',), place), (('turn',), turn),
+            (('position',), place), (('turn',), orientation),
             (('color',), color),
             *(bone(key, **{key: lambda new, key=key: _number_or_none(key, new[key])})
               for key in SURFACE)]
 
 
 def _joint_steps(name: str, shown: Sheet) -> list[Step]:
-    def axes_and_limits(scene: Scene, new: Sheet) -> Scene:
-        return _set_axes_and_limits(scene, name, new, shown)
-
     def anchor(scene: Scene, new: Sheet) -> Scene:
         old = changes.joint_of(scene, name).anchor
         return changes.change_joint(scene, name, anchor=_near(new['anchor'], old))
 
-    def damping(scene: Scene, new: Sheet) -> Scene:
-        return changes.change_joint(scene, name, damping=new['damping'])
-
-    return [(('kind', 'axis_1', 'axis_2', 'limits_1', 'limits_2'), axes_and_limits),
-            (('anchor',), anchor), (('damping',), damping)]
+    return [(('kind', 'axis_1', 'axis_2', 'limits_1', 'limits_2'),
+             lambda scene, new: _set_axes_and_limits(scene, name, new, shown)),
+            (('anchor',), anchor),
+            (('damping',), lambda scene, new: changes.change_joint(
+                scene, name, damping=new['damping']))]
 
 
 def _read_joint(joint: Joint) -> Sheet:
@@ -159,7 +156,7 @@ def _set_axes_and_limits(scene: Scene, name: str, new: Sheet, shown: Sheet) -> S
     axes = []
     for index in range(kind.axes):
         key = f'axis_{index + 1}'
-        # A limb that was turned has turned its axes already.
+        # A limb that was rotated has rotated its axes already.
         kept = kind.name == joint.kind and _same(key, new[key], shown[key])
         axes.append(joint.axes[index] if kept else unit(key, new[key]))
     if kind.name == 'universal':
@@ -177,7 +174,7 @@ def _set_axes_and_limits(scene: Scene, name: str, new: Sheet, shown: Sheet) -> S
 
 
 def _straightened(first: tuple[float, ...], second: tuple[float, ...]) -> tuple[float, ...]:
-    """Give the second axis perpendicular to the first where only rounding kept it from being."""
+    """The second axis, made perpendicular to the first where only rounding kept it from being."""
     lean = float(np.dot(first, second))
     if not 1e-7 < abs(lean) < 1e-4:
         return second
@@ -218,9 +215,9 @@ def _degrees(orientation: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(math.degrees(angle) + 0.0 for angle in rotation.to_rpy(np.array(orientation)))
 
 
-def _quaternion(turn: tuple[float, ...]) -> np.ndarray:
-    errors.check_finite('turn', tuple(turn))
-    return rotation.from_rpy(*(math.radians(angle) for angle in turn))
+def _quaternion(degrees: tuple[float, ...]) -> np.ndarray:
+    errors.check_finite('turn', tuple(degrees))
+    return rotation.from_rpy(*(math.radians(angle) for angle in degrees))
 
 
 def _near(values: tuple[float, ...], old: tuple[float, ...]) -> tuple[float, ...]:
@@ -239,7 +236,7 @@ def _same(key: str, new: Value | None, shown: Value | None) -> bool:
 
 
 def _at_field(error: errors.ModelError, keys: tuple[str, ...]) -> errors.ModelError:
-    """Give the error the key of the field that it belongs to."""
+    """The error with the key of the field that it belongs to as its path."""
     said = error.path.rsplit('.', 1)[-1].split('[')[0]
     # Of its axes only that they are not perpendicular is left to the joint to find.
     said = 'axis_2' if said == 'axes' else said

@@ -108,7 +108,7 @@ class Playback:
         """Do nothing: there is no thread, and nothing is held."""
 
     def _now(self) -> float:
-        """Give the instant of the recording, s."""
+        """Instant of the recording, s."""
         gone = 0.0
         if self._wanted and not self._paused:
             gone = (time.monotonic() - self._since) * self._pace

@@ -55,11 +55,11 @@ class Recording:
         return float(self.times[-1])
 
     def at(self, time: float) -> Pose:
-        """Give where all is at ``time`` s; before the first and after the last pose, that one.
+        """Where all is at ``time`` s; before the first and after the last pose, that one.
 
-        Between two: places on the straight line, turns on the shorter arc (normalised mean,
-        less than 0.04 degrees from the arc's even motion as long as a bone turns less than 30
-        degrees in between).
+        Between two: positions on the straight line, orientations on the shorter arc (normalised
+        mean, less than 0.04 degrees from the arc's even motion as long as a bone rotates less
+        than 30 degrees in between).
         """
         index = int(np.clip(np.searchsorted(self.times, time, 'right') - 1, 0, len(self) - 1))
         begin = self.pose(index)
@@ -68,13 +68,13 @@ class Recording:
         share = (time - self.times[index]) / (self.times[index + 1] - self.times[index])
         end = self.pose(index + 1)
         near = np.where((begin.orientations * end.orientations).sum(axis=1) < 0, -1.0, 1.0)
-        turns = (1 - share) * begin.orientations + share * near[:, None] * end.orientations
+        orientations = (1 - share) * begin.orientations + share * near[:, None] * end.orientations
         rods = None if begin.rods is None else (1 - share) * begin.rods + share * end.rods
         return Pose((1 - share) * begin.positions + share * end.positions,
-                    rotation.normalized(turns), rods)
+                    rotation.normalized(orientations), rods)
 
     def pose(self, index: int) -> Pose:
-        """Give where all was at an instant of ``times``."""
+        """Where all was at an instant of ``times``."""
         rods = None if self.rods is None else self.rods[index]
         return Pose(self.positions[index], self.orientations[index], rods)
 
@@ -113,7 +113,7 @@ class Recorder:
             self._poses.append(pose)
 
     def recording(self) -> Recording:
-        """Give what was taken; OutOfRange if that is nothing."""
+        """What was taken; OutOfRange if that is nothing."""
         poses = self._poses
         if not poses:
             raise errors.OutOfRange('recording', 0, 'at least one pose')

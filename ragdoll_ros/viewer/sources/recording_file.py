@@ -39,7 +39,7 @@ LARGEST_RECORDING = 1_000_000_000
 
 
 def recording_text(recording: Recording) -> str:
-    """Give the JSON of a recording."""
+    """A recording as JSON, from which load_recording makes an equal one."""
     return json.dumps({
         'format': FORMAT, 'version': VERSION, 'frame': FRAME,
         'names': list(recording.scene.bone_names), 'times': recording.times.tolist(),
@@ -47,11 +47,6 @@ def recording_text(recording: Recording) -> str:
         'orientations': recording.orientations.tolist(),
         'rods': None if recording.rods is None else recording.rods.tolist(),
         'scene': _without_infinity(scene_data(recording.scene))}, allow_nan=False)
-
-
-def save_recording(recording: Recording, path: str | Path) -> None:
-    """Write a recording; load_recording gives an equal one back."""
-    Path(path).write_text(recording_text(recording), encoding='utf-8')
 
 
 def load_recording(path: str | Path) -> Recording:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import operator
 import tempfile
 import threading
 import time
@@ -15,32 +14,28 @@ from pathlib import Path
 import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseArray, Twist, Vector3
+from geometry_msgs.msg import Twist, Vector3
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from sensor_msgs.msg import JointState
+from rclpy.subscription import Subscription
 from std_msgs.msg import String
 
 from ...files.scene import save_scene
 from ...model import errors
-from ...model.scene import SECOND, Scene
-from ...model.state import State
+from ...model.scene import Scene
 from ...model.vectors import Vector
 from ...ros.diagnostics import status_name
 from ...ros.inputs import Inputs
 from ...ros.outputs import LATCHED
-from ...ros.packed import poses_in
-from ...ros.parameters import BONE_NAMES, SPECS, Settings
+from .remote_frames import RemoteFrames
 from .remote_hands import RemoteHands
 from .remote_pushes import HeardPushes, Silent
-from .remote_scene import scene_of_node
+from .remote_scene import RemoteScene
 from .remote_services import Ask, Refused
-from .remote_topic import Newest
-from .rods import Rods
 from .source import Frame, Report, Wanted
 
 InvalidROSArguments = rclpy_implementation.RCLInvalidROSArgsError
@@ -76,12 +71,15 @@ class Remote:
         self._status = status_name(self._node.get_namespace(), NAME)
         self._ask = Ask(self._node, NAME)
         self._hands = RemoteHands(self._node, NAME)
+        self._frames = RemoteFrames(self._node, NAME, self._hands)
+        self._known = RemoteScene(self._ask, self._full, self._go_on)
+        self._pushes: HeardPushes | None = None
+        self._inputs: Inputs | None = None
         self._velocity = self._node.create_publisher(Twist, 'cmd_vel', 10)
         self._wanted = Wanted()
-        self._subscriptions: dict[str, list] = {}
-        self._newest: dict[str, Newest] = {}
-        self._taking = threading.Lock()
-        self._forget()
+        self._told = Report()
+        self._simulated = 0.0
+        self._subscriptions: list[Subscription] = []
         self._heard = 0.0
         self._opened = time.monotonic()
         self._folder: Path | None = None
@@ -94,35 +92,19 @@ class Remote:
     @property
     def frame(self) -> Frame | None:
         """Where the node's last message says that all is; the last one that fitted the scene."""
-        with self._taking:
-            return self._newest_frame()
-
-    def _newest_frame(self) -> Frame | None:
-        self._take()
-        data, scene = self._poses, self._scene
-        parts = (data, scene, self._masses, self._contacts, self._angles, self._hands.moves)
-        if data is None or scene is None or all(map(operator.is_, parts, self._framed)):
-            return self._frame
-        try:
-            stamp, poses = poses_in(data)
-        except ValueError:
-            return self._frame
-        if len(poses) != len(scene.bones) or not np.isfinite(poses).all():
-            return self._frame
-        self._framed = parts
-        self._frame = self._frame_of(scene, stamp, poses)
-        return self._frame
+        return self._frames.newest
 
     @property
     def report(self) -> Report:
         """What the node said last, and whether it says anything."""
-        silence = time.monotonic() - max(self._heard, self._opened)
-        problem = self._problem
-        if not self._heard:
+        heard = self._last_word()
+        silence = time.monotonic() - max(heard, self._opened)
+        problem = self._known.problem
+        if heard < self._opened:
             problem = MISSING.format(self._full) if silence > 1.0 else ''
         elif silence > SILENCE:
             problem = SILENT.format(self._full, silence)
-        return dataclasses.replace(self._told, problem=problem, note=self._note)
+        return dataclasses.replace(self._told, problem=problem, note=self._known.note)
 
     def want(self, wanted: Wanted) -> None:
         """Subscribe to what is shown, and to nothing else."""
@@ -132,7 +114,7 @@ class Remote:
 
     def push(self, force: Vector) -> None:
         """Send the velocity that gives this force; the node holds it for its cmd_vel_timeout."""
-        scale = self._settings.force_per_speed
+        scale = self._known.settings.force_per_speed
         x, y, z = (value / scale if scale else 0.0 for value in force)
         self._velocity.publish(Twist(linear=Vector3(x=x, y=y, z=z)))
 
@@ -174,7 +156,7 @@ class Remote:
 
     def grab(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
         """Let a hand hold a bone at a point."""
-        frame = self._frame
+        frame = self.frame
         if frame is not None:
             self._hands.grab(hand, bone, np.array(point), np.array(target), frame)
 
@@ -197,110 +179,43 @@ class Remote:
 
     def _spin(self) -> None:
         # ROS time may stand, and hands rest on all the same.
-        self._node.create_timer(RETRY, self._learn_if_needed,
+        self._node.create_timer(RETRY, self._stay_in_touch,
                                 clock=Clock(clock_type=ClockType.STEADY_TIME))
         while not self._ended.is_set():
             self._executor.spin_once(timeout_sec=1.0)
 
-    def _forget(self) -> None:
-        """Know nothing of the node."""
-        self._scene: Scene | None = None
-        self._settings = Settings()
-        self._description: str | None = None
-        self._learned = False
-        self._told = Report()
-        self._zero: int | None = None
-        self._zero_of_poses: int | None = None
-        self._simulated = 0.0
-        self._note = self._problem = ''
-        self._poses: bytes | None = None
-        self._rods: Rods | None = None
-        self._masses = self._contacts = self._angles = None
-        self._frame: Frame | None = None
-        self._framed: tuple = (None,) * 6
-        self._pushes: HeardPushes | None = None
+    def _last_word(self) -> float:
+        """Instant at which the node was heard last, s of the steady clock; 0 for never."""
+        return max(self._heard, self._frames.heard)
 
     def _listen(self) -> None:
         """Bring the subscriptions in line with what is wanted."""
         wanted = self._wanted
-        if wanted.frames and 'frames' not in self._subscriptions:
-            self._opened, self._heard = time.monotonic(), 0.0
-        kinds = {'frames': wanted.frames, 'contacts': wanted.contacts, 'angles': wanted.angles,
-                 'swings': wanted.frames and self._rods is not None and self._rods.count > 0,
-                 'pushes': wanted.frames and self._pushes is not None}
-        for kind, on in kinds.items():
-            if on and kind not in self._subscriptions:
-                self._subscriptions[kind] = getattr(self, f'_hear_{kind}')()
-            elif not on:
-                self._newest.pop(kind, None)
-                for subscription in self._subscriptions.pop(kind, ()):
-                    self._node.destroy_subscription(subscription)
-        if 'contacts' not in self._subscriptions:
-            self._contacts = None
-        if 'angles' not in self._subscriptions:
-            self._angles = None
-        if not wanted.frames:
-            self._description, self._learned = None, False
-
-    def _hear_frames(self) -> list:
-        create = self._node.create_subscription
-        return [*self._hear('frames', PoseArray, f'{NAME}/poses', LATCHED),
-                create(String, 'robot_description', self._take_description, LATCHED),
+        if wanted.frames and not self._subscriptions:
+            self._opened = time.monotonic()
+            create = self._node.create_subscription
+            self._subscriptions = [
+                create(String, 'robot_description', self._known.take_description, LATCHED),
                 create(DiagnosticArray, '/diagnostics', self._take_diagnostics, 10),
-                create(ParameterEvent, '/parameter_events', self._take_event, 10)]
+                create(ParameterEvent, '/parameter_events', self._known.take_event, 10)]
+        elif not wanted.frames:
+            self._end(self._subscriptions)
+            self._subscriptions = []
+            self._known.forget_description()
+        self._listen_to_pushes(wanted.frames and self._pushes is not None)
+        self._frames.listen(wanted)
 
-    def _hear_contacts(self) -> list:
-        return self._hear('contacts', PoseArray, f'{NAME}/contacts')
+    def _listen_to_pushes(self, wanted: bool) -> None:
+        if not wanted and self._inputs is not None:
+            self._end(self._inputs.subscriptions)
+            self._inputs = None
+        elif wanted:
+            self._inputs = self._inputs or Inputs(self._node, Silent(), NAME)
+            self._inputs.simulation, self._inputs.settings = self._pushes, self._known.settings
 
-    def _hear_angles(self) -> list:
-        return self._hear('angles', JointState, 'joint_states', raw=False)
-
-    def _hear_swings(self) -> list:
-        return self._hear('swings', PoseArray, f'{NAME}/swings')
-
-    def _hear(self, kind: str, message: type, topic: str, qos: object = 1,
-              raw: bool = True) -> list:
-        """Subscribe to what comes with every tick; it is taken when the page draws."""
-        self._newest[kind] = Newest(self._node, message, topic, qos, raw)
-        return [self._newest[kind].subscription]
-
-    def _hear_pushes(self) -> list:
-        self._inputs = Inputs(self._node, Silent(), NAME)
-        self._inputs.simulation, self._inputs.settings = self._pushes, self._settings
-        return self._inputs.subscriptions
-
-    def _take(self) -> None:
-        """Take what has come of all that moves; what is no such message is left."""
-        for kind, newest in list(self._newest.items()):
-            message = newest.take()
-            if message is not None:
-                with contextlib.suppress(ValueError):
-                    getattr(self, f'_take_{kind}')(message)
-
-    def _take_frames(self, data: bytes) -> None:
-        # With the time zero that holds for them: a report of another one comes before its poses.
-        self._poses, self._zero_of_poses = data, self._zero
-        self._heard = time.monotonic()
-
-    def _take_contacts(self, data: bytes) -> None:
-        self._contacts = poses_in(data)[1][:, :3]
-
-    def _take_swings(self, data: bytes) -> None:
-        self._masses = poses_in(data)[1][:, :3]
-
-    def _take_angles(self, message: JointState) -> None:
-        if self._scene is not None and tuple(message.name) == self._scene.angle_names:
-            self._angles = np.array(message.position)
-
-    def _take_description(self, message: String) -> None:
-        self._description, self._learned = message.data, False
-        self._learn_if_needed()
-
-    def _take_event(self, message: ParameterEvent) -> None:
-        """Learn anew when the node's parameters change."""
-        if message.node == self._full:
-            self._learned = False
-            self._learn_if_needed()
+    def _end(self, subscriptions: list[Subscription]) -> None:
+        for subscription in subscriptions:
+            self._node.destroy_subscription(subscription)
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -309,64 +224,26 @@ class Remote:
                 values = {pair.key: pair.value for pair in status.values}
                 self._told = told(self._told, values)
                 with contextlib.suppress(KeyError, ValueError):
-                    self._take_time(int(values['stamp_of_zero']), float(values['simulated_time']))
+                    zero, simulated = int(values['stamp_of_zero']), float(values['simulated_time'])
+                    if simulated < self._simulated:
+                        self._hands.forget()
+                    self._frames.zero, self._simulated = zero, simulated
 
-    def _take_time(self, zero: int, simulated: float) -> None:
-        """Take the stamp of time zero, ns, and the time, s, which goes back at a new start."""
-        if simulated < self._simulated:
-            self._hands.forget()
-        self._zero, self._simulated = zero, simulated
-
-    def _learn_if_needed(self) -> None:
-        """Ask what the node simulates, until it is known; called again and again."""
-        if time.monotonic() - self._heard > SILENCE:
+    def _stay_in_touch(self) -> None:
+        """Hold on with the hands, and learn what is not known; called again and again."""
+        if time.monotonic() - self._last_word() > SILENCE:
             self._hands.forget()
         self._hands.keep()
-        if self._description is not None and not self._learned:
-            self._ask.parameters((BONE_NAMES, *SPECS), self._learn)
+        self._known.ask()
 
-    def _learn(self, values: dict) -> None:
-        """Take the node's parameters, and its scene if that is another one."""
-        names = values.pop(BONE_NAMES)
-        if self._description is None or names is None or None in values.values():
-            return
-        self._settings = Settings(**values)
-        self._hands.frame_id = self._settings.frame_id
-        try:
-            scene, self._note = scene_of_node(self._settings.scene, names, self._description,
-                                              self._settings.frame_id)
-            self._problem, self._learned = '', True
-        except errors.RagdollError as error:
-            # Between two scenes the names are those of one and the URDF that of the other.
-            self._problem = f'what the node simulates is not clear: {error}'
-            return
-        if scene != self._scene:
+    def _go_on(self) -> None:
+        """Go on with what the node is known to simulate now."""
+        self._hands.frame_id = self._known.settings.frame_id
+        if self._pushes is None or self._pushes.scene != self._known.scene:
             self._hands.forget()
-            self._scene, self._rods = scene, Rods(scene)
-            self._masses = self._angles = None
-        if self._pushes is None or self._pushes.scene is not self._scene:
-            self._pushes = HeardPushes(self._scene)
-        if 'pushes' in self._subscriptions:
-            self._inputs.simulation, self._inputs.settings = self._pushes, self._settings
+            self._pushes = HeardPushes(self._known.scene)
+            self._frames.begin(self._pushes)
         self._listen()
-
-    def _frame_of(self, scene: Scene, stamp: int, poses: np.ndarray) -> Frame:
-        unknown = np.full((len(poses), 3), np.nan)
-        state = State(poses[:, :3], poses[:, 3:], unknown, unknown)
-        # Before the first report the node's time zero is not known.
-        self._zero = stamp if self._zero is None else self._zero
-        zero = self._zero if self._zero_of_poses is None else self._zero_of_poses
-        seconds = (stamp - zero) / SECOND
-        rods, masses = None, self._masses
-        if masses is not None and self._rods is not None and len(masses) == self._rods.count:
-            rods = self._rods.between(masses, state)
-        pushes = ()
-        if self._pushes is not None and self._pushes.scene is scene:
-            self._pushes.time = seconds
-            pushes = self._pushes.pushes
-        frame = Frame(scene, seconds, state, pushes, rods=rods, contacts=self._contacts,
-                      angles=self._angles)
-        return dataclasses.replace(frame, held=self._hands.held(frame))
 
 
 def told(report: Report, values: dict[str, str]) -> Report:

@@ -12,6 +12,8 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
 from ...model import rotation
+from ...model.scene import Scene
+from ...model.state import State
 from .source import Frame, Held
 
 
@@ -28,7 +30,7 @@ class _Hand:
 
 
 class RemoteHands:
-    """Grabs as feedback of the bones' markers: the pointer's way is the marker's way."""
+    """Grabs as feedback of the bones' markers: the pointer's displacement is the marker's."""
 
     def __init__(self, node: Node, name: str) -> None:
         self._node = node
@@ -45,10 +47,10 @@ class RemoteHands:
         """Take a bone of the frame that is shown at a point of its own axes."""
         self.let_go(hand)
         index = frame.scene.bone_index(bone)
-        position, turn = frame.state.positions[index], frame.state.orientations[index]
-        point = position + rotation.rotate(turn, local)
-        self._hands[hand] = held = _Hand(bone, local, point, np.concatenate([position, turn]),
-                                         point)
+        position, orientation = frame.state.positions[index], frame.state.orientations[index]
+        point = position + rotation.rotate(orientation, local)
+        pose = np.concatenate([position, orientation])
+        self._hands[hand] = held = _Hand(bone, local, point, pose, point)
         self._send(hand, held, InteractiveMarkerFeedback.MOUSE_DOWN)
         self.drag(hand, target)
 
@@ -75,9 +77,9 @@ class RemoteHands:
         for hand, held in list(self._hands.items()):
             self._send(hand, held, InteractiveMarkerFeedback.KEEP_ALIVE)
 
-    def held(self, frame: Frame) -> tuple[Held, ...]:
+    def held(self, scene: Scene, state: State) -> tuple[Held, ...]:
         """What the hands hold now."""
-        names, state = frame.scene.bone_names, frame.state
+        names = scene.bone_names
         return tuple(Held(
             hand.bone, state.positions[bone] + rotation.rotate(
                 state.orientations[bone], hand.local), hand.target)
@@ -87,11 +89,11 @@ class RemoteHands:
     def _send(self, hand: str, held: _Hand, event: int) -> None:
         self.moves += 1
         place = held.pose[:3] + held.target - held.begin
-        turn = Quaternion(**dict(zip('xyzw', held.pose[3:].tolist(), strict=True)))
+        orientation = Quaternion(**dict(zip('xyzw', held.pose[3:].tolist(), strict=True)))
         self._publisher.publish(InteractiveMarkerFeedback(
             header=Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self.frame_id),
             client_id=f'{self._client} {hand}', marker_name=held.bone, control_name=held.bone,
-            event_type=event, pose=Pose(position=_point(place), orientation=turn),
+            event_type=event, pose=Pose(position=_point(place), orientation=orientation),
             mouse_point=_point(held.target), mouse_point_valid=True))
 
 

@@ -25,7 +25,7 @@ class HeardPushes:
         self._pushes: dict[str, tuple[float, Push]] = {}
 
     def push(self, push: Push, channel: str) -> None:
-        """Let a push act from now on in place of the last one of its channel."""
+        """A push acts from now on in place of the last one of its channel."""
         self._pushes[channel] = (self.time, push)
 
     def release(self, channel: str) -> None:

@@ -20,7 +20,7 @@ class Newest:
             kind, topic, lambda _: None, qos, callback_group=_NotExecuted(), raw=raw)
 
     def take(self) -> object | None:
-        """Give the message that came since the last call, bytes if raw; None if there is none.
+        """The message that came since the last call, bytes if raw; None if there is none.
 
         With a ``qos`` of depth 1 that is the last of those that came.
         """

@@ -144,7 +144,7 @@ class Simulated:
         return self._wanted.frames and not self._report.paused
 
     def _patience(self) -> float | None:
-        """Give the s until the next tick; None while the time stands."""
+        """Time until the next tick, s; None while the time stands."""
         return self._pacer.wait(time.monotonic_ns()) / SECOND if self._goes else None
 
     def _want(self, wanted: Wanted) -> None:
@@ -159,7 +159,7 @@ class Simulated:
         self._restart()
 
     def _restart(self) -> None:
-        """Let the time go on from here; nothing is caught up."""
+        """Start the clock anew from here; nothing is caught up."""
         self._pacer.period = self._simulation.tick / self._report.pace
         self._pacer.start(time.monotonic_ns())
 
