@@ -72,7 +72,7 @@ def plain(ticks):
             if message and message[0] == 'take_force':
                 simulation.push(Push('torso', (message[1].force.x, 0, 0)), 'a')
             elif message and message[0] == 'take_velocity':
-                force = (0, 1000 * message[1].linear_velocities.y, 0)
+                force = (0, 1000 * message[1].linear.y, 0)
                 simulation.push(Push('torso', force, duration=0.6), 'b')
             elif message:
                 force = (0, 0, message[1].wrench.force.z)
