@@ -68,6 +68,12 @@ class Peer(Node):
             assert time.monotonic() < end, 'not in time'
             self.executor_.spin_once(timeout_sec=0.1)
 
+    def wait_heard(self, node, *topics):
+        """Spin until all that a node publishes on these topics has a subscriber."""
+        publishers = [publisher for publisher in node.publishers if publisher.topic_name in topics]
+        assert len(publishers) == len(topics)
+        self.wait(lambda: all(publisher.get_subscription_count() for publisher in publishers))
+
     def sender(self, kind, topic):
         """Publisher that a subscriber listens to already."""
         publisher = self.create_publisher(kind, topic, 10)

@@ -90,6 +90,11 @@ class RagdollNode(Node):
         """Values of the parameters."""
         return self._tuning.settings
 
+    @property
+    def stamp(self) -> int:
+        """Stamp of the state as it stands, ns."""
+        return self._stamps.at(self.simulation.time, self.settings.publish_clock)
+
     def tick(self) -> None:
         """Go on by one tick and publish; a state that is not finite is never shown."""
         start = self._now()
@@ -131,7 +136,7 @@ class RagdollNode(Node):
         super().destroy_node()
 
     def _advance(self) -> bool:
-        """Go on; tell whether all numbers stay finite. What runs away may fail within a tick."""
+        """Go on by a tick; whether all numbers stay finite. What runs away may fail within it."""
         try:
             state = self.simulation.advance()
         except (ArithmeticError, ValueError):
@@ -144,18 +149,12 @@ class RagdollNode(Node):
     def _ros_time(self) -> int:
         return self.get_clock().now().nanoseconds
 
-    def _stamp(self, time: int) -> int:
-        """Give the stamp of a simulated time, ns."""
-        return self._stamps.at(time, self.settings.publish_clock)
-
     def _time_of_report(self) -> int:
-        """ROS time; where this node is the clock, what it says, heard or not."""
-        if self.settings.publish_clock:
-            return self._stamp(self.simulation.time)
-        return self._ros_time()
+        """ROS time, ns; where this node is the clock, what it says, heard or not."""
+        return self.stamp if self.settings.publish_clock else self._ros_time()
 
     def _period(self) -> float:
-        """Give the ns on the wall from one tick to the next."""
+        """Time on the wall from one tick to the next, ns."""
         return self.simulation.tick / self.settings.real_time_factor
 
     def _catch_up(self) -> None:
@@ -179,7 +178,7 @@ class RagdollNode(Node):
     def _publish(self) -> None:
         simulation, now = self.simulation, self._now()
         self._stamps.follow(simulation.time)
-        self._outputs.publish(simulation, self._stamp(simulation.time), now, self.paused)
+        self._outputs.publish(simulation, self.stamp, now, self.paused)
         self.interactive.publish(now, self.paused)
 
     def _begin(self) -> None:
@@ -189,13 +188,13 @@ class RagdollNode(Node):
 
     def _show_as_it_stands(self) -> None:
         """Bring up to date what is not published with every tick."""
-        self._outputs.publish_markers(self.simulation, self._stamp(self.simulation.time))
+        self._outputs.publish_markers(self.simulation, self.stamp)
         self.interactive.publish_poses()
 
     def _repeat_clock(self) -> None:
-        """Tell the standing time to who has come since: those who go by /clock ask for no past."""
+        """Publish the standing time for who has come since: who goes by /clock asks for no past."""
         if self.paused:
-            self._outputs.publish_clock(self._stamp(self.simulation.time))
+            self._outputs.publish_clock(self.stamp)
 
     def _use(self, simulation: Simulation) -> None:
         """Let all parts work with this simulation and the settings as they are."""
@@ -237,7 +236,8 @@ class RagdollNode(Node):
 
     def _facts(self) -> dict:
         return {'paused': self.paused, 'real_time_factor': self.settings.real_time_factor,
-                'lost_time': self._pacer.lost / 1e9, 'stamp_of_zero': self._stamp(0)}
+                'lost_time': self._pacer.lost / 1e9,
+                'stamp_of_zero': self._stamps.at(0, self.settings.publish_clock)}
 
 
 def step_of(settings: Settings) -> float:
