@@ -54,6 +54,7 @@ class Peer(Node):
         super().__init__(name)
         self.executor_ = SingleThreadedExecutor()
         self.executor_.add_node(self)
+        self._callers = {}
 
     def collect(self, kind, topic, qos=1000):
         """Subscribe; give the list that messages go to, each as (arrival s, message)."""
@@ -82,11 +83,11 @@ class Peer(Node):
 
     def call(self, kind, name, request):
         """Call a service and give its answer."""
-        client = self.create_client(kind, name)
-        self.wait(client.service_is_ready)
-        future = client.call_async(request)
+        if name not in self._callers:
+            self._callers[name] = self.create_client(kind, name)
+        self.wait(self._callers[name].service_is_ready)
+        future = self._callers[name].call_async(request)
         self.wait(future.done)
-        self.destroy_client(client)
         return future.result()
 
 
