@@ -62,6 +62,14 @@ class Peer(Node):
         self.create_subscription(kind, topic, lambda m: got.append((time.monotonic(), m)), qos)
         return got
 
+    def hear_once(self, kind, topic):
+        """The first message that comes on a topic from now on."""
+        got = []
+        subscription = self.create_subscription(kind, topic, got.append, 10)
+        self.wait(lambda: got)
+        self.destroy_subscription(subscription)
+        return got[0]
+
     def wait(self, condition, timeout=PATIENCE):
         """Spin until the condition holds; fail if it does not in time."""
         end = time.monotonic() + timeout
