@@ -216,6 +216,11 @@ RIGS = {rig.name: rig for rig in (
 
 def skin(bones, around=12, rings=7):
     """A closed tube with round ends about each bone: vertices, triangles, joints, weights."""
+    along = np.linspace(0, 1, rings)[:, None, None]
+    angles = 2 * np.pi * (np.arange(around)[:, None] + .5) / around
+    swell = np.sqrt(np.maximum(.04, 1 - (2 * along - 1) ** 4))
+    shares = np.append(np.repeat(.4 * np.maximum(0, 1 - 4 * along), around), (0, 0))
+    tube = tube_faces(around, rings)
     points, faces, joints, weights = [], [], [], []
     for index, bone in enumerate(bones):
         head, tail = np.array(bone.head, float), np.array(bone.tail, float)
@@ -224,28 +229,30 @@ def skin(bones, around=12, rings=7):
         # One and the same rule on both sides, so that a mirrored rig has a mirrored skin.
         x = np.cross(z, (0, 0, 1) if abs(z[2]) < .9 else (0, 1, 0))
         x /= np.linalg.norm(x)
-        y = np.cross(z, x)
-        base = len(points)
-        for t in np.linspace(0, 1, rings):
-            swell = bone.radius * np.sqrt(max(.04, 1 - (2 * t - 1) ** 4))
-            for angle in 2 * np.pi * (np.arange(around) + .5) / around:
-                points.append(head + t * length * z
-                              + swell * (np.cos(angle) * x + np.sin(angle) * y))
-                share = .4 * max(0, 1 - 4 * t) if bone.parent >= 0 else 0
-                joints.append((index, max(bone.parent, 0), 0, 0))
-                weights.append((1 - share, share, 0, 0))
-        points += [head, tail]
-        joints += [(index, 0, 0, 0)] * 2
-        weights += [(1, 0, 0, 0)] * 2
-        for ring in range(rings - 1):
-            for k in range(around):
-                a, b = base + ring * around + k, base + ring * around + (k + 1) % around
-                faces += [(a, b, b + around), (a, b + around, a + around)]
-        first, last = base + rings * around, base + (rings - 1) * around
+        ring = np.cos(angles) * x + np.sin(angles) * np.cross(z, x)
+        sides = head + along * length * z + bone.radius * swell * ring
+        points.append(np.concatenate([sides.reshape(-1, 3), [head, tail]]))
+        faces.append(tube + index * len(points[0]))
+        share = shares if bone.parent >= 0 else 0 * shares
+        # The middles of the ends are moved by joint 0 for the rest, which is nothing.
+        others = np.where(np.arange(len(shares)) < around * rings, max(bone.parent, 0), 0)
+        none = np.zeros_like(others)
+        joints.append(np.stack([none + index, others, none, none], axis=1))
+        weights.append(np.stack([1 - share, share, none, none], axis=1))
+    return tuple(np.concatenate(parts) for parts in (points, faces, joints, weights))
+
+
+def tube_faces(around, rings):
+    """Triangles of rings one above the other, and of the two middles of its ends behind them."""
+    first, last = rings * around, (rings - 1) * around
+    faces = []
+    for ring in range(0, last, around):
         for k in range(around):
-            faces += [(first, base + (k + 1) % around, base + k),
-                      (first + 1, last + k, last + (k + 1) % around)]
-    return np.array(points), np.array(faces), np.array(joints), np.array(weights, float)
+            a, b = ring + k, ring + (k + 1) % around
+            faces += [(a, b, b + around), (a, b + around, a + around)]
+    for k in range(around):
+        faces += [(first, (k + 1) % around, k), (first + 1, last + k, last + (k + 1) % around)]
+    return np.array(faces)
 
 
 def worlds(rig):

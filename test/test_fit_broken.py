@@ -167,6 +167,17 @@ BROKEN = {
     'doll.yaml': b'bones: []'}
 
 
+PLACES = {
+    'nodes_no_list': 'nodes', 'nodes_of_numbers': 'nodes[0]', 'child_text': 'nodes[2].children',
+    'matrix_text': 'nodes[2].matrix', 'matrix_digits': 'nodes[2].matrix',
+    'joints_text': 'skins[0].joints', 'skin_outside': 'nodes[1].skin',
+    'attributes_list': 'meshes[0].primitives[0].attributes',
+    'primitives_number': 'meshes[0].primitives', 'count_float': 'accessors[1].count',
+    'component_list': 'accessors[1].componentType', 'view_negative': 'bufferViews[1].byteOffset',
+    'sparse_broken': 'accessors[1].sparse.indices.componentType'}
+"""The field that the sentence names, where the JSON has a value of the wrong type."""
+
+
 @pytest.fixture(scope='module')
 def folder(tmp_path_factory):
     outer = tmp_path_factory.mktemp('broken')
@@ -192,7 +203,7 @@ def test_one_clear_sentence_and_exit_code_2(folder, capsys, name):
     assert main([str(folder / name), '-o', str(folder / 'out.yaml')]) == 2
     error = capsys.readouterr().err
     assert error.startswith('ragdoll_fit: ')
-    assert name in error
+    assert f'{name}: {PLACES.get(Path(name).stem, "")}' in error
     assert 'expected' in error
     assert error.count('\n') == 1 or name == 'doll.yaml'
     assert not (folder / 'out.yaml').exists()

@@ -13,14 +13,17 @@ from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.fit.command import main
 
+BOTH = {'link0', 'link1', 'link1/1', 'link1/2'}
+"""Links of two bones with a ball joint between them."""
+
 
 @pytest.fixture
 def glb(tmp_path):
-    return fit_rigs.write(RIGS['unreal'], tmp_path)
+    return fit_rigs.write(RIGS['two_bones'], tmp_path)
 
 
-def test_one_command_makes_a_scene_that_loads(glb, tmp_path, capsys):
-    out = tmp_path / 'doll.yaml'
+def test_one_command_makes_a_scene_that_loads(tmp_path, capsys):
+    glb, out = fit_rigs.write(RIGS['unreal'], tmp_path), tmp_path / 'doll.yaml'
     assert main([str(glb), '-o', str(out)]) == 0
     scene = load_scene(str(out))
     assert len(scene.bones) == len(load_doll(str(out)).bones) == 20
@@ -42,7 +45,7 @@ def test_urdf_and_picture(glb, tmp_path, capsys):
     assert main([str(glb), '--urdf', str(tmp_path / 'doll.urdf'),
                  '--picture', str(tmp_path / 'doll.png')]) == 0
     names = {link.get('name') for link in ElementTree.parse(tmp_path / 'doll.urdf').iter('link')}
-    assert 'thigh_l' in names
+    assert names == BOTH
     pixels = image.imread(tmp_path / 'doll.png')[:, :, :3]
     # Skin and bodies side by side: something is drawn in each third, colours in the last.
     for third in np.array_split(pixels, 3, axis=1):
@@ -57,7 +60,7 @@ def test_a_fitted_doll_loads_in_yourdfpy_and_pybullet(glb, tmp_path, capsys):
     path = tmp_path / 'doll.urdf'
     assert main([str(glb), '--urdf', str(path)]) == 0
     robot = yourdfpy.URDF.load(str(path), load_meshes=False)
-    assert 'thigh_l' in robot.link_map
+    assert set(robot.link_map) == BOTH
     assert main([str(glb), '--urdf', str(path), '--dialect', 'bullet']) == 0
     client = pybullet.connect(pybullet.DIRECT)
     body = pybullet.loadURDF(str(path), physicsClientId=client)
@@ -68,10 +71,12 @@ def test_a_fitted_doll_loads_in_yourdfpy_and_pybullet(glb, tmp_path, capsys):
     assert mass == pytest.approx(load_doll(str(tmp_path / 'doll.yaml')).mass, rel=1e-6)
 
 
-def test_a_robot_goes_limp(tmp_path, capsys):
-    main([str(fit_rigs.write(RIGS['two_bones'], tmp_path)), '--urdf', str(tmp_path / 'a.urdf')])
+def test_a_robot_goes_limp(glb, tmp_path, capsys):
+    main([str(glb), '--urdf', str(tmp_path / 'a.urdf'), '-o', str(tmp_path / 'fitted.yaml')])
     assert main([str(tmp_path / 'a.urdf'), '-o', str(tmp_path / 'a.yaml')]) == 0
-    assert len(load_doll(str(tmp_path / 'a.yaml')).bones) == 2
+    fitted, limp = (load_doll(str(tmp_path / f'{name}.yaml')) for name in ('fitted', 'a'))
+    assert [bone.shape for bone in limp.bones] == [bone.shape for bone in fitted.bones]
+    assert [joint.limits for joint in limp.joints] == [joint.limits for joint in fitted.joints]
 
 
 def test_a_doll_is_checked(capsys):

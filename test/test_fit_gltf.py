@@ -1,5 +1,6 @@
 """Reading glTF: every way the specification lets a skin be written gives the same character."""
 import base64
+import functools
 import json
 
 import fit_rigs
@@ -11,7 +12,6 @@ from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.gltf_file import GltfFile
 from ragdoll_ros.fit.nodes import read_nodes
 from ragdoll_ros.fit.pipeline import fit_character
-from ragdoll_ros.model.errors import ModelErrors
 
 RIG = RIGS['cmu']
 
@@ -22,9 +22,18 @@ def read(made, folder, name='rig'):
     return read_character(path)
 
 
-@pytest.fixture
-def plain(tmp_path):
-    return read(document(RIG), tmp_path, 'plain')
+@functools.cache
+def raw():
+    return fit_rigs.skin(RIG.bones)
+
+
+def whole():
+    return document(RIG, raw())
+
+
+@pytest.fixture(scope='module')
+def plain(tmp_path_factory):
+    return read(whole(), tmp_path_factory.mktemp('plain'), 'plain')
 
 
 def same(character, other, tolerance=1e-6):
@@ -49,10 +58,6 @@ def attributes(made):
     return made.data['meshes'][0]['primitives'][0]['attributes']
 
 
-def raw():
-    return fit_rigs.skin(RIG.bones)
-
-
 def test_the_skin_is_where_it_was_drawn(plain):
     points = raw()[0]
     assert np.abs(plain.vertices - points[:, [2, 0, 1]]).max() < 1e-6
@@ -65,14 +70,14 @@ def signed_volume(points, faces):
 
 @pytest.mark.parametrize(('dtype', 'top'), [('u1', 255), ('u2', 65535)])
 def test_normalised_weights(tmp_path, plain, dtype, top):
-    made = document(RIG)
+    made = whole()
     attributes(made)['WEIGHTS_0'] = made.accessor(np.round(raw()[3] * top), dtype, 'VEC4',
                                                   normalized=True)
     same(read(made, tmp_path), plain)
 
 
 def test_wide_joint_indices_and_a_second_set(tmp_path, plain):
-    made = document(RIG)
+    made = whole()
     _, _, joints, weights = raw()
     halves = np.concatenate([weights[:, :1] / 2, np.zeros((len(weights), 3))], axis=1)
     first = weights.copy()
@@ -84,7 +89,7 @@ def test_wide_joint_indices_and_a_second_set(tmp_path, plain):
 
 
 def test_interleaved_with_a_stride(tmp_path, plain):
-    made = document(RIG)
+    made = whole()
     points, _, _, weights = raw()
     both = np.concatenate([points, weights], axis=1).astype('<f4')
     view = made.view(both.tobytes(), byteStride=28)
@@ -98,7 +103,7 @@ def test_interleaved_with_a_stride(tmp_path, plain):
 @pytest.mark.parametrize('base_view', [True, False])
 def test_sparse_positions(tmp_path, plain, base_view):
     """Some or, without a view, all of the values come from the sparse part."""
-    made = document(RIG)
+    made = whole()
     points = raw()[0]
     wrong = points.copy()
     chosen = np.arange(3, len(points), 5) if base_view else np.arange(len(points))
@@ -116,7 +121,7 @@ def test_sparse_positions(tmp_path, plain, base_view):
 
 
 def test_several_primitives_and_no_indices(tmp_path, plain):
-    made = document(RIG)
+    made = whole()
     points, faces, joints, weights = raw()
     cut = len(faces) // 2
     primitives = []
@@ -152,7 +157,7 @@ def test_strips_and_fans(tmp_path, mode):
 
 
 def test_a_gltf_with_its_buffer_beside_it_and_inside_it(tmp_path, plain):
-    made = document(RIG)
+    made = whole()
     made.data['buffers'][0]['byteLength'] = len(made.blob)
     (tmp_path / 'a buffer.bin').write_bytes(made.blob)
     for uri in ('a%20buffer.bin',
@@ -164,7 +169,7 @@ def test_a_gltf_with_its_buffer_beside_it_and_inside_it(tmp_path, plain):
 
 def test_nodes_in_another_pose_than_the_skin_was_bound_in(tmp_path, plain):
     """A step of a walk in the nodes: the bind pose is fitted, and that is said."""
-    made = document(RIG)
+    made = whole()
     for number in (2, 5, 9, 14):
         node = made.data['nodes'][number]
         pose = np.array(node['matrix']).reshape(4, 4).T
@@ -178,7 +183,7 @@ def test_nodes_in_another_pose_than_the_skin_was_bound_in(tmp_path, plain):
 
 def test_two_meshes_with_a_skin_each(tmp_path, plain):
     """A body and its clothes share their bones, and each has inverse bind matrices of its own."""
-    made = document(RIG)
+    made = whole()
     shift = np.eye(4)
     shift[:3, 3] = (5, 0, 0)
     binds = np.stack([np.linalg.inv(m) @ shift for m in fit_rigs.worlds(RIG)])
@@ -230,11 +235,3 @@ def test_a_matrix_is_the_same_as_translation_rotation_scale(tmp_path):
     path.write_bytes(made.glb())
     worlds = read_nodes(GltfFile(path)).worlds
     assert np.allclose(worlds[-1], worlds[-2], atol=1e-12)
-
-
-def test_no_pygltflib_is_said(tmp_path, monkeypatch):
-    import sys
-    path = fit_rigs.write(RIGS['one_bone'], tmp_path)
-    monkeypatch.setitem(sys.modules, 'pygltflib', None)
-    with pytest.raises(ModelErrors, match=r'ragdoll_ros\[fit\]'):
-        read_character(path)

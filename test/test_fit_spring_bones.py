@@ -122,8 +122,11 @@ def test_it_falls_and_swings(fit):
         for _ in range(round(1 / scene.step)):
             simulation.advance()
         now = simulation.swings
-        assert np.isfinite(now.positions).all()
-        assert np.abs(now.directions - start).max() > .05
+    # The rods keep their lengths, to the rounding of places some metres off.
+    lengths = [link.length for link in fit.doll.swings[0].links]
+    assert np.linalg.norm(np.diff(now.positions, axis=0), axis=1) == pytest.approx(
+        lengths[1:], abs=1e-12)
+    assert np.abs(now.directions - start).max() > .05
 
 
 def vrm_frames(rod, length, angle, gravity_way, count):
@@ -139,15 +142,14 @@ def vrm_frames(rod, length, angle, gravity_way, count):
 
 
 def still(swing):
-    frame = Frames(np.zeros((1, 3)), np.array([[0.0, 0, 0, 1]]), np.zeros((1, 3)),
-                   np.zeros((1, 3)), np.ones((1, 3)))
+    frame = Frames.still()
     mount = Mount(swing, 0, swing.name, np.zeros(3), np.array(swing.directions()))
     return Swings([mount], (0, 0, -9.8), lambda time: frame)
 
 
 def single(rod, length=.12):
     spring = Spring('s', (0, 1), (rod,), np.array([[0.0, 0, 0], [length, 0, 0]]))
-    return swing_of(spring, 's', 'b', 1.0)[0]
+    return swing_of(spring, 'b', 1.0)[0]
 
 
 @pytest.mark.parametrize(('stiffness', 'drag'), [(1, .4), (4, .1), (.3, .7), (1, .05)])
@@ -179,10 +181,11 @@ def start_rate(angles):
 def test_it_sags_as_far_as_vrm(stiffness, gravity):
     """A level rod comes to rest where stiffness sin(a) = gravity cos(a)."""
     rod = Rod(stiffness, gravity, .5)
-    expected = vrm_frames(rod, .12, 0.0, (0, -1), 2000)[-1]
+    # What is left of the way there shrinks by a third a frame or more: 180 of them leave nothing.
+    expected = vrm_frames(rod, .12, 0.0, (0, -1), 180)[-1]
     swings = still(single(rod))
     swings.begin(0.0)
-    way = swings.evaluate(20.0).directions[0]
+    way = swings.evaluate(3.0).directions[0]
     # A swing's spring goes by the angle, the recipe's by its sine: 1 - a^2/6 at these angles.
     assert np.arctan2(way[2], way[0]) == pytest.approx(expected, rel=expected ** 2 / 3)
 

@@ -2,21 +2,42 @@
 from __future__ import annotations
 
 import argparse
-import importlib
+import importlib.util
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
-PARTS = ('precision', 'orders', 'pieces', 'drop', 'classes', 'projection', 'hard', 'costs',
-         'estimate', 'swing')
+from . import figures
+from .parts import (
+    classes,
+    costs,
+    drop,
+    estimate,
+    hard,
+    orders,
+    pieces,
+    precision,
+    projection,
+    swing,
+)
+from .plots import draw_all
+from .report import markdown
+from .runner import Job, Options, run_jobs
+
+PARTS = {'precision': precision, 'orders': orders, 'pieces': pieces, 'drop': drop,
+         'classes': classes, 'projection': projection, 'hard': hard, 'costs': costs,
+         'estimate': estimate, 'swing': swing}
+"""Modules by the names that --case takes: each says by jobs() what it has to run."""
+
 NEEDED = ('scipy', 'matplotlib', 'mujoco')
+"""What the extra `report` brings; imported where it is used, never by a node."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; the exit code: 2 for a wrong call or a missing package."""
+    """Exit code of the command: 2 for a wrong call or a missing package."""
     options = parser().parse_args(arguments)
-    missing = missing_packages()
+    missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
     if missing:
         sys.stderr.write(f'ragdoll_report needs {", ".join(missing)}: '
                          'pip install "ragdoll_ros[report]"\n')
@@ -52,20 +73,8 @@ def parser() -> argparse.ArgumentParser:
     return made
 
 
-def missing_packages() -> list[str]:
-    """Packages of the extra `report` that cannot be imported."""
-    missing = []
-    for name in NEEDED:
-        try:
-            importlib.import_module(name)
-        except ImportError:
-            missing.append(name)
-    return missing
-
-
 def report(options: argparse.Namespace) -> int:
-    """Do what the options say."""
-    from . import figures
+    """Measure, unless the figures are there already, and write; 0."""
     if options.case == ['list']:
         sys.stdout.write('\n'.join(labels()) + '\n')
         return 0
@@ -84,18 +93,14 @@ def report(options: argparse.Namespace) -> int:
 
 
 def measured(options: argparse.Namespace) -> dict:
-    """Run the jobs; give what the JSON holds."""
-    from . import figures
-    from .parts.classes import NAME, SWITCHES, merged
-    from .runner import Options, run_jobs
+    """What the JSON holds, from running the jobs."""
     if options.starts < 1:
         raise WrongCall(f'--starts {options.starts}: expected 1 or more')
     began = time.monotonic()
-    jobs = chosen(options.case, Options(options.quick, options.starts))
-    rows = run_jobs(jobs)
-    for part in (NAME, SWITCHES):
+    rows = run_jobs(chosen(options.case, Options(options.quick, options.starts)))
+    for part in (classes.NAME, classes.SWITCHES):
         if part in rows:
-            rows[part] = merged(rows[part])
+            rows[part] = classes.merged(rows[part])
     words = ['ragdoll_report', *(['--quick'] if options.quick else []),
              *(f'--case {name}' for name in options.case),
              *([f'--starts {options.starts}'] if options.starts != 100 else [])]
@@ -105,9 +110,6 @@ def measured(options: argparse.Namespace) -> dict:
 
 def write(folder: Path) -> None:
     """Write page and pictures from the JSON in a folder."""
-    from . import figures
-    from .plots import draw_all
-    from .report import markdown
     data = figures.load(folder)
     pictures = draw_all(data['figures'], folder)
     page = folder / 'accuracy.md'
@@ -115,9 +117,9 @@ def write(folder: Path) -> None:
     sys.stdout.write(f'{page} and {len(pictures)} pictures\n')
 
 
-def chosen(names: Sequence[str], options: object) -> list:
+def chosen(names: Sequence[str], options: Options) -> list[Job]:
     """All jobs, or those of the parts and motions named; WrongCall for a name that is none."""
-    jobs = [(part, job) for part in PARTS for job in _part(part).jobs(options)]
+    jobs = [(part, job) for part, module in PARTS.items() for job in module.jobs(options)]
     for name in names:
         if not any(name in (part, job.part, job.label) for part, job in jobs):
             raise WrongCall(f'--case {name}: expected one of {", ".join(labels())}')
@@ -127,14 +129,7 @@ def chosen(names: Sequence[str], options: object) -> list:
 
 def labels() -> list[str]:
     """Names that --case takes."""
-    from .parts.precision import motions
-    return [*PARTS, *motions()]
-
-
-def _part(name: str) -> object:
-    if name == 'hard':
-        return importlib.import_module('ragdoll_ros.accuracy.hard')
-    return importlib.import_module(f'ragdoll_ros.accuracy.parts.{name}')
+    return [*PARTS, *precision.motions()]
 
 
 if __name__ == '__main__':

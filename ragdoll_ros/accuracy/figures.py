@@ -7,11 +7,18 @@ import json
 import math
 import os
 import platform
+from collections.abc import Iterable
 from pathlib import Path
 
 from ..physics import kernels
 
 FILE = 'accuracy.json'
+
+Row = dict[str, object]
+"""One result: figures by their names, which end in their units."""
+
+Figures = dict[str, list[Row]]
+"""The rows of each part."""
 
 
 def about(command: str, seconds: float, quick: bool, starts: int) -> dict[str, object]:
@@ -27,15 +34,35 @@ def about(command: str, seconds: float, quick: bool, starts: int) -> dict[str, o
 
 
 def save(data: dict, folder: Path) -> Path:
-    """Write the figures; infinity becomes the text 'inf', NaN null: JSON has neither."""
+    """Path of the JSON file, written with a line for each row: a change shows in a diff by rows.
+
+    Infinity becomes the text 'inf', NaN null: JSON has neither.
+    """
+    parts = (f'{_line(part)}: [\n' + ',\n'.join(map(_line, rows)) + '\n]'
+             for part, rows in data['figures'].items())
     path = folder / FILE
-    path.write_text(json.dumps(_plain(data), indent=1, allow_nan=False) + '\n', encoding='utf-8')
+    path.write_text(f'{{"about": {_line(data["about"])},\n"figures": {{\n' + ',\n'.join(parts)
+                    + '\n}}\n', encoding='utf-8')
     return path
 
 
 def load(folder: Path) -> dict:
-    """Read the figures back as they were written."""
+    """What save() wrote: 'about' and, under 'figures', the rows of each part."""
     return json.loads((folder / FILE).read_text(encoding='utf-8'))
+
+
+def number(value: object) -> float:
+    """A figure of the JSON, in which infinity is the text 'inf' and NaN is null."""
+    return math.nan if value is None else float(value)
+
+
+def sound(rows: Iterable[Row]) -> list[Row]:
+    """The rows of jobs that did not fail."""
+    return [row for row in rows if 'failed' not in row]
+
+
+def _line(value: object) -> str:
+    return json.dumps(_plain(value), allow_nan=False, ensure_ascii=False)
 
 
 def _plain(value: object) -> object:

@@ -3,174 +3,166 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
-Row = dict[str, object]
-Figures = dict[str, list[Row]]
+import numpy as np
+
+from ..physics.settings import ACCURACIES
+from .figures import Figures, Row, number, sound
 
 RATIOS = {'draft': 0.5, 'normal': 0.8, 'exact': 1.3}
-OVERSHOOT_DEG = {'draft': 15.0, 'normal': 6.0, 'exact': 2.5}
-SINKING_PUSHED_MM = {'draft': 100.0, 'normal': 40.0, 'exact': 20.0}
-SINKING_MM = {'draft': 10.0, 'normal': 5.0, 'exact': 2.0}
-FLIGHT_M = {'draft': 3e-3, 'normal': 60e-6, 'exact': 10e-6}
+"""CPU time of each setting over that of PyBullet at N = 10."""
+
+
+def _is_push(row: Row) -> bool:
+    return row['class'].startswith('push')
+
+
+@dataclass(frozen=True)
+class Bound:
+    """At each setting, the largest figure in rows of a part is at most so much."""
+
+    goal: str
+    part: str
+    keys: tuple[str, ...]
+    most: dict[str, float]
+    """By setting, in the unit that is shown."""
+    wanted: str
+    found: str
+    """Formats of the bound and of the largest figure."""
+    keep: Callable[[Row], bool]
+    """Which rows the bound is about."""
+    factor: float = 1.0
+    """Shown unit over SI unit."""
+
+
+BOUNDS = (
+    Bound('worst limit overshoot', 'classes', ('worst_overshoot_rad',),
+          {'draft': 15.0, 'normal': 6.0, 'exact': 2.5}, 'at most {:g}°', '{:.1f}°',
+          lambda row: row['class'] != 'start outside', 180 / math.pi),
+    Bound('worst sinking in pushes', 'classes', ('worst_sinking_m',),
+          {'draft': 100.0, 'normal': 40.0, 'exact': 20.0}, 'at most {:g} mm', '{:.1f} mm',
+          _is_push, 1e3),
+    Bound('worst sinking elsewhere', 'classes', ('worst_sinking_m',),
+          {'draft': 10.0, 'normal': 5.0, 'exact': 2.0}, 'at most {:g} mm', '{:.1f} mm',
+          lambda row: not _is_push(row), 1e3),
+    Bound('gentle flight of 0.28 s', 'precision', ('position_worst_m',),
+          {'draft': 3e-3, 'normal': 60e-6, 'exact': 10e-6}, 'at most {:g} m', '{:.1e} m',
+          lambda row: row['motion'] == 'flight_gentle'),
+    Bound('free fall and throw', 'precision', ('position_worst_m',),
+          dict.fromkeys(ACCURACIES, 1e-9), 'at most 1e-9 m', '{:.1e} m',
+          lambda row: row['motion'] in ('free_fall', 'projectile')),
+    Bound('momentum and angular momentum kept', 'precision',
+          ('momentum_drift', 'angular_momentum_drift'), dict.fromkeys(ACCURACIES, 1e-9),
+          'to 1e-9', '{:.1e}', lambda row: 'momentum_drift' in row))
 
 
 def goals(figures: Figures) -> list[Row]:
     """One row for each promise that this run has figures for: what, wanted, found, held."""
-    rows: list[Row] = []
-    for goal in (_energy, _cost, _overshoot, _sinking, _flight, _fall, _momentum, _hard,
-                 _estimate, _costs_fall, _orders, _front):
+    rows = [*_energy(figures), *_cost(figures)]
+    for bound in BOUNDS:
+        rows += _largest(bound, figures)
+    for goal in (_hard, _estimate, _costs_fall, _orders, _front):
         rows += goal(figures)
     return rows
 
 
-def number(value: object) -> float:
-    """Read a figure of the JSON, in which infinity is a text and NaN is null."""
-    return math.nan if value is None else float(value)
+def _row(goal: str, wanted: str, found: str, held: bool) -> Row:
+    return {'goal': goal, 'wanted': wanted, 'found': found, 'held': held}
 
 
-def _row(what: str, wanted: str, found: str, held: bool) -> Row:
-    return {'goal': what, 'wanted': wanted, 'found': found, 'held': held}
+def _by_setting(figures: Figures, part: str, keep: Callable[[Row], bool] = lambda row: True,
+                ) -> Iterator[tuple[str, list[Row]]]:
+    """Each of our settings and its rows of a part, where there are any."""
+    for accuracy in ACCURACIES:
+        rows = [row for row in figures.get(part, ())
+                if row.get('method') == f'ours-{accuracy}' and keep(row)]
+        if rows:
+            yield accuracy, rows
 
 
-def _ours(figures: Figures, part: str, accuracy: str) -> list[Row]:
-    return [row for row in figures.get(part, ()) if row.get('method') == f'ours-{accuracy}']
+def _largest(bound: Bound, figures: Figures) -> Iterator[Row]:
+    """NaN holds no bound."""
+    for accuracy, rows in _by_setting(figures, bound.part, bound.keep):
+        largest = bound.factor * float(np.max([
+            number(row[key]) for row in rows for key in bound.keys if key in row]))
+        most = bound.most[accuracy]
+        yield _row(f'{bound.goal}, {accuracy}', bound.wanted.format(most),
+                   bound.found.format(largest), largest <= most)
 
 
-def _each(figures: Figures, part: str, judge: Callable[[str, list[Row]], Row],
-          keep: Callable[[Row], bool] = lambda row: True) -> list[Row]:
-    """Judge each setting on those of its rows of a part that are to be kept, if there are any."""
-    found = {accuracy: [row for row in _ours(figures, part, accuracy) if keep(row)]
-             for accuracy in RATIOS}
-    return [judge(accuracy, rows) for accuracy, rows in found.items() if rows]
-
-
-def _energy(figures: Figures) -> list[Row]:
-    def judge(accuracy: str, rows: list[Row]) -> Row:
-        bad = sum(row['bad'] for row in rows)
-        starts = sum(row['starts'] for row in rows)
+def _energy(figures: Figures) -> Iterator[Row]:
+    for accuracy, rows in _by_setting(figures, 'classes'):
+        bad, starts = (sum(row[key] for row in rows) for key in ('bad', 'starts'))
         worst = max(number(row['worst_excess']) for row in rows)
-        return _row(f'energy excess in every start, {accuracy}', 'at most 0.1 %',
-                    f'{bad} of {starts} bad, worst {worst:.2%}', bad == 0)
-    return _each(figures, 'classes', judge)
+        yield _row(f'energy excess in every start, {accuracy}', 'at most 0.1 %',
+                   f'{bad} of {starts} bad, worst {worst:.2%}', bad == 0)
 
 
-def _cost(figures: Figures) -> list[Row]:
+def _cost(figures: Figures) -> Iterator[Row]:
     base = sum(number(row['cpu_s']) for row in figures.get('ratios', ())
                if row.get('method') == 'bullet-10')
-
-    def judge(accuracy: str, rows: list[Row]) -> Row:
-        ratio = sum(number(row['cpu_s']) for row in rows) / base
-        return _row(f'CPU over PyBullet N = 10, {accuracy}', f'at most {RATIOS[accuracy]:g}',
-                    f'{ratio:.2f}', ratio <= RATIOS[accuracy])
-    return _each(figures, 'ratios', judge) if base else []
-
-
-def _overshoot(figures: Figures) -> list[Row]:
-    def judge(accuracy: str, rows: list[Row]) -> Row:
-        worst = max(math.degrees(number(row['worst_overshoot_rad'])) for row in rows)
-        bound = OVERSHOOT_DEG[accuracy]
-        return _row(f'worst limit overshoot, {accuracy}', f'at most {bound:g}°', f'{worst:.1f}°',
-                    worst <= bound)
-    return _each(figures, 'classes', judge, lambda row: row['class'] != 'start outside')
+    if not base:
+        return
+    for accuracy, rows in _by_setting(figures, 'ratios'):
+        ratio, most = sum(number(row['cpu_s']) for row in rows) / base, RATIOS[accuracy]
+        yield _row(f'CPU over PyBullet N = 10, {accuracy}', f'at most {most:g}', f'{ratio:.2f}',
+                   ratio <= most)
 
 
-def _sinking(figures: Figures) -> list[Row]:
-    def judge(accuracy: str, rows: list[Row]) -> Row:
-        worst = max(1e3 * number(row['worst_sinking_m']) for row in rows)
-        pushed = rows[0]['class'].startswith('push')
-        bound = (SINKING_PUSHED_MM if pushed else SINKING_MM)[accuracy]
-        where = 'in pushes' if pushed else 'elsewhere'
-        return _row(f'worst sinking {where}, {accuracy}', f'at most {bound:g} mm',
-                    f'{worst:.1f} mm', worst <= bound)
-    return (_each(figures, 'classes', judge, lambda row: row['class'].startswith('push'))
-            + _each(figures, 'classes', judge, lambda row: not row['class'].startswith('push')))
-
-
-def _flight(figures: Figures) -> list[Row]:
-    def judge(accuracy: str, rows: list[Row]) -> Row:
-        error, bound = number(rows[0]['position_worst_m']), FLIGHT_M[accuracy]
-        return _row(f'gentle flight of 0.28 s, {accuracy}', f'at most {bound:g} m',
-                    f'{error:.1e} m', error <= bound)
-    return _each(figures, 'precision', judge, lambda row: row['motion'] == 'flight_gentle')
-
-
-def _fall(figures: Figures) -> list[Row]:
-    def judge(accuracy: str, rows: list[Row]) -> Row:
-        error = max(number(row['position_worst_m']) for row in rows)
-        return _row(f'free fall and throw, {accuracy}', 'at most 1e-9 m', f'{error:.1e} m',
-                    error <= 1e-9)
-    return _each(figures, 'precision', judge,
-                 lambda row: row['motion'] in ('free_fall', 'projectile'))
-
-
-def _momentum(figures: Figures) -> list[Row]:
-    def judge(accuracy: str, rows: list[Row]) -> Row:
-        worst = max(number(row[key]) for row in rows
-                    for key in ('momentum_drift', 'angular_momentum_drift')
-                    if row.get(key) is not None)
-        return _row(f'momentum and angular momentum kept, {accuracy}', 'to 1e-9', f'{worst:.1e}',
-                    worst <= 1e-9)
-    return _each(figures, 'precision', judge, lambda row: row.get('momentum_drift') is not None)
-
-
-def _hard(figures: Figures) -> list[Row]:
+def _hard(figures: Figures) -> Iterator[Row]:
     rows = [row for row in figures.get('hard', ()) if row.get('method') == 'ours-normal']
-    if not rows:
-        return []
-    failing = [row['case'] for row in rows if not row['passed']]
-    return [_row('hard cases at normal', f'all {len(rows)}',
-                 f'{len(rows) - len(failing)} hold' + (f'; not: {", ".join(failing)}'
-                                                       if failing else ''), not failing)]
+    failing = ', '.join(row['case'] for row in rows if not row['passed'])
+    if rows:
+        yield _row('hard cases at normal', f'all {len(rows)}',
+                   f'{sum(row["passed"] for row in rows)} hold'
+                   + (f'; not: {failing}' if failing else ''), not failing)
 
 
-def _estimate(figures: Figures) -> list[Row]:
-    made = []
+def _estimate(figures: Figures) -> Iterator[Row]:
     for row in figures.get('estimate', ()):
-        if row.get('missing') or 'failed' in row:
-            made.append(_row(f'live estimate, {row.get("label")}', '90 % within a factor 3',
-                             'there is none', False))
-            continue
-        share = number(row['within_3'])
-        made.append(_row(f'live estimate within a factor 3, {row["label"]}', '90 % of flight ticks',
-                         f'{share:.0%} of {row["ticks"]}', share >= 0.9))
-    return made
+        share = number(row.get('within_3'))
+        yield _row(f'live estimate within a factor 3, {row.get("label")}', '90 % of flight ticks',
+                   f'{share:.0%} of {row.get("ticks")}', share >= 0.9)
 
 
-def _costs_fall(figures: Figures) -> list[Row]:
+def _costs_fall(figures: Figures) -> Iterator[Row]:
     costs = [number(row['tick_s']) for row in figures.get('costs', ()) if 'tick_s' in row]
-    if not costs:
-        return []
     # timing on a shared machine is good to a tenth
     rising = sum(later > 1.1 * earlier for earlier, later in itertools.pairwise(costs))
-    return [_row('a scene that needs less costs less', 'falls from row to row',
-                 f'rises {rising} times' if rising else 'falls', not rising)]
+    if costs:
+        yield _row('a scene that needs less costs less', 'falls from row to row',
+                   f'rises {rising} times' if rising else 'falls', not rising)
 
 
-def _orders(figures: Figures) -> list[Row]:
+def _orders(figures: Figures) -> Iterator[Row]:
     rows = [row for row in figures.get('orders', ()) if row.get('theory')]
-    if not rows:
-        return []
     off = [f'{row["method"]} {number(row["order"]):.2f} ({row["motion"]})' for row in rows
            if not abs(number(row['order']) - row['theory']) <= 0.2]
-    return [_row('orders', 'within 0.2 of theory', ', '.join(off) if off else 'all are', not off)]
+    if rows:
+        yield _row('orders', 'within 0.2 of theory', ', '.join(off) or 'all are', not off)
 
 
-def _front(figures: Figures) -> list[Row]:
+def _front(figures: Figures) -> Iterator[Row]:
     """No other method is both faster and more accurate."""
-    rows = [row for row in figures.get('precision', ()) if 'failed' not in row]
+    rows = sound(figures.get('precision', ()))
     beaten: dict[str, list[str]] = {}
-    for mine in rows:
-        if mine['family'] != 'ours':
-            continue
-        cost, error = number(mine['cpu_s_per_s']), number(mine[mine['yardstick']])
-        better = [row['label'] for row in rows if row['motion'] == mine['motion']
-                  and row['family'] != 'ours' and number(row['cpu_s_per_s']) < cost
-                  and number(row[row['yardstick']]) < error * (1 - 1e-9) and error > 1e-12]
-        if better:
-            beaten.setdefault(mine['method'], []).append(mine['motion'])
-    motions = len({row['motion'] for row in rows})
-    return [_row(f'on the front of speed and error, {method}', f'in all {motions} motions',
-                 f'beaten in {len(beaten.get(method, ()))}: {", ".join(beaten.get(method, ()))}'
-                 if method in beaten else 'yes', method not in beaten)
-            for method in dict.fromkeys(row['method'] for row in rows if row['family'] == 'ours')]
+    for row in rows:
+        if row['family'] == 'ours':
+            motions = beaten.setdefault(row['method'], [])
+            if any(_beats(other, row) for other in rows):
+                motions.append(row['motion'])
+    count = len({row['motion'] for row in rows})
+    for method, motions in beaten.items():
+        yield _row(f'on the front of speed and error, {method}', f'in all {count} motions',
+                   f'beaten in {len(motions)}: {", ".join(motions)}' if motions else 'yes',
+                   not motions)
+
+
+def _beats(other: Row, ours: Row) -> bool:
+    """Whether another method is faster and nearer to the truth; errors of rounding do not count."""
+    cost, error = number(ours['cpu_s_per_s']), number(ours[ours['yardstick']])
+    return (other['motion'] == ours['motion'] and other['family'] != 'ours'
+            and number(other['cpu_s_per_s']) < cost
+            and number(other[other['yardstick']]) < error * (1 - 1e-9) and error > 1e-12)

@@ -56,13 +56,13 @@ class Method:
 class Result:
     """What a method made of a trial, and the CPU seconds of each tick (t - 1,)."""
 
-    moved: Trajectory
+    trajectory: Trajectory
     costs: np.ndarray
 
     @property
     def rate(self) -> float:
         """CPU seconds per simulated second."""
-        return float(self.costs.sum() / self.moved.times[-1])
+        return float(self.costs.sum() / self.trajectory.times[-1])
 
 
 class _FixedSteps:
@@ -179,7 +179,7 @@ def every_method(substeps: Iterable[int] = SUBSTEPS) -> list[Method]:
 
 
 def by_name(name: str) -> Method:
-    """Find a method; OutOfRange names all there are."""
+    """The method of a name; OutOfRange names the families there are."""
     methods = {method.name: method for method in every_method(range(1, 129))}
     if name not in methods:
         raise errors.OutOfRange('method', name, 'ours-*, quickstart, bullet-N, mujoco-*-N')

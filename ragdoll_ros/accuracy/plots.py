@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .figures import Figures, Row, number, sound
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-Row = dict[str, object]
 
 BLUE, RED, ORANGE, GREY = '#1f5fbf', '#c8321e', '#e69f00', '#8a8a8a'
 COLOURS = {'ours': BLUE, 'quickstart': RED, 'PyBullet': ORANGE, 'MuJoCo euler': '#9ac7a4',
@@ -31,8 +31,8 @@ WORDS = {'position_worst_m': 'worst position error, m', 'angle_worst_rad': 'wors
          'position_median_m': 'position error after 0.1 s, median, m'}
 
 
-def draw_all(figures: dict[str, list[Row]], folder: Path) -> dict[str, str]:
-    """Draw every picture there are figures for; file names by the picture's name."""
+def draw_all(figures: Figures, folder: Path) -> dict[str, str]:
+    """Every picture there are figures for, drawn into a folder; files by the pictures' names."""
     import matplotlib
     matplotlib.use('Agg')
     import matplotlib.pyplot as plt
@@ -51,8 +51,8 @@ def draw_all(figures: dict[str, list[Row]], folder: Path) -> dict[str, str]:
     return made
 
 
-def draw_energy(figures: dict[str, list[Row]], plt: object) -> object:
-    """Draw the README's picture: a spun doll that nothing touches, its energy over time."""
+def draw_energy(figures: Figures, plt: object) -> object:
+    """The README's picture: a spun doll that nothing touches, its energy over time."""
     rows = _by_method(figures.get('energy', ()), scene='spin')
     if len(rows) < 3:
         return None
@@ -64,7 +64,7 @@ def draw_energy(figures: dict[str, list[Row]], plt: object) -> object:
     top = 2.2
     for method, colour, text in lines:
         row = rows[method]
-        energy = [_number(value) for value in row['energy']]
+        energy = [number(value) for value in row['energy']]
         axes.plot(row['time_s'], energy, color=colour, lw=3 if 'ours' in method else 2)
         index = next((i for i, value in enumerate(energy) if not value < top), None)
         if index is not None:
@@ -81,15 +81,15 @@ def draw_energy(figures: dict[str, list[Row]], plt: object) -> object:
     return figure
 
 
-def draw_drop(figures: dict[str, list[Row]], plt: object) -> object:
-    """Draw the energy of the default drop over time."""
+def draw_drop(figures: Figures, plt: object) -> object:
+    """Energy of the default drop over time."""
     rows = _by_method(figures.get('energy', ()), scene='drop')
     if not rows:
         return None
     figure, axes = plt.subplots(figsize=(7.5, 3.6))
     for method, colour in (('bullet-1', ORANGE), ('quickstart', RED), ('ours-normal', BLUE)):
         row = rows[method]
-        axes.plot(row['time_s'], [_number(value) for value in row['energy']], color=colour, lw=2,
+        axes.plot(row['time_s'], [number(value) for value in row['energy']], color=colour, lw=2,
                   label=row['label'] + (', 10 ms' if method == 'bullet-1' else ''))
     axes.axvline(0.2857, color=GREY, lw=1, ls=':')
     axes.annotate('first touch', (0.2857, 0.03), color=GREY, xytext=(4, 0),
@@ -102,9 +102,9 @@ def draw_drop(figures: dict[str, list[Row]], plt: object) -> object:
     return figure
 
 
-def draw_precision(figures: dict[str, list[Row]], plt: object) -> object:
-    """Draw error over CPU time for every motion: lower left is better."""
-    rows = [row for row in figures.get('precision', ()) if 'failed' not in row]
+def draw_precision(figures: Figures, plt: object) -> object:
+    """Error over CPU time for every motion: lower left is better."""
+    rows = sound(figures.get('precision', ()))
     names = list(dict.fromkeys(row['motion'] for row in rows))
     if not names:
         return None
@@ -123,9 +123,9 @@ def draw_precision(figures: dict[str, list[Row]], plt: object) -> object:
     return figure
 
 
-def draw_pieces(figures: dict[str, list[Row]], plt: object) -> object:
-    """Draw the same for short pieces through contacts."""
-    rows = [row for row in figures.get('pieces', ()) if 'failed' not in row]
+def draw_pieces(figures: Figures, plt: object) -> object:
+    """The same for short pieces through contacts."""
+    rows = sound(figures.get('pieces', ()))
     if not rows:
         return None
     figure, axes = plt.subplots(figsize=(7.5, 4.2))
@@ -136,9 +136,9 @@ def draw_pieces(figures: dict[str, list[Row]], plt: object) -> object:
     return figure
 
 
-def draw_classes(figures: dict[str, list[Row]], plt: object) -> object:
-    """Draw the worst energy from nothing in each class of starts."""
-    rows = [row for row in figures.get('classes', ()) if 'failed' not in row]
+def draw_classes(figures: Figures, plt: object) -> object:
+    """The worst energy from nothing in each class of starts."""
+    rows = sound(figures.get('classes', ()))
     classes = list(dict.fromkeys(row['class'] for row in rows))
     shown = (('ours-draft', '#9dbbe8', 'ours draft'), ('ours-normal', BLUE, 'ours normal'),
              ('ours-exact', '#0c2d66', 'ours exact'), ('bullet-10', ORANGE, 'PyBullet N = 10'),
@@ -150,7 +150,7 @@ def draw_classes(figures: dict[str, list[Row]], plt: object) -> object:
     width = 0.8 / len(shown)
     low, high = 1e-7, 1e2
     for place, (method, colour, label) in enumerate(shown):
-        found = {row['class']: _number(row['worst_excess']) for row in rows
+        found = {row['class']: number(row['worst_excess']) for row in rows
                  if row['method'] == method}
         heights = [min(high, max(low, found.get(name, 0.0))) for name in classes]
         shift = (place - len(shown) / 2 + 0.5) * width
@@ -171,9 +171,9 @@ ROUND_TICKS = (1, 2, 5, 10, 20, 50, 100, 200)
 """ms, where the axis of ticks is labelled."""
 
 
-def draw_orders(figures: dict[str, list[Row]], plt: object) -> object:
-    """Draw errors over the tick."""
-    rows = [row for row in figures.get('orders', ()) if 'failed' not in row]
+def draw_orders(figures: Figures, plt: object) -> object:
+    """Errors over the tick."""
+    rows = sound(figures.get('orders', ()))
     names = list(dict.fromkeys(row['motion'] for row in rows))
     if not names:
         return None
@@ -191,7 +191,7 @@ def draw_orders(figures: dict[str, list[Row]], plt: object) -> object:
             order = row['order']
             text = f'{family}: {order:.2f}' if order is not None else family
             axes.loglog([1e3 * tick for tick in row['ticks_s']],
-                        [_number(error) or math.nan for error in row['errors']],
+                        [number(error) or math.nan for error in row['errors']],
                         marker=mark, color=colour, ms=5, label=text)
         axes.set(xlabel='tick, ms', ylabel='worst error, m or rad', xlim=(1, 300))
         axes.set_xticks(ROUND_TICKS, [f'{tick:g}' for tick in ROUND_TICKS])
@@ -202,8 +202,8 @@ def draw_orders(figures: dict[str, list[Row]], plt: object) -> object:
     return figure
 
 
-def draw_estimate(figures: dict[str, list[Row]], plt: object) -> object:
-    """Draw the live error estimate over the true error, tick by tick."""
+def draw_estimate(figures: Figures, plt: object) -> object:
+    """The live error estimate over the true error, tick by tick."""
     rows = [row for row in figures.get('estimate', ()) if row.get('true')]
     if not rows:
         return None
@@ -220,8 +220,8 @@ def draw_estimate(figures: dict[str, list[Row]], plt: object) -> object:
 
 
 def _work_precision(axes: Axes, rows: Sequence[Row], yardstick: str) -> None:
-    """Draw one diagram: a line for each family, the front, the real-time line, two slopes."""
-    points = [(row['family'], _number(row['cpu_s_per_s']), _number(row[yardstick]))
+    """One diagram: a line for each family, the front, the real-time line, two slopes."""
+    points = [(row['family'], number(row['cpu_s_per_s']), number(row[yardstick]))
               for row in rows]
     points = [(family, x, max(y, SMALLEST)) for family, x, y in points
               if math.isfinite(y) and y < 1e3]
@@ -245,12 +245,12 @@ def _work_precision(axes: Axes, rows: Sequence[Row], yardstick: str) -> None:
 
 
 def _name_settings(axes: Axes, rows: Sequence[Row], yardstick: str) -> None:
-    """Write each setting beside its point; one text for points that are as high on the axes."""
+    """The settings' names beside their points; points as high on the axes share one text."""
     low, high = np.log10(axes.get_ylim())
     groups: list[list[tuple[float, float, str]]] = []
     for row in rows:
-        height = math.log10(max(_number(row[yardstick]), SMALLEST))
-        point = (_number(row['cpu_s_per_s']), height, row['label'].removeprefix('ours '))
+        height = math.log10(max(number(row[yardstick]), SMALLEST))
+        point = (number(row['cpu_s_per_s']), height, row['label'].removeprefix('ours '))
         if groups and abs(groups[-1][0][1] - height) < LINE * (high - low):
             groups[-1].append(point)
         else:
@@ -262,7 +262,7 @@ def _name_settings(axes: Axes, rows: Sequence[Row], yardstick: str) -> None:
 
 
 def _front(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Give the points that no other beats in both speed and error."""
+    """The points (x, y) that no other beats in both speed and error."""
     kept: list[tuple[float, float]] = []
     for x, y in sorted(points):
         if not kept or y < kept[-1][1]:
@@ -272,7 +272,3 @@ def _front(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 def _by_method(rows: Sequence[Row], scene: str) -> dict[str, Row]:
     return {row['method']: row for row in rows if row.get('scene') == scene}
-
-
-def _number(value: object) -> float:
-    return math.nan if value is None else float(value)

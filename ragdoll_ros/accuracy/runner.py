@@ -10,12 +10,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ..physics.engine.mujoco import silence_warnings
+from .figures import Row
 from .progress import Progress
 
 WORKERS = 2
 """Processes; PyBullet never releases the GIL, so more cores need more of them."""
-
-Row = dict[str, object]
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,7 @@ class Job:
 
 
 def run_jobs(jobs: Sequence[Job]) -> dict[str, list[Row]]:
-    """Give each part's rows in the order of its jobs; a job that fails gives a row that says so."""
+    """Each part's rows in the order of its jobs; a job that fails gives a row that says so."""
     progress = Progress(sum(job.weight / (1 if job.timed else WORKERS) for job in jobs))
     results: dict[int, list[Row]] = {}
     together = [index for index, job in enumerate(jobs) if not job.timed]
@@ -65,7 +64,7 @@ def run_jobs(jobs: Sequence[Job]) -> dict[str, list[Row]]:
 
 
 def attempt(job: Job) -> list[Row]:
-    """Run a job; one that fails must not take the others' figures with it."""
+    """The rows of a job; one that fails gives a row that says so, and leaves the others theirs."""
     try:
         return job.work()
     except Exception as error:

@@ -11,20 +11,21 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..files.doll import load_doll
 from ..files.scene import load_scene
 from ..model import rotation
 from ..model.coordinates import GeneralizedState
 from ..model.push import Push
 from ..model.scene import Placement, Scene, height
 from .references.articulated import Articulated
-from .trial import Trial, angle_places, posed
+from .trial import Trial, angle_limits, angle_places, inner_angles, posed
 
 SETTLING = 2.0
 """s simulated after the first touch."""
 
 
 def trial(class_name: str, number: int) -> Trial:
-    """Give start ``number`` of a class."""
+    """Start ``number`` of a class."""
     rng = np.random.default_rng([list(CLASSES).index(class_name), number])
     return CLASSES[class_name](rng)
 
@@ -43,28 +44,29 @@ def _spin(speed: float) -> Callable[[np.random.Generator], Trial]:
     """A rigid spin about any axis, 2 m above the ground."""
     def make(rng: np.random.Generator) -> Trial:
         axis = rotation.normalized(rng.normal(size=3))
-        return _let_go(rng, 2.0, _inside(rng), spin=tuple(speed * axis))
+        return _let_go(rng, 2.0, inner_angles(load_doll('doll'), rng), spin=tuple(speed * axis))
     return make
 
 
 def _drop(fall: float) -> Callable[[np.random.Generator], Trial]:
-    """A fall from rest, turned any way."""
+    """A fall from rest, at any orientation."""
     def make(rng: np.random.Generator) -> Trial:
-        return _let_go(rng, fall, _inside(rng))
+        return _let_go(rng, fall, inner_angles(load_doll('doll'), rng))
     return make
 
 
 def _slam(rng: np.random.Generator) -> Trial:
     """Every joint flung toward one of its limits at 10 to 20 rad/s."""
-    rates = {name: rng.choice((-1, 1)) * rng.uniform(10, 20)
-             for name in angle_places(load_scene('drop').dolls[0].doll)}
-    return _let_go(rng, 0.4, _inside(rng), rates)
+    doll = load_doll('doll')
+    rates = {name: rng.choice((-1, 1)) * rng.uniform(10, 20) for name in angle_places(doll)}
+    return _let_go(rng, 0.4, inner_angles(doll, rng), rates)
 
 
 def _outside(rng: np.random.Generator) -> Trial:
     """Half of all joint angles 5 to 30 degrees past a limit."""
-    angles = _inside(rng)
-    for name, (lower, upper) in _limits().items():
+    doll = load_doll('doll')
+    angles = inner_angles(doll, rng)
+    for name, (lower, upper) in angle_limits(doll).items():
         if rng.random() < 0.5:
             past = math.radians(rng.uniform(5, 30))
             angles[name] = upper + past if rng.random() < 0.5 else lower - past
@@ -77,36 +79,24 @@ CLASSES: dict[str, Callable[[np.random.Generator], Trial]] = {
     'drop 50 m': _drop(50.0), 'limit slam': _slam, 'start outside': _outside}
 
 
-def _limits() -> dict[str, tuple[float, float]]:
-    doll = load_scene('drop').dolls[0].doll
-    return {name: pair for joint in doll.joints
-            for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
-
-
-def _inside(rng: np.random.Generator) -> dict[str, float]:
-    """Angles in the inner two fifths of their ranges."""
-    return {name: lower + (upper - lower) * rng.uniform(0.3, 0.7)
-            for name, (lower, upper) in _limits().items()}
-
-
 def _let_go(rng: np.random.Generator, fall: float, angles: dict[str, float],
             rates: dict[str, float] | None = None, **moving: object) -> Trial:
-    """Place the doll, turned any way, with its lowest point ``fall`` m above the ground."""
+    """The doll at any orientation, with its lowest point ``fall`` m above the ground."""
     scene = load_scene('drop')
-    turn = tuple(rotation.normalized(rng.normal(size=4)))
-    placement = Placement(scene.dolls[0].doll, orientation=turn, **moving)
-    start = posed(placement, angles, rates)
-    start = lifted(scene, start, fall)
+    orientation = tuple(rotation.normalized(rng.normal(size=4)))
+    placement = Placement(scene.dolls[0].doll, orientation=orientation, **moving)
+    start = lifted(scene, posed(placement, angles, rates), fall)
     scene = dataclasses.replace(scene, dolls=(placement,))
     duration = math.sqrt(2 * fall / 9.8) + SETTLING
     return Trial(scene, round(duration, 2), start)
 
 
 def lifted(scene: Scene, start: GeneralizedState, clearance: float) -> GeneralizedState:
-    """Give the same start with the lowest point of all bones ``clearance`` m above level ground."""
+    """The same start with the lowest point of all bones ``clearance`` m above level ground."""
     doll = scene.dolls[0].doll
     state = Articulated(doll).state(start.q, start.v)
-    lowest = min(height(bone, position, turn, scene.ground) for bone, position, turn
+    lowest = min(height(bone, position, orientation, scene.ground)
+                 for bone, position, orientation
                  in zip(doll.bones, state.positions, state.orientations, strict=True))
     start.q[2] += clearance - lowest
     return start

@@ -4,7 +4,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-Row = dict[str, object]
+from .figures import Row
+
 Column = tuple[str, str, str]
 """Key, heading, format: a format text, or 'deg' (from rad), 'mm' (from m), '%', 'us', 'ms'."""
 
@@ -13,7 +14,7 @@ FACTORS = {'deg': (180 / math.pi, '{:.2g}'), 'mm': (1e3, '{:.2g}'), '%': (100.0,
 
 
 def table(rows: Iterable[Row], columns: Sequence[Column]) -> str:
-    """Write rows as a Markdown table; what a row lacks is left empty, a failed job says so."""
+    """Rows as a Markdown table; what a row lacks is left empty, a failed job says so."""
     lines = ['| ' + ' | '.join(head for _, head, _ in columns) + ' |',
              '|' + '|'.join(' --- ' for _ in columns) + '|']
     for row in rows:
@@ -22,11 +23,11 @@ def table(rows: Iterable[Row], columns: Sequence[Column]) -> str:
             continue
         cells = [shown(row.get(key), form) for key, _, form in columns]
         lines.append('| ' + ' | '.join(cells) + ' |')
-    return '\n'.join(lines) + '\n'
+    return '\n'.join(lines)
 
 
 def shown(value: object, form: str = '{:.2g}') -> str:
-    """Write one figure; infinity (also as JSON's text) is what a run that exploded has."""
+    """One figure as text; infinity (also as JSON's text) is what a run that exploded has."""
     if value is None:
         return ''
     if isinstance(value, bool):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..model import rotation
 from ..model.state import State
 
 
@@ -26,12 +27,21 @@ class Trajectory:
 
     @classmethod
     def of(cls, times: Iterable[float], states: Iterable[State]) -> Trajectory:
-        """Stack states, one for each time."""
+        """States stacked, one for each of the times in s."""
         states = list(states)
         fields = ('positions', 'orientations', 'linear_velocities', 'angular_velocities')
         return cls(np.array(list(times), float),
                    *(np.array([getattr(state, field) for state in states], float)
                      for field in fields))
+
+    @classmethod
+    def of_poses(cls, times: np.ndarray, positions: np.ndarray,
+                 orientations: np.ndarray | None = None) -> Trajectory:
+        """Poses (t, n, 3) m and (t, n, 4), unrotated if None; velocities are left NaN."""
+        if orientations is None:
+            orientations = np.tile(rotation.IDENTITY, (*positions.shape[:2], 1))
+        unknown = np.full(positions.shape, np.nan)
+        return cls(np.asarray(times, float), positions, orientations, unknown, unknown)
 
     def at(self, index: int) -> State:
         """State at one of the instants."""
@@ -39,7 +49,7 @@ class Trajectory:
                      self.angular_velocities[index])
 
     def part(self, which: slice) -> Trajectory:
-        """Give the instants ``which`` names."""
+        """The instants that ``which`` picks."""
         return Trajectory(*(array[which] for array in vars(self).values()))
 
     @property

@@ -33,20 +33,20 @@ class Trial:
         return np.arange(round(self.duration / tick) + 1) * tick
 
     def with_tick(self, tick: float) -> Trial:
-        """Give the same motion in ticks of another length, s."""
+        """The same motion in ticks of another length, s."""
         return dataclasses.replace(self, scene=dataclasses.replace(self.scene, step=tick))
 
     def loads(self, begin: float, end: float) -> list[AppliedWrench]:
-        """Give the loads of a tick: of all pushes that act in its middle."""
+        """Wrenches of all pushes that act in the middle of a tick, from ``begin`` to ``end`` s."""
         middle = (begin + end) / 2
         return [AppliedWrench(self.scene.bone_index(push.bone), np.array(push.force),
-                     np.array(push.torque), np.array(push.point))
+                              np.array(push.torque), np.array(push.point))
                 for push in self.pushes if push.start <= middle < push.start + push.duration]
 
 
 def posed(placement: Placement, angles: dict[str, float] | None = None,
           rates: dict[str, float] | None = None) -> GeneralizedState:
-    """GeneralizedState of one placed doll with some joint angles (rad) and rates (rad/s) set.
+    """Coordinates of one placed doll with some joint angles (rad) and rates (rad/s) set.
 
     The names are those of Joint.angle_names; the root moves as ``placement`` says.
     """
@@ -69,3 +69,15 @@ def angle_places(doll: Ragdoll) -> dict[str, int]:
     """Place of each joint angle behind the root's coordinates, for dolls without free balls."""
     names = [name for joint in doll.joints_depth_first() for name in joint.angle_names]
     return {name: place for place, name in enumerate(names)}
+
+
+def angle_limits(doll: Ragdoll) -> dict[str, tuple[float, float]]:
+    """Range of each joint angle, rad, for dolls whose joints all have limits."""
+    return {name: pair for joint in doll.joints
+            for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
+
+
+def inner_angles(doll: Ragdoll, rng: np.random.Generator) -> dict[str, float]:
+    """Random joint angles, rad, in the inner two fifths of their ranges."""
+    return {name: lower + (upper - lower) * rng.uniform(0.3, 0.7)
+            for name, (lower, upper) in angle_limits(doll).items()}

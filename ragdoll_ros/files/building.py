@@ -19,12 +19,12 @@ def attempt(found: list[ModelError], where: str, make: type, *args: object,
 
 
 def any_under(found: list[ModelError], where: str) -> bool:
-    """Tell whether an error is at a place or below it."""
+    """Whether an error is at a place or below it."""
     return any(re.match(re.escape(where) + r'($|[.\[])', error.path) for error in found)
 
 
 def entries(data: dict, key: str) -> list[dict]:
-    """Give the mappings of a list that may be none."""
+    """The mappings of a list that may be none."""
     values = data.get(key)
     return [e for e in values if isinstance(e, dict)] if isinstance(values, list) else []
 
@@ -40,7 +40,7 @@ def build_each(data: dict, key: str, make: Callable, found: list[ModelError]) ->
 
 
 def raise_or_give(path: Path, made: object, found: list[ModelError]) -> object:
-    """Give what was made; ModelErrors with all of them if there are any."""
+    """What was made; ModelErrors with all of them if there are any."""
     if found:
         raise ModelErrors(str(path), found)
     return made

@@ -60,7 +60,7 @@ def build_doll(data: object,
 
 
 def doll_data(doll: Ragdoll, folder: Path | None = None) -> dict:
-    """Give a doll as plain lists and numbers, the form of doll.schema.json.
+    """A doll as plain lists and numbers, the form of doll.schema.json.
 
     The path of its character is written as seen from ``folder``, if given.
     """

@@ -78,7 +78,7 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
 
 
 def scene_data(scene: Scene, folder: Path | None = None) -> dict:
-    """Give a scene as plain lists and numbers, the form of scene.schema.json; see doll_data."""
+    """A scene as plain lists and numbers, the form of scene.schema.json; see doll_data."""
     data = {'name': scene.name, 'gravity': list(scene.gravity), 'step': scene.step,
             'pace': scene.pace, 'self_collision': scene.self_collision,
             'material': dict(vars(scene.material)), 'ground': None, 'dolls': []}
@@ -93,7 +93,7 @@ def scene_data(scene: Scene, folder: Path | None = None) -> dict:
 
 
 def scene_text(scene: Scene, folder: Path, head: str = '') -> str:
-    """Give what save_scene writes into a file of ``folder``."""
+    """What save_scene writes into a file of ``folder``."""
     return yaml_text.to_text(scene_data(scene, folder), 'scene', head)
 
 
@@ -108,7 +108,7 @@ def _named_doll(name: str, path: Path) -> tuple[Ragdoll | None, list[ModelError]
 
 
 def _with_swings(doll: Ragdoll, entry: dict, path: Path) -> tuple[Ragdoll | None, list[ModelError]]:
-    """Give the doll the swings that its place in the scene adds to its own."""
+    """The doll with the swings that its place in the scene adds to its own."""
     if not entry.get('swings'):
         return doll, []
     own = len(doll.swings)

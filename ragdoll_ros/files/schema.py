@@ -27,7 +27,7 @@ def schema_errors(schema: str, data: object) -> list[ModelError]:
 
 
 def _wrong(error: jsonschema.ValidationError) -> object:
-    """Give what is wrong at the place of an error: of a mapping, the keys that none has."""
+    """What is wrong at the place of an error: of a mapping, the keys that none has."""
     if error.validator != 'additionalProperties':
         return error.instance
     return ', '.join(str(key) for key in error.instance if key not in error.schema['properties'])

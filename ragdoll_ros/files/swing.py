@@ -19,7 +19,7 @@ def swing_from(data: dict) -> Swing:
 
 
 def swing_data(swing: Swing) -> dict:
-    """Give a swing as a file holds it; swing_from gives an equal one back."""
+    """A swing as a file holds it; swing_from gives an equal one back."""
     data = {'name': swing.name, 'bone': swing.bone, 'root': list(swing.root),
             'direction': list(swing.direction), 'gravity': swing.gravity, 'mode': swing.mode}
     if any(swing.velocity):

@@ -13,13 +13,9 @@ import numpy as np
 
 from ..model import errors, rotation
 from ..model.ragdoll import tree_errors
-from ..model.shapes import SHAPES, Shape
+from ..model.shapes import SHAPES, SIZES, Shape
 
 LARGEST_TEXT = 32_000_000
-
-SIZES = {'box': ('size',), 'sphere': ('radius',), 'cylinder': ('radius', 'length'),
-         'capsule': ('radius', 'length')}
-"""What a URDF says of each shape."""
 
 JOINT_TYPES = ('revolute', 'continuous', 'fixed', 'prismatic', 'planar', 'floating', 'spherical')
 
@@ -165,7 +161,7 @@ def _joint(element: ElementTree.Element) -> UrdfJoint:
 
 
 def _shape(geometry: ElementTree.Element, where: str) -> Shape | None:
-    """Give the shape; None for a mesh and whatever else is no plain shape."""
+    """The shape; None for a mesh and whatever else is no plain shape."""
     for element in geometry:
         if element.tag in SIZES:
             sizes = {key: tuple(_vector(element, key, where)) if key == 'size'

@@ -43,7 +43,7 @@ _Loader.add_constructor('tag:yaml.org,2002:int', _whole_number)
 
 
 def read(path: Path) -> object:
-    """Give what a YAML file holds as plain data; Unreadable where it is none."""
+    """What a YAML file holds as plain data; Unreadable where it is none."""
     if path.stat().st_size > LARGEST_FILE:
         raise errors.Unreadable('', f'{path.stat().st_size} bytes', f'at most {LARGEST_FILE}')
     try:
@@ -53,7 +53,7 @@ def read(path: Path) -> object:
 
 
 def parse(content: bytes) -> object:
-    """Give what a YAML file holds as plain data; Unreadable with the place where it is none."""
+    """What a YAML file holds as plain data; Unreadable with the place where it is none."""
     if len(content) > LARGEST_FILE:
         raise errors.Unreadable('', f'{len(content)} bytes', f'at most {LARGEST_FILE}')
     try:
@@ -108,7 +108,7 @@ def _unfolded(node: yaml.Node, sizes: dict[int, float]) -> float:
 
 
 def to_text(data: dict, schema: str, head: str) -> str:
-    """Give a file's text: its schema, ``head`` as a comment, then the data."""
+    """A file's text: its schema, ``head`` as a comment, then the data."""
     lines = [f'# yaml-language-server: $schema={schema}.schema.json',
              '# Units: m, kg, s, degrees where a key ends in _deg. x forward, y left, z up.']
     lines += ['# ' + line if line else '#' for line in head.splitlines()]

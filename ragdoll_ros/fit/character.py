@@ -10,7 +10,7 @@ import numpy as np
 from ..model import errors, rotation
 from ..model.ragdoll import WORLD
 from .gltf_file import GltfFile
-from .names import side_of
+from .names import plain_name, side_of
 from .nodes import Nodes, read_nodes
 from .skins import Skins, read_skins
 from .spring_bones import Spring, placed, read_springs, without_short_rods
@@ -19,49 +19,40 @@ TO_ROS = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
 """glTF is Y up and faces +Z, its left is +X: (x, y, z) here is (z, x, y) there."""
 
 LARGEST_METRES, SMALLEST_METRES = 20.0, 0.05
-"""A character longer or shorter than this is taken for one in other units, m."""
+"""What is longer or shorter than this is taken to be in other units, m."""
 
 
 @dataclass(frozen=True)
 class Character:
-    """Bones (n) and skin (v vertices, t triangles) in the bind pose.
-
-    Bones are ordered parents first; ``parents`` has -1 for a bone without one.
-    """
+    """Bones (n, parents first) and skin (v vertices, t triangles) in the bind pose."""
 
     name: str
     bone_names: tuple[str, ...]
     parents: tuple[int, ...]
+    """Index of each bone's parent, -1 for a bone without one."""
     positions: np.ndarray
     """(n, 3) m, the root of each bone."""
     orientations: np.ndarray
-    """(n, 4) x, y, z, w."""
+    """(n, 4) x, y, z, w, of the axes that the file gives each bone."""
     vertices: np.ndarray
     """(v, 3) m."""
     triangles: np.ndarray
     """(t, 3) vertex indices."""
     bones: np.ndarray
-    """(v, k) the bones that move each vertex."""
+    """(v, k) indices of the bones that move each vertex."""
     weights: np.ndarray
-    """(v, k) by how much; a row adds up to 1, or to 0 where no bone moves the vertex."""
+    """(v, k) their skin weights; a row's sum is 1, or 0 where no bone moves the vertex."""
     scale: float = 1.0
     """Metres to one unit of the file."""
     notes: tuple[str, ...] = ()
+    """A sentence for each thing that could not be taken over as it is."""
     springs: tuple[Spring, ...] = ()
+    """Its points in m, the character's frame."""
 
     @functools.cached_property
     def extent(self) -> float:
         """Longest edge of the skin's bounding box, m."""
         return float(np.ptp(self.vertices, axis=0).max())
-
-    @property
-    def children(self) -> list[list[int]]:
-        """Children of each bone."""
-        below: list[list[int]] = [[] for _ in self.parents]
-        for bone, parent in enumerate(self.parents):
-            if parent >= 0:
-                below[parent].append(bone)
-        return below
 
     def vertex_areas(self) -> np.ndarray:
         """Area (v,) m^2 that each vertex stands for: a third of its triangles'."""
@@ -78,10 +69,10 @@ class Character:
 
 
 def read_character(path: str | Path, scale: float | None = None) -> Character:
-    """Read a .glb or .gltf file; ModelErrors with what keeps it from being a character.
+    """Character of a .glb or .gltf file; ModelErrors with what keeps it from being one.
 
-    ``scale``: metres to one unit of the file; None takes 1, or what brings a size that cannot
-    be metres back to one that can, with a note.
+    ``scale`` is m to one unit of the file; None takes 1, or what brings a size that cannot be
+    metres back to one that can, with a note.
     """
     try:
         file = GltfFile(path)
@@ -107,24 +98,24 @@ def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) 
     rests = np.stack([skins.rests[node] for node in joints])
     if not np.isfinite(skins.vertices).all() or not np.isfinite(rests).all():
         raise errors.NotFinite('meshes', 'vertices in the bind pose', 'finite numbers')
-    names = _bone_names([file.document.nodes[node].name for node in joints])
+    names = _bone_names([file.json['nodes'][node].get('name') for node in joints])
     notes = list(skins.notes)
-    turn = TO_ROS
-    positions, vertices = rests[:, :3, 3] @ turn.T, skins.vertices @ turn.T
+    axes = TO_ROS
+    positions, vertices = rests[:, :3, 3] @ axes.T, skins.vertices @ axes.T
     # A bone keeps the axes that the file gives it, so that its inverse bind matrix fits on.
-    linear = turn @ rests[:, :3, :3]
+    linear = axes @ rests[:, :3, :3]
     yaw = _yaw_to_front(names, positions)
     if yaw:
         notes.append(f'its left limbs say that it does not face +Z: turned by {yaw} degrees')
         upright = np.round(rotation.matrix(rotation.from_axis_angle((0, 0, 1), np.radians(yaw))))
         positions, vertices, linear = positions @ upright.T, vertices @ upright.T, upright @ linear
-        turn = upright @ turn
+        axes = upright @ axes
     metres = _metres(vertices, scale, notes)
-    springs = _springs(file, nodes, skins, place, metres * turn, notes)
+    springs = _springs(file, nodes, skins, place, metres * axes, notes)
     stem = _bone_names([file.path.stem])[0]
     return Character(
         stem, names, tuple(_parent_bone(node, nodes.parents, place) for node in joints),
-        positions * metres, np.stack([_nearest_turn(matrix) for matrix in linear]),
+        positions * metres, np.stack([_nearest_rotation(matrix) for matrix in linear]),
         vertices * metres, skins.triangles, lookup[skins.nodes], skins.weights, metres,
         tuple(notes), springs)
 
@@ -160,9 +151,7 @@ def _bone_names(given: list[object]) -> tuple[str, ...]:
     taken = {WORLD: 1}
     names = []
     for number, name in enumerate(given):
-        text = name if isinstance(name, str) else ''
-        text = ''.join(c if c.isprintable() and c != '/' else '_' for c in text)
-        text = text.strip()[:90] or f'bone_{number}'
+        text = plain_name(name if isinstance(name, str) else '', f'bone_{number}')
         while text in taken:
             taken[text] += 1
             text = f'{text}_{taken[text]}'
@@ -172,7 +161,7 @@ def _bone_names(given: list[object]) -> tuple[str, ...]:
 
 
 def _yaw_to_front(names: tuple[str, ...], positions: np.ndarray) -> int:
-    """Turn about the vertical, degrees, that brings the bones named left to +y."""
+    """Rotation about the vertical, degrees, that brings the bones named left to +y."""
     sides = np.array([side_of(name) for name in names])
     if not (sides > 0).any() or not (sides < 0).any():
         return 0
@@ -205,7 +194,7 @@ def _metres(vertices: np.ndarray, scale: float | None, notes: list[str]) -> floa
     return metres
 
 
-def _nearest_turn(matrix: np.ndarray) -> np.ndarray:
+def _nearest_rotation(matrix: np.ndarray) -> np.ndarray:
     """Quaternion (4,) of the rotation nearest to a matrix (3, 3) that may scale and mirror."""
     u, _, vt = np.linalg.svd(matrix)
     if np.linalg.det(u @ vt) < 0:

@@ -7,11 +7,12 @@ import sys
 from pathlib import Path
 
 from ..files.doll import load_doll, save_doll
+from ..files.urdf import to_urdf
 from ..model import errors
-from ..model.ragdoll import Ragdoll
 from .character import read_character
-from .pipeline import Fit, Options, fit_character
+from .pipeline import Options, fit_character
 from .report import doll_report, fit_report
+from .robot import read_urdf
 
 EXAMPLE = """\
 example:
@@ -20,7 +21,6 @@ example:
 
 A .urdf becomes a doll too: a robot that goes limp. A doll's own .yaml is checked and reported.
 Exit code 0: done; 2: a file or an option is wrong."""
-
 
 PICTURES = ('.png', '.jpg', '.svg', '.pdf')
 
@@ -32,7 +32,7 @@ FITTING = ('mass', 'masses', 'scale', 'shape', 'orientation', 'weight', 'smalles
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command; gives the exit code."""
+    """Run the command; exit code 0, or 2 where a file or an option is wrong."""
     parser = _parser()
     options = parser.parse_args(arguments)
     try:
@@ -85,32 +85,21 @@ def _run(options: argparse.Namespace) -> None:
         doll = load_doll(options.input)
         report = doll_report(doll)
     elif path.suffix.lower() in ROBOTS:
-        doll, report = _read_robot(path)
+        doll, notes = read_urdf(path)
+        report = doll_report(doll, notes)
     else:
-        fit = _fit(path, options)
+        fit = fit_character(read_character(path, options.scale), Options(
+            options.shape, options.orientation, options.weight, options.smallest, options.mass,
+            options.masses))
         doll, report = dataclasses.replace(fit.doll, model=str(path)), fit_report(fit)
     print(report)
     if options.output:
         save_doll(doll, options.output, f'Fitted to {path.name}\n\n{report}')
     if options.urdf:
-        from ..files.urdf import to_urdf
         Path(options.urdf).write_text(to_urdf(doll, options.dialect), encoding='utf-8')
     if options.picture:
         from .picture import draw
         draw(doll, fit.character if fit else None, options.picture)
-
-
-def _fit(path: Path, options: argparse.Namespace) -> Fit:
-    character = read_character(path, options.scale)
-    return fit_character(character, Options(
-        options.shape, options.orientation, options.weight, options.smallest, options.mass,
-        options.masses))
-
-
-def _read_robot(path: Path) -> tuple[Ragdoll, str]:
-    from .robot import read_urdf
-    doll, notes = read_urdf(path)
-    return doll, doll_report(doll, notes)
 
 
 def _check(options: argparse.Namespace, parser: argparse.ArgumentParser) -> None:

@@ -7,13 +7,11 @@ import numpy as np
 
 from ..model import rotation
 from ..model.ragdoll import Joint, Ragdoll
+from .character import LARGEST_METRES, SMALLEST_METRES
 from .names import roles_of
 
 DENSEST = 3000.0
 """kg/m^3; bone has 1 900, stone 2 700."""
-
-LARGEST, SMALLEST = 20.0, 0.05
-"""Sizes between which a doll is believed to be in metres, m."""
 
 BENDS = {'shin': (-1, 'a knee that bends forwards'),
          'forearm': (1, 'an elbow that bends backwards'),
@@ -22,7 +20,7 @@ BENDS = {'shin': (-1, 'a knee that bends forwards'),
 
 
 def find_doubts(doll: Ragdoll) -> list[str]:
-    """Give one sentence for each doubt: density, joints that bend the wrong way, size."""
+    """A sentence for each doubt: about the size, a density, a joint that bends the wrong way."""
     return [*_size(doll), *_densities(doll), *_bends(doll)]
 
 
@@ -37,30 +35,25 @@ def extent(doll: Ragdoll) -> float:
 
 def _size(doll: Ragdoll) -> list[str]:
     size = extent(doll)
-    if size > LARGEST:
+    if size > LARGEST_METRES:
         unit = 'centimetres' if size < 1000 else 'millimetres'
         return [f'a doll {size:.4g} m long: the size smells of {unit}']
-    if size < SMALLEST:
+    if size < SMALLEST_METRES:
         return [f'a doll {size:.4g} m long: the size smells of a scale applied twice']
     return []
 
 
 def _densities(doll: Ragdoll) -> list[str]:
-    found = []
-    for bone in doll.bones:
-        density = bone.mass / bone.shape.volume
-        if density > DENSEST:
-            found.append(f'{bone.name}: a density of {density:.0f} kg/m^3, over {DENSEST:.0f}')
-    return found
+    densities = {bone.name: bone.mass / bone.shape.volume for bone in doll.bones}
+    return [f'{name}: a density of {density:.0f} kg/m^3, over {DENSEST:.0f}'
+            for name, density in densities.items() if density > DENSEST]
 
 
 def _bends(doll: Ragdoll) -> list[str]:
-    names = tuple(bone.name for bone in doll.bones)
-    above = {joint.child: names.index(joint.parent) for joint in doll.joints}
-    order = (doll.root.name, *(joint.child for joint in doll.joints_from_root()))
-    place = {name: index for index, name in enumerate(order)}
-    parents = tuple(place[names[above[name]]] if name in above else -1 for name in order)
-    roles = dict(zip(order, roles_of(order, parents), strict=True))
+    joints = doll.joints_from_root()
+    names = (doll.root.name, *(joint.child for joint in joints))
+    parents = (-1, *(names.index(joint.parent) for joint in joints))
+    roles = dict(zip(names, roles_of(names, parents), strict=True))
     found = []
     for joint in doll.joints:
         if roles[joint.child] in BENDS and joint.kind in ('hinge', 'universal'):
@@ -72,7 +65,7 @@ def _bends(doll: Ragdoll) -> list[str]:
 
 
 def _reach_forward(doll: Ragdoll, joint: Joint) -> float:
-    """How far the middle of its range takes the child's middle along x, by its distance."""
+    """How far the middle of its range takes the child's centre along x, by its distance."""
     if joint.limits[0] is None:
         return 0.0
     arm = np.array(doll.bone(joint.child).position) - joint.anchor

@@ -1,8 +1,8 @@
 """The container of a glTF 2.0 file: its JSON, and where the bytes of its buffers lie.
 
 Nothing is read but the JSON and the bytes an accessor asks for, and nothing is believed: every
-length is held against the file's own size. The chunks are those of section 4.4 of the glTF 2.0
-specification; pygltflib gives the JSON its types.
+length is held against the file's own size, and what the JSON says is checked where it is read.
+The chunks are those of section 4.4 of the glTF 2.0 specification.
 """
 from __future__ import annotations
 
@@ -12,10 +12,9 @@ import json
 import os
 import struct
 import urllib.parse
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
+from typing import BinaryIO
 
 from ..model import errors
 
@@ -25,11 +24,13 @@ LARGEST_JSON = 32_000_000
 LARGEST_STRUCTURE = 500_000
 """Commas and brackets in the JSON: what becomes Python objects, 64 bytes each and more."""
 
-UNREADABLE_EXTENSIONS = {'KHR_draco_mesh_compression', 'EXT_meshopt_compression'}
+UNREADABLE_EXTENSIONS = ('KHR_draco_mesh_compression', 'EXT_meshopt_compression')
 
-TYPES = {'nodes': 'Node', 'skins': 'Skin', 'meshes': 'Mesh', 'accessors': 'Accessor',
-         'bufferViews': 'BufferView', 'buffers': 'Buffer'}
-"""The parts of a document that matter, and pygltflib's types for their entries."""
+LARGEST_WHOLE = 2 ** 53
+"""Whole numbers of the JSON stay below (section 2.7 of the specification)."""
+
+LISTS = ('nodes', 'skins', 'meshes', 'accessors', 'bufferViews', 'buffers')
+"""The parts of a document that are read: lists of objects that name each other by index."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Buffer:
     data: bytes = b''
 
     def read(self, offset: int, size: int, where: str) -> bytes:
-        """Give ``size`` bytes from ``offset`` on; Unreadable where the file ends before."""
+        """Return ``size`` bytes from ``offset`` on; Unreadable where the file ends before."""
         if self.path is None:
             return self.data[offset:offset + size]
         with self.path.open('rb') as file:
@@ -54,7 +55,10 @@ class Buffer:
 
 
 class GltfFile:
-    """A .glb or .gltf file: ``document`` (pygltflib's types), ``json`` (as it stands), buffers."""
+    """A .glb or .gltf file: its ``json``, whose LISTS are lists of objects, and its buffers.
+
+    A ModelError says what keeps it from being one; OSError where it cannot be opened.
+    """
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
@@ -67,41 +71,52 @@ class GltfFile:
             raise errors.Unreadable('byte 0', 'no glTF in front', 'a file that begins with glTF')
         text, self._chunk = self._read_chunks() if binary else (self._read_text(), None)
         self.json = _parse(text)
-        self.document = _typed(self.json)
         self._buffers: dict[int, Buffer] = {}
 
+    def entry(self, key: str, index: object, where: str) -> dict:
+        """Return the object at an index of one of the LISTS; OutOfRange if it is no index."""
+        entries = self.json[key]
+        if type(index) is not int or not 0 <= index < len(entries):
+            raise errors.OutOfRange(
+                where, index, f'an index from 0 to {len(entries) - 1} in {key}' if entries
+                else f'{key} in the file')
+        return entries[index]
+
     def read(self, view_index: object, offset: int, size: int, where: str) -> bytes:
-        """Give ``size`` bytes of a buffer view from ``offset`` on."""
-        view = item(self.document.bufferViews, view_index, where, 'bufferViews')
+        """Return ``size`` bytes of a buffer view from ``offset`` on.
+
+        OutOfRange where they leave the view, the view its buffer, or the buffer its file.
+        """
+        view = self.entry('bufferViews', view_index, where)
         place = f'bufferViews[{view_index}]'
-        start, length = count(view.byteOffset or 0, place), count(view.byteLength, place)
+        start, length = count(view, 'byteOffset', place, 0), count(view, 'byteLength', place)
         if offset < 0 or offset + size > length:
             raise errors.OutOfRange(where, f'bytes {offset} to {offset + size}',
                                     f'within the {length} bytes of {place}')
-        buffer = self._buffer(view.buffer, place)
+        buffer = self._buffer(view.get('buffer'), place)
         if start + length > buffer.size:
             raise errors.OutOfRange(place, f'bytes {start} to {start + length}',
                                     f'within the {buffer.size} bytes of the buffer')
         return buffer.read(start + offset, size, place)
 
     def _buffer(self, index: object, where: str) -> Buffer:
-        entry = item(self.document.buffers, index, where, 'buffers')
+        entry = self.entry('buffers', index, where)
         if index not in self._buffers:
             self._buffers[index] = self._open_buffer(entry, f'buffers[{index}]')
         return self._buffers[index]
 
-    def _open_buffer(self, entry: object, where: str) -> Buffer:
-        wanted = count(entry.byteLength, where)
-        if entry.uri is None:
+    def _open_buffer(self, entry: dict, where: str) -> Buffer:
+        wanted, uri = count(entry, 'byteLength', where), entry.get('uri')
+        if uri is None:
             if self._chunk is None:
                 raise errors.WrongForm(where, None, 'a uri, or a binary chunk in the file')
             buffer = self._chunk
-        elif not isinstance(entry.uri, str):
-            raise errors.WrongForm(f'{where}.uri', entry.uri, 'a text')
-        elif entry.uri.startswith('data:'):
-            buffer = _embedded(entry.uri, where)
+        elif not isinstance(uri, str):
+            raise errors.WrongForm(f'{where}.uri', uri, 'a text')
+        elif uri.startswith('data:'):
+            buffer = _embedded(uri, where)
         else:
-            path = _inside(self.path.parent, entry.uri, where)
+            path = _inside(self.path.parent, uri, where)
             buffer = Buffer(path.stat().st_size, path)
         if wanted > buffer.size:
             raise errors.OutOfRange(f'{where}.byteLength', wanted,
@@ -114,7 +129,7 @@ class GltfFile:
         return self.path.read_bytes()
 
     def _read_chunks(self) -> tuple[bytes, Buffer | None]:
-        """Give the JSON chunk's bytes and where the binary chunk lies."""
+        """Bytes of the JSON chunk, and where the binary chunk lies."""
         with self.path.open('rb') as file:
             header = file.read(12)
             if len(header) < 12:
@@ -139,7 +154,7 @@ class GltfFile:
             kind, start, size = self._chunk_head(file, after)
         return text, Buffer(size, self.path, start) if kind == b'BIN\0' else None
 
-    def _chunk_head(self, file: object, at: int) -> tuple[bytes, int, int]:
+    def _chunk_head(self, file: BinaryIO, at: int) -> tuple[bytes, int, int]:
         head = file.read(8)
         if len(head) < 8:
             raise errors.Unreadable(f'byte {at}', f'{len(head)} bytes', 'a chunk')
@@ -150,19 +165,32 @@ class GltfFile:
         return kind, at + 8, size
 
 
-def item(items: list | None, index: object, where: str, name: str) -> object:
-    """Give ``items[index]``; OutOfRange for an index that is none."""
-    length = len(items or ())
-    if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < length:
-        expected = f'an index from 0 to {length - 1} in {name}' if length else f'{name} in the file'
-        raise errors.OutOfRange(where, index, expected)
-    return items[index]
+def nested(entry: dict, key: str, kind: type, where: str) -> dict | list:
+    """Value of a key, of ``kind`` dict or list; empty where there is none, else WrongForm."""
+    value = entry.get(key)
+    if value is None:
+        return kind()
+    if not isinstance(value, kind):
+        expected = 'an object' if kind is dict else 'a list'
+        raise errors.WrongForm(f'{where}.{key}'.lstrip('.'), value, expected)
+    return value
 
 
-def count(value: object, where: str) -> int:
-    """Give a number of things or bytes; WrongForm unless it is a whole number from zero on."""
-    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
-        raise errors.WrongForm(where, value, 'a whole number, zero or above')
+def objects(entry: dict, key: str, where: str = '') -> list[dict]:
+    """Value of a key, a list of objects; empty where there is none, WrongForm for another."""
+    values = nested(entry, key, list, where)
+    for index, value in enumerate(values):
+        if not isinstance(value, dict):
+            raise errors.WrongForm(f'{where}.{key}[{index}]'.lstrip('.'), value, 'an object')
+    return values
+
+
+def count(entry: dict, key: str, where: str, default: int | None = None) -> int:
+    """Number of things or bytes under a key; WrongForm unless it is whole and not negative."""
+    value = entry.get(key)
+    value = default if value is None else value
+    if type(value) is not int or not 0 <= value < LARGEST_WHOLE:
+        raise errors.WrongForm(f'{where}.{key}', value, 'a whole number, zero or above')
     return value
 
 
@@ -177,40 +205,11 @@ def _parse(text: bytes) -> dict:
         raise errors.Unreadable('JSON', str(error), 'JSON in UTF-8') from None
     if not isinstance(data, dict):
         raise errors.WrongForm('JSON', data, 'an object with nodes, skins and meshes')
-    required = data.get('extensionsRequired')
-    for extension in required if isinstance(required, list) else ():
+    for extension in nested(data, 'extensionsRequired', list, ''):
         if extension in UNREADABLE_EXTENSIONS:
             raise errors.WrongForm('extensionsRequired', extension,
                                    'an uncompressed file: export it without compression')
-    return data
-
-
-def _typed(data: dict) -> SimpleNamespace:
-    """Give the parts that matter pygltflib's types; WrongForm with the place where they misfit."""
-    try:
-        import pygltflib
-    except ImportError:
-        raise errors.Unreadable(
-            '', 'no pygltflib', "pip install 'ragdoll_ros[fit]' to read glTF") from None
-    document = SimpleNamespace()
-    with warnings.catch_warnings():
-        # It warns of each missing key; what is missing is told here, where it matters.
-        warnings.simplefilter('ignore')
-        for key, kind in TYPES.items():
-            entries = data.get(key, [])
-            if not isinstance(entries, list):
-                raise errors.WrongForm(key, entries, 'a list of objects')
-            setattr(document, key, [_entry(getattr(pygltflib, kind), entry, f'{key}[{index}]')
-                                    for index, entry in enumerate(entries)])
-    return document
-
-
-def _entry(kind: type, entry: object, where: str) -> object:
-    try:
-        return kind.from_dict(entry, infer_missing=True)
-    except (TypeError, ValueError, KeyError, AttributeError, OverflowError, RecursionError):
-        name = kind.__name__
-        raise errors.WrongForm(where, entry, f'a {name} as glTF 2.0 has it') from None
+    return data | {key: objects(data, key) for key in LISTS}
 
 
 def _embedded(uri: str, where: str) -> Buffer:

@@ -1,8 +1,12 @@
-"""Which bones of a skeleton become one body: small ones are merged into their parents."""
+"""Which bones of a skeleton become one rigid body: small ones are merged into their parents.
+
+The vertices that a bone moves are its cluster. A group is the bones that become one body, with
+their clusters.
+"""
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +18,7 @@ SMALLEST = 0.055
 """A cluster shorter than this share of the whole character gets no body of its own."""
 
 FEWEST = 4
-"""Vertices that a body needs."""
+"""Vertices of a cluster that has a size."""
 
 PAIRED = 0.02
 """Two bones are a left and a right one if one mirrored is this near to the other, of the whole."""
@@ -22,19 +26,29 @@ PAIRED = 0.02
 
 @dataclass
 class Group:
-    """One body: its topmost bone, where its joint is and after which it is named, and the rest."""
+    """Bones that become one body; all by their index in the character."""
 
     bone: int
+    """The topmost, at whose root the body's joint is; the root group's: the one with most skin."""
+    bones: list[int]
+    """All of them."""
+    vertices: np.ndarray
+    """(p,) of their clusters."""
     parent: int = -1
     """Index of the parent's group, -1 for the root."""
-    bones: list[int] = field(default_factory=list)
-    vertices: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    name: str = ''
+    """Of ``bone``, and so of the body."""
+    role: str | None = None
+    """Of ``bone``; see roles_of."""
     tied: bool = False
     """Whether no bone joins it to its parent, so that it is tied to it rigidly."""
 
 
 def vertices_by_bone(character: Character, share: float | None = None) -> list[np.ndarray]:
-    """Indices of the vertices of each bone: of those it moves most, or by at least ``share``."""
+    """Cluster of each bone: indices (p,) of the vertices that it moves most.
+
+    With a ``share``: of all that it moves by at least this skin weight, 0 to 1.
+    """
     count = len(character.bone_names)
     same = character.bones[:, :, None] == character.bones[:, None, :]
     totals = np.einsum('vij,vj->vi', same, character.weights)
@@ -54,35 +68,95 @@ def vertices_by_bone(character: Character, share: float | None = None) -> list[n
 def group_bones(character: Character, roles: tuple[str | None, ...], clusters: list[np.ndarray],
                 smallest: float | None = None,
                 swinging: frozenset[int] = frozenset()) -> list[Group]:
-    """Merge bones into bodies, parents first; ``smallest`` in m, None: a share of the whole.
+    """Groups of a character's bones, parents first.
 
-    Bones that are ``swinging`` have no body: they ride on their parents', without their skin.
+    ``roles`` and ``clusters`` are each bone's. A bone whose cluster is shorter than ``smallest``
+    m (None: SMALLEST of the character) goes into its parent's group; so do a further piece of a
+    limb, a finger, and a bone that is ``swinging``, which does so without its cluster.
     """
     clusters = [np.zeros(0, np.int64) if bone in swinging else cluster
                 for bone, cluster in enumerate(clusters)]
     smallest = SMALLEST * character.extent if smallest is None else smallest
-    held = [Group(bone, bones=[bone], vertices=cluster) for bone, cluster in enumerate(clusters)]
-    parents = character.parents
-    into = list(range(len(held)))
-    for level in reversed(_levels(parents)):
-        sizes = {bone: cluster_size(character, held[bone].vertices) for bone in level}
+    merging = _Merging(character, clusters, smallest)
+    depths = [len(merging.lineage(bone)) for bone in range(len(clusters))]
+    for depth in range(max(depths), 1, -1):
+        level = [bone for bone, own in enumerate(depths) if own == depth]
+        sizes = {bone: merging.size(bone) for bone in level}
         for bone in level:
-            parent = parents[bone]
+            parent = character.parents[bone]
             paired = max(sizes[bone], sizes[_partner(character, bone, level)])
-            small = bone in swinging or paired < smallest
-            if parent >= 0 and (small or _one_limb(roles[parent], roles[bone])):
-                _absorb(held[parent], held[bone])
-                into[bone] = parent
-    heads = [bone for bone in range(len(held)) if into[bone] == bone]
-    above = {bone: _head_above(bone, parents, into) for bone in heads}
-    _settle_roots(character, held, heads, above, smallest)
-    place = {bone: index for index, bone in enumerate(heads)}
-    for bone in heads:
-        held[bone].parent = place.get(above[bone], -1)
-    root = held[heads[0]]
+            if bone in swinging or paired < smallest or _one_limb(roles[parent], roles[bone]):
+                merging.merge(bone, parent)
+    merging.settle_roots()
+    heads = sorted(merging.heads, key=lambda bone: (len(merging.lineage(bone)), bone))
+    groups = [merging.groups[bone] for bone in heads]
     # Without a joint, the root may as well be called by the bone that gave it its skin.
-    root.bone = max(root.bones, key=lambda bone: len(clusters[bone]))
-    return [held[bone] for bone in heads]
+    groups[0].bone = max(groups[0].bones, key=lambda bone: len(clusters[bone]))
+    for head, group in zip(heads, groups, strict=True):
+        above = merging.parent(head)
+        group.parent = heads.index(above) if above >= 0 else -1
+        group.name, group.role = character.bone_names[group.bone], roles[group.bone]
+    return groups
+
+
+class _Merging:
+    """Groups in the making: at first each bone is one; ``heads`` are the topmost bones of each."""
+
+    def __init__(self, character: Character, clusters: list[np.ndarray], smallest: float) -> None:
+        self.groups = [Group(bone, [bone], cluster) for bone, cluster in enumerate(clusters)]
+        self._character, self._smallest = character, smallest
+        self._into = list(range(len(clusters)))
+        self._above = list(character.parents)
+
+    @property
+    def heads(self) -> list[int]:
+        return [bone for bone, into in enumerate(self._into) if into == bone]
+
+    def size(self, bone: int) -> float:
+        return cluster_size(self._character, self.groups[bone].vertices)
+
+    def parent(self, bone: int) -> int:
+        """Head of the group above the bone's, -1 if there is none."""
+        bone = self._above[bone]
+        while bone >= 0 and self._into[bone] != bone:
+            bone = self._into[bone]
+        return bone
+
+    def lineage(self, bone: int) -> list[int]:
+        """The head ``bone``, then those of the groups above it up to a root."""
+        line = [bone]
+        while (bone := self.parent(bone)) >= 0:
+            line.append(bone)
+        return line
+
+    def merge(self, bone: int, target: int) -> None:
+        group, other = self.groups[target], self.groups[bone]
+        group.bones += other.bones
+        group.vertices = np.union1d(group.vertices, other.vertices)
+        self._into[bone] = target
+
+    def settle_roots(self) -> None:
+        """Leave one root, and one with a body: a small root takes in its largest child.
+
+        A bone without a parent that is not the root (a file may hold several skeletons) is tied
+        to the root, or merged into it where it is small.
+        """
+        roots = [bone for bone in self.heads if self._above[bone] < 0]
+        for root in roots:
+            while self.size(root) < self._smallest:
+                below = [bone for bone in self.heads if self.parent(bone) == root]
+                if not below:
+                    break
+                self.merge(max(below, key=self.size), root)
+        vertices = dict.fromkeys(roots, 0)
+        for bone in self.heads:
+            vertices[self.lineage(bone)[-1]] += len(self.groups[bone].vertices)
+        first = max(roots, key=lambda root: vertices[root])
+        for root in roots:
+            if root != first and self.size(root) < self._smallest:
+                self.merge(root, first)
+            elif root != first:
+                self._above[root], self.groups[root].tied = first, True
 
 
 def cluster_size(character: Character, vertices: np.ndarray) -> float:
@@ -96,16 +170,6 @@ def cluster_size(character: Character, vertices: np.ndarray) -> float:
 
 def _one_limb(above: str | None, role: str | None) -> bool:
     return (role == above and role in LIMBS) or (role == 'finger' and above in ('hand', 'finger'))
-
-
-def _levels(parents: tuple[int, ...]) -> list[list[int]]:
-    depth: list[int] = []
-    for parent in parents:
-        depth.append(depth[parent] + 1 if parent >= 0 else 0)
-    levels: list[list[int]] = [[] for _ in range(max(depth) + 1)]
-    for bone, level in enumerate(depth):
-        levels[level].append(bone)
-    return levels
 
 
 def _partner(character: Character, bone: int, level: list[int]) -> int:
@@ -122,67 +186,3 @@ def partner(character: Character, groups: list[Group], index: int) -> int:
     other = heads.index(_partner(character, heads[index], heads))
     back = heads.index(_partner(character, heads[other], heads))
     return other if back == index else index
-
-
-def _absorb(group: Group, other: Group) -> None:
-    group.bones += other.bones
-    group.vertices = np.union1d(group.vertices, other.vertices)
-
-
-def _head_above(bone: int, parents: tuple[int, ...], into: list[int]) -> int:
-    parent = parents[bone]
-    while parent >= 0 and into[parent] != parent:
-        parent = into[parent]
-    return parent
-
-
-def _settle_roots(character: Character, held: list[Group], heads: list[int],
-                  above: dict[int, int], smallest: float) -> None:
-    """Leave one root, and one with a body: a small root takes in its largest child.
-
-    A bone without a parent that is not the root (a file may hold several skeletons) is tied to
-    the root, or merged into it where it is small.
-    """
-    def size(bone: int) -> float:
-        return cluster_size(character, held[bone].vertices)
-
-    def merge(bone: int, target: int) -> None:
-        _absorb(held[target], held[bone])
-        heads.remove(bone)
-        for other in heads:
-            if above[other] == bone:
-                above[other] = target
-
-    for root in [bone for bone in heads if above[bone] < 0]:
-        while size(root) < smallest:
-            below = [bone for bone in heads if above[bone] == root]
-            if not below:
-                break
-            merge(max(below, key=size), root)
-    roots = [bone for bone in heads if above[bone] < 0]
-    first = max(roots, key=lambda bone: _skin_below(held, heads, above, bone))
-    for root in roots:
-        if root == first:
-            continue
-        if size(root) < smallest:
-            merge(root, first)
-        else:
-            above[root], held[root].tied = first, True
-    heads.sort(key=lambda bone: (_depth(bone, above), bone))
-
-
-def _skin_below(held: list[Group], heads: list[int], above: dict[int, int], root: int) -> int:
-    total = 0
-    for bone in heads:
-        top = bone
-        while above[top] >= 0:
-            top = above[top]
-        total += len(held[bone].vertices) * (top == root)
-    return total
-
-
-def _depth(bone: int, above: dict[int, int]) -> int:
-    depth = 0
-    while above[bone] >= 0:
-        bone, depth = above[bone], depth + 1
-    return depth

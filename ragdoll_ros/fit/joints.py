@@ -7,6 +7,10 @@ import math
 import numpy as np
 
 from ..model.ragdoll import Bone, Joint
+from .character import Character
+from .groups import Group
+from .names import side_of
+from .shapes import DECIMALS
 
 FORWARD, LEFT, UP = np.eye(3)
 
@@ -21,20 +25,41 @@ BALLS = {'neck': (35, 40), 'head': (45, 55), 'spine': (25, 25), 'hips': (25, 25)
          'soft': (30, 20), 'wing': (60, 20), 'finger': (30, 10)}
 """Swing and twist, degrees, by role."""
 
-LOSS_TIME, SHORTEST_LOSS = 0.7, 0.1
-"""Seconds: see ``damped``."""
-
 FIRST, LATER = (60, 30), (45, 30)
 """The same by topology: a limb's first joint, and the others."""
 
+LOSS_TIME, SHORTEST_LOSS = 0.7, 0.1
+"""Seconds: see ``damped``."""
 
-def make_joint(parent: str, child: str, role: str | None, side: int, anchor: np.ndarray,
-               above: np.ndarray | None, along: np.ndarray, chain: bool) -> Joint:
-    """Make the joint at ``anchor`` (3,) m.
 
-    ``above`` is the unit direction from the parent's joint to this one, None where the parent
-    is the root; ``along`` that of the child; ``chain`` tells whether both go on without a
-    branch; ``side`` is 1 on the left, -1 on the right.
+def make_joint(character: Character, groups: list[Group], index: int, along: np.ndarray) -> Joint:
+    """Joint of a group's body to its parent's, at the root of its bone, without damping.
+
+    ``along`` (3,) is the unit direction of its bone (bind pose, doll's frame).
+    """
+    group = groups[index]
+    parent = groups[group.parent]
+    anchor = np.round(character.positions[group.bone], DECIMALS) + 0.0
+    if group.tied:
+        return Joint(parent.name, group.name, 'fixed', anchor)
+    above = None
+    step = character.positions[group.bone] - character.positions[parent.bone]
+    length = float(np.linalg.norm(step))
+    if parent.parent >= 0 and length > 1e-6:
+        above = step / length
+    children = [sum(other.parent == k for other in groups) for k in (index, group.parent)]
+    side = side_of(group.name) or int(np.sign(anchor[1]))
+    return _by_role(parent.name, group.name, group.role, side, anchor, above, along,
+                    children[0] <= 1 and children[1] == 1)
+
+
+def _by_role(parent: str, child: str, role: str | None, side: int, anchor: np.ndarray,
+             above: np.ndarray | None, along: np.ndarray, chain: bool) -> Joint:
+    """Joint as the child's role has it, else as the skeleton is built.
+
+    ``above`` (3,) is the unit direction from the parent's joint to this one, None where the
+    parent is the root; ``chain`` tells whether both go on without a branch; ``side`` is 1 on the
+    left, -1 on the right.
     """
     if role == 'shin' or role == 'forearm':
         # A knee takes the foot backwards, an elbow the hand forwards (or up).
@@ -57,7 +82,7 @@ def make_joint(parent: str, child: str, role: str | None, side: int, anchor: np.
 
 
 def damped(joint: Joint, parent: Bone, child: Bone) -> Joint:
-    """Give the joint a body's own loss, N m s/rad, so that the doll comes to rest.
+    """The joint with a living body's damping, N m s/rad, so that the doll comes to rest.
 
     The child alone, swinging about the joint, loses its speed within LOSS_TIME; about their
     thin axes neither body must lose it within a step of the engine, where damping is explicit.
@@ -87,7 +112,7 @@ def _folding(above: np.ndarray | None, along: np.ndarray,
              toward: np.ndarray) -> tuple[np.ndarray, tuple[float, float]]:
     """Axis and limits of a hinge that takes ``along`` toward a direction.
 
-    Bent that way in the bind pose already, it turns about the axis of that bend and stops
+    Bent that way in the bind pose already, it rotates about the axis of that bend and stops
     where it is straight.
     """
     axis = _across(along, toward)
@@ -99,7 +124,7 @@ def _folding(above: np.ndarray | None, along: np.ndarray,
 
 
 def _across(along: np.ndarray, toward: np.ndarray) -> np.ndarray:
-    """Axis about which ``along`` turns toward a direction; toward up where it points there."""
+    """Unit axis of the rotation of ``along`` toward a direction; toward up where it is that one."""
     axis = np.cross(along, toward)
     if np.linalg.norm(axis) < 0.3:
         axis = np.cross(along, UP if abs(along @ UP) < 0.9 else LEFT)

@@ -1,4 +1,4 @@
-"""What a bone is called tells what it is: roles from the names of well-known skeletons.
+"""Roles of bones (a thigh, a hand), from the names that well-known skeletons give them.
 
 Mixamo, MakeHuman, CMU (both its ASF and its BVH names), VRM, Unreal, 3ds Max's Biped, SMPL.
 """
@@ -40,13 +40,22 @@ ARM = ('upper_arm', 'forearm', 'hand', 'finger')
 LEG = ('thigh', 'shin', 'foot', 'toe')
 
 
+def plain_name(name: str, otherwise: str) -> str:
+    """The name as a doll's file takes it: printable, without slashes, not empty."""
+    text = ''.join(c if c.isprintable() and c != '/' else '_' for c in name)
+    return text.strip()[:90] or otherwise
+
+
 def side_of(name: str) -> int:
-    """Give 1 for a bone named as a left one, -1 for a right one, 0 for neither."""
+    """1 for a bone named as a left one, -1 for a right one, 0 for neither."""
     return _side_and_words(name)[0]
 
 
 def roles_of(names: tuple[str, ...], parents: tuple[int, ...]) -> tuple[str | None, ...]:
-    """Give each bone's role, None where its name says nothing; parents come first."""
+    """Role of each bone, None where its name says nothing.
+
+    ``parents`` are indices of the bones, which come parents first; -1 for a bone without one.
+    """
     raw = [_raw_role(name) for name in names]
     roles: list[str | None] = []
     for bone, (role, parent) in enumerate(zip(raw, parents, strict=True)):

@@ -8,7 +8,7 @@ import numpy as np
 from ..model import errors
 from ..model.ragdoll import Bone, Ragdoll
 from .character import Character
-from .solid import placed
+from .frames import from_body
 
 COLORS = np.array([[0.90, 0.45, 0.35], [0.35, 0.60, 0.85], [0.50, 0.75, 0.45], [0.95, 0.75, 0.35],
                    [0.65, 0.50, 0.80], [0.45, 0.75, 0.75], [0.85, 0.60, 0.75], [0.70, 0.65, 0.50]])
@@ -19,9 +19,10 @@ FEWER = 30_000
 
 
 def draw(doll: Ragdoll, character: Character | None, path: str | Path) -> None:
-    """Write skin, both, and bodies side by side, seen from ahead and to the left.
+    """Write a picture of skin, both, and bodies side by side, seen from ahead and to the left.
 
-    Without a character there is no skin to show, only the bodies.
+    Without a character: of the bodies alone. Unreadable where matplotlib is missing, OSError
+    where the picture cannot be written.
     """
     try:
         import matplotlib
@@ -55,7 +56,7 @@ def draw(doll: Ragdoll, character: Character | None, path: str | Path) -> None:
 
 def _triangles(bone: Bone) -> np.ndarray:
     corners, triangles = bone.shape.mesh()
-    return placed(bone, corners)[triangles]
+    return from_body(bone, corners)[triangles]
 
 
 def _draw_solids(axes: object, solids: list[tuple[np.ndarray, np.ndarray]], alpha: float) -> None:

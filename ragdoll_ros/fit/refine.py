@@ -22,7 +22,7 @@ INFLUENCES = 8
 
 
 def refined(character: Character) -> Character:
-    """Give the character with edges halved until all are short; its own vertices stay in front."""
+    """The character with edges halved until all are short; its own vertices stay the first."""
     limit = LONGEST_EDGE * character.extent
     for _ in range(ROUNDS):
         corners = character.vertices[character.triangles]

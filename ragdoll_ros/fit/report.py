@@ -6,64 +6,62 @@ import textwrap
 from ..model.ragdoll import Ragdoll
 from ..model.shapes import Shape
 from .doubts import extent, find_doubts
+from .overlap import covered, overlapping_pairs, shared_volume
 from .pipeline import BodyFit, Fit
 from .shapes import TOLERANCE
-from .solid import covered, overlapping_pairs, shared_volume
 
 
 def fit_report(fit: Fit) -> str:
-    """Give one line for each body, then the totals, then the warnings."""
+    """A line for each body, then the totals, then the warnings."""
     bones, character = fit.doll.bones, fit.character
     inside = covered(bones, character.vertices, TOLERANCE)
     volume, skin = sum(bone.shape.volume for bone in bones), character.volume()
-    width = max(4, *(len(bone.name) for bone in bones))
-    lines = [f'{"bone":{width}}  vertices inside  axis  {"shape":8} {"size, m":23} '
-             f'{"mass, kg":>9}  joint']
-    joints = {joint.child: joint.kind for joint in fit.doll.joints}
-    lines += [_body_line(body, joints.get(body.bone.name, 'root'), width) for body in fit.bodies]
-    lines += [
-        '',
+    return '\n'.join([
+        *_table(fit.doll, 'vertices inside  axis  ', [_quality(body) for body in fit.bodies]), '',
         f'{len(bones)} bodies for {len(character.bone_names)} bones, {fit.doll.mass:.4g} kg, '
         f'{extent(fit.doll):.3g} m; one unit of the file is {character.scale:g} m',
         f'{100 * inside.mean():.1f} % of {len(inside)} vertices inside a body or within 1 cm; '
         f'volume {1000 * volume:.4g} l' + (
             f", {volume / skin:.2f} of the skin's" if skin > 0 else '')
         + f', {100 * shared_volume(bones):.0f} % of it shared',
-        *_swings(fit.doll), *_overlaps(fit.doll), *_warnings([*fit.notes, *find_doubts(fit.doll)])]
-    return '\n'.join(lines)
-
-
-def _swings(doll: Ragdoll) -> list[str]:
-    count, links = len(doll.swings), sum(len(swing.links) for swing in doll.swings)
-    return [f'springs of the character that became swings: {count}, with {links} links; '
-            'no body holds their skin'] if count else []
+        *_swings(fit.doll), *_overlaps(fit.doll), *_warnings([*fit.notes, *find_doubts(fit.doll)])])
 
 
 def doll_report(doll: Ragdoll, notes: tuple[str, ...] = ()) -> str:
-    """Tell the same of a doll that was not fitted here: as far as it goes."""
+    """The same of a doll that was not fitted here, as far as it goes; ``notes`` are warnings."""
+    return '\n'.join([
+        *_table(doll, '', [''] * len(doll.bones)), '',
+        f'{len(doll.bones)} bodies, {doll.mass:.4g} kg, {extent(doll):.3g} m',
+        *_overlaps(doll), *_warnings([*notes, *find_doubts(doll)])])
+
+
+def _table(doll: Ragdoll, title: str, columns: list[str]) -> list[str]:
+    """A head and a line for each body, with a column of one's own behind the name."""
     width = max(4, *(len(bone.name) for bone in doll.bones))
     joints = {joint.child: joint.kind for joint in doll.joints}
-    lines = [f'{"bone":{width}}  {"shape":8} {"size, m":23} {"mass, kg":>9}  joint']
-    lines += [f'{bone.name:{width}}  {bone.shape.kind:8} {_size(bone.shape):23} {bone.mass:9.4g}  '
-              f'{joints.get(bone.name, "root")}' for bone in doll.bones]
-    lines += ['', f'{len(doll.bones)} bodies, {doll.mass:.4g} kg, {extent(doll):.3g} m',
-              *_overlaps(doll), *_warnings([*notes, *find_doubts(doll)])]
-    return '\n'.join(lines)
+    return [f'{"bone":{width}}  {title}{"shape":8} {"size, m":23} {"mass, kg":>9}  joint',
+            *(f'{bone.name:{width}}  {column}{bone.shape.kind:8} {_size(bone.shape):23} '
+              f'{bone.mass:9.4g}  {joints.get(bone.name, "root")}'
+              for bone, column in zip(doll.bones, columns, strict=True))]
 
 
-def _body_line(body: BodyFit, joint: str, width: int) -> str:
+def _quality(body: BodyFit) -> str:
     share = f'{100 * body.inside / body.vertices:5.1f}%' if body.vertices else '     -'
     # A star marks a z that is the principal axis, not the bone's direction.
-    axis = f'{body.axes.distinct:.2f}{"*" if body.axes.principal else " "}'
-    bone = body.bone
-    return (f'{bone.name:{width}}  {body.vertices:8d} {share} {axis}  {bone.shape.kind:8} '
-            f'{_size(bone.shape):23} {bone.mass:9.4g}  {joint}')
+    return (f'{body.vertices:8d} {share} {body.axes.distinct:.2f}'
+            f'{"*" if body.axes.principal else " "}  ')
 
 
 def _size(shape: Shape) -> str:
     edges = [edge for value in vars(shape).values()
              for edge in (value if isinstance(value, tuple) else (value,))]
     return ' x '.join(f'{edge:.4f}' for edge in edges)
+
+
+def _swings(doll: Ragdoll) -> list[str]:
+    count, links = len(doll.swings), sum(len(swing.links) for swing in doll.swings)
+    return [f'springs of the character that became swings: {count}, with {links} links; '
+            'no body holds their skin'] if count else []
 
 
 def _overlaps(doll: Ragdoll) -> list[str]:

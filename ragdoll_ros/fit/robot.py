@@ -1,10 +1,10 @@
 """URDF to Ragdoll: a robot that goes limp.
 
-A link with a shape becomes a bone; its joint becomes a hinge, or part of a universal or ball
+A link with a shape becomes a body; its joint becomes a hinge, or part of a universal or ball
 joint where links of no shape stand between (as to_urdf writes them). A link without a shape
-rides on its parent and gives it its mass. Every link is a rider, so that its frame can be
-published. Bodies are uniform solids: of a link's inertia its mass remains, and where it has no
-plain shape, the box of the same inertia.
+is carried by its parent and gives it its mass. Every link's frame is one of the doll's riders, so
+that it can be published. Bodies are uniform solids: of a link's inertia its mass remains, and
+where it has no plain shape, the box of the same inertia.
 """
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ from ..model import errors, rotation
 from ..model.ragdoll import LARGEST_SWING, WORLD, Bone, Joint, Ragdoll, SkeletonFrame
 from ..model.shapes import Box, Capsule, Shape
 from .axes import fit_axes
+from .frames import pose_in_body
+from .names import plain_name
 from .shapes import fit_best
 
 DENSITY = 1000.0
@@ -32,12 +34,19 @@ SAME_PLACE = 1e-6
 
 
 def doll_from_urdf(text: str) -> Ragdoll:
-    """Make a doll of a robot's description; ModelError with what is wrong in it."""
+    """Doll of a robot's description, a URDF's text; ModelError with what is wrong in it.
+
+    Its frame is the root link's; it stands at joint angles of zero, or the nearest inside the
+    limits.
+    """
     return _doll(parse_urdf(text))[0]
 
 
 def read_urdf(path: str | Path) -> tuple[Ragdoll, tuple[str, ...]]:
-    """Read a URDF file: the doll, and notes on what could not be taken over."""
+    """Doll of a URDF file, and a note on each thing that could not be taken over.
+
+    As doll_from_urdf; ModelErrors with what is wrong in the file, OSError where it cannot be read.
+    """
     path = Path(path)
     try:
         if not path.is_file():
@@ -84,12 +93,12 @@ def _doll(tree: UrdfTree) -> tuple[Ragdoll, list[str]]:
         joint, above = tree.joints[above], tree.joints[above].parent
         if joint.kind not in ('fixed', 'floating'):
             notes.append(f'{joint.name}: nothing with a shape above it: left out')
-    riders = _riders(poses, carriers, names, bones)
-    return Ragdoll(_plain(tree.name), tuple(bones), tuple(joints), riders=riders), notes
+    frames = _frames(poses, carriers, names, bones)
+    return Ragdoll(plain_name(tree.name, 'link'), tuple(bones), tuple(joints), riders=frames), notes
 
 
 def _solid(link: UrdfLink, notes: list[str]) -> tuple[Shape, Pose] | None:
-    """Give a link's one shape and its pose in the link's frame; None if nothing gives one."""
+    """A link's one shape and its pose in the link's frame; None if nothing gives one."""
     if link.meshes and link.shapes:
         notes.append(f'{link.name}: meshes left out, plain shapes taken')
     if len(link.shapes) == 1:
@@ -126,7 +135,7 @@ def _capsule(shapes: list[tuple[Shape, Pose]]) -> tuple[Shape, Pose] | None:
 
 
 def _around(shapes: list[tuple[Shape, Pose]]) -> tuple[Shape, Pose]:
-    """Fit one shape around several."""
+    """One shape around several."""
     points = np.concatenate([rotation.rotate(turn, shape.mesh()[0]) + centre
                              for shape, (centre, turn) in shapes])
     axes = fit_axes(points, np.ones(len(points)), np.array([0.0, 0.0, 1.0]))
@@ -136,7 +145,7 @@ def _around(shapes: list[tuple[Shape, Pose]]) -> tuple[Shape, Pose]:
 
 
 def _same_inertia(link: UrdfLink) -> tuple[Shape, Pose] | None:
-    """Give the uniform box of a link's mass and inertia: its edge a^2 = 6 (Iy + Iz - Ix) / m."""
+    """The uniform box of a link's mass and inertia: its edge a^2 = 6 (Iy + Iz - Ix) / m."""
     if link.inertia is None:
         return None
     moments, axes = np.linalg.eigh(link.inertia)
@@ -150,7 +159,7 @@ def _same_inertia(link: UrdfLink) -> tuple[Shape, Pose] | None:
 
 
 def _carriers(tree: UrdfTree, solids: dict) -> dict[str, str]:
-    """Body that carries each link: itself where it has one; a bare root rides on its child."""
+    """Link whose body carries each link: itself where it has one, a bare root's child."""
     carriers: dict[str, str] = {}
     for name in tree.order:
         above = tree.joints[name].parent if name in tree.joints else None
@@ -165,7 +174,7 @@ def _carriers(tree: UrdfTree, solids: dict) -> dict[str, str]:
 
 def _joint(tree: UrdfTree, name: str, carriers: dict[str, str], names: dict[str, str],
            poses: dict[str, Pose], angles: dict[str, float], notes: list[str]) -> Joint:
-    """Make the joint of a body: the joints in a row from the body that carries its parent."""
+    """Joint of a body: of the joints in a row from the body that carries its parent."""
     row = [tree.joints[name]]
     while row[0].parent in tree.joints and carriers[row[0].parent] != row[0].parent:
         row.insert(0, tree.joints[row[0].parent])
@@ -209,7 +218,7 @@ def _turning(parent: str, child: str, anchor: np.ndarray, row: list[UrdfJoint],
 
 def _limits(joint: UrdfJoint, angles: dict[str, float],
             notes: list[str]) -> tuple[float, float] | None:
-    """Limits from the angle that the joint starts at; None for a turn and more."""
+    """Limits from the angle that the joint starts at; None for a full circle and more."""
     if joint.kind == 'revolute' and joint.limits is None:
         notes.append(f'{joint.name}: a revolute joint without limits turns freely')
     if joint.limits is None or joint.limits[1] - joint.limits[0] >= 2 * math.pi:
@@ -228,31 +237,21 @@ def _cone(limits: list) -> tuple:
     return symmetric(limits[:-1], LARGEST_SWING), symmetric(limits[-1:], 2 * math.pi)
 
 
-def _riders(poses: dict[str, Pose], carriers: dict[str, str], names: dict[str, str],
+def _frames(poses: dict[str, Pose], carriers: dict[str, str], names: dict[str, str],
             bones: list[Bone]) -> tuple[SkeletonFrame, ...]:
     """Every link's frame, fixed on the body that carries it."""
     by_name = {bone.name: bone for bone in bones}
-    riders = []
-    for name, text in _names(list(poses)).items():
-        bone = by_name[names[carriers[name]]]
-        back = rotation.inverse(np.array(bone.orientation))
-        riders.append(SkeletonFrame(text, bone.name,
-                            rotation.rotate(back, poses[name][0] - bone.position),
-                            rotation.multiply(back, poses[name][1])))
-    return tuple(riders)
+    carried = {name: by_name[names[carriers[name]]] for name in poses}
+    return tuple(SkeletonFrame(text, carried[name].name, *pose_in_body(carried[name], *poses[name]))
+                 for name, text in _names(list(poses)).items())
 
 
 def _names(given: list[str], taken: Sequence[str] = ()) -> dict[str, str]:
     """Names as a doll takes them, each once, and none of those that are taken."""
     names: dict[str, str] = {}
     for name in given:
-        text = _plain(name)
+        text = plain_name(name, 'link')
         while text in names.values() or text in taken:
             text += '_'
         names[name] = text
     return names
-
-
-def _plain(name: str) -> str:
-    text = ''.join(c if c.isprintable() and c != '/' else '_' for c in name).strip()
-    return text[:90] or 'link'

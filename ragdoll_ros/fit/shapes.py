@@ -1,4 +1,4 @@
-"""A box, ball, cylinder or capsule around a cluster of skin vertices."""
+"""The smallest sphere, box, cylinder or capsule that holds most of a cluster of points."""
 from __future__ import annotations
 
 from collections.abc import Iterator
@@ -10,6 +10,9 @@ from ..model.shapes import Box, Capsule, Cylinder, Shape, Sphere
 
 TOLERANCE = 0.01
 """A vertex this far outside a body, m, still counts as inside."""
+
+DECIMALS = 10
+"""Decimals of m that a doll's numbers keep: below every figure of merit, above the noise."""
 
 WANTED = 0.95
 """Share of a cluster's vertices that its body should hold."""
@@ -26,19 +29,21 @@ END_CUTS = np.array([0.0, 0.01, 0.02])
 
 @dataclass(frozen=True)
 class Fitted:
-    """A shape, its centre (3,) m in the frame it was fitted in, the share of points inside."""
+    """A shape fitted to points."""
 
     shape: Shape
     centre: np.ndarray
+    """(3,) m, in the frame that the points are given in."""
     share: float = 0.0
+    """Of the points inside, to within the tolerance."""
 
 
 def fit_shape(points: np.ndarray, kind: str, thinnest: float, tolerance: float) -> Fitted:
-    """Fit a shape of one kind to points (p, 3) given in its own axes, z the long one.
+    """Shape of one kind around points (p, 3) m in its own axes, z the long one.
 
-    It is the smallest of those tried that holds enough of the points, to within the tolerance
-    (m). No edge comes out thinner than ``thinnest`` m, so that a flat, a straight, a single or
-    no cluster has a body too.
+    The smallest of those tried that holds WANTED of the points, to within ``tolerance`` m, else
+    the one that holds most. No edge is thinner than ``thinnest`` m, so that points in a plane, on
+    a line, one or none have a body too.
     """
     points = points[::max(1, -(-len(points) // MOST_POINTS))]
     if len(points) == 0:
@@ -53,7 +58,7 @@ def fit_shape(points: np.ndarray, kind: str, thinnest: float, tolerance: float) 
 
 
 def fit_best(clusters: list[np.ndarray], thinnest: float, tolerance: float) -> list[Fitted]:
-    """Fit shapes of one kind to clusters (p, 3), each in its own axes.
+    """Shapes of one kind around clusters (p, 3) m, each in its own axes; see fit_shape.
 
     The kind is the one that holds them in the smallest volume.
     """
@@ -84,7 +89,7 @@ def _cylinders(points: np.ndarray, thinnest: float) -> Iterator[Fitted]:
         radial = np.linalg.norm((points - centre)[:, :2], axis=1)
         for radius in np.quantile(radial, QUANTILES):
             for low, high in ends.T:
-                middle = np.array([centre[0], centre[1], (low + high) / 2])
+                middle = np.array([*centre[:2], (low + high) / 2])
                 yield Fitted(Cylinder(max(radius, thinnest / 2), max(high - low, thinnest)), middle)
 
 
@@ -98,7 +103,7 @@ def _capsules(points: np.ndarray, thinnest: float) -> Iterator[Fitted]:
         highs = np.quantile(points[:, 2] - domes, 1 - END_CUTS, axis=1)
         for radius, *ends in zip(radii, lows.T, highs.T, strict=True):
             for low, high in zip(*ends, strict=True):
-                middle = np.array([centre[0], centre[1], (low + high) / 2])
+                middle = np.array([*centre[:2], (low + high) / 2])
                 yield Fitted(Capsule(radius, max(high - low, thinnest / 2)), middle)
 
 

@@ -14,10 +14,11 @@ import numpy as np
 
 from ..model import errors
 from .accessors import read_floats, read_indices
-from .gltf_file import GltfFile, item
+from .gltf_file import GltfFile, count, nested, objects
 from .nodes import Nodes
 
-MODES = {4: 'triangles', 5: 'strip', 6: 'fan'}
+TRIANGLES, STRIP, FAN = 4, 5, 6
+"""Modes of a primitive; others are points and lines."""
 
 LARGEST_SKIN = 500_000
 """Vertices of all meshes together."""
@@ -25,9 +26,9 @@ LARGEST_SKIN = 500_000
 
 @dataclass
 class Skins:
-    """All skinned meshes, the file's axes and units.
+    """All skinned meshes in the bind pose, the file's axes and units.
 
-    ``rests`` maps a node to its matrix (4, 4) in the bind pose; ``vertices`` (v, 3),
+    ``rests`` has the matrix (4, 4) of each joint's node, by the node's index; ``vertices`` (v, 3),
     ``triangles`` (t, 3), ``nodes`` (v, k) the node of each influence, ``weights`` (v, k).
     """
 
@@ -40,7 +41,7 @@ class Skins:
 
     def add(self, vertices: np.ndarray, triangles: np.ndarray, nodes: np.ndarray,
             weights: np.ndarray) -> None:
-        """Take in one more mesh."""
+        """Append a mesh, its ``triangles`` by its own vertices; OutOfRange for too many."""
         base, width = len(self.vertices), max(nodes.shape[1], self.nodes.shape[1])
         if base + len(vertices) > LARGEST_SKIN:
             raise errors.OutOfRange('meshes', base + len(vertices),
@@ -52,22 +53,23 @@ class Skins:
 
 
 def read_skins(file: GltfFile, nodes: Nodes) -> Skins:
-    """Read every mesh that a skin moves; WrongForm where the file has none."""
+    """Every mesh that a skin moves; WrongForm where the file has none, ModelError where broken."""
     skins = Skins()
     loose = 0
-    for index, node in enumerate(file.document.nodes):
-        if node.mesh is None:
+    for index, node in enumerate(file.json['nodes']):
+        if node.get('mesh') is None:
             continue
-        mesh = item(file.document.meshes, node.mesh, f'nodes[{index}].mesh', 'meshes')
-        if node.skin is None:
+        mesh = file.entry('meshes', node['mesh'], f'nodes[{index}].mesh')
+        if node.get('skin') is None:
             loose += 1
             continue
-        joints, inverses = _read_skin(file, nodes, node.skin)
+        joints, inverses = _read_skin(file, node['skin'], f'nodes[{index}].skin')
         _add_rests(skins, nodes, joints, inverses)
         matrices = np.stack([skins.rests[joint] for joint in joints]) @ inverses
-        for number, primitive in enumerate(mesh.primitives or ()):
-            where = f'meshes[{node.mesh}].primitives[{number}]'
-            _add_primitive(file, skins, primitive, joints, matrices, where)
+        where = f'meshes[{node["mesh"]}]'
+        for number, primitive in enumerate(objects(mesh, 'primitives', where)):
+            _add_primitive(file, skins, primitive, joints, matrices,
+                           f'{where}.primitives[{number}]')
     if not skins.rests:
         raise errors.WrongForm('skins', 'no skin that moves a mesh',
                                'a skinned mesh: a node with both mesh and skin')
@@ -76,19 +78,19 @@ def read_skins(file: GltfFile, nodes: Nodes) -> Skins:
     return skins
 
 
-def _read_skin(file: GltfFile, nodes: Nodes, index: object) -> tuple[np.ndarray, np.ndarray]:
-    """Give the nodes (j,) of a skin's joints and the inverse bind matrices (j, 4, 4)."""
-    skin = item(file.document.skins, index, 'skin', 'skins')
-    where = f'skins[{index}]'
-    if not isinstance(skin.joints, list) or not skin.joints:
-        raise errors.WrongForm(f'{where}.joints', skin.joints, 'at least one joint')
-    for joint in skin.joints:
-        item(file.document.nodes, joint, f'{where}.joints', 'nodes')
-    joints = np.array(skin.joints)
-    if skin.inverseBindMatrices is None:
+def _read_skin(file: GltfFile, index: object, where: str) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes (j,) of a skin's joints, and their inverse bind matrices (j, 4, 4)."""
+    skin, where = file.entry('skins', index, where), f'skins[{index}]'
+    joints = nested(skin, 'joints', list, where)
+    if not joints:
+        raise errors.WrongForm(f'{where}.joints', joints, 'at least one joint')
+    for joint in joints:
+        file.entry('nodes', joint, f'{where}.joints')
+    joints = np.array(joints)
+    if skin.get('inverseBindMatrices') is None:
         return joints, np.broadcast_to(np.eye(4), (len(joints), 4, 4))
     where = f'{where}.inverseBindMatrices'
-    values = read_floats(file, skin.inverseBindMatrices, 'MAT4', where)
+    values = read_floats(file, skin['inverseBindMatrices'], 'MAT4', where)
     if len(values) < len(joints):
         raise errors.OutOfRange(where, len(values), f'{len(joints)} matrices, one for each joint')
     inverses = values[:len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1).copy()
@@ -119,7 +121,7 @@ def _mesh_to_world(skins: Skins, nodes: Nodes, joints: np.ndarray,
     """Matrix (4, 4) that takes a mesh in its bind pose to the world.
 
     Every joint says world_j M_j. They agree when the nodes stand in the bind pose. If not, the
-    topmost joint's word is taken, turned to the nearest of the 24 upright poses: a hip in the
+    topmost joint's is taken, rotated to the nearest of the 24 upright orientations: a hip in the
     middle of a step is a few degrees off, a change of axes is a multiple of 90.
     """
     said = nodes.worlds[joints] @ inverses
@@ -139,19 +141,17 @@ def _mesh_to_world(skins: Skins, nodes: Nodes, joints: np.ndarray,
     return matrix
 
 
-def _nearest_upright(turn: np.ndarray) -> np.ndarray:
+def _nearest_upright(matrix: np.ndarray) -> np.ndarray:
     """Of the 24 rotations that map axes to axes, the one nearest to a matrix (3, 3)."""
     permutations = [np.eye(3)[list(p)] for p in itertools.permutations(range(3))]
     signs = [np.diag(s) for s in itertools.product((1.0, -1.0), repeat=3)]
     proper = [p @ s for p in permutations for s in signs if np.linalg.det(p @ s) > 0]
-    return max(proper, key=lambda candidate: float(np.sum(candidate * turn)))
+    return max(proper, key=lambda candidate: float(np.sum(candidate * matrix)))
 
 
-def _add_primitive(file: GltfFile, skins: Skins, primitive: object, joints: np.ndarray,
+def _add_primitive(file: GltfFile, skins: Skins, primitive: dict, joints: np.ndarray,
                    matrices: np.ndarray, where: str) -> None:
-    attributes = primitive.attributes
-    if not isinstance(attributes, dict):
-        attributes = getattr(attributes, '__dict__', {})
+    attributes = nested(primitive, 'attributes', dict, where)
     if attributes.get('POSITION') is None:
         raise errors.WrongForm(f'{where}.attributes', sorted(attributes), 'POSITION')
     points = read_floats(file, attributes['POSITION'], 'VEC3', f'{where}.POSITION')
@@ -196,21 +196,22 @@ def _skinned(points: np.ndarray, slots: np.ndarray, weights: np.ndarray,
     return vertices
 
 
-def _triangles(file: GltfFile, primitive: object, points: int, where: str) -> np.ndarray:
-    mode = 4 if primitive.mode is None else primitive.mode
-    if mode not in MODES:
+def _triangles(file: GltfFile, primitive: dict, points: int, where: str) -> np.ndarray:
+    mode = count(primitive, 'mode', where, TRIANGLES)
+    if mode not in (TRIANGLES, STRIP, FAN):
         return np.zeros((0, 3), np.int32)
-    if primitive.indices is None:
+    if primitive.get('indices') is None:
         corners = np.arange(points, dtype=np.int32)
     else:
-        corners = read_indices(file, primitive.indices, 'SCALAR', points, f'{where}.indices')[:, 0]
-    if mode == 4:
+        corners = read_indices(file, primitive['indices'], 'SCALAR', points,
+                               f'{where}.indices')[:, 0]
+    if mode == TRIANGLES:
         return corners[:len(corners) // 3 * 3].reshape(-1, 3)
     if len(corners) < 3:
         return np.zeros((0, 3), np.int32)
-    first = corners[:-2] if mode == 5 else np.full(len(corners) - 2, corners[0])
+    first = corners[:-2] if mode == STRIP else np.full(len(corners) - 2, corners[0])
     strip = np.stack([first, corners[1:-1], corners[2:]], axis=1)
-    if mode == 5:
+    if mode == STRIP:
         # Every other triangle of a strip is wound the other way.
         strip[1::2] = strip[1::2][:, [1, 0, 2]]
     return strip

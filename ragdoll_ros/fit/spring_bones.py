@@ -12,7 +12,7 @@ import numpy as np
 
 from ..model import errors
 from ..model.swing import LENGTHS
-from .gltf_file import GltfFile, item
+from .gltf_file import GltfFile, nested, objects
 from .nodes import Nodes
 
 TAIL = 0.07
@@ -25,23 +25,25 @@ SETTINGS = {'stiffness': (1.0, 0.0, 1e6), 'gravityPower': (0.0, -1e6, 1e6),
 
 @dataclass(frozen=True)
 class Rod:
-    """VRM's numbers of one rod: units of the file a second, and ``drag`` a share a frame."""
+    """VRM's numbers of one rod."""
 
     stiffness: float
+    """Units of the file a second."""
     gravity: float
-    """Downwards."""
+    """Units of the file a second, downwards."""
     drag: float
+    """Share a frame, 0 to 1."""
 
 
 @dataclass(frozen=True)
 class Spring:
-    """A chain: ``nodes`` (n) of the file, their places in the bind pose, ``rods`` from each on."""
+    """A chain of the file's ``nodes`` (n) and the ``rods`` from each to the next."""
 
     name: str
     nodes: tuple[int, ...]
     rods: tuple[Rod, ...]
     points: np.ndarray | None = None
-    """(rods + 1, 3): the file's axes and units; a character's are in its own frame, m."""
+    """(rods + 1, 3) of the nodes, bind pose: the file's axes and units; a character's in m."""
     carrier: int = -1
     """The character's bone above the first node."""
     bones: tuple[int, ...] = ()
@@ -49,20 +51,19 @@ class Spring:
 
 
 def read_springs(file: GltfFile, nodes: Nodes, notes: list[str]) -> list[Spring]:
-    """Read all springs, without places; a ModelError names what is broken, a note the rest."""
-    extensions = file.json.get('extensions')
-    extensions = extensions if isinstance(extensions, dict) else {}
+    """All springs, without points; a ModelError for what is broken, a note on what is left out."""
+    extensions = nested(file.json, 'extensions', dict, '')
     found: list[Spring] = []
     if 'VRMC_springBone' in extensions:
         where = 'extensions.VRMC_springBone'
-        data = _of(dict, extensions['VRMC_springBone'], where)
-        for number, entry in enumerate(_of(list, data.get('springs', []), f'{where}.springs')):
+        data = nested(extensions, 'VRMC_springBone', dict, 'extensions')
+        for number, entry in enumerate(objects(data, 'springs', where)):
             found.append(_spring(file, nodes, entry, f'{where}.springs[{number}]'))
-    elif isinstance(extensions.get('VRM'), dict) and 'secondaryAnimation' in extensions['VRM']:
+    else:
         where = 'extensions.VRM.secondaryAnimation'
-        data = _of(dict, extensions['VRM']['secondaryAnimation'], where)
-        for number, entry in enumerate(_of(list, data.get('boneGroups', []),
-                                           f'{where}.boneGroups')):
+        data = nested(nested(extensions, 'VRM', dict, 'extensions'), 'secondaryAnimation', dict,
+                      'extensions.VRM')
+        for number, entry in enumerate(objects(data, 'boneGroups', where)):
             found += _group(file, nodes, entry, f'{where}.boneGroups[{number}]')
         found.sort(key=lambda spring: nodes.order.index(spring.nodes[0]))
     springs, taken = [], set()
@@ -78,7 +79,11 @@ def read_springs(file: GltfFile, nodes: Nodes, notes: list[str]) -> list[Spring]
 
 
 def placed(spring: Spring, nodes: Nodes, rests: dict[int, np.ndarray]) -> Spring:
-    """Give a spring its points in the bind pose; what no skin binds stands as its nodes do."""
+    """The spring with its points in the bind pose, ``rests`` of the nodes that a skin binds.
+
+    Other nodes stand to the nearest of these above them as the file's nodes do. NotFinite or
+    WrongForm where that leaves no place.
+    """
     points = [_place(node, nodes, rests) for node in spring.nodes]
     if len(points) == len(spring.rods):
         above = nodes.parents[spring.nodes[-1]]
@@ -91,7 +96,7 @@ def placed(spring: Spring, nodes: Nodes, rests: dict[int, np.ndarray]) -> Spring
 
 
 def without_short_rods(spring: Spring, notes: list[str]) -> Spring:
-    """Leave out rods too short to swing (points in m): their ends are one point."""
+    """The spring (points in m) without rods too short to swing: their ends become one point."""
     lengths = np.linalg.norm(np.diff(spring.points, axis=0), axis=1)
     long = lengths >= LENGTHS[0]
     if long.all():
@@ -101,16 +106,14 @@ def without_short_rods(spring: Spring, notes: list[str]) -> Spring:
                    rods=tuple(rod for rod, keep in zip(spring.rods, long, strict=True) if keep))
 
 
-def _spring(file: GltfFile, nodes: Nodes, entry: object, where: str) -> Spring:
-    entry = _of(dict, entry, where)
-    joints = _of(list, entry.get('joints'), f'{where}.joints')
+def _spring(file: GltfFile, nodes: Nodes, entry: dict, where: str) -> Spring:
+    joints = objects(entry, 'joints', where)
     if not joints:
         raise errors.WrongForm(f'{where}.joints', joints, 'at least one joint')
     chain: list[int] = []
     for number, joint in enumerate(joints):
-        place = f'{where}.joints[{number}].node'
-        node = _of(dict, joint, f'{where}.joints[{number}]').get('node')
-        item(file.document.nodes, node, place, 'nodes')
+        place, node = f'{where}.joints[{number}].node', joint.get('node')
+        file.entry('nodes', node, place)
         if chain and not _below(node, chain[-1], nodes):
             raise errors.WrongForm(place, node, f'a node below nodes[{chain[-1]}], which is '
                                    'before it in the chain')
@@ -120,20 +123,20 @@ def _spring(file: GltfFile, nodes: Nodes, entry: object, where: str) -> Spring:
     return Spring(_name(file, entry.get('name'), chain[0]), tuple(chain), rods)
 
 
-def _group(file: GltfFile, nodes: Nodes, entry: object, where: str) -> list[Spring]:
-    """Give the springs of a group of VRM 0.x: one from each root down its first children."""
+def _group(file: GltfFile, nodes: Nodes, entry: dict, where: str) -> list[Spring]:
+    """Springs of a group of VRM 0.x: one from each root down its first children."""
     # The misspelt key is the format's own.
-    entry = {'stiffness': 1.0, **_of(dict, entry, where)}
+    entry = {'stiffness': 1.0, **entry}
     entry['stiffness'] = entry.get('stiffiness', entry['stiffness'])
-    way = entry.get('gravityDir')
-    entry['gravityDir'] = [way.get(axis) for axis in 'xyz'] if isinstance(way, dict) else way
+    down = entry.get('gravityDir')
+    entry['gravityDir'] = [down.get(axis) for axis in 'xyz'] if isinstance(down, dict) else down
     rod = _rod(entry, where)
     springs = []
-    for root in _of(list, entry.get('bones', []), f'{where}.bones'):
-        item(file.document.nodes, root, f'{where}.bones', 'nodes')
+    for root in nested(entry, 'bones', list, where):
+        file.entry('nodes', root, f'{where}.bones')
         chain = [root]
-        while file.document.nodes[chain[-1]].children:
-            chain.append(file.document.nodes[chain[-1]].children[0])
+        while nodes.children[chain[-1]]:
+            chain.append(nodes.children[chain[-1]][0])
         springs.append(Spring(_name(file, None, root), tuple(chain), (rod,) * len(chain)))
     return springs
 
@@ -145,16 +148,16 @@ def _rod(data: dict, where: str) -> Rod:
         if type(value) not in (int, float) or not least <= value <= most:
             raise errors.OutOfRange(f'{where}.{key}', value, f'a number from {least:g} to {most:g}')
         values[key] = float(value)
-    way = data.get('gravityDir') or [0, -1, 0]
-    if not isinstance(way, list) or len(way) != 3 or not all(
-            type(part) in (int, float) and abs(part) < 1e6 for part in way):
-        raise errors.WrongForm(f'{where}.gravityDir', way, '3 numbers')
-    length = float(np.linalg.norm(way)) or 1.0
-    return Rod(values['stiffness'], -values['gravityPower'] * way[1] / length, values['dragForce'])
+    down = data.get('gravityDir') or [0, -1, 0]
+    if not isinstance(down, list) or len(down) != 3 or not all(
+            type(part) in (int, float) and abs(part) < 1e6 for part in down):
+        raise errors.WrongForm(f'{where}.gravityDir', down, '3 numbers')
+    length = float(np.linalg.norm(down)) or 1.0
+    return Rod(values['stiffness'], -values['gravityPower'] * down[1] / length, values['dragForce'])
 
 
 def _place(node: int, nodes: Nodes, rests: dict[int, np.ndarray]) -> np.ndarray:
-    """Point (3,) of a node where the nearest bound one at or above it puts it."""
+    """Point (3,) of a node, as it stands to the nearest node at or above it that a skin binds."""
     bound = node
     while bound >= 0 and bound not in rests:
         bound = nodes.parents[bound]
@@ -176,11 +179,5 @@ def _below(node: int, above: int, nodes: Nodes) -> bool:
 
 
 def _name(file: GltfFile, given: object, node: int) -> str:
-    given = given or file.document.nodes[node].name
+    given = given or file.json['nodes'][node].get('name')
     return given if given and isinstance(given, str) else f'spring_{node}'
-
-
-def _of(kind: type, value: object, where: str) -> object:
-    if not isinstance(value, kind):
-        raise errors.WrongForm(where, value, {dict: 'an object', list: 'a list'}[kind])
-    return value

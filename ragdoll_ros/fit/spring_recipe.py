@@ -38,15 +38,16 @@ SOFTEST, MOST_DRAG = 1e-6, 0.99
 """m/s and a share: without stiffness damping has no ratio, with all drag no motion is left."""
 
 
-def swing_of(spring: Spring, name: str, bone: str, metres: float) -> tuple[Swing, bool]:
-    """Give a spring (points in m, one unit of the file ``metres``) as a swing on ``bone``.
+def swing_of(spring: Spring, bone: str, metres: float) -> tuple[Swing, bool]:
+    """Swing on the body ``bone`` that moves as a spring does, by the formulas above.
 
-    And whether its gravity had to be cut to what a swing may have.
+    The spring's points are in m, bind pose, doll's frame; ``metres`` is m to one unit of its
+    file. And whether its gravity had to be cut to what a swing may have.
     """
     steps = np.diff(spring.points, axis=0)
     lengths = np.linalg.norm(steps, axis=1)
     masses = DENSITY * lengths
-    rates = [rates_of(rod, length, metres) for rod, length in zip(spring.rods, lengths,
+    rates = [_rates(rod, length, metres) for rod, length in zip(spring.rods, lengths,
                                                                   strict=True)]
     carried = [_carried(lengths[index:], masses[index:]) for index in range(len(lengths))]
     reaches = [inertia / lever for inertia, lever in carried]
@@ -62,11 +63,15 @@ def swing_of(spring: Spring, name: str, bone: str, metres: float) -> tuple[Swing
                           _short(min(damping / (2 * pull), MOST_DAMPED)),
                           tuple(steps[index] / lengths[index])))
     root = tuple(round(float(x), 10) for x in spring.points[0])
-    return Swing(name, bone, root, links[0].direction, tuple(links), _short(share)), share != wanted
+    swing = Swing(spring.name, bone, root, links[0].direction, tuple(links), _short(share))
+    return swing, share != wanted
 
 
-def rates_of(rod: Rod, length: float, metres: float = 1.0) -> tuple[float, float]:
-    """k/J (1/s^2) and the damping coefficient (1/s) of a rod of ``length`` m at RATE."""
+def _rates(rod: Rod, length: float, metres: float = 1.0) -> tuple[float, float]:
+    """k/J, 1/s^2, and the damping coefficient, 1/s, of a rod of ``length`` m at RATE.
+
+    The product and minus the sum of log(z) RATE for both roots z; ``metres`` as in swing_of.
+    """
     e = max(rod.stiffness * metres, SOFTEST) / (RATE * length)
     drag = min(rod.drag, MOST_DRAG)
     half, product = (1 - drag / 2) / (1 + e), (1 - drag) / (1 + e)

@@ -86,7 +86,7 @@ class DofLayout:
         return rotation.matrix(q[self.root_orientations])
 
     def with_spins_turned(self, v: np.ndarray, turns: np.ndarray) -> np.ndarray:
-        """Give v, or its rate, with the roots' angular part turned by matrices (d, 3, 3)."""
+        """v, or its rate, with the roots' angular part turned by matrices (d, 3, 3)."""
         v, spin = v.copy(), self.root_spins
         v[spin] = np.matmul(turns, v[spin][:, :, None])[:, :, 0]
         return v
@@ -102,18 +102,18 @@ class DofLayout:
         return rate
 
     def normalized(self, q: np.ndarray) -> np.ndarray:
-        """Give the same coordinates with every quaternion of length one."""
+        """The same coordinates with every quaternion of length one."""
         q, at = q.copy(), self._turning[0]
         q[at] = rotation.normalized(q[at])
         return q
 
     def integrate_configuration(self, coordinates: GeneralizedState,
-                                way: np.ndarray) -> GeneralizedState:
-        """Give the coordinates after a small way (nv,) m and rad in the directions of v."""
+                                displacement: np.ndarray) -> GeneralizedState:
+        """The coordinates after a small displacement (nv,), m and rad along the directions of v."""
         q = coordinates.q.copy()
-        q[self._plain[0]] += way[self._plain[1]]
+        q[self._plain[0]] += displacement[self._plain[1]]
         at, turn = self._turning
-        turns = rotation.from_rotation_vector(way[turn])
+        turns = rotation.from_rotation_vector(displacement[turn])
         roots = len(self.own_q)
         q[at[:roots]] = rotation.multiply(turns[:roots], q[at[:roots]])
         q[at[roots:]] = rotation.multiply(q[at[roots:]], turns[roots:])

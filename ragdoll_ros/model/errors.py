@@ -19,7 +19,7 @@ class ModelError(RagdollError):
         self.expected = expected
 
     def at(self, prefix: str) -> ModelError:
-        """Give the same error, seen from one level further out."""
+        """The same error, seen from one level further out."""
         joint = '' if not self.path or self.path.startswith('[') else '.'
         return type(self)(f'{prefix}{joint}{self.path}', self.value, self.expected)
 

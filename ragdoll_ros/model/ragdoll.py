@@ -205,7 +205,7 @@ class SkeletonFrame:
         errors.check_finite('position', self.position)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Ragdoll:
     """A tree of bones. ``bones`` fixes the order; one of them, the root, has no parent.
 
@@ -252,6 +252,10 @@ class Ragdoll:
         """Total mass, kg."""
         return sum(bone.mass for bone in self.bones)
 
+    def __repr__(self) -> str:
+        return (f'Ragdoll {self.name!r}: {len(self.bones)} bones, {len(self.joints)} joints, '
+                f'{sum(joint.dof for joint in self.joints)} degrees of freedom, {self.mass:.4g} kg')
+
     def bone(self, name: str) -> Bone:
         """Find a bone by its name; UnknownBone if there is none."""
         for bone in self.bones:
@@ -260,7 +264,7 @@ class Ragdoll:
         raise errors.UnknownBone('', name, 'one of ' + ', '.join(b.name for b in self.bones))
 
     def joints_from_root(self) -> tuple[Joint, ...]:
-        """Give all joints, each parent's before its children's."""
+        """All joints, each parent's before its children's."""
         below: dict[str, list[Joint]] = {}
         for joint in self.joints:
             below.setdefault(joint.parent, []).append(joint)
@@ -273,7 +277,7 @@ class Ragdoll:
         return tuple(ordered)
 
     def joints_depth_first(self) -> tuple[Joint, ...]:
-        """Give all joints, each one's whole branch before the next, as engines count them."""
+        """All joints, each one's whole branch before the next, as engines count them."""
         below: dict[str, list[Joint]] = {}
         for joint in reversed(self.joints):
             below.setdefault(joint.parent, []).append(joint)
@@ -285,14 +289,14 @@ class Ragdoll:
         return tuple(ordered)
 
     def replace_bone(self, name: str, **changes: object) -> Ragdoll:
-        """Give the same doll with one bone changed."""
+        """The same doll with one bone changed."""
         self.bone(name)
         bones = tuple(dataclasses.replace(bone, **changes) if bone.name == name else bone
                       for bone in self.bones)
         return dataclasses.replace(self, bones=bones)
 
     def renamed(self, rename: Callable[[str], str]) -> Ragdoll:
-        """Give the same doll with every bone named anew."""
+        """The same doll with every bone named anew."""
         bones = tuple(dataclasses.replace(bone, name=rename(bone.name)) for bone in self.bones)
         joints = tuple(dataclasses.replace(joint, parent=rename(joint.parent),
                                            child=rename(joint.child)) for joint in self.joints)
@@ -350,7 +354,7 @@ def joint_frame(joint: Joint) -> np.ndarray:
 
 
 def _reaches(parent_of: dict[str, str], start: str, goal: str) -> bool:
-    """Tell whether ``goal`` is ``start`` itself or one of its ancestors."""
+    """Whether ``goal`` is ``start`` itself or one of its ancestors."""
     while start != goal and start in parent_of:
         start = parent_of[start]
     return start == goal

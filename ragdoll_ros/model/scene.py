@@ -5,6 +5,7 @@ SI units, world frame: x forward, y left, z up (REP 103). Quaternions are x, y, 
 """
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -106,7 +107,7 @@ class Placement:
         return position, rotation.multiply(turn, bone.orientation)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Scene:
     """All that a simulation needs to begin.
 
@@ -147,10 +148,28 @@ class Scene:
                      for placement in self.dolls for bone in placement.doll.bones)
 
     @cached_property
+    def bone_slices(self) -> tuple[slice, ...]:
+        """What of all bone arrays is each doll's, in the order of ``dolls``."""
+        ends = list(itertools.accumulate(len(placement.doll.bones) for placement in self.dolls))
+        return tuple(map(slice, [0, *ends[:-1]], ends))
+
+    @cached_property
+    def doll_of_bone(self) -> np.ndarray:
+        """(n,) index into ``dolls`` of each bone's doll."""
+        counts = [own.stop - own.start for own in self.bone_slices]
+        return np.repeat(np.arange(len(counts)), counts)
+
+    @cached_property
     def angle_names(self) -> tuple[str, ...]:
         """Name of every joint angle, doll by doll, joint by joint as the doll lists them."""
         return tuple(self.qualified(placement, name) for placement in self.dolls
                      for joint in placement.doll.joints for name in joint.angle_names)
+
+    def __repr__(self) -> str:
+        ground = 'over the ground' if self.ground else 'without ground'
+        dolls = ', '.join(f'{placement.name!r} of {len(placement.doll.bones)} bones'
+                          for placement in self.dolls[:3]) + ', ...' * (len(self.dolls) > 3)
+        return f'Scene {self.name!r}: {dolls}; {ground}, tick {self.step:g} s'
 
     def qualified(self, placement: Placement, name: str) -> str:
         """Name of a doll's bone or angle that is unique in the scene."""
@@ -173,7 +192,7 @@ def height(bone: Bone, position: np.ndarray, orientation: np.ndarray, ground: Gr
 
 
 def above_ground(doll: Ragdoll, clearance: float = 0.4) -> Scene:
-    """Give a scene of one doll over level ground, its lowest point ``clearance`` m above it."""
+    """A scene of one doll over level ground, its lowest point ``clearance`` m above it."""
     ground = Ground()
     placement = Placement(doll)
     lowest = min(height(bone, *placement.bone_pose(bone), ground) for bone in doll.bones)
@@ -182,5 +201,5 @@ def above_ground(doll: Ragdoll, clearance: float = 0.4) -> Scene:
 
 
 def grip(friction: float) -> float:
-    """Give the coefficient of friction that an engine is to work with."""
+    """The coefficient of friction that an engine is to work with."""
     return NO_SLIP if math.isinf(friction) else min(friction, LARGEST_FRICTION)

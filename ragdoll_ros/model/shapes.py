@@ -4,6 +4,7 @@ A new shape is a class here: what draws, weighs, fits and writes files goes by t
 """
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from typing import ClassVar
@@ -19,10 +20,17 @@ SEGMENTS = 20
 
 
 class Solid:
-    """What all shapes have in common; each has a ``kind`` and a ``support``."""
+    """What all shapes have in common.
+
+    Each has besides, in its own axes:
+    - ``volume``, m^3, and ``half_extents``, m, half the size of its bounding box
+    - ``support``: six terms, m, of its support function; see support_distance
+    - ``inertia(mass)``: principal moments of the uniform solid about its centre, kg m^2
+    - ``signed_distance(points)``: (p,) m of points (p, 3) from its surface, negative inside
+    - ``mesh()``: corners (p, 3) m, triangles (t, 3), counter-clockwise as seen from outside
+    """
 
     kind: ClassVar[str]
-    support: tuple[float, ...]
 
     @property
     def primitives(self) -> tuple[Primitive, ...]:
@@ -67,29 +75,23 @@ class Sphere(Solid):
 
     @property
     def volume(self) -> float:
-        """Volume in m^3."""
         return 4 / 3 * math.pi * self.radius ** 3
 
     @property
     def half_extents(self) -> Vector:
-        """Half the size of the bounding box along the shape's own axes, m."""
         return (self.radius,) * 3
 
     @property
     def support(self) -> tuple[float, ...]:
-        """Terms (6,) m of the support function; see support_distance."""
         return (0.0, 0.0, 0.0, 0.0, self.radius, 0.0)
 
     def inertia(self, mass: float) -> Vector:
-        """Principal moments of the uniform solid about its centre, kg m^2."""
         return (0.4 * mass * self.radius ** 2,) * 3
 
     def signed_distance(self, points: np.ndarray) -> np.ndarray:
-        """Distance (p,) m of points (p, 3) from the surface; zero or less inside."""
         return np.linalg.norm(points, axis=1) - self.radius
 
     def mesh(self) -> tuple[np.ndarray, np.ndarray]:
-        """Corners (p, 3) m and triangles (t, 3), counter-clockwise as seen from outside."""
         angles = _half_circle()
         return _revolved(self.radius * np.cos(angles), self.radius * np.sin(angles))
 
@@ -107,30 +109,24 @@ class Box(Solid):
 
     @property
     def volume(self) -> float:
-        """Volume in m^3."""
         return math.prod(self.size)
 
     @property
     def half_extents(self) -> Vector:
-        """Half the edge lengths, m."""
         return floats(edge / 2 for edge in self.size)
 
     @property
     def support(self) -> tuple[float, ...]:
-        """Terms (6,) m of the support function; see support_distance."""
         return (*self.half_extents, 0.0, 0.0, 0.0)
 
     def inertia(self, mass: float) -> Vector:
-        """Principal moments of the uniform solid about its centre, kg m^2."""
         xx, yy, zz = (edge * edge for edge in self.size)
         return (mass * (yy + zz) / 12, mass * (xx + zz) / 12, mass * (xx + yy) / 12)
 
     def signed_distance(self, points: np.ndarray) -> np.ndarray:
-        """Distance (p,) m of points (p, 3) from the surface; zero or less inside."""
         return _beyond_faces(np.abs(points) - np.array(self.half_extents))
 
     def mesh(self) -> tuple[np.ndarray, np.ndarray]:
-        """Corners (p, 3) m and triangles (t, 3), counter-clockwise as seen from outside."""
         signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
         quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4],
                           [1, 5, 7, 3]])
@@ -151,31 +147,25 @@ class Cylinder(Solid):
 
     @property
     def volume(self) -> float:
-        """Volume in m^3."""
         return math.pi * self.radius ** 2 * self.length
 
     @property
     def half_extents(self) -> Vector:
-        """Half the size of the bounding box along the shape's own axes, m."""
         return (self.radius, self.radius, self.length / 2)
 
     @property
     def support(self) -> tuple[float, ...]:
-        """Terms (6,) m of the support function; see support_distance."""
         return (0.0, 0.0, 0.0, self.length / 2, 0.0, self.radius)
 
     def inertia(self, mass: float) -> Vector:
-        """Principal moments of the uniform solid about its centre, kg m^2."""
         across = mass * (3 * self.radius ** 2 + self.length ** 2) / 12
         return (across, across, mass * self.radius ** 2 / 2)
 
     def signed_distance(self, points: np.ndarray) -> np.ndarray:
-        """Distance (p,) m of points (p, 3) from the surface; zero or less inside."""
         return _beyond_faces(np.stack([np.linalg.norm(points[:, :2], axis=1) - self.radius,
                                        np.abs(points[:, 2]) - self.length / 2], axis=1))
 
     def mesh(self) -> tuple[np.ndarray, np.ndarray]:
-        """Corners (p, 3) m and triangles (t, 3), counter-clockwise as seen from outside."""
         radii = np.array([0, self.radius, self.radius, 0])
         return _revolved(radii, np.array([-1, -1, 1, 1]) * self.length / 2)
 
@@ -196,17 +186,14 @@ class Capsule(Solid):
 
     @property
     def volume(self) -> float:
-        """Volume in m^3."""
         return math.pi * self.radius ** 2 * (self.length + 4 / 3 * self.radius)
 
     @property
     def half_extents(self) -> Vector:
-        """Half the size of the bounding box along the shape's own axes, m."""
         return (self.radius, self.radius, self.length / 2 + self.radius)
 
     @property
     def support(self) -> tuple[float, ...]:
-        """Terms (6,) m of the support function; see support_distance."""
         return (0.0, 0.0, 0.0, self.length / 2, self.radius, 0.0)
 
     @property
@@ -231,12 +218,10 @@ class Capsule(Solid):
         return (across, across, along)
 
     def signed_distance(self, points: np.ndarray) -> np.ndarray:
-        """Distance (p,) m of points (p, 3) from the surface; zero or less inside."""
         along = np.maximum(np.abs(points[:, 2]) - self.length / 2, 0)
         return np.hypot(np.linalg.norm(points[:, :2], axis=1), along) - self.radius
 
     def mesh(self) -> tuple[np.ndarray, np.ndarray]:
-        """Corners (p, 3) m and triangles (t, 3), counter-clockwise as seen from outside."""
         angles = _half_circle()
         heights = self.radius * np.sin(angles)
         return _revolved(self.radius * np.cos(angles),
@@ -245,6 +230,9 @@ class Capsule(Solid):
 
 Shape = Sphere | Box | Cylinder | Capsule
 SHAPES: dict[str, type] = {shape.kind: shape for shape in (Sphere, Box, Cylinder, Capsule)}
+SIZES = {kind: tuple(field.name for field in dataclasses.fields(shape))
+         for kind, shape in SHAPES.items()}
+"""Names of the sizes of each kind of shape."""
 
 
 def support_distance(support: np.ndarray, direction: np.ndarray) -> np.ndarray:

@@ -23,12 +23,11 @@ class Riders:
     """The riders of a scene, ready for many states."""
 
     def __init__(self, scene: Scene) -> None:
-        offset, carriers, riders = 0, [], []
-        for placement in scene.dolls:
-            place = {bone.name: k for k, bone in enumerate(placement.doll.bones, offset)}
+        carriers, riders = [], []
+        for placement, own in zip(scene.dolls, scene.bone_slices, strict=True):
+            place = {bone.name: k for k, bone in enumerate(placement.doll.bones, own.start)}
             carriers += [place[rider.bone] for rider in placement.doll.riders]
             riders += placement.doll.riders
-            offset += len(placement.doll.bones)
         self.names = rider_names(scene)
         self._carriers = np.array(carriers, dtype=int)
         self._positions = np.array([rider.position for rider in riders]).reshape(-1, 3)

@@ -1,7 +1,6 @@
 """What a simulation tells about its bones at one instant."""
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -9,38 +8,57 @@ import numpy as np
 from . import rotation
 
 
-@dataclass(frozen=True)
 class State:
     """Poses and velocities of n bones, world frame, float64, in the scene's bone order.
 
     A bone's pose is that of its centre of mass and of its shape's own axes, which are its
-    principal axes of inertia.
+    principal axes of inertia. Not to be changed once made: what is derived may be kept.
     """
 
-    positions: np.ndarray
-    """(n, 3) m."""
-    orientations: np.ndarray
-    """(n, 4) unit quaternions x, y, z, w."""
-    linear_velocities: np.ndarray
-    """(n, 3) m/s, of the centre of mass."""
-    angular_velocities: np.ndarray
-    """(n, 3) rad/s, world axes."""
+    def __init__(self, positions: np.ndarray, orientations: np.ndarray,
+                 linear_velocities: np.ndarray, angular_velocities: np.ndarray) -> None:
+        self.rows = np.concatenate(
+            [positions, orientations, linear_velocities, angular_velocities], axis=1, dtype=float)
+        """(n, 13): position, orientation, linear and angular velocity side by side."""
 
     @classmethod
     def of(cls, rows: np.ndarray) -> State:
-        """From rows (n, 13) of position, orientation, linear and angular velocity."""
-        state = cls(rows[:, 0:3], rows[:, 3:7], rows[:, 7:10], rows[:, 10:13])
-        state.__dict__['rows'] = rows
+        """From rows (n, 13) of position, orientation, linear and angular velocity, as they are."""
+        state = cls.__new__(cls)
+        state.rows = rows
         return state
 
-    @cached_property
-    def rows(self) -> np.ndarray:
-        """(n, 13): position, orientation, linear and angular velocity side by side."""
-        return np.concatenate([self.positions, self.orientations, self.linear_velocities,
-                               self.angular_velocities],
-                              axis=1)
+    @property
+    def positions(self) -> np.ndarray:
+        """(n, 3) m, of the centres of mass."""
+        return self.rows[:, 0:3]
+
+    @property
+    def orientations(self) -> np.ndarray:
+        """(n, 4) unit quaternions x, y, z, w."""
+        return self.rows[:, 3:7]
+
+    @property
+    def linear_velocities(self) -> np.ndarray:
+        """(n, 3) m/s, of the centres of mass."""
+        return self.rows[:, 7:10]
+
+    @property
+    def angular_velocities(self) -> np.ndarray:
+        """(n, 3) rad/s, world axes."""
+        return self.rows[:, 10:13]
 
     @cached_property
     def rotation_matrices(self) -> np.ndarray:
-        """(n, 3, 3): the rotation matrices of the orientations."""
+        """(n, 3, 3): v_world = R v_bone."""
         return rotation.matrix(self.orientations)
+
+    def __repr__(self) -> str:
+        low, high = self.positions.min(axis=0), self.positions.max(axis=0)
+        speed = np.linalg.norm(self.linear_velocities, axis=1).max()
+        return (f'State of {len(self.rows)} bones, centres {_metres(low)} to {_metres(high)} m,'
+                f' fastest {speed:.3g} m/s')
+
+
+def _metres(point: np.ndarray) -> str:
+    return '(' + ', '.join(f'{value:.3f}' for value in point) + ')'

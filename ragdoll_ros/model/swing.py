@@ -94,13 +94,13 @@ class Swing:
             raise errors.WrongForm('velocity', self.velocity, 'none, or mode: free')
 
     def directions(self) -> tuple[Vector, ...]:
-        """Give each link's direction at rest (doll's frame, bind pose)."""
+        """Each link's direction at rest (doll's frame, bind pose)."""
         return tuple(link.direction or self.direction for link in self.links)
 
 
 def strand(links: int, length: float, mass: float = 0.1,
            stiffness: float | tuple[float, float] = 0.0, damping: float = 0.0) -> tuple[Link, ...]:
-    """Give ``links`` equal links that share ``length`` m and ``mass`` kg.
+    """``links`` equal links that share ``length`` m and ``mass`` kg.
 
     ``stiffness`` (N m/rad) goes linearly from the root's to the tip's; one number is both.
     """

@@ -28,7 +28,7 @@ def dynamics_of(scene: Scene, make_engine: type[Engine], layout: DofLayout) -> D
 def mechanics_of(scene: Scene) -> Mechanics:
     """Sums over the bones of each doll."""
     if ready():
-        from .mechanics import CompiledMechanics
+        from .conservation import CompiledMechanics
         return CompiledMechanics(scene)
     from .plain.mechanics import Mechanics
     return Mechanics(scene)

@@ -1,4 +1,4 @@
-"""Energy and momentum are kept, compiled."""
+"""Sums over dolls, and that energy and momentum are kept, compiled."""
 from __future__ import annotations
 
 import numpy as np
@@ -7,6 +7,17 @@ from ..model.state import State
 from .kernels.loaded import kernels
 from .motion import Motion
 from .plain.conservation import ConservationProjection
+from .plain.mechanics import Mechanics
+
+
+class CompiledMechanics(Mechanics):
+    """The sums over each doll, in one go."""
+
+    def motion(self, state: State) -> Motion:
+        """All sums at once."""
+        sums = np.empty((len(self.doll_masses), 20))
+        kernels.motion(self.masses, self.inertias, self.doll_of, self.gravity, state.rows, sums)
+        return Motion.of(sums)
 
 
 class CompiledProjection(ConservationProjection):
@@ -16,7 +27,7 @@ class CompiledProjection(ConservationProjection):
                       impulse: np.ndarray | float = 0.0, moment: np.ndarray | float | None = 0.0,
                       touched: np.ndarray | None = None
                       ) -> tuple[State, Motion, np.ndarray | None]:
-        """Give state and motion with the momentum that is due."""
+        """State and motion with the momentum that is due."""
         if self._single.any():
             return super().keep_momentum(state, before, after, duration, impulse, moment, touched)
         dolls, given = len(self._single), np.zeros((len(self._single), 6))

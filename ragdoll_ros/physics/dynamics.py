@@ -44,24 +44,21 @@ class CompiledDynamics:
         self._gravity = np.array(scene.gravity, float)
 
     def state(self, coordinates: GeneralizedState) -> State:
-        """Poses and velocities of all bones."""
         rows = np.empty((len(self._tree), 13))
         kernels.forward_kinematics(self._tree, coordinates.q, coordinates.v, rows)
         return State.of(rows)
 
     def acceleration(self, coordinates: GeneralizedState,
                      loads: Sequence[AppliedWrench] = ()) -> np.ndarray:
-        """Rates of change of ``coordinates.v``."""
         out = np.empty_like(coordinates.v)
         kernels.accelerate(self._tree, self._gravity, _packed(loads), coordinates.q, coordinates.v,
                            out)
         return out
 
     def integrate_configuration(self, coordinates: GeneralizedState,
-                                way: np.ndarray) -> GeneralizedState:
-        """Give the coordinates after a small way (nv,) m and rad in the directions of v."""
+                                displacement: np.ndarray) -> GeneralizedState:
         q = coordinates.q.copy()
-        kernels.integrate_configuration(self._tree, q, way)
+        kernels.integrate_configuration(self._tree, q, displacement)
         return GeneralizedState(q, coordinates.v)
 
     def longest(self, accuracy: Accuracy, fastest: float) -> float:
@@ -75,7 +72,7 @@ class CompiledDynamics:
 
     def fly(self, start: GeneralizedState, duration: float, steps: int,
             loads: Sequence[AppliedWrench] = ()) -> GeneralizedState:
-        """Give the coordinates ``duration`` s later, in equal steps."""
+        """The coordinates ``duration`` s later, in equal steps."""
         known, rows = None, _packed(loads)
         for _ in range(steps):
             known = self.step(start, duration / steps, rows, known)
@@ -99,16 +96,17 @@ class Step:
                  loads: np.ndarray, before: Step | None = None) -> None:
         self.duration = duration
         self._tree, self._sizes = tree, (len(start.q), len(start.v))
-        self._way, self._rates = np.empty((8, sum(self._sizes))), np.empty((2, sum(self._sizes)))
+        self._dense = np.empty((8, sum(self._sizes)))
+        self._rates = np.empty((2, sum(self._sizes)))
         if before is not None:
             self._rates[0] = before._rates[1]
         self.error = kernels.step(tree, gravity, loads, start.q, start.v, duration,
-                                  before is not None, self._way, self._rates)
+                                  before is not None, self._dense, self._rates)
 
     def at(self, share: float) -> GeneralizedState:
-        """Give the coordinates after a share of the step."""
+        """The coordinates after a share of the step."""
         q, v = np.empty(self._sizes[0]), np.empty(self._sizes[1])
-        kernels.within(self._tree, self._way, share, q, v)
+        kernels.interpolate(self._tree, self._dense, share, q, v)
         return GeneralizedState(q, v)
 
 
@@ -136,7 +134,7 @@ class Path:
         """Steps gone, the rejected ones too."""
 
     def at(self, time: float) -> GeneralizedState | None:
-        """Give the coordinates ``time`` s after the start; None if that takes too many steps.
+        """The coordinates ``time`` s after the start; None if that takes too many steps.
 
         One may look back, but not to before the time that was the latest when it was asked for
         a later one.

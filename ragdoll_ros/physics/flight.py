@@ -23,7 +23,7 @@ class Path(Protocol):
     count: int
 
     def at(self, time: float) -> GeneralizedState | None:
-        """Give the coordinates ``time`` s after the start; None if that takes too many steps."""
+        """The coordinates ``time`` s after the start; None if that takes too many steps."""
 
 
 class Dynamics(Protocol):
@@ -42,8 +42,8 @@ class Dynamics(Protocol):
         """Rates of change of ``coordinates.v``."""
 
     def integrate_configuration(self, coordinates: GeneralizedState,
-                                way: np.ndarray) -> GeneralizedState:
-        """Give the coordinates after a small way (nv,) m and rad in the directions of v."""
+                                displacement: np.ndarray) -> GeneralizedState:
+        """The coordinates after a small displacement (nv,), m and rad along the directions of v."""
 
     def longest(self, accuracy: Accuracy, fastest: float) -> float:
         """Longest path, s, where the fastest bone turns with so many rad/s; infinity: any."""
@@ -54,7 +54,7 @@ class Dynamics(Protocol):
 
     def fly(self, start: GeneralizedState, duration: float, steps: int,
             loads: Sequence[AppliedWrench] = ()) -> GeneralizedState:
-        """Give the coordinates ``duration`` s later, in equal steps of the highest order."""
+        """The coordinates ``duration`` s later, in equal steps of the highest order."""
 
     def close(self) -> None:
-        """Give everything back to the system."""
+        """Release everything."""

@@ -13,16 +13,14 @@ class JointGap:
 
     def __init__(self, scene: Scene) -> None:
         bones, points = [], []
-        first = 0
-        for placement in scene.dolls:
-            index = {bone.name: i for i, bone in enumerate(placement.doll.bones)}
+        for placement, own in zip(scene.dolls, scene.bone_slices, strict=True):
+            index = {bone.name: i for i, bone in enumerate(placement.doll.bones, own.start)}
             for joint in placement.doll.joints:
                 pair = [placement.doll.bone(name) for name in (joint.parent, joint.child)]
-                bones.append([first + index[bone.name] for bone in pair])
+                bones.append([index[bone.name] for bone in pair])
                 points.append([rotation.rotate(rotation.inverse(bone.orientation),
                                                np.subtract(joint.anchor, bone.position))
                                for bone in pair])
-            first += len(index)
         self._bones = np.array(bones, int).reshape(-1, 2)
         self._points = np.array(points).reshape(-1, 2, 3)
 

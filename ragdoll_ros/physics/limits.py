@@ -17,12 +17,10 @@ class CompiledLimits(JointLimits):
         self._bounds = np.stack(layout.limits).astype(float)
 
     def is_active(self, coordinates: GeneralizedState, duration: float) -> bool:
-        """Tell whether a joint presses against its limit, or will within ``duration`` s."""
         self._look(coordinates)
         return kernels.is_active(self._past, self._speeds, duration, AT_LIMIT, self._held)
 
     def approach(self, coordinates: GeneralizedState, soon: float) -> float:
-        """Fastest speed, rad/s, at which a joint moves that reaches its limit within ``soon`` s."""
         self._look(coordinates)
         return kernels.approach(self._past, self._speeds, soon)
 

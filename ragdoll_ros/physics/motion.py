@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -11,37 +10,51 @@ from ..model.scene import Scene
 from ..model.state import State
 
 
-@dataclass(frozen=True)
 class Motion:
-    """Where each of d dolls is as a whole, and how it moves."""
+    """Where each of d dolls is as a whole, and how it moves; sums over its bones, world frame."""
 
-    energy: np.ndarray
-    """(d,) J: kinetic energy plus that of height, zero where the world's origin is."""
-    kinetic: np.ndarray
-    """(d,) J."""
-    centre: np.ndarray
-    """(d, 3) m: centre of mass."""
-    momentum: np.ndarray
-    """(d, 3) N s."""
-    angular_momentum: np.ndarray
-    """(d, 3) N m s: angular momentum about the doll's own centre of mass."""
-    inertia: np.ndarray
-    """(d, 3, 3) kg m^2 about that centre, as if the doll's joints were locked in its pose."""
+    def __init__(self, energy: np.ndarray, kinetic: np.ndarray, centre: np.ndarray,
+                 momentum: np.ndarray, angular_momentum: np.ndarray, inertia: np.ndarray) -> None:
+        self.sums = np.concatenate([energy[:, None], kinetic[:, None], centre, momentum,
+                                    angular_momentum, inertia.reshape(-1, 9)], axis=1)
+        """(d, 20): all these side by side."""
 
     @classmethod
     def of(cls, sums: np.ndarray) -> Motion:
-        """From rows (d, 20) of all these."""
-        motion = cls(sums[:, 0], sums[:, 1], sums[:, 2:5], sums[:, 5:8], sums[:, 8:11],
-                     sums[:, 11:20].reshape(-1, 3, 3))
-        motion.__dict__['sums'] = sums
+        """From rows (d, 20) of all these, as they are."""
+        motion = cls.__new__(cls)
+        motion.sums = sums
         return motion
 
-    @cached_property
-    def sums(self) -> np.ndarray:
-        """(d, 20): all these side by side."""
-        return np.concatenate([self.energy[:, None], self.kinetic[:, None], self.centre,
-                               self.momentum, self.angular_momentum,
-                               self.inertia.reshape(-1, 9)], axis=1)
+    @property
+    def energy(self) -> np.ndarray:
+        """(d,) J: kinetic energy plus that of height, zero where the world's origin is."""
+        return self.sums[:, 0]
+
+    @property
+    def kinetic(self) -> np.ndarray:
+        """(d,) J: kinetic energy."""
+        return self.sums[:, 1]
+
+    @property
+    def centre(self) -> np.ndarray:
+        """(d, 3) m: centre of mass."""
+        return self.sums[:, 2:5]
+
+    @property
+    def momentum(self) -> np.ndarray:
+        """(d, 3) N s: linear momentum."""
+        return self.sums[:, 5:8]
+
+    @property
+    def angular_momentum(self) -> np.ndarray:
+        """(d, 3) N m s about the doll's own centre of mass."""
+        return self.sums[:, 8:11]
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """(d, 3, 3) kg m^2 about that centre, as if the doll's joints were locked in its pose."""
+        return self.sums[:, 11:20].reshape(-1, 3, 3)
 
 
 @dataclass(frozen=True)

@@ -23,11 +23,11 @@ class Pacer:
         self._next = now + self.period
 
     def wait(self, now: int) -> float:
-        """Give the ns until the next tick; 0 if it is late."""
+        """The ns until the next tick; 0 if it is late."""
         return max(0.0, self._next - now)
 
     def due(self, now: int) -> bool:
-        """Tell whether a tick is due, and count it as done if so."""
+        """Whether a tick is due; if so, it counts as done."""
         lag = now - self._next
         if lag < -self.period / 2:
             return False

@@ -20,7 +20,6 @@ class CompiledReach(Reach):
         self._least = math.inf
 
     def heights(self, state: State) -> np.ndarray:
-        """Distances (n,) m of the bones' lowest points from the ground; infinity without one."""
         if self._ground is None:
             return np.full(len(self._radii), math.inf)
         if self._last[0] is not state:
@@ -38,7 +37,6 @@ class CompiledReach(Reach):
         return self._least
 
     def falling(self, state: State, soon: float) -> float:
-        """Largest speed, m/s, at which any point of a bone that can reach the ground sinks."""
         if self._ground is None:
             return 0.0
         return kernels.falling(self._radii, self._normal, MARGIN, soon, state.rows,
@@ -62,17 +60,13 @@ class CompiledReach(Reach):
         return found | self._close(state.positions, self._far(state, duration, acceleration))
 
     def closing(self, state: State) -> float:
-        """Largest difference, m/s, of two bones' speeds along one of the axes."""
         return kernels.fastest(self._radii, state.rows)[1]
 
     def change(self, before: State, after: State) -> float:
-        """Largest change, m/s, of a velocity at a bone's centre or, by turning, at its surface."""
         return kernels.change(self._radii, before.rows, after.rows)
 
     def max_angular_speed(self, state: State) -> float:
-        """Fastest spin of a bone, rad/s."""
         return kernels.fastest(self._radii, state.rows)[0]
 
     def max_tip_speed(self, state: State) -> float:
-        """Fastest speed, m/s, of a bone's end about its centre."""
         return kernels.fastest(self._radii, state.rows)[2]

@@ -70,7 +70,7 @@ ACCURACIES = {'draft': DRAFT, 'normal': NORMAL, 'exact': EXACT}
 
 @functools.lru_cache
 def firm(accuracy: Accuracy) -> Accuracy:
-    """Give an accuracy that is fine enough for joints that are pulled with all of a hand's force.
+    """An accuracy that is fine enough for joints that are pulled with all of a hand's force.
 
     Steps are as short as a hand's force is steady, so that what each may add would add up.
     """
@@ -81,7 +81,7 @@ def firm(accuracy: Accuracy) -> Accuracy:
 
 
 def resolve_accuracy(accuracy: str | Accuracy) -> Accuracy:
-    """Give the settings that a name stands for; OutOfRange for a name that is none."""
+    """The settings that a name stands for; OutOfRange for a name that is none."""
     if isinstance(accuracy, Accuracy):
         return accuracy
     if accuracy not in ACCURACIES:

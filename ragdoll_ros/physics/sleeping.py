@@ -15,7 +15,7 @@ REST_SPEED = 0.05
 more than the flutter of a joint that leans on its limit, less than any fall gives within 10 ms.
 For other dolls it goes with the root of their size."""
 
-REST_WAY = 0.0012
+REST_DISPLACEMENT = 0.0012
 """m that a still bone of the default doll may have moved in REST_TIME: limbs that sag against
 their joints' damping slower than 4 mm/s are stopped. For other dolls it goes with their size."""
 
@@ -37,7 +37,8 @@ class SleepDetector:
         gravity = math.hypot(*scene.gravity)
         self._pulled = gravity > 0
         slower = max(1.0, math.sqrt(EARTH / gravity)) if gravity else math.inf
-        self._speed, self._way = math.sqrt(size) / slower * REST_SPEED, size * REST_WAY
+        self._speed = math.sqrt(size) / slower * REST_SPEED
+        self._displacement = size * REST_DISPLACEMENT
         self._time = slower * REST_TIME
         # A bone that is still has at most m v^2 / 2 for its speed and less than 3 times that for
         # its spin, as no radius of gyration is longer than its largest half extent.
@@ -51,7 +52,7 @@ class SleepDetector:
         """ns for which all have been still."""
 
     def update(self, state: State, kinetic: np.ndarray, tick: int) -> bool:
-        """Tell whether all have been still for long enough, after one more tick (ns).
+        """Whether all have been still for long enough, after one more tick (ns).
 
         ``kinetic`` (d,) J are the dolls' energies of motion.
         """
@@ -64,12 +65,12 @@ class SleepDetector:
         if self._still < self._time:
             return False
         self.disturb()
-        way = np.abs(state.positions - self._since.positions).max()
+        displacement = np.abs(state.positions - self._since.positions).max()
         turn = rotation.angle_between(state.orientations, self._since.orientations)
-        return bool(max(way, (turn * self._sizes).max()) < self._way)
+        return bool(max(displacement, (turn * self._sizes).max()) < self._displacement)
 
     def _moves(self, state: State, kinetic: np.ndarray) -> bool:
-        """Tell whether any bone is faster than still; in most ticks the energies say so."""
+        """Whether any bone is faster than still; in most ticks the energies say so."""
         return bool((kinetic > self._most).any()
                     or np.abs(state.linear_velocities).max() > self._speed
                     or (np.abs(state.angular_velocities).max(axis=1)

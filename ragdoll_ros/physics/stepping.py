@@ -84,7 +84,7 @@ class StepResult:
     touched: set[tuple[int, int]]
     """Pairs of dolls, or of a doll and GROUND, that touched or may have."""
     lag: float = 0.0
-    """s: of which each way was gone with the velocity at the end, not with the mean one."""
+    """s: for which bones moved with the velocity at the end, not with the mean one."""
 
 
 class Stepper:
@@ -98,9 +98,9 @@ class Stepper:
         self.reach = backend.reach_of(scene)
         self._layout = self.engine.layout
         self._limits = backend.limits_of(self._layout)
-        counts = np.cumsum([0, *(len(placement.doll.bones) for placement in scene.dolls)])
-        self._roots = np.array([start + placement.doll.bones.index(placement.doll.root)
-                                for start, placement in zip(counts[:-1], scene.dolls, strict=True)])
+        self._roots = np.array([
+            own.start + placement.doll.bones.index(placement.doll.root)
+            for own, placement in zip(scene.bone_slices, scene.dolls, strict=True)])
         self._rigid = len(scene.bones) == len(scene.dolls)
         self._solid = bool(scene.ground or scene.self_collision or len(scene.dolls) > 1)
         """Whether anything can touch at all."""
@@ -180,7 +180,7 @@ class Stepper:
         self._limits.same(before, self.coordinates)
 
     def sync_engine(self) -> Engine:
-        """Give the engine, with the dolls in it where they are."""
+        """The engine, with the dolls in it where they are."""
         if self._stale:
             self.engine.place(self.coordinates)
             self._stale = False
@@ -219,12 +219,12 @@ class Stepper:
         return max(rounding, float(np.linalg.norm(missed, axis=1).max()))
 
     def close(self) -> None:
-        """Give the engines back."""
+        """Release the engines."""
         self.engine.close()
         self.dynamics.close()
 
     def _may_fly(self, duration: float) -> bool:
-        """Tell whether nothing touches and no joint presses against its limit."""
+        """Whether nothing touches and no joint presses against its limit."""
         if (not self.accuracy.order or self.touching or self._blocked
                 or self.stats.flights >= self._most_flights):
             return False
@@ -272,7 +272,7 @@ class Stepper:
         return duration
 
     def _leads_on(self, stretch: float) -> bool:
-        """Tell whether a path is under way that leads on by ``stretch`` s."""
+        """Whether a path is under way that leads on by ``stretch`` s."""
         path = self._path
         return path is not None and self._along + stretch <= path.duration * (1 + 1e-9)
 
@@ -292,7 +292,7 @@ class Stepper:
         self._along, self._counted = 0.0, 0
 
     def _ahead(self, time: float) -> GeneralizedState | None:
-        """Tell where the path leads to, and count its steps."""
+        """Where the path leads to; its steps are counted."""
         ahead = self._path.at(time)
         self.stats.flights += self._path.count - self._counted
         self._counted = self._path.count
@@ -414,17 +414,17 @@ class Stepper:
         return StepResult(duration, substep, touched if watch else near, lag)
 
     def _went_evenly(self, before: State, duration: float) -> bool:
-        """Tell whether nothing was struck: no bone's velocity changed by more than a fall's."""
+        """Whether nothing was struck: no bone's velocity changed by more than a fall's."""
         return self.reach.change(before, self.state) < EVEN * self._gravity * duration
 
     def _centre(self, start: GeneralizedState, substep: float) -> None:
-        """Take half a substep's change of velocity back out of the way that was gone.
+        """Take half a substep's change of velocity back out of the displacement.
 
         The engine moves all by the velocity that each substep ends with; by the mean of begin and
         end (the trapezoidal rule) an even motion is right to order 2.
         """
-        way = (self.coordinates.v - start.v) * (-substep / 2)
-        self._set(self.dynamics.integrate_configuration(self.coordinates, way))
+        back = (self.coordinates.v - start.v) * (-substep / 2)
+        self._set(self.dynamics.integrate_configuration(self.coordinates, back))
 
     def _near(self, duration: float, loads: Sequence[AppliedWrench]) -> set[tuple[int, int]]:
         """Pairs of dolls, or of a doll and GROUND, that may touch within ``duration`` s."""
@@ -434,7 +434,7 @@ class Stepper:
                                self.touching)
 
     def _too_far(self) -> tuple[float, float]:
-        """Tell how far past a limit and in the ground, in units of what is put up with."""
+        """How far past a limit and in the ground, in units of what is put up with."""
         past = max(0.0, self._limits.max_violation(self.coordinates))
         sunk = -self.reach.clearance(self.state)
         return past / self.accuracy.redo, sunk / self.accuracy.sink

@@ -40,13 +40,14 @@ def mean_load(load: AppliedWrench, before: State, after: State) -> tuple[np.ndar
 
 
 def work(load: AppliedWrench, before: State, after: State, piece: StepResult) -> float:
-    """Work, J: of the force along its point's way, and of the torque through its bone's turn.
+    """Work, J: of the force along its point's displacement, and of the torque through its bone's
+    rotation.
 
-    A step that takes the velocity first (semi-implicit Euler, a substep h long) moves a point by
-    h v' where its energy grows by F (v + v') h / 2: the difference adds up to
-    F (v_end - v_start) h / 2 and is left out. Where the load turns with its bone, what it does
-    beyond mean times way is that of two even changes, t dF dv / 12. Turns are no vectors: the
-    integral of w is the turn's plus t^2 / 12 w_start x w_end (Magnus).
+    A step that takes the velocity first (semi-implicit Euler, a substep h long) moves a point by h
+    v' where its energy grows by F (v + v') h / 2: the difference adds up to F (v_end - v_start) h /
+    2 and is left out. Where the load turns with its bone, what it does beyond mean times
+    displacement is that of two even changes, t dF dv / 12. Turns are no vectors: the integral of w
+    is the turn's plus t^2 / 12 w_start x w_end (Magnus).
     """
     bone = load.bone
     force, torque = mean_load(load, before, after)

@@ -1,4 +1,4 @@
-"""Contacts whose course has a formula: a bouncing ball, a block on a slope, a rolling ball."""
+"""Contacts whose motion has a formula: a bouncing ball, a block on a slope, a rolling ball."""
 from __future__ import annotations
 
 import itertools
@@ -13,7 +13,7 @@ from ...model.shapes import Box, Sphere
 from ..references import closed_forms
 from ..trajectory import Trajectory
 from ..trial import Trial, posed
-from .motion import Motion, course, turned
+from .motion import Motion, orientations_about
 
 GRAVITY = 9.8
 RADIUS = 0.1
@@ -39,15 +39,15 @@ def bounce(height: float = 1.0, restitution: float = 0.5, bounces: int = 3) -> M
         heights = np.array([_flight_height(t, height, restitution, impacts) for t in times])
         positions = np.zeros((len(times), 1, 3))
         positions[:, 0, 2] = RADIUS + heights
-        return course(times, positions)
+        return Trajectory.of_poses(times, positions)
 
-    def apexes(moved: Trajectory) -> dict[str, float]:
-        heights = moved.positions[:, 0, 2] - RADIUS
+    def apexes(trajectory: Trajectory) -> dict[str, float]:
+        heights = trajectory.positions[:, 0, 2] - RADIUS
         errors = []
         for n, (begin, end) in enumerate(itertools.pairwise(impacts), start=1):
-            inside = (moved.times > begin) & (moved.times < end)
+            inside = (trajectory.times > begin) & (trajectory.times < end)
             exact = closed_forms.bounce_apex(height, restitution, n)
-            errors.append(abs(_apex(moved.times[inside], heights[inside]) / exact - 1))
+            errors.append(abs(_apex(trajectory.times[inside], heights[inside]) / exact - 1))
         return {f'apex_{n}_error': error for n, error in enumerate(errors, start=1)}
     scene = _ball(Material(friction=0.0, restitution=restitution), height)
     duration = round(impacts[bounces] - 0.01, 2)
@@ -77,15 +77,15 @@ def incline(name: str, title: str, friction: float, slope: float = math.radians(
     normal = (math.sin(slope), 0.0, math.cos(slope))
     downhill = np.array((math.cos(slope), 0.0, -math.sin(slope)))
     doll = Ragdoll('block', (Bone('block', Box((0.3, 0.3, 0.1)), 1.0, (0.0, 0.0, 0.0)),))
-    turn = tuple(rotation.from_axis_angle((0, 1, 0), slope))
+    orientation = tuple(rotation.from_axis_angle((0, 1, 0), slope))
     start = 0.05 * np.array(normal)
-    scene = Scene('incline', (Placement(doll, position=start, orientation=turn),),
+    scene = Scene('incline', (Placement(doll, position=start, orientation=orientation),),
                   Ground(normal), Material(friction=friction, restitution=0.0))
 
     def truth(times: np.ndarray) -> Trajectory:
-        way = closed_forms.incline_slide(slope, friction, GRAVITY, times)
-        return course(times, (start + way[:, None] * downhill)[:, None],
-                      np.tile(turn, (len(times), 1, 1)))
+        slid = closed_forms.incline_slide(slope, friction, GRAVITY, times)
+        return Trajectory.of_poses(times, (start + slid[:, None] * downhill)[:, None],
+                                   np.tile(orientation, (len(times), 1, 1)))
     return Motion(name, f'{title} on a slope of 20°, µ = {friction:g}, 1 s', "Coulomb's law",
                   Trial(scene, 1.0), truth, in_air=False)
 
@@ -99,7 +99,8 @@ def rolling_ball(speed: float = 2.0, friction: float = 0.3) -> Motion:
         positions[:, 0, 0] = closed_forms.ball_slide_then_roll(speed, friction, GRAVITY, times)
         positions[:, 0, 2] = RADIUS
         angles = closed_forms.ball_slide_then_roll_angle(speed, friction, GRAVITY, RADIUS, times)
-        return course(times, positions, turned((0.0, 1.0, 0.0), angles[:, None]))
+        return Trajectory.of_poses(
+            times, positions, orientations_about((0.0, 1.0, 0.0), angles[:, None]))
     start = posed(scene.dolls[0])
     return Motion('rolling_ball', f'Ball that slides, then rolls, µ = {friction:g}, 1.5 s',
                   'v falls to 5/7, then stays', Trial(scene, 1.5, start), truth, in_air=False)

@@ -1,7 +1,6 @@
 """Motions in the air: falls, throws, a tumbling box, chains, the doll itself."""
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import numpy as np
@@ -17,12 +16,13 @@ from ...model.shapes import Box
 from ..references.articulated import Articulated
 from ..references.closed_forms import fall
 from ..references.planar_chain import PlanarChain
-from ..references.tumbling import tumble
+from ..references.rigid_body import torque_free_rotation
 from ..trajectory import Trajectory
-from ..trial import Trial, angle_places, posed
-from .motion import Motion, alone, course, turned, without_limits
+from ..trial import Trial, angle_places, inner_angles, posed
+from .motion import Motion, alone, orientations_about, without_limits
 
 EQUATIONS = 'equations of motion of the tree, DOP853 at 1e-12'
+GENTLE = {'velocity': (1.0, 0.5, 2.0), 'spin': (0.5, -0.5, 1.0)}
 
 
 def flight_motions() -> list[Motion]:
@@ -32,47 +32,46 @@ def flight_motions() -> list[Motion]:
 
 
 def free_fall() -> Motion:
-    """Let the doll fall without a ground: as a whole, no joint moves."""
-    return _rigid_fall('free_fall', 'Free fall, 1 s', (0.0, 0.0, 0.0))
+    """The doll let fall without a ground: as a whole, no joint moves."""
+    return _rigid_fall('free_fall', 'Free fall, 1 s', _thrown((0.0, 0.0, 0.0)))
 
 
 def projectile() -> Motion:
-    """Throw the doll without spin."""
-    return _rigid_fall('projectile', 'Throw without spin, 1 s', (3.0, 1.0, 4.0))
-
-
-def _rigid_fall(name: str, title: str, velocity: tuple[float, float, float]) -> Motion:
-    placement = Placement(load_doll('doll'), velocity=velocity)
-    scene = Scene(name, (placement,))
-    start = np.array([placement.bone_pose(bone)[0] for bone in scene.bones])
-
-    def truth(times: np.ndarray) -> Trajectory:
-        way = fall(np.zeros(3), np.array(velocity), np.array(scene.gravity), times)
-        return course(times, start + way[:, None])
-    return Motion(name, title, 'x0 + v0 t + g t²/2', Trial(scene, 1.0), truth)
+    """The doll thrown, not rotating."""
+    return _rigid_fall('projectile', 'Throw without spin, 1 s', _thrown((3.0, 1.0, 4.0)))
 
 
 def first_touch() -> Motion:
     """The default scene up to just before the feet touch, at 0.2857 s."""
-    scene = load_scene('drop')
-    start = np.array([scene.dolls[0].bone_pose(bone)[0] for bone in scene.bones])
+    return _rigid_fall('drop_to_touch', 'The default drop up to the first touch, 0.28 s',
+                       load_scene('drop'), 0.28, 'x0 + g t²/2')
+
+
+def _thrown(velocity: tuple[float, float, float]) -> Scene:
+    return Scene('thrown', (Placement(load_doll('doll'), velocity=velocity),))
+
+
+def _rigid_fall(name: str, title: str, scene: Scene, duration: float = 1.0,
+                formula: str = 'x0 + v0 t + g t²/2') -> Motion:
+    placement, = scene.dolls
+    start = np.array([placement.bone_pose(bone)[0] for bone in scene.bones])
 
     def truth(times: np.ndarray) -> Trajectory:
-        way = fall(np.zeros(3), np.zeros(3), np.array(scene.gravity), times)
-        return course(times, start + way[:, None])
-    return Motion('drop_to_touch', 'The default drop up to the first touch, 0.28 s',
-                  'x0 + g t²/2', Trial(scene, 0.28), truth)
+        displacement = fall(np.zeros(3), np.array(placement.velocity), np.array(scene.gravity),
+                            times)
+        return Trajectory.of_poses(times, start + displacement[:, None])
+    return Motion(name, title, formula, Trial(scene, duration), truth)
 
 
 def tumbling_box() -> Motion:
-    """A box with moments 1 : 2 : 3 turning about its middle axis, which is unstable."""
+    """A box with moments 1 : 2 : 3 rotating about its middle axis, which is unstable."""
     bone = Bone('box', Box((0.2 * math.sqrt(2), 0.2, 0.002)), 1.0, (0.0, 0.0, 0.0))
     omega = (0.05, 8.0, 0.05)
     scene = alone(Ragdoll('box', (bone,)), (0.0, 0.0, 0.0), spin=omega)
 
     def truth(times: np.ndarray) -> Trajectory:
-        turns, _ = tumble(bone.inertia, omega, times)
-        return course(times, np.zeros((len(times), 1, 3)), turns[:, None])
+        orientations, _ = torque_free_rotation(bone.inertia, omega, times)
+        return Trajectory.of_poses(times, np.zeros((len(times), 1, 3)), orientations[:, None])
     return Motion('tumbling_box', 'Tumbling box, moments 1 : 2 : 3, 8 rad/s, 5 s',
                   "Euler's equations, DOP853 at 1e-12", Trial(scene, 5.0), truth,
                   'angle_worst_rad')
@@ -96,7 +95,7 @@ def chain(links: int, length: float = 0.2, mass: float = 1.0) -> Motion:
     def truth(times: np.ndarray) -> Trajectory:
         centres, phi = planar.motion(angles, rates, times)
         flat = np.concatenate([centres, np.zeros((*centres.shape[:2], 1))], axis=2)
-        return course(times, flat, turned((0.0, 0.0, 1.0), phi))
+        return Trajectory.of_poses(times, flat, orientations_about((0.0, 0.0, 1.0), phi))
     return Motion(f'chain_{links}', f'Thrown chain of {links} rods, 1 s',
                   "Lagrange's equations in the plane, DOP853 at 1e-12",
                   Trial(alone(doll, (0.0, 0.0, 0.0)), 1.0, start), truth)
@@ -105,31 +104,33 @@ def chain(links: int, length: float = 0.2, mass: float = 1.0) -> Motion:
 def gentle_flight() -> Motion:
     """The default doll, limbs moving a little, for as long as the default drop flies."""
     doll = load_doll('doll')
-    placement = Placement(doll, velocity=(1.0, 0.5, 2.0), spin=(0.5, -0.5, 1.0))
-    angles, rates = _inside_limits(doll, speed=1.0, seed=1)
-    trial = Trial(Scene('gentle', (placement,)), 0.28, posed(placement, angles, rates))
+    placement = Placement(doll, **GENTLE)
+    trial = Trial(Scene('gentle', (placement,)), 0.28,
+                  posed(placement, *_inside_limits(doll, speed=1.0, seed=1)))
     return Motion('flight_gentle', 'The doll in gentle flight, 0.28 s', EQUATIONS, trial,
                   _articulated(trial))
 
 
 def long_flight() -> Motion:
     """The same for 2 s, limits off."""
-    doll = without_limits(load_doll('doll'))
-    placed = {'velocity': (1.0, 0.5, 2.0), 'spin': (0.5, -0.5, 1.0)}
-    angles, rates = _inside_limits(load_doll('doll'), speed=1.0, seed=1)
-    trial = Trial(alone(doll, **placed), 2.0, posed(Placement(doll, **placed), angles, rates))
-    return Motion('flight_long', 'The doll in gentle flight, 2 s, limits off', EQUATIONS, trial,
-                  _articulated(trial))
+    return _without_limits('flight_long', 'The doll in gentle flight, 2 s, limits off', 2.0,
+                           speed=1.0, seed=1, **GENTLE)
 
 
 def fast_flight() -> Motion:
     """Spun at 20 rad/s, limbs at some 5 rad/s, limits off."""
-    doll = without_limits(load_doll('doll'))
-    placed = {'spin': tuple(20 * rotation.normalized(np.array((1.0, 2.0, 2.0))))}
-    angles, rates = _inside_limits(load_doll('doll'), speed=5.0, seed=2)
-    trial = Trial(alone(doll, **placed), 0.28, posed(Placement(doll, **placed), angles, rates))
-    return Motion('flight_fast', 'The doll spun at 20 rad/s, 0.28 s, limits off', EQUATIONS, trial,
-                  _articulated(trial))
+    return _without_limits('flight_fast', 'The doll spun at 20 rad/s, 0.28 s, limits off', 0.28,
+                           speed=5.0, seed=2,
+                           spin=tuple(20 * rotation.normalized(np.array((1.0, 2.0, 2.0)))))
+
+
+def _without_limits(name: str, title: str, duration: float, speed: float, seed: int,
+                    **placed: object) -> Motion:
+    limited = load_doll('doll')
+    doll = without_limits(limited)
+    trial = Trial(alone(doll, **placed), duration,
+                  posed(Placement(doll, **placed), *_inside_limits(limited, speed, seed)))
+    return Motion(name, title, EQUATIONS, trial, _articulated(trial))
 
 
 def pushed_flight() -> Motion:
@@ -142,13 +143,10 @@ def pushed_flight() -> Motion:
 
 
 def _inside_limits(doll: Ragdoll, speed: float, seed: int) -> tuple[dict, dict]:
-    """Angles in the inner half of their ranges, and rates of up to ``speed`` rad/s."""
+    """Angles (rad) in the inner two fifths of their ranges, and rates of up to ``speed`` rad/s."""
     rng = np.random.default_rng(seed)
-    limits = {name: pair for joint in doll.joints
-              for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
-    angles = {name: lower + (upper - lower) * rng.uniform(0.3, 0.7)
-              for name, (lower, upper) in limits.items()}
-    return angles, {name: rng.uniform(-speed, speed) for name in angle_places(doll)}
+    return inner_angles(doll, rng), {name: rng.uniform(-speed, speed)
+                                     for name in angle_places(doll)}
 
 
 def _articulated(trial: Trial) -> object:
@@ -167,8 +165,3 @@ def _articulated(trial: Trial) -> object:
     def truth(times: np.ndarray) -> Trajectory:
         return tree.trajectory(start.q, start.v, times, wrenches if breaks else None, breaks)
     return truth
-
-
-def slower(motion: Motion, tick: float) -> Motion:
-    """Give the same motion with ticks of another length, s."""
-    return dataclasses.replace(motion, trial=motion.trial.with_tick(tick))

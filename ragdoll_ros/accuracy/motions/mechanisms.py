@@ -18,7 +18,7 @@ from ..references.closed_forms import pendulum_angle
 from ..references.integration import integrate
 from ..trajectory import Trajectory
 from ..trial import Trial, posed
-from .motion import Motion, alone, course, turned
+from .motion import Motion, alone, orientations_about
 
 PIVOT = 1e12
 """kg"""
@@ -74,5 +74,6 @@ def _pendulum(name: str, title: str, reference: str, amplitude: float, damping: 
         phi = angle(times)
         bob = LENGTH * np.stack([-np.sin(phi), 0 * phi, -np.cos(phi)], axis=-1)
         positions = np.stack([0 * bob, bob], axis=1)
-        return course(times, positions, turned((0.0, 1.0, 0.0), np.stack([0 * phi, phi], axis=1)))
+        return Trajectory.of_poses(times, positions, orientations_about(
+            (0.0, 1.0, 0.0), np.stack([0 * phi, phi], axis=1)))
     return Motion(name, title, reference, trial, truth, 'angle_worst_rad', in_air=False)

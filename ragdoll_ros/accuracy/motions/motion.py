@@ -33,33 +33,24 @@ class Motion:
     """Further figures of this motion alone."""
 
 
-def course(times: np.ndarray, positions: np.ndarray,
-           orientations: np.ndarray | None = None) -> Trajectory:
-    """Make a truth out of poses (t, n, 3) m and (t, n, 4); its velocities are left NaN."""
-    if orientations is None:
-        orientations = np.tile(rotation.IDENTITY, (*positions.shape[:2], 1))
-    unknown = np.full(positions.shape, np.nan)
-    return Trajectory(np.asarray(times, float), positions, orientations, unknown, unknown)
-
-
-def turned(axis: tuple[float, float, float], angles: np.ndarray) -> np.ndarray:
-    """Orientations (t, n, 4) of bones that turned by ``angles`` (t, n) rad about one axis."""
+def orientations_about(axis: tuple[float, float, float], angles: np.ndarray) -> np.ndarray:
+    """Orientations (t, n, 4) of bones rotated by ``angles`` (t, n) rad about a unit axis."""
     return rotation.from_rotation_vector(np.asarray(angles)[..., None] * np.array(axis))
 
 
 def without_limits(doll: Ragdoll) -> Ragdoll:
-    """Give the same doll with all joints free: the reference knows no limits."""
+    """The same doll with all joints free: the reference knows no limits."""
     return dataclasses.replace(doll, joints=tuple(
         dataclasses.replace(joint, limits=()) for joint in doll.joints))
 
 
 def without_damping(doll: Ragdoll) -> Ragdoll:
-    """Give the same doll with joints that lose nothing: its energy is a constant of flight."""
+    """The same doll with joints that lose nothing: its energy is a constant of flight."""
     return dataclasses.replace(doll, joints=tuple(
         dataclasses.replace(joint, damping=0.0) for joint in doll.joints))
 
 
 def alone(doll: Ragdoll, gravity: tuple[float, float, float] = (0.0, 0.0, -9.8),
           **placed: object) -> Scene:
-    """Give a scene of one doll in the air, whose bones pass through each other."""
+    """A scene of one doll in the air, whose bones pass through each other."""
     return Scene(doll.name, (Placement(doll, **placed),), gravity=gravity, self_collision=False)

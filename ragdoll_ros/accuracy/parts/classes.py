@@ -65,7 +65,7 @@ def _chunks(part: str, class_name: str, method: str, count: int) -> list[Job]:
 
 
 def find(name: str) -> Method:
-    """Find a method by its name, or the normal setting with one mechanism switched off."""
+    """The method of a name, or the normal setting with one mechanism switched off."""
     if name not in MECHANISMS:
         return by_name(name)
     return ours(dataclasses.replace(ACCURACIES['normal'], **MECHANISMS[name]), name)
@@ -80,18 +80,19 @@ def measure_class(class_name: str, method_name: str, first: int, end: int) -> li
         measure = Measure(start.scene)
         found.append({'number': number, 'cpu_s': float(result.costs.sum()),
                       'simulated_s': start.duration,
-                      **_worst(measure, start, result.moved)})
+                      **_worst(measure, start, result.trajectory)})
     return [gathered(class_name, method_name, found)]
 
 
-def _worst(measure: Measure, start: object, moved: Trajectory) -> dict[str, float]:
-    if not moved.finite:
+def _worst(measure: Measure, start: object, trajectory: Trajectory) -> dict[str, float]:
+    if not trajectory.finite:
         return dict.fromkeys(('excess', 'overshoot_rad', 'sinking_m', 'gap_m', 'speed_m_s',
                               'settled_s'), math.inf)
-    return {'excess': measure.excess(start, moved), 'overshoot_rad': measure.overshoot(moved),
-            'sinking_m': measure.sinking(moved), 'gap_m': measure.gap(moved),
-            'speed_m_s': float(np.linalg.norm(moved.linear_velocities, axis=-1).max()),
-            'settled_s': measure.settled(moved)}
+    return {'excess': measure.energy_excess(start, trajectory),
+            'overshoot_rad': measure.overshoot(trajectory),
+            'sinking_m': measure.sinking(trajectory), 'gap_m': measure.joint_gap(trajectory),
+            'speed_m_s': float(np.linalg.norm(trajectory.linear_velocities, axis=-1).max()),
+            'settled_s': measure.settling_time(trajectory)}
 
 
 def gathered(class_name: str, method: str, found: list[Row]) -> Row:
@@ -108,7 +109,7 @@ def gathered(class_name: str, method: str, found: list[Row]) -> Row:
 
 
 def merged(rows: list[Row]) -> list[Row]:
-    """Join the rows of one class and method that came from several jobs."""
+    """One row for each class and method, whose rows came from several jobs."""
     joined: dict[tuple, Row] = {}
     for row in rows:
         if 'failed' in row:

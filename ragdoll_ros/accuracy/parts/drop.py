@@ -51,10 +51,10 @@ def energies(scene: str) -> list[Row]:
     """Energy as a share of that at the start, at every tick."""
     trial, rows = {'drop': falling, 'spin': spinning}[scene](), []
     for method in (quickstart(), bullet(1), ours('normal')):
-        moved = run(method, trial).moved
-        energy = Measure(trial.scene).energy(moved)
+        trajectory = run(method, trial).trajectory
+        energy = Measure(trial.scene).energy(trajectory)
         rows.append({'scene': scene, 'method': method.name, 'label': method.label,
-                     'time_s': moved.times.tolist(), 'energy': (energy / energy[0]).tolist()})
+                     'time_s': trajectory.times.tolist(), 'energy': (energy / energy[0]).tolist()})
     return rows
 
 
@@ -85,13 +85,13 @@ def spread(method_index: int, count: int) -> list[Row]:
     masses = np.array([bone.mass for bone in load_scene('drop').bones])
     for number in range(count):
         trial = _tilted(number)
-        moved = run(method, trial).moved
+        trajectory = run(method, trial).trajectory
         measure = Measure(trial.scene)
-        centre = masses @ moved.positions[-1] / masses.sum()
-        energy = measure.energy(moved)
-        ends.append({'settled_s': measure.settled(moved), 'height_m': float(centre[2]),
+        centre = masses @ trajectory.positions[-1] / masses.sum()
+        energy = measure.energy(trajectory)
+        ends.append({'settled_s': measure.settling_time(trajectory), 'height_m': float(centre[2]),
                      'way_m': float(np.hypot(*centre[:2])),
-                     'energy_left_1s': float(np.interp(1.0, moved.times, energy) / energy[0])})
+                     'energy_left_1s': float(np.interp(1.0, trajectory.times, energy) / energy[0])})
     row: Row = {'method': method.name, 'label': method.label, 'starts': count}
     for key in ('height_m', 'way_m', 'energy_left_1s'):
         values = np.array([end[key] for end in ends])

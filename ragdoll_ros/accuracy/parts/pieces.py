@@ -57,7 +57,7 @@ def beginnings(count: int) -> list[Trial]:
 def truths(family: str, count: int) -> list:
     """The same pieces by the engine itself at its finest."""
     method = mujoco('implicitfast', FINE) if family.startswith('MuJoCo') else bullet(FINE)
-    return [run(method, trial).moved for trial in beginnings(count)]
+    return [run(method, trial).trajectory for trial in beginnings(count)]
 
 
 def measure(name: str, count: int) -> list[Row]:
@@ -65,12 +65,12 @@ def measure(name: str, count: int) -> list[Row]:
     method, errors, turns, gaps, sunk, cpu = by_name(name), [], [], [], [], 0.0
     for trial, truth in zip(beginnings(count), truths(method.family, count), strict=True):
         result = run(method, trial)
-        found = compare(result.moved, truth)
+        found = compare(result.trajectory, truth)
         errors.append(found['position_worst_m'])
         turns.append(found['angle_worst_rad'])
         scales = Measure(trial.scene)
-        gaps.append(scales.gap(result.moved))
-        sunk.append(scales.sinking(result.moved))
+        gaps.append(scales.joint_gap(result.trajectory))
+        sunk.append(scales.sinking(result.trajectory))
         cpu += result.costs.sum()
     return [{'method': name, 'label': method.label, 'family': method.family, 'pieces': count,
              'cpu_s_per_s': float(cpu / (count * LENGTH)),

@@ -40,7 +40,7 @@ def measure_all(motion_name: str, method_names: list[str], repeats: int) -> list
     for name in method_names:
         method = by_name(name)
         result = median_run(method, motion.trial, repeats)
-        times = result.moved.times
+        times = result.trajectory.times
         if len(times) not in truths:
             truths[len(times)] = motion.truth(times)
         rows.append(figures(motion, method, result, truths[len(times)]))
@@ -49,21 +49,21 @@ def measure_all(motion_name: str, method_names: list[str], repeats: int) -> list
 
 def figures(motion: Motion, method: Method, result: Result, truth: Trajectory) -> Row:
     """All figures of one motion by one method; None where one makes no sense."""
-    moved, trial = result.moved, motion.trial
+    trajectory, trial = result.trajectory, motion.trial
     measure = Measure(trial.scene)
     row: Row = {'motion': motion.name, 'title': motion.title, 'reference': motion.reference,
                 'yardstick': motion.yardstick, 'method': method.name, 'label': method.label,
                 'family': method.family, 'substeps': method.substeps,
                 'cpu_s_per_s': result.rate,
                 'tick_p99_s': float(np.percentile(result.costs, 99)),
-                'finite': moved.finite, **compare(moved, truth)}
-    row['energy_excess'] = measure.excess(trial, moved)
-    row['joint_gap_m'] = measure.gap(moved)
-    row['limit_overshoot_rad'] = measure.overshoot(moved)
+                'finite': trajectory.finite, **compare(trajectory, truth)}
+    row['energy_excess'] = measure.energy_excess(trial, trajectory)
+    row['joint_gap_m'] = measure.joint_gap(trajectory)
+    row['limit_overshoot_rad'] = measure.overshoot(trajectory)
     if trial.scene.ground is not None:
-        row['sinking_m'] = measure.sinking(moved)
+        row['sinking_m'] = measure.sinking(trajectory)
     if motion.in_air:
-        row['momentum_drift'] = measure.momentum_drift(trial, moved)
+        row['momentum_drift'] = measure.momentum_drift(trial, trajectory)
         if not trial.pushes:
-            row['angular_momentum_drift'] = measure.spin_drift(moved)
-    return {**row, **motion.extra(moved)}
+            row['angular_momentum_drift'] = measure.angular_momentum_drift(trajectory)
+    return {**row, **motion.extra(trajectory)}

@@ -40,10 +40,10 @@ def measure(name: str, repeats: int) -> list[Row]:
             method = ours(dataclasses.replace(setting, **changes), f'{accuracy} {switched}')
             result = median_run(method, motion.trial, repeats)
             row = {'motion': motion.title, 'accuracy': accuracy, 'switched': switched,
-                   'cpu_s_per_s': result.rate, **compare(result.moved, truth),
-                   'energy_excess': scales.excess(motion.trial, result.moved)}
+                   'cpu_s_per_s': result.rate, **compare(result.trajectory, truth),
+                   'energy_excess': scales.energy_excess(motion.trial, result.trajectory)}
             if motion.in_air:
-                row['momentum_drift'] = scales.momentum_drift(motion.trial, result.moved)
-                row['angular_momentum_drift'] = scales.spin_drift(result.moved)
+                row['momentum_drift'] = scales.momentum_drift(motion.trial, result.trajectory)
+                row['angular_momentum_drift'] = scales.angular_momentum_drift(result.trajectory)
             rows.append(row)
     return rows

@@ -15,8 +15,8 @@ import numpy as np
 from ...model import rotation
 from ...model.ragdoll import Bone
 from ...model.shapes import Sphere
+from ...model.state import State
 from ...model.swing import Link, Swing
-from ...physics.swing.frames import Frames
 from ...physics.swing.mount import Mount
 from ...physics.swing.swings import Swings
 from ..references.closed_forms import pendulum_angle
@@ -28,6 +28,7 @@ DURATION = 3.0
 GRAVITY = 9.8
 LENGTH, MASS, STIFFNESS, DAMPING = 0.3, 0.5, 8.0, 0.1
 START = math.radians(60)
+STILL = State(np.zeros((1, 3)), np.array([rotation.IDENTITY]), *np.zeros((2, 1, 3)))
 
 
 def jobs(options: Options) -> list[Job]:
@@ -53,7 +54,7 @@ def measure() -> list[Row]:
 def _swings(link: Link, mode: str, gravity: float, **fields: object) -> Swings:
     swing = Swing('swing', 'bone', (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (link,), mode=mode, **fields)
     mount = Mount.on(swing, Bone('bone', Sphere(0.1), 1.0, (0.0, 0.0, 0.0)), 0)
-    return Swings([mount], (0.0, 0.0, -gravity), lambda time: Frames.still())
+    return Swings([mount], (0.0, 0.0, -gravity), lambda time: STILL)
 
 
 def _spring(times: np.ndarray) -> float:

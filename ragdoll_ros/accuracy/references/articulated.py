@@ -1,6 +1,6 @@
 """The motion of a doll in flight, from the equations of motion, independent of any engine.
 
-GeneralizedState are those of the tree, so a joint cannot open. With J the Jacobians of all centres
+The coordinates are those of the tree, so a joint cannot open. With J the Jacobians of all centres
 of mass, Jw of all angular velocities, and a0, alpha0 the accelerations that are left when dv/dt
 vanishes (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 3):
 
@@ -9,7 +9,7 @@ vanishes (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 3):
 
 integrated by DOP853 (Hairer, Norsett, Wanner) at 1e-12. Limits and contacts are not in it.
 
-GeneralizedState are laid out as in coordinates.py, the joints depth first.
+They are laid out as in coordinates.py, the joints depth first.
 """
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ Wrenches = Callable[[float, State], tuple[np.ndarray, np.ndarray]]
 @dataclass(frozen=True)
 class _Kinematics:
     centres: np.ndarray  # (n, 3)
-    turns: np.ndarray  # (n, 3, 3), from the bind pose
+    rotations: np.ndarray  # (n, 3, 3), from the bind pose
     omegas: np.ndarray  # (n, 3)
     jv: np.ndarray  # (n, 3, nv)
     jw: np.ndarray  # (n, 3, nv)
-    drift: np.ndarray  # (n, 3) accelerations of the centres at dv/dt = 0
-    spin_drift: np.ndarray  # (n, 3) the same, angular
+    bias_linear: np.ndarray  # (n, 3) bias accelerations: of the centres at dv/dt = 0
+    bias_angular: np.ndarray  # (n, 3) the same, angular
 
 
 class Articulated:
@@ -60,7 +60,7 @@ class Articulated:
 
     def bind(self, position: Sequence[float] = (0, 0, 0),
              orientation: Sequence[float] = rotation.IDENTITY) -> np.ndarray:
-        """GeneralizedState q of the bind pose with the doll's frame at a place and turn."""
+        """Coordinates q (nq,) of the bind pose, the doll's frame posed at ``position`` m."""
         q = np.zeros(self.nq)
         root = self.doll.root
         q[:3] = position + rotation.rotate(np.array(orientation), root.position)
@@ -73,27 +73,27 @@ class Articulated:
     def state(self, q: np.ndarray, v: np.ndarray) -> State:
         """Poses and velocities of all bones."""
         kin = self._kinematics(q, v)
-        turns = np.array([rotation.from_matrix(turn @ bind)
-                          for turn, bind in zip(kin.turns, self._binds, strict=True)])
-        return State(kin.centres, turns, kin.jv @ v, kin.omegas)
+        rotations = np.array([rotation.from_matrix(rotated @ bind)
+                              for rotated, bind in zip(kin.rotations, self._binds, strict=True)])
+        return State(kin.centres, rotations, kin.jv @ v, kin.omegas)
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, forces: np.ndarray | None = None,
                      torques: np.ndarray | None = None) -> np.ndarray:
         """dv/dt (nv,) under forces (n, 3) N and torques (n, 3) N m at the centres of mass."""
         kin = self._kinematics(q, v)
-        inertias = kin.turns @ self._inertias @ kin.turns.transpose(0, 2, 1)
-        spin = (inertias @ kin.omegas[..., None])[..., 0]
-        push = self._masses[:, None] * (self.gravity - kin.drift)
-        twist = -(inertias @ kin.spin_drift[..., None])[..., 0] - np.cross(kin.omegas, spin)
+        inertias = kin.rotations @ self._inertias @ kin.rotations.transpose(0, 2, 1)
+        momenta = (inertias @ kin.omegas[..., None])[..., 0]
+        force = self._masses[:, None] * (self.gravity - kin.bias_linear)
+        torque = -(inertias @ kin.bias_angular[..., None])[..., 0] - np.cross(kin.omegas, momenta)
         if forces is not None:
-            push = push + forces
+            force = force + forces
         if torques is not None:
-            twist = twist + torques
+            torque = torque + torques
         nv = self.nv
         flat_v, flat_w = kin.jv.reshape(-1, nv), kin.jw.reshape(-1, nv)
         mass = (flat_v.T @ (self._masses[:, None, None] * kin.jv).reshape(-1, nv)
                 + flat_w.T @ (inertias @ kin.jw).reshape(-1, nv))
-        return np.linalg.solve(mass, flat_v.T @ push.ravel() + flat_w.T @ twist.ravel()
+        return np.linalg.solve(mass, flat_v.T @ force.ravel() + flat_w.T @ torque.ravel()
                                - self._damping * v)
 
     def trajectory(self, q: np.ndarray, v: np.ndarray, times: Sequence[float],
@@ -138,50 +138,50 @@ class Articulated:
                 [(axis, _skew(axis), _skew(axis) @ _skew(axis)) for axis in axes])
 
     def _kinematics(self, q: np.ndarray, v: np.ndarray) -> _Kinematics:
-        """Go from the root to the leaves, once."""
+        """Forward kinematics, from the root to the leaves."""
         n, nv = len(self._masses), self.nv
         centres, omegas = np.zeros((n, 3)), np.zeros((n, 3))
-        drift, spin_drift = np.zeros((n, 3)), np.zeros((n, 3))
-        turns, jv, jw = np.zeros((n, 3, 3)), np.zeros((n, 3, nv)), np.zeros((n, 3, nv))
+        bias_linear, bias_angular = np.zeros((n, 3)), np.zeros((n, 3))
+        rotations, jv, jw = np.zeros((n, 3, 3)), np.zeros((n, 3, nv)), np.zeros((n, 3, nv))
         root = self._index[self.doll.root.name]
         centres[root], omegas[root] = q[:3], v[3:6]
-        turns[root] = rotation.matrix(rotation.normalized(q[3:7])) @ self._binds[root].T
+        rotations[root] = rotation.matrix(rotation.normalized(q[3:7])) @ self._binds[root].T
         jv[root, :, :3] = jw[root, :, 3:6] = np.eye(3)
         for joint, parent, child, to_anchor, from_anchor, axes in self._ordered:
-            turn, axis_columns = self._turned(joint, turns[parent], axes, q)
+            rotated, axis_columns = self._child_rotation(joint, rotations[parent], axes, q)
             rates = v[self._v_of[joint.child]]
-            omega, spin = omegas[parent], spin_drift[parent].copy()
+            omega, bias = omegas[parent], bias_angular[parent].copy()
             jw[child] = jw[parent]
             jw[child][:, self._v_of[joint.child]] = axis_columns
             if joint.is_free_ball:
-                spin += _skew(omega) @ (axis_columns @ rates)
+                bias += _skew(omega) @ (axis_columns @ rates)
                 omega = omega + axis_columns @ rates
             else:
                 for axis, rate in zip(axis_columns.T, rates, strict=True):
-                    spin += _skew(omega) @ axis * rate
+                    bias += _skew(omega) @ axis * rate
                     omega = omega + axis * rate
-            before, after = turns[parent] @ to_anchor, turn @ from_anchor
+            before, after = rotations[parent] @ to_anchor, rotated @ from_anchor
             old, new = _skew(omegas[parent]), _skew(omega)
             centres[child] = centres[parent] + before + after
             jv[child] = jv[parent] - _skew(before) @ jw[parent] - _skew(after) @ jw[child]
-            drift[child] = (drift[parent] - _skew(before) @ spin_drift[parent]
-                            + old @ (old @ before) - _skew(after) @ spin + new @ (new @ after))
-            turns[child], omegas[child], spin_drift[child] = turn, omega, spin
-        return _Kinematics(centres, turns, omegas, jv, jw, drift, spin_drift)
+            bias_linear[child] = (bias_linear[parent] - _skew(before) @ bias_angular[parent]
+                            + old @ (old @ before) - _skew(after) @ bias + new @ (new @ after))
+            rotations[child], omegas[child], bias_angular[child] = rotated, omega, bias
+        return _Kinematics(centres, rotations, omegas, jv, jw, bias_linear, bias_angular)
 
-    def _turned(self, joint: Joint, parent: np.ndarray, axes: list,
+    def _child_rotation(self, joint: Joint, parent: np.ndarray, axes: list,
                 q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Child's turn from the bind pose, and the world axes (3, k) of the joint's rates."""
+        """Child's rotation from the bind pose, and the world axes (3, k) of the joint's rates."""
         values = q[self._q_of[joint.child]]
         if joint.is_free_ball:
             frame = np.column_stack([axis for axis, *_ in axes])
-            turn = parent @ frame @ rotation.matrix(rotation.normalized(values)) @ frame.T
-            return turn, turn @ frame
-        turn, columns = parent, np.empty((3, len(axes)))
+            rotated = parent @ frame @ rotation.matrix(rotation.normalized(values)) @ frame.T
+            return rotated, rotated @ frame
+        rotated, columns = parent, np.empty((3, len(axes)))
         for k, ((axis, cross, square), angle) in enumerate(zip(axes, values, strict=True)):
-            columns[:, k] = turn @ axis
-            turn = turn + turn @ (np.sin(angle) * cross + (1 - np.cos(angle)) * square)
-        return turn, columns
+            columns[:, k] = rotated @ axis
+            rotated = rotated + rotated @ (np.sin(angle) * cross + (1 - np.cos(angle)) * square)
+        return rotated, columns
 
 
 def _layout(doll: Ragdoll) -> tuple[dict[str, slice], dict[str, slice], int, int]:
@@ -200,6 +200,6 @@ def _skew(a: np.ndarray) -> np.ndarray:
 
 
 def _quaternion_rate(q: np.ndarray, omega: np.ndarray, outer: bool) -> np.ndarray:
-    """dq/dt of a body that turns with omega, given in the outer frame or in the body's."""
+    """dq/dt of a body that rotations with omega, given in the outer frame or in the body's."""
     pure = np.append(omega, 0.0)
     return (rotation.multiply(pure, q) if outer else rotation.multiply(q, pure)) / 2

@@ -24,12 +24,6 @@ def pendulum_angle(amplitude: float, omega: float, t: np.ndarray) -> np.ndarray:
     return 2 * np.arcsin(k * cn / dn)
 
 
-def pendulum_period(amplitude: float, omega: float) -> float:
-    """Period in s: 4 K(k^2) / omega, K the complete elliptic integral of the first kind."""
-    from scipy.special import ellipk
-    return 4 * float(ellipk(math.sin(amplitude / 2) ** 2)) / omega
-
-
 def bounce_apex(height: float, restitution: float, bounces: int) -> float:
     """Height in m a ball comes back to: each bounce leaves e^2 of the energy."""
     return height * restitution ** (2 * bounces)
@@ -65,13 +59,8 @@ def ball_slide_then_roll(speed: float, friction: float, gravity: float,
 
 def ball_slide_then_roll_angle(speed: float, friction: float, gravity: float, radius: float,
                                t: np.ndarray) -> np.ndarray:
-    """Angle in rad that the same ball has turned: 5/2 mu g / r until it rolls, then v / r."""
+    """Angle in rad by which the same ball has rotated: 5/2 mu g / r until it rolls, then v / r."""
     t = np.asarray(t, float)
     grip = 2 * speed / (7 * friction * gravity)
     slid, rolled = np.minimum(t, grip), np.maximum(t - grip, 0.0)
     return 5 / 4 * friction * gravity / radius * slid ** 2 + 5 / 7 * speed / radius * rolled
-
-
-def ball_on_incline(slope: float, gravity: float, t: np.ndarray) -> np.ndarray:
-    """Distance in m of a solid ball that rolls down from rest without slip: 5/7 g sin(slope)."""
-    return 5 / 14 * gravity * math.sin(slope) * np.asarray(t, float) ** 2

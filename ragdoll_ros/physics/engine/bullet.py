@@ -83,244 +83,27 @@ class _Doll:
     """Place of each joint in ``joints`` by the name of its angle."""
 
 
-class BulletEngine:
-    """A scene in PyBullet. Runs in a client of its own, so that many can live side by side."""
+class _World:
+    """The scene in a client of PyBullet: ground and dolls, as they stand and move at the start."""
 
-    def __init__(self, scene: Scene, free: bool = False) -> None:
-        self.scene = scene
-        self._free = free
-        self._client = pybullet.connect(pybullet.DIRECT)
-        self._timing: tuple[float, int] | None = None
-        self._thorough = False
-        self._gravity = math.hypot(*scene.gravity)
-        self._least_bounce = max(LEAST_BOUNCE, scene.material.restitution_speed)
-        self._unit = _unit_of_mass(scene)
-        try:
-            self._build()
-        except BaseException:
-            self.close()
-            raise
-
-    def step(self, duration: float, substeps: int, loads: Sequence[AppliedWrench] = ()) -> None:
-        """Go on by ``duration`` s in equal substeps, under ``loads`` that do not turn."""
-        timing = (duration, substeps)
-        if timing != self._timing:
-            pybullet.setPhysicsEngineParameter(
-                fixedTimeStep=duration, numSubSteps=substeps if substeps > 1 else 0,
-                erp=min(0.2, duration / substeps / RETURN),
-                contactERP=min(0.08, duration / substeps / RETURN),
-                restitutionVelocityThreshold=max(
-                    self._least_bounce, 2 * self._gravity * duration / substeps),
-                physicsClientId=self._client)
-            self._timing = timing
-        for load in loads:
-            self._apply(load)
-        pybullet.stepSimulation(physicsClientId=self._client)
-
-    def acceleration(self, coordinates: GeneralizedState,
-                     loads: Sequence[AppliedWrench] = ()) -> np.ndarray:
-        """Rates of change of ``coordinates.v``, from one small step.
-
-        PyBullet's step takes v to v + a h with a from where the step begins, so the quotient is
-        exact but for rounding. It holds where nothing touches and no limit is reached.
-        """
-        self.place(coordinates)
-        self.step(PROBE_STEP, 1, loads)
-        return (self._velocities() - coordinates.v) / PROBE_STEP
-
-    def read(self) -> State:
-        """Poses and velocities of all bones."""
-        return State.of(np.array([row for doll in self._dolls for row in self._rows(doll)]))
-
-    def coordinates(self) -> GeneralizedState:
-        """Generalised coordinates of all dolls."""
-        q: list[float] = []
-        v: list[float] = []
-        for doll in self._dolls:
-            position, orientation = pybullet.getBasePositionAndOrientation(doll.body, self._client)
-            linear, angular = pybullet.getBaseVelocity(doll.body, self._client)
-            q += position + orientation
-            v += linear + angular
-            for joint in self._joints(doll):
-                q += joint[0]
-                v += joint[1]
-        return GeneralizedState(np.array(q), np.array(v))
-
-    def get_state(self) -> tuple[State, GeneralizedState]:
-        """Both at once, in less time."""
-        rows: list[tuple] = []
-        q: list[float] = []
-        v: list[float] = []
-        for doll in self._dolls:
-            own = self._rows(doll)
-            root = own[doll.root]
-            q += root[:7]
-            v += root[7:]
-            for joint in self._joints(doll):
-                q += joint[0]
-                v += joint[1]
-            rows += own
-        return State.of(np.array(rows)), GeneralizedState(np.array(q), np.array(v))
-
-    def place(self, coordinates: GeneralizedState) -> None:
-        """Put all dolls where ``coordinates`` says."""
-        q, v = coordinates.q.tolist(), coordinates.v.tolist()
-        i = j = 0
-        for doll in self._dolls:
-            # PyBullet takes any quaternion for one of length one, and its own length for a scale.
-            length = math.hypot(*q[i + 3:i + 7])
-            pybullet.resetBasePositionAndOrientation(
-                doll.body, q[i:i + 3], [x / length for x in q[i + 3:i + 7]], self._client)
-            pybullet.resetBaseVelocity(
-                doll.body, v[j:j + 3], v[j + 3:j + 6], physicsClientId=self._client)
-            i, j = i + 7, j + 6
-            values, rates = [], []
-            for wide, deep in doll.widths:
-                values.append(q[i:i + wide])
-                rates.append(v[j:j + deep])
-                i, j = i + wide, j + deep
-            if doll.joints:
-                pybullet.resetJointStatesMultiDof(
-                    doll.body, doll.joints, values, rates, physicsClientId=self._client)
-
-    def joint_angles(self) -> np.ndarray:
-        """All joint angles in rad, in the order of Scene.angle_names."""
-        values = []
-        for doll, placement in zip(self._dolls, self.scene.dolls, strict=True):
-            states = self._joints(doll)
-            for joint in placement.doll.joints:
-                if joint.angle_names and joint.angle_names[0] not in doll.angles:
-                    values += rotation.to_xyz(states[doll.angles[joint.child]][0])
-                else:
-                    values += [states[doll.angles[name]][0][0] for name in joint.angle_names]
-        return np.array(values)
-
-    def touching(self) -> set[tuple[int, int]]:
-        """Pairs of dolls within BREAKING_DISTANCE of touching; GROUND stands for the ground."""
-        pybullet.performCollisionDetection(self._client)
-        return self.touched()
-
-    def touched(self) -> set[tuple[int, int]]:
-        """Pairs of dolls that touched in the last substep, as it saw them."""
-        points = pybullet.getContactPoints(physicsClientId=self._client)
-        return {(self._doll_of[point[1]], self._doll_of[point[2]]) for point in points}
-
-    def set_solver_iterations(self, wanted: bool) -> None:
-        """Solve contacts that bear on each other, or as fast as is enough for others."""
-        if wanted is not self._thorough:
-            self._thorough = wanted
-            pybullet.setPhysicsEngineParameter(
-                numSolverIterations=THOROUGH_ITERATIONS if wanted else SOLVER_ITERATIONS,
-                physicsClientId=self._client)
-
-    def set_ground_friction(self, wanted: bool) -> None:
-        """Take the ground's friction away, or give it back."""
-        friction = 0.0 if wanted else math.sqrt(grip(self.scene.material.friction))
-        pybullet.changeDynamics(self._ground, -1, lateralFriction=friction,
-                                physicsClientId=self._client)
-
-    def exclude_initial_penetrations(self) -> None:
-        """Let bones of one doll that overlap by more than pressed() now collide no more."""
-        depth = pressed(self.scene)
-        pybullet.performCollisionDetection(physicsClientId=self._client)
-        for point in pybullet.getContactPoints(physicsClientId=self._client):
-            if point[1] == point[2] and point[8] < -depth:
-                pybullet.setCollisionFilterPair(*point[1:5], 0, physicsClientId=self._client)
-
-    def contacts(self) -> list[Contact]:
-        """What touches at the end of the last substep."""
-        found = []
-        for point in pybullet.getContactPoints(physicsClientId=self._client):
-            a, b = self._bone_of.get(point[1:4:2]), self._bone_of.get(point[2:5:2])
-            position, normal = np.array(point[5]), np.array(point[7])
-            if a is None:
-                a, b, position, normal = b, GROUND, np.array(point[6]), -normal
-            found.append(Contact(a, GROUND if b is None else b, position, normal,
-                                 -point[8], point[9] * self._unit))
-        return found
-
-    def save(self) -> int:
-        """Give a snapshot that restore brings back to the bit."""
-        return pybullet.saveState(self._client)
-
-    def restore(self, snapshot: int) -> None:
-        """Go back to a snapshot."""
-        pybullet.restoreState(stateId=snapshot, physicsClientId=self._client)
-
-    def forget(self, snapshot: int) -> None:
-        """Give back what a snapshot holds."""
-        pybullet.removeState(snapshot, physicsClientId=self._client)
-
-    def close(self) -> None:
-        """Give everything back to the system; a second time does nothing."""
-        if self._client >= 0:
-            pybullet.disconnect(self._client)
-            self._client = -1
-
-    def _rows(self, doll: _Doll) -> list[tuple]:
-        """Position, orientation, linear and angular velocity of each bone."""
-        bones = []
-        if doll.children:
-            links = pybullet.getLinkStates(
-                doll.body, doll.children, computeLinkVelocity=1, computeForwardKinematics=1,
-                physicsClientId=self._client)
-            bones = [link[0] + link[1] + link[6] + link[7] for link in links]
-        pose = pybullet.getBasePositionAndOrientation(doll.body, self._client)
-        motion = pybullet.getBaseVelocity(doll.body, self._client)
-        bones.insert(doll.root, pose[0] + pose[1] + motion[0] + motion[1])
-        return bones
-
-    def _joints(self, doll: _Doll) -> tuple:
-        """States of the joints that move: each (angles, rates, ...)."""
-        if not doll.joints:
-            return ()
-        return pybullet.getJointStatesMultiDof(doll.body, doll.joints,
-                                               physicsClientId=self._client)
-
-    def _velocities(self) -> np.ndarray:
-        v: list[float] = []
-        for doll in self._dolls:
-            motion = pybullet.getBaseVelocity(doll.body, self._client)
-            v += motion[0] + motion[1]
-            for joint in self._joints(doll):
-                v += joint[1]
-        return np.array(v)
-
-    def _apply(self, load: AppliedWrench) -> None:
-        body, link = self._links[load.bone]
-        if link < 0:
-            position, orientation = pybullet.getBasePositionAndOrientation(body, self._client)
-        else:
-            position, orientation = pybullet.getLinkState(
-                body, link, computeForwardKinematics=1, physicsClientId=self._client)[:2]
-        turn = rotation.matrix(orientation)
-        force, torque = load.force / self._unit, load.torque / self._unit
-        arm = turn @ load.point
-        if load.local:
-            force, torque = turn @ force, turn @ torque
-        pybullet.applyExternalForce(body, link, _list(force), _list(position + arm),
-                                    pybullet.WORLD_FRAME, physicsClientId=self._client)
-        pybullet.applyExternalTorque(body, link, _list(torque), pybullet.WORLD_FRAME,
-                                     physicsClientId=self._client)
-
-    def _build(self) -> None:
+    def __init__(self, scene: Scene, free: bool, client: int) -> None:
+        self.scene, self._free, self._client = scene, free, client
+        self.unit = _unit_of_mass(scene)
+        """kg that the engine takes for one."""
         pybullet.setPhysicsEngineParameter(
             numSolverIterations=SOLVER_ITERATIONS, contactBreakingThreshold=BREAKING_DISTANCE,
             deterministicOverlappingPairs=1, enableFileCaching=0, useSplitImpulse=0, contactSlop=0,
-            physicsClientId=self._client)
-        pybullet.setGravity(*self.scene.gravity, physicsClientId=self._client)
-        self._ground = self._add_ground()
-        self._dolls = [self._add_doll(placement) for placement in self.scene.dolls]
-        self._links = [(doll.body, link) for doll in self._dolls for link in doll.links]
-        self._doll_of = {doll.body: index for index, doll in enumerate(self._dolls)}
-        if self._ground is not None:
-            self._doll_of[self._ground] = GROUND
-        self._bone_of = {link: bone for bone, link in enumerate(self._links)}
+            physicsClientId=client)
+        pybullet.setGravity(*scene.gravity, physicsClientId=client)
+        self.ground = self._add_ground()
+        self.dolls = [self._add_doll(placement) for placement in scene.dolls]
         self.layout = self._lay_out()
         self._check_sizes()
-        self.exclude_initial_penetrations()
-        for index, placement in enumerate(self.scene.dolls):
-            self._set_in_motion(self._dolls[index].body, placement)
+
+    def set_in_motion(self) -> None:
+        """Set each doll in motion as at the start, as one rigid body about its centre of mass."""
+        for doll, placement in zip(self.dolls, self.scene.dolls, strict=True):
+            self._set_in_motion(doll.body, placement)
 
     def _add_ground(self) -> int | None:
         if self.scene.ground is None or self._free:
@@ -356,14 +139,14 @@ class BulletEngine:
         return self._set_up(doll, body)
 
     def _weighed(self, doll: Ragdoll) -> Ragdoll:
-        """Give the doll with its masses, and what goes with them, in the engine's unit."""
-        if self._unit == 1:
+        """The doll with its masses, and what goes with them, in the engine's unit."""
+        if self.unit == 1:
             return doll
         return dataclasses.replace(
             doll,
-            bones=tuple(dataclasses.replace(bone, mass=bone.mass / self._unit)
+            bones=tuple(dataclasses.replace(bone, mass=bone.mass / self.unit)
                         for bone in doll.bones),
-            joints=tuple(dataclasses.replace(joint, damping=joint.damping / self._unit)
+            joints=tuple(dataclasses.replace(joint, damping=joint.damping / self.unit)
                          for joint in doll.joints))
 
     def _set_up(self, doll: Ragdoll, body: int) -> _Doll:
@@ -431,7 +214,7 @@ class BulletEngine:
     def _lay_out(self) -> DofLayout:
         """Say where in the coordinates which joint's angle and limit stands."""
         dolls = []
-        for doll, placement in zip(self._dolls, self.scene.dolls, strict=True):
+        for doll, placement in zip(self.dolls, self.scene.dolls, strict=True):
             limits = {name: pair for joint in placement.doll.joints
                       for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
             names = list(doll.angles)
@@ -448,7 +231,6 @@ class BulletEngine:
                                         f'at most {MOST_COORDINATES} coordinates, 7 for the root')
 
     def _set_in_motion(self, body: int, placement: Placement) -> None:
-        """Give a doll its velocity at the start, as one rigid body about its centre of mass."""
         if not any(placement.velocity + placement.spin):
             return
         doll = placement.doll
@@ -459,9 +241,226 @@ class BulletEngine:
                                    physicsClientId=self._client)
 
 
+class BulletEngine:
+    """A scene in PyBullet. Runs in a client of its own, so that many can live side by side."""
+
+    def __init__(self, scene: Scene, free: bool = False) -> None:
+        self.scene = scene
+        self._client = pybullet.connect(pybullet.DIRECT)
+        self._timing: tuple[float, int] | None = None
+        self._thorough = False
+        self._gravity = math.hypot(*scene.gravity)
+        self._least_bounce = max(LEAST_BOUNCE, scene.material.restitution_speed)
+        try:
+            self._take(_World(scene, free, self._client))
+        except BaseException:
+            self.close()
+            raise
+
+    def step(self, duration: float, substeps: int, loads: Sequence[AppliedWrench] = ()) -> None:
+        timing = (duration, substeps)
+        if timing != self._timing:
+            pybullet.setPhysicsEngineParameter(
+                fixedTimeStep=duration, numSubSteps=substeps if substeps > 1 else 0,
+                erp=min(0.2, duration / substeps / RETURN),
+                contactERP=min(0.08, duration / substeps / RETURN),
+                restitutionVelocityThreshold=max(
+                    self._least_bounce, 2 * self._gravity * duration / substeps),
+                physicsClientId=self._client)
+            self._timing = timing
+        for load in loads:
+            self._apply(load)
+        pybullet.stepSimulation(physicsClientId=self._client)
+
+    def acceleration(self, coordinates: GeneralizedState,
+                     loads: Sequence[AppliedWrench] = ()) -> np.ndarray:
+        """Rates of change of ``coordinates.v``, from one small step.
+
+        PyBullet's step takes v to v + a h with a from where the step begins, so the quotient is
+        exact but for rounding. It holds where nothing touches and no limit is reached.
+        """
+        self.place(coordinates)
+        self.step(PROBE_STEP, 1, loads)
+        return (self._velocities() - coordinates.v) / PROBE_STEP
+
+    def read(self) -> State:
+        return State.of(np.array([row for doll in self._dolls for row in self._rows(doll)]))
+
+    def coordinates(self) -> GeneralizedState:
+        q: list[float] = []
+        v: list[float] = []
+        for doll in self._dolls:
+            position, orientation = pybullet.getBasePositionAndOrientation(doll.body, self._client)
+            linear, angular = pybullet.getBaseVelocity(doll.body, self._client)
+            q += position + orientation
+            v += linear + angular
+            for joint in self._joints(doll):
+                q += joint[0]
+                v += joint[1]
+        return GeneralizedState(np.array(q), np.array(v))
+
+    def get_state(self) -> tuple[State, GeneralizedState]:
+        """Both at once, in less time."""
+        rows: list[tuple] = []
+        q: list[float] = []
+        v: list[float] = []
+        for doll in self._dolls:
+            own = self._rows(doll)
+            root = own[doll.root]
+            q += root[:7]
+            v += root[7:]
+            for joint in self._joints(doll):
+                q += joint[0]
+                v += joint[1]
+            rows += own
+        return State.of(np.array(rows)), GeneralizedState(np.array(q), np.array(v))
+
+    def place(self, coordinates: GeneralizedState) -> None:
+        q, v = coordinates.q.tolist(), coordinates.v.tolist()
+        i = j = 0
+        for doll in self._dolls:
+            # PyBullet takes any quaternion for one of length one, and its own length for a scale.
+            length = math.hypot(*q[i + 3:i + 7])
+            pybullet.resetBasePositionAndOrientation(
+                doll.body, q[i:i + 3], [x / length for x in q[i + 3:i + 7]], self._client)
+            pybullet.resetBaseVelocity(
+                doll.body, v[j:j + 3], v[j + 3:j + 6], physicsClientId=self._client)
+            i, j = i + 7, j + 6
+            values, rates = [], []
+            for wide, deep in doll.widths:
+                values.append(q[i:i + wide])
+                rates.append(v[j:j + deep])
+                i, j = i + wide, j + deep
+            if doll.joints:
+                pybullet.resetJointStatesMultiDof(
+                    doll.body, doll.joints, values, rates, physicsClientId=self._client)
+
+    def joint_angles(self) -> np.ndarray:
+        values = []
+        for doll, placement in zip(self._dolls, self.scene.dolls, strict=True):
+            states = self._joints(doll)
+            for joint in placement.doll.joints:
+                if joint.angle_names and joint.angle_names[0] not in doll.angles:
+                    values += rotation.to_xyz(states[doll.angles[joint.child]][0])
+                else:
+                    values += [states[doll.angles[name]][0][0] for name in joint.angle_names]
+        return np.array(values)
+
+    def touching(self) -> set[tuple[int, int]]:
+        """Pairs of dolls within BREAKING_DISTANCE of touching; GROUND stands for the ground."""
+        pybullet.performCollisionDetection(self._client)
+        return self.touched()
+
+    def touched(self) -> set[tuple[int, int]]:
+        points = pybullet.getContactPoints(physicsClientId=self._client)
+        return {(self._doll_of[point[1]], self._doll_of[point[2]]) for point in points}
+
+    def set_solver_iterations(self, wanted: bool) -> None:
+        if wanted is not self._thorough:
+            self._thorough = wanted
+            pybullet.setPhysicsEngineParameter(
+                numSolverIterations=THOROUGH_ITERATIONS if wanted else SOLVER_ITERATIONS,
+                physicsClientId=self._client)
+
+    def set_ground_friction(self, wanted: bool) -> None:
+        friction = 0.0 if wanted else math.sqrt(grip(self.scene.material.friction))
+        pybullet.changeDynamics(self._ground, -1, lateralFriction=friction,
+                                physicsClientId=self._client)
+
+    def exclude_initial_penetrations(self) -> None:
+        depth = pressed(self.scene)
+        pybullet.performCollisionDetection(physicsClientId=self._client)
+        for point in pybullet.getContactPoints(physicsClientId=self._client):
+            if point[1] == point[2] and point[8] < -depth:
+                pybullet.setCollisionFilterPair(*point[1:5], 0, physicsClientId=self._client)
+
+    def contacts(self) -> list[Contact]:
+        found = []
+        for point in pybullet.getContactPoints(physicsClientId=self._client):
+            a, b = self._bone_of.get(point[1:4:2]), self._bone_of.get(point[2:5:2])
+            position, normal = np.array(point[5]), np.array(point[7])
+            if a is None:
+                a, b, position, normal = b, GROUND, np.array(point[6]), -normal
+            found.append(Contact(a, GROUND if b is None else b, position, normal,
+                                 -point[8], point[9] * self._unit))
+        return found
+
+    def save(self) -> int:
+        return pybullet.saveState(self._client)
+
+    def restore(self, snapshot: int) -> None:
+        pybullet.restoreState(stateId=snapshot, physicsClientId=self._client)
+
+    def forget(self, snapshot: int) -> None:
+        pybullet.removeState(snapshot, physicsClientId=self._client)
+
+    def close(self) -> None:
+        if self._client >= 0:
+            pybullet.disconnect(self._client)
+            self._client = -1
+
+    def _take(self, world: _World) -> None:
+        """Note what the world holds, and let it begin."""
+        self._unit, self._ground, self._dolls = world.unit, world.ground, world.dolls
+        self.layout = world.layout
+        self._links = [(doll.body, link) for doll in self._dolls for link in doll.links]
+        self._doll_of = {doll.body: index for index, doll in enumerate(self._dolls)}
+        if self._ground is not None:
+            self._doll_of[self._ground] = GROUND
+        self._bone_of = {link: bone for bone, link in enumerate(self._links)}
+        self.exclude_initial_penetrations()
+        world.set_in_motion()
+
+    def _rows(self, doll: _Doll) -> list[tuple]:
+        """Position, orientation, linear and angular velocity of each bone."""
+        bones = []
+        if doll.children:
+            links = pybullet.getLinkStates(
+                doll.body, doll.children, computeLinkVelocity=1, computeForwardKinematics=1,
+                physicsClientId=self._client)
+            bones = [link[0] + link[1] + link[6] + link[7] for link in links]
+        pose = pybullet.getBasePositionAndOrientation(doll.body, self._client)
+        motion = pybullet.getBaseVelocity(doll.body, self._client)
+        bones.insert(doll.root, pose[0] + pose[1] + motion[0] + motion[1])
+        return bones
+
+    def _joints(self, doll: _Doll) -> tuple:
+        """States of the joints that move: each (angles, rates, ...)."""
+        if not doll.joints:
+            return ()
+        return pybullet.getJointStatesMultiDof(doll.body, doll.joints,
+                                               physicsClientId=self._client)
+
+    def _velocities(self) -> np.ndarray:
+        v: list[float] = []
+        for doll in self._dolls:
+            motion = pybullet.getBaseVelocity(doll.body, self._client)
+            v += motion[0] + motion[1]
+            for joint in self._joints(doll):
+                v += joint[1]
+        return np.array(v)
+
+    def _apply(self, load: AppliedWrench) -> None:
+        body, link = self._links[load.bone]
+        if link < 0:
+            position, orientation = pybullet.getBasePositionAndOrientation(body, self._client)
+        else:
+            position, orientation = pybullet.getLinkState(
+                body, link, computeForwardKinematics=1, physicsClientId=self._client)[:2]
+        turn = rotation.matrix(orientation)
+        force, torque = load.force / self._unit, load.torque / self._unit
+        arm = turn @ load.point
+        if load.local:
+            force, torque = turn @ force, turn @ torque
+        pybullet.applyExternalForce(body, link, _list(force), _list(position + arm),
+                                    pybullet.WORLD_FRAME, physicsClientId=self._client)
+        pybullet.applyExternalTorque(body, link, _list(torque), pybullet.WORLD_FRAME,
+                                     physicsClientId=self._client)
+
+
 def bare_loop(scene: Scene, start: GeneralizedState,
               substeps: int) -> tuple[Callable[[], None], Callable[[], None]]:
-    """Give the least that can be done in a tick, as a yardstick, and what ends it.
+    """The least that can be done in a tick, as a yardstick, and what ends it.
 
     It steps at a fixed length and reads the links once, with no thought for energy or limits.
     """
@@ -483,17 +482,17 @@ def _list(values: np.ndarray) -> list[float]:
 
 
 def _slab_is_better(scene: Scene) -> bool:
-    """Tell whether a slab stands for the ground: where single boxes slide and tumble.
+    """Whether a slab stands for the ground: where single boxes slide and tumble.
 
     Against a plane PyBullet finds one corner in a step, so that a sliding box rocks and sinks, and
-    its way is off by ten times as much. Dolls of several bones are no better off on a slab, and
-    jam sooner.
+    its displacement is off by ten times as much. Dolls of several bones are no better off on a
+    slab, and jam sooner.
     """
     return (all(len(placement.doll.bones) == 1 for placement in scene.dolls)
             and any(bone.shape.kind == 'box' for bone in scene.bones))
 
 
 def _unit_of_mass(scene: Scene) -> float:
-    """Give the kg that the engine takes for one: 1, or a power of two for giants."""
+    """The kg that the engine takes for one: 1, or a power of two for giants."""
     largest = max(bone.mass * max(bone.shape.half_extents) ** 2 for bone in scene.bones)
     return 2.0 ** max(0, math.ceil(math.log2(largest / HEAVIEST)))

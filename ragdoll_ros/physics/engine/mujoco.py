@@ -50,7 +50,6 @@ class MujocoEngine:
         self.exclude_initial_penetrations()
 
     def step(self, duration: float, substeps: int, loads: Sequence[AppliedWrench] = ()) -> None:
-        """Go on by ``duration`` s in equal substeps, under ``loads`` that do not turn."""
         self._model.opt.timestep = duration / substeps
         self._apply(loads)
         self._mujoco.mj_step(self._model, self._data, substeps)
@@ -70,7 +69,6 @@ class MujocoEngine:
         return self._outwards(self._data.qpos, self._data.qacc)
 
     def read(self) -> State:
-        """Poses and velocities of all bones."""
         self._refresh()
         data, bodies = self._data, self._bodies
         # cvel is given in the centre of mass of the whole tree
@@ -80,7 +78,6 @@ class MujocoEngine:
                      data.cvel[bodies, 3:] + np.cross(angular, arms), angular)
 
     def coordinates(self) -> GeneralizedState:
-        """Generalised coordinates of all dolls."""
         q = self._data.qpos.copy()
         for iq, _ in self._roots:
             q[iq + 3:iq + 7] = q[iq + 3:iq + 7][XYZW]
@@ -94,7 +91,6 @@ class MujocoEngine:
         return self.read(), self.coordinates()
 
     def place(self, coordinates: GeneralizedState) -> None:
-        """Put all dolls where ``coordinates`` says."""
         q, v = coordinates.q.copy(), coordinates.v.copy()
         for iq, iv in self._roots:
             turn = coordinates.q[iq + 3:iq + 7]
@@ -109,7 +105,6 @@ class MujocoEngine:
         self._stale = True
 
     def joint_angles(self) -> np.ndarray:
-        """All joint angles in rad, in the order of Scene.angle_names."""
         q, values = self.coordinates().q, []
         for place in self._angles:
             values += rotation.to_xyz(q[place:place + 4]) if isinstance(place, int) \
@@ -117,13 +112,11 @@ class MujocoEngine:
         return np.array(values)
 
     def touching(self) -> set[tuple[int, int]]:
-        """Pairs of dolls that touch where they are now; GROUND stands for the ground."""
         self._refresh()
         self._mujoco.mj_collision(self._model, self._data)
         return self.touched()
 
     def touched(self) -> set[tuple[int, int]]:
-        """Pairs of dolls that touched in the last substep, as it saw them."""
         if not self._data.ncon:
             return set()
         return {tuple(pair) for pair in self._doll_of[self._data.contact.geom].tolist()}
@@ -135,7 +128,6 @@ class MujocoEngine:
         """Nothing to do: this solver finds an answer with any friction."""
 
     def exclude_initial_penetrations(self) -> None:
-        """Let bones of one doll that overlap by more than pressed() now collide no more."""
         self._refresh()
         self._mujoco.mj_collision(self._model, self._data)
         bodies, roots = self._model.geom_bodyid, self._model.body_rootid
@@ -168,14 +160,12 @@ class MujocoEngine:
         return found
 
     def save(self) -> object:
-        """Give a snapshot that restore brings back to the bit."""
         kind = self._mujoco.mjtState.mjSTATE_INTEGRATION
         state = np.empty(self._mujoco.mj_stateSize(self._model, kind))
         self._mujoco.mj_getState(self._model, self._data, state, kind)
         return state
 
     def restore(self, snapshot: object) -> None:
-        """Go back to a snapshot."""
         kind = self._mujoco.mjtState.mjSTATE_INTEGRATION
         self._mujoco.mj_setState(self._model, self._data, snapshot, kind)
         self._stale = True
@@ -199,8 +189,7 @@ class MujocoEngine:
         self._bone_of = {self._model.geom(name).id: bone
                          for bone, name in enumerate(self.scene.bone_names)}
         self._doll_of = np.full(self._model.ngeom, GROUND)
-        counts = [len(placement.doll.bones) for placement in self.scene.dolls]
-        self._doll_of[list(self._bone_of)] = np.repeat(np.arange(len(counts)), counts)
+        self._doll_of[list(self._bone_of)] = self.scene.doll_of_bone
         self._roots, self._balls, self._angles = [], [], []
         dolls = []
         for placement in self.scene.dolls:
@@ -226,7 +215,7 @@ class MujocoEngine:
         return int(joint.qposadr[0]), int(joint.dofadr[0])
 
     def _set_in_motion(self) -> None:
-        """Give each doll its velocity at the start, as one rigid body about its centre of mass."""
+        """Set each doll in motion as at the start, as one rigid body about its centre of mass."""
         start = self.coordinates()
         for placement, (_, iv) in zip(self.scene.dolls, self._roots, strict=True):
             doll = placement.doll

@@ -99,16 +99,16 @@ class Engine(Protocol):
         """What touches at the end of the last substep."""
 
     def save(self) -> object:
-        """Give a snapshot that restore brings back to the bit."""
+        """A snapshot that restore brings back to the bit."""
 
     def restore(self, snapshot: object) -> None:
         """Go back to a snapshot."""
 
     def forget(self, snapshot: object) -> None:
-        """Give back what a snapshot holds."""
+        """Release what a snapshot holds."""
 
     def close(self) -> None:
-        """Give everything back to the system."""
+        """Release everything."""
 
 
 def pressed(scene: Scene) -> float:

@@ -18,7 +18,7 @@ ORDER = 8
 
 @functools.cache
 def ready() -> bool:
-    """Tell whether compiled code is used; a numba that does not work is named once."""
+    """Whether compiled code is used; a numba that does not work is named once."""
     if os.environ.get(SWITCH, '1') == '0':
         return False
     try:

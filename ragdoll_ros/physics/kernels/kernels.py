@@ -412,14 +412,14 @@ def _error(k: np.ndarray, h: float, nq: int, room: np.ndarray) -> float:
 
 @entry(TREE, ROW, TABLE, ANY_ROW, ANY_ROW, REAL, YES, TABLE, TABLE)
 def step(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray, v: np.ndarray,
-         h: float, known: bool, way: np.ndarray, ends: np.ndarray) -> float:
+         h: float, known: bool, dense: np.ndarray, ends: np.ndarray) -> float:
     """Go one step of ``h`` s and give the error of its end.
 
-    Puts what leads from the start to anywhere within into ``way`` (8, nq + nv), and into ``ends``
-    the rates of change at both ends; those at the start are there already if ``known``.
+    Puts the dense output's coefficients (see interpolate) into ``dense`` (8, nq + nv), and into
+    ``ends`` the rates of change at both ends; those at the start are there already if ``known``.
     """
     nq, size = len(q), len(q) + len(v)
-    work, k, y, start = room(len(tree), len(v)), np.empty((16, size)), np.empty(size), way[0]
+    work, k, y, start = room(len(tree), len(v)), np.empty((16, size)), np.empty(size), dense[0]
     start[:nq], start[nq:] = q, v
     normalize(tree, start[:nq])
     turn_spins(tree, start[:nq], start[nq:], True)
@@ -433,31 +433,32 @@ def step(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray
             y[j] += start[j]
         normalize(tree, y[:nq])
         if stage == 12:
-            way[1] = y
+            dense[1] = y
         rates(tree, gravity, loads, y[:nq], y[nq:], work, k[stage])
     for j in range(size):
-        way[1, j] -= start[j]
-        way[2, j] = h * k[0, j] - way[1, j]
-        way[3, j] = 2 * way[1, j] - h * (k[12, j] + k[0, j])
+        dense[1, j] -= start[j]
+        dense[2, j] = h * k[0, j] - dense[1, j]
+        dense[3, j] = 2 * dense[1, j] - h * (k[12, j] + k[0, j])
     for row in range(4):
-        _sum(CONTINUED[row], 16, k, h, way[4 + row])
+        _sum(CONTINUED[row], 16, k, h, dense[4 + row])
     ends[0], ends[1] = k[0], k[12]
     return _error(k, h, nq, y)
 
 
 @entry(TREE, TABLE, REAL, ROW, ROW)
-def within(tree: np.ndarray, way: np.ndarray, share: float, q: np.ndarray, v: np.ndarray) -> None:
+def interpolate(tree: np.ndarray, dense: np.ndarray, share: float, q: np.ndarray,
+                v: np.ndarray) -> None:
     """GeneralizedState at a share of the step."""
     nq, size = len(q), len(q) + len(v)
     y = np.zeros(size)
     for row in range(7, 0, -1):
         factor = share if row % 2 else 1 - share
         for j in range(size):
-            y[j] = (y[j] + way[row, j]) * factor
+            y[j] = (y[j] + dense[row, j]) * factor
     for j in range(nq):
-        q[j] = y[j] + way[0, j]
+        q[j] = y[j] + dense[0, j]
     for j in range(nq, size):
-        v[j - nq] = y[j] + way[0, j]
+        v[j - nq] = y[j] + dense[0, j]
     normalize(tree, q)
     turn_spins(tree, q, v, False)
 
@@ -517,7 +518,7 @@ def motion(masses: np.ndarray, inertias: np.ndarray, doll_of: np.ndarray, gravit
 def keep_momentum(masses: np.ndarray, doll_of: np.ndarray, gravity: np.ndarray, duration: float,
                   given: np.ndarray, spun: bool, touched: np.ndarray, before: np.ndarray,
                   sums: np.ndarray, rows: np.ndarray) -> None:
-    """Give each doll that is not ``touched`` the momentum and the way that it must have, as one
+    """Project each doll that is not ``touched`` onto its due momentum and displacement, as one
     rigid body; see ConservationProjection.momentum_due. Changes its ``sums`` (d, 20) and ``rows``
     (n, 13).
 
@@ -679,17 +680,18 @@ def change(radii: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
 
 
 @entry(TREE, ROW, ROW)
-def integrate_configuration(tree: np.ndarray, q: np.ndarray, way: np.ndarray) -> None:
-    """Move q by a small way in the directions of v; roots turn about the world's axes."""
+def integrate_configuration(tree: np.ndarray, q: np.ndarray, displacement: np.ndarray) -> None:
+    """Move q by a small displacement along the directions of v; roots turn about world axes."""
     for i in range(len(tree)):
         bone = tree[i]
         at, rate = bone.q, bone.v
         if bone.parent < 0:
             for k in range(3):
-                q[at + k] += way[rate + k]
+                q[at + k] += displacement[rate + k]
             at, rate = at + 3, rate + 3
         if bone.free:
-            a, b, c = way[rate] / 2, way[rate + 1] / 2, way[rate + 2] / 2
+            a, b, c = (displacement[rate] / 2, displacement[rate + 1] / 2,
+                       displacement[rate + 2] / 2)
             size = math.sqrt(1 + a * a + b * b + c * c)
             a, b, c, d = a / size, b / size, c / size, 1 / size
             x, y, z, w = q[at], q[at + 1], q[at + 2], q[at + 3]
@@ -700,4 +702,4 @@ def integrate_configuration(tree: np.ndarray, q: np.ndarray, way: np.ndarray) ->
             q[at], q[at + 1], q[at + 2], q[at + 3] = x, y, z, w
         else:
             for k in range(bone.dof):
-                q[at + k] += way[rate + k]
+                q[at + k] += displacement[rate + k]

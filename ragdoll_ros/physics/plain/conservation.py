@@ -105,7 +105,7 @@ class ConservationProjection:
         return groups
 
     def touched(self, pairs: set[tuple[int, int]]) -> np.ndarray:
-        """Tell which dolls (d,) are in one of the pairs."""
+        """Which dolls (d,) are in one of the pairs."""
         found = np.zeros(len(self._own_groups), bool)
         found[[doll for pair in pairs for doll in pair if doll >= 0]] = True
         return found
@@ -114,7 +114,7 @@ class ConservationProjection:
                       impulse: np.ndarray | float = 0.0, moment: np.ndarray | float | None = 0.0,
                       touched: np.ndarray | None = None
                       ) -> tuple[State, Motion, np.ndarray | None]:
-        """Give state and motion with the momentum that is due, and how roots were turned for it."""
+        """State and motion with the momentum that is due, and how roots were turned for it."""
         shift, due = self.momentum_due(before, after, duration, impulse, moment, touched)
         return self._mechanics.shifted(state, after, shift), due, shift.rotation
 
@@ -122,8 +122,8 @@ class ConservationProjection:
                      impulse: np.ndarray | float = 0.0,
                      moment: np.ndarray | float | None = 0.0,
                      touched: np.ndarray | None = None) -> tuple[Shift, Motion]:
-        """Tell what dolls in the air lack of the momentum, and of the way, that they must have,
-        and their motion with it. Those that were ``touched`` (d,) stay as they are.
+        """What dolls in the air lack of their due momentum and displacement, and their motion
+        with it. Those that were ``touched`` (d,) stay as they are.
 
         ``impulse`` (d, 3) N s and ``moment`` (d, 3) N m s are what pushes gave; no moment: the
         angular momentum is left as it is. The lack is made up by a motion of the whole doll as
@@ -207,13 +207,13 @@ class ConservationProjection:
         return GeneralizedState(q, v)
 
     def burst(self, motion: Motion, groups: np.ndarray) -> np.ndarray:
-        """Tell which dolls (d,) have far more than they may even after a correction."""
+        """Which dolls (d,) have far more than they may even after a correction."""
         scale = motion.kinetic + self._fall + self.budget.put_in
         return self.surplus(motion, groups) > BURST * scale
 
     def stopped(self, start: GeneralizedState, end: GeneralizedState,
                 burst: np.ndarray) -> GeneralizedState:
-        """Give ``end`` with the dolls that have ``burst`` (d,) at rest where they were."""
+        """``end`` with the dolls that have ``burst`` (d,) at rest where they were."""
         q, v = end.q.copy(), end.v.copy()
         for doll in np.flatnonzero(burst):
             q[self._layout.own_q[doll]] = start.q[self._layout.own_q[doll]]

@@ -36,19 +36,16 @@ class EngineDynamics:
         self._damping_rate = damping_rate(scene)
 
     def state(self, coordinates: GeneralizedState) -> State:
-        """Poses and velocities of all bones."""
         self._engine.place(coordinates)
         return self._engine.read()
 
     def acceleration(self, coordinates: GeneralizedState,
                      loads: Sequence[AppliedWrench] = ()) -> np.ndarray:
-        """Rates of change of ``coordinates.v``."""
         return self._engine.acceleration(coordinates, loads)
 
     def integrate_configuration(self, coordinates: GeneralizedState,
-                                way: np.ndarray) -> GeneralizedState:
-        """Give the coordinates after a small way (nv,) m and rad in the directions of v."""
-        return self._layout.integrate_configuration(coordinates, way)
+                                displacement: np.ndarray) -> GeneralizedState:
+        return self._layout.integrate_configuration(coordinates, displacement)
 
     def longest(self, accuracy: Accuracy, fastest: float) -> float:
         """Longest path, s, that speeds and damping allow."""
@@ -62,11 +59,10 @@ class EngineDynamics:
 
     def fly(self, start: GeneralizedState, duration: float, steps: int,
             loads: Sequence[AppliedWrench] = ()) -> GeneralizedState:
-        """Give the coordinates ``duration`` s later, in equal steps of order 4."""
+        """The coordinates ``duration`` s later, in equal steps of order 4."""
         return fly(self._engine, start, duration, 4, steps, loads)
 
     def close(self) -> None:
-        """Give the engine back."""
         self._engine.close()
 
 
@@ -107,7 +103,7 @@ class EnginePath:
         self.end = self._outward(*self._end)
 
     def at(self, time: float) -> GeneralizedState:
-        """Give the coordinates ``time`` s after the start."""
+        """The coordinates ``time`` s after the start."""
         s = time / self.duration
         if s > 1 - 1e-12:
             return self.end
@@ -130,7 +126,7 @@ class EnginePath:
 
 def fly(engine: Engine, start: GeneralizedState, duration: float, order: int, steps: int = 1,
         loads: Sequence[AppliedWrench] = ()) -> GeneralizedState:
-    """Give the coordinates ``duration`` s later, in equal steps of a method of this order.
+    """The coordinates ``duration`` s later, in equal steps of a method of this order.
 
     ``engine`` must hold the scene without contacts and limits; where it ends up is undefined.
     """

@@ -46,7 +46,7 @@ class JointLimits:
         self._held |= self._past > 0
 
     def is_active(self, coordinates: GeneralizedState, duration: float) -> bool:
-        """Tell whether a joint presses against its limit, or will within ``duration`` s."""
+        """Whether a joint presses against its limit, or will within ``duration`` s."""
         self._look(coordinates)
         past, ahead = self._past, self._past + self._speeds * duration
         self._held &= past > -AT_LIMIT

@@ -20,10 +20,8 @@ class Mechanics:
         self.masses = np.array([bone.mass for bone in bones])
         self.inertias = np.array([bone.inertia for bone in bones])
         self.gravity = np.array(scene.gravity)
-        counts = [len(placement.doll.bones) for placement in scene.dolls]
-        self.starts = np.cumsum([0, *counts[:-1]])
-        self.doll_of = np.repeat(np.arange(len(counts)), counts)
-        self._members = (self.doll_of == np.arange(len(counts))[:, None]).astype(float)
+        self.doll_of = scene.doll_of_bone
+        self._members = (self.doll_of == np.arange(len(scene.dolls))[:, None]).astype(float)
         self._weights = self._members * self.masses
         self.doll_masses = self._weights.sum(axis=1)
         self._of_points = _sums_of_points()
@@ -50,7 +48,7 @@ class Mechanics:
                       sums[:, 4:].reshape(-1, 3, 3))
 
     def shifted(self, state: State, motion: Motion, shift: Shift) -> State:
-        """Give the state after each doll is moved on and set in motion as one rigid body."""
+        """The state after each doll is moved on and set in motion as one rigid body."""
         orientations, angular = state.orientations, state.angular_velocities
         if shift.rotation is not None:
             turns = shift.rotation[self.doll_of]
@@ -60,10 +58,11 @@ class Mechanics:
                 (shift.angular_velocity @ _CROSS).reshape(-1, 3, 3))
         if len(shift.displacement) > 1:
             rows = tuple(row[self.doll_of] for row in rows)
-        way, linear, spin, centre, turning = rows
+        displacement, linear, angular_velocity, centre, turning = rows
         turned = np.matmul((state.positions - centre)[:, None, :], turning)[:, 0]
-        return State(state.positions + way, orientations, state.linear_velocities + linear + turned,
-                     angular + spin)
+        return State(state.positions + displacement, orientations,
+                     state.linear_velocities + linear + turned,
+                     angular + angular_velocity)
 
 
 _CROSS = np.array([[0, 0, 0, 0, 0, 1, 0, -1, 0], [0, 0, -1, 0, 0, 0, 1, 0, 0],

@@ -24,8 +24,7 @@ class Reach:
         self._thinnest = min(min(bone.shape.half_extents) for bone in bones)
         self._ground = scene.ground
         self._normal = np.array(scene.ground.normal if scene.ground else (0, 0, 1))
-        counts = [len(placement.doll.bones) for placement in scene.dolls]
-        self._bounds = np.cumsum([0, *counts], dtype=np.int64)
+        self._bounds = np.array([0, *(own.stop for own in scene.bone_slices)], np.int64)
         self._last: tuple[State | None, np.ndarray] = (None, np.zeros(0))
         """The heights told last, and of which state."""
 

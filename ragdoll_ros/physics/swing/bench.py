@@ -7,17 +7,18 @@ import time
 import numpy as np
 
 from ...model.rotation import from_rotation_vector
+from ...model.state import State
 from ...model.swing import Swing, strand
-from .frames import Frames, Track
 from .mount import Mount
 from .swings import Swings
+from .track import Track
 
 
 def tick_cost(count: int = 1000, links: int = 1, bones: int = 10, tick: float = 0.01,
               ticks: int = 200) -> float:
     """Median time, s, of a tick of ``tick`` s with ``count`` swings of ``links`` damped springs.
 
-    The bones shake and rotate at 3 Hz. A tick is all of it: the bones' frames told, the swings
+    The bones shake and rotate at 3 Hz. A tick is all of it: the bones' state told, the swings
     moved, every mass's position in the world read.
     """
     random = np.random.default_rng(0)
@@ -29,13 +30,13 @@ def tick_cost(count: int = 1000, links: int = 1, bones: int = 10, tick: float = 
                              np.array(swing.directions())))
     track = Track()
     swings = Swings(mounted, (0, 0, -9.8), track)
-    frames = [_shaken(bones, number * tick) for number in range(ticks + 1)]
-    track.tell(0.0, frames[0])
+    states = [_shaken(bones, number * tick) for number in range(ticks + 1)]
+    track.tell(0.0, states[0])
     swings.evaluate(0.0)
     costs = []
     for number in range(1, ticks + 1):
         begin = time.perf_counter()
-        track.tell(number * tick, frames[number])
+        track.tell(number * tick, states[number])
         _ = swings.evaluate(number * tick).positions
         costs.append(time.perf_counter() - begin)
     return statistics.median(costs)
@@ -49,13 +50,13 @@ def main() -> None:
         print(f'{label:22}{tick_cost(count, links) * 1e6:14.1f}', flush=True)
 
 
-def _shaken(bones: int, t: float) -> Frames:
+def _shaken(bones: int, t: float) -> State:
     rate = 6 * np.pi
     axis = np.tile([0.2, 0.1, 0.3], (bones, 1))
     move = np.tile([0.0, 0.05, 0.02], (bones, 1))
     sin, cos = np.sin(rate * t), np.cos(rate * t)
-    return Frames(move * sin, from_rotation_vector(axis * sin), move * rate * cos,
-                  axis * rate * cos, np.ones((bones, 3)))
+    return State(move * sin, from_rotation_vector(axis * sin), move * rate * cos,
+                 axis * rate * cos)
 
 
 if __name__ == '__main__':

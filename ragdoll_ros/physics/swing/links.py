@@ -87,7 +87,7 @@ class Links:
     @classmethod
     def at(cls, seat: Seat, rest: np.ndarray, direction: np.ndarray,
            rate: np.ndarray | None = None) -> Links:
-        """Give links that point so; without a rate they are at rest in their frame."""
+        """Links that point so; without a rate they are at rest in their frame."""
         drift = cross(seat.spin, direction)
         return cls(seat, direction, drift if rate is None else rate,
                    arc(direction, seat.outward(rest)), drift)
@@ -135,7 +135,7 @@ class Level:
 
     def swing(self, now: Links, seat: Seat, step: Step,
               forces: tuple[np.ndarray, np.ndarray]) -> Links:
-        """Give the links one ``step`` later, when their seats are at ``seat``."""
+        """The links one ``step`` later, when their seats are at ``seat``."""
         d, rate, pull, drift = now.direction, now.rate, now.pull, now.drift
         first, last = forces
         turned = arc(d, seat.outward(now.seat.inward(d)))
@@ -170,7 +170,7 @@ class Level:
         return then.drift + np.minimum(np.sqrt(share), 1) * relative
 
     def tips(self, links: Links) -> Seat:
-        """Give the masses' own motion and frames: the seats of the next level.
+        """The masses' own motion and frames: the seats of the next level.
 
         The frame turns with the rod by the smallest turn from the rest direction n to d; its
         angular velocity relative to the seat is (n + d) x d' / (1 + n . d).

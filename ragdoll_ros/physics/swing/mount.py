@@ -9,15 +9,15 @@ import numpy as np
 from ...model import rotation
 from ...model.ragdoll import Bone
 from ...model.scene import Scene
+from ...model.state import State
 from ...model.swing import Swing
-from .frames import Frames
 from .links import Level, Seat
 from .sphere import cross
 
 
 @dataclass(frozen=True)
 class Mount:
-    """A swing on bone number ``bone`` of the frames; root and directions in the bone's frame."""
+    """A swing on bone number ``bone`` of the state; root and directions in the bone's frame."""
 
     swing: Swing
     bone: int
@@ -64,23 +64,22 @@ class Roots:
 
     @classmethod
     def of(cls, mounted: Sequence[Mount]) -> Roots:
-        """Give the roots of mounted swings."""
+        """The roots of mounted swings."""
         place = np.array([mount.root for mount in mounted], float).reshape(-1, 3).T
         return cls(np.array([mount.bone for mount in mounted], int), np.ascontiguousarray(place))
 
-    def seat(self, frames: Frames) -> Seat:
-        """Give what the roots do while the bones are at these frames."""
-        axes = rotation.matrix(frames.orientations).transpose(2, 1, 0).reshape(9, -1)
-        rows = np.concatenate([axes, frames.positions.T, frames.linear_velocities.T,
-                               frames.angular_velocities.T,
-                               frames.scales.T]).take(self.bone, axis=1)
+    def seat(self, bones: State) -> Seat:
+        """What the roots do while the bones are in this state."""
+        axes = rotation.matrix(bones.orientations).transpose(2, 1, 0).reshape(9, -1)
+        rows = np.concatenate([axes, bones.positions.T, bones.linear_velocities.T,
+                               bones.angular_velocities.T]).take(self.bone, axis=1)
         axes, spin = rows[:9].reshape(3, 3, -1), rows[15:18]
-        arm = np.einsum('jin,jn->in', axes, self.place * rows[18:])
+        arm = np.einsum('jin,jn->in', axes, self.place)
         return Seat(rows[9:12] + arm, rows[12:15] + cross(spin, arm), axes, spin)
 
 
 def levels(mounted: Sequence[Mount], gravity: np.ndarray) -> list[Level]:
-    """Give the links of chains level by level; ``mounted`` has the longest chains first.
+    """The links of chains level by level; ``mounted`` has the longest chains first.
 
     Level i holds link i of the first so many swings that have one.
     """

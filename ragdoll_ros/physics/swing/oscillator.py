@@ -27,7 +27,7 @@ class Flow:
 
 
 def flow(w: np.ndarray, c: np.ndarray, h: float) -> Flow:
-    """Give the exact flow for stiffness ``w`` (1/s^2), damping ``c`` (1/s) and step ``h`` (s).
+    """The exact flow for stiffness ``w`` (1/s^2), damping ``c`` (1/s) and step ``h`` (s).
 
     With a, b the roots of s^2 + c s + w times h, the three are divided differences of the
     exponential function: m = h exp[a, b], n1 = h^2 exp[0, a, b], n3 = h^2 exp[0, 0, a, b]

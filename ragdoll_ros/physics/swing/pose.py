@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ...model import rotation
-from .frames import Frames
+from ...model.state import State
 from .links import Level, Links
 from .mount import Mount
 from .sphere import cross, dot
@@ -27,7 +27,7 @@ class Order:
 
     @classmethod
     def of(cls, mounted: Sequence[Mount], chains: Sequence[Mount]) -> Order:
-        """Give the order for mounted swings, of which ``chains`` are not free."""
+        """The order for mounted swings, of which ``chains`` are not free."""
         begins, count = {}, 0
         for mount in mounted:
             begins[id(mount)] = count
@@ -45,7 +45,7 @@ class Order:
         return np.array_equal(self.chained, np.arange(len(self.bone)))
 
     def gather(self, chained: Sequence[np.ndarray], free: np.ndarray) -> np.ndarray:
-        """Give one row for each mass from the levels' columns and the free masses' rows."""
+        """One row for each mass from the levels' columns and the free masses' rows."""
         if len(chained) == 1 and self.plain:
             return chained[0].T
         out = np.empty((len(self.bone), free.shape[1]))
@@ -69,12 +69,11 @@ class SwingState:
     """All m masses of the swings at ``time`` s, in the scene's order; worked out when asked for.
 
     A mass's orientation is that of its rod's frame: at rest it is the bone's own, and from
-    there it has turned with the rod by the smallest turns. ``local_`` is in the bone's frame:
-    the inverse of the bone's full pose (place, turn and scale).
+    there it has turned with the rod by the smallest rotations.
     """
 
     time: float
-    frames: Frames
+    bones: State
     levels: Sequence[Level] = field(repr=False)
     links: Sequence[Links] = field(repr=False)
     flight: Flight = field(repr=False)
@@ -120,24 +119,10 @@ class SwingState:
         for level, links in zip(self.levels, self.links, strict=True):
             count = len(level.length)
             bones = self.order.bone[self.order.chained[begin:begin + count]]
-            frame = turns[-1][:, :count].T if turns else self.frames.orientations[bones]
+            frame = turns[-1][:, :count].T if turns else self.bones.orientations[bones]
             n = links.seat.outward(level.rest)
             arcs = np.vstack([cross(n, links.direction), 1 + dot(n, links.direction)])
             arcs[0, np.sum(arcs * arcs, axis=0) < 1e-24] = 1
             turns.append(rotation.multiply(rotation.normalized(arcs.T), frame).T)
             begin += count
         return self.order.gather(turns, self.flight.orientations)
-
-    @cached_property
-    def local_positions(self) -> np.ndarray:
-        """(m, 3) in units of the bones' frames (m, where the scale is 1)."""
-        bone = self.order.bone
-        offset = self.positions - self.frames.positions[bone]
-        back = rotation.inverse(self.frames.orientations)[bone]
-        return rotation.rotate(back, offset) / self.frames.scales[bone]
-
-    @cached_property
-    def local_orientations(self) -> np.ndarray:
-        """(m, 4) unit quaternions x, y, z, w, in the bones' frames."""
-        back = rotation.inverse(self.frames.orientations)[self.order.bone]
-        return rotation.multiply(back, self.orientations)

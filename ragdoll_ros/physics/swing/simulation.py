@@ -7,10 +7,10 @@ import numpy as np
 
 from ...model.scene import SECOND, Scene
 from ...model.state import State
-from .frames import Frames, Track
 from .mount import mounts
 from .pose import SwingState
 from .swings import Swings
+from .track import Track
 
 
 class SwingSimulation:
@@ -41,14 +41,11 @@ class SwingSimulation:
         self.state = self._swings.evaluate(time / SECOND)
 
     def _tell(self, time: int, state: State) -> None:
-        bones = self._bones
-        self._track.tell(time / SECOND, Frames(
-            state.positions[bones], state.orientations[bones], state.linear_velocities[bones],
-            state.angular_velocities[bones], np.ones((len(bones), 3))))
+        self._track.tell(time / SECOND, State.of(state.rows[self._bones]))
 
 
 def swing_simulation(scene: Scene) -> SwingSimulation | None:
-    """Give what lets a scene's swings follow, or None for a scene without any."""
+    """What lets a scene's swings follow, or None for a scene without any."""
     return SwingSimulation(scene) if any(placement.doll.swings
                                          for placement in scene.dolls) else None
 

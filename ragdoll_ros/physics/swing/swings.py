@@ -22,7 +22,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ...model import rotation
-from .frames import Frames
+from ...model.state import State
 from .links import Links, Seat, Step
 from .mount import Mount, Roots, levels
 from .pose import Flight, Order, SwingState
@@ -48,7 +48,7 @@ class Swings:
     """
 
     def __init__(self, mounted: Sequence[Mount], gravity: Sequence[float],
-                 motion: Callable[[float], Frames], step: float | None = None) -> None:
+                 motion: Callable[[float], State], step: float | None = None) -> None:
         self.names = [name for mount in mounted for name in mount.names]
         self.motion = motion
         gravity = np.array(gravity, float)
@@ -63,7 +63,7 @@ class Swings:
         self._begin: float | None = None
 
     def evaluate(self, time: float) -> SwingState:
-        """Give all masses at ``time`` s.
+        """All masses at ``time`` s.
 
         The first call, and one for an earlier time than the last, starts from rest: every
         link in its rest direction, still in its bone's frame.
@@ -91,11 +91,11 @@ class Swings:
         ``directions`` (m, 3) are unit vectors and ``rates`` (m, 3) 1/s theirs, world frame,
         one for each mass in the scene's order (those of free masses are ignored).
         """
-        frames = self.motion(time)
+        bones = self.motion(time)
         self._begin = self._time = time
         self._count = 0
         self._now = []
-        seat = self._roots.seat(frames)
+        seat = self._roots.seat(bones)
         offset = 0
         for level in self._levels:
             count = len(level.length)
@@ -107,7 +107,7 @@ class Swings:
             self._now.append(Links.at(seat, level.rest, np.ascontiguousarray(pointing), rate))
             seat = level.tips(self._now[-1])
             offset += count
-        self._free.begin(time, frames)
+        self._free.begin(time, bones)
         self._answer = self._give(self._now, time)
 
     def _grid(self) -> float:
@@ -146,7 +146,7 @@ class Swings:
         return then
 
     def _factors(self, h: float) -> list[Step]:
-        """Give each level's factors for a step; those in use are kept."""
+        """Each level's factors for a step; those in use are kept."""
         if h not in self._steps:
             if len(self._steps) >= MOST_PARTS:
                 self._steps.clear()
@@ -173,16 +173,16 @@ class _Free:
                                   for mount, _ in links]).reshape(-1, 3)
         self._velocity = np.array([mount.swing.velocity for mount, _ in links]).reshape(-1, 3)
 
-    def begin(self, time: float, frames: Frames) -> None:
+    def begin(self, time: float, bones: State) -> None:
         """Let go at ``time`` s, the masses where their rods at rest would hold them."""
         self._begin = time
-        self._turn = frames.orientations[self._bone]
-        arm = rotation.rotate(self._turn, frames.scales[self._bone] * self._root)
+        self._turn = bones.orientations[self._bone]
+        arm = rotation.rotate(self._turn, self._root)
         rod = rotation.rotate(self._turn, self._rod)
-        self._from = frames.positions[self._bone] + arm + rod
+        self._from = bones.positions[self._bone] + arm + rod
 
     def at(self, time: float) -> Flight:
-        """Give the masses at ``time`` s."""
+        """The masses at ``time`` s."""
         if not len(self._bone):
             return _NOTHING
         t = time - self._begin
@@ -206,7 +206,7 @@ def _parts(forces: tuple[np.ndarray, np.ndarray], h: float) -> int:
 
 
 def _first(seat: Seat, count: int) -> Seat:
-    """Give the first so many of the seats."""
+    """The first so many of the seats."""
     if seat.point.shape[1] == count:
         return seat
     return Seat(seat.point[:, :count], seat.velocity[:, :count], seat.axes[:, :, :count],

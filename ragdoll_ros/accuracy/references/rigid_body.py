@@ -9,7 +9,7 @@ from ...model import rotation
 from .integration import integrate
 
 
-def tumble(inertia: Sequence[float], omega: Sequence[float],
+def torque_free_rotation(inertia: Sequence[float], omega: Sequence[float],
            times: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
     """Orientations (t, 4) and angular velocities (t, 3) rad/s in the body's frame.
 

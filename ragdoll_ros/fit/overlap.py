@@ -1,11 +1,11 @@
-"""Bodies as triangles and as points: for pictures, and for how far they overlap."""
+"""How far bodies overlap each other, and how much of a skin they cover; bind pose."""
 from __future__ import annotations
 
 import numpy as np
 
-from ..model import rotation
 from ..model.ragdoll import Bone
 from ..model.shapes import Shape
+from .frames import from_body, to_body
 
 DEEP = 0.001
 """Bodies overlap where one's point is deeper than this in the other, m."""
@@ -19,21 +19,15 @@ def filling(shape: Shape) -> np.ndarray:
     return points[shape.signed_distance(points) <= 0]
 
 
-def placed(bone: Bone, points: np.ndarray) -> np.ndarray:
-    """Points (p, 3) of a body's own axes in the doll's frame."""
-    return rotation.rotate(np.array(bone.orientation), points) + bone.position
-
-
 def depth_in(bone: Bone, points: np.ndarray) -> np.ndarray:
-    """How deep (p,) m points of the doll's frame are in a body; below zero outside."""
-    back = rotation.inverse(np.array(bone.orientation))
-    return -bone.shape.signed_distance(rotation.rotate(back, points - np.array(bone.position)))
+    """How deep (p,) m points (p, 3) of the doll's frame are in a body; below zero outside."""
+    return -bone.shape.signed_distance(to_body(bone, points))
 
 
 def overlapping_pairs(bones: tuple[Bone, ...]) -> list[tuple[str, str]]:
-    """Find the pairs of bodies that overlap in the bind pose."""
-    clouds = [np.concatenate([placed(bone, bone.shape.mesh()[0]),
-                              placed(bone, filling(bone.shape))]) for bone in bones]
+    """Names of the pairs of bodies that overlap by more than DEEP."""
+    clouds = [from_body(bone, np.concatenate([bone.shape.mesh()[0], filling(bone.shape)]))
+              for bone in bones]
     reaches = [float(np.linalg.norm(bone.shape.half_extents)) for bone in bones]
     found = []
     for i, first in enumerate(bones):
@@ -48,7 +42,7 @@ def overlapping_pairs(bones: tuple[Bone, ...]) -> list[tuple[str, str]]:
 
 
 def covered(bones: tuple[Bone, ...], points: np.ndarray, tolerance: float) -> np.ndarray:
-    """Tell which points (p,) of the doll's frame lie in some body, or within the tolerance."""
+    """Which (p,) of points (p, 3) m, doll's frame, lie in some body, or within ``tolerance`` m."""
     inside = np.zeros(len(points), bool)
     for bone in bones:
         inside[~inside] = depth_in(bone, points[~inside]) >= -tolerance
@@ -59,7 +53,7 @@ def shared_volume(bones: tuple[Bone, ...]) -> float:
     """Share of the bodies' volume, 0 to 1, that lies in another body too."""
     whole = shared = 0.0
     for bone in bones:
-        points = placed(bone, filling(bone.shape))
+        points = from_body(bone, filling(bone.shape))
         others = tuple(other for other in bones if other is not bone)
         share = float(np.mean(covered(others, points, 0.0))) if others else 0.0
         whole += bone.shape.volume

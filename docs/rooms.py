@@ -1,0 +1,79 @@
+"""Draws docs/rooms.png: the rooms of the package and who imports whom, read from the code.
+
+python docs/rooms.py
+"""
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use('Agg')
+import matplotlib.pyplot as plt
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / 'test'))
+from test_rooms import PACKAGE, imports, modules  # noqa: E402
+
+IDEAS = {'model': 'what a scene is', 'files': 'model as text and back',
+         'physics': 'how a scene moves', 'fit': 'a character becomes a doll',
+         'ros': 'topics, parameters, services', 'viewer': 'the page in the browser',
+         'accuracy': 'the report and its references'}
+COLUMNS = {'viewer': 0.0, 'ros': -3.0, 'accuracy': 3.0, 'physics': -1.6, 'fit': 1.6}
+WIDE, HIGH = 2.7, 0.62
+
+
+def arrows() -> Counter:
+    """Number of imports from each room (or its subfolder ``sources``) to each other."""
+    found: Counter = Counter()
+    for name, target in imports(PACKAGE):
+        rooms = name.partition('.')[0], target.partition('.')[0]
+        if rooms[0] != rooms[1] and set(rooms) <= set(IDEAS):
+            found[rooms] += 1
+    return found
+
+
+def floors(edges: Counter) -> dict[str, int]:
+    """Floor of each room: one above the highest that it imports."""
+    def floor(room: str) -> int:
+        return max((1 + floor(target) for source, target in edges if source == room), default=0)
+    return {room: floor(room) for room in IDEAS}
+
+
+def draw(path: Path) -> None:
+    """Draw the rooms, floor by floor; what all above it import is a floor that they stand on."""
+    edges = arrows()
+    level = floors(edges)
+    files = Counter(name.partition('.')[0] for name in modules(PACKAGE))
+    under = [room for room in IDEAS if all((other, room) in edges for other in IDEAS
+                                           if level[other] > level[room])]
+    under = [room for room in under if sum(level[o] == level[room] for o in IDEAS) == 1][:2]
+    figure, axes = plt.subplots(figsize=(10, 6))
+    places = {}
+    for height in sorted(set(level.values())):
+        for room in [room for room in IDEAS if level[room] == height]:
+            x, y = COLUMNS.get(room, 0.0), 1.2 * height
+            places[room], wide = (x, y), 8.7 if room in under else WIDE
+            axes.add_patch(plt.Rectangle((x - wide / 2, y - HIGH / 2), wide, HIGH, zorder=3,
+                                         fc='#dde8f4', ec='#3b5b7c'))
+            axes.text(x, y + 0.1, f'{room}/', ha='center', va='center', weight='bold', zorder=4)
+            axes.text(x, y - 0.15, f'{IDEAS[room]}, {files[room]} files', ha='center',
+                      va='center', size=7.5, zorder=4)
+    for (source, target), count in edges.items():
+        if target in under:
+            continue
+        (x, y), (u, v) = places[source], places[target]
+        axes.annotate('', (u + 0.25 * (x - u), v + HIGH / 2), (x + 0.25 * (u - x), y - HIGH / 2),
+                      arrowprops={'arrowstyle': '-|>', 'color': '0.35', 'lw': 1.2, 'shrinkA': 0,
+                                  'shrinkB': 0})
+        axes.text((x + u) / 2 + 0.1, (y + v) / 2, str(count), size=7.5, color='0.35')
+    axes.set_xlim(-4.5, 4.5)
+    axes.set_ylim(-0.5, 1.2 * max(level.values()) + 0.5)
+    axes.axis('off')
+    figure.savefig(path, dpi=110, bbox_inches='tight')
+
+
+if __name__ == '__main__':
+    draw(ROOT / 'docs' / 'rooms.png')

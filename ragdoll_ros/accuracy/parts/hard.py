@@ -1,0 +1,125 @@
+"""Hard cases: each is run and held against its rule."""
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+
+import numpy as np
+
+from ...files.scene import load_scene
+from ...model.push import Push
+from ...model.ragdoll import Bone, Ragdoll
+from ...model.scene import Placement
+from ...model.shapes import Sphere
+from ...physics.simulation import Simulation
+from ..hard_cases import SINKING, HardCase, hard_cases
+from ..measure import Measure
+from ..methods import by_name, run
+from ..runner import Job, Options, Row
+from ..trajectory import Trajectory
+from ..trial import Trial
+
+NAME = 'hard'
+RESTING = 'rest for 10 min'
+EXCESS, GAP, REST = 1e-3, 1e-3, 0.05
+"""Energy from nothing as a share, m between the ends of a joint, m/s: more breaks every rule."""
+
+QUICK_CASES = ('mass ratio 1:100', 'start in a self-overlap', 'limits of 2°', 'scale 0.01',
+               'hits the ground at 100 m/s', 'spin 20 rad/s', 'limit slams')
+
+
+def jobs(options: Options, accuracy: str = 'normal') -> list[Job]:
+    """Every case at a setting, and beside it PyBullet at N = 10."""
+    made = []
+    for case in hard_cases():
+        if options.quick and case.name not in QUICK_CASES:
+            continue
+        for method in (f'ours-{accuracy}', *(() if options.quick else ('bullet-10',))):
+            weight = 20 if 'ten dolls' in case.name else 3
+            made.append(Job(NAME, f'{case.name}, {method}', functools.partial(
+                measure, case.name, method), weight))
+    made.append(Job(NAME, RESTING, functools.partial(rest, accuracy), 4))
+    return made
+
+
+def measure(name: str, method_name: str) -> list[Row]:
+    """A case run by a method: one row. What of its rule does not hold is its published 'faults'."""
+    case = next(case for case in hard_cases() if case.name == name)
+    trial = case.make()
+    result = run(by_name(method_name), trial)
+    row: Row = {'case': name, 'method': method_name,
+                'cpu_s_per_s': float(result.costs.sum() / trial.duration)}
+    if not result.trajectory.finite:
+        return [{**row, 'faults': ['NaN'], 'passed': False}]
+    row |= figures(case, trial, result.trajectory)
+    row['faults'] = violations(case, row)
+    return [{**row, 'passed': not row['faults']}]
+
+
+def figures(case: HardCase, trial: Trial, trajectory: Trajectory) -> Row:
+    """Figures the rules are about; names end in their units."""
+    measure = Measure(trial.scene)
+    speeds = np.linalg.norm(trajectory.linear_velocities, axis=-1).max(axis=1)
+    energy, work = measure.energy(trajectory), measure.work(trial, trajectory)
+    lift = (sum(bone.mass for bone in trial.scene.bones) * case.rule.lift_m
+            * float(np.linalg.norm(trial.scene.gravity)))
+    own = np.maximum.accumulate(energy[0] + work + lift)
+    return {'excess': float(((energy - energy[0] - work - lift) / own).max()),
+            'gap_m': measure.joint_gap(trajectory), 'overshoot_rad': measure.overshoot(trajectory),
+            'sinking_m': measure.sinking(trajectory),
+            'end_sinking_m': measure.sinking(trajectory.part(slice(-1, None))),
+            'fastest_m_s': float(speeds.max()),
+            'end_m_s': float(speeds[-10:].max()), 'settled_s': measure.settling_time(trajectory)}
+
+
+def violations(case: HardCase, row: Row) -> list[str]:
+    """What of a case's rule does not hold, in words; NaN holds no rule."""
+    rule, found = case.rule, []
+    size = max(1.0, case.scale)
+    bounds = (('excess', EXCESS, 'energy from nothing'), ('gap_m', GAP * size, 'gap'),
+              ('overshoot_rad', rule.overshoot_rad, 'overshoot'),
+              ('sinking_m', rule.sinking_m and rule.sinking_m * size, 'sinking'),
+              ('end_sinking_m', SINKING * size, 'stays sunk'),
+              ('fastest_m_s', rule.exit_m_s, 'speed'),
+              ('end_m_s', REST * math.sqrt(size) if rule.rest else None, 'not at rest'))
+    for key, bound, text in bounds:
+        if bound is not None and not row[key] <= bound:
+            found.append(text)
+    return found
+
+
+def rest(accuracy: str) -> list[Row]:
+    """Ten minutes on the ground: settle in 5 s, stand, sleep, wake by push and by touch."""
+    found, fastest = [], 0.0
+    with Simulation(load_scene('drop'), accuracy=accuracy) as simulation:
+        settled = math.inf
+        for tick in range(60_000):
+            speed = float(np.abs(simulation.advance().linear_velocities).max())
+            if tick == 500:
+                settled = speed
+            if tick > 500:
+                fastest = max(fastest, speed)
+        found += ['not settled in 5 s'] * (settled > REST)
+        found += ['moves after 5 s'] * (fastest > 1e-3)
+        found += ['does not sleep'] * (not simulation.asleep)
+        simulation.push(Push('head', (0.0, 0.0, 300.0), duration=0.1))
+        simulation.advance()
+        speed = float(np.abs(simulation.advance().linear_velocities).max())
+        found += ['a push does not wake it'] * (not speed > 0.1)
+    found += ['a touch does not wake it'] * (not _wakes_by_touch(accuracy))
+    return [{'case': RESTING, 'method': f'ours-{accuracy}', 'end_m_s': fastest,
+             'faults': found, 'passed': not found}]
+
+
+def _wakes_by_touch(accuracy: str) -> bool:
+    """A doll that has lain for seconds is hit by a ball, 1 m wide, that rolls up (5.5 s)."""
+    scene = load_scene('drop')
+    ball = Ragdoll('ball', (Bone('ball', Sphere(0.5), 50.0, (0.0, 0.0, 0.0)),))
+    rolling = Placement(ball, position=(-33.0, 0.0, 0.5), velocity=(6.0, 0.0, 0.0),
+                        spin=(0.0, 12.0, 0.0))
+    scene = dataclasses.replace(scene, dolls=(scene.dolls[0], rolling))
+    with Simulation(scene, accuracy=accuracy) as simulation:
+        speeds = [float(np.abs(simulation.advance().linear_velocities[:-1]).max())
+                  for _ in range(700)]
+    return speeds[450] < REST and max(speeds[451:]) > 0.5

@@ -1,0 +1,38 @@
+"""What the bodies carry: every bone of the skeleton, and the swings."""
+from __future__ import annotations
+
+import numpy as np
+
+from ..model.ragdoll import Bone, SkeletonFrame
+from ..model.swing import Swing
+from .character import Character
+from .frames import pose_in_body
+from .groups import Group
+from .spring_recipe import swing_of
+
+
+def carriers(groups: list[Group], bodies: list[Bone]) -> dict[int, Bone]:
+    """Body that carries each of the character's bones, by the bone's index."""
+    return {bone: body for group, body in zip(groups, bodies, strict=True) for bone in group.bones}
+
+
+def skeleton_frames(character: Character, carrier: dict[int, Bone]) -> tuple[SkeletonFrame, ...]:
+    """Every bone of the skeleton, fixed on the body that carries it, in the skeleton's order."""
+    frames = []
+    for index, name in enumerate(character.bone_names):
+        body = carrier[index]
+        pose = pose_in_body(body, character.positions[index], character.orientations[index])
+        frames.append(SkeletonFrame(name, body.name, *(np.round(part, 12) + 0.0 for part in pose)))
+    return tuple(frames)
+
+
+def swings(character: Character, carrier: dict[int, Bone], notes: list[str]) -> tuple[Swing, ...]:
+    """Each spring of the character as a swing; a note says where its gravity had to be cut."""
+    made = []
+    for spring in character.springs:
+        swing, cut = swing_of(spring, carrier[spring.carrier].name, character.scale)
+        made.append(swing)
+        if cut:
+            notes.append(f'spring {spring.name} has too much gravity: a share of '
+                         f'{swing.gravity:g} is taken')
+    return tuple(made)
