@@ -28,7 +28,7 @@ run: $(COMPILED) ## the doll falls, arrow keys push it; SCENE=crowd: another sce
 	@$(BIN)/python -m ragdoll_ros.ros.run $(SCENE)
 
 # A file's tests stay together: those of one ROS domain, and those that time, go one by one.
-test: $(COMPILED) chromium ## the tests, three minutes on two cores
+test: $(COMPILED) chromium ## the tests, a minute and a half on two cores
 	@$(BIN)/python -m pytest -n 3 --dist loadfile
 
 # What numpy and PyBullet do where numba is not.
@@ -56,9 +56,10 @@ lint: $(READY) ## ruff
 slow: $(COMPILED) ## the tests that take minutes
 	@$(BIN)/python -m pytest -m slow
 
-bench: $(COMPILED) ## cost of a tick and of its parts, and of the page, 2 min
+bench: $(COMPILED) ## cost of a tick and of its parts, of swings and of the page, 2 min
 	@$(BIN)/python -m ragdoll_ros.ros.bench
-	@$(BIN)/python test/page_cost.py
+	@$(BIN)/python -m ragdoll_ros.physics.swing.bench
+	@$(BIN)/python -m ragdoll_ros.viewer.bench
 
 report: $(COMPILED) ## accuracy against independent references, into docs/, 20 min
 	@$(BIN)/python -m ragdoll_ros.accuracy.command --out docs

@@ -80,7 +80,7 @@ setup(
         # Machine code for the sums of every tick; 0.59 is the first for Ubuntu 24.04's Python.
         'fast': ['numba>=0.59'],
         'report': ['scipy', 'matplotlib', 'mujoco', 'numba>=0.59'],
-        'fit': ['pygltflib', 'matplotlib'],
+        'fit': ['matplotlib'],
         # The page: 3D, panels and plots in a browser, served from Python, with no build of its own.
         'viewer': ['viser', 'imageio'],
         'test': ['pytest', 'pytest-xdist', 'ruff', 'setuptools', 'wheel', 'yourdfpy',

@@ -54,6 +54,7 @@ class Peer(Node):
         super().__init__(name)
         self.executor_ = SingleThreadedExecutor()
         self.executor_.add_node(self)
+        self._callers = {}
 
     def collect(self, kind, topic, qos=1000):
         """Subscribe; give the list that messages go to, each as (arrival s, message)."""
@@ -61,12 +62,26 @@ class Peer(Node):
         self.create_subscription(kind, topic, lambda m: got.append((time.monotonic(), m)), qos)
         return got
 
+    def hear_once(self, kind, topic):
+        """The first message that comes on a topic from now on."""
+        got = []
+        subscription = self.create_subscription(kind, topic, got.append, 10)
+        self.wait(lambda: got)
+        self.destroy_subscription(subscription)
+        return got[0]
+
     def wait(self, condition, timeout=PATIENCE):
         """Spin until the condition holds; fail if it does not in time."""
         end = time.monotonic() + timeout
         while not condition():
             assert time.monotonic() < end, 'not in time'
             self.executor_.spin_once(timeout_sec=0.1)
+
+    def wait_heard(self, node, *topics):
+        """Spin until all that a node publishes on these topics has a subscriber."""
+        publishers = [publisher for publisher in node.publishers if publisher.topic_name in topics]
+        assert len(publishers) == len(topics)
+        self.wait(lambda: all(publisher.get_subscription_count() for publisher in publishers))
 
     def sender(self, kind, topic):
         """Publisher that a subscriber listens to already."""
@@ -76,11 +91,11 @@ class Peer(Node):
 
     def call(self, kind, name, request):
         """Call a service and give its answer."""
-        client = self.create_client(kind, name)
-        self.wait(client.service_is_ready)
-        future = client.call_async(request)
+        if name not in self._callers:
+            self._callers[name] = self.create_client(kind, name)
+        self.wait(self._callers[name].service_is_ready)
+        future = self._callers[name].call_async(request)
         self.wait(future.done)
-        self.destroy_client(client)
         return future.result()
 
 

@@ -24,7 +24,7 @@ class RvizClient:
         self.resets = 0
         self.seen = []
         self.dragged = None
-        self._peer, self._id = peer, client_id
+        self._peer, self.client_id = peer, client_id
         self._service = peer.create_client(GetInteractiveMarkers,
                                            f'{namespace}/get_interactive_markers')
         self._publisher = peer.create_publisher(Feedback, f'{namespace}/feedback', QOS)
@@ -69,10 +69,10 @@ class RvizClient:
 
     def send(self, **fields):
         """Feedback of any kind."""
-        self._publisher.publish(Feedback(client_id=self._id, **fields))
+        self._publisher.publish(Feedback(client_id=self.client_id, **fields))
 
     def _send(self, name, kind, pose, point=None):
-        message = Feedback(client_id=self._id, marker_name=name, control_name='drag',
+        message = Feedback(client_id=self.client_id, marker_name=name, control_name='drag',
                            event_type=kind, pose=pose, mouse_point_valid=point is not None)
         message.header = self.markers[name].header
         if point is not None:

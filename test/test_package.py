@@ -24,11 +24,16 @@ DEFAULTS_OF_A_SCENE = {'rate', 'real_time_factor', 'pushed_bone'}
 SCENES = ('import ragdoll_ros; from ragdoll_ros.files import config; '
           'ragdoll_ros.load_scene("drop"); print(config.__file__); print(config.config_folder())')
 
-ROSDEP_KEYS = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml', 'scipy': 'python3-scipy',
-               'jsonschema': 'python3-jsonschema', 'matplotlib': 'python3-matplotlib',
-               'mpl_toolkits': 'python3-matplotlib', 'pybullet': 'python3-pybullet-pip'}
-NO_ROSDEP_KEY = {'imageio', 'mujoco', 'numba', 'pygltflib', 'viser'}
-"""Needed by extras only, or with a key that may lead nowhere; docs/ says how to get them."""
+ROSDEP_KEYS = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml',
+               'jsonschema': 'python3-jsonschema', 'pybullet': 'python3-pybullet-pip'}
+DISTRIBUTIONS = {'yaml': 'pyyaml', 'mpl_toolkits': 'matplotlib'}
+"""Where a package on PyPI is called otherwise than its module."""
+
+ROBOT = ('model', 'files', 'physics', 'ros')
+"""Rooms that run on a robot, with OPTIONAL modules or without."""
+OPTIONAL = {'mujoco', 'numba'}
+EXTRAS = {'fit': 'fit', 'viewer': 'viewer', 'accuracy': 'report'}
+"""The other rooms, and the extra that brings what each needs beyond that."""
 
 COUNT_POSES = """
 import rclpy
@@ -86,12 +91,33 @@ def prefix(wheel, tmp_path_factory):
     return folder
 
 
-def imported(path: Path) -> set[str]:
-    """Top-level modules that a file imports, not counting its own package's."""
-    nodes = list(ast.walk(ast.parse(path.read_text())))
+def imported(*rooms: str) -> set[str]:
+    """Top-level modules that rooms import, but for Python's own and this package's."""
+    nodes = [node for room in rooms for path in (ROOT / 'ragdoll_ros' / room).rglob('*.py')
+             for node in ast.walk(ast.parse(path.read_text()))]
     plain = {name.name for node in nodes if isinstance(node, ast.Import) for name in node.names}
     froms = {node.module for node in nodes if isinstance(node, ast.ImportFrom) and not node.level}
-    return {name.split('.')[0] for name in plain | froms}
+    found = {name.split('.')[0] for name in plain | froms}
+    return found - set(sys.stdlib_module_names) - {'ragdoll_ros'}
+
+
+def metadata(wheel: Path) -> email.message.Message:
+    """What setup.py says, as it reached the wheel."""
+    with zipfile.ZipFile(wheel) as files:
+        name = next(name for name in files.namelist() if name.endswith('.dist-info/METADATA'))
+        return email.message_from_bytes(files.read(name))
+
+
+def required(wheel: Path, extra: str | None = None) -> set[str]:
+    """Distributions that pip installs with a wheel, or that an extra adds."""
+    lines = [line.partition(';') for line in metadata(wheel).get_all('Requires-Dist')]
+    return {re.match(r'[\w-]+', name)[0].lower() for name, _, condition in lines
+            if (f'extra == "{extra}"' in condition.replace("'", '"') if extra
+                else 'extra' not in condition)}
+
+
+def distributions(modules: set[str]) -> set[str]:
+    return {DISTRIBUTIONS.get(module, module) for module in modules}
 
 
 def poses_published_by(python: Path, *command: object, **variables: str) -> int:
@@ -112,10 +138,7 @@ def site_packages(prefix: Path) -> Path:
 
 def test_versions_and_words_agree(wheel):
     """package.xml, and setup.py as it reached the wheel."""
-    manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
-    with zipfile.ZipFile(wheel) as files:
-        name = next(name for name in files.namelist() if name.endswith('.dist-info/METADATA'))
-        built = email.message_from_bytes(files.read(name))
+    manifest, built = ElementTree.parse(ROOT / 'package.xml').getroot(), metadata(wheel)
     for tag, header in (('name', 'Name'), ('version', 'Version'), ('description', 'Summary')):
         assert built[header].replace('-', '_') == manifest.findtext(tag).replace('-', '_')
     assert (built['License'] or built['License-Expression']) == manifest.findtext('license')
@@ -132,17 +155,29 @@ def test_changelog_has_the_headings_that_catkin_prepare_release_knows():
             'version')
 
 
-def test_manifest_names_what_the_package_imports():
-    """Every module of the distribution that the code imports has its line in package.xml."""
+def test_manifest_names_what_a_robot_needs_and_nothing_else():
+    """By the imports of the rooms that run there."""
     manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
     assert manifest.findtext('export/build_type') == 'ament_python'
-    declared = {tag.text for tag in manifest.iter() if tag.tag.endswith('depend')}
-    used = {module for path in (ROOT / 'ragdoll_ros').rglob('*.py') for module in imported(path)}
-    used -= set(sys.stdlib_module_names) | NO_ROSDEP_KEY | {'ragdoll_ros'}
-    assert {ROSDEP_KEYS.get(module, module) for module in used} <= declared
+    declared = [tag.text for tag in manifest.iter() if tag.tag == 'exec_depend']
+    used = imported(*ROBOT) - OPTIONAL
+    assert sorted(ROSDEP_KEYS.get(module, module) for module in used) == sorted(declared)
+    assert {tag.tag for tag in manifest.iter() if 'depend' in tag.tag} == {
+        'exec_depend', 'test_depend'}
 
 
-def test_docs_say_how_to_get_what_rosdep_does_not_know():
+def test_pip_brings_what_the_core_imports_and_extras_what_their_rooms_do(wheel):
+    """ROS is an extra too; what numba makes faster may have it as well."""
+    core = imported('model', 'files', 'physics') - OPTIONAL
+    assert required(wheel) == distributions(core)
+    rooms = {path.name for path in (ROOT / 'ragdoll_ros').iterdir() if any(path.glob('*.py'))}
+    assert rooms == {*ROBOT, *EXTRAS}
+    for room, extra in EXTRAS.items():
+        needed = distributions(imported(room) - imported(*ROBOT))
+        assert needed == required(wheel, extra) - OPTIONAL, room
+
+
+def test_docs_say_how_to_get_what_rosdep_does_not_know(wheel):
     """By an extra for an environment of one's own; and for ROS's Python, which Ubuntu guards.
 
     PEP 668: pip refuses to touch that one without a word of consent.
@@ -150,9 +185,8 @@ def test_docs_say_how_to_get_what_rosdep_does_not_know():
     pages = '\n'.join(path.read_text() for path in (ROOT / 'README.md', *ROOT.glob('docs/*.md')))
     named = {extra for text in re.findall(r"pip install '\.\[(.*?)\]'", pages)
              for extra in text.split(',')}
-    extras = dict(re.findall(r"'(\w+)': \[(.*?)\]", SETUP, re.S))
-    got = {module for extra in named for module in re.findall(r"'(\w[\w-]*)", extras[extra])}
-    assert got >= NO_ROSDEP_KEY
+    got = {name for extra in named for name in required(wheel, extra)}
+    assert got >= OPTIONAL.union(*(required(wheel, extra) for extra in EXTRAS.values()))
     guide = (ROOT / 'docs/ros.md').read_text()
     command = 'PIP_BREAK_SYSTEM_PACKAGES=1 pip install viser'
     assert command in guide and command in NO_VISER

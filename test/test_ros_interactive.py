@@ -16,6 +16,7 @@ from visualization_msgs.msg import (
     InteractiveMarkerUpdate,
     Marker,
 )
+from visualization_msgs.srv import GetInteractiveMarkers
 
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.scene import SECOND
@@ -79,16 +80,15 @@ def test_updates_come_in_sequence_and_follow_the_bones(node, peer, client):
     head = client.seen[-1].poses[1]
     assert head.name == 'head'
     node.pause(True)
-    node.interactive._next = 0
-    node.interactive.publish(0)
-    count = len(client.seen)
-    peer.wait(lambda: len(client.seen) > count)
-    assert at(client.markers['head'].pose.position) == pytest.approx(place(node, 'head'), abs=1e-9)
+    peer.wait(lambda: at(client.markers['head'].pose.position)
+              == pytest.approx(place(node, 'head'), abs=1e-9))
 
 
 def test_without_subscriber_no_update_is_made(node, peer):
     peer.wait(lambda: node.simulation.time > SECOND // 2)
-    assert node.interactive._sequence == 1
+    answer = peer.call(GetInteractiveMarkers, 'ragdoll/interactive/get_interactive_markers',
+                       GetInteractiveMarkers.Request())
+    assert answer.sequence_number == 1
 
 
 def test_a_drag_takes_the_point_under_the_mouse_and_the_bone_follows(node, peer, client):
@@ -186,8 +186,10 @@ def test_a_reset_lets_go_and_the_drag_that_goes_on_moves_nothing(node, peer, cli
     node.reset()
     client.move(0.0, 0.0, 5.0)
     client.release()
-    peer.wait(lambda: not node.interactive._drags)
-    assert node.simulation.grabs == () and node.tally.refused == {}
+    client.send(marker_name='head', header=Header(frame_id='world'), event_type=99)
+    peer.wait(lambda: node.tally.refused)
+    assert 'event_type' in node.tally.reason, 'the last one, and the first that is refused'
+    assert node.simulation.grabs == () and node.tally.refused.total() == 1
 
 
 @pytest.mark.parametrize('frame, name, kind, change, word', [
@@ -224,7 +226,7 @@ def test_a_flood_of_clients_is_held_off(node, peer, client):
     def refused():
         # Again and again: a slow machine forgets the first hands before it has heard the last.
         for number in itertools.islice(numbers, 30):
-            client._id = f'client {number}'
+            client.client_id = f'client {number}'
             client.press('head')
         for _ in range(200):
             peer.executor_.spin_once(timeout_sec=0.01)
@@ -234,7 +236,7 @@ def test_a_flood_of_clients_is_held_off(node, peer, client):
 
     peer.wait(refused)
     assert 'hands' in node.tally.reason
-    client._id = 'client 0'
+    client.client_id = 'client 0'
     client.release()
 
 

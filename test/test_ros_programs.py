@@ -11,6 +11,8 @@ import pytest
 from geometry_msgs.msg import PoseArray, Wrench
 from peer import PATIENCE, STARTED, Peer, end, kill, start, start_on_terminal
 
+from ragdoll_ros.ros import node, run, teleop
+
 
 @pytest.fixture(scope='module')
 def peer(ros):
@@ -46,7 +48,6 @@ def test_a_wrong_start_ends_with_2_and_a_reason(ros, broken_scene):
     cases = [(('node', '--ros-args', '-p', 'rate:=-1.0', '-p', 'real_time_factor:=.nan'),
               ['rate', 'real_time_factor']),
              (('node', '--ros-args', '-p', 'rate'), ['rate']),
-             (('node', '--faster'), ['--faster']),
              (('node', '--ros-args', '-p', f'scene:={path}'), words),
              (('run', str(path)), words),
              (('teleop',), ['terminal'])]
@@ -56,10 +57,14 @@ def test_a_wrong_start_ends_with_2_and_a_reason(ros, broken_scene):
         assert all(word in errors for word in words) and 'Traceback' not in errors
 
 
-def test_help_has_an_example(ros):
-    for process in [start(module, '--help') for module in ('node', 'teleop', 'run')]:
-        output, _ = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 0 and 'examples:' in output
+@pytest.mark.parametrize('program', [node, run, teleop])
+@pytest.mark.parametrize('option, code, stream, word', [
+    ('--help', 0, 'out', 'examples:'), ('--faster', 2, 'err', '--faster')])
+def test_help_has_an_example_and_a_wrong_option_is_named(capsys, program, option, code, stream,
+                                                         word):
+    with pytest.raises(SystemExit) as ended:
+        program.main([program.__name__, option])
+    assert ended.value.code == code and word in getattr(capsys.readouterr(), stream)
 
 
 class Screen:

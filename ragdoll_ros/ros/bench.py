@@ -6,10 +6,8 @@ microseconds are this machine's.
 """
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import statistics
-import sys
 import time
 from collections.abc import Callable
 
@@ -22,7 +20,6 @@ from ..model.scene import Scene
 from ..physics.engine.bullet import BulletEngine, bare_loop
 from ..physics.settings import ACCURACIES
 from ..physics.simulation import Simulation
-from ..physics.swing.bench import tick_cost
 from .messages import poses_of, to_pose_array
 from .outputs import Outputs
 
@@ -40,91 +37,75 @@ def cost(action: Callable[[], object]) -> float:
 
 
 def timed_engine() -> type[BulletEngine]:
-    """Give an engine that adds up the s that it spends on stepping and on reading."""
-    spent = {'step': 0.0, 'read': 0.0}
+    """An engine that adds up the s that it spends on stepping and on reading."""
+    spent = dict.fromkeys(('of it engine', 'of it reading'), 0.0)
 
-    def timed(part: str, method: Callable) -> Callable:
+    def timed(name: str) -> Callable:
+        method = getattr(BulletEngine, name)
+        part = 'of it engine' if name == 'step' else 'of it reading'
+
         def run(*arguments: object) -> object:
-            begin = time.perf_counter()
+            begin = time.process_time()
             try:
                 return method(*arguments)
             finally:
-                spent[part] += time.perf_counter() - begin
+                spent[part] += time.process_time() - begin
         return run
 
-    methods = {name: timed(part, getattr(BulletEngine, name)) for name, part in (
-        ('step', 'step'), ('read', 'read'), ('coordinates', 'read'), ('touching', 'read'))}
-    return type('TimedEngine', (BulletEngine,), {**methods, 'spent': spent})
+    names = ('step', 'read', 'coordinates', 'get_state', 'touching')
+    return type('TimedEngine', (BulletEngine,), {**{name: timed(name) for name in names},
+                                                 'spent': spent})
 
 
-class Bench:
-    """One scene in one condition: our tick and the bare loop, turn by turn."""
-
-    def __init__(self, node: Node, scene: Scene, accuracy: str, ticks_before: int) -> None:
-        timed = timed_engine()
-        self._spent = timed.spent
-        self._simulation = Simulation(scene, engine=timed, accuracy=dataclasses.replace(
-            ACCURACIES[accuracy], sleep=ticks_before > 500))
-        self._outputs = Outputs(node)
-        self._outputs.describe(scene, 'world')
-        for _ in range(ticks_before):
-            self._simulation.advance()
-        ready = to_pose_array('world', 0, poses_of(self._simulation.state))
-        publisher = node.create_publisher(PoseArray, '~/bare', 10)
-        self._bare_engine, self._close = bare_loop(
-            scene, self._simulation.coordinates, BARE_SUBSTEPS)
-        self._publish_bare = lambda: publisher.publish(ready)
-
-    def row(self) -> dict[str, float]:
-        """Median costs in us of a tick's parts."""
-        parts: dict[str, list[float]] = {}
-        simulation, outputs = self._simulation, self._outputs
-        for _ in range(ROUNDS):
-            before = dict(self._spent)
-            parts.setdefault('simulation', []).append(cost(simulation.advance))
-            for part, name in (('step', 'of it engine'), ('read', 'of it reading')):
-                spent = (self._spent[part] - before[part]) / TICKS * 1e6
-                parts.setdefault(name, []).append(spent)
-            for name, action in (
-                    ('conversion', lambda: poses_of(simulation.state)),
-                    ('messages', lambda: outputs.publish(simulation, 0, 0)),
-                    ('bare engine', self._bare_engine), ('bare publish', self._publish_bare)):
-                parts.setdefault(name, []).append(cost(action))
-        self._simulation.close()
-        self._close()
-        return {name: statistics.median(costs) for name, costs in parts.items()}
+def row(node: Node, scene: Scene, accuracy: str, ticks_before: int) -> dict[str, float]:
+    """Median costs in us of a tick's parts, ours and the bare loop's, turn by turn."""
+    engine = timed_engine()
+    simulation = Simulation(scene, engine=engine, accuracy=dataclasses.replace(
+        ACCURACIES[accuracy], sleep=ticks_before > 500))
+    for _ in range(ticks_before):
+        simulation.advance()
+    outputs = Outputs(node)
+    outputs.describe(scene, 'world')
+    ready = to_pose_array('world', 0, poses_of(simulation.state))
+    publisher = node.create_publisher(PoseArray, '~/bare', 10)
+    bare_engine, close = bare_loop(scene, simulation.coordinates, BARE_SUBSTEPS)
+    rounds = []
+    for _ in range(ROUNDS):
+        before = dict(engine.spent)
+        rounds.append({
+            'simulation': cost(simulation.advance),
+            **{part: (engine.spent[part] - before[part]) / TICKS * 1e6 for part in before},
+            'conversion': cost(lambda: poses_of(simulation.state)),
+            'messages': cost(lambda: outputs.publish(simulation, 0, 0)),
+            'bare engine': cost(bare_engine),
+            'bare publish': cost(lambda: publisher.publish(ready))})
+    simulation.close()
+    close()
+    return {name: statistics.median(found[name] for found in rounds) for name in rounds[0]}
 
 
-def main() -> int:
+def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(
-        'python -m ragdoll_ros.ros.bench', description=__doc__, epilog='example: make bench',
-        formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.parse_args()
     rclpy.init()
     node = Node('bench')
     drop = load_scene('drop')
     high = dataclasses.replace(drop, dolls=(dataclasses.replace(
         drop.dolls[0], position=(0, 0, 1000), spin=(0.2, 0.1, 0.3)),))
     print('us a tick of 10 ms, median; bare: fixed 1 ms substeps, getLinkStates, a ready message')
-    names = ('simulation', 'of it engine', 'of it reading', 'conversion', 'messages',
-             'bare engine', 'bare publish')
-    print(f'{"":18}' + ''.join(f'{name:>14}' for name in names) + f'{"tick / bare":>14}')
+    print(' ' * 22 + ''.join(f'{name:>14}' for name in (
+        'simulation', 'of it engine', 'of it reading', 'conversion', 'messages', 'bare engine',
+        'bare publish', 'tick / bare')))
     for label, scene, before in (('in flight', high, 0), ('on the ground', drop, 100),
                                  ('asleep', drop, 1500)):
         for accuracy in ACCURACIES:
-            row = Bench(node, scene, accuracy, before).row()
-            ratio = ((row['simulation'] + row['messages'])
-                     / (row['bare engine'] + row['bare publish']))
-            print(f'{label + ", " + accuracy:22}'[:22] + ''.join(
-                f'{row[name]:14.1f}' for name in names)[4:] + f'{ratio:14.2f}', flush=True)
-    for count, links in ((1000, 1), (125, 8)):
-        swings = tick_cost(count, links) * 1e6
-        print(f'{count} swings of {links} link{"s" * (links > 1)}: {swings:.0f} us a tick')
+            costs = row(node, scene, accuracy, before)
+            ratio = ((costs['simulation'] + costs['messages'])
+                     / (costs['bare engine'] + costs['bare publish']))
+            print(f'{label + ", " + accuracy:22}' + ''.join(
+                f'{us:14.1f}' for us in costs.values()) + f'{ratio:14.2f}', flush=True)
     node.destroy_node()
     rclpy.try_shutdown()
-    return 0
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    main()

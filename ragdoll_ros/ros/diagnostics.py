@@ -15,21 +15,21 @@ from ..physics import kernels
 from .messages import to_time
 from .tally import Tally
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # else the page and the teleop, which read this file, would load an engine
     from ..physics.simulation import Simulation
 
 PERIOD = 1.0
 """s of the steady clock between two reports."""
 
 BEHIND = 0.95
-"""Share of the wanted pace below which it is told that the doll falls behind."""
+"""Share of the wanted pace below which a report warns that the doll falls behind."""
 
 
 class Diagnostics:
     """Collects what each tick cost; reports pace, cost, errors and counts.
 
-    ``facts`` gives what only the node knows, as names and values; ``wanted_pace`` the pace that
-    is asked for now, 0 while the doll is paused; ``stamp`` the ns that a report is to bear.
+    ``facts()``: what only the node knows, by name; ``wanted_pace()``: simulated s asked for in each
+    s on the wall, 0 while paused; ``stamp()``: ns that a report is to bear.
     """
 
     def __init__(self, node: Node, steady: Clock, tally: Tally, facts: Callable[[], dict],
@@ -37,14 +37,14 @@ class Diagnostics:
         self._node, self._steady, self._tally = node, steady, tally
         self._facts, self._wanted_pace, self._stamp = facts, wanted_pace, stamp
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self._told = 0
+        self._reported = 0
         self._last: dict[str, float] | None = None
         self.simulation: Simulation
         self._begin()
         node.create_timer(PERIOD, self._close, clock=steady)
 
     def count(self, cost: int, simulated: int) -> None:
-        """Enter a tick: ns that it took, and ns that it went on."""
+        """Enter a tick: the ns that it took, and those that it simulated."""
         self._ticks += 1
         self._cost += cost
         self._dearest = max(self._dearest, cost)
@@ -81,7 +81,7 @@ class Diagnostics:
         """Level and message: what was refused since the last report, else how the pace is."""
         tally, wanted, pace = self._tally, self._wanted_pace(), self._last['pace']
         counted = tally.refused.total() + tally.clamped.total()
-        news, self._told = counted > self._told, counted
+        news, self._reported = counted > self._reported, counted
         if news:
             return DiagnosticStatus.WARN, tally.reason
         if wanted and self._ticks and pace < BEHIND * wanted:

@@ -40,9 +40,9 @@ class Handles:
 
     def move(self, state: State) -> None:
         """Put all where the bones are; markers and poses are the same objects."""
-        for marker, position, turn in zip(self.markers, state.positions.tolist(),
+        for marker, position, orientation in zip(self.markers, state.positions.tolist(),
                                           state.orientations.tolist(), strict=True):
-            place(marker.pose, position, turn)
+            place(marker.pose, position, orientation)
 
 
 def _marker(name: str, bone: Bone, frame: str) -> InteractiveMarker:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from geometry_msgs.msg import Twist, Vector3, Wrench, WrenchStamped
 from rclpy.node import Node
@@ -15,15 +15,25 @@ from rclpy.node import Node
 from ..model import errors
 from ..model.push import Push
 from ..model.ragdoll import WORLD
+from ..model.scene import Scene
 from ..model.vectors import Vector
 from .parameters import Settings
 from .tally import Tally
 
-if TYPE_CHECKING:
-    from ..physics.simulation import Simulation
-
 LEVER = 0.1
 """m: a torque may be as strong as the strongest force at this lever."""
+
+
+class Pushed(Protocol):
+    """What is pushed: a simulation, or what stands for the node's where one only listens."""
+
+    scene: Scene
+
+    def push(self, push: Push, channel: str) -> None:
+        """Let a push act in place of the last one of its channel."""
+
+    def release(self, channel: str) -> None:
+        """End the push of a channel."""
 
 
 class Inputs:
@@ -35,7 +45,7 @@ class Inputs:
 
     def __init__(self, node: Node, tally: Tally, name: str = '~') -> None:
         self._tally = tally
-        self.simulation: Simulation
+        self.simulation: Pushed
         self.settings: Settings
         self.subscriptions = [
             node.create_subscription(Wrench, f'{name}/force', self.take_force, 10),
@@ -95,9 +105,9 @@ class Inputs:
 
 
 def shortened(values: Sequence[float], scale: float, most: float) -> tuple[Vector, float]:
-    """Scale a finite vector and shorten it to ``most``; also give the length it would have had.
+    """A finite vector times ``scale``, at most ``most`` long, and the length it would have had.
 
-    Works on the vector divided by its largest component, so that nothing overflows on the way.
+    The vector is first divided by its largest component, so that nothing overflows on the way.
     """
     largest = max(map(abs, values))
     if largest == 0 or scale == 0:

@@ -95,7 +95,7 @@ class Interactive:
             self._updates.publish(self._update(markers=handles.markers, erases=gone))
 
     def publish(self, now: int, still: bool = False) -> None:
-        """Tell where the markers are at ``now``, and let go for clients that are gone.
+        """Publish where the markers are at ``now``, and let go for clients that are gone.
 
         ``still``: nothing may follow, so that markers can not wait.
         """
@@ -107,7 +107,7 @@ class Interactive:
             self.publish_poses()
 
     def publish_poses(self) -> None:
-        """Tell where the markers are, now, if somebody listens."""
+        """Publish where the markers are, now, if somebody listens."""
         if self._updates.get_subscription_count():
             self._handles.move(self._simulation.state)
             self._sequence += 1
@@ -122,17 +122,17 @@ class Interactive:
 
     def _take(self, message: InteractiveMarkerFeedback) -> None:
         self._check(message)
-        position, turn = _pose(message.pose)
+        position, orientation = _pose(message.pose)
         hand = f'{message.client_id} {message.marker_name}'
         kind, drag = message.event_type, self._drags.get(hand)
         if kind == message.MOUSE_DOWN:
-            self._grab(hand, message, position, turn)
+            self._grab(hand, message, position, orientation)
         elif kind == message.MOUSE_UP:
             self._let_go(hand)
         elif drag is not None:
             drag.heard = self._now()
             if kind == message.POSE_UPDATE:
-                self._simulation.drag(hand, position + rotation.rotate(turn, drag.point),
+                self._simulation.drag(hand, position + rotation.rotate(orientation, drag.point),
                                       EVENLY * self.settings.real_time_factor)
 
     def _check(self, message: InteractiveMarkerFeedback) -> None:
@@ -149,7 +149,7 @@ class Interactive:
                                     'KEEP_ALIVE, POSE_UPDATE, MOUSE_DOWN or MOUSE_UP')
 
     def _grab(self, hand: str, message: InteractiveMarkerFeedback, position: np.ndarray,
-              turn: np.ndarray) -> None:
+              orientation: np.ndarray) -> None:
         """Take a bone; a point beside it, in a ghost's rim or in another's way, is moved onto it.
 
         The point is seen from the pose that the client showed, as the bone may have gone on.
@@ -158,7 +158,7 @@ class Interactive:
         point, target = np.zeros(3), position
         if message.mouse_point_valid:
             target = _vector('mouse_point', message.mouse_point)
-            point = rotation.rotate(rotation.inverse(turn), target - position)
+            point = rotation.rotate(rotation.inverse(orientation), target - position)
         scene = self._simulation.scene
         half = np.array(scene.bones[scene.bone_index(bone)].shape.half_extents)
         point = np.clip(point, -half, half)
@@ -181,14 +181,14 @@ class Interactive:
 
 
 def _pose(pose: Pose) -> tuple[np.ndarray, np.ndarray]:
-    """Position (3,) m and orientation (4,) of length one; four zeros stand for no turn."""
+    """Position (3,) m and orientation (4,) of length one; four zeros stand for no rotation."""
     q = pose.orientation
-    turn = (q.x, q.y, q.z, q.w)
-    errors.check_finite('pose.orientation', turn)
-    length = math.hypot(*turn)
+    orientation = (q.x, q.y, q.z, q.w)
+    errors.check_finite('pose.orientation', orientation)
+    length = math.hypot(*orientation)
     straight = np.array([0.0, 0.0, 0.0, 1.0])
     return _vector('pose.position', pose.position), (
-        np.array(turn) / length if 0 < length < math.inf else straight)
+        np.array(orientation) / length if 0 < length < math.inf else straight)
 
 
 def _vector(name: str, message: object) -> np.ndarray:

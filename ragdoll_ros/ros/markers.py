@@ -32,7 +32,7 @@ class Markers:
         self._parts = [part for bone in scene.bones for part in bone.shape.primitives]
         self._bones = [index for index, bone in enumerate(scene.bones)
                        for _ in bone.shape.primitives]
-        self._shifts = np.array([part.offset for part in self._parts])
+        self._offsets = np.array([part.offset for part in self._parts])
         self._markers = [self._marker(number) for number in range(len(self._parts))]
         self._arrows = 0
         self._fresh = True
@@ -45,11 +45,11 @@ class Markers:
         """
         header = to_header(stamp, self._frame)
         orientations = state.orientations[self._bones]
-        positions = state.positions[self._bones] + rotation.rotate(orientations, self._shifts)
-        for marker, position, turn in zip(self._markers, positions.tolist(),
+        positions = state.positions[self._bones] + rotation.rotate(orientations, self._offsets)
+        for marker, position, orientation in zip(self._markers, positions.tolist(),
                                           orientations.tolist(), strict=True):
             marker.header = header
-            place(marker.pose, position, turn)
+            place(marker.pose, position, orientation)
         arrows = [self._arrow(number, push, state) for number, push in enumerate(
             push for push in pushes if any(push.force))]
         gone = [Marker(ns='push', id=number, action=Marker.DELETE)
@@ -78,8 +78,8 @@ class Markers:
         tail, tip = push.arrow(state.positions[bone], state.orientations[bone])
         marker = Marker(ns='push', id=number, type=Marker.ARROW, action=Marker.ADD)
         marker.scale = to_vector((np.linalg.norm(tip - tail), 0.04, 0.06))
-        turn = rotation.shortest_arc(np.array([1.0, 0, 0]), tip - tail)
-        place(marker.pose, tail.tolist(), turn.tolist())
+        orientation = rotation.shortest_arc(np.array([1.0, 0, 0]), tip - tail)
+        place(marker.pose, tail.tolist(), orientation.tolist())
         paint(marker, RED)
         return marker
 
@@ -95,13 +95,13 @@ def _rods(swings: SwingState) -> Marker:
     return marker
 
 
-def place(pose: Pose, position: list[float], turn: list[float]) -> None:
+def place(pose: Pose, position: list[float], orientation: list[float]) -> None:
     """Set a pose from m and x, y, z, w; the message stays the same object."""
-    where, how = pose.position, pose.orientation
-    where.x, where.y, where.z = position
-    how.x, how.y, how.z, how.w = turn
+    pose.position.x, pose.position.y, pose.position.z = position
+    q = pose.orientation
+    q.x, q.y, q.z, q.w = orientation
 
 
 def paint(marker: Marker, color: tuple[float, ...]) -> None:
-    """Give a marker its colour (red, green, blue, opacity)."""
+    """Set a marker's colour: red, green, blue, opacity."""
     marker.color.r, marker.color.g, marker.color.b, marker.color.a = map(float, color)

@@ -24,7 +24,7 @@ def poses_of(state: State | SwingState) -> np.ndarray:
 
 
 def contact_poses(contacts: Sequence[Contact]) -> np.ndarray:
-    """Poses (c, 7) of contacts: position m, and a turn that brings x to the normal."""
+    """Poses (c, 7) of contacts: position m, and a rotation of x to the normal."""
     x = np.array([1.0, 0, 0])
     return np.array([(*contact.position, *rotation.shortest_arc(x, contact.normal))
                      for contact in contacts]).reshape(-1, 7)

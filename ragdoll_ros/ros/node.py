@@ -16,7 +16,6 @@ from rclpy.utilities import remove_ros_args
 
 from ..model import errors
 from ..model.scene import STEP_RANGE, Scene
-from ..physics.pacing import Pacer
 from ..physics.simulation import Simulation
 from .diagnostics import Diagnostics
 from .inputs import Inputs
@@ -27,20 +26,12 @@ from .services import Services
 from .session import ros_session
 from .stamps import Stamps
 from .tally import Tally
+from .ticker import Ticker
 
 InvalidROSArguments = rclpy_implementation.RCLInvalidROSArgsError
 
-SHORTEST_PERIOD = 1_000_000
-"""ns between two calls of the timer at the least; at a faster pace, it makes several ticks."""
-
-LONGEST_BURST = 20_000_000
-"""ns that the timer may make ticks for before others have their turn."""
-
 STANDING_CLOCK = 0.5
 """s on the wall between two messages on /clock while the doll is paused."""
-
-CATCH_UP = 2
-"""Times the wanted pace at which a stall is caught up: listeners' queues are ten messages long."""
 
 EXAMPLE = """examples:
   ragdoll_node
@@ -79,16 +70,20 @@ class RagdollNode(Node):
         self.paused = False
         self._use(self.simulation)
         self._outputs.be_clock(self.settings.publish_clock)
-        self._pacer = Pacer(self._period(), self._now())
-        self._timer = self.create_timer(1.0, self._catch_up, clock=self._steady)
+        self._ticker = Ticker(self, self._steady, self.tick)
         self.create_timer(STANDING_CLOCK, self._repeat_clock, clock=self._steady)
-        self._restart_timer()
+        self._go_on()
         self._tuning.watch(self._prepare, self._apply)
 
     @property
     def settings(self) -> Settings:
         """Values of the parameters."""
         return self._tuning.settings
+
+    @property
+    def stamp(self) -> int:
+        """Stamp of the state as it stands, ns."""
+        return self._stamps.at(self.simulation.time, self.settings.publish_clock)
 
     def tick(self) -> None:
         """Go on by one tick and publish; a state that is not finite is never shown."""
@@ -111,7 +106,7 @@ class RagdollNode(Node):
         if self.paused and not wanted:
             self._stamps.catch_up(self.simulation.time)
         self.paused = wanted
-        self._restart_timer()
+        self._go_on()
         if wanted:
             self._show_as_it_stands()
         self._diagnostics.report()
@@ -131,7 +126,7 @@ class RagdollNode(Node):
         super().destroy_node()
 
     def _advance(self) -> bool:
-        """Go on; tell whether all numbers stay finite. What runs away may fail within a tick."""
+        """Go on by a tick; whether all numbers stay finite. What runs away may fail within it."""
         try:
             state = self.simulation.advance()
         except (ArithmeticError, ValueError):
@@ -144,42 +139,21 @@ class RagdollNode(Node):
     def _ros_time(self) -> int:
         return self.get_clock().now().nanoseconds
 
-    def _stamp(self, time: int) -> int:
-        """Give the stamp of a simulated time, ns."""
-        return self._stamps.at(time, self.settings.publish_clock)
-
     def _time_of_report(self) -> int:
-        """ROS time; where this node is the clock, what it says, heard or not."""
-        if self.settings.publish_clock:
-            return self._stamp(self.simulation.time)
-        return self._ros_time()
+        """ROS time, ns; where this node is the clock, what it says, heard or not."""
+        return self.stamp if self.settings.publish_clock else self._ros_time()
 
-    def _period(self) -> float:
-        """Give the ns on the wall from one tick to the next."""
-        return self.simulation.tick / self.settings.real_time_factor
-
-    def _catch_up(self) -> None:
-        """Make the ticks that are due, as far as there is time."""
-        end = self._now() + LONGEST_BURST
-        for _ in range(self._most_ticks):
-            if self._now() > end or not self._pacer.due(self._now()):
-                break
-            self.tick()
-
-    def _restart_timer(self) -> None:
+    def _go_on(self) -> None:
+        """Tick from now on at the wanted pace, or not while the doll is paused."""
         if self.paused:
-            self._timer.cancel()
-            return
-        self._pacer.period = self._period()
-        self._pacer.start(self._now())
-        self._timer.timer_period_ns = max(SHORTEST_PERIOD, round(self._pacer.period))
-        self._most_ticks = math.ceil(CATCH_UP * self._timer.timer_period_ns / self._pacer.period)
-        self._timer.reset()
+            self._ticker.stop()
+        else:
+            self._ticker.start(self.simulation.tick / self.settings.real_time_factor)
 
     def _publish(self) -> None:
         simulation, now = self.simulation, self._now()
         self._stamps.follow(simulation.time)
-        self._outputs.publish(simulation, self._stamp(simulation.time), now, self.paused)
+        self._outputs.publish(simulation, self.stamp, now, self.paused)
         self.interactive.publish(now, self.paused)
 
     def _begin(self) -> None:
@@ -189,13 +163,13 @@ class RagdollNode(Node):
 
     def _show_as_it_stands(self) -> None:
         """Bring up to date what is not published with every tick."""
-        self._outputs.publish_markers(self.simulation, self._stamp(self.simulation.time))
+        self._outputs.publish_markers(self.simulation, self.stamp)
         self.interactive.publish_poses()
 
     def _repeat_clock(self) -> None:
-        """Tell the standing time to who has come since: those who go by /clock ask for no past."""
+        """Publish the standing time for who has come since: who goes by /clock asks for no past."""
         if self.paused:
-            self._outputs.publish_clock(self._stamp(self.simulation.time))
+            self._outputs.publish_clock(self.stamp)
 
     def _use(self, simulation: Simulation) -> None:
         """Let all parts work with this simulation and the settings as they are."""
@@ -230,14 +204,15 @@ class RagdollNode(Node):
         self.simulation.accuracy = settings.accuracy
         if changed & {'scene', 'rate', 'real_time_factor'}:
             self.simulation.step = step_of(settings)
-            self._restart_timer()
+            self._go_on()
 
     def _wanted_pace(self) -> float:
         return 0.0 if self.paused else self.settings.real_time_factor
 
     def _facts(self) -> dict:
         return {'paused': self.paused, 'real_time_factor': self.settings.real_time_factor,
-                'lost_time': self._pacer.lost / 1e9, 'stamp_of_zero': self._stamp(0)}
+                'lost_time': self._ticker.lost / 1e9,
+                'stamp_of_zero': self._stamps.at(0, self.settings.publish_clock)}
 
 
 def step_of(settings: Settings) -> float:

@@ -29,7 +29,7 @@ from .messages import (
 )
 from .packed import Packed
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # else the page, which reads this file, would load an engine
     from ..physics.simulation import Simulation
 
 MARKER_PERIOD = 33_000_000
@@ -99,7 +99,7 @@ class Outputs:
                                                          simulation.pushes, simulation.swings))
 
     def publish_clock(self, stamp: int) -> None:
-        """Tell the time, ns, if it is this node that tells it."""
+        """Publish the time, ns, if this node is the clock."""
         if self._clock is not None:
             self._clock.publish(Clock(clock=to_time(stamp)))
 

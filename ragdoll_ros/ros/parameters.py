@@ -20,7 +20,7 @@ from ..physics.settings import ACCURACIES
 
 def _setting(default: object, description: str, span: tuple[float, float] | None = None,
              constraints: str = '', scene_default: Callable | None = None) -> object:
-    """A parameter; ``scene_default`` gives the default that a scene brings along."""
+    """A parameter; ``scene_default`` takes its default from the scene, where a scene has one."""
     return dataclasses.field(default=default, metadata={
         'description': description, 'span': span, 'constraints': constraints,
         'scene_default': scene_default})
@@ -82,7 +82,7 @@ class Parameters:
         found: list[str] = []
         self._declare('scene', found)
         self.scene = load_scene(self.settings.scene)
-        for name, default in scene_default(self.scene).items():
+        for name, default in scene_defaults(self.scene).items():
             self.settings = dataclasses.replace(self.settings, **{name: default})
         for name in SPECS:
             if name != 'scene':
@@ -119,7 +119,7 @@ class Parameters:
         given = _given(parameters)
         try:
             scene = load_scene(given['scene']) if 'scene' in given else self.scene
-            settings = dataclasses.replace(self.settings, **{**self._brought_by(scene), **given})
+            settings = dataclasses.replace(self.settings, **{**self._followed(scene), **given})
             check(settings, scene)
             changed = self._changed(given, settings)
             self._prepare(changed, settings, scene)
@@ -133,9 +133,8 @@ class Parameters:
         if not changed:
             return
         self._apply(changed)
-        followed = changed - set(_given(parameters))
         self._node.set_parameters([Parameter(name, value=getattr(self.settings, name))
-                                   for name in followed])
+                                   for name in changed - set(_given(parameters))])
         if 'scene' in changed:
             self._set_bone_names()
 
@@ -145,10 +144,10 @@ class Parameters:
                    if getattr(settings, name) != getattr(self.settings, name)}
         return changed | ({'scene'} & set(given))
 
-    def _brought_by(self, scene: Scene) -> dict:
-        """Values that change because they were those of the scene before."""
-        before = scene_default(self.scene)
-        return {name: value for name, value in scene_default(scene).items()
+    def _followed(self, scene: Scene) -> dict:
+        """The scene's defaults for what still is at the default of the scene before."""
+        before = scene_defaults(self.scene)
+        return {name: value for name, value in scene_defaults(scene).items()
                 if getattr(self.settings, name) == before[name]}
 
     def _set_bone_names(self) -> None:
@@ -160,8 +159,8 @@ class Parameters:
         descriptor.read_only = True
 
 
-def scene_default(scene: Scene) -> dict:
-    """Defaults that a scene brings along."""
+def scene_defaults(scene: Scene) -> dict:
+    """The defaults that are a scene's, by parameter."""
     return {name: spec.metadata['scene_default'](scene) for name, spec in SPECS.items()
             if spec.metadata['scene_default']}
 

@@ -1,4 +1,4 @@
-"""What swings cost: the row of the benchmark."""
+"""What a tick of swings costs, without the dolls that carry them."""
 from __future__ import annotations
 
 import statistics
@@ -16,10 +16,10 @@ from .track import Track
 
 def tick_cost(count: int = 1000, links: int = 1, bones: int = 10, tick: float = 0.01,
               ticks: int = 200) -> float:
-    """The median time in s of a tick with ``count`` swings of ``links`` damped springs.
+    """Median time, s, of a tick of ``tick`` s with ``count`` swings of ``links`` damped springs.
 
-    The bones shake and turn at 3 Hz. A tick is all of it: the bones' state told, the swings
-    moved, every mass's place in the world read.
+    The bones shake and rotate at 3 Hz. A tick is all of it: the bones' state told, the swings
+    moved, every mass's position in the world read.
     """
     random = np.random.default_rng(0)
     mounted = []
@@ -42,6 +42,14 @@ def tick_cost(count: int = 1000, links: int = 1, bones: int = 10, tick: float = 
     return statistics.median(costs)
 
 
+def main() -> None:
+    """Print the table."""
+    print(f'us a tick of 10 ms, median\n{"":22}{"swings":>14}')
+    for count, links in ((1000, 1), (125, 8)):
+        label = f'{count} of {links} link{"s" * (links > 1)}'
+        print(f'{label:22}{tick_cost(count, links) * 1e6:14.1f}', flush=True)
+
+
 def _shaken(bones: int, t: float) -> State:
     rate = 6 * np.pi
     axis = np.tile([0.2, 0.1, 0.3], (bones, 1))
@@ -49,3 +57,7 @@ def _shaken(bones: int, t: float) -> State:
     sin, cos = np.sin(rate * t), np.cos(rate * t)
     return State(move * sin, from_rotation_vector(axis * sin), move * rate * cos,
                  axis * rate * cos)
+
+
+if __name__ == '__main__':
+    main()

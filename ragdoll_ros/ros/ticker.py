@@ -1,0 +1,54 @@
+"""Ticks by the clock on the wall."""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from rclpy.clock import Clock
+from rclpy.node import Node
+
+from ..physics.pacing import Pacer
+
+SHORTEST_PERIOD = 1_000_000
+"""ns between two calls of the timer at the least; at a faster pace, it makes several ticks."""
+
+LONGEST_BURST = 20_000_000
+"""ns that the timer may make ticks for before others have their turn."""
+
+CATCH_UP = 2
+"""Times the wanted pace at which a stall is caught up: listeners' queues are ten messages long."""
+
+
+class Ticker:
+    """A timer of the ``steady`` clock that calls ``tick`` each period, from start() to stop()."""
+
+    def __init__(self, node: Node, steady: Clock, tick: Callable[[], None]) -> None:
+        self._steady, self._tick = steady, tick
+        self._pacer = Pacer(1.0, 0)
+        self._timer = node.create_timer(1.0, self._catch_up, clock=steady)
+
+    @property
+    def lost(self) -> float:
+        """Time that was given up in long stalls, ns."""
+        return self._pacer.lost
+
+    def start(self, period: float) -> None:
+        """Begin anew: the first tick comes one ``period``, ns, from now."""
+        self._pacer.period = period
+        self._pacer.start(self._steady.now().nanoseconds)
+        self._timer.timer_period_ns = max(SHORTEST_PERIOD, round(period))
+        self._most_ticks = math.ceil(CATCH_UP * self._timer.timer_period_ns / period)
+        self._timer.reset()
+
+    def stop(self) -> None:
+        """No tick from now on."""
+        self._timer.cancel()
+
+    def _catch_up(self) -> None:
+        """Make the ticks that are due, as far as there is time."""
+        end = self._steady.now().nanoseconds + LONGEST_BURST
+        for _ in range(self._most_ticks):
+            now = self._steady.now().nanoseconds
+            if now > end or not self._pacer.due(now):
+                break
+            self._tick()
