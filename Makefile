@@ -59,7 +59,7 @@ slow: $(COMPILED) ## the tests that take minutes
 bench: $(COMPILED) ## cost of a tick and of its parts, of swings and of the page, 2 min
 	@$(BIN)/python -m ragdoll_ros.ros.bench
 	@$(BIN)/python -m ragdoll_ros.physics.swing.bench
-	@$(BIN)/python -m ragdoll_ros.viewer.bench
+	@$(BIN)/python test/page_cost.py
 
 report: $(COMPILED) ## accuracy against independent references, into docs/, 20 min
 	@$(BIN)/python -m ragdoll_ros.accuracy.command --out docs

@@ -188,8 +188,7 @@ def compare(trajectory: Trajectory, truth: Trajectory) -> dict[str, float]:
 
 def _body_rates(trajectory: Trajectory) -> np.ndarray:
     """Angular velocities (t, n, 3) rad/s along the bones' own axes."""
-    return rotation.rotate(rotation.inverse(trajectory.orientations),
-                           trajectory.angular_velocities)
+    return rotation.rotate(rotation.inverse(trajectory.orientations), trajectory.angular_velocities)
 
 
 def _rms(values: np.ndarray) -> float:

@@ -34,8 +34,7 @@ def save_doll(doll: Ragdoll, path: str | Path, head: str = '') -> None:
     Path(path).write_text(text, encoding='utf-8')
 
 
-def build_doll(data: object,
-               path: Path = Path('doll')) -> tuple[Ragdoll | None, list[ModelError]]:
+def build_doll(data: object, path: Path = Path('doll')) -> tuple[Ragdoll | None, list[ModelError]]:
     """Make a doll from what the YAML file at ``path`` holds: the doll, or None and every error."""
     found = schema_errors('doll', data)
     if not isinstance(data, dict):

@@ -75,15 +75,13 @@ class UrdfTree:
                 placed[name] = (np.zeros(3), np.array(rotation.IDENTITY))
                 continue
             turn = rotation.from_axis_angle(joint.axis, angles.get(name, 0.0))
-            placed[name] = compose(compose(placed[joint.parent], joint.origin),
-                                   (np.zeros(3), turn))
+            placed[name] = compose(compose(placed[joint.parent], joint.origin), (np.zeros(3), turn))
         return placed
 
 
 def compose(outer: Pose, inner: Pose) -> Pose:
     """Pose of something in the frame that ``outer`` stands in, given in outer's own."""
-    return (outer[0] + rotation.rotate(outer[1], inner[0]),
-            rotation.multiply(outer[1], inner[1]))
+    return (outer[0] + rotation.rotate(outer[1], inner[0]), rotation.multiply(outer[1], inner[1]))
 
 
 def parse_urdf(text: str) -> UrdfTree:

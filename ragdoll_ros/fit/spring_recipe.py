@@ -47,8 +47,7 @@ def swing_of(spring: Spring, bone: str, metres: float) -> tuple[Swing, bool]:
     steps = np.diff(spring.points, axis=0)
     lengths = np.linalg.norm(steps, axis=1)
     masses = DENSITY * lengths
-    rates = [_rates(rod, length, metres) for rod, length in zip(spring.rods, lengths,
-                                                                  strict=True)]
+    rates = [_rates(rod, length, metres) for rod, length in zip(spring.rods, lengths, strict=True)]
     carried = [_carried(lengths[index:], masses[index:]) for index in range(len(lengths))]
     reaches = [inertia / lever for inertia, lever in carried]
     wanted = float(np.mean([rod.gravity / max(rod.stiffness, SOFTEST / metres) * stiff * reach

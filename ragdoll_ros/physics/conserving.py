@@ -13,7 +13,7 @@ from ..model.coordinates import GeneralizedState
 from ..model.scene import Scene
 from ..model.state import State
 from . import backend
-from .engine.protocol import AppliedWrench, Engine, pressed
+from .engine.protocol import Engine, Wrenches, pressed
 from .grab import Pull
 from .motion import Motion
 from .settings import Accuracy
@@ -51,7 +51,7 @@ class ConservingStepper:
             stepper.place(dataclasses.replace(stepper.coordinates, q=q))
             stepper.begin()
 
-    def substep(self, duration: float, loads: list[AppliedWrench]) -> float:
+    def substep(self, duration: float, loads: Wrenches) -> float:
         """Go through one stretch of motion, of at most ``duration`` s; its length, s."""
         stepper, before, motion = self.stepper, self.state, self.motion
         start = stepper.coordinates
@@ -92,7 +92,7 @@ class ConservingStepper:
         self.stepper.place(coordinates)
         self.update_state(self.stepper.state)
 
-    def _keep_momentum(self, before: Motion, result: StepResult, loads: list[AppliedWrench],
+    def _keep_momentum(self, before: Motion, result: StepResult, loads: Wrenches,
                        state: State) -> None:
         """Project dolls that touched nothing outside themselves onto their due momentum.
 
@@ -110,7 +110,7 @@ class ConservingStepper:
             self.state, before, self.motion, result.duration, impulse, moment, touched)
         self.stepper.shift(self.state, turn)
 
-    def _impulse(self, loads: list[AppliedWrench], duration: float,
+    def _impulse(self, loads: Wrenches, duration: float,
                  before: State) -> tuple[np.ndarray, np.ndarray | None]:
         """Impulse (d, 3) N s and moment (d, 3) N m s of loads; no moment where a force has one."""
         impulse, moment = np.zeros((2, len(self._scene.dolls), 3))
@@ -143,7 +143,7 @@ class ConservingStepper:
                 self._correct(conservation.stopped(start, stepper.coordinates, burst))
         conservation.close_step(self.motion.energy, groups)
 
-    def _enter_work(self, loads: list[AppliedWrench], before: State, result: StepResult) -> None:
+    def _enter_work(self, loads: Wrenches, before: State, result: StepResult) -> None:
         done = np.zeros(len(self._scene.dolls))
         for load in loads:
             joules = work(load, before, self.state, result)

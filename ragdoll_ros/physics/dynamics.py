@@ -2,14 +2,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
 from ..model.coordinates import GeneralizedState
 from ..model.scene import Scene
 from ..model.state import State
-from .engine.protocol import AppliedWrench
+from .engine.protocol import Wrenches
 from .kernels.loaded import kernels
 from .settings import Accuracy
 from .tree import table
@@ -48,8 +47,7 @@ class CompiledDynamics:
         kernels.forward_kinematics(self._tree, coordinates.q, coordinates.v, rows)
         return State.of(rows)
 
-    def acceleration(self, coordinates: GeneralizedState,
-                     loads: Sequence[AppliedWrench] = ()) -> np.ndarray:
+    def acceleration(self, coordinates: GeneralizedState, loads: Wrenches = ()) -> np.ndarray:
         out = np.empty_like(coordinates.v)
         kernels.accelerate(self._tree, self._gravity, _packed(loads), coordinates.q, coordinates.v,
                            out)
@@ -66,12 +64,12 @@ class CompiledDynamics:
         return math.inf
 
     def path(self, start: GeneralizedState, duration: float, accuracy: Accuracy, fastest: float,
-             loads: Sequence[AppliedWrench] = (), after: Path | None = None) -> Path:
+             loads: Wrenches = (), after: Path | None = None) -> Path:
         """Fly from ``start`` on without end, in steps of ``duration`` s at the most."""
         return Path(self, start, accuracy.flight_error, duration, fastest, loads)
 
     def fly(self, start: GeneralizedState, duration: float, steps: int,
-            loads: Sequence[AppliedWrench] = ()) -> GeneralizedState:
+            loads: Wrenches = ()) -> GeneralizedState:
         """The coordinates ``duration`` s later, in equal steps."""
         known, rows = None, _packed(loads)
         for _ in range(steps):
@@ -120,7 +118,7 @@ class Path:
     duration = math.inf
 
     def __init__(self, dynamics: CompiledDynamics, start: GeneralizedState, tolerance: float,
-                 longest: float, fastest: float, loads: Sequence[AppliedWrench] = ()) -> None:
+                 longest: float, fastest: float, loads: Wrenches = ()) -> None:
         self._dynamics, self._loads = dynamics, _packed(loads)
         self._tolerance, self._longest = tolerance, longest
         first = longest if math.isinf(tolerance) else FIRST_TURN / max(fastest, 1e-9)
@@ -170,7 +168,7 @@ class Path:
         self._try = min(self._longest, step.duration * min(LONGER, max(SHORTER, factor)))
 
 
-def _packed(loads: Sequence[AppliedWrench]) -> np.ndarray:
+def _packed(loads: Wrenches) -> np.ndarray:
     """Loads as a table (m, 11) for compiled code."""
     rows = np.empty((len(loads), 11))
     for row, load in zip(rows, loads, strict=True):

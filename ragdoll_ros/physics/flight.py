@@ -1,14 +1,13 @@
 """Flight: motion where nothing touches and no joint is at its limit; what any way to fly gives."""
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 
 from ..model.coordinates import GeneralizedState
 from ..model.state import State
-from .engine.protocol import AppliedWrench
+from .engine.protocol import Wrenches
 from .settings import Accuracy
 
 STIFFEST = 1.5
@@ -37,8 +36,7 @@ class Dynamics(Protocol):
     def state(self, coordinates: GeneralizedState) -> State:
         """Poses and velocities of all bones."""
 
-    def acceleration(self, coordinates: GeneralizedState,
-                     loads: Sequence[AppliedWrench] = ()) -> np.ndarray:
+    def acceleration(self, coordinates: GeneralizedState, loads: Wrenches = ()) -> np.ndarray:
         """Rates of change of ``coordinates.v``."""
 
     def integrate_configuration(self, coordinates: GeneralizedState,
@@ -49,11 +47,11 @@ class Dynamics(Protocol):
         """Longest path, s, where the fastest bone turns with so many rad/s; infinity: any."""
 
     def path(self, start: GeneralizedState, duration: float, accuracy: Accuracy, fastest: float,
-             loads: Sequence[AppliedWrench] = (), after: Path | None = None) -> Path:
+             loads: Wrenches = (), after: Path | None = None) -> Path:
         """Fly from ``start`` on for ``duration`` s or more, on ``after`` what ended there."""
 
     def fly(self, start: GeneralizedState, duration: float, steps: int,
-            loads: Sequence[AppliedWrench] = ()) -> GeneralizedState:
+            loads: Wrenches = ()) -> GeneralizedState:
         """The coordinates ``duration`` s later, in equal steps of the highest order."""
 
     def close(self) -> None:

@@ -12,7 +12,7 @@ from ..model.scene import SECOND, STEP_RANGE, Scene
 from ..model.state import State
 from .conserving import ConservingStepper
 from .engine import resolve_engine
-from .engine.protocol import GROUND, AppliedWrench, Contact, Engine
+from .engine.protocol import GROUND, Contact, Engine, Wrenches
 from .grab import EVENLY, Grab, Hands
 from .joint_gap import JointGap
 from .push_queue import PushQueue
@@ -253,7 +253,7 @@ class Simulation:
             remaining -= substep(length, loads)
         self.time = end
 
-    def _pulled_substep(self, duration: float, loads: list[AppliedWrench]) -> float:
+    def _pulled_substep(self, duration: float, loads: Wrenches) -> float:
         """Go through a stretch as short as hands need it; its length, s."""
         stepper, length = self._stepper, self._hands.stretch(duration)
         pulls = self._hands.pulls(stepper.dynamics, stepper.coordinates, self.state, length)

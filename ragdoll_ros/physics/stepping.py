@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import bisect
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +17,7 @@ from ..model.coordinates import GeneralizedState
 from ..model.scene import Scene
 from ..model.state import State
 from . import backend
-from .engine.protocol import GROUND, AppliedWrench, Engine
+from .engine.protocol import GROUND, Engine, Wrenches
 from .flight import STIFFEST, Path
 from .motion import damping_rate
 from .settings import HUMAN, Accuracy
@@ -90,8 +89,7 @@ class StepResult:
 class Stepper:
     """Moves a scene on. Holds where it is: ``coordinates``, ``state``, what is ``touching``."""
 
-    def __init__(self, scene: Scene, make_engine: type[Engine],
-                 accuracy: Accuracy) -> None:
+    def __init__(self, scene: Scene, make_engine: type[Engine], accuracy: Accuracy) -> None:
         self._accuracy = accuracy
         self.engine = make_engine(scene)
         self.dynamics = backend.dynamics_of(scene, make_engine, self.engine.layout)
@@ -116,7 +114,7 @@ class Stepper:
         """Whether something that no flight can foresee comes next: bones that meet."""
         self._departure: GeneralizedState
         """Where the tick began."""
-        self._flown: list[tuple[float, Sequence[AppliedWrench]]] | None
+        self._flown: list[tuple[float, Wrenches]] | None
         """Durations, s, and loads of the tick's flights; None: it was not all flight."""
         self._path: Path | None
         """The step of a flight that is under way: it may lead over many ticks."""
@@ -192,7 +190,7 @@ class Stepper:
         self._most_flights = math.ceil(MOST_FLIGHTS * max(1.0, tick / self._span))
         self._departure, self._flown = self.coordinates, []
 
-    def step(self, duration: float, loads: Sequence[AppliedWrench]) -> StepResult:
+    def step(self, duration: float, loads: Wrenches) -> StepResult:
         """Move on by ``duration`` s, or by less: up to the next touch or limit in a flight."""
         if self._may_fly(duration):
             flown = self._fly(duration, loads)
@@ -230,7 +228,7 @@ class Stepper:
             return False
         return not self._limits.is_active(self.coordinates, 0.0 if self.accuracy.land else duration)
 
-    def _fly(self, duration: float, loads: Sequence[AppliedWrench]) -> float:
+    def _fly(self, duration: float, loads: Wrenches) -> float:
         """Fly up to ``duration`` s; give the time flown, 0 where something comes in between."""
         if loads or self._loaded:
             self._path, self._loaded = None, bool(loads)
@@ -276,7 +274,7 @@ class Stepper:
         path = self._path
         return path is not None and self._along + stretch <= path.duration * (1 + 1e-9)
 
-    def _onward(self, stretch: float, longest: float, loads: Sequence[AppliedWrench]) -> None:
+    def _onward(self, stretch: float, longest: float, loads: Wrenches) -> None:
         """See that the path leads on from here by ``stretch`` s at the least.
 
         A new one is as many stretches long as speeds allow, and fit into ``longest`` s.
@@ -370,7 +368,7 @@ class Stepper:
         """Fastest turning, rad/s, of a bone or about a limited axis."""
         return max(self.reach.max_angular_speed(self.state), self._limits.fastest(self.coordinates))
 
-    def _engine_step(self, duration: float, loads: Sequence[AppliedWrench]) -> StepResult:
+    def _engine_step(self, duration: float, loads: Wrenches) -> StepResult:
         """Take the engine's own step, finer where that overshoots less.
 
         What is too far already at its start is jammed: that takes a solver more turns. Where a
@@ -426,7 +424,7 @@ class Stepper:
         back = (self.coordinates.v - start.v) * (-substep / 2)
         self._set(self.dynamics.integrate_configuration(self.coordinates, back))
 
-    def _near(self, duration: float, loads: Sequence[AppliedWrench]) -> set[tuple[int, int]]:
+    def _near(self, duration: float, loads: Wrenches) -> set[tuple[int, int]]:
         """Pairs of dolls, or of a doll and GROUND, that may touch within ``duration`` s."""
         pull = max((math.hypot(*load.force) for load in loads), default=0.0)
         return self.reach.broadphase_pairs(self.state, duration,
@@ -439,7 +437,7 @@ class Stepper:
         sunk = -self.reach.clearance(self.state)
         return past / self.accuracy.redo, sunk / self.accuracy.sink
 
-    def _run(self, duration: float, substeps: int, loads: Sequence[AppliedWrench],
+    def _run(self, duration: float, substeps: int, loads: Wrenches,
              watch: bool) -> set[tuple[int, int]]:
         """Let the engine go; what changes with the motion is looked at again now and then.
 

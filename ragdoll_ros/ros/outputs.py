@@ -69,8 +69,7 @@ class Outputs:
         self._next_markers = 0
         self._description.publish(String(data=scene_to_urdf(scene, frame)))
 
-    def publish(self, simulation: Simulation, stamp: int, now: int,
-                still: bool = False) -> None:
+    def publish(self, simulation: Simulation, stamp: int, now: int, still: bool = False) -> None:
         """Publish where the simulation is; ``stamp`` and the steady clock's ``now`` in ns.
 
         ``still``: nothing may follow, so that markers can not wait.

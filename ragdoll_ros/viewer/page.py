@@ -36,8 +36,7 @@ class Page:
     The editor, which comes with the first scene, keeps its files in ``folder``.
     """
 
-    def __init__(self, server: viser.ViserServer, source: Source,
-                 folder: str | Path = '.') -> None:
+    def __init__(self, server: viser.ViserServer, source: Source, folder: str | Path = '.') -> None:
         self.server = server
         self.source = source
         self.editor: Editor | None = None
@@ -83,8 +82,7 @@ class Page:
                 self.plots.show(frame, report, now)
                 self._follower.follow(frame, now, self.view.follow.value)
             if self.stage is not None:
-                self.stage.be_visible(bones=self.view.bones.value,
-                                      skins=self.view.skin.value)
+                self.stage.be_visible(bones=self.view.bones.value, skins=self.view.skin.value)
             if self.editor is not None:
                 self.editor.take_note(report.paused)
             self._tell(report.problem, report.note)

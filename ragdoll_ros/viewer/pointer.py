@@ -36,8 +36,7 @@ class Pointer:
     def attach(self, bodies: Bodies, skins: Skins) -> None:
         """Listen to drags and clicks on the bodies and skins of a new scene."""
         for batch in bodies.batches:
-            self._listen(batch.handle,
-                         lambda index, _, bones=batch.bones: int(bones[index or 0]))
+            self._listen(batch.handle, lambda index, _, bones=batch.bones: int(bones[index or 0]))
         for skin in skins.handles:
             self._listen(skin, lambda _, point: self._nearest(point))
 

@@ -6,8 +6,7 @@ import math
 import numpy as np
 
 
-def fall(start: np.ndarray, velocity: np.ndarray, gravity: np.ndarray,
-         t: np.ndarray) -> np.ndarray:
+def fall(start: np.ndarray, velocity: np.ndarray, gravity: np.ndarray, t: np.ndarray) -> np.ndarray:
     """Positions (t, 3) m of a body in free flight: x0 + v0 t + g t^2 / 2."""
     t = np.asarray(t, float)[:, None]
     return start + velocity * t + np.asarray(gravity) * t * t / 2

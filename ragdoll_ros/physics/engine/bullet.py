@@ -10,7 +10,7 @@ import dataclasses
 import math
 import os
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +22,7 @@ from ...model.coordinates import UNLIMITED, DofLayout, GeneralizedState
 from ...model.ragdoll import Ragdoll
 from ...model.scene import Placement, Scene, grip
 from ...model.state import State
-from .protocol import GROUND, AppliedWrench, Contact, pressed
+from .protocol import GROUND, AppliedWrench, Contact, Wrenches, pressed
 
 BREAKING_DISTANCE = 2e-3
 """m at which a contact point is let go. A gap is room to move in within a substep, so that it eats
@@ -257,7 +257,7 @@ class BulletEngine:
             self.close()
             raise
 
-    def step(self, duration: float, substeps: int, loads: Sequence[AppliedWrench] = ()) -> None:
+    def step(self, duration: float, substeps: int, loads: Wrenches = ()) -> None:
         timing = (duration, substeps)
         if timing != self._timing:
             pybullet.setPhysicsEngineParameter(
@@ -272,8 +272,7 @@ class BulletEngine:
             self._apply(load)
         pybullet.stepSimulation(physicsClientId=self._client)
 
-    def acceleration(self, coordinates: GeneralizedState,
-                     loads: Sequence[AppliedWrench] = ()) -> np.ndarray:
+    def acceleration(self, coordinates: GeneralizedState, loads: Wrenches = ()) -> np.ndarray:
         """Rates of change of ``coordinates.v``, from one small step.
 
         PyBullet's step takes v to v + a h with a from where the step begins, so the quotient is
@@ -428,8 +427,7 @@ class BulletEngine:
         """States of the joints that move: each (angles, rates, ...)."""
         if not doll.joints:
             return ()
-        return pybullet.getJointStatesMultiDof(doll.body, doll.joints,
-                                               physicsClientId=self._client)
+        return pybullet.getJointStatesMultiDof(doll.body, doll.joints, physicsClientId=self._client)
 
     def _velocities(self) -> np.ndarray:
         v: list[float] = []

@@ -5,7 +5,6 @@ The package works without it: `pip install ragdoll_ros[report]` brings it.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from ...model.coordinates import UNLIMITED, DofLayout, GeneralizedState
 from ...model.ragdoll import Joint, Limits, Ragdoll, joint_frame
 from ...model.scene import Placement, Scene
 from ...model.state import State
-from .protocol import GROUND, AppliedWrench, Contact, pressed
+from .protocol import GROUND, Contact, Wrenches, pressed
 
 INTEGRATORS = ('euler', 'implicitfast', 'rk4')
 """Order 1 with implicit joint damping; order 1, implicit in all velocities; order 4."""
@@ -32,8 +31,7 @@ class MissingEngine(errors.RagdollError):
 class MujocoEngine:
     """A scene in MuJoCo. ``free``: nothing touches and no joint has a limit."""
 
-    def __init__(self, scene: Scene, free: bool = False,
-                 integrator: str = 'implicitfast') -> None:
+    def __init__(self, scene: Scene, free: bool = False, integrator: str = 'implicitfast') -> None:
         if integrator not in INTEGRATORS:
             raise errors.OutOfRange('integrator', integrator, 'one of ' + ', '.join(INTEGRATORS))
         try:
@@ -49,15 +47,14 @@ class MujocoEngine:
         self._set_in_motion()
         self.exclude_initial_penetrations()
 
-    def step(self, duration: float, substeps: int, loads: Sequence[AppliedWrench] = ()) -> None:
+    def step(self, duration: float, substeps: int, loads: Wrenches = ()) -> None:
         self._model.opt.timestep = duration / substeps
         self._apply(loads)
         self._mujoco.mj_step(self._model, self._data, substeps)
         self._data.xfrc_applied[:] = 0
         self._stale = True
 
-    def acceleration(self, coordinates: GeneralizedState,
-                     loads: Sequence[AppliedWrench] = ()) -> np.ndarray:
+    def acceleration(self, coordinates: GeneralizedState, loads: Wrenches = ()) -> np.ndarray:
         """Rates of change of ``coordinates.v`` where nothing touches and no limit is reached."""
         self.place(coordinates)
         self._apply(loads)
@@ -225,7 +222,7 @@ class MujocoEngine:
             start.v[iv + 3:iv + 6] = placement.spin
         self.place(start)
 
-    def _apply(self, loads: Sequence[AppliedWrench]) -> None:
+    def _apply(self, loads: Wrenches) -> None:
         for load in loads:
             self._refresh()
             body = self._bodies[load.bone]

@@ -50,6 +50,10 @@ class AppliedWrench:
     local: bool = False
 
 
+Wrenches = Sequence[AppliedWrench]
+"""All that acts during one step."""
+
+
 class Engine(Protocol):
     """A scene in motion. ``free``: nothing touches and no joint has a limit."""
 
@@ -58,11 +62,10 @@ class Engine(Protocol):
 
     def __init__(self, scene: Scene, free: bool = False) -> None: ...
 
-    def step(self, duration: float, substeps: int, loads: Sequence[AppliedWrench] = ()) -> None:
+    def step(self, duration: float, substeps: int, loads: Wrenches = ()) -> None:
         """Go on by ``duration`` s in equal substeps, under ``loads`` that do not turn."""
 
-    def acceleration(self, coordinates: GeneralizedState,
-                     loads: Sequence[AppliedWrench] = ()) -> np.ndarray:
+    def acceleration(self, coordinates: GeneralizedState, loads: Wrenches = ()) -> np.ndarray:
         """Rates of change of ``coordinates.v``; leaves the engine in no state to go on from."""
 
     def read(self) -> State:

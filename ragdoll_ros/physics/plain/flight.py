@@ -11,7 +11,6 @@ tumbling plate's error is 300 times smaller so than along the world's.
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +18,7 @@ import numpy as np
 from ...model.coordinates import DofLayout, GeneralizedState
 from ...model.scene import Scene
 from ...model.state import State
-from ..engine.protocol import AppliedWrench, Engine
+from ..engine.protocol import Engine, Wrenches
 from ..flight import STIFFEST
 from ..motion import damping_rate
 from ..settings import Accuracy
@@ -39,8 +38,7 @@ class EngineDynamics:
         self._engine.place(coordinates)
         return self._engine.read()
 
-    def acceleration(self, coordinates: GeneralizedState,
-                     loads: Sequence[AppliedWrench] = ()) -> np.ndarray:
+    def acceleration(self, coordinates: GeneralizedState, loads: Wrenches = ()) -> np.ndarray:
         return self._engine.acceleration(coordinates, loads)
 
     def integrate_configuration(self, coordinates: GeneralizedState,
@@ -53,12 +51,12 @@ class EngineDynamics:
                    STIFFEST / max(self._damping_rate, 1e-9))
 
     def path(self, start: GeneralizedState, duration: float, accuracy: Accuracy, fastest: float,
-             loads: Sequence[AppliedWrench] = (), after: EnginePath | None = None) -> EnginePath:
+             loads: Wrenches = (), after: EnginePath | None = None) -> EnginePath:
         """Fly from ``start`` on for ``duration`` s, in one step."""
         return EnginePath(self._engine, start, duration, accuracy.order, loads, after)
 
     def fly(self, start: GeneralizedState, duration: float, steps: int,
-            loads: Sequence[AppliedWrench] = ()) -> GeneralizedState:
+            loads: Wrenches = ()) -> GeneralizedState:
         """The coordinates ``duration`` s later, in equal steps of order 4."""
         return fly(self._engine, start, duration, 4, steps, loads)
 
@@ -92,7 +90,7 @@ class EnginePath:
     count = 1
 
     def __init__(self, engine: Engine, start: GeneralizedState, duration: float, order: int,
-                 loads: Sequence[AppliedWrench] = (), after: EnginePath | None = None) -> None:
+                 loads: Wrenches = (), after: EnginePath | None = None) -> None:
         self._engine, self._loads, self.duration = engine, loads, duration
         layout = engine.layout
         turns = layout.root_turns(start.q).transpose(0, 2, 1)
@@ -125,7 +123,7 @@ class EnginePath:
 
 
 def fly(engine: Engine, start: GeneralizedState, duration: float, order: int, steps: int = 1,
-        loads: Sequence[AppliedWrench] = ()) -> GeneralizedState:
+        loads: Wrenches = ()) -> GeneralizedState:
     """The coordinates ``duration`` s later, in equal steps of a method of this order.
 
     ``engine`` must hold the scene without contacts and limits; where it ends up is undefined.
@@ -137,7 +135,7 @@ def fly(engine: Engine, start: GeneralizedState, duration: float, order: int, st
 
 def _step(engine: Engine, start: tuple[np.ndarray, np.ndarray],
           rates: tuple[np.ndarray, np.ndarray], h: float, method: Tableau,
-          loads: Sequence[AppliedWrench]) -> tuple[np.ndarray, np.ndarray]:
+          loads: Wrenches) -> tuple[np.ndarray, np.ndarray]:
     q, v = start
     rate_q, rate_v = rates
     sum_q, sum_v = method.weights[0] * rate_q, method.weights[0] * rate_v
@@ -149,7 +147,7 @@ def _step(engine: Engine, start: tuple[np.ndarray, np.ndarray],
 
 
 def _rates(engine: Engine, q: np.ndarray, v: np.ndarray,
-           loads: Sequence[AppliedWrench]) -> tuple[np.ndarray, np.ndarray]:
+           loads: Wrenches) -> tuple[np.ndarray, np.ndarray]:
     """Rates of change of q and v, roots' spins along their own axes: w' = R^T w'_world.
 
     A stage's quaternions are brought to length one: its rates are those of a turn, not of a turn

@@ -55,8 +55,7 @@ def _shaken(bones: int, t: float) -> State:
     axis = np.tile([0.2, 0.1, 0.3], (bones, 1))
     move = np.tile([0.0, 0.05, 0.02], (bones, 1))
     sin, cos = np.sin(rate * t), np.cos(rate * t)
-    return State(move * sin, from_rotation_vector(axis * sin), move * rate * cos,
-                 axis * rate * cos)
+    return State(move * sin, from_rotation_vector(axis * sin), move * rate * cos, axis * rate * cos)
 
 
 if __name__ == '__main__':

@@ -96,8 +96,7 @@ class SwingState:
     @cached_property
     def roots(self) -> np.ndarray:
         """(m, 3) m, world frame: where each mass's rod begins; a free mass's own place."""
-        return self.order.gather([links.seat.point for links in self.links],
-                                 self.flight.positions)
+        return self.order.gather([links.seat.point for links in self.links], self.flight.positions)
 
     @cached_property
     def directions(self) -> np.ndarray:

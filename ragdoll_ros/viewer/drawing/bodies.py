@@ -63,8 +63,7 @@ class Bodies:
             batch.handle.opacity = GLASS if glass else None
 
 
-def _placed(state: State, bones: np.ndarray,
-            offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _placed(state: State, bones: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions (p, 3) m and orientations (p, 4) w, x, y, z of parts, float32."""
     orientations = state.orientations[bones]
     positions = state.positions[bones]

@@ -94,8 +94,7 @@ def _read_once(path: str, scale: float | None, _: tuple[int, int]) -> Character:
     return read_character(path, scale)
 
 
-def _bound(doll: Ragdoll, character: Character,
-           bones: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _bound(doll: Ragdoll, character: Character, bones: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Poses of bodies from those of the character's bones that ride on them."""
     place = {name: k for k, name in enumerate(character.bone_names)}
     riders = {rider.bone: rider for rider in reversed(doll.riders) if rider.name in place}

@@ -112,8 +112,7 @@ class Folder:
             except errors.ModelError:
                 found = ''
             if found not in (source, f'{source}.yaml'):
-                raise errors.Unreadable(place, source,
-                                        f'a file of {self.path}, or the doll itself')
+                raise errors.Unreadable(place, source, f'a file of {self.path}, or the doll itself')
 
     def _check_models(self, data: object) -> None:
         """Refuse characters that do not lie here."""

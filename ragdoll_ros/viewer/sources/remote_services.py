@@ -26,8 +26,7 @@ class Ask:
     def __init__(self, node: Node, name: str) -> None:
         self._name = name
         self._get = node.create_client(GetParameters, f'{name}/get_parameters')
-        self._set = node.create_client(SetParametersAtomically,
-                                       f'{name}/set_parameters_atomically')
+        self._set = node.create_client(SetParametersAtomically, f'{name}/set_parameters_atomically')
         self._triggers = {service: node.create_client(Trigger, f'{name}/{service}')
                           for service in ('reset', 'step')}
         self._pause = node.create_client(SetBool, f'{name}/pause')

@@ -108,8 +108,7 @@ class Simulated:
 
     def drag(self, hand: str, target: Vector) -> None:
         """Move a hand."""
-        self._commands.put(lambda: self._simulation.drag(hand, target,
-                                                         EVENLY * self._report.pace))
+        self._commands.put(lambda: self._simulation.drag(hand, target, EVENLY * self._report.pace))
 
     def let_go(self, hand: str) -> None:
         """Open a hand; what it held keeps its speed."""
