@@ -569,7 +569,7 @@ def test_a_doll_in_the_air_with_stiff_joints_gives_surplus_energy_from_its_rotat
     assert after.momentum[0] == pytest.approx(before.momentum[0], abs=1e-9)
     assert np.cross(after.angular_momentum[0],
                     before.angular_momentum[0]) == pytest.approx((0, 0, 0), abs=1e-9)
-    assert conservation.account.taken == pytest.approx(2.0, abs=1e-9)
+    assert conservation.budget.taken == pytest.approx(2.0, abs=1e-9)
 
 
 @pytest.mark.parametrize('name', ['drop', 'crowd'])
