@@ -45,7 +45,7 @@ numba.njit = lambda *types, **options: njit(**options)
 from ragdoll_ros.physics.kernels.loaded import kernels
 print(kernels.KEPT, kernels.approach(np.array([-0.1, -0.2]), np.array([3.0, 5.0]), 0.035))
 """
-"""Declared without their types, kernels are compiled when they are called: one, as all take 40 s."""
+"""Declared without their types, kernels are compiled when called: one, as all take 40 s."""
 
 
 def run(*arguments, **variables):
