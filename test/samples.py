@@ -63,15 +63,17 @@ def each_tree(scene, coordinates, gravity=(0, 0, 0)):
         q, v = q + tree.nq, v + tree.nv
 
 
-def random_coordinates(scene, seed, speed=3.0, far=0.0):
-    """Any pose that leaves limited balls their three angles, ``far`` m from the origin."""
+def random_coordinates(scene, seed, speed=3.0, far=0.0, bend=1.0):
+    """A pose within ``bend`` rad of the bind pose, which leaves limited balls their three angles,
+    ``far`` m from the origin, moving at some ``speed`` m/s and rad/s.
+    """
     rng, q, v = np.random.default_rng(seed), [], []
     for placement in scene.dolls:
         tree = Articulated(placement.doll)
         own = tree.bind(placement.position, placement.orientation)
         own[:3] += far * rotation.normalized(rng.normal(size=3))
         own[3:7] = rng.normal(size=4)
-        own[7:] += rng.uniform(-1, 1, size=own.size - 7)
+        own[7:] += rng.uniform(-bend, bend, size=own.size - 7)
         q.append(own)
         v.append(rng.normal(size=tree.nv) * speed)
         turns, at = [3], 7

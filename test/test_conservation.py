@@ -6,9 +6,6 @@ import math
 
 import numpy as np
 import pytest
-
-pytest.importorskip('scipy')
-
 from conserved import conserved
 from samples import MANY, SCENES, each_tree, layout_of, random_coordinates, random_state
 

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 pytest.importorskip('numba', reason='numba is not installed: nothing is compiled')
-pytest.importorskip('scipy')
 
 from samples import MANY, SCENES, layout_of, random_coordinates
 

@@ -3,9 +3,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-pytest.importorskip('scipy')
-
 from conserved import conserved, matrices
 from samples import MANY, SCENES, random_state
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 pytest.importorskip('numba', reason='numba is not installed: nothing is compiled')
-pytest.importorskip('scipy')
 
 from samples import MANY, random_state
 
