@@ -20,6 +20,7 @@ from samples import (
     apart,
     each_tree,
     every_kind,
+    layout_of,
     random_coordinates,
     scene_of,
 )
@@ -93,6 +94,21 @@ def test_bones_are_where_jacobians_and_the_engine_see_them(scene, seed, far):
     assert np.less(apart(state, truth(scene, placed)), bounds).all()
     assert np.less(apart(state, engine.read()), bounds).all()
     engine.close()
+
+
+@pytest.mark.parametrize('make', [CompiledDynamics, layout_of])
+@pytest.mark.parametrize('scene', SCENES.values(), ids=SCENES)
+def test_a_small_way_leads_where_velocities_point(scene, make):
+    """10 us on and back: the difference over the time is the velocity, to h^2 w^3 l = 1e-8."""
+    here, dynamics, h = random_coordinates(scene, 1), CompiledDynamics(scene), 1e-5
+    ends = [dynamics.state(make(scene).integrate_configuration(here, way))
+            for way in (here.v * h, -here.v * h)]
+    state = dynamics.state(here)
+    assert (ends[0].positions - ends[1].positions) / (2 * h) == pytest.approx(
+        state.linear_velocities, abs=1e-7)
+    turned = rotation.multiply(ends[0].orientations, rotation.inverse(ends[1].orientations))
+    assert rotation.rotation_vector(turned) / (2 * h) == pytest.approx(
+        state.angular_velocities, abs=1e-7)
 
 
 @pytest.mark.parametrize('far', [0.0, 1e4])

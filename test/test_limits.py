@@ -9,6 +9,9 @@ pytest.importorskip('numba', reason='numba is not installed: nothing is compiled
 from samples import MANY, SCENES, layout_of, random_coordinates
 
 from ragdoll_ros.model.coordinates import GeneralizedState
+from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
+from ragdoll_ros.model.scene import Placement, Scene
+from ragdoll_ros.model.shapes import Sphere
 from ragdoll_ros.physics.limits import CompiledLimits
 from ragdoll_ros.physics.plain.limits import JointLimits
 
@@ -39,3 +42,25 @@ def test_joint_limits_are_told_of_as_by_numpy(scene, duration):
             found.hold(here)
             plain.hold(here)
     assert len(set(pressed)) == (2 if len(ends) else 1)
+
+
+PAIR = Scene('pair', (Placement(Ragdoll('pair', (
+    Bone('a', Sphere(.1), 1.0, (0, 0, 0)), Bone('b', Sphere(.1), 1.0, (1, 0, 0))), (
+    Joint('a', 'b', 'hinge', (.5, 0, 0), ((0, 0, 1),), ((-.5, .3),)),))),), ground=None)
+
+
+@pytest.mark.parametrize('make', [JointLimits, CompiledLimits])
+@pytest.mark.parametrize(('angle', 'rate', 'past', 'active', 'approach'), [
+    (.1, 2.0, -.2, False, 0.0), (.29, 2.0, -.01, True, 2.0), (.29, -2.0, -.01, False, 0.0),
+    (.2995, .01, -.0005, True, 0.0), (.2995, -.01, -.0005, False, 0.0),
+    (.302, -.5, .002, True, 0.0), (-.51, 0.0, .01, True, 0.0), (-.49, -2.0, -.01, True, 2.0),
+    (-.49, 2.0, -.01, False, 0.0)])
+def test_one_hinge_between_its_limits(make, angle, rate, past, active, approach):
+    """Past is beyond the nearer end; active: pressing there, or past it by 1 mrad within 0.01 s."""
+    limits = make(layout_of(PAIR))
+    here = GeneralizedState(np.array([0, 0, 0, 0, 0, 0, 1, angle]), np.array([0.0] * 6 + [rate]))
+    # A joint's limits are rounded to 1e-9 degrees.
+    assert limits.max_violation(here) == pytest.approx(past, abs=2e-11)
+    assert limits.is_active(here, .01) is active
+    assert limits.approach(here, .01) == approach
+    assert limits.fastest(here) == abs(rate)
