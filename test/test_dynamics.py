@@ -277,9 +277,8 @@ def test_a_step_that_breaks_down_is_not_taken(force, damping):
     start = random_coordinates(scene, 0, .5)
     load = AppliedWrench(1, np.array([force, 0, 0]), np.zeros(3), np.array([0, .01, 0]))
     path = CompiledDynamics(scene).path(start, .05, NORMAL, .5, [load])
-    end = path.at(.01)
+    assert path.at(.01) is None
     assert path.count < 1000
-    assert end is None or np.isfinite(np.concatenate([end.q, end.v])).all()
 
 
 @pytest.mark.parametrize('doll', [every_kind(), load_doll('doll'), PLATE], ids=lambda d: d.name)
