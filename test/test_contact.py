@@ -88,6 +88,15 @@ def test_rolling_friction_is_a_lever_arm(friction):
     assert (first - last) / 0.4 == pytest.approx(5 / 7 * 9.8 * arm / radius, rel=1e-6)
 
 
+def test_a_ball_that_spins_on_the_spot_goes_on():
+    """It touches in a point: there is no friction of spinning."""
+    scene = Scene('top', (Placement(BALL, position=(0, 0, 0.1), spin=(0, 0, 10)),), Ground())
+    with Simulation(scene) as simulation:
+        for _ in range(60):
+            state = simulation.advance()
+    assert state.angular_velocities[0] == pytest.approx((0, 0, 10), abs=1e-3)
+
+
 @pytest.mark.parametrize('accuracy', ['draft', 'normal', 'exact'])
 @pytest.mark.parametrize('apart', [0.5, 0.503, 0.51, 0.5151, 0.5299])
 def test_a_ball_hands_its_momentum_on_to_another(accuracy, apart):
