@@ -104,13 +104,17 @@ def test_a_ball_rests_on_a_tilted_ground_and_tells_of_it():
 
 
 @pytest.mark.parametrize('engine', ENGINES)
-def test_a_contact_lies_on_its_first_bone_however_deep(engine):
-    ball = Ragdoll('ball', (Bone('ball', Sphere(.1), 2.0, (0, 0, 0)),))
-    deep = engine(Scene('deep', (Placement(ball, position=(0, 0, .098)),), Ground()))
+@pytest.mark.parametrize(('shape', 'beside'), [(Sphere(.1), 0.0), (Box((.2, .2, .2)), .1)])
+def test_a_contact_lies_on_its_first_bone_however_deep(engine, shape, beside):
+    """Under a ball's middle and a box's corners."""
+    doll = Ragdoll('doll', (Bone('bone', shape, 2.0, (0, 0, 0)),))
+    deep = engine(Scene('deep', (Placement(doll, position=(0, 0, .098)),), Ground()))
     deep.step(1e-5, 1)
-    contact, = deep.contacts()
-    assert contact.position == pytest.approx((0, 0, -.002), abs=1e-6)
-    assert contact.depth == pytest.approx(.002, abs=1e-6)
+    assert deep.contacts()
+    for contact in deep.contacts():
+        assert np.abs(contact.position[:2]) == pytest.approx([beside, beside], abs=1e-6)
+        assert contact.position[2] == pytest.approx(-.002, abs=1e-6)
+        assert contact.depth == pytest.approx(.002, abs=1e-6)
 
 
 def test_jointed_and_overlapping_pairs_do_not_collide():
