@@ -32,7 +32,8 @@ test: $(COMPILED) chromium ## the tests, a minute and a half on two cores
 	@$(BIN)/python -m pytest -n 3 --dist loadfile
 
 # What numpy and PyBullet do where numba is not.
-CORE := simulation grab conventions riders measure references ragdoll
+CORE := simulation pushes contact conservation mechanics flight grab conventions riders measure \
+	references ragdoll
 plain: $(READY) ## the core's tests without compiled code
 	@RAGDOLL_COMPILED=0 $(BIN)/python -m pytest -n 3 --dist loadfile $(CORE:%=test/test_%.py)
 

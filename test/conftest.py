@@ -16,9 +16,16 @@ collect_ignore_glob = [file for package, files in FILES_THAT_NEED.items()
                        if importlib.util.find_spec(package) is None for file in files]
 
 
-LONGEST = ('test_ros_viewer.py', 'test_viewer_browser.py', 'test_ros_process.py',
-           'test_ros_browser.py', 'test_ros_programs.py', 'test_grab.py', 'test_simulation.py',
-           'test_editor.py', 'test_viewer.py', 'test_swing.py')
+LONGEST = ('test_ros_viewer.py', 'test_ros_programs.py', 'test_viewer_command.py',
+           'test_viewer_browser.py', 'test_ros_browser.py', 'test_ros_process.py',
+           'test_references.py', 'test_contact.py', 'test_grab.py', 'test_swing.py',
+           'test_pushes.py', 'test_dynamics.py', 'test_package.py', 'test_simulation.py',
+           'test_viewer_network.py', 'test_ros_node.py', 'test_compiled_cache.py')
+
+
+def pytest_configure(config):
+    """By itself pytest-xdist begins with the files of the most tests, which are not the longest."""
+    config.option.loadscopereorder = False
 
 
 def pytest_collection_modifyitems(items):

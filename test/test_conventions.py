@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from conserved import conserved
 
 from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.files.scene import load_scene
@@ -117,14 +118,15 @@ def test_quaternions_are_xyzw_and_right_handed():
 
 def test_velocities_are_of_the_centre_of_mass_in_world_axes():
     scene = load_scene('flight')
-    spun = dataclasses.replace(scene.dolls[0], spin=(0, 0, 2), velocity=(1, 0, 0))
+    spun = dataclasses.replace(scene.dolls[0], spin=(1, -3, 2), velocity=(1, 0, 0))
     engine = BulletEngine(dataclasses.replace(scene, dolls=(spun,)))
     state = engine.read()
     engine.close()
-    # The doll's mass is symmetric about x = y = 0, so all turns about the z axis.
-    expected = np.add(np.cross((0, 0, 2), state.positions), (1, 0, 0))
+    # All turns about the doll's centre of mass, which moves with the velocity.
+    arms = state.positions - conserved(scene, state).centre
+    expected = np.add(np.cross((1, -3, 2), arms), (1, 0, 0))
     assert state.linear_velocities == pytest.approx(expected, abs=1e-12)
-    assert state.angular_velocities == pytest.approx(np.tile((0, 0, 2), (10, 1)), abs=1e-12)
+    assert state.angular_velocities == pytest.approx(np.tile((1, -3, 2), (10, 1)), abs=1e-12)
 
 
 def test_mirrored_poses_are_mirror_images(engine):

@@ -7,9 +7,10 @@ import math
 
 import numpy as np
 import pytest
+from conserved import conserved, matrices
 
 from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.model import errors, rotation
+from ragdoll_ros.model import errors
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.model.shapes import Box, Sphere
@@ -22,7 +23,6 @@ from ragdoll_ros.physics.grab import (
     MOST_HANDS,
     mobility,
 )
-from ragdoll_ros.physics.plain.mechanics import Mechanics
 from ragdoll_ros.physics.settings import NORMAL
 from ragdoll_ros.physics.simulation import Simulation
 
@@ -43,8 +43,7 @@ def held_point(simulation, hand=0):
     grab = simulation.grabs[hand]
     bone = simulation.scene.bone_index(grab.bone)
     state = simulation.state
-    return state.positions[bone] + rotation.rotate(state.orientations[bone],
-                                                   np.array(grab.point))
+    return state.positions[bone] + matrices(state.orientations)[bone] @ grab.point
 
 
 def corner(bone):
@@ -101,13 +100,12 @@ def test_a_bone_follows_within_a_fifth_of_a_second(bone):
 
 def test_a_hand_pulls_no_harder_than_it_may():
     """From afar it pulls with all its force: momentum is force times time."""
-    mechanics = Mechanics(FLIGHT)
     with Simulation(FLIGHT) as simulation:
         simulation.grab('hand', 'torso')
         simulation.drag('hand', simulation.grabs[0].target + np.array((300, 0, 0)), 0.0)
         for _ in range(20):
             state = simulation.advance()
-    momentum = mechanics.motion(state).momentum[0]
+    momentum = conserved(FLIGHT, state).momentum
     # The bone gives way askew, and the pull is askew by some 2 degrees to make up for it.
     assert momentum == pytest.approx((LARGEST_PULL * 0.2, 0, 0), abs=0.05 * LARGEST_PULL * 0.2)
     assert 0.995 < np.linalg.norm(momentum) / (LARGEST_PULL * 0.2) <= 1 + 1e-9
@@ -128,14 +126,14 @@ def test_mobility_is_that_of_a_rigid_body():
     with Simulation(scene) as simulation:
         for _ in range(7):
             state = simulation.advance()
-        dynamics = backend.dynamics_of(scene, BulletEngine, simulation._stepper.engine.layout)
         point = np.array((0.05, -0.1, 0.2))
+        engine = BulletEngine(scene)
+        dynamics = backend.dynamics_of(scene, BulletEngine, engine.layout)
         got = mobility(dynamics, simulation.coordinates, 0, point)
         dynamics.close()
-    turn = rotation.matrix(state.orientations[0])
-    arm = turn @ point
-    skew = np.cross(np.eye(3), arm)
-    inertia = turn @ np.diag(Mechanics(scene).inertias[0]) @ turn.T
+        engine.close()
+    arm = matrices(state.orientations)[0] @ point
+    skew, inertia = np.cross(np.eye(3), arm), conserved(scene, state).inertia
     assert got == pytest.approx(np.eye(3) / 10 - skew @ np.linalg.inv(inertia) @ skew, abs=1e-6)
 
 
@@ -144,7 +142,6 @@ def test_mobility_is_that_of_a_rigid_body():
 def test_the_work_is_what_the_energy_grows_by(order, point):
     """A ball has no gyroscopic torque: without the guard, the engine's step keeps its energy."""
     scene = single(Sphere(0.1))
-    mechanics = Mechanics(scene)
     with Simulation(scene, accuracy=dataclasses.replace(PLAIN, order=order)) as simulation:
         simulation.grab('hand', 'body', point)
         start = np.array(simulation.grabs[0].target)
@@ -157,7 +154,8 @@ def test_the_work_is_what_the_energy_grows_by(order, point):
             simulation.advance()
             work = simulation.measures()['work_of_grabs_J']
             # 5e-5 of the 300 J that go in and out.
-            assert mechanics.energy(simulation.state)[0] == pytest.approx(work, abs=0.015)
+            energy = conserved(scene, simulation.state).energy
+            assert energy == pytest.approx(work, abs=0.015)
         assert work > 100
         assert simulation.measures()['work_of_pushes_J'] == 0
 
@@ -168,9 +166,9 @@ def thrown(simulation, bone, direction, seconds=(0.1, 0.25, 0.2)):
     Gives the most by which a limit was passed, rad, that a bone sank, m, and the energy from
     nothing, as a share of the energy at the start and of all work done.
     """
-    step, mechanics = simulation.step, Mechanics(simulation.scene)
+    step, scene = simulation.step, simulation.scene
     fall, drag, fly = (round(part / step) for part in seconds)
-    start = mechanics.energy(simulation.state)[0]
+    start = conserved(scene, simulation.state).energy
     worst = {'limit': 0.0, 'sunk': 0.0, 'excess': -math.inf, 'gap': 0.0}
     turned_over = last = 0.0
     for tick in range(fall + drag + fly):
@@ -186,7 +184,7 @@ def thrown(simulation, bone, direction, seconds=(0.1, 0.25, 0.2)):
         measures = simulation.measures()
         work = measures['work_of_grabs_J']
         turned_over, last = turned_over + abs(work - last), work
-        excess = mechanics.energy(state)[0] - start - work
+        excess = conserved(scene, state).energy - start - work
         for name, value in (('limit', measures['limit_overshoot_rad']),
                             ('sunk', measures['sinking_m']), ('gap', measures['joint_gap_m']),
                             ('excess', excess / (start + turned_over))):
@@ -235,9 +233,8 @@ def test_pulled_at_ten_metres_a_second_and_let_go_in_every_way(accuracy, step):
                                             pytest.param('draft', 0.002, marks=pytest.mark.slow)])
 def test_jumps_of_the_pointer_by_metres_leave_it_stable(accuracy, step):
     rng = np.random.default_rng(1)
-    mechanics = Mechanics(DROP)
     with Simulation(DROP, accuracy=accuracy, step=step) as simulation:
-        start = mechanics.energy(simulation.state)[0]
+        start = conserved(DROP, simulation.state).energy
         simulation.grab('hand', 'left_forearm', (0, 0.1, 0))
         turned_over = last = 0.0
         for tick in range(round(1.5 / step)):
@@ -247,7 +244,7 @@ def test_jumps_of_the_pointer_by_metres_leave_it_stable(accuracy, step):
             measures = simulation.measures()
             work = measures['work_of_grabs_J']
             turned_over, last = turned_over + abs(work - last), work
-            excess = mechanics.energy(state)[0] - start - work
+            excess = conserved(DROP, state).energy - start - work
             assert excess <= 1e-3 * (start + turned_over)
             assert math.degrees(measures['limit_overshoot_rad']) <= 5
         assert measures['stopped_total'] == 0
@@ -259,7 +256,6 @@ def test_jumps_of_the_pointer_by_metres_leave_it_stable(accuracy, step):
 
 
 def test_what_is_thrown_keeps_its_momentum():
-    mechanics = Mechanics(FLIGHT)
     with Simulation(FLIGHT) as simulation:
         simulation.grab('hand', 'right_shin', corner('right_shin'))
         for tick in range(20):
@@ -268,15 +264,15 @@ def test_what_is_thrown_keeps_its_momentum():
         before = simulation.state
         simulation.let_go('hand')
         assert simulation.state is before
-        motion = mechanics.motion(before)
+        motion = conserved(FLIGHT, before)
         assert np.linalg.norm(motion.momentum) > 50
         for _ in range(50):
-            after = mechanics.motion(simulation.advance())
-            assert after.momentum[0] == pytest.approx(motion.momentum[0], abs=1e-6)
+            after = conserved(FLIGHT, simulation.advance())
+            assert after.momentum == pytest.approx(motion.momentum, abs=1e-6)
             # What the stepping takes from the turn in contacts between bones, the guard gives
             # back; what it cannot know it leaves: 1e-3.
-            assert after.angular_momentum[0] == pytest.approx(
-                motion.angular_momentum[0], abs=1e-3 * np.linalg.norm(motion.angular_momentum))
+            assert after.angular_momentum == pytest.approx(
+                motion.angular_momentum, abs=1e-3 * np.linalg.norm(motion.angular_momentum))
 
 
 def swung(hands):

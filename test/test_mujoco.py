@@ -6,68 +6,28 @@ import pytest
 
 pytest.importorskip('mujoco')
 
+from samples import GRAVITY, every_kind, random_coordinates
+
+from ragdoll_ros.accuracy.motions.motion import without_limits
 from ragdoll_ros.accuracy.references.articulated import Articulated
 from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.model import errors, rotation
-from ragdoll_ros.model.coordinates import GeneralizedState
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.scene import Ground, Material, Placement, Scene
-from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Sphere
+from ragdoll_ros.model.shapes import Box, Sphere
 from ragdoll_ros.physics.engine.bullet import BulletEngine
 from ragdoll_ros.physics.engine.mujoco import MujocoEngine
 from ragdoll_ros.physics.engine.protocol import GROUND, AppliedWrench
 
-GRAVITY = (0.3, -0.2, -9.8)
 ENGINES = [BulletEngine, MujocoEngine]
-
-
-def every_kind():
-    """All joint kinds and shapes, nothing aligned with anything, no limit near."""
-    turn = tuple(rotation.normalized((.1, .5, -.3, .8)))
-    bones = (Bone('root', Box((.1, .2, .4)), 4.0, (0, .1, 1), turn),
-             Bone('hinged', Capsule(.05, .2), 1.0, (.3, .1, 1.1), turn),
-             Bone('free_ball', Box((.1, .3, .05)), 2.0, (-.3, .2, .9), (.6, 0, 0, .8)),
-             Bone('double', Cylinder(.05, .3), 1.5, (.6, 0, 1.1), (0, .6, 0, .8)),
-             Bone('ball', Sphere(.07), .8, (-.3, .5, .9), turn),
-             Bone('glued', Sphere(.05), .5, (-.3, .7, .9)))
-    joints = (Joint('root', 'hinged', 'hinge', (.15, .1, 1.0), ((1, 1, 0),), damping=.3),
-              Joint('root', 'free_ball', 'ball', (-.15, .1, 1), ((0, 1, 1),), damping=.2),
-              Joint('hinged', 'double', 'universal', (.45, 0, 1.1), ((0, 0, 1), (1, -1, 0))),
-              Joint('free_ball', 'ball', 'ball', (-.3, .4, .9), ((0, 1, 0),), ((-1, 1), (-.5, .5))),
-              Joint('ball', 'glued', 'fixed', (-.3, .6, .9)))
-    return Ragdoll('every_kind', bones, joints)
-
-
-def default_doll():
-    """The default doll with all limits off: here they would take part in the motion."""
-    doll = load_doll('doll')
-    return dataclasses.replace(doll, joints=tuple(dataclasses.replace(joint, limits=())
-                                                  for joint in doll.joints))
 
 
 def flying(doll):
     return Scene('flying', (Placement(doll),), gravity=GRAVITY, self_collision=False)
 
 
-def random_coordinates(doll, seed):
-    """A pose within .4 rad of the bind pose, moving at some 3 m/s and rad/s."""
-    rng = np.random.default_rng(seed)
-    tree = Articulated(doll)
-    q, v = tree.bind(), rng.normal(size=tree.nv) * 3
-    q[:3] = rng.normal(size=3)
-    q[3:7] = rotation.normalized(rng.normal(size=4))
-    q[7:] += rng.uniform(-.4, .4, size=q.size - 7)
-    at = 7
-    for joint in doll.joints_depth_first():
-        if joint.kind == 'ball' and not any(joint.limits):
-            q[at:at + 4] = rotation.normalized(q[at:at + 4])
-            at += 4
-        else:
-            at += joint.dof
-    return GeneralizedState(q, v)
-
-
-DOLLS = [default_doll(), every_kind()]
+DOLLS = [without_limits(load_doll('doll')), every_kind()]
+"""The default doll without its limits: here they would take part in the motion."""
 EVERY = [pytest.param(doll, seed, id=f'{doll.name}-{seed}') for doll in DOLLS for seed in range(3)]
 
 
@@ -76,7 +36,7 @@ EVERY = [pytest.param(doll, seed, id=f'{doll.name}-{seed}') for doll in DOLLS fo
 def test_poses_and_velocities_are_those_of_the_tree(engine, doll, seed):
     """Forward kinematics of three independent programs; 1e-7 rad is the root of rounding."""
     simulated = engine(flying(doll))
-    placed = random_coordinates(doll, seed)
+    placed = random_coordinates(flying(doll), seed, bend=.4)
     simulated.place(placed)
     back = simulated.coordinates()
     sign = np.sign(back.q[3:7] @ placed.q[3:7])
@@ -95,7 +55,7 @@ def test_both_engines_read_the_same_angles(doll, seed):
     """Hinges, universals and both sorts of ball joints, in the order of Scene.angle_names."""
     engines = [engine(flying(doll)) for engine in ENGINES]
     for engine in engines:
-        engine.place(random_coordinates(doll, seed))
+        engine.place(random_coordinates(flying(doll), seed, bend=.4))
     assert engines[0].joint_angles() == pytest.approx(engines[1].joint_angles(), abs=1e-12)
 
 
@@ -103,7 +63,7 @@ def test_both_engines_read_the_same_angles(doll, seed):
 @pytest.mark.parametrize(('doll', 'seed'), EVERY)
 def test_engines_accelerate_as_the_equations_of_motion_say(engine, doll, seed):
     """Measured: 1e-10 of the largest for PyBullet, 1e-12 for MuJoCo."""
-    placed = random_coordinates(doll, seed)
+    placed = random_coordinates(flying(doll), seed, bend=.4)
     truth = Articulated(doll, GRAVITY).acceleration(placed.q, placed.v)
     found = engine(flying(doll)).acceleration(placed)
     assert np.abs(found - truth).max() < 1e-8 * np.abs(truth).max()
@@ -144,13 +104,17 @@ def test_a_ball_rests_on_a_tilted_ground_and_tells_of_it():
 
 
 @pytest.mark.parametrize('engine', ENGINES)
-def test_a_contact_lies_on_its_first_bone_however_deep(engine):
-    ball = Ragdoll('ball', (Bone('ball', Sphere(.1), 2.0, (0, 0, 0)),))
-    deep = engine(Scene('deep', (Placement(ball, position=(0, 0, .098)),), Ground()))
+@pytest.mark.parametrize(('shape', 'beside'), [(Sphere(.1), 0.0), (Box((.2, .2, .2)), .1)])
+def test_a_contact_lies_on_its_first_bone_however_deep(engine, shape, beside):
+    """Under a ball's middle and a box's corners."""
+    doll = Ragdoll('doll', (Bone('bone', shape, 2.0, (0, 0, 0)),))
+    deep = engine(Scene('deep', (Placement(doll, position=(0, 0, .098)),), Ground()))
     deep.step(1e-5, 1)
-    contact, = deep.contacts()
-    assert contact.position == pytest.approx((0, 0, -.002), abs=1e-6)
-    assert contact.depth == pytest.approx(.002, abs=1e-6)
+    assert deep.contacts()
+    for contact in deep.contacts():
+        assert np.abs(contact.position[:2]) == pytest.approx([beside, beside], abs=1e-6)
+        assert contact.position[2] == pytest.approx(-.002, abs=1e-6)
+        assert contact.depth == pytest.approx(.002, abs=1e-6)
 
 
 def test_jointed_and_overlapping_pairs_do_not_collide():

@@ -72,10 +72,19 @@ def test_volume_and_inertia_are_those_of_the_uniform_solid(shape):
     (lambda: Ragdoll('d', (bone('a'), bone('b')),
                      (hinge('a', 'b'), hinge('b', 'a'))), errors.JointCycle),
 ])
-def test_each_fault_has_a_name(make, error):
+def test_each_error_has_a_name(make, error):
     with pytest.raises(error) as caught:
         make()
     assert caught.value.path and caught.value.expected
+
+
+@pytest.mark.parametrize(('field', 'value'), [
+    ('friction', -1), ('friction', math.nan), ('rolling_friction', -0.1), ('restitution', 1.5),
+    ('color', (1, 0, 0, 2))])
+def test_a_bones_surface_is_checked_too(field, value):
+    with pytest.raises(errors.OutOfRange) as caught:
+        bone('b', **{field: value})
+    assert caught.value.path == field
 
 
 def test_limits_in_degrees_survive_radians_to_the_bit():

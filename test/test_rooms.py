@@ -26,6 +26,8 @@ ONLY = {'pybullet': 'physics/engine/bullet.py', 'mujoco': 'physics/engine/mujoco
 """Libraries, and the one place of each. The report's pendulum in three lines of PyBullet alone is
 what a user would write without this package: it shares no code with it."""
 
+Edges = list[tuple[str, str]]
+
 MACHINE_CODE = {'numba', 'numpy', *sys.stdlib_module_names}
 
 REPORTS_OWN = {'accuracy/quickstart.py': {'pybullet'}}
@@ -40,7 +42,7 @@ def modules(package: Path) -> dict[str, Path]:
     return found
 
 
-def imports(package: Path) -> list[tuple[str, str]]:
+def imports(package: Path) -> Edges:
     """Every import (module, what it imports), also within functions and under TYPE_CHECKING.
 
     What is of the package is named by its module; other libraries as in the code, after a colon.
@@ -68,10 +70,10 @@ def imports(package: Path) -> list[tuple[str, str]]:
     return edges
 
 
-def broken_arrows(package: Path) -> list[str]:
+def broken_arrows(edges: Edges) -> list[str]:
     """Imports that no arrow allows."""
     found = []
-    for name, target in imports(package):
+    for name, target in edges:
         room, other = name.partition('.')[0], target.partition('.')[0]
         if target.startswith(':') or room == other or room in ('', 'riders') or target == '':
             continue
@@ -80,17 +82,17 @@ def broken_arrows(package: Path) -> list[str]:
             found.append(f'{name} -> {target}')
         if room == 'physics' and other == 'files' and not name.startswith('physics.engine.'):
             found.append(f'{name} -> {target}: only an engine wants a text')
-    for name, target in imports(package):
+    for name, target in edges:
         if name.startswith('physics.kernels') and not target.startswith('physics.kernels') and (
                 target[0] != ':' or target[1:].partition('.')[0] not in MACHINE_CODE):
             found.append(f'{name} -> {target}: kernels are machine code and nothing else')
     return found
 
 
-def circle(package: Path) -> list[str]:
+def circle(edges: Edges) -> list[str]:
     """A circle of imports between modules, or none; what is imported within a function counts."""
     graph: dict[str, set[str]] = {}
-    for name, target in imports(package):
+    for name, target in edges:
         if not target.startswith(':') and target != name and not name.startswith(target + '.'):
             graph.setdefault(name, set()).add(target)
     try:
@@ -100,6 +102,12 @@ def circle(package: Path) -> list[str]:
     return []
 
 
+@pytest.fixture(scope='module')
+def edges():
+    """The imports of the package, read once."""
+    return imports(PACKAGE)
+
+
 def test_rooms_are_those_of_the_plan():
     rooms = {path.name for path in PACKAGE.iterdir() if path.is_dir() and path.name != '__pycache__'
              and any(path.rglob('*.py'))}
@@ -107,17 +115,18 @@ def test_rooms_are_those_of_the_plan():
     assert {path.name for path in PACKAGE.glob('*.py')} == {'__init__.py', 'riders.py'}
 
 
-def test_imports_follow_the_arrows():
-    assert broken_arrows(PACKAGE) == []
+def test_imports_follow_the_arrows(edges):
+    assert broken_arrows(edges) == []
 
 
-def test_imports_close_no_circle():
-    assert circle(PACKAGE) == []
+def test_imports_close_no_circle(edges):
+    assert circle(edges) == []
 
 
 @pytest.mark.parametrize('library', ONLY)
-def test_a_library_is_imported_in_one_place(library):
-    places = {str(modules(PACKAGE)[name].relative_to(PACKAGE)) for name, target in imports(PACKAGE)
+def test_a_library_is_imported_in_one_place(edges, library):
+    files = modules(PACKAGE)
+    places = {str(files[name].relative_to(PACKAGE)) for name, target in edges
               if target[1:].partition('.')[0] == library and target.startswith(':')}
     places -= {place for place, own in REPORTS_OWN.items() if library in own}
     assert places and all(place.startswith(ONLY[library]) for place in places), places
@@ -146,17 +155,17 @@ def copy_with(tmp_path: Path, file: str, line: str) -> Path:
     ('physics/kernels/step.py', 'from ...model.scene import Scene'),
     ('physics/kernels/step.py', 'import scipy.linalg')])
 def test_an_arrow_that_is_broken_on_purpose_is_found(tmp_path, file, line):
-    assert broken_arrows(copy_with(tmp_path, 'model/push.py', '')) == []
-    assert len(broken_arrows(copy_with(tmp_path, file, line))) == 1
+    assert broken_arrows(imports(copy_with(tmp_path, 'model/push.py', ''))) == []
+    assert len(broken_arrows(imports(copy_with(tmp_path, file, line)))) == 1
 
 
 def test_what_listens_to_a_node_may_know_the_ros_room(tmp_path):
-    assert broken_arrows(copy_with(tmp_path, 'viewer/sources/remote.py', 'from ...ros import node')
-                         ) == []
+    package = copy_with(tmp_path, 'viewer/sources/remote.py', 'from ...ros import node')
+    assert broken_arrows(imports(package)) == []
 
 
 def test_a_circle_made_on_purpose_is_found(tmp_path):
     package = copy_with(tmp_path, 'model/scene.py', 'from .push import Push')
-    assert circle(package) == []
+    assert circle(imports(package)) == []
     (package / 'model/push.py').write_text('def late():\n    from .scene import Scene')
-    assert set(circle(package)) == {'model.scene', 'model.push'}
+    assert set(circle(imports(package))) == {'model.scene', 'model.push'}

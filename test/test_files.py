@@ -1,4 +1,4 @@
-"""Files: the shipped ones, a round trip, and all errors at once."""
+"""Scenes and dolls as files: the shipped ones, a round trip, and all errors at once."""
 import dataclasses
 import math
 
@@ -88,15 +88,6 @@ def test_the_path_of_a_character_is_seen_from_its_dolls_file(tmp_path):
     assert load_doll(str(moved / 'ball.yaml')) == ball
 
 
-@pytest.mark.parametrize(('field', 'value'), [
-    ('friction', -1), ('friction', math.nan), ('rolling_friction', -0.1), ('restitution', 1.5),
-    ('color', (1, 0, 0, 2))])
-def test_a_bones_surface_is_checked_without_a_file_too(field, value):
-    with pytest.raises(errors.OutOfRange) as caught:
-        Bone('b', Sphere(0.1), 1, (0, 0, 0), **{field: value})
-    assert caught.value.path == field
-
-
 def test_a_bone_may_not_be_called_as_the_world(tmp_path):
     """A push in the frame `world` could be meant for either."""
     path = tmp_path / 'doll.yaml'
@@ -107,7 +98,7 @@ def test_a_bone_may_not_be_called_as_the_world(tmp_path):
         load_scene(str(path))
 
 
-def test_all_faults_come_at_once_with_their_places(tmp_path):
+def test_all_errors_come_at_once_with_their_places(tmp_path):
     path = tmp_path / 'five.yaml'
     path.write_text(FIVE)
     with pytest.raises(errors.ModelErrors) as caught:
