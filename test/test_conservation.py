@@ -36,8 +36,7 @@ def make(request):
         return ConservationProjection, Mechanics
     if not kernels.ready():
         pytest.skip('nothing is compiled here')
-    from ragdoll_ros.physics.conservation import CompiledProjection
-    from ragdoll_ros.physics.mechanics import CompiledMechanics
+    from ragdoll_ros.physics.conservation import CompiledMechanics, CompiledProjection
     return CompiledProjection, CompiledMechanics
 
 

@@ -11,9 +11,10 @@ from ragdoll_ros.fit.pipeline import fit_character
 from ragdoll_ros.fit.report import fit_report
 from ragdoll_ros.fit.spring_bones import Rod, Spring
 from ragdoll_ros.fit.spring_recipe import swing_of
+from ragdoll_ros.model import rotation
 from ragdoll_ros.model.scene import above_ground
+from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.physics.swing.frames import Frames
 from ragdoll_ros.physics.swing.mount import Mount
 from ragdoll_ros.physics.swing.swings import Swings
 
@@ -142,7 +143,7 @@ def vrm_frames(rod, length, angle, gravity_way, count):
 
 
 def still(swing):
-    frame = Frames.still()
+    frame = State(np.zeros((1, 3)), np.array([rotation.IDENTITY]), *np.zeros((2, 1, 3)))
     mount = Mount(swing, 0, swing.name, np.zeros(3), np.array(swing.directions()))
     return Swings([mount], (0, 0, -9.8), lambda time: frame)
 

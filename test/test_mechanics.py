@@ -18,7 +18,7 @@ def make(request):
         return Mechanics
     if not kernels.ready():
         pytest.skip('nothing is compiled here')
-    from ragdoll_ros.physics.mechanics import CompiledMechanics
+    from ragdoll_ros.physics.conservation import CompiledMechanics
     return CompiledMechanics
 
 
