@@ -12,6 +12,7 @@ pytest.importorskip('numba', reason='numba is not installed: nothing is compiled
 from samples import MANY, random_state
 
 from ragdoll_ros.model.scene import Ground, height
+from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.engine.protocol import GROUND
 from ragdoll_ros.physics.plain.reach import MARGIN, Reach
 from ragdoll_ros.physics.reach import CompiledReach
