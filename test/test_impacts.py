@@ -198,7 +198,7 @@ def test_a_rod_falls_over_about_its_edge():
         truth[-1], abs=math.radians(0.05))
 
 
-@known('the excess of a group is shared by heads, not by energy: a light ball is stopped in the air')
+@known('the excess of a group is shared by heads, not by energy: a light ball is stopped')
 def test_a_light_ball_that_hits_the_doll_goes_on():
     ball = Ragdoll('ball', (Bone('ball', Sphere(0.05), 0.01, (0, 0, 0)),))
     scene = Scene('hit', (Placement(load_doll('doll')),
