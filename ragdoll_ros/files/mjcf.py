@@ -19,6 +19,7 @@ from collections.abc import Collection, Iterable
 import numpy as np
 
 from ..model import rotation
+from ..model.pose import Pose
 from ..model.ragdoll import Bone, Joint, joint_frame
 from ..model.scene import Placement, Scene, grip
 from ..model.shapes import Shape
@@ -78,15 +79,13 @@ def _add_doll(world: ET.Element, scene: Scene, placement: Placement) -> None:
     """Nest the bodies of one doll as its joints do."""
     doll = placement.doll
     made = {doll.root.name: _add_bone(world, scene, placement, doll.root,
-                                      *placement.bone_pose(doll.root))}
+                                      placement.bone_pose(doll.root))}
     ET.SubElement(made[doll.root.name], 'freejoint',
                   name=scene.qualified(placement, doll.root.name) + '/free')
     for joint in doll.joints_from_root():
         parent, child = doll.bone(joint.parent), doll.bone(joint.child)
-        back = rotation.inverse(parent.orientation)
-        offset = rotation.rotate(back, np.subtract(child.position, parent.position))
-        body = _add_bone(made[parent.name], scene, placement, child, offset,
-                         rotation.multiply(back, child.orientation))
+        body = _add_bone(made[parent.name], scene, placement, child,
+                         parent.pose.relative(child.pose))
         for attributes in _joints(joint, child):
             attributes['name'] = scene.qualified(placement, attributes['name'])
             ET.SubElement(body, 'joint', attributes)
@@ -94,10 +93,10 @@ def _add_doll(world: ET.Element, scene: Scene, placement: Placement) -> None:
 
 
 def _add_bone(parent: ET.Element, scene: Scene, placement: Placement, bone: Bone,
-              position: np.ndarray, orientation: np.ndarray) -> ET.Element:
+              pose: Pose) -> ET.Element:
     name = scene.qualified(placement, bone.name)
-    body = ET.SubElement(parent, 'body', name=name, pos=_text(position),
-                         quat=_quaternion(orientation))
+    body = ET.SubElement(parent, 'body', name=name, pos=_text(pose.position),
+                         quat=_quaternion(pose.orientation))
     ET.SubElement(body, 'inertial', pos='0 0 0', mass=repr(bone.mass),
                   diaginertia=_text(bone.inertia))
     # bit 0: meets the ground and, with self-collision, each other; bit 1: meets the ground only
@@ -111,8 +110,7 @@ def _add_bone(parent: ET.Element, scene: Scene, placement: Placement, bone: Bone
 def _joints(joint: Joint, child: Bone) -> Iterable[dict[str, str]]:
     """Attributes of one element for each axis, in the child's frame; none for a fixed joint."""
     back = rotation.inverse(child.orientation)
-    place = {'pos': _text(rotation.rotate(back, np.subtract(joint.anchor, child.position))),
-             'damping': repr(joint.damping)}
+    place = {'pos': _text(child.pose.inward(joint.anchor)), 'damping': repr(joint.damping)}
     axes, limits = joint.axes, joint.angle_limits
     if joint.kind == 'ball' and not any(limits):
         yield {'name': joint.child, 'type': 'ball', **place}

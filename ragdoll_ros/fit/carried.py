@@ -3,10 +3,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..model.pose import Pose
 from ..model.ragdoll import Bone, SkeletonFrame
 from ..model.swing import Swing
 from .character import Character
-from .frames import pose_in_body
 from .groups import Group
 from .spring_recipe import swing_of
 
@@ -21,7 +21,7 @@ def skeleton_frames(character: Character, carrier: dict[int, Bone]) -> tuple[Ske
     frames = []
     for index, name in enumerate(character.bone_names):
         body = carrier[index]
-        pose = pose_in_body(body, character.positions[index], character.orientations[index])
+        pose = body.pose.relative(Pose(character.positions[index], character.orientations[index]))
         frames.append(SkeletonFrame(name, body.name, *(np.round(part, 12) + 0.0 for part in pose)))
     return tuple(frames)
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from . import errors, rotation
 from .errors import set_fields
+from .pose import Pose
 from .rotation import IDENTITY
 from .shapes import Shape
 from .swing import Swing
@@ -67,6 +68,11 @@ class Bone:
             set_fields(self, color=floats(self.color))
             for part in self.color:
                 errors.check_range('color', part, 0, 1)
+
+    @property
+    def pose(self) -> Pose:
+        """Of its centre of mass and its shape's axes, doll's frame, bind pose."""
+        return Pose(np.array(self.position), np.array(self.orientation))
 
     @property
     def inertia(self) -> Vector:

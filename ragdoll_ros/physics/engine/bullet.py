@@ -18,7 +18,7 @@ import pybullet
 
 from ...files.urdf import to_urdf
 from ...model import errors, rotation
-from ...model.coordinates import UNLIMITED, DofLayout, GeneralizedState
+from ...model.coordinates import DofLayout, GeneralizedState
 from ...model.ragdoll import Ragdoll
 from ...model.scene import Placement, Scene, grip
 from ...model.state import State
@@ -76,7 +76,6 @@ class _Doll:
     """Index of the root among the doll's bones."""
     joints: list[int]
     """Joints that move, in the engine's order, root to leaf."""
-    balls: list[bool]
     widths: list[tuple[int, int]]
     """Numbers in q and in v of each joint."""
     angles: dict[str, int]
@@ -97,13 +96,15 @@ class _World:
         pybullet.setGravity(*scene.gravity, physicsClientId=client)
         self.ground = self._add_ground()
         self.dolls = [self._add_doll(placement) for placement in scene.dolls]
-        self.layout = self._lay_out()
+        self.layout = DofLayout([placement.doll for placement in scene.dolls])
         self._check_sizes()
 
     def set_in_motion(self) -> None:
         """Set each doll in motion as at the start, as one rigid body about its centre of mass."""
         for doll, placement in zip(self.dolls, self.scene.dolls, strict=True):
-            self._set_in_motion(doll.body, placement)
+            if any(placement.velocity + placement.spin):
+                pybullet.resetBaseVelocity(doll.body, _list(placement.root_velocity()),
+                                           placement.spin, physicsClientId=self._client)
 
     def _add_ground(self) -> int | None:
         if self.scene.ground is None or self._free:
@@ -128,13 +129,12 @@ class _World:
         doll = self._weighed(placement.doll)
         collide = self.scene.self_collision and not self._free
         flags = _FLAGS | (pybullet.URDF_USE_SELF_COLLISION if collide else 0)
-        position, orientation = placement.bone_pose(doll.root)
-        orientation = np.array(placement.orientation)
+        position, _ = placement.bone_pose(doll.root)
         with tempfile.TemporaryDirectory(prefix='ragdoll_ros_') as folder:
             path = os.path.join(folder, 'doll.urdf')
             with open(path, 'w', encoding='utf-8') as file:
                 file.write(to_urdf(doll, 'bullet', limited=not self._free))
-            body = pybullet.loadURDF(path, _list(position), _list(orientation), flags=flags,
+            body = pybullet.loadURDF(path, _list(position), placement.orientation, flags=flags,
                                      physicsClientId=self._client)
         return self._set_up(doll, body)
 
@@ -151,7 +151,7 @@ class _World:
 
     def _set_up(self, doll: Ragdoll, body: int) -> _Doll:
         """Find links and joints by name, and switch off what PyBullet switches on."""
-        links, joints, balls, angles = {doll.root.name: -1}, [], [], {}
+        links, joints, widths, angles = {doll.root.name: -1}, [], [], {}
         damping = {name: joint.damping for joint in doll.joints for name in joint.angle_names}
         for index in range(pybullet.getNumJoints(body, self._client)):
             info = pybullet.getJointInfo(body, index, self._client)
@@ -161,8 +161,9 @@ class _World:
                 continue
             angles[name] = len(joints)
             joints.append(index)
-            balls.append(kind == pybullet.JOINT_SPHERICAL)
-            self._free_joint(body, index, balls[-1])
+            ball = kind == pybullet.JOINT_SPHERICAL
+            widths.append((4, 3) if ball else (1, 1))
+            self._free_joint(body, index, ball)
             loss = damping.get(name, damping.get(f'{name}_x', 0.0))
             pybullet.changeDynamics(body, index, jointDamping=loss, physicsClientId=self._client)
         for link in range(-1, pybullet.getNumJoints(body, self._client)):
@@ -177,7 +178,7 @@ class _World:
                 pybullet.setCollisionFilterGroupMask(body, link, 0, 0, self._client)
         self._exclude_adjacent_bodies(doll, body, links)
         return _Doll(body, order, [link for link in order if link >= 0], order.index(-1),
-                     joints, balls, [(4, 3) if ball else (1, 1) for ball in balls], angles)
+                     joints, widths, angles)
 
     def _free_joint(self, body: int, joint: int, ball: bool) -> None:
         """Take PyBullet's default motor off a joint."""
@@ -211,17 +212,6 @@ class _World:
             pybullet.setCollisionFilterPair(body, body, links[joint.parent], links[joint.child],
                                             0, physicsClientId=self._client)
 
-    def _lay_out(self) -> DofLayout:
-        """Say where in the coordinates which joint's angle and limit stands."""
-        dolls = []
-        for doll, placement in zip(self.dolls, self.scene.dolls, strict=True):
-            limits = {name: pair for joint in placement.doll.joints
-                      for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
-            names = list(doll.angles)
-            dolls.append([None if ball else limits[name] or UNLIMITED
-                          for name, ball in zip(names, doll.balls, strict=True)])
-        return DofLayout(dolls)
-
     def _check_sizes(self) -> None:
         """Refuse what PyBullet would cut off without a word."""
         for placement, own in zip(self.scene.dolls, self.layout.own_q, strict=True):
@@ -229,16 +219,6 @@ class _World:
             if count > MOST_COORDINATES:
                 raise errors.OutOfRange(f'joints of {placement.name}', count,
                                         f'at most {MOST_COORDINATES} coordinates, 7 for the root')
-
-    def _set_in_motion(self, body: int, placement: Placement) -> None:
-        if not any(placement.velocity + placement.spin):
-            return
-        doll = placement.doll
-        centre = sum(bone.mass * np.array(bone.position) for bone in doll.bones) / doll.mass
-        arm = rotation.rotate(placement.orientation, doll.root.position - centre)
-        velocity = placement.velocity + np.cross(placement.spin, arm)
-        pybullet.resetBaseVelocity(body, _list(velocity), placement.spin,
-                                   physicsClientId=self._client)
 
 
 class BulletEngine:
