@@ -67,8 +67,7 @@ class Quickstart:
                 continue
             found = pybullet.getLinkState(self._body, link, 1, 1, self._client)
             rows.append(found[0] + found[1] + found[6] + found[7])
-        table = np.array(rows)
-        return State(table[:, 0:3], table[:, 3:7], table[:, 7:10], table[:, 10:13])
+        return State.of(np.array(rows))
 
     def close(self) -> None:
         """Give everything back, to others of this process the breaking distance too."""

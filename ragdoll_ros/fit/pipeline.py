@@ -93,7 +93,8 @@ def fit_character(character: Character, options: Options | None = None) -> Fit:
               for index, group in enumerate(groups) if group.parent >= 0]
     notes += [f'no bone joins {group.name} to the rest: it is tied to {groups[group.parent].name}'
               for group in groups if group.tied]
-    carrier = carried.carriers(groups, bones)
+    carrier = {index: bone for group, bone in zip(groups, bones, strict=True)
+               for index in group.bones}
     swings = carried.swings(character, carrier, notes)
     doll = Ragdoll(character.name, tuple(bones), tuple(joints), swings,
                    carried.skeleton_frames(character, carrier))

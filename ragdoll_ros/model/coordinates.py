@@ -91,7 +91,8 @@ class DofLayout:
         rate = np.empty_like(q)
         rate[self._plain[0]] = v[self._plain[1]]
         at, spin = self._turning
-        rate[at] = 0.5 * rotation.multiply(q[at], _pure(v[spin]))
+        pure = np.concatenate([v[spin], np.zeros((len(spin), 1))], axis=1)
+        rate[at] = 0.5 * rotation.multiply(q[at], pure)
         return rate
 
     def normalized(self, q: np.ndarray) -> np.ndarray:
@@ -126,8 +127,3 @@ class DofLayout:
     def _indices(starts: list[tuple[int, int]]) -> tuple[np.ndarray, np.ndarray]:
         table = np.array(starts, int).reshape(-1, 2)
         return table[:, :1] + np.arange(4), table[:, 1:] + np.arange(3)
-
-
-def _pure(w: np.ndarray) -> np.ndarray:
-    """Angular velocities (k, 3) as quaternions (k, 4) without a real part."""
-    return np.concatenate([w, np.zeros((len(w), 1))], axis=1)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
+from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -271,28 +272,26 @@ class Ragdoll:
 
     def joints_from_root(self) -> tuple[Joint, ...]:
         """All joints, each parent's before its children's."""
-        below: dict[str, list[Joint]] = {}
-        for joint in self.joints:
-            below.setdefault(joint.parent, []).append(joint)
-        ordered: list[Joint] = []
-        names = [self.root.name]
-        for name in names:
-            for joint in below.get(name, ()):
-                ordered.append(joint)
-                names.append(joint.child)
+        below = self._joints_below()
+        ordered = below[self.root.name]
+        for joint in ordered:
+            ordered += below[joint.child]
         return tuple(ordered)
 
     def joints_depth_first(self) -> tuple[Joint, ...]:
         """All joints, each one's whole branch before the next, as engines count them."""
-        below: dict[str, list[Joint]] = {}
-        for joint in reversed(self.joints):
-            below.setdefault(joint.parent, []).append(joint)
-        ordered: list[Joint] = []
-        waiting = below.pop(self.root.name, [])
-        while waiting:
-            ordered.append(waiting.pop())
-            waiting += below.pop(ordered[-1].child, [])
+        below = self._joints_below()
+        ordered = below[self.root.name]
+        for after, joint in enumerate(ordered, start=1):
+            ordered[after:after] = below[joint.child]
         return tuple(ordered)
+
+    def _joints_below(self) -> defaultdict[str, list[Joint]]:
+        """The joints of each bone to its children."""
+        below: defaultdict[str, list[Joint]] = defaultdict(list)
+        for joint in self.joints:
+            below[joint.parent].append(joint)
+        return below
 
     def replace_bone(self, name: str, **changes: object) -> Ragdoll:
         """The same doll with one bone changed."""

@@ -145,7 +145,7 @@ class Stepper:
             self.coordinates = self.engine.coordinates()
             self.state = self.dynamics.state(self.coordinates)
         else:
-            self.state, self.coordinates = self.engine.get_state()
+            self.state, self.coordinates = self.engine.read(), self.engine.coordinates()
         self.touching = self.engine.touching()
 
     def begin(self) -> None:

@@ -18,7 +18,10 @@ def table(scene: Scene) -> np.ndarray:
         doll, at = placement.doll, {}
         for joint in (None, *doll.joints_depth_first()):
             bone = doll.bone(joint.child) if joint else doll.root
-            record = _joined(doll, joint, at) if joint else _root()
+            record = np.zeros((), RECORD)
+            record['parent'], record['free'] = -1, 1
+            if joint:
+                _enter_joint(record, doll, joint, at)
             record['bone'] = places[scene.qualified(placement, bone.name)]
             record['mass'], record['inertia'] = bone.mass, bone.inertia
             record['bind'], record['q'], record['v'] = bone.orientation, q, v
@@ -31,15 +34,8 @@ def table(scene: Scene) -> np.ndarray:
     return np.array(records, RECORD)
 
 
-def _root() -> np.ndarray:
-    record = np.zeros((), RECORD)
-    record['parent'], record['free'] = -1, 1
-    return record
-
-
-def _joined(doll: Ragdoll, joint: Joint, at: dict[str, int]) -> np.ndarray:
-    """What a joint says of its child's record; ``at``: which record is whose."""
-    record = np.zeros((), RECORD)
+def _enter_joint(record: np.ndarray, doll: Ragdoll, joint: Joint, at: dict[str, int]) -> None:
+    """Enter what a joint says of its child's record; ``at``: which record is whose."""
     record['parent'] = at[joint.parent]
     record['free'] = joint.is_free_ball
     record['dof'], record['damping'] = joint.dof, joint.damping
@@ -48,4 +44,3 @@ def _joined(doll: Ragdoll, joint: Joint, at: dict[str, int]) -> np.ndarray:
     axes = rotation.matrix(joint_frame(joint)).T if joint.kind == 'ball' else joint.axes
     for row, axis in enumerate(axes):
         record['axes'][row] = axis
-    return record

@@ -99,13 +99,6 @@ class _World:
         self.layout = DofLayout([placement.doll for placement in scene.dolls])
         self._check_sizes()
 
-    def set_in_motion(self) -> None:
-        """Set each doll in motion as at the start, as one rigid body about its centre of mass."""
-        for doll, placement in zip(self.dolls, self.scene.dolls, strict=True):
-            if any(placement.velocity + placement.spin):
-                pybullet.resetBaseVelocity(doll.body, _list(placement.root_velocity()),
-                                           placement.spin, physicsClientId=self._client)
-
     def _add_ground(self) -> int | None:
         if self.scene.ground is None or self._free:
             return None
@@ -136,6 +129,9 @@ class _World:
                 file.write(to_urdf(doll, 'bullet', limited=not self._free))
             body = pybullet.loadURDF(path, _list(position), placement.orientation, flags=flags,
                                      physicsClientId=self._client)
+        if any(placement.velocity + placement.spin):
+            pybullet.resetBaseVelocity(body, _list(placement.root_velocity()), placement.spin,
+                                       physicsClientId=self._client)
         return self._set_up(doll, body)
 
     def _weighed(self, doll: Ragdoll) -> Ragdoll:
@@ -170,13 +166,15 @@ class _World:
             pybullet.changeDynamics(
                 body, link, linearDamping=0, angularDamping=0, maxJointVelocity=LARGEST_RATE,
                 physicsClientId=self._client)
+            if self._free:
+                pybullet.setCollisionFilterGroupMask(body, link, 0, 0, self._client)
         order = [links[bone.name] for bone in doll.bones]
         for bone, link in zip(doll.bones, order, strict=True):
             self._set_material(body, link, bone.friction, bone.rolling_friction, bone.restitution)
-        if self._free:
-            for link in range(-1, pybullet.getNumJoints(body, self._client)):
-                pybullet.setCollisionFilterGroupMask(body, link, 0, 0, self._client)
-        self._exclude_adjacent_bodies(doll, body, links)
+        # Bones that share a joint do not collide.
+        for joint in doll.joints:
+            pybullet.setCollisionFilterPair(body, body, links[joint.parent], links[joint.child],
+                                            0, physicsClientId=self._client)
         return _Doll(body, order, [link for link in order if link >= 0], order.index(-1),
                      joints, widths, angles)
 
@@ -205,12 +203,6 @@ class _World:
             body, link, lateralFriction=sliding,
             rollingFriction=rolling / (2 * sliding) if sliding else 0.0, spinningFriction=0,
             restitution=math.sqrt(restitution), physicsClientId=self._client)
-
-    def _exclude_adjacent_bodies(self, doll: Ragdoll, body: int, links: dict[str, int]) -> None:
-        """Bones that share a joint do not collide."""
-        for joint in doll.joints:
-            pybullet.setCollisionFilterPair(body, body, links[joint.parent], links[joint.child],
-                                            0, physicsClientId=self._client)
 
     def _check_sizes(self) -> None:
         """Refuse what PyBullet would cut off without a word."""
@@ -277,22 +269,6 @@ class BulletEngine:
                 q += joint[0]
                 v += joint[1]
         return GeneralizedState(np.array(q), np.array(v))
-
-    def get_state(self) -> tuple[State, GeneralizedState]:
-        """Both at once, in less time."""
-        rows: list[tuple] = []
-        q: list[float] = []
-        v: list[float] = []
-        for doll in self._dolls:
-            own = self._rows(doll)
-            root = own[doll.root]
-            q += root[:7]
-            v += root[7:]
-            for joint in self._joints(doll):
-                q += joint[0]
-                v += joint[1]
-            rows += own
-        return State.of(np.array(rows)), GeneralizedState(np.array(q), np.array(v))
 
     def place(self, coordinates: GeneralizedState) -> None:
         q, v = coordinates.q.tolist(), coordinates.v.tolist()
@@ -388,7 +364,6 @@ class BulletEngine:
             self._doll_of[self._ground] = GROUND
         self._bone_of = {link: bone for bone, link in enumerate(self._links)}
         self.exclude_initial_penetrations()
-        world.set_in_motion()
 
     def _rows(self, doll: _Doll) -> list[tuple]:
         """Position, orientation, linear and angular velocity of each bone."""

@@ -83,10 +83,6 @@ class MujocoEngine:
             q[iq:iq + 4] = rotation.multiply(turn, rotation.inverse(seat))
         return GeneralizedState(q, self._outwards(self._data.qpos, self._data.qvel))
 
-    def get_state(self) -> tuple[State, GeneralizedState]:
-        """Both at once."""
-        return self.read(), self.coordinates()
-
     def place(self, coordinates: GeneralizedState) -> None:
         q, v = coordinates.q.copy(), coordinates.v.copy()
         for iq, iv in self._roots:
