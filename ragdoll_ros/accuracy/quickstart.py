@@ -54,9 +54,10 @@ class Quickstart:
                                         pybullet.WORLD_FRAME, physicsClientId=self._client)
         pybullet.stepSimulation(physicsClientId=self._client)
         self._time += STEP
-        return self.read()
+        return self.state
 
-    def read(self) -> State:
+    @property
+    def state(self) -> State:
         """Poses and velocities of all bones."""
         base = (*pybullet.getBasePositionAndOrientation(self._body, self._client),
                 *pybullet.getBaseVelocity(self._body, self._client))
