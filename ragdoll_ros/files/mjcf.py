@@ -20,7 +20,7 @@ import numpy as np
 
 from ..model import rotation
 from ..model.pose import Pose
-from ..model.ragdoll import Bone, Joint, joint_frame
+from ..model.ragdoll import Bone, Joint, joint_axes
 from ..model.scene import Placement, Scene, grip
 from ..model.shapes import Shape
 
@@ -111,13 +111,11 @@ def _joints(joint: Joint, child: Bone) -> Iterable[dict[str, str]]:
     """Attributes of one element for each axis, in the child's frame; none for a fixed joint."""
     back = rotation.inverse(child.orientation)
     place = {'pos': _text(child.pose.inward(joint.anchor)), 'damping': repr(joint.damping)}
-    axes, limits = joint.axes, joint.angle_limits
-    if joint.kind == 'ball' and not any(limits):
+    if joint.is_free_ball:
         yield {'name': joint.child, 'type': 'ball', **place}
         return
-    if joint.kind == 'ball':
-        axes = rotation.matrix(joint_frame(joint)).T
-    for name, axis, pair in zip(joint.angle_names, axes, limits, strict=True):
+    for name, axis, pair in zip(joint.angle_names, joint_axes(joint), joint.angle_limits,
+                                strict=True):
         ranged = {'range': _text(pair)} if pair else {}
         yield {'name': name, 'type': 'hinge', **place, **ranged,
                'axis': _text(rotation.rotate(back, axis))}
@@ -132,16 +130,11 @@ def _size(shape: Shape) -> tuple[float, ...]:
 
 def _material(scene: Scene, bone: Bone | None) -> dict[str, str]:
     """Friction and restitution of a bone, or of the ground."""
-    plain = scene.material
-    friction = rolling = 0.0
-    restitution = plain.restitution
-    if bone is not None:
-        own = plain.friction if bone.friction is None else bone.friction
-        friction = math.sqrt(grip(own) * grip(plain.friction))
-        rolling = plain.rolling_friction if bone.rolling_friction is None \
-            else bone.rolling_friction
-        restitution = math.sqrt(restitution * (restitution if bone.restitution is None
-                                               else bone.restitution))
+    friction, rolling, restitution = scene.material.on(bone)
+    friction = math.sqrt(grip(friction) * grip(scene.material.friction))
+    if bone is None:
+        friction = rolling = 0.0
+    restitution = math.sqrt(restitution * scene.material.restitution)
     return {'friction': _text((friction, 0.0, rolling)),
             'condim': '6' if rolling else '3',
             'solref': _text((CONTACT_TIME, damping_ratio(restitution)))}

@@ -149,19 +149,15 @@ def _row(joint: Joint, row: list, place: Pose, dialect: str) -> list[str]:
         if kind != 'fixed':
             lines.append(f'    <dynamics damping="{joint.damping!r}"/>')
         lines.append('  </joint>')
-        if not last:
-            lines += _massless(child, dialect)
+        if not last and dialect == 'ros':
+            lines.append(f'  <link name={_quoted(child)}/>')
+        elif not last:
+            lines += [f'  <link name={_quoted(child)}>',
+                      '    <inertial><mass value="0"/>'
+                      '<inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial>',
+                      '  </link>']
         parent = child
     return lines
-
-
-def _massless(name: str, dialect: str) -> list[str]:
-    if dialect == 'ros':
-        return [f'  <link name={_quoted(name)}/>']
-    return [f'  <link name={_quoted(name)}>',
-            '    <inertial><mass value="0"/>'
-            '<inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial>',
-            '  </link>']
 
 
 def _quoted(text: str) -> str:

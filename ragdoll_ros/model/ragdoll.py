@@ -58,9 +58,6 @@ class Bone:
             raise errors.DuplicateName('name', self.name, "a name other than the world frame's")
         errors.check_positive('mass', self.mass)
         errors.check_finite('position', self.position)
-        self._check_surface()
-
-    def _check_surface(self) -> None:
         for key, most in (('friction', math.inf), ('rolling_friction', math.inf),
                           ('restitution', 1)):
             if getattr(self, key) is not None:
@@ -356,6 +353,13 @@ def joint_frame(joint: Joint) -> np.ndarray:
     if joint.kind != 'ball':
         return np.array(rotation.IDENTITY)
     return rotation.shortest_arc(np.array([0.0, 0.0, 1.0]), np.array(joint.axes[0]))
+
+
+def joint_axes(joint: Joint) -> np.ndarray:
+    """Axes (dof, 3) of a joint's angles, doll's frame, bind pose."""
+    if joint.kind == 'ball':
+        return rotation.matrix(joint_frame(joint)).T
+    return np.array(joint.axes).reshape(-1, 3)
 
 
 def _reaches(parent_of: dict[str, str], start: str, goal: str) -> bool:

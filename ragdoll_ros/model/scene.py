@@ -55,6 +55,11 @@ class Material:
         errors.check_range('restitution', self.restitution, 0, 1)
         errors.check_range('restitution_speed', self.restitution_speed, 0, 1e6)
 
+    def on(self, bone: Bone | None) -> tuple[float, float, float]:
+        """Friction, rolling friction (m) and restitution of a bone, its own where it has them."""
+        return tuple(getattr(self, key) if getattr(bone, key, None) is None else getattr(bone, key)
+                     for key in ('friction', 'rolling_friction', 'restitution'))
+
 
 @dataclass(frozen=True)
 class Ground:

@@ -3,8 +3,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model import rotation
-from ..model.ragdoll import Joint, Ragdoll, joint_frame
+from ..model.ragdoll import Joint, Ragdoll, joint_axes
 from ..model.scene import Scene
 from .kernels.record import RECORD
 
@@ -41,6 +40,4 @@ def _enter_joint(record: np.ndarray, doll: Ragdoll, joint: Joint, at: dict[str, 
     record['dof'], record['damping'] = joint.dof, joint.damping
     record['before'] = np.subtract(joint.anchor, doll.bone(joint.parent).position)
     record['after'] = np.subtract(doll.bone(joint.child).position, joint.anchor)
-    axes = rotation.matrix(joint_frame(joint)).T if joint.kind == 'ball' else joint.axes
-    for row, axis in enumerate(axes):
-        record['axes'][row] = axis
+    record['axes'][:joint.dof] = joint_axes(joint)

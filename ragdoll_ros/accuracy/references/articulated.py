@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import rotation
-from ...model.ragdoll import Joint, Ragdoll, joint_frame
+from ...model.ragdoll import Joint, Ragdoll, joint_axes
 from ...model.state import State
 from ..trajectory import Trajectory
 from .integration import integrate
@@ -129,13 +129,10 @@ class Articulated:
 
     def _prepared(self, joint: Joint) -> tuple:
         parent, child = self.doll.bone(joint.parent), self.doll.bone(joint.child)
-        axes = [np.array(axis) for axis in joint.axes]
-        if joint.kind == 'ball':
-            axes = list(rotation.matrix(joint_frame(joint)).T)
         return (joint, self._index[joint.parent], self._index[joint.child],
                 np.subtract(joint.anchor, parent.position),
                 np.subtract(child.position, joint.anchor),
-                [(axis, _skew(axis), _skew(axis) @ _skew(axis)) for axis in axes])
+                [(axis, _skew(axis), _skew(axis) @ _skew(axis)) for axis in joint_axes(joint)])
 
     def _kinematics(self, q: np.ndarray, v: np.ndarray) -> _Kinematics:
         """Forward kinematics, from the root to the leaves."""

@@ -19,7 +19,7 @@ import pybullet
 from ...files.urdf import to_urdf
 from ...model import errors, rotation
 from ...model.coordinates import DofLayout, GeneralizedState
-from ...model.ragdoll import Ragdoll
+from ...model.ragdoll import Bone, Ragdoll
 from ...model.scene import Placement, Scene, grip
 from ...model.state import State
 from .protocol import GROUND, AppliedWrench, Contact, Wrenches, pressed
@@ -115,7 +115,7 @@ class _World:
         place = [n * (ground.offset - depth) for n in ground.normal]
         body = pybullet.createMultiBody(0, shape, -1, place, _list(turn),
                                         physicsClientId=self._client)
-        self._set_material(body, -1, None, None, None)
+        self._set_material(body, -1, None)
         return body
 
     def _add_doll(self, placement: Placement) -> _Doll:
@@ -170,7 +170,7 @@ class _World:
                 pybullet.setCollisionFilterGroupMask(body, link, 0, 0, self._client)
         order = [links[bone.name] for bone in doll.bones]
         for bone, link in zip(doll.bones, order, strict=True):
-            self._set_material(body, link, bone.friction, bone.rolling_friction, bone.restitution)
+            self._set_material(body, link, bone)
         # Bones that share a joint do not collide.
         for joint in doll.joints:
             pybullet.setCollisionFilterPair(body, body, links[joint.parent], links[joint.child],
@@ -188,16 +188,13 @@ class _World:
             pybullet.setJointMotorControl2(body, joint, pybullet.VELOCITY_CONTROL, force=0,
                                            physicsClientId=self._client)
 
-    def _set_material(self, body: int, link: int, friction: float | None,
-                      rolling: float | None, restitution: float | None) -> None:
-        """Set a link's part of a contact: PyBullet multiplies the two parts, so take roots.
+    def _set_material(self, body: int, link: int, bone: Bone | None) -> None:
+        """Set what a bone, or the ground, brings to a contact.
 
-        For rolling it adds each one's lever arm times the other's friction.
+        PyBullet multiplies the two parts, so take roots; for rolling it adds each one's lever arm
+        times the other's friction.
         """
-        material = self.scene.material
-        friction = material.friction if friction is None else friction
-        rolling = material.rolling_friction if rolling is None else rolling
-        restitution = material.restitution if restitution is None else restitution
+        friction, rolling, restitution = self.scene.material.on(bone)
         sliding = math.sqrt(grip(friction))
         pybullet.changeDynamics(
             body, link, lateralFriction=sliding,
