@@ -15,7 +15,7 @@ UNLIMITED: Limits = (-math.inf, math.inf)
 
 @dataclass(frozen=True)
 class GeneralizedState:
-    """GeneralizedState and velocities of all dolls, one behind the other (Featherstone's q and q').
+    """Coordinates and velocities of all dolls, one behind the other (Featherstone's q and q').
 
     For each doll ``q`` holds the root's position (3) m and orientation (4), then the joints'
     from root to leaf: one angle (rad) an axis, a quaternion (4) for a free ball joint, which

@@ -51,7 +51,7 @@ GRADES = sorted({math.ceil(2 ** (k / 2)) for k in range(40)})
 
 HELPED = 0.98
 """Share of an overshoot that finer steps must come below to be tried once more: where contacts
-is_active a joint past its limit, they never do."""
+press a joint past its limit, they never do."""
 
 EVEN = 3.0
 """Accelerations up to so many times gravity's are those of an even motion, not of a blow."""

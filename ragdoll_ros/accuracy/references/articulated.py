@@ -197,6 +197,6 @@ def _skew(a: np.ndarray) -> np.ndarray:
 
 
 def _quaternion_rate(q: np.ndarray, omega: np.ndarray, outer: bool) -> np.ndarray:
-    """dq/dt of a body that rotations with omega, given in the outer frame or in the body's."""
+    """dq/dt of a body that turns with omega, given in the outer frame or in the body's."""
     pure = np.append(omega, 0.0)
     return (rotation.multiply(pure, q) if outer else rotation.multiply(q, pure)) / 2
