@@ -43,6 +43,11 @@ class Trajectory:
         unknown = np.full(positions.shape, np.nan)
         return cls(np.asarray(times, float), positions, orientations, unknown, unknown)
 
+    def at(self, index: int) -> State:
+        """State at one of the instants."""
+        return State(self.positions[index], self.orientations[index], self.linear_velocities[index],
+                     self.angular_velocities[index])
+
     def part(self, which: slice) -> Trajectory:
         """The instants that ``which`` picks."""
         return Trajectory(*(array[which] for array in vars(self).values()))
