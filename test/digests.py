@@ -62,7 +62,7 @@ def scenes() -> Iterator[tuple[str, Scene]]:
     yield 'long_tick', dataclasses.replace(load_scene('drop'), step=0.05)
     ball = Ragdoll('ball', (Bone('ball', Sphere(0.05), 0.01, (0, 0, 0)),))
     yield 'stop', Scene('stop', (
-        Placement(doll), Placement(ball, position=(2, 0, 1.1), velocity=(-5, 0, 0.5))), ground)
+        Placement(doll), Placement(ball, position=(2, 0, 1.1), velocity=(-5, 0, 0.6))), ground)
 
 
 def disturb(simulation: Simulation, tick: int) -> None:
@@ -88,7 +88,8 @@ def digest_run(scene: Scene, accuracy: str) -> dict[str, str]:
     states, told = hashlib.sha256(), hashlib.sha256()
     with Simulation(scene, accuracy=accuracy) as simulation:
         for tick in range(TICKS):
-            disturb(simulation, tick)
+            if scene.name != 'stop' or tick > 100:  # by then the ball has been stopped, at normal
+                disturb(simulation, tick)
             states.update(state_bytes(simulation.advance()))
             if simulation.swings is not None:
                 states.update(np.ascontiguousarray(simulation.swings.positions).tobytes())

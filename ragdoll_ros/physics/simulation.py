@@ -11,8 +11,8 @@ from ..model.push import Push
 from ..model.scene import SECOND, STEP_RANGE, Scene
 from ..model.state import State
 from .conserving import ConservingStepper
-from .engine import resolve_engine
 from .engine.protocol import GROUND, Contact, Engine, Wrenches
+from .engine.registry import resolve_engine
 from .grab import EVENLY, Grab, Hands
 from .joint_gap import JointGap
 from .push_queue import PushQueue

@@ -114,7 +114,7 @@ def _size(doll: Ragdoll, character: Character) -> float:
     """
     poses = State(np.array([bone.position for bone in doll.bones]),
                   np.array([bone.orientation for bone in doll.bones]),
-                  np.zeros((0, 3)), np.zeros((0, 3)))
+                  *np.zeros((2, len(doll.bones), 3)))
     positions, _ = Riders(Scene('bind', (Placement(doll),))).poses(poses)
     place = {rider.name: k for k, rider in enumerate(doll.riders)}
     edges = np.array([(place[name], place[character.bone_names[up]], bone, up)
