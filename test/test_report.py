@@ -23,8 +23,8 @@ from ragdoll_ros.accuracy.parts import classes, orders
 from ragdoll_ros.accuracy.parts.hard import violations
 from ragdoll_ros.accuracy.references.articulated import Articulated
 from ragdoll_ros.accuracy.references.rigid_body import torque_free_rotation
-from ragdoll_ros.accuracy.report import markdown
 from ragdoll_ros.accuracy.runner import Job, attempt
+from ragdoll_ros.accuracy.sections import markdown
 from ragdoll_ros.accuracy.trajectory import Trajectory
 from ragdoll_ros.accuracy.trial import Trial
 from ragdoll_ros.model import rotation

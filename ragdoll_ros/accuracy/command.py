@@ -22,8 +22,8 @@ from .parts import (
     swing,
 )
 from .plots import draw_all
-from .report import markdown
 from .runner import Job, Options, run_jobs
+from .sections import markdown
 
 PARTS = {'precision': precision, 'orders': orders, 'pieces': pieces, 'drop': drop,
          'classes': classes, 'projection': projection, 'hard': hard, 'costs': costs,

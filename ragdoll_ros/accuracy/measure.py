@@ -173,9 +173,8 @@ class Measure:
 
     def _end(self, placement: Placement, name: str, anchor: tuple[float, float, float]) -> End:
         bone = placement.doll.bone(name)
-        back = rotation.inverse(bone.orientation)
         return (self.scene.bone_index(self.scene.qualified(placement, name)),
-                rotation.rotate(back, np.subtract(anchor, bone.position)), back)
+                bone.pose.inward(anchor), rotation.inverse(bone.orientation))
 
 
 def compare(trajectory: Trajectory, truth: Trajectory) -> dict[str, float]:

@@ -25,9 +25,10 @@ from .trial import Trial
 
 
 class Run(Protocol):
-    """A trial under way."""
+    """A trial under way; a Simulation is one."""
 
-    def read(self) -> State:
+    @property
+    def state(self) -> State:
         """Poses and velocities of all bones now."""
 
     def advance(self) -> State:
@@ -75,7 +76,8 @@ class _FixedSteps:
         if trial.start is not None:
             self._engine.place(trial.start)
 
-    def read(self) -> State:
+    @property
+    def state(self) -> State:
         return self._engine.read()
 
     def advance(self) -> State:
@@ -83,34 +85,20 @@ class _FixedSteps:
         loads = self._trial.loads(begin, begin + self._tick) if self._trial.pushes else ()
         self._engine.step(self._tick, self._substeps, loads)
         self._count += 1
-        return self._engine.read()
+        return self.state
 
     def close(self) -> None:
         self._engine.close()
 
 
-class Ours:
-    """The simulation as the node runs it."""
-
-    def __init__(self, trial: Trial, accuracy: str | Accuracy,
-                 engine: type[Engine] = BulletEngine) -> None:
-        self.simulation = Simulation(trial.scene, accuracy=accuracy, engine=engine)
-        if trial.start is not None:
-            self.simulation.place(trial.start)
-        for push in trial.pushes:
-            self.simulation.push(push)
-
-    def read(self) -> State:
-        """Poses and velocities of all bones now."""
-        return self.simulation.state
-
-    def advance(self) -> State:
-        """Go on by one tick."""
-        return self.simulation.advance()
-
-    def close(self) -> None:
-        """Give the engine back."""
-        self.simulation.close()
+def simulated(trial: Trial, accuracy: str | Accuracy) -> Simulation:
+    """A trial's simulation, as the node runs it."""
+    simulation = Simulation(trial.scene, accuracy=accuracy)
+    if trial.start is not None:
+        simulation.place(trial.start)
+    for push in trial.pushes:
+        simulation.push(push)
+    return simulation
 
 
 def run(method: Method, trial: Trial) -> Result:
@@ -119,7 +107,7 @@ def run(method: Method, trial: Trial) -> Result:
     times = trial.times(tick)
     motion = method.begin(trial)
     try:
-        states, costs = [motion.read()], np.empty(len(times) - 1)
+        states, costs = [motion.state], np.empty(len(times) - 1)
         for index in range(len(costs)):
             before = process_time()
             state = motion.advance()
@@ -143,7 +131,7 @@ def ours(accuracy: str | Accuracy, name: str | None = None) -> Method:
     order = (ACCURACIES[accuracy] if isinstance(accuracy, str) else accuracy).order
     order = kernels.ORDER if order and kernels.ready() else order or 1
     return Method(name, name.replace('-', ' '), 'ours', functools.partial(
-        Ours, accuracy=accuracy), order=order)
+        simulated, accuracy=accuracy), order=order)
 
 
 def quickstart() -> Method:

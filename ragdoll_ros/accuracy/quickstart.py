@@ -54,9 +54,10 @@ class Quickstart:
                                         pybullet.WORLD_FRAME, physicsClientId=self._client)
         pybullet.stepSimulation(physicsClientId=self._client)
         self._time += STEP
-        return self.read()
+        return self.state
 
-    def read(self) -> State:
+    @property
+    def state(self) -> State:
         """Poses and velocities of all bones."""
         base = (*pybullet.getBasePositionAndOrientation(self._body, self._client),
                 *pybullet.getBaseVelocity(self._body, self._client))
@@ -67,8 +68,7 @@ class Quickstart:
                 continue
             found = pybullet.getLinkState(self._body, link, 1, 1, self._client)
             rows.append(found[0] + found[1] + found[6] + found[7])
-        table = np.array(rows)
-        return State(table[:, 0:3], table[:, 3:7], table[:, 7:10], table[:, 10:13])
+        return State.of(np.array(rows))
 
     def close(self) -> None:
         """Give everything back, to others of this process the breaking distance too."""

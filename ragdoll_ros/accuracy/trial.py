@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import rotation
 from ..model.coordinates import GeneralizedState
 from ..model.push import Push
 from ..model.ragdoll import Ragdoll
@@ -53,10 +52,7 @@ def posed(placement: Placement, angles: dict[str, float] | None = None,
     doll = placement.doll
     tree = Articulated(doll)
     q, v = tree.bind(placement.position, placement.orientation), np.zeros(tree.nv)
-    centre = sum(bone.mass * np.array(bone.position) for bone in doll.bones) / doll.mass
-    arm = rotation.rotate(placement.orientation, doll.root.position - centre)
-    v[:3] = placement.velocity + np.cross(placement.spin, arm)
-    v[3:6] = placement.spin
+    v[:3], v[3:6] = placement.root_velocity(), placement.spin
     where = angle_places(doll)
     for name, angle in (angles or {}).items():
         q[7 + where[name]] = angle

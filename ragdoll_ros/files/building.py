@@ -6,6 +6,16 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..model.errors import ModelError, ModelErrors
+from . import config, yaml_text
+
+
+def read_named(name: str) -> tuple[object, Path]:
+    """What the YAML file of a path or a shipped name holds, and its path; or ModelErrors."""
+    try:
+        path = config.find(name)
+        return yaml_text.read(path), path
+    except ModelError as error:
+        raise ModelErrors(str(name), [error]) from None
 
 
 def attempt(found: list[ModelError], where: str, make: type, *args: object,

@@ -8,23 +8,19 @@ import math
 import os
 from pathlib import Path
 
-from ..model.errors import ModelError, ModelErrors
+from ..model.errors import ModelError
 from ..model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame, carried_errors, tree_errors
 from ..model.rotation import IDENTITY
 from ..model.shapes import SHAPES, Shape
-from . import config, yaml_text
-from .building import build_each, entries, raise_or_give
+from . import yaml_text
+from .building import build_each, entries, raise_or_give, read_named
 from .schema import schema_errors
 from .swing import swing_data, swing_from
 
 
 def load_doll(name: str) -> Ragdoll:
     """Read a doll's file; ModelErrors with all that is wrong in it."""
-    try:
-        path = config.find(name)
-        data = yaml_text.read(path)
-    except ModelError as error:
-        raise ModelErrors(str(name), [error]) from None
+    data, path = read_named(name)
     return raise_or_give(path, *build_doll(data, path))
 
 

@@ -19,7 +19,8 @@ from collections.abc import Collection, Iterable
 import numpy as np
 
 from ..model import rotation
-from ..model.ragdoll import Bone, Joint, joint_frame
+from ..model.pose import Pose
+from ..model.ragdoll import Bone, Joint, joint_axes
 from ..model.scene import Placement, Scene, grip
 from ..model.shapes import Shape
 
@@ -78,15 +79,13 @@ def _add_doll(world: ET.Element, scene: Scene, placement: Placement) -> None:
     """Nest the bodies of one doll as its joints do."""
     doll = placement.doll
     made = {doll.root.name: _add_bone(world, scene, placement, doll.root,
-                                      *placement.bone_pose(doll.root))}
+                                      placement.bone_pose(doll.root))}
     ET.SubElement(made[doll.root.name], 'freejoint',
                   name=scene.qualified(placement, doll.root.name) + '/free')
     for joint in doll.joints_from_root():
         parent, child = doll.bone(joint.parent), doll.bone(joint.child)
-        back = rotation.inverse(parent.orientation)
-        offset = rotation.rotate(back, np.subtract(child.position, parent.position))
-        body = _add_bone(made[parent.name], scene, placement, child, offset,
-                         rotation.multiply(back, child.orientation))
+        body = _add_bone(made[parent.name], scene, placement, child,
+                         parent.pose.relative(child.pose))
         for attributes in _joints(joint, child):
             attributes['name'] = scene.qualified(placement, attributes['name'])
             ET.SubElement(body, 'joint', attributes)
@@ -94,10 +93,10 @@ def _add_doll(world: ET.Element, scene: Scene, placement: Placement) -> None:
 
 
 def _add_bone(parent: ET.Element, scene: Scene, placement: Placement, bone: Bone,
-              position: np.ndarray, orientation: np.ndarray) -> ET.Element:
+              pose: Pose) -> ET.Element:
     name = scene.qualified(placement, bone.name)
-    body = ET.SubElement(parent, 'body', name=name, pos=_text(position),
-                         quat=_quaternion(orientation))
+    body = ET.SubElement(parent, 'body', name=name, pos=_text(pose.position),
+                         quat=_quaternion(pose.orientation))
     ET.SubElement(body, 'inertial', pos='0 0 0', mass=repr(bone.mass),
                   diaginertia=_text(bone.inertia))
     # bit 0: meets the ground and, with self-collision, each other; bit 1: meets the ground only
@@ -111,15 +110,12 @@ def _add_bone(parent: ET.Element, scene: Scene, placement: Placement, bone: Bone
 def _joints(joint: Joint, child: Bone) -> Iterable[dict[str, str]]:
     """Attributes of one element for each axis, in the child's frame; none for a fixed joint."""
     back = rotation.inverse(child.orientation)
-    place = {'pos': _text(rotation.rotate(back, np.subtract(joint.anchor, child.position))),
-             'damping': repr(joint.damping)}
-    axes, limits = joint.axes, joint.angle_limits
-    if joint.kind == 'ball' and not any(limits):
+    place = {'pos': _text(child.pose.inward(joint.anchor)), 'damping': repr(joint.damping)}
+    if joint.is_free_ball:
         yield {'name': joint.child, 'type': 'ball', **place}
         return
-    if joint.kind == 'ball':
-        axes = rotation.matrix(joint_frame(joint)).T
-    for name, axis, pair in zip(joint.angle_names, axes, limits, strict=True):
+    for name, axis, pair in zip(joint.angle_names, joint_axes(joint), joint.angle_limits,
+                                strict=True):
         ranged = {'range': _text(pair)} if pair else {}
         yield {'name': name, 'type': 'hinge', **place, **ranged,
                'axis': _text(rotation.rotate(back, axis))}
@@ -134,16 +130,11 @@ def _size(shape: Shape) -> tuple[float, ...]:
 
 def _material(scene: Scene, bone: Bone | None) -> dict[str, str]:
     """Friction and restitution of a bone, or of the ground."""
-    plain = scene.material
-    friction = rolling = 0.0
-    restitution = plain.restitution
-    if bone is not None:
-        own = plain.friction if bone.friction is None else bone.friction
-        friction = math.sqrt(grip(own) * grip(plain.friction))
-        rolling = plain.rolling_friction if bone.rolling_friction is None \
-            else bone.rolling_friction
-        restitution = math.sqrt(restitution * (restitution if bone.restitution is None
-                                               else bone.restitution))
+    friction, rolling, restitution = scene.material.on(bone)
+    friction = math.sqrt(grip(friction) * grip(scene.material.friction))
+    if bone is None:
+        friction = rolling = 0.0
+    restitution = math.sqrt(restitution * scene.material.restitution)
     return {'friction': _text((friction, 0.0, rolling)),
             'condim': '6' if rolling else '3',
             'solref': _text((CONTACT_TIME, damping_ratio(restitution)))}

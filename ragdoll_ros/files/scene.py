@@ -8,23 +8,18 @@ import functools
 import re
 from pathlib import Path
 
-from ..model.errors import ModelError, ModelErrors
+from ..model.errors import ModelError
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Ground, Material, Placement, Scene, above_ground
 from . import config, yaml_text
-from .building import any_under, attempt, raise_or_give
+from .building import any_under, attempt, raise_or_give, read_named
 from .doll import build_doll, doll_data
 from .schema import schema_errors
 
 
 def load_scene(name: str) -> Scene:
     """Read a scene, or a doll (then above level ground); ModelErrors with all that is wrong."""
-    try:
-        path = config.find(name)
-        data = yaml_text.read(path)
-    except ModelError as error:
-        raise ModelErrors(str(name), [error]) from None
-    return scene_from(data, path)
+    return scene_from(*read_named(name))
 
 
 def scene_from(data: object, path: Path) -> Scene:

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..model import rotation
+from ..model.pose import Pose
 from ..model.ragdoll import DEFAULT_COLOR, WORLD, Bone, Joint, Ragdoll, joint_frame
 from ..model.scene import Scene
 from ..model.shapes import Shape
@@ -62,10 +63,10 @@ def _document(name: str, lines: list[str]) -> str:
 
 
 def _tree(doll: Ragdoll, dialect: str, limited: bool) -> list[str]:
-    frames = {doll.root.name: (np.array(doll.root.position), np.array(rotation.IDENTITY))}
+    frames = {doll.root.name: Pose(np.array(doll.root.position))}
     lines = _link(doll.root, frames[doll.root.name], dialect)
     for joint in doll.joints_from_root():
-        frames[joint.child] = (np.array(joint.anchor), joint_frame(joint))
+        frames[joint.child] = Pose(np.array(joint.anchor), joint_frame(joint))
         lines += _joint(joint, frames, dialect, limited)
         lines += _link(doll.bone(joint.child), frames[joint.child], dialect)
     return lines
@@ -79,19 +80,17 @@ def _origin(position: Sequence[float], orientation: np.ndarray) -> str:
     return f'<origin xyz={_numbers(position)} rpy={_numbers(rotation.to_rpy(orientation))}/>'
 
 
-def _link(bone: Bone, frame: tuple[np.ndarray, np.ndarray], dialect: str) -> list[str]:
-    back = rotation.inverse(frame[1])
-    centre = rotation.rotate(back, bone.position - frame[0])
-    turn = rotation.multiply(back, bone.orientation)
+def _link(bone: Bone, frame: Pose, dialect: str) -> list[str]:
+    pose = frame.relative(bone.pose)
     ixx, iyy, izz = bone.inertia
     color = bone.color or DEFAULT_COLOR
     lines = [f'  <link name={_quoted(bone.name)}>',
-             '    <inertial>', f'      {_origin(centre, turn)}',
+             '    <inertial>', f'      {_origin(*pose)}',
              f'      <mass value="{bone.mass!r}"/>',
              f'      <inertia ixx="{ixx!r}" iyy="{iyy!r}" izz="{izz!r}" ixy="0" ixz="0" iyz="0"/>',
              '    </inertial>']
-    for position, geometry in _geometries(bone, centre, turn, dialect):
-        origin = _origin(position, turn)
+    for position, geometry in _geometries(bone, pose, dialect):
+        origin = _origin(position, pose.orientation)
         lines += ['    <visual>', f'      {origin}', f'      {geometry}',
                   f'      <material name={_quoted(bone.name)}>'
                   f'<color rgba={_numbers(color)}/></material>', '    </visual>',
@@ -99,15 +98,13 @@ def _link(bone: Bone, frame: tuple[np.ndarray, np.ndarray], dialect: str) -> lis
     return [*lines, '  </link>']
 
 
-def _geometries(bone: Bone, centre: np.ndarray, turn: np.ndarray,
-                dialect: str) -> list[tuple[np.ndarray, str]]:
+def _geometries(bone: Bone, pose: Pose, dialect: str) -> list[tuple[np.ndarray, str]]:
     """Places and XML of the primitives that make up a bone's shape."""
     shape = bone.shape
     if shape.kind == 'capsule' and dialect == 'ros':
         # URDF has none: a cylinder between two balls.
-        return [(centre + rotation.rotate(turn, np.array(part.offset)), _geometry(part.shape))
-                for part in shape.primitives]
-    return [(centre, _geometry(shape))]
+        return [(pose.outward(part.offset), _geometry(part.shape)) for part in shape.primitives]
+    return [(pose.position, _geometry(shape))]
 
 
 def _geometry(shape: Shape) -> str:
@@ -117,11 +114,9 @@ def _geometry(shape: Shape) -> str:
     return f'<geometry><{shape.kind} {sizes}/></geometry>'
 
 
-def _joint(joint: Joint, frames: dict, dialect: str, limited: bool) -> list[str]:
+def _joint(joint: Joint, frames: dict[str, Pose], dialect: str, limited: bool) -> list[str]:
     """Write a joint and, where it has several axes, the links between."""
-    parent, turn = frames[joint.parent], rotation.inverse(frames[joint.parent][1])
-    place = (rotation.rotate(turn, joint.anchor - parent[0]),
-             rotation.multiply(turn, joint_frame(joint)))
+    place = frames[joint.parent].relative(frames[joint.child])
     if joint.kind == 'fixed':
         return _row(joint, [(joint.child, 'fixed', None, None)], place, dialect)
     if joint.is_free_ball and dialect == 'bullet':
@@ -137,7 +132,7 @@ def _joint(joint: Joint, frames: dict, dialect: str, limited: bool) -> list[str]
     return _row(joint, row, place, dialect)
 
 
-def _row(joint: Joint, row: list, place: tuple, dialect: str) -> list[str]:
+def _row(joint: Joint, row: list, place: Pose, dialect: str) -> list[str]:
     """Write joints one behind the other; only the first one is displaced."""
     lines, parent = [], joint.parent
     for index, (name, kind, axis, limit) in enumerate(row, start=1):
@@ -154,19 +149,15 @@ def _row(joint: Joint, row: list, place: tuple, dialect: str) -> list[str]:
         if kind != 'fixed':
             lines.append(f'    <dynamics damping="{joint.damping!r}"/>')
         lines.append('  </joint>')
-        if not last:
-            lines += _massless(child, dialect)
+        if not last and dialect == 'ros':
+            lines.append(f'  <link name={_quoted(child)}/>')
+        elif not last:
+            lines += [f'  <link name={_quoted(child)}>',
+                      '    <inertial><mass value="0"/>'
+                      '<inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial>',
+                      '  </link>']
         parent = child
     return lines
-
-
-def _massless(name: str, dialect: str) -> list[str]:
-    if dialect == 'ros':
-        return [f'  <link name={_quoted(name)}/>']
-    return [f'  <link name={_quoted(name)}>',
-            '    <inertial><mass value="0"/>'
-            '<inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial>',
-            '  </link>']
 
 
 def _quoted(text: str) -> str:

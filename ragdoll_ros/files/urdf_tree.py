@@ -12,15 +12,13 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ..model import errors, rotation
+from ..model.pose import Pose
 from ..model.ragdoll import tree_errors
 from ..model.shapes import SHAPES, SIZES, Shape
 
 LARGEST_TEXT = 32_000_000
 
 JOINT_TYPES = ('revolute', 'continuous', 'fixed', 'prismatic', 'planar', 'floating', 'spherical')
-
-Pose = tuple[np.ndarray, np.ndarray]
-"""Position (3,) m and orientation (4,)."""
 
 
 @dataclass
@@ -29,7 +27,7 @@ class UrdfLink:
 
     name: str
     mass: float = 0.0
-    centre: Pose = (np.zeros(3), np.array(rotation.IDENTITY))
+    centre: Pose = field(default_factory=Pose)
     inertia: np.ndarray | None = None
     """(3, 3) kg m^2 about the centre of mass, in the axes of ``centre``."""
     shapes: list[tuple[Shape, Pose]] = field(default_factory=list)
@@ -72,16 +70,12 @@ class UrdfTree:
         for name in self.order:
             joint = self.joints.get(name)
             if joint is None:
-                placed[name] = (np.zeros(3), np.array(rotation.IDENTITY))
+                placed[name] = Pose()
                 continue
             turn = rotation.from_axis_angle(joint.axis, angles.get(name, 0.0))
-            placed[name] = compose(compose(placed[joint.parent], joint.origin), (np.zeros(3), turn))
+            origin = placed[joint.parent].compose(joint.origin)
+            placed[name] = origin.compose(Pose(orientation=turn))
         return placed
-
-
-def compose(outer: Pose, inner: Pose) -> Pose:
-    """Pose of something in the frame that ``outer`` stands in, given in outer's own."""
-    return (outer[0] + rotation.rotate(outer[1], inner[0]), rotation.multiply(outer[1], inner[1]))
 
 
 def parse_urdf(text: str) -> UrdfTree:
@@ -182,9 +176,9 @@ def _inertia(element: ElementTree.Element | None, where: str) -> np.ndarray | No
 def _pose(element: ElementTree.Element, where: str) -> Pose:
     origin = element.find('origin')
     if origin is None:
-        return np.zeros(3), np.array(rotation.IDENTITY)
-    return (_vector(origin, 'xyz', where, (0, 0, 0)),
-            rotation.from_rpy(*_vector(origin, 'rpy', where, (0, 0, 0))))
+        return Pose()
+    return Pose(_vector(origin, 'xyz', where, (0, 0, 0)),
+                rotation.from_rpy(*_vector(origin, 'rpy', where, (0, 0, 0))))
 
 
 def _text(element: ElementTree.Element, key: str, where: str) -> str:

@@ -3,25 +3,22 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..model.pose import Pose
 from ..model.ragdoll import Bone, SkeletonFrame
 from ..model.swing import Swing
 from .character import Character
-from .frames import pose_in_body
-from .groups import Group
 from .spring_recipe import swing_of
 
 
-def carriers(groups: list[Group], bodies: list[Bone]) -> dict[int, Bone]:
-    """Body that carries each of the character's bones, by the bone's index."""
-    return {bone: body for group, body in zip(groups, bodies, strict=True) for bone in group.bones}
-
-
 def skeleton_frames(character: Character, carrier: dict[int, Bone]) -> tuple[SkeletonFrame, ...]:
-    """Every bone of the skeleton, fixed on the body that carries it, in the skeleton's order."""
+    """Every bone of the skeleton, fixed on the body that carries it, in the skeleton's order.
+
+    ``carrier`` has that body by the index of each of the character's bones.
+    """
     frames = []
     for index, name in enumerate(character.bone_names):
         body = carrier[index]
-        pose = pose_in_body(body, character.positions[index], character.orientations[index])
+        pose = body.pose.relative(Pose(character.positions[index], character.orientations[index]))
         frames.append(SkeletonFrame(name, body.name, *(np.round(part, 12) + 0.0 for part in pose)))
     return tuple(frames)
 

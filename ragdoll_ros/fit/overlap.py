@@ -5,7 +5,6 @@ import numpy as np
 
 from ..model.ragdoll import Bone
 from ..model.shapes import Shape
-from .frames import from_body, to_body
 
 DEEP = 0.001
 """Bodies overlap where one's point is deeper than this in the other, m."""
@@ -21,12 +20,12 @@ def filling(shape: Shape) -> np.ndarray:
 
 def depth_in(bone: Bone, points: np.ndarray) -> np.ndarray:
     """How deep (p,) m points (p, 3) of the doll's frame are in a body; below zero outside."""
-    return -bone.shape.signed_distance(to_body(bone, points))
+    return -bone.shape.signed_distance(bone.pose.inward(points))
 
 
 def overlapping_pairs(bones: tuple[Bone, ...]) -> list[tuple[str, str]]:
     """Names of the pairs of bodies that overlap by more than DEEP."""
-    clouds = [from_body(bone, np.concatenate([bone.shape.mesh()[0], filling(bone.shape)]))
+    clouds = [bone.pose.outward(np.concatenate([bone.shape.mesh()[0], filling(bone.shape)]))
               for bone in bones]
     reaches = [float(np.linalg.norm(bone.shape.half_extents)) for bone in bones]
     found = []
@@ -53,7 +52,7 @@ def shared_volume(bones: tuple[Bone, ...]) -> float:
     """Share of the bodies' volume, 0 to 1, that lies in another body too."""
     whole = shared = 0.0
     for bone in bones:
-        points = from_body(bone, filling(bone.shape))
+        points = bone.pose.outward(filling(bone.shape))
         others = tuple(other for other in bones if other is not bone)
         share = float(np.mean(covered(others, points, 0.0))) if others else 0.0
         whole += bone.shape.volume

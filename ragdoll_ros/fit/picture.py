@@ -8,7 +8,6 @@ import numpy as np
 from ..model import errors
 from ..model.ragdoll import Bone, Ragdoll
 from .character import Character
-from .frames import from_body
 
 COLORS = np.array([[0.90, 0.45, 0.35], [0.35, 0.60, 0.85], [0.50, 0.75, 0.45], [0.95, 0.75, 0.35],
                    [0.65, 0.50, 0.80], [0.45, 0.75, 0.75], [0.85, 0.60, 0.75], [0.70, 0.65, 0.50]])
@@ -56,7 +55,7 @@ def draw(doll: Ragdoll, character: Character | None, path: str | Path) -> None:
 
 def _triangles(bone: Bone) -> np.ndarray:
     corners, triangles = bone.shape.mesh()
-    return from_body(bone, corners)[triangles]
+    return bone.pose.outward(corners)[triangles]
 
 
 def _draw_solids(axes: object, solids: list[tuple[np.ndarray, np.ndarray]], alpha: float) -> None:

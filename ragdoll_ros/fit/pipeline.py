@@ -14,7 +14,6 @@ from ..model.shapes import Shape
 from . import carried
 from .axes import Axes, fit_axes
 from .character import Character
-from .frames import to_body
 from .groups import Group, group_bones, partner, vertices_by_bone
 from .joints import damped, make_joint
 from .masses import share_mass
@@ -94,7 +93,8 @@ def fit_character(character: Character, options: Options | None = None) -> Fit:
               for index, group in enumerate(groups) if group.parent >= 0]
     notes += [f'no bone joins {group.name} to the rest: it is tied to {groups[group.parent].name}'
               for group in groups if group.tied]
-    carrier = carried.carriers(groups, bones)
+    carrier = {index: bone for group, bone in zip(groups, bones, strict=True)
+               for index in group.bones}
     swings = carried.swings(character, carrier, notes)
     doll = Ragdoll(character.name, tuple(bones), tuple(joints), swings,
                    carried.skeleton_frames(character, carrier))
@@ -161,6 +161,6 @@ def _body(character: Character, group: Group, fitted: Fitted, axes: Axes, mass: 
     bone = Bone(group.name, fitted.shape, mass, np.round(fitted.centre, DECIMALS) + 0.0,
                 np.round(rotation.from_matrix(axes.frame), 12) + 0.0)
     points = character.vertices[group.vertices[group.vertices < len(character.vertices)]]
-    off = bone.shape.signed_distance(to_body(bone, points))
+    off = bone.shape.signed_distance(bone.pose.inward(points))
     return BodyFit(bone, tuple(character.bone_names[b] for b in group.bones), group.role,
                    len(points), int(np.count_nonzero(off <= TOLERANCE)), axes)

@@ -10,6 +10,7 @@ import dataclasses
 import numpy as np
 
 from .character import Character
+from .skins import widened
 
 LONGEST_EDGE = 0.025
 """Edges longer than this share of the character are halved."""
@@ -49,8 +50,8 @@ def _split(character: Character, chosen: np.ndarray) -> Character:
         character,
         vertices=np.concatenate([character.vertices, character.vertices[ends].mean(axis=1)]),
         triangles=np.concatenate([character.triangles[~chosen], quarters]),
-        bones=np.concatenate([_wide(character.bones, width), _wide(bones, width)]),
-        weights=np.concatenate([_wide(character.weights, width), _wide(weights, width)]))
+        bones=np.concatenate([widened(character.bones, width), widened(bones, width)]),
+        weights=np.concatenate([widened(character.weights, width), widened(weights, width)]))
 
 
 def _mixed(character: Character, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -66,7 +67,3 @@ def _mixed(character: Character, ends: np.ndarray) -> tuple[np.ndarray, np.ndarr
     sums = totals.sum(axis=1, keepdims=True)
     totals = np.divide(totals, sums, out=np.zeros_like(totals), where=sums > 0)
     return np.take_along_axis(bones, order, axis=1), totals
-
-
-def _wide(array: np.ndarray, width: int) -> np.ndarray:
-    return np.pad(array, ((0, 0), (0, width - array.shape[1])))

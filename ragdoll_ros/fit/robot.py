@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..files.urdf_tree import LARGEST_TEXT, Pose, UrdfJoint, UrdfLink, UrdfTree, compose, parse_urdf
+from ..files.urdf_tree import LARGEST_TEXT, UrdfJoint, UrdfLink, UrdfTree, parse_urdf
 from ..model import errors, rotation
+from ..model.pose import Pose
 from ..model.ragdoll import LARGEST_SWING, WORLD, Bone, Joint, Ragdoll, SkeletonFrame
 from ..model.shapes import Box, Capsule, Shape
 from .axes import fit_axes
-from .frames import pose_in_body
 from .names import plain_name
 from .shapes import fit_best
 
@@ -84,8 +84,7 @@ def _doll(tree: UrdfTree) -> tuple[Ragdoll, list[str]]:
         if masses[name] <= 0:
             masses[name] = DENSITY * shape.volume
             notes.append(f'{name} has no mass: that of water is taken, {masses[name]:.3g} kg')
-        position, turn = compose(poses[name], place)
-        bones.append(Bone(text, shape, masses[name], position, turn))
+        bones.append(Bone(text, shape, masses[name], *poses[name].compose(place)))
     joints = [_joint(tree, name, carriers, names, poses, angles, notes)
               for name in names if name != root]
     above = root
@@ -125,8 +124,8 @@ def _capsule(shapes: list[tuple[Shape, Pose]]) -> tuple[Shape, Pose] | None:
     if len(cylinders) != 1 or len(balls) != 2 or len(shapes) != 3:
         return None
     barrel, place = cylinders[0]
-    half = rotation.rotate(place[1], np.array([0, 0, barrel.length / 2]))
-    centres = np.stack([centre for _, (centre, _) in balls]) - place[0]
+    half = rotation.rotate(place.orientation, np.array([0, 0, barrel.length / 2]))
+    centres = np.stack([pose.position for _, pose in balls]) - place.position
     fits = any(np.abs(centres - ends).max() < 1e-6 * barrel.length
                for ends in (np.stack([half, -half]), np.stack([-half, half])))
     if not fits or any(abs(ball.radius - barrel.radius) > 1e-9 for ball, _ in balls):
@@ -136,12 +135,11 @@ def _capsule(shapes: list[tuple[Shape, Pose]]) -> tuple[Shape, Pose] | None:
 
 def _around(shapes: list[tuple[Shape, Pose]]) -> tuple[Shape, Pose]:
     """One shape around several."""
-    points = np.concatenate([rotation.rotate(turn, shape.mesh()[0]) + centre
-                             for shape, (centre, turn) in shapes])
+    points = np.concatenate([pose.outward(shape.mesh()[0]) for shape, pose in shapes])
     axes = fit_axes(points, np.ones(len(points)), np.array([0.0, 0.0, 1.0]))
     local = points @ axes.frame
     fitted, = fit_best([local], THINNEST, 0.0)
-    return fitted.shape, (axes.frame @ fitted.centre, rotation.from_matrix(axes.frame))
+    return fitted.shape, Pose(axes.frame @ fitted.centre, rotation.from_matrix(axes.frame))
 
 
 def _same_inertia(link: UrdfLink) -> tuple[Shape, Pose] | None:
@@ -155,7 +153,7 @@ def _same_inertia(link: UrdfLink) -> tuple[Shape, Pose] | None:
     if np.linalg.det(axes) < 0:
         axes = axes * (1, 1, -1)
     edges = np.sqrt(np.maximum(squares, THINNEST ** 2))
-    return Box(tuple(edges)), compose(link.centre, (np.zeros(3), rotation.from_matrix(axes)))
+    return Box(tuple(edges)), link.centre.compose(Pose(orientation=rotation.from_matrix(axes)))
 
 
 def _carriers(tree: UrdfTree, solids: dict) -> dict[str, str]:
@@ -179,7 +177,7 @@ def _joint(tree: UrdfTree, name: str, carriers: dict[str, str], names: dict[str,
     while row[0].parent in tree.joints and carriers[row[0].parent] != row[0].parent:
         row.insert(0, tree.joints[row[0].parent])
     parent, child = names[carriers[row[0].parent]], names[name]
-    anchor = poses[row[0].child][0]
+    anchor = poses[row[0].child].position
     for joint in row:
         if joint.kind in ('prismatic', 'planar'):
             notes.append(f'{joint.name}: a doll has no {joint.kind} joint: it is fixed')
@@ -201,14 +199,14 @@ def _turning(parent: str, child: str, anchor: np.ndarray, row: list[UrdfJoint],
         return Joint(parent, child, 'fixed', anchor)
     places = [poses[joint.child] for joint in row]
     meeting = [joint for joint, place in zip(row, places, strict=True)
-               if np.linalg.norm(place[0] - places[0][0]) < SAME_PLACE]
+               if np.linalg.norm(place.position - places[0].position) < SAME_PLACE]
     if len(meeting) < len(row):
         dropped = [joint.name for joint in row if joint not in meeting]
         notes.append(f'{", ".join(dropped)}: between links without a shape: fixed')
-    axes = [rotation.rotate(poses[joint.child][1], joint.axis) for joint in meeting]
+    axes = [rotation.rotate(poses[joint.child].orientation, joint.axis) for joint in meeting]
     limits = [_limits(joint, angles, notes) for joint in meeting]
     damping = max(joint.damping for joint in meeting)
-    anchor = places[0][0]
+    anchor = places[0].position
     if len(meeting) == 1:
         return Joint(parent, child, 'hinge', anchor, tuple(axes), tuple(limits), damping)
     if len(meeting) == 2 and abs(axes[0] @ axes[1]) < 1e-6:
@@ -242,7 +240,7 @@ def _frames(poses: dict[str, Pose], carriers: dict[str, str], names: dict[str, s
     """Every link's frame, fixed on the body that carries it."""
     by_name = {bone.name: bone for bone in bones}
     carried = {name: by_name[names[carriers[name]]] for name in poses}
-    return tuple(SkeletonFrame(text, carried[name].name, *pose_in_body(carried[name], *poses[name]))
+    return tuple(SkeletonFrame(text, carried[name].name, *carried[name].pose.relative(poses[name]))
                  for name, text in _names(list(poses)).items())
 
 

@@ -48,8 +48,8 @@ class Skins:
                                     f'at most {LARGEST_SKIN} skinned vertices')
         self.vertices = np.concatenate([self.vertices, vertices])
         self.triangles = np.concatenate([self.triangles, triangles + base])
-        self.nodes = np.concatenate([_widened(self.nodes, width), _widened(nodes, width)])
-        self.weights = np.concatenate([_widened(self.weights, width), _widened(weights, width)])
+        self.nodes = np.concatenate([widened(self.nodes, width), widened(nodes, width)])
+        self.weights = np.concatenate([widened(self.weights, width), widened(weights, width)])
 
 
 def read_skins(file: GltfFile, nodes: Nodes) -> Skins:
@@ -217,5 +217,6 @@ def _triangles(file: GltfFile, primitive: dict, points: int, where: str) -> np.n
     return strip
 
 
-def _widened(array: np.ndarray, width: int) -> np.ndarray:
+def widened(array: np.ndarray, width: int) -> np.ndarray:
+    """Influences (v, k) with zeros up to ``width`` for each vertex."""
     return np.pad(array, ((0, 0), (0, width - array.shape[1])))

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import rotation
-from .ragdoll import Limits
+from .ragdoll import Limits, Ragdoll
 
 UNLIMITED: Limits = (-math.inf, math.inf)
 
 
 @dataclass(frozen=True)
 class GeneralizedState:
-    """GeneralizedState and velocities of all dolls, one behind the other (Featherstone's q and q').
+    """Coordinates and velocities of all dolls, one behind the other (Featherstone's q and q').
 
     For each doll ``q`` holds the root's position (3) m and orientation (4), then the joints'
     from root to leaf: one angle (rad) an axis, a quaternion (4) for a free ball joint, which
@@ -29,15 +29,10 @@ class GeneralizedState:
 
 
 class DofLayout:
-    """Where in q and v what stands.
+    """Where in q and v what stands, the joints of each doll depth first."""
 
-    ``dolls`` gives for each doll its joints in the engine's order: a pair of limits (rad) for
-    one axis, None for a free ball joint.
-    """
-
-    def __init__(self, dolls: Sequence[Sequence[Limits | None]]) -> None:
-        lower: list[float] = []
-        upper: list[float] = []
+    def __init__(self, dolls: Sequence[Ragdoll]) -> None:
+        bounds: list[Limits] = []
         plain_q: list[int] = []
         plain_v: list[int] = []
         roots: list[tuple[int, int]] = []
@@ -46,27 +41,25 @@ class DofLayout:
         self.own_q: list[slice] = []
         self.own_v: list[slice] = []
         """What of q and of v is each doll's."""
-        for joints in dolls:
-            q, first_v = len(lower), v
+        for doll in dolls:
+            q, first_v = len(bounds), v
             plain_q += range(q, q + 3)
             plain_v += range(v, v + 3)
             roots.append((q + 3, v + 3))
-            lower += [-math.inf] * 7
-            upper += [math.inf] * 7
+            bounds += [UNLIMITED] * 7
             v += 6
-            for limits in joints:
-                if limits is None:
-                    balls.append((len(lower), v))
+            for joint in doll.joints_depth_first():
+                if joint.is_free_ball:
+                    balls.append((len(bounds), v))
+                    bounds += [UNLIMITED] * 4
                 else:
-                    plain_q.append(len(lower))
-                    plain_v.append(v)
-                wide = 4 if limits is None else 1
-                lower += [-math.inf if limits is None else limits[0]] * wide
-                upper += [math.inf if limits is None else limits[1]] * wide
-                v += 3 if limits is None else 1
-            self.own_q.append(slice(q, len(lower)))
+                    plain_q += range(len(bounds), len(bounds) + joint.dof)
+                    plain_v += range(v, v + joint.dof)
+                    bounds += [pair or UNLIMITED for pair in joint.angle_limits]
+                v += joint.dof
+            self.own_q.append(slice(q, len(bounds)))
             self.own_v.append(slice(first_v, v))
-        self.sizes = (len(lower), v)
+        self.sizes = (len(bounds), v)
         """Numbers in q and in v."""
         self._plain = (np.array(plain_q), np.array(plain_v))
         self._turning = self._indices(roots + balls)
@@ -75,7 +68,7 @@ class DofLayout:
         """(d, 4) and (d, 3): where in q each root's orientation and position stand."""
         self.root_velocities = self.root_spins[:, :1] - 3 + np.arange(3)
         """(d, 3) each: where in v each root's linear and angular velocity stand."""
-        low, high = np.array(lower)[plain_q], np.array(upper)[plain_q]
+        low, high = np.array(bounds)[plain_q].T
         some = np.isfinite(low) | np.isfinite(high)
         self.limited = (self._plain[0][some], self._plain[1][some])
         """Where the limited angles stand in q and their rates in v."""
@@ -98,7 +91,8 @@ class DofLayout:
         rate = np.empty_like(q)
         rate[self._plain[0]] = v[self._plain[1]]
         at, spin = self._turning
-        rate[at] = 0.5 * rotation.multiply(q[at], _pure(v[spin]))
+        pure = np.concatenate([v[spin], np.zeros((len(spin), 1))], axis=1)
+        rate[at] = 0.5 * rotation.multiply(q[at], pure)
         return rate
 
     def normalized(self, q: np.ndarray) -> np.ndarray:
@@ -133,8 +127,3 @@ class DofLayout:
     def _indices(starts: list[tuple[int, int]]) -> tuple[np.ndarray, np.ndarray]:
         table = np.array(starts, int).reshape(-1, 2)
         return table[:, :1] + np.arange(4), table[:, 1:] + np.arange(3)
-
-
-def _pure(w: np.ndarray) -> np.ndarray:
-    """Angular velocities (k, 3) as quaternions (k, 4) without a real part."""
-    return np.concatenate([w, np.zeros((len(w), 1))], axis=1)

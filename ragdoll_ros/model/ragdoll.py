@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
+from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -16,6 +17,7 @@ import numpy as np
 
 from . import errors, rotation
 from .errors import set_fields
+from .pose import Pose
 from .rotation import IDENTITY
 from .shapes import Shape
 from .swing import Swing
@@ -56,9 +58,6 @@ class Bone:
             raise errors.DuplicateName('name', self.name, "a name other than the world frame's")
         errors.check_positive('mass', self.mass)
         errors.check_finite('position', self.position)
-        self._check_surface()
-
-    def _check_surface(self) -> None:
         for key, most in (('friction', math.inf), ('rolling_friction', math.inf),
                           ('restitution', 1)):
             if getattr(self, key) is not None:
@@ -67,6 +66,11 @@ class Bone:
             set_fields(self, color=floats(self.color))
             for part in self.color:
                 errors.check_range('color', part, 0, 1)
+
+    @property
+    def pose(self) -> Pose:
+        """Of its centre of mass and its shape's axes, doll's frame, bind pose."""
+        return Pose(np.array(self.position), np.array(self.orientation))
 
     @property
     def inertia(self) -> Vector:
@@ -265,28 +269,26 @@ class Ragdoll:
 
     def joints_from_root(self) -> tuple[Joint, ...]:
         """All joints, each parent's before its children's."""
-        below: dict[str, list[Joint]] = {}
-        for joint in self.joints:
-            below.setdefault(joint.parent, []).append(joint)
-        ordered: list[Joint] = []
-        names = [self.root.name]
-        for name in names:
-            for joint in below.get(name, ()):
-                ordered.append(joint)
-                names.append(joint.child)
+        below = self._joints_below()
+        ordered = below[self.root.name]
+        for joint in ordered:
+            ordered += below[joint.child]
         return tuple(ordered)
 
     def joints_depth_first(self) -> tuple[Joint, ...]:
         """All joints, each one's whole branch before the next, as engines count them."""
-        below: dict[str, list[Joint]] = {}
-        for joint in reversed(self.joints):
-            below.setdefault(joint.parent, []).append(joint)
-        ordered: list[Joint] = []
-        waiting = below.pop(self.root.name, [])
-        while waiting:
-            ordered.append(waiting.pop())
-            waiting += below.pop(ordered[-1].child, [])
+        below = self._joints_below()
+        ordered = below[self.root.name]
+        for after, joint in enumerate(ordered, start=1):
+            ordered[after:after] = below[joint.child]
         return tuple(ordered)
+
+    def _joints_below(self) -> defaultdict[str, list[Joint]]:
+        """The joints of each bone to its children."""
+        below: defaultdict[str, list[Joint]] = defaultdict(list)
+        for joint in self.joints:
+            below[joint.parent].append(joint)
+        return below
 
     def replace_bone(self, name: str, **changes: object) -> Ragdoll:
         """The same doll with one bone changed."""
@@ -351,6 +353,13 @@ def joint_frame(joint: Joint) -> np.ndarray:
     if joint.kind != 'ball':
         return np.array(rotation.IDENTITY)
     return rotation.shortest_arc(np.array([0.0, 0.0, 1.0]), np.array(joint.axes[0]))
+
+
+def joint_axes(joint: Joint) -> np.ndarray:
+    """Axes (dof, 3) of a joint's angles, doll's frame, bind pose."""
+    if joint.kind == 'ball':
+        return rotation.matrix(joint_frame(joint)).T
+    return np.array(joint.axes).reshape(-1, 3)
 
 
 def _reaches(parent_of: dict[str, str], start: str, goal: str) -> bool:

@@ -14,9 +14,10 @@ import numpy as np
 
 from . import errors, rotation
 from .errors import set_fields
+from .pose import Pose
 from .ragdoll import Bone, Ragdoll
 from .rotation import IDENTITY
-from .vectors import Quaternion, Vector, floats
+from .vectors import Quaternion, Vector, floats, unit
 
 SECOND = 1_000_000_000
 """Nanoseconds in a second: time is counted in whole nanoseconds, as in ROS."""
@@ -53,6 +54,11 @@ class Material:
         errors.check_range('rolling_friction', self.rolling_friction, 0, 1e6)
         errors.check_range('restitution', self.restitution, 0, 1)
         errors.check_range('restitution_speed', self.restitution_speed, 0, 1e6)
+
+    def on(self, bone: Bone | None) -> tuple[float, float, float]:
+        """Friction, rolling friction (m) and restitution of a bone, its own where it has them."""
+        return tuple(getattr(self, key) if getattr(bone, key, None) is None else getattr(bone, key)
+                     for key in ('friction', 'rolling_friction', 'restitution'))
 
 
 @dataclass(frozen=True)
@@ -91,20 +97,19 @@ class Placement:
         for key in ('position', 'velocity', 'spin'):
             set_fields(self, **{key: floats(getattr(self, key))})
             errors.check_finite(key, getattr(self, key))
-        orientation = floats(self.orientation)
-        errors.check_finite('orientation', orientation)
-        length = math.hypot(*orientation)
-        if length < 1e-9:
-            raise errors.NotUnit('orientation', orientation, 'a quaternion x, y, z, w, not zero')
-        if abs(length - 1) > 1e-15:
-            orientation = floats(value / length for value in orientation)
-        set_fields(self, orientation=orientation, name=self.name or self.doll.name)
+        set_fields(self, name=self.name or self.doll.name, orientation=unit(
+            'orientation', self.orientation, 'a quaternion x, y, z, w, not zero'))
 
-    def bone_pose(self, bone: Bone) -> tuple[np.ndarray, np.ndarray]:
-        """Position (3,) m and orientation (4,) of a bone at the start, world frame."""
-        turn = np.array(self.orientation)
-        position = self.position + rotation.rotate(turn, bone.position)
-        return position, rotation.multiply(turn, bone.orientation)
+    def bone_pose(self, bone: Bone) -> Pose:
+        """Of a bone at the start, world frame."""
+        return Pose(np.array(self.position), np.array(self.orientation)).compose(bone.pose)
+
+    def root_velocity(self) -> np.ndarray:
+        """Velocity (3,) m/s of the root's centre of mass at the start, world frame."""
+        bones = self.doll.bones
+        centre = sum(bone.mass * np.array(bone.position) for bone in bones) / self.doll.mass
+        arm = rotation.rotate(self.orientation, self.doll.root.position - centre)
+        return self.velocity + np.cross(self.spin, arm)
 
 
 @dataclass(frozen=True, repr=False)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import rotation
+from .pose import Pose
 from .scene import Scene
 from .state import State
 
@@ -30,11 +30,9 @@ class Riders:
             riders += placement.doll.riders
         self.names = rider_names(scene)
         self._carriers = np.array(carriers, dtype=int)
-        self._positions = np.array([rider.position for rider in riders]).reshape(-1, 3)
-        self._orientations = np.array([rider.orientation for rider in riders]).reshape(-1, 4)
+        self._seats = Pose(np.array([rider.position for rider in riders]).reshape(-1, 3),
+                           np.array([rider.orientation for rider in riders]).reshape(-1, 4))
 
-    def poses(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+    def poses(self, state: State) -> Pose:
         """Positions (m, 3) m and orientations (m, 4) of all riders, world frame."""
-        turns = state.orientations[self._carriers]
-        positions = state.positions[self._carriers] + rotation.rotate(turns, self._positions)
-        return positions, rotation.multiply(turns, self._orientations)
+        return state.poses(self._carriers).compose(self._seats)

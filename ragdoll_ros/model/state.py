@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from . import rotation
+from .pose import Pose
 
 
 class State:
@@ -52,6 +53,10 @@ class State:
     def rotation_matrices(self) -> np.ndarray:
         """(n, 3, 3): v_world = R v_bone."""
         return rotation.matrix(self.orientations)
+
+    def poses(self, bones: np.ndarray | int) -> Pose:
+        """Of some of the bones, an array of indices of any shape, or of one."""
+        return Pose(self.positions[bones], self.orientations[bones])
 
     def __repr__(self) -> str:
         low, high = self.positions.min(axis=0), self.positions.max(axis=0)

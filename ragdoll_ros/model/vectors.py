@@ -14,11 +14,12 @@ def floats(values: object) -> tuple[float, ...]:
     return tuple(float(value) for value in values)
 
 
-def unit(path: str, values: object) -> tuple[float, ...]:
+def unit(path: str, values: object,
+         expected: str = 'a direction, not zero') -> tuple[float, ...]:
     """Scale to length one; NotUnit for zero."""
     values = floats(values)
     errors.check_finite(path, values)
     length = math.hypot(*values)
     if length < 1e-9:
-        raise errors.NotUnit(path, values, 'a direction, not zero')
+        raise errors.NotUnit(path, values, expected)
     return values if abs(length - 1) < 1e-15 else floats(value / length for value in values)

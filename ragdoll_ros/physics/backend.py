@@ -1,19 +1,16 @@
 """What can be compiled or done by numpy, made here the one way or the other."""
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from ..model.coordinates import DofLayout
+from ..model.scene import Scene
+from .engine.protocol import Engine
+from .flight import Dynamics
 from .kernels import ready
-
-if TYPE_CHECKING:
-    from ..model.coordinates import DofLayout
-    from ..model.scene import Scene
-    from .engine.protocol import Engine
-    from .flight import Dynamics
-    from .plain.conservation import ConservationProjection
-    from .plain.limits import JointLimits
-    from .plain.mechanics import Mechanics
-    from .plain.reach import Reach
+from .plain.conservation import ConservationProjection
+from .plain.flight import EngineDynamics
+from .plain.limits import JointLimits
+from .plain.mechanics import Mechanics
+from .plain.reach import Reach
 
 
 def dynamics_of(scene: Scene, make_engine: type[Engine], layout: DofLayout) -> Dynamics:
@@ -21,7 +18,6 @@ def dynamics_of(scene: Scene, make_engine: type[Engine], layout: DofLayout) -> D
     if ready():
         from .dynamics import CompiledDynamics
         return CompiledDynamics(scene)
-    from .plain.flight import EngineDynamics
     return EngineDynamics(scene, make_engine, layout)
 
 
@@ -30,7 +26,6 @@ def mechanics_of(scene: Scene) -> Mechanics:
     if ready():
         from .conservation import CompiledMechanics
         return CompiledMechanics(scene)
-    from .plain.mechanics import Mechanics
     return Mechanics(scene)
 
 
@@ -40,7 +35,6 @@ def conservation_of(scene: Scene, mechanics: Mechanics,
     if ready():
         from .conservation import CompiledProjection
         return CompiledProjection(scene, mechanics, layout)
-    from .plain.conservation import ConservationProjection
     return ConservationProjection(scene, mechanics, layout)
 
 
@@ -49,7 +43,6 @@ def limits_of(layout: DofLayout) -> JointLimits:
     if ready():
         from .limits import CompiledLimits
         return CompiledLimits(layout)
-    from .plain.limits import JointLimits
     return JointLimits(layout)
 
 
@@ -58,5 +51,4 @@ def reach_of(scene: Scene) -> Reach:
     if ready():
         from .reach import CompiledReach
         return CompiledReach(scene)
-    from .plain.reach import Reach
     return Reach(scene)

@@ -3,7 +3,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model import rotation
 from ..model.scene import Scene
 from ..model.state import State
 
@@ -18,14 +17,11 @@ class JointGap:
             for joint in placement.doll.joints:
                 pair = [placement.doll.bone(name) for name in (joint.parent, joint.child)]
                 bones.append([index[bone.name] for bone in pair])
-                points.append([rotation.rotate(rotation.inverse(bone.orientation),
-                                               np.subtract(joint.anchor, bone.position))
-                               for bone in pair])
+                points.append([bone.pose.inward(joint.anchor) for bone in pair])
         self._bones = np.array(bones, int).reshape(-1, 2)
         self._points = np.array(points).reshape(-1, 2, 3)
 
     def gaps(self, state: State) -> np.ndarray:
         """Distances (j,) m, joint by joint as the dolls list them."""
-        seen = (state.positions[self._bones]
-                + rotation.rotate(state.orientations[self._bones], self._points))
+        seen = state.poses(self._bones).outward(self._points)
         return np.linalg.norm(seen[:, 0] - seen[:, 1], axis=-1)

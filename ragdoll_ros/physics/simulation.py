@@ -20,7 +20,7 @@ from .settings import Accuracy, firm, resolve_accuracy
 from .sleeping import SleepDetector
 from .stepping import StepStats
 from .swing.pose import SwingState
-from .swing.simulation import swing_simulation
+from .swing.simulation import SwingSimulation
 from .work import longest_stretch
 
 THROWN = SECOND
@@ -55,7 +55,8 @@ class Simulation:
         self._start = (self._stepper.engine.save(), self._stepper.coordinates)
         self._gap = JointGap(scene)
         self._sleep_detector = SleepDetector(scene)
-        self._swings = swing_simulation(scene)
+        self._swings = SwingSimulation(scene) if any(
+            placement.doll.swings for placement in scene.dolls) else None
         self.reset()
 
     def __enter__(self) -> Simulation:

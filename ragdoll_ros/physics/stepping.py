@@ -51,7 +51,7 @@ GRADES = sorted({math.ceil(2 ** (k / 2)) for k in range(40)})
 
 HELPED = 0.98
 """Share of an overshoot that finer steps must come below to be tried once more: where contacts
-is_active a joint past its limit, they never do."""
+press a joint past its limit, they never do."""
 
 EVEN = 3.0
 """Accelerations up to so many times gravity's are those of an even motion, not of a blow."""
@@ -145,7 +145,7 @@ class Stepper:
             self.coordinates = self.engine.coordinates()
             self.state = self.dynamics.state(self.coordinates)
         else:
-            self.state, self.coordinates = self.engine.get_state()
+            self.state, self.coordinates = self.engine.read(), self.engine.coordinates()
         self.touching = self.engine.touching()
 
     def begin(self) -> None:

@@ -3,8 +3,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model import rotation
-from ..model.ragdoll import Joint, Ragdoll, joint_frame
+from ..model.ragdoll import Joint, Ragdoll, joint_axes
 from ..model.scene import Scene
 from .kernels.record import RECORD
 
@@ -18,7 +17,10 @@ def table(scene: Scene) -> np.ndarray:
         doll, at = placement.doll, {}
         for joint in (None, *doll.joints_depth_first()):
             bone = doll.bone(joint.child) if joint else doll.root
-            record = _joined(doll, joint, at) if joint else _root()
+            record = np.zeros((), RECORD)
+            record['parent'], record['free'] = -1, 1
+            if joint:
+                _enter_joint(record, doll, joint, at)
             record['bone'] = places[scene.qualified(placement, bone.name)]
             record['mass'], record['inertia'] = bone.mass, bone.inertia
             record['bind'], record['q'], record['v'] = bone.orientation, q, v
@@ -31,21 +33,11 @@ def table(scene: Scene) -> np.ndarray:
     return np.array(records, RECORD)
 
 
-def _root() -> np.ndarray:
-    record = np.zeros((), RECORD)
-    record['parent'], record['free'] = -1, 1
-    return record
-
-
-def _joined(doll: Ragdoll, joint: Joint, at: dict[str, int]) -> np.ndarray:
-    """What a joint says of its child's record; ``at``: which record is whose."""
-    record = np.zeros((), RECORD)
+def _enter_joint(record: np.ndarray, doll: Ragdoll, joint: Joint, at: dict[str, int]) -> None:
+    """Enter what a joint says of its child's record; ``at``: which record is whose."""
     record['parent'] = at[joint.parent]
     record['free'] = joint.is_free_ball
     record['dof'], record['damping'] = joint.dof, joint.damping
     record['before'] = np.subtract(joint.anchor, doll.bone(joint.parent).position)
     record['after'] = np.subtract(doll.bone(joint.child).position, joint.anchor)
-    axes = rotation.matrix(joint_frame(joint)).T if joint.kind == 'ball' else joint.axes
-    for row, axis in enumerate(axes):
-        record['axes'][row] = axis
-    return record
+    record['axes'][:joint.dof] = joint_axes(joint)

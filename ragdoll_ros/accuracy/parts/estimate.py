@@ -9,13 +9,12 @@ import functools
 
 import numpy as np
 
-from ..methods import Ours
+from ..methods import simulated
 from ..references.articulated import Articulated
 from ..runner import Job, Options, Row
 from .precision import motions
 
 NAME = 'estimate'
-KEY, TRUST = 'error_estimate_m', 'error_trusted'
 MOTIONS = ('flight_gentle', 'flight_fast', 'flight_long')
 FACTOR = 3.0
 NOISE = 1e-14
@@ -35,22 +34,18 @@ def measure(accuracy: str, names: tuple[str, ...]) -> list[Row]:
     for name in names:
         trial = motions()[name].trial
         tree = Articulated(trial.scene.dolls[0].doll, trial.scene.gravity)
-        ours = Ours(trial, accuracy)
-        simulation, tick = ours.simulation, trial.scene.step
+        simulation, tick = simulated(trial, accuracy), trial.scene.step
         for _ in range(round(trial.duration / tick)):
             before = simulation.coordinates
             truth = tree.trajectory(before.q, before.v, (0.0, tick)).positions[-1]
-            state = ours.advance()
+            state = simulation.advance()
             found = simulation.measures()
-            if KEY not in found:
-                ours.close()
-                return [{'label': accuracy, 'missing': True}]
-            if not found.get(TRUST, 1.0):
+            if not found['error_trusted']:
                 distrusted += 1
                 continue
             true.append(float(np.linalg.norm(state.positions - truth, axis=-1).max()))
-            estimated.append(float(found[KEY]))
-        ours.close()
+            estimated.append(float(found['error_estimate_m']))
+        simulation.close()
     pairs = [(t, e) for t, e in zip(true, estimated, strict=True) if max(t, e) > NOISE]
     within = [max(t, e) <= FACTOR * max(min(t, e), NOISE) for t, e in pairs]
     return [{'label': accuracy, 'ticks': len(pairs), 'distrusted': distrusted,

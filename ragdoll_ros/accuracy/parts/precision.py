@@ -7,7 +7,10 @@ import numpy as np
 
 from ..measure import Measure, compare
 from ..methods import Method, Result, by_name, every_method, median_run
-from ..motions import Motion, every_motion
+from ..motions.contact import contact_motions
+from ..motions.flight import flight_motions
+from ..motions.mechanisms import mechanism_motions
+from ..motions.motion import Motion
 from ..runner import Job, Options, Row
 from ..trajectory import Trajectory
 
@@ -30,8 +33,9 @@ def jobs(options: Options) -> list[Job]:
 
 @functools.cache
 def motions() -> dict[str, Motion]:
-    """All motions by name, built once in each process."""
-    return {motion.name: motion for motion in every_motion()}
+    """All motions by name, simple ones first, built once in each process."""
+    return {motion.name: motion
+            for motion in (*flight_motions(), *mechanism_motions(), *contact_motions())}
 
 
 def measure_all(motion_name: str, method_names: list[str], repeats: int) -> list[Row]:

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import rotation
-from ...model.ragdoll import Joint, Ragdoll, joint_frame
+from ...model.ragdoll import Joint, Ragdoll, joint_axes
 from ...model.state import State
 from ..trajectory import Trajectory
 from .integration import integrate
@@ -129,13 +129,10 @@ class Articulated:
 
     def _prepared(self, joint: Joint) -> tuple:
         parent, child = self.doll.bone(joint.parent), self.doll.bone(joint.child)
-        axes = [np.array(axis) for axis in joint.axes]
-        if joint.kind == 'ball':
-            axes = list(rotation.matrix(joint_frame(joint)).T)
         return (joint, self._index[joint.parent], self._index[joint.child],
                 np.subtract(joint.anchor, parent.position),
                 np.subtract(child.position, joint.anchor),
-                [(axis, _skew(axis), _skew(axis) @ _skew(axis)) for axis in axes])
+                [(axis, _skew(axis), _skew(axis) @ _skew(axis)) for axis in joint_axes(joint)])
 
     def _kinematics(self, q: np.ndarray, v: np.ndarray) -> _Kinematics:
         """Forward kinematics, from the root to the leaves."""
@@ -200,6 +197,6 @@ def _skew(a: np.ndarray) -> np.ndarray:
 
 
 def _quaternion_rate(q: np.ndarray, omega: np.ndarray, outer: bool) -> np.ndarray:
-    """dq/dt of a body that rotations with omega, given in the outer frame or in the body's."""
+    """dq/dt of a body that turns with omega, given in the outer frame or in the body's."""
     pure = np.append(omega, 0.0)
     return (rotation.multiply(pure, q) if outer else rotation.multiply(q, pure)) / 2

@@ -18,8 +18,8 @@ import pybullet
 
 from ...files.urdf import to_urdf
 from ...model import errors, rotation
-from ...model.coordinates import UNLIMITED, DofLayout, GeneralizedState
-from ...model.ragdoll import Ragdoll
+from ...model.coordinates import DofLayout, GeneralizedState
+from ...model.ragdoll import Bone, Ragdoll
 from ...model.scene import Placement, Scene, grip
 from ...model.state import State
 from .protocol import GROUND, AppliedWrench, Contact, Wrenches, pressed
@@ -76,7 +76,6 @@ class _Doll:
     """Index of the root among the doll's bones."""
     joints: list[int]
     """Joints that move, in the engine's order, root to leaf."""
-    balls: list[bool]
     widths: list[tuple[int, int]]
     """Numbers in q and in v of each joint."""
     angles: dict[str, int]
@@ -97,13 +96,8 @@ class _World:
         pybullet.setGravity(*scene.gravity, physicsClientId=client)
         self.ground = self._add_ground()
         self.dolls = [self._add_doll(placement) for placement in scene.dolls]
-        self.layout = self._lay_out()
+        self.layout = DofLayout([placement.doll for placement in scene.dolls])
         self._check_sizes()
-
-    def set_in_motion(self) -> None:
-        """Set each doll in motion as at the start, as one rigid body about its centre of mass."""
-        for doll, placement in zip(self.dolls, self.scene.dolls, strict=True):
-            self._set_in_motion(doll.body, placement)
 
     def _add_ground(self) -> int | None:
         if self.scene.ground is None or self._free:
@@ -121,21 +115,23 @@ class _World:
         place = [n * (ground.offset - depth) for n in ground.normal]
         body = pybullet.createMultiBody(0, shape, -1, place, _list(turn),
                                         physicsClientId=self._client)
-        self._set_material(body, -1, None, None, None)
+        self._set_material(body, -1, None)
         return body
 
     def _add_doll(self, placement: Placement) -> _Doll:
         doll = self._weighed(placement.doll)
         collide = self.scene.self_collision and not self._free
         flags = _FLAGS | (pybullet.URDF_USE_SELF_COLLISION if collide else 0)
-        position, orientation = placement.bone_pose(doll.root)
-        orientation = np.array(placement.orientation)
+        position, _ = placement.bone_pose(doll.root)
         with tempfile.TemporaryDirectory(prefix='ragdoll_ros_') as folder:
             path = os.path.join(folder, 'doll.urdf')
             with open(path, 'w', encoding='utf-8') as file:
                 file.write(to_urdf(doll, 'bullet', limited=not self._free))
-            body = pybullet.loadURDF(path, _list(position), _list(orientation), flags=flags,
+            body = pybullet.loadURDF(path, _list(position), placement.orientation, flags=flags,
                                      physicsClientId=self._client)
+        if any(placement.velocity + placement.spin):
+            pybullet.resetBaseVelocity(body, _list(placement.root_velocity()), placement.spin,
+                                       physicsClientId=self._client)
         return self._set_up(doll, body)
 
     def _weighed(self, doll: Ragdoll) -> Ragdoll:
@@ -151,7 +147,7 @@ class _World:
 
     def _set_up(self, doll: Ragdoll, body: int) -> _Doll:
         """Find links and joints by name, and switch off what PyBullet switches on."""
-        links, joints, balls, angles = {doll.root.name: -1}, [], [], {}
+        links, joints, widths, angles = {doll.root.name: -1}, [], [], {}
         damping = {name: joint.damping for joint in doll.joints for name in joint.angle_names}
         for index in range(pybullet.getNumJoints(body, self._client)):
             info = pybullet.getJointInfo(body, index, self._client)
@@ -161,23 +157,26 @@ class _World:
                 continue
             angles[name] = len(joints)
             joints.append(index)
-            balls.append(kind == pybullet.JOINT_SPHERICAL)
-            self._free_joint(body, index, balls[-1])
+            ball = kind == pybullet.JOINT_SPHERICAL
+            widths.append((4, 3) if ball else (1, 1))
+            self._free_joint(body, index, ball)
             loss = damping.get(name, damping.get(f'{name}_x', 0.0))
             pybullet.changeDynamics(body, index, jointDamping=loss, physicsClientId=self._client)
         for link in range(-1, pybullet.getNumJoints(body, self._client)):
             pybullet.changeDynamics(
                 body, link, linearDamping=0, angularDamping=0, maxJointVelocity=LARGEST_RATE,
                 physicsClientId=self._client)
+            if self._free:
+                pybullet.setCollisionFilterGroupMask(body, link, 0, 0, self._client)
         order = [links[bone.name] for bone in doll.bones]
         for bone, link in zip(doll.bones, order, strict=True):
-            self._set_material(body, link, bone.friction, bone.rolling_friction, bone.restitution)
-        if self._free:
-            for link in range(-1, pybullet.getNumJoints(body, self._client)):
-                pybullet.setCollisionFilterGroupMask(body, link, 0, 0, self._client)
-        self._exclude_adjacent_bodies(doll, body, links)
+            self._set_material(body, link, bone)
+        # Bones that share a joint do not collide.
+        for joint in doll.joints:
+            pybullet.setCollisionFilterPair(body, body, links[joint.parent], links[joint.child],
+                                            0, physicsClientId=self._client)
         return _Doll(body, order, [link for link in order if link >= 0], order.index(-1),
-                     joints, balls, [(4, 3) if ball else (1, 1) for ball in balls], angles)
+                     joints, widths, angles)
 
     def _free_joint(self, body: int, joint: int, ball: bool) -> None:
         """Take PyBullet's default motor off a joint."""
@@ -189,38 +188,18 @@ class _World:
             pybullet.setJointMotorControl2(body, joint, pybullet.VELOCITY_CONTROL, force=0,
                                            physicsClientId=self._client)
 
-    def _set_material(self, body: int, link: int, friction: float | None,
-                      rolling: float | None, restitution: float | None) -> None:
-        """Set a link's part of a contact: PyBullet multiplies the two parts, so take roots.
+    def _set_material(self, body: int, link: int, bone: Bone | None) -> None:
+        """Set what a bone, or the ground, brings to a contact.
 
-        For rolling it adds each one's lever arm times the other's friction.
+        PyBullet multiplies the two parts, so take roots; for rolling it adds each one's lever arm
+        times the other's friction.
         """
-        material = self.scene.material
-        friction = material.friction if friction is None else friction
-        rolling = material.rolling_friction if rolling is None else rolling
-        restitution = material.restitution if restitution is None else restitution
+        friction, rolling, restitution = self.scene.material.on(bone)
         sliding = math.sqrt(grip(friction))
         pybullet.changeDynamics(
             body, link, lateralFriction=sliding,
             rollingFriction=rolling / (2 * sliding) if sliding else 0.0, spinningFriction=0,
             restitution=math.sqrt(restitution), physicsClientId=self._client)
-
-    def _exclude_adjacent_bodies(self, doll: Ragdoll, body: int, links: dict[str, int]) -> None:
-        """Bones that share a joint do not collide."""
-        for joint in doll.joints:
-            pybullet.setCollisionFilterPair(body, body, links[joint.parent], links[joint.child],
-                                            0, physicsClientId=self._client)
-
-    def _lay_out(self) -> DofLayout:
-        """Say where in the coordinates which joint's angle and limit stands."""
-        dolls = []
-        for doll, placement in zip(self.dolls, self.scene.dolls, strict=True):
-            limits = {name: pair for joint in placement.doll.joints
-                      for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
-            names = list(doll.angles)
-            dolls.append([None if ball else limits[name] or UNLIMITED
-                          for name, ball in zip(names, doll.balls, strict=True)])
-        return DofLayout(dolls)
 
     def _check_sizes(self) -> None:
         """Refuse what PyBullet would cut off without a word."""
@@ -229,16 +208,6 @@ class _World:
             if count > MOST_COORDINATES:
                 raise errors.OutOfRange(f'joints of {placement.name}', count,
                                         f'at most {MOST_COORDINATES} coordinates, 7 for the root')
-
-    def _set_in_motion(self, body: int, placement: Placement) -> None:
-        if not any(placement.velocity + placement.spin):
-            return
-        doll = placement.doll
-        centre = sum(bone.mass * np.array(bone.position) for bone in doll.bones) / doll.mass
-        arm = rotation.rotate(placement.orientation, doll.root.position - centre)
-        velocity = placement.velocity + np.cross(placement.spin, arm)
-        pybullet.resetBaseVelocity(body, _list(velocity), placement.spin,
-                                   physicsClientId=self._client)
 
 
 class BulletEngine:
@@ -297,22 +266,6 @@ class BulletEngine:
                 q += joint[0]
                 v += joint[1]
         return GeneralizedState(np.array(q), np.array(v))
-
-    def get_state(self) -> tuple[State, GeneralizedState]:
-        """Both at once, in less time."""
-        rows: list[tuple] = []
-        q: list[float] = []
-        v: list[float] = []
-        for doll in self._dolls:
-            own = self._rows(doll)
-            root = own[doll.root]
-            q += root[:7]
-            v += root[7:]
-            for joint in self._joints(doll):
-                q += joint[0]
-                v += joint[1]
-            rows += own
-        return State.of(np.array(rows)), GeneralizedState(np.array(q), np.array(v))
 
     def place(self, coordinates: GeneralizedState) -> None:
         q, v = coordinates.q.tolist(), coordinates.v.tolist()
@@ -408,7 +361,6 @@ class BulletEngine:
             self._doll_of[self._ground] = GROUND
         self._bone_of = {link: bone for bone, link in enumerate(self._links)}
         self.exclude_initial_penetrations()
-        world.set_in_motion()
 
     def _rows(self, doll: _Doll) -> list[tuple]:
         """Position, orientation, linear and angular velocity of each bone."""

@@ -10,8 +10,8 @@ import numpy as np
 
 from ...files.mjcf import to_mjcf
 from ...model import errors, rotation
-from ...model.coordinates import UNLIMITED, DofLayout, GeneralizedState
-from ...model.ragdoll import Joint, Limits, Ragdoll, joint_frame
+from ...model.coordinates import DofLayout, GeneralizedState
+from ...model.ragdoll import Joint, joint_frame
 from ...model.scene import Placement, Scene
 from ...model.state import State
 from .protocol import GROUND, Contact, Wrenches, pressed
@@ -82,10 +82,6 @@ class MujocoEngine:
             turn = rotation.multiply(seat, q[iq:iq + 4][XYZW])
             q[iq:iq + 4] = rotation.multiply(turn, rotation.inverse(seat))
         return GeneralizedState(q, self._outwards(self._data.qpos, self._data.qvel))
-
-    def get_state(self) -> tuple[State, GeneralizedState]:
-        """Both at once."""
-        return self.read(), self.coordinates()
 
     def place(self, coordinates: GeneralizedState) -> None:
         q, v = coordinates.q.copy(), coordinates.v.copy()
@@ -188,13 +184,11 @@ class MujocoEngine:
         self._doll_of = np.full(self._model.ngeom, GROUND)
         self._doll_of[list(self._bone_of)] = self.scene.doll_of_bone
         self._roots, self._balls, self._angles = [], [], []
-        dolls = []
         for placement in self.scene.dolls:
             doll = placement.doll
             self._roots.append(self._address(placement, doll.root.name + '/free'))
             self._angles += [self._place_of(placement, joint) for joint in doll.joints]
-            dolls.append(_limits(doll))
-        self.layout = DofLayout(dolls)
+        self.layout = DofLayout([placement.doll for placement in self.scene.dolls])
         self._stale = True
 
     def _place_of(self, placement: Placement, joint: Joint) -> int | list[int]:
@@ -215,10 +209,7 @@ class MujocoEngine:
         """Set each doll in motion as at the start, as one rigid body about its centre of mass."""
         start = self.coordinates()
         for placement, (_, iv) in zip(self.scene.dolls, self._roots, strict=True):
-            doll = placement.doll
-            centre = sum(bone.mass * np.array(bone.position) for bone in doll.bones) / doll.mass
-            arm = rotation.rotate(placement.orientation, doll.root.position - centre)
-            start.v[iv:iv + 3] = placement.velocity + np.cross(placement.spin, arm)
+            start.v[iv:iv + 3] = placement.root_velocity()
             start.v[iv + 3:iv + 6] = placement.spin
         self.place(start)
 
@@ -256,12 +247,3 @@ def silence_warnings() -> None:
     with contextlib.suppress(ImportError):
         import mujoco
         mujoco.set_mju_user_warning(lambda message: None)
-
-
-def _limits(doll: Ragdoll) -> list[Limits | None]:
-    """Limits of all joint angles in the order of the coordinates; None for a free ball joint."""
-    found: list[Limits | None] = []
-    for joint in doll.joints_depth_first():
-        found += [None] if joint.is_free_ball else [
-            pair or UNLIMITED for pair in joint.angle_limits]
-    return found

@@ -74,9 +74,6 @@ class Engine(Protocol):
     def coordinates(self) -> GeneralizedState:
         """Generalised coordinates of all dolls."""
 
-    def get_state(self) -> tuple[State, GeneralizedState]:
-        """Both at once, as after each step."""
-
     def place(self, coordinates: GeneralizedState) -> None:
         """Put all dolls where ``coordinates`` says."""
 

@@ -43,9 +43,3 @@ class SwingSimulation:
     def _tell(self, time: int, state: State) -> None:
         self._track.tell(time / SECOND, State.of(state.rows[self._bones]))
 
-
-def swing_simulation(scene: Scene) -> SwingSimulation | None:
-    """What lets a scene's swings follow, or None for a scene without any."""
-    return SwingSimulation(scene) if any(placement.doll.swings
-                                         for placement in scene.dolls) else None
-
