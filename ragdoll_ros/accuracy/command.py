@@ -66,8 +66,8 @@ def parser() -> argparse.ArgumentParser:
                       help='only this part or motion; may be given again; "list" names them all')
     made.add_argument('--starts', type=int, default=100, metavar='N',
                       help='starts of each of the nine classes (100)')
-    made.add_argument('--out', type=Path, default=Path('docs'), metavar='DIR',
-                      help='folder to write into (docs)')
+    made.add_argument('--out', type=Path, metavar='DIR', help='folder to write into (docs; with '
+                      '--case build/report, so that the published page stays whole)')
     made.add_argument('--from-json', action='store_true',
                       help='measure nothing, write page and pictures anew from DIR/accuracy.json')
     return made
@@ -78,6 +78,7 @@ def report(options: argparse.Namespace) -> int:
     if options.case == ['list']:
         sys.stdout.write('\n'.join(labels()) + '\n')
         return 0
+    options.out = options.out or Path('build/report' if options.case else 'docs')
     folder = options.out.absolute()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -121,8 +122,11 @@ def chosen(names: Sequence[str], options: Options) -> list[Job]:
     """All jobs, or those of the parts and motions named; WrongCall for a name that is none."""
     jobs = [(part, job) for part, module in PARTS.items() for job in module.jobs(options)]
     for name in names:
-        if not any(name in (part, job.part, job.label) for part, job in jobs):
-            raise WrongCall(f'--case {name}: expected one of {", ".join(labels())}')
+        if any(name in (part, job.part, job.label) for part, job in jobs):
+            continue
+        if name in labels():
+            raise WrongCall(f'--case {name}: not in the quick report; leave --quick out')
+        raise WrongCall(f'--case {name}: expected one of {", ".join(labels())}')
     return [job for part, job in jobs
             if not names or {part, job.part, job.label}.intersection(names)]
 

@@ -26,7 +26,8 @@ class ModelError(RagdollError):
     def __str__(self) -> str:
         value = repr(self.value)
         shown = value if len(value) <= 60 else value[:57] + '...'
-        return f'{self.path or "file"}: {type(self).__name__}: {shown}; expected {self.expected}'
+        where = self.path and f'{self.path}: '
+        return f'{where}{type(self).__name__}: {shown}; expected {self.expected}'
 
 
 class NotPositive(ModelError):
@@ -91,7 +92,8 @@ class ModelErrors(RagdollError):
 
     def __str__(self) -> str:
         count = f'{len(self.errors)} error{"s" * (len(self.errors) != 1)}'
-        return '\n'.join([f'{self.file}: {count}', *(f'  {error}' for error in self.errors)])
+        return '\n'.join([f'{self.file}: {count}', *(
+            f'  {error}' if error.path else f'  file: {error}' for error in self.errors)])
 
 
 def check_finite(path: str, values: object) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from . import errors, rotation
 from .errors import set_fields
-from .vectors import Vector, floats
+from .vectors import Vector, finite
 
 LARGEST = 1e7
 """N and N m: beyond it a push is refused, as no body that this package is for meets it."""
@@ -37,8 +37,7 @@ class Push:
 
     def __post_init__(self) -> None:
         for key in ('force', 'torque', 'point'):
-            set_fields(self, **{key: floats(getattr(self, key))})
-            errors.check_finite(key, getattr(self, key))
+            set_fields(self, **{key: finite(key, getattr(self, key))})
         for key in ('force', 'torque'):
             if math.hypot(*getattr(self, key)) > LARGEST:
                 raise errors.OutOfRange(key, getattr(self, key), f'at most {LARGEST:g} long')

@@ -21,7 +21,7 @@ from .pose import Pose
 from .rotation import IDENTITY
 from .shapes import Shape
 from .swing import Swing
-from .vectors import Quaternion, Vector, floats, unit
+from .vectors import Quaternion, Vector, finite, floats, unit
 
 Limits = tuple[float, float]
 
@@ -52,18 +52,17 @@ class Bone:
     color: tuple[float, float, float, float] | None = None
 
     def __post_init__(self) -> None:
-        set_fields(self, mass=float(self.mass), position=floats(self.position),
-                   orientation=unit('orientation', self.orientation))
+        set_fields(self, mass=float(self.mass), position=finite('position', self.position),
+                   orientation=unit('orientation', self.orientation, count=4))
         if self.name == WORLD:
             raise errors.DuplicateName('name', self.name, "a name other than the world frame's")
         errors.check_positive('mass', self.mass)
-        errors.check_finite('position', self.position)
         for key, most in (('friction', math.inf), ('rolling_friction', math.inf),
                           ('restitution', 1)):
             if getattr(self, key) is not None:
                 errors.check_range(key, getattr(self, key), 0, most)
         if self.color is not None:
-            set_fields(self, color=floats(self.color))
+            set_fields(self, color=finite('color', self.color, 4))
             for part in self.color:
                 errors.check_range('color', part, 0, 1)
 
@@ -128,10 +127,9 @@ class Joint:
         if self.kind not in JOINT_KINDS:
             raise errors.WrongAxes('kind', self.kind, 'one of ' + ', '.join(JOINT_KINDS))
         kind = JOINT_KINDS[self.kind]
-        set_fields(self, anchor=floats(self.anchor), damping=float(self.damping),
+        set_fields(self, anchor=finite('anchor', self.anchor), damping=float(self.damping),
                    axes=tuple(unit('axes', axis) for axis in self.axes),
                    limits=tuple(_angles(pair) for pair in self.limits or (None,) * kind.limits))
-        errors.check_finite('anchor', self.anchor)
         if len(self.axes) != kind.axes:
             raise errors.WrongAxes('axes', self.axes, f'{kind.axes} for a {self.kind} joint')
         if len(self.limits) != kind.limits:
@@ -204,9 +202,8 @@ class SkeletonFrame:
     orientation: Quaternion = IDENTITY
 
     def __post_init__(self) -> None:
-        set_fields(self, position=floats(self.position),
-                   orientation=unit('orientation', self.orientation))
-        errors.check_finite('position', self.position)
+        set_fields(self, position=finite('position', self.position),
+                   orientation=unit('orientation', self.orientation, count=4))
 
 
 @dataclass(frozen=True, repr=False)

@@ -17,7 +17,7 @@ from .errors import set_fields
 from .pose import Pose
 from .ragdoll import Bone, Ragdoll
 from .rotation import IDENTITY
-from .vectors import Quaternion, Vector, floats, unit
+from .vectors import Quaternion, Vector, finite, floats, unit
 
 SECOND = 1_000_000_000
 """Nanoseconds in a second: time is counted in whole nanoseconds, as in ROS."""
@@ -69,8 +69,7 @@ class Ground:
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        normal = floats(self.normal)
-        errors.check_finite('normal', normal)
+        normal = finite('normal', self.normal)
         length = math.hypot(*normal)
         if length < 1e-9:
             raise errors.NotUnit('normal', normal, 'a direction, not zero')
@@ -95,10 +94,9 @@ class Placement:
 
     def __post_init__(self) -> None:
         for key in ('position', 'velocity', 'spin'):
-            set_fields(self, **{key: floats(getattr(self, key))})
-            errors.check_finite(key, getattr(self, key))
+            set_fields(self, **{key: finite(key, getattr(self, key))})
         set_fields(self, name=self.name or self.doll.name, orientation=unit(
-            'orientation', self.orientation, 'a quaternion x, y, z, w, not zero'))
+            'orientation', self.orientation, 'a quaternion x, y, z, w, not zero', 4))
 
     def bone_pose(self, bone: Bone) -> Pose:
         """Of a bone at the start, world frame."""
@@ -130,10 +128,9 @@ class Scene:
     self_collision: bool = True
 
     def __post_init__(self) -> None:
-        set_fields(self, dolls=tuple(self.dolls), gravity=floats(self.gravity))
+        set_fields(self, dolls=tuple(self.dolls), gravity=finite('gravity', self.gravity))
         if not self.dolls:
             raise errors.WrongForm('dolls', (), 'at least one doll')
-        errors.check_finite('gravity', self.gravity)
         errors.check_range('step', self.step, *STEP_RANGE)
         errors.check_positive('pace', self.pace)
         names = [placement.name for placement in self.dolls]

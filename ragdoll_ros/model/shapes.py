@@ -13,7 +13,7 @@ import numpy as np
 
 from . import errors
 from .errors import set_fields
-from .vectors import Vector, floats
+from .vectors import Vector, finite, floats
 
 SEGMENTS = 20
 """Corners of a circle in a mesh."""
@@ -104,7 +104,7 @@ class Box(Solid):
     kind: ClassVar[str] = 'box'
 
     def __post_init__(self) -> None:
-        set_fields(self, size=floats(self.size))
+        set_fields(self, size=finite('box', self.size))
         errors.check_positive('box', self.size)
 
     @property

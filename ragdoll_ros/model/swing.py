@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 from . import errors
 from .errors import set_fields
-from .vectors import Vector, floats, unit
+from .vectors import Vector, finite, unit
 
 MODES = ('spring', 'pendulum', 'free')
 LENGTHS = (1e-3, 1e3)
@@ -76,11 +76,9 @@ class Swing:
     velocity: Vector = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        set_fields(self, root=floats(self.root), direction=unit('direction', self.direction),
-                   links=tuple(self.links), gravity=float(self.gravity),
-                   velocity=floats(self.velocity))
-        errors.check_finite('root', self.root)
-        errors.check_finite('velocity', self.velocity)
+        set_fields(self, root=finite('root', self.root),
+                   direction=unit('direction', self.direction), links=tuple(self.links),
+                   gravity=float(self.gravity), velocity=finite('velocity', self.velocity))
         errors.check_range('gravity', self.gravity, -LARGEST_SHARE, LARGEST_SHARE)
         if self.mode not in MODES:
             raise errors.WrongForm('mode', self.mode, 'one of ' + ', '.join(MODES))

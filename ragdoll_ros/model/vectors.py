@@ -14,11 +14,22 @@ def floats(values: object) -> tuple[float, ...]:
     return tuple(float(value) for value in values)
 
 
-def unit(path: str, values: object,
-         expected: str = 'a direction, not zero') -> tuple[float, ...]:
-    """Scale to length one; NotUnit for zero."""
-    values = floats(values)
-    errors.check_finite(path, values)
+def finite(path: str, values: object, count: int = 3) -> tuple[float, ...]:
+    """``count`` floats; WrongForm where that is not what is given, NotFinite for NaN, infinity."""
+    try:
+        found = floats(values)
+    except (TypeError, ValueError):
+        found = ()
+    if len(found) != count:
+        raise errors.WrongForm(path, values, f'{count} numbers')
+    errors.check_finite(path, found)
+    return found
+
+
+def unit(path: str, values: object, expected: str = 'a direction, not zero',
+         count: int = 3) -> tuple[float, ...]:
+    """``count`` numbers scaled to length one; NotUnit for zero, else as finite()."""
+    values = finite(path, values, count)
     length = math.hypot(*values)
     if length < 1e-9:
         raise errors.NotUnit(path, values, expected)

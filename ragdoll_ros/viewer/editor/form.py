@@ -88,7 +88,7 @@ class Form:
 
 def text_of(error: errors.ModelError) -> str:
     """What is wrong with a field: the value, and what would be right."""
-    return str(type(error)('', error.value, error.expected)).removeprefix('file: ')
+    return str(type(error)('', error.value, error.expected))
 
 
 def colored(text: str, color: str) -> str:
