@@ -112,9 +112,9 @@ def _size(doll: Ragdoll, character: Character) -> float:
 
     Not how far apart they stand: limbs may have been moved.
     """
+    still = np.zeros((len(doll.bones), 3))
     poses = State(np.array([bone.position for bone in doll.bones]),
-                  np.array([bone.orientation for bone in doll.bones]),
-                  np.zeros((0, 3)), np.zeros((0, 3)))
+                  np.array([bone.orientation for bone in doll.bones]), still, still)
     positions, _ = Riders(Scene('bind', (Placement(doll),))).poses(poses)
     place = {rider.name: k for k, rider in enumerate(doll.riders)}
     edges = np.array([(place[name], place[character.bone_names[up]], bone, up)
