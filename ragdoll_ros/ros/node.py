@@ -110,7 +110,9 @@ class RagdollNode(Node):
         self.paused = wanted
         self._go_on()
         if wanted:
-            self._show_as_it_stands()
+            # What is not published with every tick.
+            self._outputs.publish_markers(self.simulation, self.stamp)
+            self.interactive.publish_poses()
         self._diagnostics.report()
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
@@ -162,11 +164,6 @@ class RagdollNode(Node):
         """Publish a start: first which stamp it has, so that listeners know the next one's time."""
         self._diagnostics.report()
         self._publish()
-
-    def _show_as_it_stands(self) -> None:
-        """Bring up to date what is not published with every tick."""
-        self._outputs.publish_markers(self.simulation, self.stamp)
-        self.interactive.publish_poses()
 
     def _repeat_clock(self) -> None:
         """Publish the standing time for who has come since: who goes by /clock asks for no past."""

@@ -213,7 +213,12 @@ class Remote(Source):
             if status.name == self._status:
                 self._heard = time.monotonic()
                 values = {pair.key: pair.value for pair in status.values}
-                self._told = told(self._told, values)
+                # What cannot be read stays as it was.
+                with contextlib.suppress(KeyError, ValueError):
+                    self._told = dataclasses.replace(
+                        self._told, paused=values['paused'] == 'True',
+                        pace=float(values['real_time_factor']),
+                        measures={key: float(values[key]) for key in KEYS if key in values})
                 with contextlib.suppress(KeyError, ValueError):
                     zero, simulated = int(values['stamp_of_zero']), float(values['simulated_time'])
                     if simulated < self._simulated:
@@ -235,14 +240,3 @@ class Remote(Source):
             self._pushes = HeardPushes(self._known.scene)
             self._frames.begin(self._pushes)
         self._listen()
-
-
-def told(report: Report, values: dict[str, str]) -> Report:
-    """Take over what the node's diagnostics tell; what cannot be read stays as it was."""
-    try:
-        measures = {key: float(values[key]) for key in KEYS if key in values}
-        return dataclasses.replace(
-            report, paused=values['paused'] == 'True',
-            pace=float(values['real_time_factor']), measures=measures)
-    except (KeyError, ValueError):
-        return report
