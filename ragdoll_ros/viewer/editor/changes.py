@@ -33,9 +33,7 @@ USUAL, USUAL_TWIST = math.radians(45), math.radians(30)
 def find(scene: Scene, name: str) -> tuple[Placement, Bone]:
     """The doll that holds a bone, and the bone; UnknownBone if there is none."""
     index = scene.bone_index(name)
-    return next((placement, scene.bones[index])
-                for placement, part in zip(scene.dolls, scene.bone_slices, strict=True)
-                if index < part.stop)
+    return scene.dolls[scene.doll_of_bone[index]], scene.bones[index]
 
 
 def joint_of(scene: Scene, name: str) -> Joint | None:
