@@ -55,11 +55,10 @@ class Diagnostics:
         if self._last is None:
             return
         level, message = self._judge()
-        values = {name: _text(value) for name, value in self._values().items()}
         status = DiagnosticStatus(
             level=level, name=status_name(self._node.get_namespace(), self._node.get_name()),
             message=message, hardware_id=self.simulation.scene.name,
-            values=[KeyValue(key=key, value=value) for key, value in values.items()])
+            values=[KeyValue(key=key, value=_text(value)) for key, value in self._values().items()])
         array = DiagnosticArray(status=[status])
         array.header.stamp = to_time(self._stamp())
         self._publisher.publish(array)

@@ -9,8 +9,9 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from ..model import rotation
 from ..model.push import Push
-from ..model.ragdoll import DEFAULT_COLOR
+from ..model.ragdoll import DEFAULT_COLOR, Bone
 from ..model.scene import Scene
+from ..model.shapes import Primitive
 from ..model.state import State
 from ..physics.swing.pose import SwingState
 from .messages import to_header, to_point, to_vector
@@ -29,11 +30,12 @@ class Markers:
     def __init__(self, scene: Scene, frame: str) -> None:
         self._scene = scene
         self._frame = frame
-        self._parts = [part for bone in scene.bones for part in bone.shape.primitives]
-        self._bones = [index for index, bone in enumerate(scene.bones)
-                       for _ in bone.shape.primitives]
-        self._offsets = np.array([part.offset for part in self._parts])
-        self._markers = [self._marker(number) for number in range(len(self._parts))]
+        parts = [(index, number, part) for index, bone in enumerate(scene.bones)
+                 for number, part in enumerate(bone.shape.primitives)]
+        self._bones = [index for index, _, _ in parts]
+        self._offsets = np.array([part.offset for _, _, part in parts])
+        self._markers = [_part(scene.bone_names[index], scene.bones[index], number, part)
+                         for index, number, part in parts]
         self._arrows = 0
         self._fresh = True
 
@@ -62,16 +64,6 @@ class Markers:
             marker.header = header
         return MarkerArray(markers=before + self._markers + arrows + gone + rods)
 
-    def _marker(self, number: int) -> Marker:
-        part = self._parts[number]
-        color = self._scene.bones[self._bones[number]].color or DEFAULT_COLOR
-        name = self._scene.bone_names[self._bones[number]]
-        same = self._bones[:number].count(self._bones[number])
-        marker = Marker(ns=name, id=same, type=KINDS[part.kind], action=Marker.ADD)
-        marker.scale = to_vector(part.size)
-        paint(marker, color)
-        return marker
-
     def _arrow(self, number: int, push: Push, state: State) -> Marker:
         """Arrow whose tip is where the push attacks."""
         bone = self._scene.bone_index(push.bone)
@@ -82,6 +74,13 @@ class Markers:
         place(marker.pose, tail.tolist(), orientation.tolist())
         paint(marker, RED)
         return marker
+
+
+def _part(name: str, bone: Bone, number: int, part: Primitive) -> Marker:
+    marker = Marker(ns=name, id=number, type=KINDS[part.kind], action=Marker.ADD)
+    marker.scale = to_vector(part.size)
+    paint(marker, bone.color or DEFAULT_COLOR)
+    return marker
 
 
 def _rods(swings: SwingState) -> Marker:

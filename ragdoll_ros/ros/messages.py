@@ -5,6 +5,7 @@ What runs each tick is packed.Packed, which takes these functions as its model.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -14,8 +15,10 @@ from std_msgs.msg import Header
 
 from ..model import rotation
 from ..model.state import State
-from ..physics.engine.protocol import Contact
 from ..physics.swing.pose import SwingState
+
+if TYPE_CHECKING:  # else the page, which reads this file, would load an engine
+    from ..physics.engine.protocol import Contact
 
 
 def poses_of(state: State | SwingState) -> np.ndarray:

@@ -13,16 +13,16 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.utilities import remove_ros_args
+from std_srvs.srv import SetBool, Trigger
 
 from ..model import errors
-from ..model.scene import STEP_RANGE, Scene
+from ..model.scene import SECOND, STEP_RANGE, Scene
 from ..physics.simulation import Simulation
 from .diagnostics import Diagnostics
 from .inputs import Inputs
 from .interactive import Interactive
 from .outputs import Outputs
 from .parameters import Parameters, Settings
-from .services import Services
 from .session import ros_session
 from .stamps import Stamps
 from .tally import Tally
@@ -66,7 +66,9 @@ class RagdollNode(Node):
         self.interactive = Interactive(self, self.tally, self._now)
         self._diagnostics = Diagnostics(self, self._steady, self.tally, self._facts,
                                         self._wanted_pace, self._time_of_report)
-        Services(self, self)
+        self.create_service(Trigger, '~/reset', self._serve_reset)
+        self.create_service(Trigger, '~/step', self._serve_step)
+        self.create_service(SetBool, '~/pause', self._serve_pause)
         self.paused = False
         self._use(self.simulation)
         self._outputs.be_clock(self.settings.publish_clock)
@@ -108,7 +110,9 @@ class RagdollNode(Node):
         self.paused = wanted
         self._go_on()
         if wanted:
-            self._show_as_it_stands()
+            # What is not published with every tick.
+            self._outputs.publish_markers(self.simulation, self.stamp)
+            self.interactive.publish_poses()
         self._diagnostics.report()
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
@@ -161,11 +165,6 @@ class RagdollNode(Node):
         self._diagnostics.report()
         self._publish()
 
-    def _show_as_it_stands(self) -> None:
-        """Bring up to date what is not published with every tick."""
-        self._outputs.publish_markers(self.simulation, self.stamp)
-        self.interactive.publish_poses()
-
     def _repeat_clock(self) -> None:
         """Publish the standing time for who has come since: who goes by /clock asks for no past."""
         if self.paused:
@@ -206,6 +205,25 @@ class RagdollNode(Node):
             self.simulation.step = step_of(settings)
             self._go_on()
 
+    def _serve_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Go back to the start; what is paused stays paused."""
+        self.reset()
+        return _answer(response, True, 'back at the start')
+
+    def _serve_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """One tick; refused unless paused, as the timer makes them otherwise."""
+        if not self.paused:
+            self.tally.refuse('~/step', 'not paused')
+            return _answer(response, False, 'not paused: call ~/pause with data: true first')
+        self.tick()
+        return _answer(response, True, f'at {self.simulation.time / SECOND:.9g} s')
+
+    def _serve_pause(self, request: SetBool.Request, response: SetBool.Response
+                     ) -> SetBool.Response:
+        self.pause(request.data)
+        word = 'paused' if request.data else 'running'
+        return _answer(response, True, f'{word} at {self.simulation.time / SECOND:.9g} s')
+
     def _wanted_pace(self) -> float:
         return 0.0 if self.paused else self.settings.real_time_factor
 
@@ -213,6 +231,11 @@ class RagdollNode(Node):
         return {'paused': self.paused, 'real_time_factor': self.settings.real_time_factor,
                 'lost_time': self._ticker.lost / 1e9,
                 'stamp_of_zero': self._stamps.at(0, self.settings.publish_clock)}
+
+
+def _answer(response: object, success: bool, message: str) -> object:
+    response.success, response.message = success, message
+    return response
 
 
 def step_of(settings: Settings) -> float:

@@ -62,12 +62,17 @@ class Controls:
                                    hint='simulated seconds for each second on the wall')
         self.scene = gui.add_dropdown('Scene', (OTHER, *scene_names()), initial_value=OTHER)
         pushes.on_click(lambda event: self.push(ARROWS[event.target.value]))
-        self.pause.on_click(lambda _: self.toggle_pause())
-        self.step_button.on_click(lambda _: self.step())
-        reset.on_click(lambda _: self.source.reset())
         self.pace.on_update(lambda event: event.client and self.source.set_pace(self.pace.value))
         self.scene.on_update(self._choose)
-        self._add_keys(gui)
+        for arrow in ARROWS.values():
+            command = gui.add_command(f'Push {arrow}', hotkey=f'arrow{arrow}')
+            command.on_trigger(lambda _, arrow=arrow: self.push(arrow))
+        for button, label, key, action in (
+                (self.pause, 'Pause, or go on', 'space', self.toggle_pause),
+                (self.step_button, 'Step', 'N', self.step), (reset, 'Reset', 'R', source.reset)):
+            command = gui.add_command(label, hotkey=key)
+            for trigger in (button.on_click, command.on_trigger):
+                trigger(lambda _, action=action: action())
 
     def push(self, arrow: str) -> None:
         """Push, together with the other arrows of the last tenths of a second."""
@@ -115,13 +120,3 @@ class Controls:
         except RagdollError as error:
             self.show_scene(self._scene_shown)
             client.add_notification('Refused', str(error), color='red')
-
-    def _add_keys(self, gui: viser.GuiApi) -> None:
-        for arrow in ARROWS.values():
-            command = gui.add_command(f'Push {arrow}', hotkey=f'arrow{arrow}')
-            command.on_trigger(lambda _, arrow=arrow: self.push(arrow))
-        for label, key, action in (('Pause, or go on', 'space', self.toggle_pause),
-                                   ('Step', 'N', self.step),
-                                   ('Reset', 'R', lambda: self.source.reset())):
-            command = gui.add_command(label, hotkey=key)
-            command.on_trigger(lambda _, action=action: action())

@@ -20,7 +20,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from ...model import errors, rotation
-from ...model.ragdoll import JOINT_KINDS, LARGEST_SWING, Bone, Joint, Ragdoll
+from ...model.ragdoll import JOINT_KINDS, LARGEST_SWING, Bone, Joint, Ragdoll, SkeletonFrame
 from ...model.scene import Placement, Scene
 from ...model.shapes import SHAPES, Box, Shape, Sphere
 from ...model.swing import Swing
@@ -33,9 +33,7 @@ USUAL, USUAL_TWIST = math.radians(45), math.radians(30)
 def find(scene: Scene, name: str) -> tuple[Placement, Bone]:
     """The doll that holds a bone, and the bone; UnknownBone if there is none."""
     index = scene.bone_index(name)
-    return next((placement, scene.bones[index])
-                for placement, part in zip(scene.dolls, scene.bone_slices, strict=True)
-                if index < part.stop)
+    return scene.dolls[scene.doll_of_bone[index]], scene.bones[index]
 
 
 def joint_of(scene: Scene, name: str) -> Joint | None:
@@ -84,13 +82,8 @@ def set_pose(scene: Scene, name: str, position: Sequence[float] | None = None,
             bone, **{key: value for key, value in fields.items() if value is not None})
     if limb:
         return _move_limb(scene, placement, bone, moved)
-    back = rotation.inverse(moved.orientation)
-    rotated = rotation.multiply(back, bone.orientation)
-    shift = rotation.rotate(back, np.subtract(bone.position, moved.position))
-    riders = tuple(
-        dataclasses.replace(rider, position=shift + rotation.rotate(rotated, rider.position),
-                            orientation=rotation.multiply(rotated, rider.orientation))
-        if rider.bone == bone.name else rider for rider in placement.doll.riders)
+    riders = tuple(carried(rider, bone, moved) if rider.bone == bone.name else rider
+                   for rider in placement.doll.riders)
     return replace_doll(scene, placement, riders=riders,
                         bones=_swapped(placement.doll.bones, bone, moved))
 
@@ -163,11 +156,26 @@ def limb(doll: Ragdoll, root: str) -> tuple[str, ...]:
     return tuple(names)
 
 
+def carried(rider: SkeletonFrame, old: Bone, new: Bone) -> SkeletonFrame:
+    """A rider of ``old`` as ``new`` carries it: in the bind pose it stays where it is."""
+    back = rotation.inverse(new.orientation)
+    rotated = rotation.multiply(back, old.orientation)
+    shift = rotation.rotate(back, np.subtract(old.position, new.position))
+    return dataclasses.replace(
+        rider, bone=new.name, position=shift + rotation.rotate(rotated, rider.position),
+        orientation=rotation.multiply(rotated, rider.orientation))
+
+
+def outward_from(joint: Joint | None, bone: Bone) -> np.ndarray:
+    """Unit direction (3,) from where a bone hangs to its middle; up for the root."""
+    outward = np.subtract(bone.position, joint.anchor) if joint else np.zeros(3)
+    length = np.linalg.norm(outward)
+    return outward / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
+
+
 def _axes(joint: Joint, bone: Bone) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Axes (3,) for a joint of any kind: to rotate about, one across it, and along the bone."""
-    along = np.subtract(bone.position, joint.anchor)
-    length = np.linalg.norm(along)
-    along = along / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
+    along = outward_from(joint, bone)
     if joint.kind in ('hinge', 'universal'):
         first = np.array(joint.axes[0])
     else:

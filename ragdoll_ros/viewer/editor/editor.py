@@ -49,9 +49,10 @@ class Editor:
         self.editing = False
         """Whether the page stands in the bind pose."""
         self.handles = Handles(server, self._pose_dragged, self._size_dragged)
-        self.panel = Panel(server.gui, self)
+        self.panel = Panel(server.gui, self.select, self.suggest)
+        self._connect(server.gui)
         with server.gui.add_folder('Files'):
-            self.files = Files(server, self, Folder(folder))
+            self.files = Files(server, lambda: self.scene, self.take, Folder(folder))
         self._refresh()
 
     @property
@@ -151,6 +152,21 @@ class Editor:
         with self._telling():
             name = self._chosen()
             self.take(growth.remove_limb(self.scene, name), f'remove {name}')
+
+    def _connect(self, gui: viser.GuiApi) -> None:
+        """Have the panel's buttons, and keys, do what they say."""
+        panel = self.panel
+        panel.limb.on_update(lambda _: self.show_handles())
+        panel.update.on_click(lambda _: self.update())
+        panel.add.on_click(lambda _: self.add_bone(panel.name.value))
+        panel.remove.on_click(lambda _: self.remove_limb())
+        for button, label, key, modifier, action in (
+                (panel.edit, 'Edit, or drop it', 'E', None, self.toggle),
+                (panel.undo, 'Undo', 'Z', 'cmd/ctrl', self.undo),
+                (panel.redo, 'Redo', 'Z', 'cmd/ctrl+shift', self.redo)):
+            command = gui.add_command(label, hotkey=key, modifier=modifier)
+            for trigger in (button.on_click, command.on_trigger):
+                trigger(lambda _, action=action: action())
 
     def _pose_dragged(self, position: np.ndarray, orientation: np.ndarray) -> None:
         with self._telling():

@@ -4,7 +4,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
 
 import viser
 
@@ -14,22 +13,16 @@ from .folder import CHARACTERS, DOLLS, LARGEST_UPLOAD, Folder
 from .form import GREEN, RED, colored
 
 
-class Host(Protocol):
-    """Whose scene is saved, and who takes the one that is loaded."""
-
-    @property
-    def scene(self) -> Scene:
-        """The scene as it is now."""
-
-    def take(self, scene: Scene, what: str) -> None:
-        """Go on with another scene; RagdollError if it cannot run."""
-
-
 class Files:
-    """Widgets for files in the GUI container that is current. Callbacks run in viser's threads."""
+    """Widgets for files in the GUI container that is current. Callbacks run in viser's threads.
 
-    def __init__(self, server: viser.ViserServer, host: Host, folder: Folder) -> None:
-        self._server, self._host, self._folder = server, host, folder
+    ``scene()`` is the one to save; ``take(scene, what)`` goes on with one that is loaded, or raises
+    RagdollError.
+    """
+
+    def __init__(self, server: viser.ViserServer, scene: Callable[[], Scene],
+                 take: Callable[[Scene, str], None], folder: Folder) -> None:
+        self._server, self._scene, self._go_on_with, self._folder = server, scene, take, folder
         self._fitting = threading.Lock()
         gui = server.gui
         self.name = gui.add_text('file', 'scene.yaml', hint=f'in {folder.path}')
@@ -53,7 +46,7 @@ class Files:
 
     def save(self) -> None:
         """Write the scene to the file that is typed."""
-        self._try(lambda: f'saved {self._folder.save(self._host.scene, self.name.value).name}')
+        self._try(lambda: f'saved {self._folder.save(self._scene(), self.name.value).name}')
 
     def load(self) -> None:
         """Take the scene of the file that is typed."""
@@ -64,7 +57,7 @@ class Files:
         """Send the scene's file to the page that asked for it, or to all."""
         name = Path(self.name.value.strip() or 'scene').stem + '.yaml'
         to = client or self._server
-        to.send_file_download(name, self._folder.text(self._host.scene), save_immediately=True)
+        to.send_file_download(name, self._folder.text(self._scene()), save_immediately=True)
 
     def upload(self, name: str, content: bytes) -> None:
         """Take the scene, or the doll, of a YAML file that was sent."""
@@ -84,7 +77,7 @@ class Files:
             self._fitting.release()
 
     def _take(self, scene: Scene, what: str, name: str) -> str:
-        self._host.take(scene, f'{what} {name}')
+        self._go_on_with(scene, f'{what} {name}')
         return f'{"fitted" if what == "fit" else "loaded"} {name}: {len(scene.bones)} bones'
 
     def _show_progress(self, part: float, what: str) -> None:

@@ -71,10 +71,9 @@ class Folder:
             data = yaml_text.parse(content)
             self._check_dolls(data)
             self._check_models(data)
+            return scene_from(data, self.path / name)
         except errors.ModelError as error:
             raise errors.ModelErrors(name, [error]) from None
-        try:
-            return scene_from(data, self.path / name)
         except errors.ModelErrors as error:
             raise errors.ModelErrors(name, error.errors) from None
 

@@ -21,10 +21,6 @@ YELLOW, BLUE, RED = (255, 200, 0), (40, 90, 220), (220, 50, 30)
 GROWN = 1.03
 """The ghost is this much larger than the body, so that it is seen around it."""
 
-SIZING = {'box': (True, True, True), 'sphere': (True, False, False),
-          'cylinder': (True, False, True), 'capsule': (True, False, True)}
-"""Along which of its own axes a shape of each kind can be drawn out."""
-
 XYZW = [1, 2, 3, 0]
 """Our order of a quaternion, from viser's."""
 
@@ -111,7 +107,8 @@ class Handles:
                 self._on_pose(_unless_still(position, bone.position), orientation)
 
     def _add_size(self, bone: Bone) -> None:
-        active = SIZING[bone.shape.kind]
+        # A round shape is as wide along y as along x, a ball along z as well.
+        active = (True, bone.shape.kind == 'box', bone.shape.kind != 'sphere')
         half = np.array(bone.shape.half_extents)
         self.size = size = self._server.scene.add_transform_controls(
             f'{ROOM}/own/size', scale=0.8 * float(half.max()), active_axes=active,

@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
 
 from ...model.scene import Scene
 
@@ -10,40 +9,36 @@ MOST = 500
 """Steps back that are kept. A step shares all that it did not change with the one before."""
 
 
-@dataclass(frozen=True)
-class Step:
-    """A scene, and what made it of the one before."""
-
-    scene: Scene
-    what: str
+Step = tuple[Scene, str]
+"""A scene, and what made it of the one before."""
 
 
 class History:
     """Scenes in the order they were made, and which of them is now."""
 
     def __init__(self, scene: Scene, most: int = MOST) -> None:
-        self._past: deque[Step] = deque([Step(scene, '')], maxlen=most + 1)
+        self._past: deque[Step] = deque([(scene, '')], maxlen=most + 1)
         self._future: list[Step] = []
 
     @property
     def scene(self) -> Scene:
         """The scene as it is now."""
-        return self._past[-1].scene
+        return self._past[-1][0]
 
     @property
     def undoes(self) -> str:
         """What undo would take back; empty if there is nothing."""
-        return self._past[-1].what if len(self._past) > 1 else ''
+        return self._past[-1][1] if len(self._past) > 1 else ''
 
     @property
     def redoes(self) -> str:
         """What redo would bring again; empty if there is nothing."""
-        return self._future[-1].what if self._future else ''
+        return self._future[-1][1] if self._future else ''
 
     def push(self, scene: Scene, what: str) -> None:
         """Go on to another scene; what was undone is gone. The same scene again is no step."""
         if scene != self.scene:
-            self._past.append(Step(scene, what))
+            self._past.append((scene, what))
             self._future.clear()
 
     def undo(self) -> Scene:

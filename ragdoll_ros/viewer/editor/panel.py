@@ -1,8 +1,7 @@
 """The panel: which bone, its numbers and those of its joint, and what can be done."""
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Protocol
+from collections.abc import Callable, Iterable
 
 import viser
 
@@ -14,42 +13,15 @@ from .sheet import BODY, JOINT, Sheet
 NONE = '(no bone)'
 
 
-class Host(Protocol):
-    """Who does what the buttons say."""
-
-    def select(self, bone: str | None) -> None:
-        """Choose a bone."""
-
-    def update(self) -> None:
-        """Apply what stands in the fields."""
-
-    def undo(self) -> None:
-        """Go back a step."""
-
-    def redo(self) -> None:
-        """Go a step forward again."""
-
-    def toggle(self) -> None:
-        """Go to the bind pose to edit, or drop the doll."""
-
-    def suggest(self, key: str, kind: str) -> None:
-        """Another kind of shape or joint has been chosen, not applied yet."""
-
-    def show_handles(self) -> None:
-        """Put the handles where they belong now."""
-
-    def add_bone(self, name: str) -> None:
-        """Add a bone at the end of the chosen one."""
-
-    def remove_limb(self) -> None:
-        """Take the chosen bone off, with all that hangs from it."""
-
-
 class Panel:
-    """Widgets in the GUI container that is current."""
+    """Widgets in the GUI container that is current.
 
-    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
-        self._host = host
+    ``select`` takes the name of a chosen bone, or None; ``suggest`` what a Form's ``on_kind`` does.
+    The buttons are without a deed of their own: the editor gives them one.
+    """
+
+    def __init__(self, gui: viser.GuiApi, select: Callable[[str | None], None],
+                 suggest: Callable[[str, str], None]) -> None:
         self._filling = Quiet()
         self.edit = gui.add_button('Edit', icon='pencil', hint='E: pause in the bind pose')
         self.undo = gui.add_button('Undo', icon='arrow-back-up', hint='Ctrl+Z')
@@ -62,10 +34,10 @@ class Panel:
         gui.add_html(ROOMY)
         self.body_folder = gui.add_folder('Body')
         with self.body_folder:
-            self.body = Form(gui, BODY, host.suggest)
+            self.body = Form(gui, BODY, suggest)
         self.joint_folder = gui.add_folder('Joint to the parent')
         with self.joint_folder:
-            self.joint = Form(gui, JOINT, host.suggest)
+            self.joint = Form(gui, JOINT, suggest)
         self.update = gui.add_button('Update', icon='check', color='green',
                                      hint='apply the numbers; a running doll starts anew')
         self.said = gui.add_html('')
@@ -74,7 +46,8 @@ class Panel:
             self.name = gui.add_text('name', 'new bone')
             self.add = gui.add_button('Add a bone here', icon='plus')
             self.remove = gui.add_button('Remove this limb', icon='trash')
-        self._connect(gui)
+        self.bone.on_update(lambda _: self._filling.now or select(
+            None if self.bone.value == NONE else self.bone.value))
 
     def show_bones(self, names: tuple[str, ...], chosen: str | None) -> None:
         """Offer these bones."""
@@ -121,19 +94,3 @@ class Panel:
         """Label the button with what it would do."""
         self.edit.label = 'Drop it' if editing else 'Edit'
         self.edit.icon = 'arrow-big-down-lines' if editing else 'pencil'
-
-    def _connect(self, gui: viser.GuiApi) -> None:
-        host = self._host
-        self.bone.on_update(lambda _: self._filling.now or host.select(
-            None if self.bone.value == NONE else self.bone.value))
-        self.limb.on_update(lambda _: host.show_handles())
-        self.update.on_click(lambda _: host.update())
-        self.add.on_click(lambda _: host.add_bone(self.name.value))
-        self.remove.on_click(lambda _: host.remove_limb())
-        for button, label, key, modifier, action in (
-                (self.edit, 'Edit, or drop it', 'E', None, host.toggle),
-                (self.undo, 'Undo', 'Z', 'cmd/ctrl', host.undo),
-                (self.redo, 'Redo', 'Z', 'cmd/ctrl+shift', host.redo)):
-            button.on_click(lambda _, action=action: action())
-            command = gui.add_command(label, hotkey=key, modifier=modifier)
-            command.on_trigger(lambda _, action=action: action())

@@ -14,16 +14,12 @@ import numpy as np
 from ...model import errors, rotation
 from ...model.ragdoll import DEFAULT_COLOR, JOINT_KINDS, Joint
 from ...model.scene import Scene
-from ...model.shapes import SHAPES, Shape
+from ...model.shapes import SHAPES, SIZES, Shape
 from ...model.vectors import unit
 from . import changes
 
 Value = str | float | tuple[float, ...]
 Sheet = dict[str, Value]
-
-SHAPE_FIELDS = {'box': ('size',), 'sphere': ('radius',), 'cylinder': ('radius', 'length'),
-                'capsule': ('radius', 'length')}
-"""Fields that make each kind of shape, named as its parts are."""
 
 SURFACE = ('friction', 'rolling_friction', 'restitution')
 
@@ -205,10 +201,10 @@ def _number_or_none(key: str, text: str) -> float | None:
 
 
 def _shape(new: Sheet) -> Shape:
-    kind = new['shape']
-    for key in SHAPE_FIELDS[kind]:
-        errors.check_positive(key, new[key])
-    return SHAPES[kind](**{key: new[key] for key in SHAPE_FIELDS[kind]})
+    sizes = {key: new[key] for key in SIZES[new['shape']]}
+    for key, size in sizes.items():
+        errors.check_positive(key, size)
+    return SHAPES[new['shape']](**sizes)
 
 
 def _degrees(orientation: tuple[float, ...]) -> tuple[float, ...]:

@@ -9,17 +9,19 @@ import numpy as np
 from ...model import errors
 from ...model.scene import Scene
 from ...model.state import State
-from ...model.vectors import Vector
 from .recording import Recording
-from .source import PACES, Frame, Report, Wanted
+from .source import PACES, Frame, Report, Source, Wanted
 
 
 class Fixed(errors.RagdollError):
     """A wish that a recording cannot grant."""
 
 
-class Playback:
-    """Plays a recording by the clock on the wall while a page is open; at its end it stands."""
+class Playback(Source):
+    """Plays a recording by the clock on the wall while a page is open; at its end it stands.
+
+    A push or a hand does nothing, as in any source without: what was recorded is over.
+    """
 
     def __init__(self, recording: Recording, name: str = 'recording') -> None:
         self._recording = recording
@@ -35,7 +37,6 @@ class Playback:
 
     @property
     def frame(self) -> Frame:
-        """Where all is now."""
         with self._lock:
             instant = self._now()
             if instant != self._frame.time:
@@ -44,7 +45,6 @@ class Playback:
 
     @property
     def report(self) -> Report:
-        """Where in the recording it is."""
         with self._lock:
             instant = self._now()
             end = self._recording.duration
@@ -52,7 +52,6 @@ class Playback:
             return Report(note=note, paused=self._paused or instant >= end, pace=self._pace)
 
     def want(self, wanted: Wanted) -> None:
-        """Say what is shown; while no page is open, the time stands."""
         with self._lock:
             self._go_on_from(self._now())
             self._wanted = wanted.frames
@@ -65,7 +64,6 @@ class Playback:
             self._go_on_from(0.0 if instant >= self._recording.duration and not wanted else instant)
 
     def step(self) -> None:
-        """Go to the next recorded pose while paused."""
         with self._lock:
             if self._paused:
                 times = self._recording.times
@@ -73,7 +71,6 @@ class Playback:
                 self._go_on_from(float(times[min(following, len(times) - 1)]))
 
     def reset(self) -> None:
-        """Go back to the start."""
         with self._lock:
             self._go_on_from(0.0)
 
@@ -85,27 +82,10 @@ class Playback:
             self._pace = pace
 
     def load(self, name: str) -> None:
-        """Refuse: Fixed."""
         raise Fixed(f'a recording has one scene; for another: ragdoll_viewer --scene {name}')
 
     def use(self, scene: Scene) -> None:
-        """Refuse: Fixed."""
         raise Fixed('a recording has one scene; to change it: ragdoll_viewer --scene')
-
-    def push(self, force: Vector) -> None:
-        """Do nothing, as grab, drag and let_go: what was recorded is over."""
-
-    def grab(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
-        """Do nothing."""
-
-    def drag(self, hand: str, target: Vector) -> None:
-        """Do nothing."""
-
-    def let_go(self, hand: str) -> None:
-        """Do nothing."""
-
-    def close(self) -> None:
-        """Do nothing: there is no thread, and nothing is held."""
 
     def _now(self) -> float:
         """Instant of the recording, s."""

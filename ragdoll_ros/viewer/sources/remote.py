@@ -36,7 +36,7 @@ from .remote_hands import RemoteHands
 from .remote_pushes import HeardPushes, Silent
 from .remote_scene import RemoteScene
 from .remote_services import Ask, Refused
-from .source import Frame, Report, Wanted
+from .source import Frame, Report, Source, Wanted
 
 InvalidROSArguments = rclpy_implementation.RCLInvalidROSArgsError
 
@@ -56,7 +56,7 @@ KEYS = ('work_of_pushes_J', 'work_of_grabs_J', 'energy_excess_J')
 """Measures that the page needs, of those that the diagnostics tell."""
 
 
-class Remote:
+class Remote(Source):
     """Listens to the node in its own namespace, in a thread of its own, while a page is open."""
 
     def __init__(self, arguments: list[str]) -> None:
@@ -107,7 +107,6 @@ class Remote:
         return dataclasses.replace(self._told, problem=problem, note=self._known.note)
 
     def want(self, wanted: Wanted) -> None:
-        """Subscribe to what is shown, and to nothing else."""
         if wanted != self._wanted:
             self._wanted = wanted
             self._executor.create_task(self._listen)
@@ -119,19 +118,15 @@ class Remote:
         self._velocity.publish(Twist(linear=Vector3(x=x, y=y, z=z)))
 
     def pause(self, wanted: bool) -> None:
-        """Call ~/pause."""
         self._ask.pause(wanted)
 
     def step(self) -> None:
-        """Call ~/step."""
         self._ask.trigger('step')
 
     def reset(self) -> None:
-        """Call ~/reset."""
         self._ask.trigger('reset')
 
     def set_pace(self, pace: float) -> None:
-        """Set real_time_factor."""
         self._ask.set('real_time_factor', float(pace))
 
     def load(self, name: str) -> None:
@@ -155,21 +150,17 @@ class Remote:
                           f'seems to be on another one, as it cannot read that: {error}') from None
 
     def grab(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
-        """Let a hand hold a bone at a point."""
         frame = self.frame
         if frame is not None:
             self._hands.grab(hand, bone, np.array(point), np.array(target), frame)
 
     def drag(self, hand: str, target: Vector) -> None:
-        """Move a hand."""
         self._hands.drag(hand, np.array(target))
 
     def let_go(self, hand: str) -> None:
-        """Open a hand."""
         self._hands.let_go(hand)
 
     def close(self) -> None:
-        """End the thread and leave ROS."""
         self._ended.set()
         self._executor.wake()
         self._thread.join(1.0)
@@ -222,7 +213,12 @@ class Remote:
             if status.name == self._status:
                 self._heard = time.monotonic()
                 values = {pair.key: pair.value for pair in status.values}
-                self._told = told(self._told, values)
+                # What cannot be read stays as it was.
+                with contextlib.suppress(KeyError, ValueError):
+                    self._told = dataclasses.replace(
+                        self._told, paused=values['paused'] == 'True',
+                        pace=float(values['real_time_factor']),
+                        measures={key: float(values[key]) for key in KEYS if key in values})
                 with contextlib.suppress(KeyError, ValueError):
                     zero, simulated = int(values['stamp_of_zero']), float(values['simulated_time'])
                     if simulated < self._simulated:
@@ -244,14 +240,3 @@ class Remote:
             self._pushes = HeardPushes(self._known.scene)
             self._frames.begin(self._pushes)
         self._listen()
-
-
-def told(report: Report, values: dict[str, str]) -> Report:
-    """Take over what the node's diagnostics tell; what cannot be read stays as it was."""
-    try:
-        measures = {key: float(values[key]) for key in KEYS if key in values}
-        return dataclasses.replace(
-            report, paused=values['paused'] == 'True',
-            pace=float(values['real_time_factor']), measures=measures)
-    except (KeyError, ValueError):
-        return report

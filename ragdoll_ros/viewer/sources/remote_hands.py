@@ -6,7 +6,7 @@ import socket
 from dataclasses import dataclass
 
 import numpy as np
-from geometry_msgs.msg import Point, Pose, Quaternion
+from geometry_msgs.msg import Pose
 from rclpy.node import Node
 from std_msgs.msg import Header
 from visualization_msgs.msg import InteractiveMarkerFeedback
@@ -14,6 +14,7 @@ from visualization_msgs.msg import InteractiveMarkerFeedback
 from ...model import rotation
 from ...model.scene import Scene
 from ...model.state import State
+from ...ros.messages import to_point, to_quaternion
 from .source import Frame, Held
 
 
@@ -89,13 +90,9 @@ class RemoteHands:
     def _send(self, hand: str, held: _Hand, event: int) -> None:
         self.moves += 1
         place = held.pose[:3] + held.target - held.begin
-        orientation = Quaternion(**dict(zip('xyzw', held.pose[3:].tolist(), strict=True)))
+        orientation = to_quaternion(held.pose[3:])
         self._publisher.publish(InteractiveMarkerFeedback(
             header=Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self.frame_id),
             client_id=f'{self._client} {hand}', marker_name=held.bone, control_name=held.bone,
-            event_type=event, pose=Pose(position=_point(place), orientation=orientation),
-            mouse_point=_point(held.target), mouse_point_valid=True))
-
-
-def _point(values: np.ndarray) -> Point:
-    return Point(**dict(zip('xyz', values.tolist(), strict=True)))
+            event_type=event, pose=Pose(position=to_point(place), orientation=orientation),
+            mouse_point=to_point(held.target), mouse_point_valid=True))

@@ -1,7 +1,7 @@
 """Asks a node: its parameters and services, without waiting where nobody has to."""
 from __future__ import annotations
 
-import threading
+import queue
 from collections.abc import Callable, Sequence
 
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
@@ -39,41 +39,34 @@ class Ask:
         """Hold the node's time, or let it go on."""
         self._send(self._pause, SetBool.Request(data=wanted))
 
-    def parameters(self, names: Sequence[str], take: Callable[[dict], None]) -> bool:
-        """Ask for parameters by name; False if there is no node that could answer."""
+    def parameters(self, names: Sequence[str], take: Callable[[dict], None]) -> None:
+        """Ask for parameters by name; no answer if there is no node."""
         def answered(answer: GetParameters.Response) -> None:
             if len(answer.values) == len(names):
                 take({name: parameter_value_to_python(value)
                       for name, value in zip(names, answer.values, strict=True)})
-        return self._send(self._get, GetParameters.Request(names=list(names)), answered)
+        self._send(self._get, GetParameters.Request(names=list(names)), answered)
 
-    def set(self, name: str, value: object) -> None:
-        """Set a parameter without waiting; a refusal is in the node's diagnostics."""
-        self._send(self._set, self._setting(name, value))
+    def set(self, name: str, value: object, take: Callable[[object], None] | None = None) -> bool:
+        """Set a parameter without waiting; a refusal is in the node's diagnostics, too."""
+        return self._send(self._set, SetParametersAtomically.Request(
+            parameters=[Parameter(name, value=value).to_parameter_msg()]), take)
 
     def set_and_wait(self, name: str, value: object) -> None:
         """Set a parameter; Refused, with the node's reason, if it will not. Not for callbacks."""
-        answers: list[SetParametersAtomically.Response] = []
-        done = threading.Event()
-
-        def answered(answer: SetParametersAtomically.Response) -> None:
-            answers.append(answer)
-            done.set()
-
-        if not self._send(self._set, self._setting(name, value), answered):
+        answers: queue.SimpleQueue[SetParametersAtomically.Response] = queue.SimpleQueue()
+        if not self.set(name, value, answers.put):
             raise Refused(f'there is no node `{self._name}` to ask')
-        if not done.wait(PATIENCE):
-            raise Refused(f'the node `{self._name}` does not answer')
-        if not answers[0].result.successful:
-            raise Refused(answers[0].result.reason)
-
-    @staticmethod
-    def _setting(name: str, value: object) -> SetParametersAtomically.Request:
-        return SetParametersAtomically.Request(
-            parameters=[Parameter(name, value=value).to_parameter_msg()])
+        try:
+            result = answers.get(timeout=PATIENCE).result
+        except queue.Empty:
+            raise Refused(f'the node `{self._name}` does not answer') from None
+        if not result.successful:
+            raise Refused(result.reason)
 
     def _send(self, client: Client, request: object,
               take: Callable[[object], None] | None = None) -> bool:
+        """Ask; False if there is no node that could answer."""
         if not client.service_is_ready():
             return False
         future = client.call_async(request)

@@ -18,7 +18,7 @@ from ...model.vectors import Vector
 from ...physics.grab import EVENLY
 from ...physics.pacing import Pacer
 from ...physics.simulation import Simulation
-from .source import PACES, Frame, Held, Report, Wanted
+from .source import PACES, Frame, Held, Report, Source, Wanted
 
 HOLD = 0.6
 """s of simulated time that a push holds, as the node's cmd_vel_timeout."""
@@ -33,8 +33,11 @@ PATIENCE = 60.0
 """s that building a scene may take."""
 
 
-class Simulated:
-    """Steps a scene by the clock on the wall, while a page is open to show it."""
+class Simulated(Source):
+    """Steps a scene by the clock on the wall, while a page is open to show it.
+
+    The first doll's root is pushed.
+    """
 
     def __init__(self, scene: Scene) -> None:
         self._commands: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
@@ -51,46 +54,36 @@ class Simulated:
 
     @property
     def frame(self) -> Frame | None:
-        """Where all is after the last tick."""
         return self._frame
 
     @property
     def report(self) -> Report:
-        """How it does."""
         return self._report
 
     def want(self, wanted: Wanted) -> None:
-        """Say what is shown; while no page is open, the time stands."""
         if wanted != self._wanted:
             self._commands.put(lambda: self._want(wanted))
 
     def push(self, force: Vector) -> None:
-        """Push the first doll's root."""
         self._commands.put(lambda: self._push(force))
 
     def pause(self, wanted: bool) -> None:
-        """Hold the time, or let it go on."""
         self._commands.put(lambda: self._tell(paused=wanted))
 
     def step(self) -> None:
-        """Make one tick while paused."""
         self._commands.put(lambda: self._report.paused and self._tick())
 
     def reset(self) -> None:
-        """Go back to the start, to the bit."""
-        self._commands.put(self._reset)
+        self._commands.put(lambda: self._simulation.reset())
 
     def set_pace(self, pace: float) -> None:
-        """Go faster or slower; OutOfRange."""
         errors.check_range('pace', pace, *PACES)
         self._commands.put(lambda: self._tell(pace=pace))
 
     def load(self, name: str) -> None:
-        """Take a scene from a file; RagdollError with all that is wrong in it."""
         self.use(load_scene(name))
 
     def use(self, scene: Scene) -> None:
-        """Start anew with a scene; RagdollError if it can not be simulated."""
         done: Future[None] = Future()
 
         def replace() -> None:
@@ -103,19 +96,15 @@ class Simulated:
         done.result(PATIENCE)
 
     def grab(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
-        """Let a hand hold a bone at a point."""
-        self._commands.put(lambda: self._pull(hand, bone, point, target))
+        self._commands.put(lambda: self._simulation.grab(hand, bone, point, target))
 
     def drag(self, hand: str, target: Vector) -> None:
-        """Move a hand."""
         self._commands.put(lambda: self._simulation.drag(hand, target, EVENLY * self._report.pace))
 
     def let_go(self, hand: str) -> None:
-        """Open a hand; what it held keeps its speed."""
         self._commands.put(lambda: self._simulation.let_go(hand))
 
     def close(self) -> None:
-        """End the thread and give the engine back."""
         self._commands.put(None)
         self._thread.join(ENDING)
         self._simulation.close()
@@ -124,19 +113,18 @@ class Simulated:
         while True:
             try:
                 command = self._commands.get(timeout=self._patience())
-                if command is None:
-                    return
-                self._obey(command)
             except queue.Empty:
                 if self._pacer.due(time.monotonic_ns()):
                     self._tick()
-
-    def _obey(self, command: Callable[[], object]) -> None:
-        """Do what a page asks for; what can not be, as the scene has changed, is told."""
-        try:
-            command()
-        except errors.RagdollError as error:
-            self._tell(problem=str(error))
+                continue
+            if command is None:
+                return
+            try:
+                command()
+            except errors.RagdollError as error:
+                # What a page asks for may not be any more, as the scene has changed.
+                self._tell(problem=str(error))
+            self._show()
 
     @property
     def _goes(self) -> bool:
@@ -148,7 +136,6 @@ class Simulated:
 
     def _want(self, wanted: Wanted) -> None:
         stood, self._wanted = not self._goes, wanted
-        self._show()
         if stood:
             self._restart()
 
@@ -167,15 +154,6 @@ class Simulated:
         doll = scene.dolls[0]
         bone = scene.qualified(doll, doll.doll.root.name)
         self._simulation.push(Push(bone, force, duration=HOLD), 'page')
-        self._show()
-
-    def _pull(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
-        self._simulation.grab(hand, bone, point, target)
-        self._show()
-
-    def _reset(self) -> None:
-        self._simulation.reset()
-        self._show()
 
     def _replace(self, scene: Scene) -> None:
         simulation = Simulation(scene)

@@ -74,7 +74,10 @@ class Wanted:
 
 
 class Source(Protocol):
-    """Where frames come from and commands go to. All may be called from any thread."""
+    """Where frames come from and commands go to; what a source has not, does nothing.
+
+    All may be called from any thread.
+    """
 
     @property
     def frame(self) -> Frame | None:
