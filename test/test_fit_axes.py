@@ -1,11 +1,11 @@
 """Axes of clusters: against a solver of another kind, and where there is nothing to solve."""
 import numpy as np
 import pytest
+from specimens import SPECIMENS
 
 from ragdoll_ros.fit.axes import STANDS_OUT, fit_axes, spread
 from ragdoll_ros.fit.overlap import filling
 from ragdoll_ros.fit.shapes import MAKERS, fit_best, fit_shape
-from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Sphere
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -106,10 +106,7 @@ def test_no_points_have_no_spread():
     assert (vectors == np.eye(3)).all()
 
 
-SOLIDS = (Sphere(0.2), Box((0.1, 0.2, 0.4)), Cylinder(0.1, 0.5), Capsule(0.1, 0.3))
-
-
-@pytest.mark.parametrize('solid', SOLIDS, ids=lambda solid: solid.kind)
+@pytest.mark.parametrize('solid', SPECIMENS.values(), ids=lambda solid: solid.kind)
 def test_distance_against_the_nearest_of_many_surface_points(solid):
     corners, triangles = solid.mesh()
     random = np.random.default_rng(0)
@@ -123,7 +120,7 @@ def test_distance_against_the_nearest_of_many_surface_points(solid):
     assert np.abs(solid.signed_distance(corners)).max() < 1e-9
 
 
-@pytest.mark.parametrize('solid', SOLIDS, ids=lambda solid: solid.kind)
+@pytest.mark.parametrize('solid', SPECIMENS.values(), ids=lambda solid: solid.kind)
 def test_a_solid_is_recognised_by_its_skin(solid):
     corners, triangles = solid.mesh()
     weights = np.random.default_rng(1).dirichlet((1, 1, 1), size=(len(triangles), 12))

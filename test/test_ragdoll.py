@@ -3,6 +3,7 @@ import math
 
 import numpy as np
 import pytest
+from specimens import SPECIMENS
 
 from ragdoll_ros.model import errors
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
@@ -20,8 +21,7 @@ def hinge(parent, child, **changes):
                                    **changes})
 
 
-@pytest.mark.parametrize('shape', [Sphere(0.3), Box((0.2, 0.5, 0.9)), Cylinder(0.2, 0.7),
-                                   Capsule(0.2, 0.5)])
+@pytest.mark.parametrize('shape', SPECIMENS.values(), ids=SPECIMENS)
 def test_volume_and_inertia_are_those_of_the_uniform_solid(shape):
     """Against sums over a million random points of the bounding box: 1 % is four sigma."""
     rng = np.random.default_rng(0)

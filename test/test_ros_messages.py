@@ -7,6 +7,7 @@ import timeit
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
+from specimens import SPECIMENS
 from visualization_msgs.msg import Marker
 
 from ragdoll_ros.files.scene import load_scene
@@ -14,7 +15,6 @@ from ragdoll_ros.model import rotation
 from ragdoll_ros.model.push import ARROW, Push
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Placement, Scene
-from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Sphere
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.ros.markers import Markers
 from ragdoll_ros.ros.messages import to_joint_state, to_multi_dof, to_pose_array
@@ -117,15 +117,11 @@ def test_a_computer_s_clock_that_is_set_back_a_little_moves_no_stamp():
     assert ros.stamp(10) == 5_000_000_010
 
 
-SHAPES = {'box': Box((0.1, 0.2, 0.3)), 'sphere': Sphere(0.1), 'cylinder': Cylinder(0.1, 0.4),
-          'capsule': Capsule(0.1, 0.4)}
-
-
-@pytest.fixture(params=SHAPES)
+@pytest.fixture(params=SPECIMENS)
 def lone(request):
     """A simulation of one bone of each shape, turned and away from the origin."""
     turn = tuple(rotation.from_rpy(0.3, -0.4, 0.5))
-    bone = Bone('bone', SHAPES[request.param], 2.0, (1.0, 2.0, 3.0), turn, color=(1, 0, 0, 1))
+    bone = Bone('bone', SPECIMENS[request.param], 2.0, (1.0, 2.0, 3.0), turn, color=(1, 0, 0, 1))
     with Simulation(Scene('lone', (Placement(Ragdoll('lone', (bone,))),))) as simulation:
         yield simulation
 

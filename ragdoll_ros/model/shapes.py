@@ -1,7 +1,4 @@
-"""Shapes of bones: sphere, box, cylinder, capsule; each a uniform solid in its own axes, in m.
-
-A new shape is a class here: what draws, weighs, fits and writes files goes by these methods alone.
-"""
+"""Shapes of bones: sphere, box, cylinder, capsule; each a uniform solid in its own axes, in m."""
 from __future__ import annotations
 
 import dataclasses
@@ -46,7 +43,7 @@ class Solid:
 class Primitive:
     """A box, cylinder or sphere with its centre at ``offset`` m along the shape's own axes.
 
-    Every viewer knows these three, and every shape is made up of them.
+    Every viewer knows these three alone, and every shape is made up of them.
     """
 
     shape: Shape
@@ -71,6 +68,7 @@ class Sphere(Solid):
     kind: ClassVar[str] = 'sphere'
 
     def __post_init__(self) -> None:
+        set_fields(self, radius=float(self.radius))
         errors.check_positive('sphere', self.radius)
 
     @property
@@ -143,6 +141,7 @@ class Cylinder(Solid):
     kind: ClassVar[str] = 'cylinder'
 
     def __post_init__(self) -> None:
+        set_fields(self, radius=float(self.radius), length=float(self.length))
         errors.check_positive('cylinder', (self.radius, self.length))
 
     @property
@@ -182,6 +181,7 @@ class Capsule(Solid):
     kind: ClassVar[str] = 'capsule'
 
     def __post_init__(self) -> None:
+        set_fields(self, radius=float(self.radius), length=float(self.length))
         errors.check_positive('capsule', (self.radius, self.length))
 
     @property

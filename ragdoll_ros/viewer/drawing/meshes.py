@@ -57,4 +57,4 @@ def ball() -> Mesh:
 
 
 MESHES = {'box': box(), 'cylinder': cylinder(), 'sphere': ball()}
-"""By the kinds of parts.Part."""
+"""By the kinds of model.shapes.Primitive."""

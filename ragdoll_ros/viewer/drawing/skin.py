@@ -112,7 +112,6 @@ def _size(doll: Ragdoll, character: Character) -> float:
 
     Not how far apart they stand: limbs may have been moved.
     """
-    still = np.zeros((len(doll.bones), 3))
     poses = State(np.array([bone.position for bone in doll.bones]),
                   np.array([bone.orientation for bone in doll.bones]),
                   *np.zeros((2, len(doll.bones), 3)))
