@@ -57,8 +57,8 @@ class Bench:
         arguments = ('--ros-args', '-p', f'scene:={scene}')
         self.peer = Peer()
         self._reports = self.peer.collect(DiagnosticArray, '/diagnostics')
-        self._node = start('node', *arguments)
-        self._twin = start('node', *arguments, '-r', '__ns:=/twin') if twin else None
+        self._node = start('node', *arguments, compiled=True)
+        self._twin = start('node', *arguments, '-r', '__ns:=/twin', compiled=True) if twin else None
         self._viewer = self._client = None
 
     def open_viewer(self) -> None:

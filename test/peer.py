@@ -13,6 +13,7 @@ import termios
 import time
 from pathlib import Path
 
+from conftest import light
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
@@ -99,14 +100,14 @@ class Peer(Node):
         return future.result()
 
 
-def start(module, *arguments, terminal=None):
+def start(module, *arguments, terminal=None, compiled=False):
     """Start a module of the ROS side as a process; ``terminal``: on that pty's end."""
     command = [sys.executable, '-m', f'ragdoll_ros.ros.{module}', *arguments]
     keys = subprocess.DEVNULL if terminal is None else terminal
     STARTED.append(subprocess.Popen(
         command, stdin=keys, stdout=subprocess.PIPE if terminal is None else terminal,
         stderr=subprocess.PIPE, text=True, start_new_session=True,
-        pass_fds=[lock.fileno() for lock in LOCKS]))
+        env=dict(os.environ) if compiled else light(), pass_fds=[lock.fileno() for lock in LOCKS]))
     return STARTED[-1]
 
 

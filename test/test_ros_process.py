@@ -36,7 +36,7 @@ def peer(ros):
 @pytest.fixture(scope='module')
 def running(ros):
     """A node in the default scene, twice as fast as life: 200 ticks a second."""
-    process = start('node', '--ros-args', '-p', f'real_time_factor:={PACE}')
+    process = start('node', '--ros-args', '-p', f'real_time_factor:={PACE}', compiled=True)
     yield process
     try:
         end(process, signal.SIGINT)

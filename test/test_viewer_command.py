@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 pytest.importorskip('viser')
-from conftest import ROOT
+from conftest import ROOT, light
 from page_client import PageClient
 
 from ragdoll_ros.viewer.command import main
@@ -24,13 +24,13 @@ COMMAND = [sys.executable, '-m', 'ragdoll_ros.viewer.command']
 
 def run(*arguments):
     return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, cwd=ROOT,
-                          timeout=30)
+                          env=light(), timeout=30)
 
 
 def start(*arguments):
     """Start it; give the process and the port of the address that it prints."""
     process = subprocess.Popen([*COMMAND, *arguments], stdout=subprocess.PIPE, text=True, cwd=ROOT,
-                               stderr=subprocess.PIPE)
+                               env=light(), stderr=subprocess.PIPE)
     line = process.stdout.readline()
     found = re.fullmatch(r'The page is at http://127\.0\.0\.1:(\d+)\n', line)
     assert found, line
