@@ -28,7 +28,7 @@ run: $(COMPILED) ## the doll falls, arrow keys push it; SCENE=crowd: another sce
 	@$(BIN)/python -m ragdoll_ros.ros.run $(SCENE)
 
 # A file's tests stay together: those of one ROS domain, and those that time, go one by one.
-test: $(COMPILED) chromium ## the tests, a minute and a half on two cores
+test: $(COMPILED) chromium ## the tests, two and a half minutes on two cores
 	@$(BIN)/python -m pytest -n 3 --dist loadfile
 
 # What numpy and PyBullet do where numba is not.

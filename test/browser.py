@@ -15,7 +15,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from conftest import ROOT, light
+from conftest import ROOT
 
 PATIENCE = 60.0
 """s that the page may take for anything, on a busy machine without a GPU."""
@@ -205,7 +205,7 @@ def opened(browser, url, scene):
 def serving(*arguments, module='ragdoll_ros.viewer.command'):
     """Run what serves a page, until SIGTERM, on which it must end well; give the page's address."""
     process = subprocess.Popen([sys.executable, '-m', module, *arguments], cwd=ROOT,
-                               env=light(), stdout=subprocess.PIPE, start_new_session=True)
+                               stdout=subprocess.PIPE, start_new_session=True)
     try:
         yield _address(process)
         process.send_signal(signal.SIGTERM)
