@@ -32,8 +32,7 @@ test: $(COMPILED) chromium ## the tests, two and a half minutes on two cores
 	@$(BIN)/python -m pytest -n 3 --dist loadfile
 
 # What numpy and PyBullet do where numba is not.
-CORE := simulation pushes contact conservation mechanics flight grab conventions riders measure \
-	references ragdoll
+CORE := simulation pushes contact conservation mechanics flight grab conventions riders measure references ragdoll
 plain: $(READY) ## the core's tests without compiled code
 	@RAGDOLL_COMPILED=0 $(BIN)/python -m pytest -n 3 --dist loadfile $(CORE:%=test/test_%.py)
 
