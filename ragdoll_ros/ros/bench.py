@@ -52,7 +52,7 @@ def timed_engine() -> type[BulletEngine]:
                 spent[part] += time.process_time() - begin
         return run
 
-    names = ('step', 'read', 'coordinates', 'get_state', 'touching')
+    names = ('step', 'read', 'coordinates', 'touching')
     return type('TimedEngine', (BulletEngine,), {**{name: timed(name) for name in names},
                                                  'spent': spent})
 
