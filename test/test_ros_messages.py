@@ -212,3 +212,13 @@ def test_another_scene_leaves_nothing_of_the_last_one():
                 simulation.scene.bone_names)
             assert ('swings' in {name for name, _ in screen}) == (name == 'ponytail')
             assert Marker.DELETEALL not in {marker.action for marker in array.markers}
+
+
+def test_the_benchmark_times_an_engine_that_works():
+    """Its methods by name are those that an engine has, and what it spends is added up."""
+    from ragdoll_ros.ros.bench import timed_engine
+    engine = timed_engine()
+    with Simulation(load_scene('drop'), engine=engine, accuracy='draft') as simulation:
+        for _ in range(40):
+            simulation.advance()
+    assert engine.spent['of it engine'] > 0 and engine.spent['of it reading'] > 0
