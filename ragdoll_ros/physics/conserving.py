@@ -33,7 +33,7 @@ class ConservingStepper:
 
     def begin(self) -> None:
         """Take where the stepper is for the start."""
-        self.update_state(self.stepper.state)
+        self._update_state(self.stepper.state)
         self.conservation.open(self.state)
         self.work_of_grabs = 0.0
         """J: work of hands since the start."""
@@ -56,7 +56,7 @@ class ConservingStepper:
         stepper, before, motion = self.stepper, self.state, self.motion
         start = stepper.coordinates
         result = stepper.step(duration, loads)
-        self.update_state(stepper.state)
+        self._update_state(stepper.state)
         if loads:
             self._enter_work(loads, before, result)
         if stepper.accuracy.momentum and (result.substep or not stepper.dynamics.keeps_momentum):
@@ -83,14 +83,14 @@ class ConservingStepper:
             'work_of_pushes_J': float(conservation.worked.sum()) - self.work_of_grabs,
             'work_of_grabs_J': self.work_of_grabs}
 
-    def update_state(self, state: State) -> None:
+    def _update_state(self, state: State) -> None:
         """Take note of where all is."""
         self.state = state
         self.motion = self.mechanics.motion(state)
 
     def _correct(self, coordinates: GeneralizedState) -> None:
         self.stepper.place(coordinates)
-        self.update_state(self.stepper.state)
+        self._update_state(self.stepper.state)
 
     def _keep_momentum(self, before: Motion, result: StepResult, loads: Wrenches,
                        state: State) -> None:
