@@ -2,9 +2,7 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import math
-from pathlib import Path as File
 
 import numpy as np
 import pytest
@@ -34,7 +32,6 @@ from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.dynamics import CompiledDynamics
 from ragdoll_ros.physics.engine.bullet import BulletEngine
 from ragdoll_ros.physics.engine.protocol import AppliedWrench
-from ragdoll_ros.physics.kernels import kernels
 from ragdoll_ros.physics.plain.flight import EngineDynamics
 from ragdoll_ros.physics.settings import EXACT, NORMAL
 
@@ -311,9 +308,3 @@ def test_damping_only_takes_energy():
     assert np.diff(energies).max() < 0
     assert energies[-1] < energies[0] - .1 * motions[0].kinetic
     assert motions[-1].angular_momentum == pytest.approx(motions[0].angular_momentum, rel=1e-9)
-
-
-def test_the_kernels_name_the_numbers_that_are_frozen_into_them():
-    """Else numba would go on with the old ones after a change, see kernels.py."""
-    source = File(kernels.__file__).with_name('dop853.py').read_bytes()
-    assert hashlib.sha256(source).hexdigest()[:16] == kernels.NUMBERS
