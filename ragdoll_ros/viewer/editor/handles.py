@@ -71,8 +71,9 @@ class Handles:
         for number, part in enumerate(bone.shape.primitives):
             vertices, faces = MESHES[part.kind]
             self._server.scene.add_mesh_simple(
-                f'{ROOM}/own/ghost_{number}', vertices * part.size * GROWN + part.offset, faces,
-                color=YELLOW, wireframe=True, cast_shadow=False, receive_shadow=False)
+                f'{ROOM}/own/ghost_{number}', vertices * part.size * GROWN, faces, color=YELLOW,
+                wireframe=True, cast_shadow=False, receive_shadow=False,
+                position=part.position, wxyz=_wxyz(part.orientation))
 
     def _add_pivot(self, joint: Joint, bone: Bone) -> None:
         """Draw the joint: a ball where it is, a line along each axis, the first in blue."""
