@@ -6,8 +6,9 @@ import pytest
 from specimens import HANDLE, HEAD, SPECIMENS
 
 from ragdoll_ros.model import errors
+from ragdoll_ros.model.compound import Compound
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
-from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Sphere
+from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Part, Sphere
 
 BALL = Sphere(0.1)
 
@@ -63,6 +64,14 @@ def test_volume_and_inertia_are_those_of_the_uniform_solid(shape):
     (lambda: Capsule(1, math.inf), errors.NotFinite),
     (lambda: bone('a', mass=0), errors.NotPositive),
     (lambda: bone('world'), errors.DuplicateName),
+    (lambda: bone('a', moments=(1, 1)), errors.WrongForm),
+    (lambda: bone('a', moments=(1, 1, math.nan)), errors.NotFinite),
+    (lambda: bone('a', moments=(1, 1, 0)), errors.NotPositive),
+    (lambda: bone('a', moments=(3, 1, 1)), errors.OutOfRange),
+    (lambda: Compound(()), errors.WrongForm),
+    (lambda: Part(Compound((Part(BALL),))), errors.WrongForm),
+    (lambda: Part(BALL, (0, 0)), errors.WrongForm),
+    (lambda: Part(BALL, orientation=(0, 0, 0, 0)), errors.NotUnit),
     (lambda: bone('a', position=(0, math.nan, 0)), errors.NotFinite),
     (lambda: bone('a', orientation=(0, 0, 0, 0)), errors.NotUnit),
     (lambda: hinge('a', 'b', limits=((1, -1),)), errors.LimitsReversed),

@@ -97,6 +97,7 @@ def test_the_editor_makes_each_kind_of_each_other(shape):
         changed = changes.set_shape(scene, 'bone', kind)
         assert changed.bones[0].shape.kind == kind
         assert sheet.apply(changed, 'bone', sheet.read(changed, 'bone')) == changed
+    assert sheet.apply(scene, 'bone', sheet.read(scene, 'bone')) == scene
 
 
 @pytest.mark.parametrize('number', [np.float64(0.1), np.float32(0.5), 1])

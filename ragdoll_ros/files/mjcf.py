@@ -98,7 +98,7 @@ def _add_bone(parent: ET.Element, scene: Scene, placement: Placement, bone: Bone
     body = ET.SubElement(parent, 'body', name=name, pos=_text(pose.position),
                          quat=_quaternion(pose.orientation))
     ET.SubElement(body, 'inertial', pos='0 0 0', mass=repr(bone.mass),
-                  diaginertia=_text(_moments(bone)))
+                  diaginertia=_text(bone.inertia))
     # bit 0: meets the ground and, with self-collision, each other; bit 1: meets the ground only
     mask = '1' if scene.self_collision else '2'
     for number, part in enumerate(bone.shape.parts, 1):
@@ -108,12 +108,6 @@ def _add_bone(parent: ET.Element, scene: Scene, placement: Placement, bone: Bone
                       contype=mask, conaffinity='1' if scene.self_collision else '0',
                       **_material(scene, bone))
     return body
-
-
-def _moments(bone: Bone) -> list[float]:
-    """Principal moments, none of them above the sum of the others to the last digit."""
-    return [min(moment, sum(bone.inertia[:axis] + bone.inertia[axis + 1:]))
-            for axis, moment in enumerate(bone.inertia)]
 
 
 def _placed(part: Part) -> dict[str, str]:

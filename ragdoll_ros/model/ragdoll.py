@@ -69,8 +69,7 @@ class Bone:
             for part in self.color:
                 errors.check_range('color', part, 0, 1)
         if self.moments is not None:
-            set_fields(self, moments=finite('inertia', self.moments))
-            _check_moments(self.moments)
+            set_fields(self, moments=_moments(finite('inertia', self.moments)))
         elif isinstance(self.shape, Compound):
             self.shape.check_principal()
 
@@ -374,12 +373,17 @@ def _reaches(parent_of: dict[str, str], start: str, goal: str) -> bool:
     return start == goal
 
 
-def _check_moments(moments: Vector) -> None:
-    """Raise unless some body of mass can have these principal moments of inertia."""
+def _moments(moments: Vector) -> Vector:
+    """Principal moments that a body can have: each at most the sum of the other two.
+
+    Two make up the third of what is flat. What six digits have rounded beyond that is taken back,
+    as PyBullet takes such an inertia for zero and MuJoCo refuses it.
+    """
     errors.check_positive('inertia', moments)
-    # Two are equal to the third of what is flat; written with six digits, to rounding.
-    if max(moments) > (sum(moments) - max(moments)) * (1 + 1e-6):
+    others = tuple(sum(moments[:axis] + moments[axis + 1:]) for axis in range(3))
+    if any(moment > most * (1 + 1e-6) for moment, most in zip(moments, others, strict=True)):
         raise errors.OutOfRange('inertia', moments, 'each at most the sum of the other two')
+    return tuple(map(min, moments, others))
 
 
 def _angles(pair: Limits | None) -> Limits | None:

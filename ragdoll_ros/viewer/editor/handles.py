@@ -9,6 +9,7 @@ import viser
 from ...model import rotation
 from ...model.ragdoll import Bone, Joint
 from ...model.scene import Placement, Scene, height
+from ...model.shapes import SHAPES
 from ..drawing.bodies import WXYZ
 from ..drawing.meshes import MESHES
 from .changes import find, joint_of
@@ -65,7 +66,8 @@ class Handles:
             if joint is not None:
                 self._add_pivot(joint, bone)
             self._add_body(bone, at)
-            self._add_size(bone)
+            if bone.shape.kind in SHAPES:
+                self._add_size(bone)
 
     def _add_ghost(self, bone: Bone) -> None:
         for number, part in enumerate(bone.shape.primitives):
