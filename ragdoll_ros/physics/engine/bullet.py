@@ -140,8 +140,10 @@ class _World:
             return doll
         return dataclasses.replace(
             doll,
-            bones=tuple(dataclasses.replace(bone, mass=bone.mass / self.unit)
-                        for bone in doll.bones),
+            bones=tuple(dataclasses.replace(
+                bone, mass=bone.mass / self.unit,
+                moments=bone.moments and tuple(moment / self.unit for moment in bone.moments))
+                for bone in doll.bones),
             joints=tuple(dataclasses.replace(joint, damping=joint.damping / self.unit)
                          for joint in doll.joints))
 
@@ -439,10 +441,11 @@ def _slab_is_better(scene: Scene) -> bool:
     slab, and jam sooner.
     """
     return (all(len(placement.doll.bones) == 1 for placement in scene.dolls)
-            and any(bone.shape.kind == 'box' for bone in scene.bones))
+            and any(part.kind == 'box' for bone in scene.bones for part in bone.shape.parts))
 
 
 def _unit_of_mass(scene: Scene) -> float:
     """The kg that the engine takes for one: 1, or a power of two for giants."""
-    largest = max(bone.mass * max(bone.shape.half_extents) ** 2 for bone in scene.bones)
+    largest = max(max(bone.mass * max(bone.shape.half_extents) ** 2, *bone.inertia)
+                  for bone in scene.bones)
     return 2.0 ** max(0, math.ceil(math.log2(largest / HEAVIEST)))
