@@ -11,7 +11,8 @@ from .record import RECORD
 MATH = {'contract', 'nsz', 'arcp'}
 """Freedoms of rounding: a product and a sum may be rounded once. Sums stay in their order."""
 
-compiled = numba.njit(error_model='numpy', fastmath=MATH)
+compiled = numba.njit(error_model='numpy', fastmath=MATH, no_cpython_wrapper=True,
+                      no_cfunc_wrapper=True)
 """Machine code, for what other compiled code calls."""
 
 inlined = numba.njit(inline='always', error_model='numpy', fastmath=MATH)
