@@ -46,82 +46,81 @@ def nearest_direction(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: i
 def _nearest(points: np.ndarray, count: int) -> tuple[int, float, float, float]:
     """The point of a simplex that is nearest to the origin; keeps the corners that it is made of.
 
-    The tetrahedron's is the nearest of its faces', as the origin is outside.
+    The tetrahedron's is the nearest of its faces', as the origin is outside, and not on the one
+    without the last corner, which came as it was nearer.
     """
     if count == 1:
         return 1, points[0, 0], points[0, 1], points[0, 2]
     if count == 2:
-        return _keep(points, 0, 1, 1, *_on_triangle(points, 0, 1, 1))
-    if count == 3:
-        return _keep(points, 0, 1, 2, *_on_triangle(points, 0, 1, 2))
-    best, omitted = math.inf, 0
-    for k in range(4):
-        i, j, m = (1 if k == 0 else 0), (2 if k < 2 else 1), (3 if k < 3 else 2)
-        a, b, c = _on_triangle(points, i, j, m)
-        square = 0.0
-        for e in range(3):
-            square += (a * points[i, e] + b * points[j, e] + c * points[m, e]) ** 2
-        if square < best:
-            best, omitted = square, k
-    i, j = (1 if omitted == 0 else 0), (2 if omitted < 2 else 1)
-    m = 3 if omitted < 3 else 2
-    return _keep(points, i, j, m, *_on_triangle(points, i, j, m))
-
-
-@compiled
-def _keep(points: np.ndarray, i: int, j: int, m: int, a: float, b: float,
-          c: float) -> tuple[int, float, float, float]:
-    """Move the corners i < j < m that have a weight to the front; gives their number and sum."""
-    x = a * points[i, 0] + b * points[j, 0] + c * points[m, 0]
-    y = a * points[i, 1] + b * points[j, 1] + c * points[m, 1]
-    z = a * points[i, 2] + b * points[j, 2] + c * points[m, 2]
-    count = 0
-    for k, weight in ((i, a), (j, b), (m, c)):
-        if weight > 0:
+        _, x, y, z, kept = _on_segment(points, 0, 1)
+    else:
+        square, x, y, z, kept = _on_triangle(points, count - 3, count - 2, count - 1)
+        if count == 4:
+            for k in range(1, 3):
+                found, a, b, c, these = _on_triangle(points, 0, k, 3)
+                if found < square:
+                    square, x, y, z, kept = found, a, b, c, these
+    number = 0
+    for k in range(count):
+        if kept & (1 << k):
             for e in range(3):
-                points[count, e] = points[k, e]
-            count += 1
-    return count, x, y, z
+                points[number, e] = points[k, e]
+            number += 1
+    return number, x, y, z
+
+
+Nearest = tuple[float, float, float, float, int]
+"""Square of the distance from the origin, the point, and the corners it stands on, a bit each."""
 
 
 @compiled
-def _on_triangle(points: np.ndarray, i: int, j: int, m: int) -> tuple[float, float, float]:
-    """Weights of a triangle's corners in its point nearest to the origin; j = m: of a segment.
+def _on_segment(points: np.ndarray, i: int, j: int) -> Nearest:
+    ax, ay, az = points[i, 0], points[i, 1], points[i, 2]
+    px, py, pz = points[j, 0] - ax, points[j, 1] - ay, points[j, 2] - az
+    along, square = -(ax * px + ay * py + az * pz), px * px + py * py + pz * pz
+    kept = (1 << i) | (1 << j)
+    if along <= 0:
+        t, kept = 0.0, 1 << i
+    elif along >= square:
+        t, kept = 1.0, 1 << j
+    else:
+        t = along / square
+    x, y, z = ax + t * px, ay + t * py, az + t * pz
+    return x * x + y * y + z * z, x, y, z, kept
 
-    Ericson, Real-Time Collision Detection (2005), section 5.1.5.
-    """
+
+@compiled
+def _on_triangle(points: np.ndarray, i: int, j: int, m: int) -> Nearest:
+    """Within, it lies along the normal, which from differences keeps its digits in slivers too."""
     ax, ay, az = points[i, 0], points[i, 1], points[i, 2]
     bx, by, bz = points[j, 0], points[j, 1], points[j, 2]
-    px, py, pz = bx - ax, by - ay, bz - az
-    if j == m:
-        square = px * px + py * py + pz * pz
-        t = -(ax * px + ay * py + az * pz)
-        t = min(max(t / square, 0.0), 1.0) if square > 0 else 0.0
-        return 1 - t, t, 0.0
     cx, cy, cz = points[m, 0], points[m, 1], points[m, 2]
-    qx, qy, qz = cx - ax, cy - ay, cz - az
-    d1, d2 = -(px * ax + py * ay + pz * az), -(qx * ax + qy * ay + qz * az)
-    if d1 <= 0 and d2 <= 0:
-        return 1.0, 0.0, 0.0
-    d3, d4 = -(px * bx + py * by + pz * bz), -(qx * bx + qy * by + qz * bz)
-    if d3 >= 0 and d4 <= d3:
-        return 0.0, 1.0, 0.0
-    vc = d1 * d4 - d3 * d2
-    if vc <= 0 and d1 >= 0 and d3 <= 0 and d1 > d3:
-        t = d1 / (d1 - d3)
-        return 1 - t, t, 0.0
-    d5, d6 = -(px * cx + py * cy + pz * cz), -(qx * cx + qy * cy + qz * cz)
-    if d6 >= 0 and d5 <= d6:
-        return 0.0, 0.0, 1.0
-    vb = d5 * d2 - d1 * d6
-    if vb <= 0 and d2 >= 0 and d6 <= 0 and d2 > d6:
-        t = d2 / (d2 - d6)
-        return 1 - t, 0.0, t
-    va = d3 * d6 - d5 * d4
-    if va <= 0 and d4 >= d3 and d5 >= d6:
-        t = (d4 - d3) / max((d4 - d3) + (d5 - d6), 1e-300)
-        return 0.0, 1 - t, t
-    total = va + vb + vc
-    if total <= 0:
-        return 1.0, 0.0, 0.0
-    return 1 - vb / total - vc / total, vb / total, vc / total
+    nx, ny, nz = cross(bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az)
+    square = nx * nx + ny * ny + nz * nz
+    if square > 0 and _turns(nx, ny, nz, ax, ay, az, bx, by, bz) and _turns(
+            nx, ny, nz, bx, by, bz, cx, cy, cz) and _turns(nx, ny, nz, cx, cy, cz, ax, ay, az):
+        t = (ax * nx + ay * ny + az * nz) / square
+        return t * t * square, t * nx, t * ny, t * nz, (1 << i) | (1 << j) | (1 << m)
+    best = _on_segment(points, i, j)
+    other = _on_segment(points, j, m)
+    if other[0] < best[0]:
+        best = other
+    other = _on_segment(points, i, m)
+    if other[0] < best[0]:
+        best = other
+    return best
+
+
+@compiled
+def _turns(nx: float, ny: float, nz: float, ax: float, ay: float, az: float, bx: float, by: float,
+           bz: float) -> bool:
+    """Whether the origin lies on the inner side of the edge a b of a triangle with normal n."""
+    x, y, z = cross(ax, ay, az, bx - ax, by - ay, bz - az)
+    return nx * x + ny * y + nz * z > 0
+
+
+@compiled
+def cross(ax: float, ay: float, az: float, bx: float, by: float,
+          bz: float) -> tuple[float, float, float]:
+    """Cross product of two vectors."""
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
