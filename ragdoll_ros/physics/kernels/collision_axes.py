@@ -21,7 +21,7 @@ import math
 import numpy as np
 
 from .collision_shapes import BOX, bound, compiled, extent
-from .gjk import nearest_direction
+from .gjk import Direction, nearest_direction
 
 PARALLEL = 1e-8
 """Sine between two edges below which the normals of faces do for their cross product."""
@@ -35,6 +35,9 @@ SHRUNK = 0.98
 
 BETWEEN = 1e-3
 """Of the bodies' size: what is put between them to find the nearest points."""
+
+ROUGH, CLOSE = 1e-2, 1e-10
+"""What part of the nearest points' distance may be wrong, at first and in the end."""
 
 Axis = tuple[float, float, float, float]
 """s, m, and the unit vector n from b to a, world."""
@@ -101,19 +104,19 @@ def refined(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b
             rb: np.ndarray, cx: float, cy: float, cz: float, s: float, x: float, y: float,
             z: float) -> Axis:
     """The axis of the largest s of all, from the best of some axes."""
-    points = np.empty((4, 3))
+    points, count = np.empty((4, 6)), 0
     gap = BETWEEN * (bound(kind_a, size_a) + bound(kind_b, size_b))
     if s < 0:
-        ax, ay, az = _outward(
+        count, ax, ay, az = _outward(
             kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, x, y, z, points)
         found = along(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, ax, ay, az)
         if found > s:
             s, x, y, z = found, ax, ay, az
     for _ in range(20):
         move = max(gap - s, 0.0)
-        ax, ay, az = nearest_direction(
+        count, ax, ay, az = nearest_direction(
             kind_a, size_a, ra, kind_b, size_b, rb, cx + move * x, cy + move * y, cz + move * z,
-            1.0, x, y, z, points)
+            1.0, CLOSE, points, count, x, y, z)
         found = along(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, ax, ay, az)
         if found <= s:
             break
@@ -126,9 +129,9 @@ def refined(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b
 @compiled
 def _outward(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b: np.ndarray,
              rb: np.ndarray, cx: float, cy: float, cz: float, x: float, y: float, z: float,
-             points: np.ndarray) -> tuple[float, float, float]:
+              points: np.ndarray) -> Direction:
     """Along which axis bodies that grow about their centres meet: Dinkelbach's iteration."""
-    most = 0.0
+    most, count = 0.0, 0
     bx, by, bz = x, y, z
     for _ in range(6):
         way = cx * x + cy * y + cz * z
@@ -137,6 +140,6 @@ def _outward(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_
         if growth <= 1.001 * most:
             break
         most, bx, by, bz = growth, x, y, z
-        x, y, z = nearest_direction(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz,
-                                    SHRUNK * growth, x, y, z, points)
-    return bx, by, bz
+        count, x, y, z = nearest_direction(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz,
+                                           SHRUNK * growth, ROUGH, points, count, x, y, z)
+    return count, bx, by, bz
