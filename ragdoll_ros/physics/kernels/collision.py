@@ -35,10 +35,13 @@ def collide(kind_a: int, size_a: np.ndarray, pa: np.ndarray, ra: np.ndarray, kin
     reach = bound(kind_a, size_a) + bound(kind_b, size_b) + margin
     if x * x + y * y + z * z > reach * reach:
         return 0
+    sign = 1.0
+    if kind_b <= CAPSULE < kind_a:
+        kind_a, size_a, pa, ra, kind_b, size_b, pb, rb = (
+            kind_b, size_b, pb, rb, kind_a, size_a, pa, ra)
+        sign = -1.0
     if kind_a <= CAPSULE:
-        return round_contacts(size_a, pa, ra, kind_b, size_b, pb, rb, margin, 1.0, out)
-    if kind_b <= CAPSULE:
-        return round_contacts(size_b, pb, rb, kind_a, size_a, pa, ra, margin, -1.0, out)
+        return round_contacts(size_a, pa, ra, kind_b, size_b, pb, rb, margin, sign, out)
     return flat_contacts(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb, margin, out)
 
 
@@ -52,8 +55,9 @@ def separation(kind_a: int, size_a: np.ndarray, pa: np.ndarray, ra: np.ndarray, 
     largest along an axis of theirs. Overlapped: the least penetration, for spheres and capsules
     that of the deepest ball of their axis.
     """
+    if kind_b <= CAPSULE < kind_a:
+        kind_a, size_a, pa, ra, kind_b, size_b, pb, rb = (
+            kind_b, size_b, pb, rb, kind_a, size_a, pa, ra)
     if kind_a <= CAPSULE:
         return round_separation(size_a, pa, ra, kind_b, size_b, pb, rb)
-    if kind_b <= CAPSULE:
-        return round_separation(size_b, pb, rb, kind_a, size_a, pa, ra)
     return flat_separation(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb)

@@ -51,12 +51,14 @@ def flat_contacts(kind_a: int, size_a: np.ndarray, pa: np.ndarray, ra: np.ndarra
     face_a, face_b = squareness(kind_a, ra, x, y, z), squareness(kind_b, rb, x, y, z)
     if max(face_a, face_b) < STRAIGHT:
         count = _lines(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, s, x, y, z, found)
-    elif face_a >= face_b - AGREED:
-        count = _faces(kind_a, size_a, ra, cx, cy, cz, kind_b, size_b, rb, 0.0, 0.0, 0.0, x, y, z,
-                       -1.0, work[:ROOM], found, corners)
     else:
-        count = _faces(kind_b, size_b, rb, 0.0, 0.0, 0.0, kind_a, size_a, ra, cx, cy, cz, x, y, z,
-                       1.0, work[:ROOM], found, corners)
+        # what is clipped is drawn first, the reference second
+        first = (kind_b, size_b, rb, 0.0, 0.0, 0.0)
+        second = (kind_a, size_a, ra, cx, cy, cz)
+        sign = -1.0
+        if face_b > face_a + AGREED:
+            first, second, sign = second, first, 1.0
+        count = _faces(*first, *second, x, y, z, sign, work[:ROOM], found, corners)
     least = math.inf
     for i in range(count):
         least = min(least, found[i, 4])
@@ -75,10 +77,10 @@ def flat_contacts(kind_a: int, size_a: np.ndarray, pa: np.ndarray, ra: np.ndarra
 
 
 @compiled
-def _faces(kind: int, size: np.ndarray, r: np.ndarray, cx: float, cy: float, cz: float,
-           other_kind: int, other_size: np.ndarray, other_r: np.ndarray, ox: float, oy: float,
-           oz: float, nx: float, ny: float, nz: float, sign: float, rows: np.ndarray,
-           found: np.ndarray, corners: np.ndarray) -> int:
+def _faces(other_kind: int, other_size: np.ndarray, other_r: np.ndarray, ox: float, oy: float,
+           oz: float, kind: int, size: np.ndarray, r: np.ndarray, cx: float, cy: float, cz: float,
+           nx: float, ny: float, nz: float, sign: float, rows: np.ndarray, found: np.ndarray,
+           corners: np.ndarray) -> int:
     """Clip what the other body shows by this one's face; ``sign`` is 1 if n leaves this one.
 
     c and o are the centres from b's. Rows (k, 5) of ``found``: place, name, gap.

@@ -62,15 +62,15 @@ def _nearest(points: np.ndarray, count: int) -> tuple[int, float, float, float]:
     """
     if count == 1:
         return 1, points[0, 0], points[0, 1], points[0, 2]
+    last = count - 1
     if count == 2:
-        _, x, y, z, kept = _on_segment(points, 0, 1)
+        square, x, y, z, kept = _on_segment(points, last - 1, last)
     else:
-        square, x, y, z, kept = _on_triangle(points, count - 3, count - 2, count - 1)
-        if count == 4:
-            for k in range(1, 3):
-                found, a, b, c, these = _on_triangle(points, 0, k, 3)
-                if found < square:
-                    square, x, y, z, kept = found, a, b, c, these
+        square, x, y, z, kept = _on_triangle(points, last - 2, last - 1, last)
+    for k in range(1, count - 1 if count == 4 else 1):
+        found, a, b, c, these = _on_triangle(points, last - 3, k, last)
+        if found < square:
+            square, x, y, z, kept = found, a, b, c, these
     number = 0
     for k in range(count):
         if kept & (1 << k):
