@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .collision_clip import MOST
 from .collision_flat import flat_contacts, flat_separation
 from .collision_round import round_contacts, round_separation
 from .collision_shapes import BOX, CAPSULE, CYLINDER, SPHERE, bound, compiled
@@ -16,9 +17,6 @@ __all__ = ['BOX', 'CAPSULE', 'CYLINDER', 'MOST', 'POINT', 'SPHERE', 'collide', '
 
 POINT = 8
 """Columns of a contact: point, normal from b to a, gap, name."""
-
-MOST = 8
-"""Contacts of a pair."""
 
 
 @compiled

@@ -1,4 +1,9 @@
-"""Contacts of boxes and cylinders with each other: their axis, their patch, its best points."""
+"""Contacts of boxes and cylinders with each other: where what they show lies over each other.
+
+The outline of one is clipped by the sides of that which lies square to the axis n. All is seen and
+measured along n, not along the face's normal, so that the deepest contact is as deep as the bodies
+are. Where nothing lies square, two lines touch, or a corner or rim touches.
+"""
 from __future__ import annotations
 
 import math
@@ -6,11 +11,23 @@ import math
 import numpy as np
 
 from .collision_axes import BIAS, BIAS_PART, Axis, best_axis, refined
-from .collision_patch import (
-    AGREED, CORNERS, MERGED, ROOM, SIDE_BY_SIDE, SQUARE, TOUCH, clip, line, outline, squareness)
+from .collision_clip import ROOM, clip, merge, spread
+from .collision_outline import CORNERS, SQUARE, line, outline, squareness
 from .collision_shapes import BOX, CYLINDER, bound, compiled
 
 STRAIGHT = math.sqrt(1 - SQUARE * SQUARE)
+
+SIDE_BY_SIDE = 1e-3
+"""Sine between two lines up to which they touch at two points, not at one."""
+
+MERGED = 1e-3
+"""Points that are nearer to each other than this part of the smaller body's size are one."""
+
+AGREED = 1e-10
+"""m: by how much the deepest contact may differ from the depth of the bodies."""
+
+TOUCH = 2 * CORNERS * 2 * CORNERS - 1
+"""Name of the contact at the nearest points, which no two sides of outlines have."""
 
 
 @compiled
@@ -66,8 +83,8 @@ def flat_contacts(kind_a: int, size_a: np.ndarray, pa: np.ndarray, ra: np.ndarra
         _touch(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, s, x, y, z, found[count])
         count += 1
     apart = MERGED * min(bound(kind_a, size_a), bound(kind_b, size_b))
-    count = _merge(found, count, margin, apart)
-    count = _spread(found, count)
+    count = merge(found, count, margin, apart)
+    count = spread(found, count)
     for i in range(count):
         row, point = out[i], found[i]
         for e in range(3):
@@ -175,53 +192,3 @@ def _touch(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b:
         x, y, z, half = ax + t * ux, ay + t * uy, az + t * uz, -s / 2
     row[0], row[1], row[2] = x + half * nx, y + half * ny, z + half * nz
     row[3], row[4] = TOUCH, s
-
-
-@compiled
-def _merge(found: np.ndarray, count: int, margin: float, apart: float) -> int:
-    """Drop points that are farther than the margin, and of two in one place the higher."""
-    kept = 0
-    for i in range(count):
-        if found[i, 4] > margin:
-            continue
-        place = kept
-        for k in range(kept):
-            if _square(found[i], found[k]) < apart * apart:
-                place = k
-        if place == kept:
-            kept += 1
-        elif found[i, 4] >= found[place, 4]:
-            continue
-        for e in range(5):
-            found[place, e] = found[i, e]
-    return kept
-
-
-@compiled
-def _spread(found: np.ndarray, count: int) -> int:
-    """Bring the deepest point to the front, and behind it, each time, the farthest from all."""
-    if count <= CORNERS:
-        return count
-    best = 0
-    for i in range(count):
-        if found[i, 4] < found[best, 4]:
-            best = i
-    for k in range(CORNERS):
-        if k > 0:
-            best, most = k, -1.0
-            for i in range(k, count):
-                nearest = math.inf
-                for j in range(k):
-                    nearest = min(nearest, _square(found[i], found[j]))
-                if nearest > most:
-                    best, most = i, nearest
-        for e in range(5):
-            found[k, e], found[best, e] = found[best, e], found[k, e]
-    return CORNERS
-
-
-@compiled
-def _square(a: np.ndarray, b: np.ndarray) -> float:
-    """Square of the distance of two points."""
-    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
-    return x * x + y * y + z * z

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from .collision_shapes import BOX, CAPSULE, CYLINDER, compiled, distance, into, out_of
+from .collision_shapes import BOX, CAPSULE, CYLINDER, SPHERE, compiled, distance, into, out_of
 
 STEEP = 0.7
 """Of a normal along a cylinder's axis from which on its cap, not its side, is what is lain on."""
@@ -31,7 +31,7 @@ def nearest_ball(kind: int, size: np.ndarray, px: float, py: float, pz: float, u
     """Where on the axis p + t u, |t| <= half, of the shape's frame its distance is least."""
     if half <= 0:
         return 0.0
-    if kind == BOX or kind == CYLINDER:
+    if kind >= BOX:
         return _least(kind, size, px, py, pz, ux, uy, uz, half)
     # Ericson 5.1.9 for two segments given by their middles
     along, across, other = px * ux + py * uy + pz * uz, ux * ux + uy * uy, 0.0
@@ -112,7 +112,7 @@ def _shadow(kind: int, size: np.ndarray, px: float, py: float, pz: float, ux: fl
             return 1.0, 0.0
         chord = math.sqrt(chord)
         lo, hi = max(lo, middle - chord), min(hi, middle + chord)
-    elif kind == CAPSULE or kind == CYLINDER:
+    elif kind != SPHERE:
         lo, hi = _slab(lo, hi, pz, uz, size[1])
     return lo, hi
 
