@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from .collision_axes import widest_axis
 from .collision_clip import MOST
-from .collision_flat import flat_contacts, flat_separation
+from .collision_flat import flat_contacts
 from .collision_round import round_contacts, round_separation
 from .collision_shapes import BOX, CAPSULE, CYLINDER, SPHERE, bound, compiled
 
@@ -50,12 +51,13 @@ def separation(kind_a: int, size_a: np.ndarray, pa: np.ndarray, ra: np.ndarray, 
 
     It is continuous, and while they touch its rate is the relative velocity along the normal. With
     a sphere or capsule, or a cylinder, it is the distance while they are apart; of two boxes the
-    largest along an axis of theirs. Overlapped: the least penetration, for spheres and capsules
-    that of the deepest ball of their axis.
+    largest along an axis of theirs. Overlapped: the least penetration.
     """
     if kind_b <= CAPSULE < kind_a:
         kind_a, size_a, pa, ra, kind_b, size_b, pb, rb = (
             kind_b, size_b, pb, rb, kind_a, size_a, pa, ra)
     if kind_a <= CAPSULE:
         return round_separation(size_a, pa, ra, kind_b, size_b, pb, rb)
-    return flat_separation(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb)
+    s, _, _, _ = widest_axis(kind_a, size_a, ra, kind_b, size_b, rb, pa[0] - pb[0], pa[1] - pb[1],
+                             pa[2] - pb[2])
+    return s

@@ -20,7 +20,7 @@ import math
 
 import numpy as np
 
-from .collision_shapes import BOX, bound, compiled, extent
+from .collision_shapes import BOX, CAPSULE, CYLINDER, bound, compiled, extent
 from .gjk import Direction, nearest_direction
 
 PARALLEL = 1e-8
@@ -54,25 +54,27 @@ def along(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b: 
 
 @compiled
 def best_axis(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b: np.ndarray,
-              rb: np.ndarray, cx: float, cy: float, cz: float, bias: float, enough: float) -> Axis:
-    """The axis of the largest s among normals of faces and cross products of edges.
+              rb: np.ndarray, cx: float, cy: float, cz: float, biased: bool, enough: float) -> Axis:
+    """The axis of the largest s among normals of faces and cross products of edges. a may be the
+    axis of a capsule, which is an edge.
 
-    With a ``bias`` of 1 a's faces come before b's and these before edges; 0: the largest alone.
+    If ``biased`` a's faces come before b's and these before edges.
     The first that is larger than ``enough`` will do.
     """
     s, x, y, z = -math.inf, 0.0, 0.0, 0.0
     first_a, first_b = 0 if kind_a == BOX else 2, 0 if kind_b == BOX else 2
+    faces_a = 3 if kind_a == CAPSULE else first_a
     bar = -math.inf
     for body in range(2):
         r = ra if body == 0 else rb
-        for k in range(first_a if body == 0 else first_b, 3):
+        for k in range(faces_a if body == 0 else first_b, 3):
             nx, ny, nz = _facing(r[0, k], r[1, k], r[2, k], cx, cy, cz)
             found = along(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, nx, ny, nz)
             if found > s and found > bar:
                 s, x, y, z = found, nx, ny, nz
                 if s > enough:
                     return s, x, y, z
-        bar = s + bias * (BIAS + BIAS_PART * abs(s))
+        bar = s + BIAS + BIAS_PART * abs(s) if biased else s
     for i in range(first_a, 3):
         for j in range(first_b, 3):
             nx = ra[1, i] * rb[2, j] - ra[2, i] * rb[1, j]
@@ -123,6 +125,17 @@ def refined(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b
         gain, s, x, y, z = found - s, found, ax, ay, az
         if gain < 1e-13:
             break
+    return s, x, y, z
+
+
+@compiled
+def widest_axis(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b: np.ndarray,
+                rb: np.ndarray, cx: float, cy: float, cz: float) -> Axis:
+    """The axis of the largest s of all."""
+    s, x, y, z = best_axis(
+        kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, False, math.inf)
+    if kind_a == CYLINDER or kind_b == CYLINDER:
+        return refined(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, s, x, y, z)
     return s, x, y, z
 
 

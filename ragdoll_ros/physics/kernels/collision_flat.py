@@ -13,7 +13,7 @@ import numpy as np
 from .collision_axes import BIAS, BIAS_PART, Axis, best_axis, refined
 from .collision_clip import ROOM, clip, merge, spread
 from .collision_outline import CORNERS, SQUARE, line, outline, squareness
-from .collision_shapes import BOX, CYLINDER, bound, compiled
+from .collision_shapes import BOX, CYLINDER, bound, compiled, support
 
 STRAIGHT = math.sqrt(1 - SQUARE * SQUARE)
 
@@ -23,30 +23,18 @@ SIDE_BY_SIDE = 1e-3
 MERGED = 1e-3
 """Points that are nearer to each other than this part of the smaller body's size are one."""
 
-AGREED = 1e-10
-"""m: by how much the deepest contact may differ from the depth of the bodies."""
+ALIKE = 1e-10
+"""By how much the cosine of b's face must be larger for it to be the reference instead of a's."""
 
 TOUCH = 2 * CORNERS * 2 * CORNERS - 1
 """Name of the contact at the nearest points, which no two sides of outlines have."""
 
 
 @compiled
-def flat_separation(kind_a: int, size_a: np.ndarray, pa: np.ndarray, ra: np.ndarray, kind_b: int,
-                    size_b: np.ndarray, pb: np.ndarray, rb: np.ndarray) -> float:
-    """How far apart, m, two bodies are that are boxes or cylinders; negative: least penetration."""
-    cx, cy, cz = pa[0] - pb[0], pa[1] - pb[1], pa[2] - pb[2]
-    s, x, y, z = best_axis(
-        kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, 0.0, math.inf)
-    if kind_a == CYLINDER or kind_b == CYLINDER:
-        s, x, y, z = refined(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, s, x, y, z)
-    return s
-
-
-@compiled
 def _axis(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b: np.ndarray,
           rb: np.ndarray, cx: float, cy: float, cz: float, margin: float) -> Axis:
     """The axis to touch along: a face's unless another is clearly better."""
-    s, x, y, z = best_axis(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, 1.0, margin)
+    s, x, y, z = best_axis(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, True, margin)
     if s <= margin and (kind_a == CYLINDER or kind_b == CYLINDER):
         t, a, b, c = refined(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, s, x, y, z)
         if t > s + BIAS + BIAS_PART * abs(s):
@@ -66,21 +54,24 @@ def flat_contacts(kind_a: int, size_a: np.ndarray, pa: np.ndarray, ra: np.ndarra
     work = np.empty((2 * ROOM + CORNERS, 5))
     found, corners = work[ROOM:2 * ROOM], work[2 * ROOM:]
     face_a, face_b = squareness(kind_a, ra, x, y, z), squareness(kind_b, rb, x, y, z)
-    if max(face_a, face_b) < STRAIGHT:
-        count = _lines(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, s, x, y, z, found)
-    else:
-        # what is clipped is drawn first, the reference second
-        first = (kind_b, size_b, rb, 0.0, 0.0, 0.0)
-        second = (kind_a, size_a, ra, cx, cy, cz)
-        sign = -1.0
-        if face_b > face_a + AGREED:
-            first, second, sign = second, first, 1.0
+    flat = max(face_a, face_b) >= STRAIGHT
+    # what is clipped is drawn first, the reference second
+    first, second = (kind_b, size_b, rb, 0.0, 0.0, 0.0), (kind_a, size_a, ra, cx, cy, cz)
+    sign = -1.0
+    if face_b > face_a + ALIKE:
+        first, second, sign = second, first, 1.0
+    if flat:
         count = _faces(*first, *second, x, y, z, sign, work[:ROOM], found, corners)
+    else:
+        count = _lines(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, x, y, z, found)
     least = math.inf
     for i in range(count):
         least = min(least, found[i, 4])
-    if least > s + AGREED:
-        _touch(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, s, x, y, z, found[count])
+    if least > s + BIAS + BIAS_PART * abs(s):
+        if flat:
+            _corner(*first, s, x, y, z, sign, found[count])
+        else:
+            _crossing(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, s, x, y, z, found[count])
         count += 1
     apart = MERGED * min(bound(kind_a, size_a), bound(kind_b, size_b))
     count = merge(found, count, margin, apart)
@@ -133,7 +124,7 @@ def _faces(other_kind: int, other_size: np.ndarray, other_r: np.ndarray, ox: flo
 
 @compiled
 def _lines(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b: np.ndarray,
-           rb: np.ndarray, cx: float, cy: float, cz: float, s: float, nx: float, ny: float,
+           rb: np.ndarray, cx: float, cy: float, cz: float, nx: float, ny: float,
            nz: float, found: np.ndarray) -> int:
     """The ends of what two lines side by side have in common, seen along n; 0 if they cross."""
     ax, ay, az, ux, uy, uz = line(kind_a, size_a, ra, -nx, -ny, -nz)
@@ -163,10 +154,20 @@ def _lines(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b:
 
 
 @compiled
-def _touch(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b: np.ndarray,
-           rb: np.ndarray, cx: float, cy: float, cz: float, s: float, nx: float, ny: float,
-           nz: float, row: np.ndarray) -> None:
-    """The one contact of two lines that cross, or of a corner or rim with whatever there is."""
+def _corner(kind: int, size: np.ndarray, r: np.ndarray, cx: float, cy: float, cz: float, s: float,
+            nx: float, ny: float, nz: float, sign: float, row: np.ndarray) -> None:
+    """The one contact of a corner or rim with a face from which n goes to it, times ``sign``."""
+    x, y, z = support(kind, size, r, -sign * nx, -sign * ny, -sign * nz)
+    half = sign * s / 2
+    row[0], row[1], row[2] = cx + x - half * nx, cy + y - half * ny, cz + z - half * nz
+    row[3], row[4] = TOUCH, s
+
+
+@compiled
+def _crossing(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b: np.ndarray,
+              rb: np.ndarray, cx: float, cy: float, cz: float, s: float, nx: float, ny: float,
+              nz: float, row: np.ndarray) -> None:
+    """The one contact of two lines that cross, or of a corner or rim with a line."""
     ax, ay, az, ux, uy, uz = line(kind_a, size_a, ra, -nx, -ny, -nz)
     bx, by, bz, vx, vy, vz = line(kind_b, size_b, rb, nx, ny, nz)
     ax, ay, az = ax + cx, ay + cy, az + cz

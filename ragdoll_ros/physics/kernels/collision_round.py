@@ -2,7 +2,8 @@
 
 The signed distance of a point from a convex shape is a convex function of the point; so along a
 capsule's axis it has one least value. Each contact is that of one ball of the axis, with a normal
-and a gap of its own.
+and a gap of its own. Only when the axis itself is within a box or cylinder, which may be deep, is
+the way out that of the whole axis.
 """
 from __future__ import annotations
 
@@ -10,6 +11,7 @@ import math
 
 import numpy as np
 
+from .collision_axes import widest_axis
 from .collision_shapes import BOX, CAPSULE, CYLINDER, SPHERE, compiled, distance, into, out_of
 
 STEEP = 0.7
@@ -125,6 +127,9 @@ def round_separation(size_a: np.ndarray, pa: np.ndarray, ra: np.ndarray, kind_b:
     ux, uy, uz = into(rb, ra[0, 2], ra[1, 2], ra[2, 2])
     t = nearest_ball(kind_b, size_b, px, py, pz, ux, uy, uz, size_a[1])
     gap, _, _, _ = distance(kind_b, size_b, px + t * ux, py + t * uy, pz + t * uz, ux, uy)
+    if gap < 0 and kind_b >= BOX and size_a[1] > 0:
+        gap, _, _, _ = widest_axis(CAPSULE, size_a, ra, kind_b, size_b, rb, pa[0] - pb[0],
+                                   pa[1] - pb[1], pa[2] - pb[2])
     return gap - size_a[0]
 
 
@@ -145,7 +150,11 @@ def round_contacts(size_a: np.ndarray, pa: np.ndarray, ra: np.ndarray, kind_b: i
     if gap - radius > margin:
         return 0
     name, count = 2.0, 0
-    if half > 0:
+    if gap < 0 and kind_b >= BOX and half > 0:
+        gap, nx, ny, nz = widest_axis(CAPSULE, size_a, ra, kind_b, size_b, rb, pa[0] - pb[0],
+                                      pa[1] - pb[1], pa[2] - pb[2])
+        nx, ny, nz = into(rb, nx, ny, nz)
+    elif half > 0:
         lo, hi = _shadow(kind_b, size_b, px, py, pz, ux, uy, uz, half, nx, ny, nz)
         if hi - lo > APART * radius:
             for k in range(2):

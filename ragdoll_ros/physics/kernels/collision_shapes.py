@@ -43,25 +43,29 @@ def bound(kind: int, size: np.ndarray) -> float:
 
 @compiled
 def extent(kind: int, size: np.ndarray, r: np.ndarray, x: float, y: float, z: float) -> float:
-    """How far, m, a box or a cylinder reaches from its centre along a unit vector of the world."""
+    """How far, m, a shape reaches from its centre along a unit vector of the world.
+
+    Of a capsule its axis alone: what is around it is the same along all vectors.
+    """
     x, y, z = into(r, x, y, z)
     if kind == BOX:
         return size[0] * abs(x) + size[1] * abs(y) + size[2] * abs(z)
+    if kind == CAPSULE:
+        return size[1] * abs(z)
     return size[0] * math.sqrt(x * x + y * y) + size[1] * abs(z)
 
 
 @compiled
 def support(kind: int, size: np.ndarray, r: np.ndarray, x: float, y: float,
             z: float) -> tuple[float, float, float]:
-    """The point of a box or a cylinder, from its centre, that is farthest along a vector."""
+    """The point of a shape, from its centre, that is farthest along a vector; see extent."""
     x, y, z = into(r, x, y, z)
     if kind == BOX:
         return out_of(r, math.copysign(size[0], x), math.copysign(size[1], y),
                       math.copysign(size[2], z))
     across = math.sqrt(x * x + y * y)
-    if across > 0:
-        x, y = x * size[0] / across, y * size[0] / across
-    return out_of(r, x, y, math.copysign(size[1], z))
+    radius = 0.0 if kind == CAPSULE or across == 0 else size[0] / across
+    return out_of(r, x * radius, y * radius, math.copysign(size[1], z))
 
 
 @compiled
