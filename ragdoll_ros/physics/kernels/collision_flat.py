@@ -24,7 +24,11 @@ MERGED = 1e-3
 """Points that are nearer to each other than this part of the smaller body's size are one."""
 
 ALIKE = 1e-10
-"""By how much the cosine of b's face must be larger for it to be the reference instead of a's."""
+"""Faces whose cosines differ by less do not differ: a is the reference, or else a box."""
+
+AGREED = 1e-10
+"""m: by how much the deepest contact may differ from the depth of the bodies, where the axis is not
+that of a face; where it is, it may be as far from the best as the bias allows."""
 
 TOUCH = 2 * CORNERS * 2 * CORNERS - 1
 """Name of the contact at the nearest points, which no two sides of outlines have."""
@@ -54,21 +58,22 @@ def flat_contacts(kind_a: int, size_a: np.ndarray, pa: np.ndarray, ra: np.ndarra
     work = np.empty((2 * ROOM + CORNERS, 5))
     found, corners = work[ROOM:2 * ROOM], work[2 * ROOM:]
     face_a, face_b = squareness(kind_a, ra, x, y, z), squareness(kind_b, rb, x, y, z)
-    flat = max(face_a, face_b) >= STRAIGHT
+    square = max(face_a, face_b)
+    exact = square > 1 - ALIKE
     # what is clipped is drawn first, the reference second
     first, second = (kind_b, size_b, rb, 0.0, 0.0, 0.0), (kind_a, size_a, ra, cx, cy, cz)
     sign = -1.0
-    if face_b > face_a + ALIKE:
+    if face_b > face_a + (ALIKE if kind_a == BOX else -ALIKE):
         first, second, sign = second, first, 1.0
-    if flat:
+    if square >= STRAIGHT:
         count = _faces(*first, *second, x, y, z, sign, work[:ROOM], found, corners)
     else:
         count = _lines(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, x, y, z, found)
     least = math.inf
     for i in range(count):
         least = min(least, found[i, 4])
-    if least > s + BIAS + BIAS_PART * abs(s):
-        if flat:
+    if least > s + (BIAS + BIAS_PART * abs(s) if exact else AGREED):
+        if exact:
             _corner(*first, s, x, y, z, sign, found[count])
         else:
             _crossing(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, s, x, y, z, found[count])
@@ -93,9 +98,11 @@ def _faces(other_kind: int, other_size: np.ndarray, other_r: np.ndarray, ox: flo
 
     c and o are the centres from b's. Rows (k, 5) of ``found``: place, name, gap.
     """
-    number, cut = outline(
-        other_kind, other_size, other_r, -sign * nx, -sign * ny, -sign * nz, rows)
-    count, face = outline(kind, size, r, sign * nx, sign * ny, sign * nz, corners)
+    tx, ty, tz = support(other_kind, other_size, other_r, -sign * nx, -sign * ny, -sign * nz)
+    number, cut = outline(other_kind, other_size, other_r, -sign * nx, -sign * ny, -sign * nz,
+                          0.0, 0.0, 0.0, rows)
+    count, face = outline(kind, size, r, sign * nx, sign * ny, sign * nz,
+                          ox + tx - cx, oy + ty - cy, oz + tz - cz, corners)
     for i in range(number):
         rows[i, 0] += ox - cx
         rows[i, 1] += oy - cy

@@ -18,12 +18,13 @@ CORNERS = 8
 
 
 @compiled
-def outline(kind: int, size: np.ndarray, r: np.ndarray, x: float, y: float, z: float,
-            corners: np.ndarray) -> tuple[int, int]:
+def outline(kind: int, size: np.ndarray, r: np.ndarray, x: float, y: float, z: float, tx: float,
+            ty: float, tz: float, corners: np.ndarray) -> tuple[int, int]:
     """Put the corners (k, 3), from the centre, world, of what a body shows along the unit vector.
 
     Gives k (4: face, 8: cap, 2: line) and the face's number. A cap has the corners of a regular
-    octagon, but that the one next to the place that is farthest along the vector stands there.
+    octagon, but that the one next to the place that is farthest along the vector stands there; if
+    none is, the one next to the way ``t``.
     """
     x, y, z = into(r, x, y, z)
     if kind == BOX:
@@ -34,6 +35,9 @@ def outline(kind: int, size: np.ndarray, r: np.ndarray, x: float, y: float, z: f
         corners[0, 0], corners[0, 1], corners[0, 2] = out_of(r, a, b, -size[1])
         corners[1, 0], corners[1, 1], corners[1, 2] = out_of(r, a, b, size[1])
         return 2, 2
+    if across < 1e-9:
+        x, y, _ = into(r, tx, ty, tz)
+        across = math.sqrt(x * x + y * y)
     deepest = round(math.atan2(y, x) * CORNERS / (2 * math.pi)) % CORNERS
     for k in range(CORNERS):
         a, b = math.cos(2 * math.pi * k / CORNERS), math.sin(2 * math.pi * k / CORNERS)
