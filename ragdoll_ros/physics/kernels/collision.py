@@ -40,7 +40,7 @@ def collide(kind_a: int, size_a: np.ndarray, pa: np.ndarray, ra: np.ndarray, kin
             kind_b, size_b, pb, rb, kind_a, size_a, pa, ra)
         sign = -1.0
     if kind_a <= CAPSULE:
-        return round_contacts(size_a, pa, ra, kind_b, size_b, pb, rb, margin, sign, out)
+        return round_contacts(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb, margin, sign, out)
     return flat_contacts(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb, margin, out)
 
 
@@ -57,7 +57,7 @@ def separation(kind_a: int, size_a: np.ndarray, pa: np.ndarray, ra: np.ndarray, 
         kind_a, size_a, pa, ra, kind_b, size_b, pb, rb = (
             kind_b, size_b, pb, rb, kind_a, size_a, pa, ra)
     if kind_a <= CAPSULE:
-        return round_separation(size_a, pa, ra, kind_b, size_b, pb, rb)
+        return round_separation(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb)
     s, _, _, _ = widest_axis(kind_a, size_a, ra, kind_b, size_b, rb, pa[0] - pb[0], pa[1] - pb[1],
                              pa[2] - pb[2])
     return s

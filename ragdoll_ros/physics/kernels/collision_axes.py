@@ -36,6 +36,9 @@ SHRUNK = 0.98
 BETWEEN = 1e-3
 """Of the bodies' size: what is put between them to find the nearest points."""
 
+FAR = 1e9
+"""m: more than any two bodies reach into each other."""
+
 ROUGH, CLOSE = 1e-2, 1e-10
 """What part of the nearest points' distance may be wrong, at first and in the end."""
 
@@ -54,17 +57,17 @@ def along(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b: 
 
 @compiled
 def best_axis(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b: np.ndarray,
-              rb: np.ndarray, cx: float, cy: float, cz: float, biased: bool, enough: float) -> Axis:
+              rb: np.ndarray, cx: float, cy: float, cz: float, bias: float, enough: float) -> Axis:
     """The axis of the largest s among normals of faces and cross products of edges. a may be the
     axis of a capsule, which is an edge.
 
-    If ``biased`` a's faces come before b's and these before edges.
+    With a ``bias`` of 1, not 0, a's faces come before b's and these before edges.
     The first that is larger than ``enough`` will do.
     """
-    s, x, y, z = -math.inf, 0.0, 0.0, 0.0
+    s, x, y, z = -FAR, 0.0, 0.0, 0.0
     first_a, first_b = 0 if kind_a == BOX else 2, 0 if kind_b == BOX else 2
     faces_a = 3 if kind_a == CAPSULE else first_a
-    bar = -math.inf
+    bar = -FAR
     for body in range(2):
         r = ra if body == 0 else rb
         for k in range(faces_a if body == 0 else first_b, 3):
@@ -74,7 +77,7 @@ def best_axis(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size
                 s, x, y, z = found, nx, ny, nz
                 if s > enough:
                     return s, x, y, z
-        bar = s + BIAS + BIAS_PART * abs(s) if biased else s
+        bar = s + bias * (BIAS + BIAS_PART * abs(s))
     for i in range(first_a, 3):
         for j in range(first_b, 3):
             nx = ra[1, i] * rb[2, j] - ra[2, i] * rb[1, j]
@@ -106,7 +109,8 @@ def refined(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b
             rb: np.ndarray, cx: float, cy: float, cz: float, s: float, x: float, y: float,
             z: float) -> Axis:
     """The axis of the largest s of all, from the best of some axes."""
-    points, count = np.empty((4, 6)), 0
+    # a bare 0 is a type of its own to numba, for which it would compile all once more
+    points, count = np.empty((4, 6)), np.int64(0)
     gap = BETWEEN * (bound(kind_a, size_a) + bound(kind_b, size_b))
     if s < 0:
         count, ax, ay, az = _outward(
@@ -133,7 +137,7 @@ def widest_axis(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, si
                 rb: np.ndarray, cx: float, cy: float, cz: float) -> Axis:
     """The axis of the largest s of all."""
     s, x, y, z = best_axis(
-        kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, False, math.inf)
+        kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, 0.0, math.inf)
     if kind_a == CYLINDER or kind_b == CYLINDER:
         return refined(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, s, x, y, z)
     return s, x, y, z
@@ -144,7 +148,7 @@ def _outward(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_
              rb: np.ndarray, cx: float, cy: float, cz: float, x: float, y: float, z: float,
               points: np.ndarray) -> Direction:
     """Along which axis bodies that grow about their centres meet: Dinkelbach's iteration."""
-    most, count = 0.0, 0
+    most, count = 0.0, np.int64(0)
     bx, by, bz = x, y, z
     for _ in range(6):
         way = cx * x + cy * y + cz * z

@@ -38,7 +38,7 @@ TOUCH = 2 * CORNERS * 2 * CORNERS - 1
 def _axis(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b: np.ndarray,
           rb: np.ndarray, cx: float, cy: float, cz: float, margin: float) -> Axis:
     """The axis to touch along: a face's unless another is clearly better."""
-    s, x, y, z = best_axis(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, True, margin)
+    s, x, y, z = best_axis(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, 1.0, margin)
     if s <= margin and (kind_a == CYLINDER or kind_b == CYLINDER):
         t, a, b, c = refined(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, s, x, y, z)
         if t > s + BIAS + BIAS_PART * abs(s):

@@ -120,7 +120,7 @@ def _shadow(kind: int, size: np.ndarray, px: float, py: float, pz: float, ux: fl
 
 
 @compiled
-def round_separation(size_a: np.ndarray, pa: np.ndarray, ra: np.ndarray, kind_b: int,
+def round_separation(kind_a: int, size_a: np.ndarray, pa: np.ndarray, ra: np.ndarray, kind_b: int,
                      size_b: np.ndarray, pb: np.ndarray, rb: np.ndarray) -> float:
     """Signed distance, m, of a sphere or capsule a from any shape b."""
     px, py, pz = into(rb, pa[0] - pb[0], pa[1] - pb[1], pa[2] - pb[2])
@@ -128,13 +128,13 @@ def round_separation(size_a: np.ndarray, pa: np.ndarray, ra: np.ndarray, kind_b:
     t = nearest_ball(kind_b, size_b, px, py, pz, ux, uy, uz, size_a[1])
     gap, _, _, _ = distance(kind_b, size_b, px + t * ux, py + t * uy, pz + t * uz, ux, uy)
     if gap < 0 and kind_b >= BOX and size_a[1] > 0:
-        gap, _, _, _ = widest_axis(CAPSULE, size_a, ra, kind_b, size_b, rb, pa[0] - pb[0],
+        gap, _, _, _ = widest_axis(kind_a, size_a, ra, kind_b, size_b, rb, pa[0] - pb[0],
                                    pa[1] - pb[1], pa[2] - pb[2])
     return gap - size_a[0]
 
 
 @compiled
-def round_contacts(size_a: np.ndarray, pa: np.ndarray, ra: np.ndarray, kind_b: int,
+def round_contacts(kind_a: int, size_a: np.ndarray, pa: np.ndarray, ra: np.ndarray, kind_b: int,
                    size_b: np.ndarray, pb: np.ndarray, rb: np.ndarray, margin: float, sign: float,
                    out: np.ndarray) -> int:
     """Contacts of a sphere or capsule a with any shape b; ``sign`` -1 turns the normals round.
@@ -151,7 +151,7 @@ def round_contacts(size_a: np.ndarray, pa: np.ndarray, ra: np.ndarray, kind_b: i
         return 0
     name, count = 2.0, 0
     if gap < 0 and kind_b >= BOX and half > 0:
-        gap, nx, ny, nz = widest_axis(CAPSULE, size_a, ra, kind_b, size_b, rb, pa[0] - pb[0],
+        gap, nx, ny, nz = widest_axis(kind_a, size_a, ra, kind_b, size_b, rb, pa[0] - pb[0],
                                       pa[1] - pb[1], pa[2] - pb[2])
         nx, ny, nz = into(rb, nx, ny, nz)
     elif half > 0:
