@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import rotation
+from . import errors, rotation
 from .ragdoll import Limits, Ragdoll
 
 UNLIMITED: Limits = (-math.inf, math.inf)
@@ -37,18 +37,21 @@ class DofLayout:
         plain_v: list[int] = []
         roots: list[tuple[int, int]] = []
         balls: list[tuple[int, int]] = []
+        self._angles: list[slice] = []
+        """Where in q each joint stands, in the order of Scene.angle_names."""
         v = 0
         self.own_q: list[slice] = []
         self.own_v: list[slice] = []
         """What of q and of v is each doll's."""
         for doll in dolls:
-            q, first_v = len(bounds), v
+            q, first_v, at = len(bounds), v, {}
             plain_q += range(q, q + 3)
             plain_v += range(v, v + 3)
             roots.append((q + 3, v + 3))
             bounds += [UNLIMITED] * 7
             v += 6
             for joint in doll.joints_depth_first():
+                at[joint.child] = len(bounds)
                 if joint.is_free_ball:
                     balls.append((len(bounds), v))
                     bounds += [UNLIMITED] * 4
@@ -57,6 +60,8 @@ class DofLayout:
                     plain_v += range(v, v + joint.dof)
                     bounds += [pair or UNLIMITED for pair in joint.angle_limits]
                 v += joint.dof
+            self._angles += [slice(at[joint.child], at[joint.child] + (
+                4 if joint.is_free_ball else joint.dof)) for joint in doll.joints]
             self.own_q.append(slice(q, len(bounds)))
             self.own_v.append(slice(first_v, v))
         self.sizes = (len(bounds), v)
@@ -101,6 +106,11 @@ class DofLayout:
         q[at] = rotation.normalized(q[at])
         return q
 
+    def check_orientations(self, q: np.ndarray) -> None:
+        """Raise NotUnit for a quaternion of length zero."""
+        if (np.linalg.norm(q[self._turning[0]], axis=1) < 1e-9).any():
+            raise errors.NotUnit('coordinates', 0.0, 'quaternions x, y, z, w, not zero')
+
     def integrate_configuration(self, coordinates: GeneralizedState,
                                 displacement: np.ndarray) -> GeneralizedState:
         """The coordinates after a small displacement (nv,), m and rad along the directions of v."""
@@ -112,6 +122,13 @@ class DofLayout:
         q[at[:roots]] = rotation.multiply(turns[:roots], q[at[:roots]])
         q[at[roots:]] = rotation.multiply(q[at[roots:]], turns[roots:])
         return GeneralizedState(q, coordinates.v)
+
+    def joint_angles(self, q: np.ndarray) -> np.ndarray:
+        """All joint angles, rad, in the order of Scene.angle_names; of a free ball joint those
+        about x, then y, then z.
+        """
+        return np.array([angle for at in self._angles for angle in (
+            rotation.to_xyz(q[at]) if at.stop - at.start == 4 else q[at])])
 
     def past_limits(self, q: np.ndarray) -> np.ndarray:
         """Angles (k,) rad by which the limited joints are past their limits; negative inside."""
