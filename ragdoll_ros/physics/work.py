@@ -44,10 +44,10 @@ def work(load: AppliedWrench, before: State, after: State, duration: float,
     the torque through its bone's rotation.
 
     A step that takes the velocity first (semi-implicit Euler, ``substep`` h s long) moves a point
-    by h v' where its energy grows by F (v + v') h / 2: the difference adds up to F (v_end - v_start) h /
-    2 and is left out. Where the load turns with its bone, what it does beyond mean times
-    displacement is that of two even changes, t dF dv / 12. Turns are no vectors: the integral of w
-    is the turn's plus t^2 / 12 w_start x w_end (Magnus).
+    by h v' where its energy grows by F (v + v') h / 2: the difference adds up to
+    F (v_end - v_start) h / 2 and is left out. Where the load turns with its bone, what it does
+    beyond mean times displacement is that of two even changes, t dF dv / 12. Turns are no vectors:
+    the integral of w is the turn's plus t^2 / 12 w_start x w_end (Magnus).
     """
     bone = load.bone
     force, torque = mean_load(load, before, after)

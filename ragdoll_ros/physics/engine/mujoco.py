@@ -142,6 +142,9 @@ class MujocoEngine(SubsteppedEngine):
         self._mujoco.mj_setState(self._model, self._data, held, kind)
         self._stale = True
 
+    def _forget(self, held: object) -> None:
+        """Nothing to give back: the memory goes with the object."""
+
     def _build(self) -> None:
         mujoco = self._mujoco
         self._model = mujoco.MjModel.from_xml_string(to_mjcf(self.scene, self._apart))

@@ -90,6 +90,7 @@ class SubsteppedEngine(ABC):
         here = self.coordinates
         self._put(GeneralizedState(here.q, np.zeros_like(here.v)))
         self._account.lower(self.motion.energy)
+        self._taken = 0
 
     def grounded(self) -> bool:
         """Whether anything touches the ground."""
@@ -188,5 +189,5 @@ class SubsteppedEngine(ABC):
     @abstractmethod
     def _restore(self, held: object) -> None: ...
 
-    def _forget(self, held: object) -> None:
-        """Nothing to give back: the memory goes with the object."""
+    @abstractmethod
+    def _forget(self, held: object) -> None: ...

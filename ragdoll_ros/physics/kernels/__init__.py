@@ -1,5 +1,4 @@
-"""Machine code, made by numba, and nothing else; where numba does not work, nothing of it is used.
-"""
+"""Machine code, made by numba, and nothing else; who needs it asks first whether it can be made."""
 from __future__ import annotations
 
 import functools
