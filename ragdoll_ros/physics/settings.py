@@ -5,10 +5,6 @@ from dataclasses import dataclass
 
 from ..model import errors
 
-HUMAN = 1.4
-"""m: extent of the default doll, for which Accuracy's substeps are counted. What is smaller falls
-and rolls by its own size sooner, as the root of its size."""
-
 
 @dataclass(frozen=True)
 class Accuracy:
@@ -18,8 +14,8 @@ class Accuracy:
     """s: the rigid engine's longest step while something touches."""
     flight_error: float
     """m or rad by which the end of a step of its flight may err, by its own estimate."""
-    substeps: int
-    """Of PyBullet and MuJoCo in 10 ms."""
+    substeps: float
+    """Of PyBullet and MuJoCo in 10 ms; a stretch has a whole number of them, not fewer."""
     sleep: bool = True
     """Stop the engine when all is at rest."""
     energy: bool = True

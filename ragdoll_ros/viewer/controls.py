@@ -9,8 +9,8 @@ import viser
 
 from ..files.config import scene_names
 from ..model.errors import RagdollError
-from ..physics.engine.registry import ENGINES
 from ..physics.arrow_keys import Held, total
+from ..physics.engine.registry import ENGINES
 from .sources.source import Report, Source
 
 ARROWS = {'←': 'left', '↑': 'up', '↓': 'down', '→': 'right'}

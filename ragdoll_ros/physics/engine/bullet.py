@@ -249,6 +249,7 @@ class BulletEngine(SubsteppedEngine):
 
     @property
     def _accounts(self) -> bool:
+        """Whether energy and momentum are kept."""
         return self.accuracy.energy and self._projection is not None
 
     def _step(self, duration: float, substeps: int) -> None:
@@ -275,7 +276,6 @@ class BulletEngine(SubsteppedEngine):
                   touched: set[tuple[int, int]]) -> None:
         """Keep the momentum of what was in the air, and take out energy from nothing."""
         if not self._accounts:
-            super()._conserve(before, duration, loads, touched)
             return
         projection, account = self._projection, self._account
         outside = np.isin(np.arange(len(self._dolls)), [doll for pair in touched for doll in pair])

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -12,14 +13,15 @@ from ...model.state import State
 from ..account import Account
 from ..ground_heights import ground_heights
 from ..motion import Motion
-from ..settings import HUMAN, Accuracy
+from ..settings import Accuracy
 from ..sums import DollSums
 from ..work import longest_stretch, work
 from .protocol import GROUND, Springs, Wrenches, pressed
 from .pull import LONGEST, Pull, pulls
 
 SPAN = 0.01
-"""s for which Accuracy counts substeps, and the longest stretch that is accounted for at once."""
+"""s for which Accuracy counts substeps, and the longest stretch of which work or an account is
+taken."""
 
 LEAST_SHARE = 0.01
 """Of what is asked for: stretches under loads are no shorter, however fast the bone spins."""
@@ -38,8 +40,6 @@ class SubsteppedEngine(ABC):
         self.scene, self.accuracy = scene, accuracy
         self.layout = DofLayout([placement.doll for placement in scene.dolls])
         self._sums = DollSums(scene)
-        smallest = min(placement.doll.extent for placement in scene.dolls)
-        self._span = SPAN * min(1.0, math.sqrt(smallest / HUMAN))
         self._taken = 0
         """Substeps that the last advance took."""
         self._changed()
@@ -78,8 +78,7 @@ class SubsteppedEngine(ABC):
         """Go on by ``duration`` s; see Engine."""
         self._taken, least, left = 0, LEAST_SHARE * duration, duration
         while left > 1e-12 * duration:
-            longest = max(least, min([SPAN, *(LONGEST for _ in springs), *(longest_stretch(
-                wrench, self.state, self._sums.inertias[wrench.bone]) for wrench in wrenches)]))
+            longest = max(least, min(left, *self._steady(wrenches, springs)))
             length = left / math.ceil(left / longest - 1e-6)
             self._stretch(length, [*wrenches, *pulls(springs, self._sums, self.state, length)])
             springs = [spring.after(length) for spring in springs]
@@ -115,10 +114,22 @@ class SubsteppedEngine(ABC):
         """Release what a snapshot holds."""
         self._forget(snapshot[0])
 
+    @property
+    def _accounts(self) -> bool:
+        """Whether an account is closed after each stretch."""
+        return False
+
+    def _steady(self, wrenches: Wrenches, springs: Springs) -> Iterator[float]:
+        """For how long loads may be taken as steady, and an account may wait, s."""
+        yield SPAN if wrenches or springs or self._accounts else math.inf
+        yield LONGEST if springs else math.inf
+        for wrench in wrenches:
+            yield longest_stretch(wrench, self.state, self._sums.inertias[wrench.bone])
+
     def _stretch(self, duration: float, loads: Wrenches) -> None:
         """Go through substeps under steady loads, and enter their work."""
         before, substeps = self.state, max(self._least_substeps(duration), math.ceil(
-            self.accuracy.substeps * duration / self._span - 1e-6))
+            self.accuracy.substeps * duration / SPAN - 1e-6))
         touched = self._run(duration, substeps, loads)
         self._taken += substeps
         self._changed()
@@ -130,8 +141,7 @@ class SubsteppedEngine(ABC):
 
     def _conserve(self, before: State, duration: float, loads: Wrenches,
                   touched: set[tuple[int, int]]) -> None:
-        """Close the account of a stretch in which pairs of dolls ``touched``."""
-        self._account.lower(self.motion.energy)
+        """Close the account of a stretch in which pairs of dolls ``touched``, if one is kept."""
 
     def _lift_out(self) -> None:
         """Set dolls that are in the ground onto it: else they stay, or are thrown out."""
