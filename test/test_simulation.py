@@ -13,9 +13,7 @@ from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.coordinates import GeneralizedState
 from ragdoll_ros.model.push import Push
-from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
-from ragdoll_ros.model.scene import Placement, Scene, height
-from ragdoll_ros.model.shapes import Sphere
+from ragdoll_ros.model.scene import height
 from ragdoll_ros.physics import kernels
 from ragdoll_ros.physics.simulation import Simulation
 
@@ -204,13 +202,3 @@ def test_coordinates_are_taken_as_they_come_and_are_left_to_their_owner():
         begun = simulation.place(GeneralizedState(wide[::2], still)).positions.copy()
         wide[:] = 7.0
         assert simulation.advance().positions == pytest.approx(begun, abs=1e-12)
-
-
-def test_more_joints_than_pybullet_tells_of_are_refused():
-    """Of 128 coordinates at the most: of a chain of 31 free balls it would drop some silently."""
-    balls = tuple(Bone(f'b{k}', Sphere(0.04), 0.1, (0.1 * k, 0.0, 0.0)) for k in range(32))
-    joints = tuple(Joint(f'b{k}', f'b{k + 1}', 'ball', (0.1 * k + 0.05, 0.0, 0.0),
-                         ((1.0, 0.0, 0.0),)) for k in range(31))
-    scene = Scene('chain', (Placement(Ragdoll('chain', balls, joints)),), ground=None)
-    with pytest.raises(errors.OutOfRange, match='at most 128'):
-        Simulation(scene)

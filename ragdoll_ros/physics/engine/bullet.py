@@ -275,8 +275,6 @@ class BulletEngine(SubsteppedEngine):
     def _conserve(self, before: State, duration: float, loads: Wrenches,
                   touched: set[tuple[int, int]]) -> None:
         """Keep the momentum of what was in the air, and take out energy from nothing."""
-        if not self._accounts:
-            return
         projection, account = self._projection, self._account
         outside = np.isin(np.arange(len(self._dolls)), [doll for pair in touched for doll in pair])
         if not outside.all():

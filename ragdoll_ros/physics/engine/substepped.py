@@ -137,11 +137,13 @@ class SubsteppedEngine(ABC):
             joules = work(load, before, self.state, duration,
                           duration / substeps if self.lags else 0.0)
             self._account.add_work(self._sums.doll_of[load.bone], joules, isinstance(load, Pull))
-        self._conserve(before, duration, loads, touched)
+        if self._accounts:
+            self._conserve(before, duration, loads, touched)
 
     def _conserve(self, before: State, duration: float, loads: Wrenches,
                   touched: set[tuple[int, int]]) -> None:
-        """Close the account of a stretch in which pairs of dolls ``touched``, if one is kept."""
+        """Close the account of a stretch in which pairs of dolls ``touched``, where one is kept."""
+        raise NotImplementedError
 
     def _lift_out(self) -> None:
         """Set dolls that are in the ground onto it: else they stay, or are thrown out."""
