@@ -74,12 +74,11 @@ setup(
     ],
     cmdclass={'build_py': BuildWithConfig, 'install_data': InstallDataWithLaunchers},
     entry_points={'console_scripts': [f'{name} = {place}' for name, place in EXECUTABLES.items()]},
-    install_requires=['numpy', 'pyyaml', 'jsonschema', 'pybullet'],
+    # numba 0.59 is the first for Ubuntu 24.04's Python.
+    install_requires=['numpy', 'pyyaml', 'jsonschema', 'pybullet', 'numba>=0.59'],
     extras_require={
         'ros': ['ros-jazzy-rclpy', 'ros-jazzy-rmw-fastrtps-cpp', 'ros-jazzy-common-interfaces'],
-        # Machine code for the sums of every tick; 0.59 is the first for Ubuntu 24.04's Python.
-        'fast': ['numba>=0.59'],
-        'report': ['scipy', 'matplotlib', 'mujoco', 'numba>=0.59'],
+        'report': ['scipy', 'matplotlib', 'mujoco'],
         'fit': ['matplotlib'],
         # The page: 3D, panels and plots in a browser, served from Python, with no build of its own.
         'viewer': ['viser', 'imageio'],

@@ -197,5 +197,5 @@ def test_every_engine_starts_where_the_scene_says_and_falls(engine):
 
 
 def test_an_unknown_engine_is_named():
-    with pytest.raises(errors.OutOfRange, match='steam.*rigid'):
+    with pytest.raises(errors.OutOfRange, match=r'steam.*rigid'):
         Simulation(FLIGHT, engine='steam')

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import functools
+import os
 
 ORDER = 8
 """Of the method that flies in compiled code."""
@@ -10,12 +11,14 @@ ORDER = 8
 @functools.cache
 def problem() -> str:
     """Why there is no machine code, in words; empty where it can be made."""
+    if os.environ.get('NUMBA_DISABLE_JIT', '0') not in ('', '0'):
+        return 'NUMBA_DISABLE_JIT is set'
     try:
-        import numba
-    except Exception as error:  # whatever a numba raises that fits neither numpy nor Python
+        import numba  # noqa: F401
+    except Exception as error:  # whatever one raises that fits neither numpy nor Python
         return ('numba is missing' if getattr(error, 'name', None) == 'numba'
                 else f'numba does not work here: {error}')
-    return 'numba is told not to compile' if numba.config.DISABLE_JIT else ''
+    return ''
 
 
 def ready() -> bool:
