@@ -91,7 +91,7 @@ class Diagnostics:
         return {
             **self._last,
             'engine': simulation.engine_name,
-            **({'engine_reason': simulation.engine_reason} if simulation.engine_reason else {}),
+            'engine_reason': simulation.engine_reason,
             'simulated_time': simulation.time / SECOND,
             'push': pushes_text(simulation.pushes),
             **self._facts(),
