@@ -131,8 +131,8 @@ class Controls:
                   lambda: self._show_engine(self.source.report.engine))
 
     def _show_engine(self, name: str) -> None:
-        if name in ENGINES:
-            self._loop.call_soon_threadsafe(setattr, self.engine, 'value', name)
+        shown = name if name in ENGINES else ENGINES[0]
+        self._loop.call_soon_threadsafe(setattr, self.engine, 'value', shown)
 
     def _load(self, name: str, client: viser.ClientHandle) -> None:
         self._ask(client, lambda: self.source.load(name),
