@@ -11,6 +11,7 @@ from samples import GRAVITY, every_kind, random_coordinates
 
 from ragdoll_ros.accuracy.references.articulated import Articulated
 from ragdoll_ros.files.doll import load_doll
+from ragdoll_ros.files.mjcf import damping_ratio
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
@@ -159,3 +160,33 @@ def _stepped(engine):
 def test_an_unknown_integrator_is_named():
     with pytest.raises(errors.OutOfRange, match='leapfrog'):
         MujocoEngine(flying(load_doll('doll')), NORMAL, integrator='leapfrog')
+
+
+@pytest.mark.parametrize('restitution', [.2, .5, .8, .95])
+def test_a_contact_lets_go_with_the_restitution_it_is_built_for(restitution):
+    """A mass on a spring and a damper that only push, step by step, against the speed it came with.
+
+    A contact of time constant 2 / b and damping ratio z has the stiffness of a critical one by z^2.
+    """
+    ratio = damping_ratio(restitution)
+    damping, way, speed, h = 1.0, 0.0, -1.0, 1e-4
+    while True:
+        push = -damping * speed - way * (damping / (2 * ratio)) ** 2
+        if push <= 0:
+            break
+        speed += h * push
+        way += h * speed
+    assert speed == pytest.approx(restitution, abs=1e-3)
+
+
+def test_a_ball_bounces_in_mujoco_as_high_as_it_is_to():
+    """By the ratio of speeds, to 10 %, at ten substeps."""
+    ball = Ragdoll('ball', (Bone('ball', Sphere(.1), 1.0, (0, 0, 0)),))
+    scene = Scene('bounce', (Placement(ball, position=(0, 0, .8)),), Ground(),
+                  Material(restitution=.5))
+    engine, heights = MujocoEngine(scene, NORMAL), []
+    for _ in range(120):
+        engine.advance(.01)
+        heights.append(engine.state.positions[0, 2] - .1)
+    first = int(np.argmin(heights[:60]))
+    assert np.sqrt(max(heights[first:]) / .7) == pytest.approx(.5, abs=.05)
