@@ -60,8 +60,7 @@ class InstallDataWithLaunchers(Distribution().get_command_class('install_data'))
 setup(
     name=NAME,
     version='0.1.0',
-    description='A passive doll simulated in PyBullet: takes pushes, publishes the pose of every '
-                'bone.',
+    description='A passive doll of rigid bodies: takes pushes, publishes the pose of every bone.',
     license='Apache-2.0',
     maintainer='ragdoll_ros maintainers',
     maintainer_email='maintainers@users.noreply.github.com',
