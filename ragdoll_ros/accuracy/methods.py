@@ -16,7 +16,7 @@ from ..physics import kernels
 from ..physics.engine.bullet import BulletEngine
 from ..physics.engine.mujoco import MujocoEngine
 from ..physics.engine.protocol import Engine
-from ..physics.settings import ACCURACIES, Accuracy
+from ..physics.settings import ACCURACIES, NORMAL, Accuracy
 from ..physics.simulation import Simulation
 from .quickstart import STEP as QUICKSTART_STEP
 from .quickstart import Quickstart
@@ -70,20 +70,20 @@ class _FixedSteps:
     """An engine driven with the same number of substeps in each tick."""
 
     def __init__(self, trial: Trial, substeps: int, make: Callable[..., Engine]) -> None:
-        self._trial, self._substeps = trial, substeps
-        self._engine = make(trial.scene)
+        self._trial = trial
         self._tick, self._count = trial.scene.step, 0
+        self._engine = make(trial.scene, plain(substeps, self._tick))
         if trial.start is not None:
             self._engine.place(trial.start)
 
     @property
     def state(self) -> State:
-        return self._engine.read()
+        return self._engine.state
 
     def advance(self) -> State:
         begin = self._count * self._tick
         loads = self._trial.loads(begin, begin + self._tick) if self._trial.pushes else ()
-        self._engine.step(self._tick, self._substeps, loads)
+        self._engine.advance(self._tick, loads)
         self._count += 1
         return self.state
 
@@ -91,9 +91,14 @@ class _FixedSteps:
         self._engine.close()
 
 
-def simulated(trial: Trial, accuracy: str | Accuracy) -> Simulation:
+def plain(substeps: int, tick: float) -> Accuracy:
+    """So many substeps in a tick, s, and nothing else."""
+    return dataclasses.replace(NORMAL, substeps=substeps * 0.01 / tick, energy=False, sleep=False)
+
+
+def simulated(trial: Trial, accuracy: str | Accuracy, engine: str = 'auto') -> Simulation:
     """A trial's simulation, as the node runs it."""
-    simulation = Simulation(trial.scene, accuracy=accuracy)
+    simulation = Simulation(trial.scene, accuracy=accuracy, engine=engine)
     if trial.start is not None:
         simulation.place(trial.start)
     for push in trial.pushes:
@@ -125,13 +130,12 @@ def median_run(method: Method, trial: Trial, repeats: int) -> Result:
     return dataclasses.replace(results[0], costs=costs)
 
 
-def ours(accuracy: str | Accuracy, name: str | None = None) -> Method:
+def ours(accuracy: str | Accuracy, name: str | None = None, engine: str = 'auto') -> Method:
     """Our simulation at one of its settings, or with settings of one's own."""
     name = name or f'ours-{accuracy}'
-    order = (ACCURACIES[accuracy] if isinstance(accuracy, str) else accuracy).order
-    order = kernels.ORDER if order and kernels.ready() else order or 1
+    order = kernels.ORDER if engine == 'auto' and kernels.ready() else 1
     return Method(name, name.replace('-', ' '), 'ours', functools.partial(
-        simulated, accuracy=accuracy), order=order)
+        simulated, accuracy=accuracy, engine=engine), order=order)
 
 
 def quickstart() -> Method:

@@ -177,9 +177,7 @@ SECTIONS = (
     Section('switches', 'The mechanisms one by one',
             'The setting normal with one thing switched off.', body=switch_tables),
     Section('projection', 'The price of keeping energy and momentum',
-            'What the corrections cost in time, and what they change in the error, each motion at '
-            'each setting. In the air they are for what the engine steps; without Runge-Kutta it '
-            'steps all. What slides or rolls is moved by the mean of its velocities (centred).', (
+            'What the account of engine bullet costs in time, and what it changes in the error.', (
                 ('motion', 'motion', '{}'), ('accuracy', 'setting', '{}'),
                 ('switched', 'switched off', '{}'), ('cpu_s_per_s', 'CPU ms/s', 'ms'),
                 ('position_worst_m', 'position m', '{:.2e}'),

@@ -33,10 +33,7 @@ OTHERS = ('quickstart', f'bullet-{BASELINE}', 'bullet-20', 'mujoco-implicitfast-
 QUICK_CLASSES = ('push .1 to 3 s', 'spin 20 rad/s', 'drop 2 m', 'start outside')
 
 MECHANISMS: dict[str, dict[str, object]] = {
-    'all on': {}, 'flight by the engine': {'order': 0}, 'a flight step each tick': {'longest': 0.0},
-    'no landing on limits': {'land': False}, 'fixed substeps': {'adaptive': False},
-    'no redo': {'redo': math.inf}, 'energy let be': {'energy': False},
-    'momentum let be': {'momentum': False}, 'no sleep': {'sleep': False}}
+    'all on': {}, 'no sleep': {'sleep': False}}
 """What is switched off, in words and as fields of Accuracy."""
 
 

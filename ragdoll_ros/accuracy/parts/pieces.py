@@ -15,7 +15,7 @@ from ...files.scene import load_scene
 from ...model.coordinates import GeneralizedState
 from ...physics.engine.bullet import BulletEngine
 from ..measure import Measure, compare
-from ..methods import bullet, by_name, mujoco, run
+from ..methods import bullet, by_name, mujoco, plain, run
 from ..runner import Job, Options, Row
 from ..trial import Trial
 
@@ -42,13 +42,13 @@ def jobs(options: Options) -> list[Job]:
 def beginnings(count: int) -> list[Trial]:
     """Pieces of the default drop at ``count`` instants of a run at FINE substeps."""
     scene = load_scene('drop')
-    engine, found = BulletEngine(scene), []
+    engine, found = BulletEngine(scene, plain(FINE, scene.step)), []
     wanted = np.rint(np.linspace(FIRST, LAST, count) / scene.step).astype(int)
     for tick in range(wanted[-1] + 1):
         if tick in wanted:
-            here = engine.coordinates()
+            here = engine.coordinates
             found.append(Trial(scene, LENGTH, GeneralizedState(here.q, here.v)))
-        engine.step(scene.step, FINE)
+        engine.advance(scene.step)
     engine.close()
     return found
 
