@@ -22,7 +22,7 @@ from .flight import (
     time_free,
 )
 from .impact import SLOW, SLOW_TURN, contact_step, enter_work, impact, power
-from .kernels import pose
+from .kernels import cross, pose, times
 from .machine import REAL, ROW, TABLE, YES, compiled, entry
 from .system import CONTACTS, ROOM, SYSTEM, Room, System
 
@@ -164,10 +164,10 @@ def first_touch(s: System, r: Room, h: float) -> float:
     return first
 
 
-@entry(SYSTEM, ROOM, ROW, ROW, REAL, TABLE, TABLE, REAL, REAL, YES, PATH, TABLE, ROW, ROW, CONTACTS)
+@entry(SYSTEM, ROOM, ROW, ROW, REAL, TABLE, TABLE, REAL, REAL, YES, REAL, PATH, TABLE, ROW, ROW, CONTACTS)
 def advance(s: System, r: Room, q: np.ndarray, v: np.ndarray, duration: float,
             loads: np.ndarray, springs: np.ndarray, step: float, tolerance: float, flies: bool,
-            path: Path, k: np.ndarray, y: np.ndarray, armed: np.ndarray,
+            longest: float, path: Path, k: np.ndarray, y: np.ndarray, armed: np.ndarray,
             known: np.ndarray) -> None:
     """Go on by ``duration`` s: q and v, roots' angular velocities along their own axes, become
     those at the end. ``step``: s of a step on the ground; ``tolerance``: m or rad by which a path's
@@ -178,8 +178,8 @@ def advance(s: System, r: Room, q: np.ndarray, v: np.ndarray, duration: float,
         left = duration - time
         if path.times[VALID] == 0.0 and flies and events < MOST_EVENTS and may_fly(
                 s, r, q, v, known, path, step):
-            longest = min(left, LONGEST) if len(loads) else LONGEST
-            if begin_path(s, r, loads, q, v, tolerance, longest, path, k, y):
+            most = min(left if len(loads) else longest, LONGEST)
+            if begin_path(s, r, loads, q, v, tolerance, most, path, k, y):
                 find_event(s, r, path, armed, r.states[1], r.vectors[0])
                 r.counts[5] = 0
         if path.times[VALID] > 0.0:
@@ -200,3 +200,26 @@ def advance(s: System, r: Room, q: np.ndarray, v: np.ndarray, duration: float,
         if touched:
             impact(s, r, q, v)
             events += 1
+
+
+@entry(SYSTEM, ROOM, ROW, ROW, TABLE)
+def observe(s: System, r: Room, q: np.ndarray, v: np.ndarray, rows: np.ndarray) -> None:
+    """Position, orientation, linear and angular velocity (n, 13) of all bones, world frame."""
+    pose(s.tree, q, v, r.work)
+    for i in range(len(s.tree)):
+        bone, row, move, centre = s.tree[i], rows[s.tree[i].bone], r.work.moves[i], r.work.centres[i]
+        root, turn, bind = s.tree[s.root_of[i]].q, r.work.turns[i], bone.bind
+        row[3], row[4], row[5], row[6] = times(turn[0], turn[1], turn[2], turn[3], bind[0],
+                                               bind[1], bind[2], bind[3])
+        x, y, z = cross(move[0], move[1], move[2], centre[0], centre[1], centre[2])
+        row[7], row[8], row[9] = move[3] + x, move[4] + y, move[5] + z
+        for k in range(3):
+            row[k] = q[root + k] + centre[k]
+            row[10 + k] = move[k]
+
+
+@entry(SYSTEM, ROOM, ROW, ROW, ROW)
+def gaps_at(s: System, r: Room, q: np.ndarray, v: np.ndarray, out: np.ndarray) -> None:
+    """All gaps at a pose; see contact.py."""
+    pose(s.tree, q, v, r.work)
+    all_gaps(s, q, r, out, math.inf, out)

@@ -115,8 +115,22 @@ def contact_step(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loa
     integrate(s.tree, middle, end_v, h / 2, end_q)
     if m:
         integrate(s.tree, end_q, shift, 1.0, end_q)
+        r.sums[2] += lifted(s, r, shift)
     r.counts[1] += 1
     return m
+
+
+@compiled
+def lifted(s: System, r: Room, shift: np.ndarray) -> float:
+    """Energy of height, J, that a displacement (nv,) gives; axes and composites are those of now."""
+    total, g = 0.0, s.gravity
+    for j in range(len(shift)):
+        if shift[j] != 0.0:
+            a, c = r.work.axes[j], r.composite[s.bone_of[j]]
+            x, y, z = cross(a[0], a[1], a[2], c[1], c[2], c[3])
+            total -= shift[j] * (g[0] * (c[0] * a[3] + x) + g[1] * (c[0] * a[4] + y)
+                                 + g[2] * (c[0] * a[5] + z))
+    return total
 
 
 @compiled

@@ -15,12 +15,10 @@ import math
 import numpy as np
 
 from .machine import compiled
+from .system import STICKS
 
 LIMIT, TOUCH, ROLLING = 1, 3, 5
 """Kinds of contact: how many rows each has."""
-
-STICKS = 1e5
-"""Coefficient from which friction has no limit."""
 
 ALTERNATIONS = 12
 """Turns that a sliding contact takes between its normal and its friction in one sweep."""

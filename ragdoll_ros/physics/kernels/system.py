@@ -53,6 +53,9 @@ Room = collections.namedtuple(
     'kinds rows mu roll need label vectors states counts sums')
 """Scratch of the rigid core."""
 
+STICKS = 1e5
+"""Coefficient from which friction has no limit."""
+
 VECTORS, STATES = 8, 6
 
 

@@ -1,0 +1,300 @@
+"""The package's own engine: rigid bodies, machine code from a stretch's start to its end.
+
+What it does is in kernels/: advance.py reads as the algorithm. Here are only its tables, its state
+and what is told of it.
+"""
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model import rotation
+from ...model.coordinates import DofLayout, GeneralizedState
+from ...model.scene import Scene
+from ...model.state import State
+from ..ground_heights import ground_heights
+from ..kernels.loaded import advance as kernels
+from ..kernels.loaded import kernels as sums
+from ..kernels.system import CONTACT, make_room
+from ..kernels.flight import Path
+from ..motion import Motion, damping_rate
+from ..settings import Accuracy
+from ..system import pairs_between, system_of
+from .neighbours import Neighbours
+from .protocol import GROUND, Contact, Spring, Springs, Wrenches, pressed
+
+STIFFEST = 1000.0
+"""1/s at which joint damping may end a motion for it to be flown; above, steps take it
+implicitly."""
+
+MOST_CONTACTS = 400
+"""Contacts at a time; those beyond are counted and left out."""
+
+FINER = 0.5
+"""Share of the step by which the last stretch is gone again to tell its error."""
+
+CONTACTS_OF_GEOM = 12
+"""Contacts for which there is room, for each part of a bone."""
+
+
+@dataclass
+class _Snapshot:
+    """All that the next stretch depends on."""
+
+    q: np.ndarray
+    v: np.ndarray
+    path: Path
+    known: np.ndarray
+    counts: np.ndarray
+    sums: np.ndarray
+    excluded: frozenset
+    start_energy: float
+
+
+class RigidEngine:
+    """An Engine by the rigid core; see Engine."""
+
+    def __init__(self, scene: Scene, accuracy: Accuracy) -> None:
+        self.scene, self.accuracy = scene, accuracy
+        self.layout = DofLayout([placement.doll for placement in scene.dolls])
+        self._whole = self._system = system_of(scene)
+        self._neighbours = Neighbours(scene, self._whole)
+        self._flies = damping_rate(scene) < STIFFEST
+        self._masses = np.array([bone.mass for bone in scene.bones])
+        self._inertias = np.array([bone.inertia for bone in scene.bones], float)
+        self._doll_of = np.ascontiguousarray(scene.doll_of_bone, np.int64)
+        self._spins = self.layout.root_spins
+        self._size = sum(self.layout.sizes)
+        self._stages, self._row = np.empty((16, self._size)), np.empty(self._size)
+        self.place(self._placed())
+
+    @property
+    def state(self) -> State:
+        """Poses and velocities of all bones now."""
+        if self._state is None:
+            rows = np.empty((len(self._masses), 13))
+            kernels.observe(self._system, self._room, self._q, self._v, rows)
+            self._state = State.of(rows)
+        return self._state
+
+    @property
+    def coordinates(self) -> GeneralizedState:
+        """Generalised coordinates and velocities of all dolls now."""
+        v = self._v.copy()
+        turns = self._q[self.layout.root_orientations]
+        v[self._spins] = rotation.rotate(turns, v[self._spins])
+        return GeneralizedState(self._q.copy(), v)
+
+    @property
+    def motion(self) -> Motion:
+        """Sums over each doll now."""
+        if self._motion is None:
+            out = np.empty((len(self.scene.dolls), 20))
+            sums.motion(self._masses, self._inertias, self._doll_of, self._system.gravity,
+                        self.state.rows, out)
+            self._motion = Motion.of(out)
+        return self._motion
+
+    def place(self, coordinates: GeneralizedState) -> None:
+        """Put all dolls there and begin; see Engine."""
+        self._q = np.array(coordinates.q, float)
+        self._v = np.array(coordinates.v, float)
+        turns = self._q[self.layout.root_orientations]
+        self._v[self._spins] = rotation.rotate(rotation.inverse(turns), self._v[self._spins])
+        self._use(self._whole)
+        self._lift_out()
+        self._exclude_overlaps()
+        self._path = Path(np.zeros((8, self._size)), np.zeros((2, self._size)), np.zeros(8))
+        self._neighbours.forget()
+        self._start_energy = float(self.motion.energy.sum())
+        self._departure = None
+
+    def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = ()) -> None:
+        """Go on by ``duration`` s; see Engine."""
+        self._departure = (self._q.copy(), self._v.copy(), duration, wrenches, springs)
+        self._go(duration, wrenches, springs, self.accuracy)
+
+    def stop(self) -> None:
+        """Bring all to rest where it is; the energy that is left is lost for good."""
+        self._v[:] = 0.0
+        self._path.times[:] = 0.0
+        self._forget_state()
+
+    def grounded(self) -> bool:
+        """Whether anything rests on the ground."""
+        now = self._contacts
+        return bool(((now['kind'] > 1) & (now['b'] < 0) & (now['impulse'][:, 0] > 0)).any())
+
+    def contacts(self) -> list[Contact]:
+        """What touches now."""
+        bones, lasted = self._system.tree['bone'], self._room.sums[4] or 1.0
+        return [Contact(int(bones[c['a']]), int(bones[c['b']]) if c['b'] >= 0 else GROUND,
+                        c['point'].copy(), c['normal'].copy(), -float(c['gap']),
+                        float(c['impulse'][0]) / lasted)
+                for c in self._contacts if c['kind'] > 1]
+
+    def measures(self) -> dict[str, float]:
+        """What went wrong since the start, and what was done: names end in their units."""
+        counts, room_sums = self._room.counts, self._room.sums
+        energy = float(self.motion.energy.sum())
+        return {
+            'energy_excess_J': energy - self._start_energy - float(room_sums[0] + room_sums[1]),
+            'energy_lifted_J': float(room_sums[2]),
+            'work_of_pushes_J': float(room_sums[0]), 'work_of_grabs_J': float(room_sums[1]),
+            'error_estimate_m': self._estimate_error(),
+            'flights': int(counts[0]), 'substeps': int(counts[1]), 'impacts': int(counts[2]),
+            'unsolved_total': int(counts[3])}
+
+    def save(self) -> object:
+        """A snapshot that restore brings back to the bit."""
+        return _Snapshot(
+            self._q.copy(), self._v.copy(), Path(*(part.copy() for part in self._path)),
+            self._known.copy(), self._room.counts.copy(), self._room.sums.copy(),
+            self._excluded, self._start_energy)
+
+    def restore(self, snapshot: _Snapshot) -> None:
+        """Go back to a snapshot."""
+        self._q, self._v = snapshot.q.copy(), snapshot.v.copy()
+        self._path = Path(*(part.copy() for part in snapshot.path))
+        self._excluded = snapshot.excluded
+        self._use(self._whole)
+        self._drop_excluded()
+        self._known[:] = snapshot.known
+        self._room.counts[:] = snapshot.counts
+        self._room.sums[:] = snapshot.sums
+        self._start_energy = snapshot.start_energy
+        self._neighbours.forget()
+
+    def forget(self, snapshot: object) -> None:
+        """Nothing to release: the memory goes with the object."""
+
+    def close(self) -> None:
+        """Nothing to release: the memory goes with the object."""
+
+    @property
+    def _contacts(self) -> np.ndarray:
+        """Contacts of the last step; none in flight."""
+        return self._known[:0 if self._path.times[0] else int(self._room.counts[5])]
+
+    def _go(self, duration: float, wrenches: Wrenches, springs: Springs,
+            accuracy: Accuracy) -> None:
+        self._meet(duration)
+        kernels.advance(self._system, self._room, self._q, self._v, duration, _loads(wrenches),
+                        _hands(springs), accuracy.step, accuracy.flight_error,
+                        self._flies and not springs, self._longest, self._path, self._stages,
+                        self._row, self._armed, self._known)
+        self._forget_state()
+
+    def _meet(self, duration: float) -> None:
+        """See that all geoms of two dolls that may meet within ``duration`` s are paired."""
+        self._longest = math.inf
+        if len(self.scene.dolls) > 1:
+            couples = self._neighbours.update(self.state, duration)
+            if couples is not None:
+                pairs = np.concatenate([self._own_pairs,
+                                        pairs_between(self.scene, self._whole.geoms, couples)])
+                self._use(self._system._replace(pairs=pairs), keep=True)
+                self._path.times[:] = 0.0
+            self._longest = duration
+
+    def _use(self, system: object, keep: bool = False) -> None:
+        """Work with these tables from now on; ``keep``: what is counted and known so far."""
+        self._system = system
+        contacts = min(MOST_CONTACTS, CONTACTS_OF_GEOM * len(system.geoms) + len(system.bounds))
+        counts, totals = (self._room.counts, self._room.sums) if keep else (None, None)
+        self._room = make_room(system, contacts)
+        if keep:
+            self._room.counts[:], self._room.sums[:] = counts, totals
+            self._room.counts[5] = 0
+        self._known = np.zeros(contacts, CONTACT)
+        self._armed = np.zeros(len(self._room.gaps))
+        self._forget_state()
+
+    def _forget_state(self) -> None:
+        self._state: State | None = None
+        self._motion: Motion | None = None
+
+    def _lift_out(self) -> None:
+        """Set dolls that are in the ground onto it."""
+        heights = ground_heights(self.scene, self.state)
+        for doll, own in enumerate(self.scene.bone_slices):
+            depth = -heights[own].min()
+            if depth > pressed(self.scene):
+                at = self.layout.root_positions[doll]
+                self._q[at] += depth * np.array(self.scene.ground.normal)
+        self._forget_state()
+
+    def _exclude_overlaps(self) -> None:
+        """Let geoms of one doll that overlap by more than pressed() collide no more."""
+        kernels.gaps_at(self._system, self._room, self._q, self._v, self._room.gaps)
+        count = len(self._system.pairs)
+        gaps = self._room.gaps[len(self._room.gaps) - count:]
+        deep = self._system.pairs[gaps < -pressed(self.scene)]
+        self._excluded = frozenset(zip(deep['a'].tolist(), deep['b'].tolist(), strict=True))
+        self._drop_excluded()
+
+    def _drop_excluded(self) -> None:
+        pairs = self._whole.pairs
+        self._own_pairs = pairs[[(a, b) not in self._excluded for a, b in
+                                 zip(pairs['a'].tolist(), pairs['b'].tolist(), strict=True)]]
+        self._use(self._whole._replace(pairs=self._own_pairs))
+
+    def _placed(self) -> GeneralizedState:
+        """Where the scene's placements stand."""
+        q, v = np.zeros(self.layout.sizes[0]), np.zeros(self.layout.sizes[1])
+        for bone in self._whole.tree:
+            if bone['free'] and bone['parent'] >= 0:
+                q[bone['q'] + 3] = 1.0
+        for doll, placement in enumerate(self.scene.dolls):
+            pose = placement.bone_pose(placement.doll.root)
+            q[self.layout.root_positions[doll]] = pose.position
+            q[self.layout.root_orientations[doll]] = pose.orientation
+            v[self.layout.root_velocities[doll]] = placement.root_velocity()
+            v[self._spins[doll]] = placement.spin
+        return GeneralizedState(q, v)
+
+    def _estimate_error(self) -> float:
+        """Error, m, that the last stretch added to the worst position.
+
+        It is gone again in steps half as long, flights with a hundredth of the error: what is of
+        order 2 then errs by a quarter.
+        """
+        if self._departure is None:
+            return 0.0
+        q, v, duration, wrenches, springs = self._departure
+        finer = dataclasses.replace(self.accuracy, step=FINER * self.accuracy.step,
+                                    flight_error=self.accuracy.flight_error / 100)
+        here, there = self.save(), self.state.positions
+        self._q, self._v = q.copy(), v.copy()
+        self._path.times[:] = 0.0
+        self._room.counts[5] = 0
+        self._go(duration, wrenches, springs, finer)
+        missed = np.linalg.norm(self.state.positions - there, axis=1).max()
+        self._q, self._v, self._path = here.q, here.v, here.path
+        self._known[:] = here.known
+        self._room.counts[:], self._room.sums[:] = here.counts, here.sums
+        self._forget_state()
+        return float(4 / 3 * missed)
+
+
+def _loads(wrenches: Wrenches) -> np.ndarray:
+    """Wrenches as a table (m, 11) for compiled code."""
+    rows = np.empty((len(wrenches), 11))
+    for row, load in zip(rows, wrenches, strict=True):
+        row[0], row[1:4], row[4:7], row[7:10], row[10] = (
+            load.bone, load.force, load.torque, load.point, load.local)
+    return rows
+
+
+def _hands(springs: Springs) -> np.ndarray:
+    """Springs as a table (m, 15) for compiled code."""
+    return np.array([_hand(spring) for spring in springs]).reshape(-1, 15)
+
+
+def _hand(spring: Spring) -> np.ndarray:
+    speed = (spring.target - spring.position) / spring.left if spring.left > 0 else np.zeros(3)
+    return np.concatenate([[spring.bone], spring.point, spring.position, speed, [
+        spring.left, spring.stiffness, spring.damping, spring.most, 1.0]])
