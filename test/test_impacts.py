@@ -9,8 +9,6 @@ import pytest
 
 pytest.importorskip('scipy')
 
-import impacts
-
 from ragdoll_ros import (
     Bone,
     Box,
@@ -23,6 +21,8 @@ from ragdoll_ros import (
     Sphere,
     load_doll,
 )
+from ragdoll_ros.accuracy.motions.impacts import impact_motions
+from ragdoll_ros.accuracy.references import closed_forms, impacts
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.scene import Material
 
@@ -95,10 +95,32 @@ def test_balls_in_a_row_keep_momentum_and_part_as_newton_says(restitution):
     assert first[1] - first[0] == pytest.approx(restitution * 2, abs=1e-9)
 
 
+def test_a_ball_with_backspin_ends_rolling():
+    """At the end the rim is as fast as the ball; forward speed (5 v + 2 r w) / 7."""
+    t = np.array([3.0, 3.001])
+    x = closed_forms.ball_slide_then_roll(1.0, 0.3, G, t, -4.0)
+    angle = closed_forms.ball_slide_then_roll_angle(1.0, 0.3, G, 0.1, t, -4.0)
+    assert np.diff(x) / 0.001 == pytest.approx(-3 / 7, rel=1e-9)
+    assert np.diff(angle) * 0.1 == pytest.approx(np.diff(x), rel=1e-9)
+
+
 def test_a_disc_is_stopped_by_the_work_of_friction():
     """Half m r^2 w^2 / 2 against the mean of mu m g over the area times its way: 2/3 r angle."""
     angle = impacts.spin_down(0.2, 0.3, G, 10.0, np.array([5.0]))[0]
     assert pytest.approx(0.3 * G * 2 / 3 * 0.2 * angle, rel=1e-12) == 0.25 * 0.2 ** 2 * 10.0 ** 2
+
+
+@pytest.mark.parametrize('motion', impact_motions(), ids=lambda motion: motion.name)
+def test_a_truth_begins_where_its_scene_does(motion):
+    """Position and orientation at the start, and velocity by a difference of 1 us."""
+    truth = motion.truth(np.array([0.0, 1e-6]))
+    scene = motion.trial.scene
+    for index, placement in enumerate(scene.dolls):
+        assert truth.positions[0, index] == pytest.approx(placement.position, abs=1e-12)
+        turned = abs(truth.orientations[0, index] @ np.array(placement.orientation))
+        assert turned == pytest.approx(1, abs=1e-12)
+        moved = (truth.positions[1, index] - truth.positions[0, index]) / 1e-6
+        assert moved == pytest.approx(placement.velocity, abs=1e-4)
 
 
 # The simulation

@@ -22,7 +22,9 @@ RADIUS = 0.1
 def contact_motions() -> list[Motion]:
     """All motions on the ground."""
     return [bounce(), incline('incline_stick', 'Block that sticks', 0.6),
-            incline('incline_slip', 'Block that slips', 0.2), rolling_ball()]
+            incline('incline_slip', 'Block that slips', 0.2), rolling_ball(),
+            rolling_ball('backspin_ball', 'Ball with backspin that comes back',
+                         'v falls to (5 v + 2 r w) / 7', 1.0, -4.0)]
 
 
 def _ball(material: Material, height: float, **placed: object) -> Scene:
@@ -90,17 +92,21 @@ def incline(name: str, title: str, friction: float, slope: float = math.radians(
                   Trial(scene, 1.0), truth, in_air=False)
 
 
-def rolling_ball(speed: float = 2.0, friction: float = 0.3) -> Motion:
-    """A ball thrown flat without spin: it slides, then rolls."""
-    scene = _ball(Material(friction=friction, restitution=0.0), 0.0, velocity=(speed, 0.0, 0.0))
+def rolling_ball(name: str = 'rolling_ball', title: str = 'Ball that slides, then rolls',
+                 reference: str = 'v falls to 5/7, then stays', speed: float = 2.0,
+                 rim: float = 0.0, friction: float = 0.3) -> Motion:
+    """A ball thrown flat, its rim spinning at ``rim`` m/s, forwards if positive."""
+    scene = _ball(Material(friction=friction, restitution=0.0), 0.0, velocity=(speed, 0.0, 0.0),
+                  spin=(0.0, rim / RADIUS, 0.0))
 
     def truth(times: np.ndarray) -> Trajectory:
         positions = np.zeros((len(times), 1, 3))
-        positions[:, 0, 0] = closed_forms.ball_slide_then_roll(speed, friction, GRAVITY, times)
+        positions[:, 0, 0] = closed_forms.ball_slide_then_roll(speed, friction, GRAVITY, times, rim)
         positions[:, 0, 2] = RADIUS
-        angles = closed_forms.ball_slide_then_roll_angle(speed, friction, GRAVITY, RADIUS, times)
+        angles = closed_forms.ball_slide_then_roll_angle(speed, friction, GRAVITY, RADIUS, times,
+                                                         rim)
         return Trajectory.of_poses(
             times, positions, orientations_about((0.0, 1.0, 0.0), angles[:, None]))
     start = posed(scene.dolls[0])
-    return Motion('rolling_ball', f'Ball that slides, then rolls, µ = {friction:g}, 1.5 s',
-                  'v falls to 5/7, then stays', Trial(scene, 1.5, start), truth, in_air=False)
+    return Motion(name, f'{title}, µ = {friction:g}, 1.5 s', reference, Trial(scene, 1.5, start),
+                  truth, in_air=False)

@@ -9,6 +9,7 @@ from ..measure import Measure, compare
 from ..methods import Method, Result, by_name, every_method, median_run
 from ..motions.contact import contact_motions
 from ..motions.flight import flight_motions
+from ..motions.impacts import impact_motions
 from ..motions.mechanisms import mechanism_motions
 from ..motions.motion import Motion
 from ..runner import Job, Options, Row
@@ -35,7 +36,8 @@ def jobs(options: Options) -> list[Job]:
 def motions() -> dict[str, Motion]:
     """All motions by name, simple ones first, built once in each process."""
     return {motion.name: motion
-            for motion in (*flight_motions(), *mechanism_motions(), *contact_motions())}
+            for motion in (*flight_motions(), *mechanism_motions(), *contact_motions(),
+                           *impact_motions())}
 
 
 def measure_all(motion_name: str, method_names: list[str], repeats: int) -> list[Row]:

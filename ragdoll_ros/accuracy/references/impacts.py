@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ragdoll_ros.accuracy.references.integration import LONGEST, TOLERANCE
+from .integration import LONGEST, TOLERANCE
 
 STILL = 1e-9
 """rad/s below which a rocking block is taken to have come to rest."""
