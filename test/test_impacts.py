@@ -22,7 +22,7 @@ from ragdoll_ros import (
     load_doll,
 )
 from ragdoll_ros.accuracy.motions.impacts import impact_motions
-from ragdoll_ros.accuracy.references import closed_forms, impacts
+from ragdoll_ros.accuracy.references import closed_forms, impacts, sliding_disc
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.scene import Material
 
@@ -108,6 +108,35 @@ def test_a_disc_is_stopped_by_the_work_of_friction():
     """Half m r^2 w^2 / 2 against the mean of mu m g over the area times its way: 2/3 r angle."""
     angle = impacts.spin_down(0.2, 0.3, G, 10.0, np.array([5.0]))[0]
     assert pytest.approx(0.3 * G * 2 / 3 * 0.2 * angle, rel=1e-12) == 0.25 * 0.2 ** 2 * 10.0 ** 2
+
+
+@pytest.mark.parametrize('ratio', [0.0, 0.3, 0.99, 1.0, 1.01, 4.0])
+def test_friction_under_a_disc_is_the_mean_over_its_face(ratio):
+    """2000 rings of 2000 points; the ring through the point that stands still errs by 1e-3."""
+    rho = np.sqrt((np.arange(2000) + 0.5) / 2000)[:, None]
+    theta = (np.arange(2000) + 0.5) * math.pi / 1000
+    along, across = ratio - rho * np.sin(theta), rho * np.cos(theta)
+    size = np.hypot(along, across)
+    force = (along / size).mean()
+    torque = ((rho * np.cos(theta) * across - rho * np.sin(theta) * along) / size).mean()
+    assert sliding_disc.shares(ratio) == pytest.approx((force, torque), abs=2e-3)
+
+
+def test_a_disc_stops_sliding_and_spinning_at_once():
+    """At the ratio to which all discs tend both fall in proportion; and friction's work fits."""
+    force, torque = sliding_disc.shares(0.653)
+    assert force / (2 * torque) == pytest.approx(0.653, abs=1e-3)
+    times = np.linspace(0, 1, 100001)
+    for speed, rate in ((1.0, 10.0), (0.2, 10.0)):
+        slid, angle = sliding_disc.slide_and_spin(0.2, 0.3, G, speed, rate, times)
+        moving = np.flatnonzero(np.diff(slid) > 1e-8)[-10]
+        assert np.diff(angle)[moving + 20:].max() < 1e-7 * rate
+        v, w = np.gradient(slid, times), np.gradient(angle, times)
+        power = [0.3 * G * sum(np.array(sliding_disc.shares(a / (0.2 * b))) * (a, 0.2 * b))
+                 for a, b in zip(v[1:moving:50], w[1:moving:50], strict=True)]
+        energy = speed ** 2 / 2 + 0.2 ** 2 * rate ** 2 / 4
+        # a sum of rectangles 0.5 ms wide
+        assert sum(power) * 50e-5 == pytest.approx(energy, rel=3e-3)
 
 
 @pytest.mark.parametrize('motion', impact_motions(), ids=lambda motion: motion.name)

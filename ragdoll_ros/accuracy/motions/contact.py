@@ -21,7 +21,7 @@ RADIUS = 0.1
 
 def contact_motions() -> list[Motion]:
     """All motions on the ground."""
-    return [bounce(), incline('incline_stick', 'Block that sticks', 0.6),
+    return [*map(bounce, (0.1, 0.5, 0.9, 1.0)), incline('incline_stick', 'Block that sticks', 0.6),
             incline('incline_slip', 'Block that slips', 0.2), rolling_ball(),
             rolling_ball('backspin_ball', 'Ball with backspin that comes back',
                          'v falls to (5 v + 2 r w) / 7', 1.0, -4.0)]
@@ -33,7 +33,7 @@ def _ball(material: Material, height: float, **placed: object) -> Scene:
     return Scene('ball', (placement,), Ground(), material)
 
 
-def bounce(height: float = 1.0, restitution: float = 0.5, bounces: int = 3) -> Motion:
+def bounce(restitution: float = 0.5, height: float = 1.0, bounces: int = 3) -> Motion:
     """A ball let fall from 1 m; the heights it comes back to are e^(2 n) of it."""
     impacts = closed_forms.bounce_times(height, restitution, GRAVITY, bounces + 1)
 
@@ -53,7 +53,8 @@ def bounce(height: float = 1.0, restitution: float = 0.5, bounces: int = 3) -> M
         return {f'apex_{n}_error': error for n, error in enumerate(errors, start=1)}
     scene = _ball(Material(friction=0.0, restitution=restitution), height)
     duration = round(impacts[bounces] - 0.01, 2)
-    return Motion('bounce', f'Ball that bounces {bounces} times, e = {restitution:g}',
+    name = 'bounce' if restitution == 0.5 else f'bounce_{restitution:g}'
+    return Motion(name, f'Ball that bounces {bounces} times, e = {restitution:g}',
                   'parabolas, heights e²ⁿ h', Trial(scene, duration), truth, in_air=False,
                   extra=apexes)
 

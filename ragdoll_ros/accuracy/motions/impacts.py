@@ -9,7 +9,7 @@ from ...model import rotation
 from ...model.ragdoll import Bone, Ragdoll
 from ...model.scene import Ground, Material, Placement, Scene
 from ...model.shapes import Box, Cylinder, Shape, Sphere
-from ..references import impacts
+from ..references import impacts, sliding_disc
 from ..trajectory import Trajectory
 from ..trial import Trial
 from .motion import Motion, orientations_about
@@ -24,7 +24,7 @@ def impact_motions() -> list[Motion]:
     """All motions in which something is struck, or stands on an edge or a face."""
     return [rocking_block(), falling_rod(), *(dropped_rod(*rod) for rod in (
         ('rod_frictionless', 'without friction', 0.5, 0.0), ('rod_sticks', 'that sticks', 0.5, 2.0),
-        ('rod_slides', 'that slides', 0.5, 0.1))), spinning_disc(),
+        ('rod_slides', 'that slides', 0.5, 0.1))), spinning_disc(), thin_disc(),
         balls('two_balls', 'Two balls, e = 0.8', (1.0, 2.0), 0.8),
         balls('three_balls', 'Three balls one after the other, e = 1', (1.0, 1.0, 1.0), 1.0)]
 
@@ -105,6 +105,22 @@ def spinning_disc() -> Motion:
                   (0.0, 0.0, thick / 2), spin=(0.0, 0.0, rate))
     return Motion('spinning_disc', 'Disc that spins on its face, µ = 0.3, 0.7 s',
                   'torque 2/3 µ m g r', Trial(scene, 0.7), truth, 'angle_worst_rad', in_air=False)
+
+
+def thin_disc() -> Motion:
+    """A disc of 2 mm that slides and spins on its face; so thin that it is evenly pressed."""
+    radius, thick, speed, rate, friction = 0.2, 0.002, 1.0, 10.0, 0.3
+
+    def truth(times: np.ndarray) -> Trajectory:
+        slid, angles = sliding_disc.slide_and_spin(radius, friction, GRAVITY, speed, rate, times)
+        centres = np.stack([slid, 0 * slid, 0 * slid + thick / 2], axis=1)
+        return Trajectory.of_poses(times, centres[:, None],
+                                   orientations_about((0.0, 0.0, 1.0), angles[:, None]))
+    scene = _body(Cylinder(radius, thick), Material(friction=friction, restitution=0.0),
+                  (0.0, 0.0, thick / 2), velocity=(speed, 0.0, 0.0), spin=(0.0, 0.0, rate))
+    return Motion('thin_disc', 'Disc that slides and spins on its face, µ = 0.3, 0.7 s',
+                  'Coulomb over an even pressure, Farkas 2003', Trial(scene, 0.7), truth,
+                  in_air=False)
 
 
 def balls(name: str, title: str, masses: tuple[float, ...], restitution: float) -> Motion:

@@ -12,6 +12,7 @@ from ..motions.flight import flight_motions
 from ..motions.impacts import impact_motions
 from ..motions.mechanisms import mechanism_motions
 from ..motions.motion import Motion
+from ..motions.planar_doll import planar_motions
 from ..runner import Job, Options, Row
 from ..trajectory import Trajectory
 
@@ -37,7 +38,7 @@ def motions() -> dict[str, Motion]:
     """All motions by name, simple ones first, built once in each process."""
     return {motion.name: motion
             for motion in (*flight_motions(), *mechanism_motions(), *contact_motions(),
-                           *impact_motions())}
+                           *impact_motions(), *planar_motions())}
 
 
 def measure_all(motion_name: str, method_names: list[str], repeats: int) -> list[Row]:
