@@ -11,6 +11,7 @@ from pathlib import Path
 from . import figures
 from .parts import (
     classes,
+    convergence,
     costs,
     drop,
     estimate,
@@ -25,7 +26,8 @@ from .plots import draw_all
 from .runner import Job, Options, run_jobs
 from .sections import markdown
 
-PARTS = {'precision': precision, 'orders': orders, 'pieces': pieces, 'drop': drop,
+PARTS = {'precision': precision, 'orders': orders, 'convergence': convergence,
+         'pieces': pieces, 'drop': drop,
          'classes': classes, 'projection': projection, 'hard': hard, 'costs': costs,
          'estimate': estimate, 'swing': swing}
 """Modules by the names that --case takes: each says by jobs() what it has to run."""

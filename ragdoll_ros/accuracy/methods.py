@@ -18,6 +18,7 @@ from ..physics.engine.mujoco import MujocoEngine
 from ..physics.engine.protocol import Engine
 from ..physics.settings import ACCURACIES, Accuracy
 from ..physics.simulation import Simulation
+from . import fineness
 from .quickstart import STEP as QUICKSTART_STEP
 from .quickstart import Quickstart
 from .trajectory import Trajectory
@@ -91,9 +92,9 @@ class _FixedSteps:
         self._engine.close()
 
 
-def simulated(trial: Trial, accuracy: str | Accuracy) -> Simulation:
+def simulated(trial: Trial, accuracy: str | Accuracy, engine: str = 'auto') -> Simulation:
     """A trial's simulation, as the node runs it."""
-    simulation = Simulation(trial.scene, accuracy=accuracy)
+    simulation = Simulation(trial.scene, accuracy=accuracy, engine=engine)
     if trial.start is not None:
         simulation.place(trial.start)
     for push in trial.pushes:
@@ -134,6 +135,20 @@ def ours(accuracy: str | Accuracy, name: str | None = None) -> Method:
         simulated, accuracy=accuracy), order=order)
 
 
+def core(step: float) -> Method:
+    """The engine that solves impacts where they happen, with steps of ``step`` s."""
+    return Method(f'core-{step:g}', f'core, steps of {step * 1e6:g} µs', 'core', functools.partial(
+        simulated, accuracy=fineness.of_step(step), engine=fineness.CORE))
+
+
+def reference(parts: int) -> Method:
+    """What stands for the truth where there is no formula: the core, its step in ``parts``.
+
+    PyBullet at 128 substeps until there is a core; the label says which one it was.
+    """
+    return core(fineness.core_step() / parts) if fineness.has_core() else bullet(128)
+
+
 def quickstart() -> Method:
     """PyBullet by its quickstart."""
     return Method('quickstart', 'PyBullet quickstart, 1/240 s', 'quickstart', Quickstart, 1,
@@ -168,7 +183,18 @@ def every_method(substeps: Iterable[int] = SUBSTEPS) -> list[Method]:
 
 def by_name(name: str) -> Method:
     """The method of a name; OutOfRange names the families there are."""
-    methods = {method.name: method for method in every_method(range(1, 129))}
-    if name not in methods:
-        raise errors.OutOfRange('method', name, 'ours-*, quickstart, bullet-N, mujoco-*-N')
-    return methods[name]
+    family, _, rest = name.partition('-')
+    try:
+        if family == 'ours' and rest in ACCURACIES:
+            return ours(rest)
+        if name == 'quickstart':
+            return quickstart()
+        if family in ('bullet', 'core'):
+            return bullet(int(rest)) if family == 'bullet' else core(float(rest))
+        if family == 'mujoco':
+            integrator, _, count = rest.partition('-')
+            return mujoco(integrator, int(count))
+    except ValueError:
+        pass
+    raise errors.OutOfRange('method', name,
+                            'ours-*, quickstart, core-SECONDS, bullet-N, mujoco-*-N')

@@ -1,0 +1,30 @@
+"""What the page says of contacts: errors against steps, rebounds, clouds of drops."""
+from __future__ import annotations
+
+from .figures import Row
+from .section import Section
+from .tables import table
+
+
+def convergence_tables(rows: list[Row]) -> list[str]:
+    """A table for each motion: error at h, h/2 ... h/64, an engine a line."""
+    blocks = []
+    for motion in dict.fromkeys(row['motion'] for row in rows):
+        own = [row for row in rows if row['motion'] == motion]
+        unit = {'position_worst_m': 'm', 'angle_worst_rad': 'rad'}[own[0]['yardstick']]
+        lines = [{**row, 'h': row['steps_s'][0], 'itself': row['own'][-1],
+                  **{str(k): error for k, error in enumerate(row['errors'])}} for row in own]
+        halves = [(str(k), f'h/{2 ** k}' if k else f'h: error {unit}', '{:.0e}')
+                  for k in range(len(own[0]['errors']))]
+        blocks += [f'### {own[0]["title"]}, error against step', table(lines, (
+            ('label', 'engine', '{}'), ('h', 'h ms', 'ms'), *halves,
+            ('order', 'slope', '{:.2f}'),
+            ('itself', 'beside it: h/32 against itself at h/64', '{:.0e}')))]
+    return blocks
+
+
+CONVERGENCE = Section(
+    'convergence', 'On the ground: error against step',
+    'The truths are closed forms and event-driven integrations that share no code with an engine. '
+    'A slope near 0 is an engine that comes to something else, however small its difference to '
+    'itself.', body=convergence_tables)
