@@ -20,16 +20,17 @@ from .parts import (
     pieces,
     precision,
     projection,
+    restitution,
     swing,
 )
 from .plots import draw_all
 from .runner import Job, Options, run_jobs
 from .sections import markdown
 
-PARTS = {'precision': precision, 'orders': orders, 'convergence': convergence,
-         'pieces': pieces, 'drop': drop,
-         'classes': classes, 'projection': projection, 'hard': hard, 'costs': costs,
-         'estimate': estimate, 'swing': swing}
+PARTS = {'precision': precision, 'orders': orders, 'restitution': restitution,
+         'convergence': convergence, 'pieces': pieces, 'drop': drop, 'classes': classes,
+         'projection': projection, 'hard': hard, 'costs': costs, 'estimate': estimate,
+         'swing': swing}
 """Modules by the names that --case takes: each says by jobs() what it has to run."""
 
 NEEDED = ('scipy', 'matplotlib', 'mujoco')

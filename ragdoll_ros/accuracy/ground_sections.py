@@ -23,6 +23,30 @@ def convergence_tables(rows: list[Row]) -> list[str]:
     return blocks
 
 
+def restitution_tables(rows: list[Row]) -> list[str]:
+    """What restitution the first bounce has, then the worst height of all: a line each body."""
+    wanted = list(dict.fromkeys(row['restitution'] for row in rows))
+    lines: dict[tuple, Row] = {}
+    for row in rows:
+        line = lines.setdefault((row['label'], row['body']), {
+            'label': row['label'], 'body': row['body'], 'seen': 0, 'flights': 0})
+        line |= {f'found {row["restitution"]}': row['found'],
+                 f'worst {row["restitution"]}': row['worst'],
+                 'seen': line['seen'] + row['seen'], 'flights': line['flights'] + row['flights']}
+    first = (('label', 'method', '{}'), ('body', 'body', '{}'))
+    return [table(lines.values(), (*first, *((f'found {e}', f'e = {e:g}', '{:.4f}')
+                                             for e in wanted))),
+            '### Every apex after an approach of 0.05 m/s or more: worst relative error',
+            table(lines.values(), (*first, *((f'worst {e}', f'e = {e:g}', '{:.0e}')
+                                             for e in wanted),
+                                   ('seen', 'apexes seen', '{}'), ('flights', 'of', '{}')))]
+
+
+RESTITUTION = Section(
+    'restitution', 'Restitution of single bodies',
+    'Let go level from 1 m. First what the first bounce makes of the restitution that is asked '
+    'for.', body=restitution_tables)
+
 CONVERGENCE = Section(
     'convergence', 'On the ground: error against step',
     'The truths are closed forms and event-driven integrations that share no code with an engine. '

@@ -116,7 +116,7 @@ SECTIONS = (
                 ('order', 'measured', '{:.2f}'), ('order_finest', 'between the finest', '{:.2f}'),
                 ('points', 'points', '{}')),
             below=(('orders', 'Error over the tick'),)),
-    ground_sections.CONVERGENCE,
+    ground_sections.RESTITUTION, ground_sections.CONVERGENCE,
     Section('pieces', 'Through contacts: short pieces from a reference',
             '0.1 s each, begun at instants of a fine run of the default drop, against the same '
             'engine at N = 128 (after Erez, Tassa and Todorov, ICRA 2015).', (
