@@ -130,7 +130,7 @@ def draw_pieces(figures: Figures, plt: object) -> object:
         return None
     figure, axes = plt.subplots(figsize=(7.5, 4.2))
     _work_precision(axes, rows, 'position_median_m')
-    axes.set_title('Pieces of 0.1 s through contacts, each engine against itself at N = 128',
+    axes.set_title('Pieces of 0.1 s through contacts, against one reference',
                    loc='left')
     axes.legend(fontsize=9)
     return figure

@@ -117,15 +117,7 @@ SECTIONS = (
                 ('points', 'points', '{}')),
             below=(('orders', 'Error over the tick'),)),
     ground_sections.RESTITUTION, ground_sections.CONVERGENCE,
-    Section('pieces', 'Through contacts: short pieces from a reference',
-            '0.1 s each, begun at instants of a fine run of the default drop, against the same '
-            'engine at N = 128 (after Erez, Tassa and Todorov, ICRA 2015).', (
-                ('label', 'method', '{}'), ('cpu_s_per_s', 'CPU ms/s', 'ms'),
-                ('position_median_m', 'position mm, median', 'mm'),
-                ('position_p90_m', '90 %', 'mm'), ('angle_median_rad', 'angle °, median', 'deg'),
-                ('gap_worst_m', 'worst joint gap m', '{:.0e}'),
-                ('sinking_worst_m', 'worst sinking mm', 'mm')),
-            below=(('pieces', 'Error over CPU time through contacts'),)),
+    ground_sections.PIECES,
     Section('spread', 'The default drop, {starts} starts tilted by thousandths of a radian',
             'The path is chaotic; the cloud is not. The first row stands for the truth of its '
             'engine.', body=spread_table),
