@@ -14,6 +14,7 @@ from .parts import (
     convergence,
     costs,
     drop,
+    drops,
     estimate,
     hard,
     orders,
@@ -28,9 +29,9 @@ from .runner import Job, Options, run_jobs
 from .sections import markdown
 
 PARTS = {'precision': precision, 'orders': orders, 'restitution': restitution,
-         'convergence': convergence, 'pieces': pieces, 'drop': drop, 'classes': classes,
-         'projection': projection, 'hard': hard, 'costs': costs, 'estimate': estimate,
-         'swing': swing}
+         'convergence': convergence, 'pieces': pieces, 'drop': drop, 'drops': drops,
+         'classes': classes, 'projection': projection, 'hard': hard, 'costs': costs,
+         'estimate': estimate, 'swing': swing}
 """Modules by the names that --case takes: each says by jobs() what it has to run."""
 
 NEEDED = ('scipy', 'matplotlib', 'mujoco')
@@ -102,9 +103,10 @@ def measured(options: argparse.Namespace) -> dict:
         raise WrongCall(f'--starts {options.starts}: expected 1 or more')
     began = time.monotonic()
     rows = run_jobs(chosen(options.case, Options(options.quick, options.starts)))
-    for part in (classes.NAME, classes.SWITCHES):
+    for part, join in ((classes.NAME, classes.merged), (classes.SWITCHES, classes.merged),
+                       (drops.NAME, drops.merged)):
         if part in rows:
-            rows[part] = classes.merged(rows[part])
+            rows[part] = join(rows[part])
     words = ['ragdoll_report', *(['--quick'] if options.quick else []),
              *(f'--case {name}' for name in options.case),
              *([f'--starts {options.starts}'] if options.starts != 100 else [])]

@@ -76,3 +76,30 @@ PIECES = Section(
     'and Todorov, ICRA 2015), all against one reference. The last two columns are no errors: each '
     'engine against itself at its finest.', body=pieces_table,
     below=(('pieces', 'Error over CPU time through contacts'),))
+
+
+DROP_HEADS = {'energy_0.3s': 'energy left at 0.3 s', 'energy_0.5s': 'at 0.5 s',
+              'energy_1s': 'at 1 s', 'slide_m': 'slide m', 'settled_s': 'settled after s',
+              'spread_m': 'bones apart m'}
+
+
+def drop_tables(rows: list[Row]) -> list[str]:
+    """Means with standard errors, and p against the reference; a table each population."""
+    blocks = []
+    for population in dict.fromkeys(row['population'] for row in rows):
+        own = [row for row in rows if row['population'] == population]
+        lines = [{'label': row['label'] + (', the reference' if row is own[0] else ''),
+                  **{key: f'{number(row[f"{key}_mean"]):.3f} ± {number(row[f"{key}_error"]):.3f}'
+                     + ('' if row is own[0] else f' (p {number(row[f"{key}_p"]):.2g})')
+                     for key in DROP_HEADS}} for row in own]
+        blocks += [f'### {own[0]["drops"]} drops, {population}', table(lines, (
+            ('label', 'method', '{}'),
+            *((key, head, '{}') for key, head in DROP_HEADS.items())))]
+    return blocks
+
+
+DROPS = Section(
+    'drops', 'Many drops as a cloud',
+    'A fall is chaotic, the distribution of many is not. Means with their standard errors; p is '
+    'that of the two-sample test of Kolmogorov and Smirnov against the reference: where it is '
+    'small, the clouds differ.', body=drop_tables)

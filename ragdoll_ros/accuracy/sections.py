@@ -29,17 +29,6 @@ def motion_tables(rows: list[Row]) -> list[str]:
     return blocks
 
 
-def spread_table(rows: list[Row]) -> list[str]:
-    """Means with their standard deviations."""
-    shown = [{**row, **{key: f'{number(row[f"{key}_mean"]):.3f} ± {number(row[f"{key}_sd"]):.3f}'
-                        for key in ('height_m', 'way_m', 'energy_left_1s')}} for row in rows]
-    return [table(shown, (
-        ('label', 'method', '{}'), ('height_m', 'height at the end m', '{}'),
-        ('way_m', 'distance m', '{}'), ('energy_left_1s', 'share of energy left at 1 s', '{}'),
-        ('settled', 'settled within 5 s', '{}'),
-        ('settled_s_median', 'median settle time s', '{:.2f}')))]
-
-
 def ratio_table(rows: list[Row]) -> list[str]:
     """CPU times over those of the first method, class by class and of all."""
     methods = list(dict.fromkeys(row['method'] for row in rows))
@@ -118,9 +107,7 @@ SECTIONS = (
             below=(('orders', 'Error over the tick'),)),
     ground_sections.RESTITUTION, ground_sections.CONVERGENCE,
     ground_sections.PIECES,
-    Section('spread', 'The default drop, {starts} starts tilted by thousandths of a radian',
-            'The path is chaotic; the cloud is not. The first row stands for the truth of its '
-            'engine.', body=spread_table),
+    ground_sections.DROPS,
     Section('classes', 'Nine classes of starts',
             'Energy excess is max(E - E0 - work) / max(E0 + work); over 0.1 % counts as bad.', (
                 ('class', 'class', '{}'), ('method', 'method', '{}'), ('starts', 'starts', '{}'),
