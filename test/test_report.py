@@ -174,8 +174,9 @@ def test_starts_are_what_their_class_says(name):
 
 
 def row(**changes):
-    base = {'number': 0, 'excess': 0.0, 'overshoot_rad': .1, 'sinking_m': 0.0, 'gap_m': 0.0,
-            'speed_m_s': 1.0, 'settled_s': 1.0, 'cpu_s': .5, 'simulated_s': 2.0}
+    base = {'number': 0, 'excess': 0.0, 'overshoot_rad': .1, 'sinking_m': 0.0, 'depth_m': 0.0,
+            'gap_m': 0.0, 'restless': False, 'speed_m_s': 1.0, 'settled_s': 1.0, 'cpu_s': .5,
+            'simulated_s': 2.0}
     return {**base, **changes}
 
 
@@ -191,7 +192,7 @@ def test_many_starts_become_one_row_with_the_worst_of_each():
 
 def test_a_promise_broken_is_shown_as_broken():
     rows = [{**classes.gathered('spin', f'ours-{name}', [row(excess=excess)])}
-            for name, excess in (('draft', 1e-4), ('normal', 2e-3))]
+            for name, excess in (('draft', 1e-6), ('normal', 2e-5))]
     held = {entry['goal']: entry['held'] for entry in goals.goals({'classes': rows})}
     assert held['energy excess in every start, draft'] is True
     assert held['energy excess in every start, normal'] is False

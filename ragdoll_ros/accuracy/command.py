@@ -20,7 +20,6 @@ from .parts import (
     orders,
     pieces,
     precision,
-    projection,
     restitution,
     swing,
 )
@@ -30,7 +29,7 @@ from .sections import markdown
 
 PARTS = {'precision': precision, 'orders': orders, 'restitution': restitution,
          'convergence': convergence, 'pieces': pieces, 'drop': drop, 'drops': drops,
-         'classes': classes, 'projection': projection, 'hard': hard, 'costs': costs,
+         'classes': classes, 'hard': hard, 'costs': costs,
          'estimate': estimate, 'swing': swing}
 """Modules by the names that --case takes: each says by jobs() what it has to run."""
 
@@ -103,8 +102,7 @@ def measured(options: argparse.Namespace) -> dict:
         raise WrongCall(f'--starts {options.starts}: expected 1 or more')
     began = time.monotonic()
     rows = run_jobs(chosen(options.case, Options(options.quick, options.starts)))
-    for part, join in ((classes.NAME, classes.merged), (classes.SWITCHES, classes.merged),
-                       (drops.NAME, drops.merged)):
+    for part, join in ((classes.NAME, classes.merged), (drops.NAME, drops.merged)):
         if part in rows:
             rows[part] = join(rows[part])
     words = ['ragdoll_report', *(['--quick'] if options.quick else []),

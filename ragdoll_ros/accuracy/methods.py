@@ -4,7 +4,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import process_time
 from typing import Protocol
 
@@ -60,6 +60,8 @@ class Result:
 
     trajectory: Trajectory
     costs: np.ndarray
+    told: dict[str, float] = field(default_factory=dict)
+    """Simulation.measures() at the end; empty for others."""
 
     @property
     def rate(self) -> float:
@@ -114,9 +116,10 @@ def run(method: Method, trial: Trial) -> Result:
             state = motion.advance()
             costs[index] = process_time() - before
             states.append(state)
+        told = motion.measures() if isinstance(motion, Simulation) else {}
     finally:
         motion.close()
-    return Result(Trajectory.of(times, states), costs)
+    return Result(Trajectory.of(times, states), costs, told)
 
 
 def median_run(method: Method, trial: Trial, repeats: int) -> Result:

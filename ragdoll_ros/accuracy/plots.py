@@ -125,7 +125,7 @@ def draw_precision(figures: Figures, plt: object) -> object:
 
 def draw_pieces(figures: Figures, plt: object) -> object:
     """The same for short pieces through contacts."""
-    rows = sound(figures.get('pieces', ()))
+    rows = [row for row in sound(figures.get('pieces', ())) if 'reference' in row]
     if not rows:
         return None
     figure, axes = plt.subplots(figsize=(7.5, 4.2))

@@ -1,7 +1,9 @@
 """Impacts and edges whose motion is known: struck, rocking, tipping over, spinning on its face."""
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -49,8 +51,22 @@ def _on_edge(name: str, title: str, reference: str, size: tuple[float, float, fl
     centre = impacts.edge_centre(half_width, half_height, np.array([start]))[0]
     scene = _body(Box(size), Material(restitution=0.0), tuple(centre),
                   rotation.from_axis_angle(PITCH, start))
+    extra = functools.partial(_peaks, truth) if rocks else lambda _: {}
     return Motion(name, title, reference, Trial(scene, duration), truth, 'angle_worst_rad',
-                  in_air=False)
+                  in_air=False, extra=extra)
+
+
+def _peaks(truth: Callable[[np.ndarray], Trajectory], found: Trajectory) -> dict[str, float]:
+    """Relative error of the ninth peak of a block that rocks."""
+    exact, peaks = impacts.peaks(pitches(truth(found.times))), impacts.peaks(pitches(found))
+    error = abs(peaks[8] / exact[8] - 1) if len(peaks) > 8 else math.inf
+    return {'peak_9_error': float(error)}
+
+
+def pitches(trajectory: Trajectory) -> np.ndarray:
+    """Angles (t,) rad about y of a body that rotates about y alone."""
+    _, y, _, w = trajectory.orientations[:, 0].T
+    return 2 * np.arctan2(y, w)
 
 
 def rocking_block() -> Motion:

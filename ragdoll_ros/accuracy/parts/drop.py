@@ -54,8 +54,9 @@ def energies(scene: str) -> list[Row]:
 def tick_costs(repeats: int) -> list[Row]:
     """Cost of the ticks of the default drop, 3 s."""
     rows, trial = [], falling()
-    for method in (*map(ours, ('draft', 'normal', 'exact')), bullet(10), bullet(1), quickstart(),
-                   mujoco('implicitfast', 10), mujoco('rk4', 4)):
+    for method in (*map(ours, ('draft', 'normal', 'exact')), bullet(10), bullet(4),
+                   bullet(1), quickstart(), mujoco('implicitfast', 10),
+                   mujoco('implicitfast', 4), mujoco('rk4', 4)):
         costs = np.median([run(method, trial).costs for _ in range(repeats)], axis=0)
         tick = method.tick or trial.scene.step
         rows.append({'method': method.name, 'label': method.label, 'tick_s': tick,

@@ -64,6 +64,14 @@ def edge_centre(half_width: float, half_height: float, angles: np.ndarray) -> np
                      side * sin + half_height * cos], axis=1)
 
 
+def peaks(angles: np.ndarray) -> np.ndarray:
+    """Peaks of |angle| between samples at even times, by the parabola through the three highest."""
+    size = np.abs(angles)
+    tops = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
+    before, here, after = size[tops - 1], size[tops], size[tops + 1]
+    return here + (after - before) ** 2 / (8 * (2 * here - before - after))
+
+
 def planar_impulse(arm: tuple[float, float], mass: float, inertia: float,
                    velocity: tuple[float, float], restitution: float,
                    friction: float) -> tuple[float, float]:
