@@ -303,10 +303,16 @@ def test_a_hard_case_is_held_against_its_rule():
     """A limit passed by 7 degrees, at rest, whole: one error."""
     case = hard_cases()[0]
     good = {'excess': 0.0, 'gap_m': 0.0, 'overshoot_rad': 0.0, 'sinking_m': 0.0,
-            'end_sinking_m': 0.0, 'fastest_m_s': 5.0, 'end_m_s': 0.0}
+            'end_sinking_m': 0.0, 'depth_m': 0.0, 'momentum': 1.0, 'moved_m': 9.0, 'stops': 0.0,
+            'slowest_s': 0.0, 'fastest_m_s': 5.0, 'end_m_s': 0.0}
     assert violations(case, good) == []
     assert violations(case, {**good, 'overshoot_rad': math.radians(7)}) == ['overshoot']
     assert 'energy from nothing' in violations(case, {**good, 'excess': math.nan})
+    assert violations(case, {**good, 'stops': 1.0, 'depth_m': 2e-3}) == ['stopped', 'bone in bone']
+    cases = {case.name: case for case in hard_cases()}
+    collision, stack = cases['two dolls at 6 m/s in the air'], cases['stack of five boxes']
+    assert violations(collision, {**good, 'momentum': 2e-9}) == ['momentum']
+    assert violations(stack, {**good, 'moved_m': 2e-3}) == ['does not stay']
 
 
 @pytest.mark.parametrize(('name', 'number'), [

@@ -11,6 +11,7 @@ from pathlib import Path
 from . import figures
 from .parts import (
     classes,
+    collisions,
     convergence,
     costs,
     drop,
@@ -29,8 +30,8 @@ from .sections import markdown
 
 PARTS = {'precision': precision, 'orders': orders, 'restitution': restitution,
          'convergence': convergence, 'pieces': pieces, 'drop': drop, 'drops': drops,
-         'classes': classes, 'hard': hard, 'costs': costs,
-         'estimate': estimate, 'swing': swing}
+         'classes': classes, 'collisions': collisions, 'hard': hard,
+         'costs': costs, 'estimate': estimate, 'swing': swing}
 """Modules by the names that --case takes: each says by jobs() what it has to run."""
 
 NEEDED = ('scipy', 'matplotlib', 'mujoco')

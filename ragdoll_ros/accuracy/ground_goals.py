@@ -19,6 +19,9 @@ APEX, FORMULA, PEAK = 1e-6, 1e-6, 0.01
 PIECES = {'draft': (1.0, 7.0, 0.6), 'normal': (0.4, 3.0, 1.0), 'exact': (0.05, 1.0, 3.0)}
 """mm, mm: median and 90 % of the errors of short pieces; CPU over PyBullet's at N = 10."""
 
+KEPT, DEPTH = 1e-9, 1.0
+"""Share of the momenta that a collision in the air may change; mm of a bone in a bone."""
+
 STANDARD_ERRORS = 2.0
 """By which mean energies of drops may differ from the reference's."""
 
@@ -26,7 +29,7 @@ STANDARD_ERRORS = 2.0
 def ground_goals(figures: Figures) -> Iterator[Row]:
     """One row for each promise that this run has figures for."""
     for goal in (_restitution, _closed_forms, _rocking, _pieces, _nearer_and_cheaper, _drops,
-                 _rest):
+                 _collisions, _rest):
         yield from goal(figures)
 
 
@@ -98,6 +101,16 @@ def _drops(figures: Figures) -> Iterator[Row]:
         yield promise(f'energies of {rows[0]["drops"]} default drops, {accuracy}',
                       f'within {STANDARD_ERRORS:g} standard errors of the reference', told,
                       max(off.values()) <= STANDARD_ERRORS)
+
+
+def _collisions(figures: Figures) -> Iterator[Row]:
+    for accuracy, rows in by_setting(figures, 'collisions'):
+        lost = float(np.max([number(row[key]) for row in rows
+                             for key in ('momentum_drift', 'angular_momentum_drift')]))
+        depth = 1e3 * float(np.max([number(row['depth_m']) for row in rows]))
+        yield promise(f'dolls that collide in the air, {accuracy}',
+                      f'momenta kept to {KEPT:g}, bone in bone at most {DEPTH:g} mm',
+                      f'{lost:.0e}, {depth:.2f} mm', lost <= KEPT and depth <= DEPTH)
 
 
 def _rest(figures: Figures) -> Iterator[Row]:

@@ -103,3 +103,13 @@ DROPS = Section(
     'A fall is chaotic, the distribution of many is not. Means with their standard errors; p is '
     'that of the two-sample test of Kolmogorov and Smirnov against the reference: where it is '
     'small, the clouds differ.', body=drop_tables)
+
+
+COLLISIONS = Section(
+    'collisions', 'Two dolls that collide in the air',
+    'What is lost of momentum, as a share of the sum of all m |v|, and of angular momentum about '
+    'the common centre; depths by a judge that moves no bone.', (
+        ('label', 'method', '{}'), ('speed_m_s', 'm/s', '{:g}'),
+        ('momentum_drift', 'momentum', '{:.0e}'),
+        ('angular_momentum_drift', 'angular m.', '{:.0e}'),
+        ('depth_m', 'bone in bone mm', 'mm'), ('energy_excess', 'energy excess', '{:.0e}')))

@@ -55,8 +55,9 @@ def hard_table(rows: list[Row]) -> list[str]:
     return [table(shown, (
         ('case', 'case', '{}'), ('passed', 'holds', '{}'), ('faults', 'what does not', '{}'),
         ('excess', 'energy excess', '{:.1e}'), ('overshoot_rad', 'overshoot °', 'deg'),
-        ('sinking_m', 'sinking mm', 'mm'), ('gap_m', 'gap m', '{:.0e}'),
-        ('fastest_m_s', 'fastest m/s', '{:.1f}'), ('end_m_s', 'at the end m/s', '{:.3f}'),
+        ('sinking_m', 'sinking mm', 'mm'), ('depth_m', 'bone in bone mm', 'mm'),
+        ('gap_m', 'gap m', '{:.0e}'), ('fastest_m_s', 'fastest m/s', '{:.1f}'),
+        ('end_m_s', 'at the end m/s', '{:.3f}'),
         ('other', 'PyBullet N = 10', '{}'))), *filter(None, ['\n'.join(reasons)])]
 
 
@@ -80,7 +81,7 @@ SECTIONS = (
             below=(('orders', 'Error over the tick'),)),
     ground_sections.RESTITUTION, ground_sections.CONVERGENCE,
     ground_sections.PIECES,
-    ground_sections.DROPS,
+    ground_sections.DROPS, ground_sections.COLLISIONS,
     Section('classes', 'Nine classes of starts',
             'Energy excess is the largest rise of E - work above its running minimum, over '
             'max(E0 + work); over 1e-5 counts as bad. What starts outside its limits counts from '
