@@ -13,7 +13,17 @@ from conftest import ROOT
 pytest.importorskip('scipy')
 pytest.importorskip('mujoco')
 
-from ragdoll_ros.accuracy import command, figures, goals, hard, methods, plots, starts, tables
+from ragdoll_ros.accuracy import (
+    command,
+    figures,
+    goals,
+    hard,
+    many_starts,
+    methods,
+    plots,
+    starts,
+    tables,
+)
 from ragdoll_ros.accuracy.hard_cases import hard_cases
 from ragdoll_ros.accuracy.measure import Measure
 from ragdoll_ros.accuracy.methods import bullet, by_name, median_run, ours, quickstart, run
@@ -285,7 +295,7 @@ def test_a_wrong_call_is_told_and_ends_with_2(arguments, text, capsys):
 
 
 def test_help_has_an_example(capsys):
-    for main in (command.main, hard.main):
+    for main in (command.main, hard.main, many_starts.main):
         with pytest.raises(SystemExit) as left:
             main(['--help'])
         assert left.value.code == 0

@@ -1,4 +1,5 @@
 """The report's arithmetic of contacts: clouds of drops, apexes, steps, promises."""
+import dataclasses
 import math
 
 import numpy as np
@@ -8,11 +9,16 @@ pytest.importorskip('scipy')
 pytest.importorskip('mujoco')
 
 from ragdoll_ros.accuracy import goals
+from ragdoll_ros.accuracy.contact_cases import two_dolls
+from ragdoll_ros.accuracy.fuzzed import fuzzed
 from ragdoll_ros.accuracy.ground_sections import CONVERGENCE, DROPS, PIECES, RESTITUTION
-from ragdoll_ros.accuracy.methods import by_name, core, reference
+from ragdoll_ros.accuracy.measure import Measure
+from ragdoll_ros.accuracy.methods import bullet, by_name, core, reference, run
 from ragdoll_ros.accuracy.parts import convergence, drops, estimate, restitution
 from ragdoll_ros.accuracy.references.closed_forms import bounce_times
 from ragdoll_ros.accuracy.trajectory import Trajectory
+from ragdoll_ros.model.ragdoll import JOINT_KINDS
+from ragdoll_ros.model.shapes import SHAPES
 
 
 def cloud(method, values, population='random'):
@@ -135,3 +141,22 @@ def test_methods_are_found_by_their_names():
     for wrong in ('bullet-x', 'ours-finest', 'mujoco-euler', 'mujoco-rk4-'):
         with pytest.raises(ValueError, match=wrong):
             by_name(wrong)
+
+
+def test_random_scenes_are_the_same_for_ever_and_unlike_each_other():
+    first, again, other = fuzzed(3), fuzzed(3), fuzzed(4)
+    assert first.scene == again.scene and first.pushes == again.pushes
+    assert first.scene != other.scene
+    kinds = {joint.kind for number in range(20) for placement in fuzzed(number).scene.dolls
+             for joint in placement.doll.joints}
+    shapes = {bone.shape.kind for number in range(20) for bone in fuzzed(number).scene.bones}
+    assert kinds == set(JOINT_KINDS) and shapes == set(SHAPES)
+
+
+def test_dolls_that_collide_meet_and_one_alone_keeps_its_momentum():
+    """The measure itself: the pair's flight before they meet loses nothing."""
+    trial = two_dolls(6.0)
+    early = dataclasses.replace(trial, duration=0.1)
+    assert Measure(trial.scene).momentum_drift(early, run(bullet(4), early).trajectory) < 1e-9
+    moved = run(bullet(4), trial).trajectory
+    assert np.abs(moved.angular_velocities[-1]).max() > 0.5

@@ -63,7 +63,7 @@ def parser() -> argparse.ArgumentParser:
         prog='ragdoll_report', description='Measure how wrong and how fast the simulation is, '
         'beside PyBullet and MuJoCo. Writes accuracy.json, accuracy.md and pictures.',
         epilog='example: ragdoll_report --quick --out /tmp/report; '
-        'ragdoll_report --case classes --starts 10000')
+        'ragdoll_report --case classes --starts 300')
     made.add_argument('--quick', action='store_true',
                       help='fewer motions, methods and starts: at most 90 s (else 20 min)')
     made.add_argument('--case', action='append', metavar='NAME', default=[],
