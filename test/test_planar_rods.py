@@ -136,3 +136,18 @@ def test_the_scene_begins_as_its_truth_does():
     assert np.abs((state.orientations * truth.orientations[0]).sum(axis=1)) == pytest.approx(1)
     moved = np.diff(truth.positions, axis=0)[0] / 1e-6
     assert state.linear_velocities == pytest.approx(moved, abs=1e-4)
+
+
+@pytest.mark.parametrize(('name', 'bound'), [('planar_ice', 3e-3), ('planar_stick', 1e-3)])
+def test_pybullet_without_restitution_comes_to_the_same(name, bound):
+    """An outside check: of order 1, so within ten times what 2 m/s go in a step of 0.16 ms.
+
+    Bounces are left out: PyBullet's do not converge.
+    """
+    from ragdoll_ros.accuracy.measure import compare
+    from ragdoll_ros.accuracy.methods import bullet, run
+    motion = next(motion for motion in planar_doll.planar_motions() if motion.name == name)
+    truth = motion.truth(motion.trial.times())
+    coarse, fine = (compare(run(bullet(count), motion.trial).trajectory, truth)['position_worst_m']
+                    for count in (4, 64))
+    assert fine < bound and fine < coarse / 5

@@ -114,8 +114,8 @@ def test_promises_about_restitution_and_energy_hold_or_not():
                 'flights': 7, 'seen': 7, 'worst': worst, 'found': 0.5}
     rows = [body('normal', 1e-9), body('exact', math.nan)]
     held = promised({'restitution': rows})
-    assert held['apexes of single bodies, e = 0.1 to 1, normal'] is True
-    assert held['apexes of single bodies, e = 0.1 to 1, exact'] is False
+    assert held['apexes of single bodies, e = 0.5 to 0.5, normal'] is True
+    assert held['apexes of single bodies, e = 0.5 to 0.5, exact'] is False
     assert '| normal | ball | 0.5000 |' in RESTITUTION.tables(rows)[0]
     clouds = drops.merged([cloud('truth', (0.5, 0.6, 0.7), 'default, tilted'),
                            cloud('ours-draft', (0.51, 0.6, 0.7), 'default, tilted'),

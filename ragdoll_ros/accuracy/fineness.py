@@ -2,9 +2,11 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 
-from ..physics.engine.registry import ENGINES
+from ..model.errors import RagdollError
+from ..physics.engine.registry import resolve_engine
 from ..physics.settings import ACCURACIES, Accuracy
 
 TICK = 0.01
@@ -21,9 +23,14 @@ PLAIN = {'sleep': False, 'energy': False, 'momentum': False, 'centred': False, '
 """Mechanisms that would hide what a step alone does."""
 
 
+@functools.cache
 def has_core() -> bool:
-    """Whether the engine that all others are compared with is there."""
-    return CORE in ENGINES
+    """Whether the engine that all others are compared with is there and can be made."""
+    try:
+        resolve_engine(CORE)
+    except (RagdollError, ImportError):
+        return False
+    return True
 
 
 def core_step(setting: str = 'normal') -> float:

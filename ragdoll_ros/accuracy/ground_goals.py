@@ -37,9 +37,14 @@ def _restitution(figures: Figures) -> Iterator[Row]:
     for accuracy, rows in by_setting(figures, 'restitution'):
         worst = float(np.max([number(row['worst']) for row in rows]))
         apexes = sum(row['seen'] for row in rows)
-        yield promise(f'apexes of single bodies, e = 0.1 to 1, {accuracy}',
+        yield promise(f'apexes of single bodies, {_span(rows)}, {accuracy}',
                       f'within {APEX:g} of themselves', f'{apexes} seen, worst {worst:.1e}',
                       worst <= APEX)
+
+
+def _span(rows: list[Row]) -> str:
+    found = [row['restitution'] for row in rows]
+    return f'e = {min(found):g} to {max(found):g}'
 
 
 def _closed_forms(figures: Figures) -> Iterator[Row]:

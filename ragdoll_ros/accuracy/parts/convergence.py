@@ -32,8 +32,9 @@ def jobs(options: Options) -> list[Job]:
     names = [motion.name for make in (contact_motions, impact_motions, planar_motions)
              for motion in make()]
     chosen = [name for name in names if not options.quick or name in QUICK_MOTIONS]
-    return [Job(NAME, f'convergence, {name}', functools.partial(measure, name, HALVINGS),
-                1 + 2 * motions()[name].trial.duration) for name in chosen]
+    return [Job(NAME, f'convergence, {name}', functools.partial(
+        measure, name, 4 if options.quick else HALVINGS),
+        1 + 2 * motions()[name].trial.duration) for name in chosen]
 
 
 def families(halvings: int) -> dict[str, list[Method]]:

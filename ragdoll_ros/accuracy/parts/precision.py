@@ -18,7 +18,7 @@ from ..trajectory import Trajectory
 
 NAME = 'precision'
 QUICK_MOTIONS = ('free_fall', 'projectile', 'pendulum_large', 'tumbling_box', 'flight_gentle',
-                 'flight_fast', 'bounce')
+                 'flight_fast', 'bounce', 'rod_slides', 'rocking_block')
 
 
 def jobs(options: Options) -> list[Job]:
