@@ -47,11 +47,12 @@ def turned_start(seed):
     return dataclasses.replace(DROP, dolls=(placement,))
 
 
-@pytest.mark.parametrize('seed', range(20))
-def test_a_fall_makes_no_energy_keeps_together_and_ends(seed):
+@pytest.mark.parametrize(('engine', 'seed'), [
+    *(('auto', seed) for seed in range(20)), *(('bullet', seed) for seed in range(5))])
+def test_a_fall_makes_no_energy_keeps_together_and_ends(engine, seed):
     scene = turned_start(seed)
     gap = JointGap(scene)
-    with Simulation(scene) as simulation:
+    with Simulation(scene, engine=engine) as simulation:
         start = conserved(scene, simulation.state).energy
         while not simulation.asleep:
             state = simulation.advance()
@@ -114,7 +115,7 @@ def test_a_ball_hands_its_momentum_on_to_another(accuracy, apart):
     assert state.linear_velocities[:, 0].sum() == pytest.approx(3.0, abs=1e-6)
 
 
-def on_a_slope(degrees, friction):
+def on_a_slope(degrees, friction, engine='auto'):
     """Way, m, that a box slides down a slope within a second."""
     tilt = math.radians(degrees)
     box = Ragdoll('box', (Bone('box', Box((0.4, 0.4, 0.1)), 5.0, (0.0, 0.0, 0.0)),))
@@ -122,32 +123,38 @@ def on_a_slope(degrees, friction):
     placement = Placement(box, position=tuple(0.05 * n for n in normal),
                           orientation=tuple(rotation.from_rpy(0.0, tilt, 0.0)))
     scene = Scene('slope', (placement,), Ground(normal), material=Material(friction, 0.0, 0.0))
-    with Simulation(scene) as simulation:
+    with Simulation(scene, engine=engine) as simulation:
         start = simulation.state.positions[0]
         for _ in range(100):
             state = simulation.advance()
     return float(np.linalg.norm(state.positions[0] - start))
 
 
-def test_friction_without_limit_holds_up_to_its_angle():
-    """Coulomb's: no slip below atan(NO_SLIP) = 35 degrees, above g (sin - mu cos) t^2 / 2."""
+@pytest.mark.parametrize('engine', ['auto', 'bullet'])
+def test_friction_holds_up_to_its_angle(engine):
+    """Coulomb's: no slip below atan(mu), above g (sin - mu cos) t^2 / 2."""
     # While it settles it may give way by as much as it sinks.
-    assert on_a_slope(30, math.inf) < 0.004
+    assert on_a_slope(30, NO_SLIP, engine) < 0.004
+    assert on_a_slope(50, 2.0, engine) < 0.004
     tilt = math.radians(50)
     way = 9.8 * (math.sin(tilt) - NO_SLIP * math.cos(tilt)) / 2
-    assert on_a_slope(50, math.inf) == pytest.approx(way, rel=0.02)
-    assert on_a_slope(50, 2.0) < 0.004
+    assert on_a_slope(50, NO_SLIP, engine) == pytest.approx(way, rel=0.02)
 
 
-def test_the_longest_tick_may_ask_for_any_number_of_substeps():
-    """Found by a fall at 28 m/s in ticks of 0.2 s: the table of counts ended too early.
+def test_friction_without_limit_is_a_large_one_for_bullet():
+    """Its solver does not end with larger ones."""
+    assert on_a_slope(50, math.inf, 'bullet') == on_a_slope(50, NO_SLIP, 'bullet')
 
-    The blow takes most of its 22 kJ, and it lies on the ground from then on.
+
+@pytest.mark.parametrize('engine', ['auto', 'bullet'])
+def test_the_longest_tick_ends_a_fast_fall_on_the_ground(engine):
+    """At 28 m/s, in ticks of 0.2 s: the blow takes most of its 22 kJ, and it lies there from then
+    on.
     """
     scene = load_scene('drop')
     fast = dataclasses.replace(scene.dolls[0], velocity=(0.0, 0.0, -28.0))
     scene = dataclasses.replace(scene, dolls=(fast,), step=0.2)
-    with Simulation(scene, accuracy='exact') as simulation:
+    with Simulation(scene, accuracy='exact', engine=engine) as simulation:
         energies = [conserved(scene, simulation.state).energy]
         for _ in range(5):
             state = simulation.advance()

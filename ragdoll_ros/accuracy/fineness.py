@@ -3,11 +3,10 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import math
 
 from ..model.errors import RagdollError
 from ..physics.engine.registry import resolve_engine
-from ..physics.settings import ACCURACIES, Accuracy
+from ..physics.settings import ACCURACIES, NORMAL, Accuracy
 
 TICK = 0.01
 """s in which substeps are counted."""
@@ -17,10 +16,6 @@ CORE = 'rigid'
 
 LEAST_FLIGHT_ERROR = 1e-13
 """m or rad; below it a flight's estimate is rounding."""
-
-PLAIN = {'sleep': False, 'energy': False, 'momentum': False, 'centred': False, 'land': False,
-         'redo': math.inf, 'order': 0, 'adaptive': False}
-"""Mechanisms that would hide what a step alone does."""
 
 
 @functools.cache
@@ -35,14 +30,12 @@ def has_core() -> bool:
 
 def core_step(setting: str = 'normal') -> float:
     """Longest step, s, of the core at a setting while something touches."""
-    return getattr(ACCURACIES[setting], 'step', TICK / 10)
+    return ACCURACIES[setting].step
 
 
 def of_step(step: float) -> Accuracy:
-    """An accuracy whose steps, of whatever engine, are ``step`` s long where it can choose."""
-    normal, count = ACCURACIES['normal'], max(1, round(TICK / step))
-    wanted = {**PLAIN, 'step': step, 'substeps': count, 'contact': count, 'settled': count,
-              'most': count, 'flight_error': LEAST_FLIGHT_ERROR}
-    known = {field.name for field in dataclasses.fields(normal)}
-    return dataclasses.replace(normal, **{key: value for key, value in wanted.items()
-                                          if key in known})
+    """An accuracy of steps of ``step`` s, of whatever engine, without what would hide their errors:
+    no account of energy, no sleep.
+    """
+    return dataclasses.replace(NORMAL, step=step, substeps=TICK / step, energy=False, sleep=False,
+                               flight_error=LEAST_FLIGHT_ERROR)

@@ -73,20 +73,20 @@ class _FixedSteps:
     """An engine driven with the same number of substeps in each tick."""
 
     def __init__(self, trial: Trial, substeps: int, make: Callable[..., Engine]) -> None:
-        self._trial, self._substeps = trial, substeps
-        self._engine = make(trial.scene)
+        self._trial = trial
         self._tick, self._count = trial.scene.step, 0
+        self._engine = make(trial.scene, fineness.of_step(self._tick / substeps))
         if trial.start is not None:
             self._engine.place(trial.start)
 
     @property
     def state(self) -> State:
-        return self._engine.read()
+        return self._engine.state
 
     def advance(self) -> State:
         begin = self._count * self._tick
         loads = self._trial.loads(begin, begin + self._tick) if self._trial.pushes else ()
-        self._engine.step(self._tick, self._substeps, loads)
+        self._engine.advance(self._tick, loads)
         self._count += 1
         return self.state
 
@@ -129,13 +129,12 @@ def median_run(method: Method, trial: Trial, repeats: int) -> Result:
     return dataclasses.replace(results[0], costs=costs)
 
 
-def ours(accuracy: str | Accuracy, name: str | None = None) -> Method:
+def ours(accuracy: str | Accuracy, name: str | None = None, engine: str = 'auto') -> Method:
     """Our simulation at one of its settings, or with settings of one's own."""
     name = name or f'ours-{accuracy}'
-    order = (ACCURACIES[accuracy] if isinstance(accuracy, str) else accuracy).order
-    order = kernels.ORDER if order and kernels.ready() else order or 1
+    order = kernels.ORDER if engine == 'auto' and kernels.ready() else 1
     return Method(name, name.replace('-', ' '), 'ours', functools.partial(
-        simulated, accuracy=accuracy), order=order)
+        simulated, accuracy=accuracy, engine=engine), order=order)
 
 
 def core(step: float) -> Method:
