@@ -110,6 +110,25 @@ def test_contacts_without_friction_are_least_squares(seed):
     assert [mode == contact_modes.OPEN for mode in modes] == (least < 1e-12).tolist()
 
 
+@pytest.mark.parametrize('seed', range(8))
+def test_contacts_with_friction_keep_every_law(seed):
+    """Responses anew from the forces: no pull, no sinking, within the cone, against the slip."""
+    rng, friction = np.random.default_rng(seed), 0.5
+    root = rng.normal(size=(7, 7))
+    mass, jacobian = root @ root.T + np.eye(7), rng.normal(size=(3, 2, 7))
+    free = rng.normal(size=(3, 2))
+    _, found = contact_modes.solve(mass, jacobian, free, friction,
+                                   [contact_modes.choices(friction)] * 3)
+    impulse = sum(row.T @ force for row, force in zip(jacobian, found, strict=True))
+    response = free + jacobian @ np.linalg.inv(mass) @ impulse
+    (normal, tangent), (away, along) = found.T, response.T
+    assert normal.min() >= -1e-9 and away.min() >= -1e-9
+    assert np.abs(normal * away).max() < 1e-9
+    assert (np.abs(tangent) <= friction * normal + 1e-9).all()
+    slides = np.abs(along) > 1e-9
+    assert tangent[slides] == pytest.approx((-friction * normal * np.sign(along))[slides], abs=1e-9)
+
+
 @pytest.mark.parametrize(('friction', 'restitution'), [(0.0, 0.5), (0.3, 0.0), (0.8, 0.5)])
 def test_a_doll_keeps_its_energy_between_touches_and_never_gains(friction, restitution):
     """Rises are rounding; without friction nothing pushes it along the ground."""

@@ -22,7 +22,10 @@ RADIUS = 0.1
 def contact_motions() -> list[Motion]:
     """All motions on the ground."""
     return [*map(bounce, (0.1, 0.5, 0.9, 1.0)), incline('incline_stick', 'Block that sticks', 0.6),
-            incline('incline_slip', 'Block that slips', 0.2), rolling_ball(),
+            incline('incline_slip', 'Block that slips', 0.2),
+            incline('tilted_stick', 'Block that sticks under tilted gravity', 0.6, tilted=True),
+            incline('tilted_slip', 'Block that slips under tilted gravity', 0.2, tilted=True),
+            rolling_ball(),
             rolling_ball('backspin_ball', 'Ball with backspin that comes back',
                          'v falls to (5 v + 2 r w) / 7', 1.0, -4.0)]
 
@@ -75,21 +78,25 @@ def _flight_height(t: float, height: float, restitution: float, impacts: list[fl
     return max(0.0, speed * since - GRAVITY * since * since / 2)
 
 
-def incline(name: str, title: str, friction: float, slope: float = math.radians(20)) -> Motion:
-    """A flat block laid on a slope of 20 degrees."""
-    normal = (math.sin(slope), 0.0, math.cos(slope))
-    downhill = np.array((math.cos(slope), 0.0, -math.sin(slope)))
+def incline(name: str, title: str, friction: float, slope: float = math.radians(20),
+            tilted: bool = False) -> Motion:
+    """A flat block laid on a slope of 20 degrees; or on level ground, gravity ``tilted``."""
+    lean = 0.0 if tilted else slope
+    normal = (math.sin(lean), 0.0, math.cos(lean))
+    downhill = np.array((math.cos(lean), 0.0, -math.sin(lean)))
+    pull = GRAVITY * np.array((math.sin(slope - lean), 0.0, -math.cos(slope - lean)))
     doll = Ragdoll('block', (Bone('block', Box((0.3, 0.3, 0.1)), 1.0, (0.0, 0.0, 0.0)),))
-    orientation = tuple(rotation.from_axis_angle((0, 1, 0), slope))
+    orientation = tuple(rotation.from_axis_angle((0, 1, 0), lean))
     start = 0.05 * np.array(normal)
     scene = Scene('incline', (Placement(doll, position=start, orientation=orientation),),
-                  Ground(normal), Material(friction=friction, restitution=0.0))
+                  Ground(normal), Material(friction=friction, restitution=0.0), tuple(pull))
 
     def truth(times: np.ndarray) -> Trajectory:
         slid = closed_forms.incline_slide(slope, friction, GRAVITY, times)
         return Trajectory.of_poses(times, (start + slid[:, None] * downhill)[:, None],
                                    np.tile(orientation, (len(times), 1, 1)))
-    return Motion(name, f'{title} on a slope of 20°, µ = {friction:g}, 1 s', "Coulomb's law",
+    where = 'of 20°' if tilted else 'on a slope of 20°'
+    return Motion(name, f'{title} {where}, µ = {friction:g}, 1 s', "Coulomb's law",
                   Trial(scene, 1.0), truth, in_air=False)
 
 
