@@ -11,6 +11,7 @@ pytest.importorskip('mujoco')
 from ragdoll_ros.accuracy import goals
 from ragdoll_ros.accuracy.contact_cases import two_dolls
 from ragdoll_ros.accuracy.fuzzed import fuzzed
+from ragdoll_ros.accuracy.ground_plots import STYLES, draw_convergence, draw_drops
 from ragdoll_ros.accuracy.ground_sections import CONVERGENCE, DROPS, PIECES, RESTITUTION
 from ragdoll_ros.accuracy.measure import Measure
 from ragdoll_ros.accuracy.methods import bullet, by_name, core, reference, run
@@ -160,3 +161,19 @@ def test_dolls_that_collide_meet_and_one_alone_keeps_its_momentum():
     assert Measure(trial.scene).momentum_drift(early, run(bullet(4), early).trajectory) < 1e-9
     moved = run(bullet(4), trial).trajectory
     assert np.abs(moved.angular_velocities[-1]).max() > 0.5
+
+
+def test_pictures_show_a_line_for_each_engine_and_each_cloud():
+    matplotlib = pytest.importorskip('matplotlib')
+    matplotlib.use('Agg')
+    import matplotlib.pyplot as plt
+    rows = [{'motion': 'm', 'title': 'M', 'label': label, 'yardstick': 'position_worst_m',
+             'steps_s': [1e-2, 5e-3], 'errors': [1e-3, 0.0]} for label in STYLES]
+    figure = draw_convergence({'convergence': rows}, plt)
+    assert len(figure.axes[0].lines) == len(STYLES) + 1
+    clouds = drops.merged([cloud('truth', [0.1, 0.2]), cloud('other', [0.3, math.inf])])
+    figure = draw_drops({'drops': clouds}, plt)
+    # of two drops one has no value: its line ends at a half
+    assert [line.get_ydata()[-1] for line in figure.axes[0].lines] == [1.0, 0.5]
+    assert draw_drops({}, plt) is None and draw_convergence({}, plt) is None
+    plt.close('all')

@@ -51,7 +51,8 @@ CONVERGENCE = Section(
     'convergence', 'On the ground: error against step',
     'The truths are closed forms and event-driven integrations that share no code with an engine. '
     'A slope near 0 is an engine that comes to something else, however small its difference to '
-    'itself.', body=convergence_tables)
+    'itself.', body=convergence_tables,
+    above=(('convergence', 'Error over step, motion by motion'),))
 
 
 def pieces_table(rows: list[Row]) -> list[str]:
@@ -102,7 +103,8 @@ DROPS = Section(
     'drops', 'Many drops as a cloud',
     'A fall is chaotic, the distribution of many is not. Means with their standard errors; p is '
     'that of the two-sample test of Kolmogorov and Smirnov against the reference: where it is '
-    'small, the clouds differ.', body=drop_tables)
+    'small, the clouds differ.', body=drop_tables,
+    below=(('drops', 'Random drops as distributions'),))
 
 
 COLLISIONS = Section(
