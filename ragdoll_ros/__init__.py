@@ -9,11 +9,12 @@ import importlib
 
 _HOMES = {
     'Bone': 'model.ragdoll', 'Box': 'model.shapes', 'Capsule': 'model.shapes',
-    'Cylinder': 'model.shapes', 'Ground': 'model.scene', 'Joint': 'model.ragdoll',
-    'Placement': 'model.scene', 'Push': 'model.push', 'Ragdoll': 'model.ragdoll',
-    'RagdollError': 'model.errors', 'Scene': 'model.scene', 'Simulation': 'physics.simulation',
-    'Sphere': 'model.shapes', 'State': 'model.state', 'load_doll': 'files.doll',
-    'load_scene': 'files.scene', 'save_doll': 'files.doll', 'save_scene': 'files.scene'}
+    'Compound': 'model.compound', 'Cylinder': 'model.shapes', 'Ground': 'model.scene',
+    'Joint': 'model.ragdoll', 'Part': 'model.shapes', 'Placement': 'model.scene',
+    'Push': 'model.push', 'Ragdoll': 'model.ragdoll', 'RagdollError': 'model.errors',
+    'Scene': 'model.scene', 'Simulation': 'physics.simulation', 'Sphere': 'model.shapes',
+    'State': 'model.state', 'load_doll': 'files.doll', 'load_scene': 'files.scene',
+    'save_doll': 'files.doll', 'save_scene': 'files.scene'}
 __all__ = list(_HOMES)
 
 

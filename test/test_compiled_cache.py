@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip('numba')
 
-from ragdoll_ros.physics.kernels import cache
+from ragdoll_ros.physics.kernels import cache, notices
 
 ROOT = Path(cache.__file__).resolve().parents[3]
 """Where the package is that is tested: here or installed."""
@@ -26,26 +26,14 @@ for name, accuracy in (('article', 'draft'), ('flight', 'exact'), ('crowd', 'nor
 AGAIN = 'from ragdoll_ros.physics.kernels.__main__ import main; main([])'
 READY = 'from ragdoll_ros.physics.kernels import ready; print(ready())'
 SAMPLE = """
-import numba
-from ragdoll_ros.physics.kernels import cache
+from ragdoll_ros.physics.kernels.machine import REAL, entry
 
-@numba.njit(cache=cache.KEPT)
+@entry(REAL)
 def double(x):
     return 2 * x
 
-print(cache.KEPT, double(3), double(1.5))
+print(double(3.0))
 """
-
-
-ONE = """
-import numba
-import numpy as np
-njit = numba.njit
-numba.njit = lambda *types, **options: njit(**options)
-from ragdoll_ros.physics.kernels.loaded import kernels
-print(kernels.KEPT, kernels.approach(np.array([-0.1, -0.2]), np.array([3.0, 5.0]), 0.035))
-"""
-"""Declared without their types, kernels are compiled when called: one, as all take 40 s."""
 
 
 def run(*arguments, **variables):
@@ -66,17 +54,9 @@ def sample(tmp_path):
             'import ragdoll_ros.physics.kernels.sample')
 
 
-def test_compiling_is_said_once_and_loading_is_not(sample, tmp_path):
-    said = [cache.COMPILING.format(cache.ONCE)]
-    assert run('-c', sample, NUMBA_CACHE_DIR=tmp_path / 'kept') == (0, 'True 6 3.0', said)
-    assert run('-c', sample, NUMBA_CACHE_DIR=tmp_path / 'kept') == (0, 'True 6 3.0', [])
-
-
 @pytest.fixture
 def archive(tmp_path):
-    """Paths to import by, the package from an archive: numba finds no place for its code then, as
-    for that of a read-only installation.
-    """
+    """Paths to import by, the package from an archive: nothing tells when its sources change."""
     archive = tmp_path / 'archive'
     with zipfile.ZipFile(archive, 'w') as files:
         for path in ROOT.glob('ragdoll_ros/**/*.py'):
@@ -85,16 +65,10 @@ def archive(tmp_path):
 
 
 def test_where_nothing_can_be_kept_it_compiles_all_the_same_and_says_so(sample, archive):
+    """The whole, moving, is in test_without_numba.py, slow."""
     code, printed, said = run('-c', sample, PYTHONPATH=archive)
-    assert (code, printed) == (0, 'False 6 3.0')
-    assert said == [cache.COMPILING.format(cache.EVERY_TIME)]
-
-
-def test_no_kernel_insists_on_being_kept(archive):
-    """Numba refuses to compile it then; the whole, moving, is in test_without_numba.py, slow."""
-    code, printed, said = run('-c', ONE, PYTHONPATH=archive)
-    assert (code, printed) == (0, 'False 3.0')
-    assert said == [cache.COMPILING.format(cache.EVERY_TIME)]
+    assert (code, printed) == (0, '6.0')
+    assert said == [notices.COMPILING.format(notices.EVERY_TIME)]
 
 
 def test_one_process_loads_or_compiles_at_a_time(monkeypatch):
@@ -102,7 +76,7 @@ def test_one_process_loads_or_compiles_at_a_time(monkeypatch):
     monkeypatch.setattr(cache, 'PATIENCE', 0.05)
     told, entered = [threading.Event() for _ in range(2)]
     said = []
-    monkeypatch.setattr(cache, 'say', lambda words: said.append(words) or told.set())
+    monkeypatch.setattr(notices, 'say', lambda words: said.append(words) or told.set())
 
     def enter():
         with cache.alone():
@@ -114,7 +88,7 @@ def test_one_process_loads_or_compiles_at_a_time(monkeypatch):
         assert told.wait(10) and not entered.is_set()
     assert entered.wait(10)
     other.join()
-    assert said == [cache.WAITING]
+    assert said == [notices.WAITING]
 
 
 def test_it_is_told_where_nothing_can_be_compiled():

@@ -12,6 +12,7 @@ import yaml
 viser = pytest.importorskip('viser')
 
 from page_client import wait  # noqa: E402
+from specimens import HAMMER  # noqa: E402
 from test_fit_broken import BROKEN  # noqa: E402
 
 from ragdoll_ros.files.doll import load_doll, save_doll  # noqa: E402
@@ -267,6 +268,28 @@ def test_handles_move_turn_and_resize(desk):
     for _ in range(3):
         desk.editor.undo()
     assert desk.editor.scene == DROP
+
+
+def test_a_body_of_several_shapes_is_shown_moved_and_saved(server, desk):
+    """It has no handle for its size and no fields of a shape; the next body has them again."""
+    scene = changes.change_bone(DROP, 'left_forearm', shape=HAMMER)
+    desk.editor.show(scene)
+    desk.editor.select('left_forearm')
+    desk.editor.toggle()
+    assert desk.editor.handles.size is None
+    assert not desk.panel.body['shape'].visible and not desk.panel.body['size'].visible
+    ghosts = [server.scene.get_handle_by_name(f'/editor/own/ghost_{number}')
+              for number in range(len(HAMMER.primitives))]
+    for ghost, part in zip(ghosts, HAMMER.primitives, strict=True):
+        assert tuple(ghost.position) == pytest.approx(part.position, abs=1e-12)
+    drag(desk.editor.handles.body, (0.1, 0.55, 1.25))
+    assert desk.bone('left_forearm') == dataclasses.replace(
+        scene.bones[scene.bone_index('left_forearm')], position=(0.1, 0.55, 1.25))
+    desk.files.name.value = 'hammer'
+    desk.files.save()
+    assert load_scene(str(desk.path / 'hammer.yaml')) == desk.editor.scene
+    desk.editor.select('head')
+    assert desk.editor.handles.size is not None and desk.panel.body['shape'].visible
 
 
 @pytest.mark.parametrize(('bone', 'corner', 'sizes'), [

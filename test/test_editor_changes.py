@@ -1,4 +1,5 @@
 """Changes of bones and joints: what must follow follows, what must stay stays."""
+import dataclasses
 import itertools
 import math
 
@@ -8,9 +9,10 @@ import pytest
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import errors, rotation
+from ragdoll_ros.model.compound import Compound
 from ragdoll_ros.model.ragdoll import JOINT_KINDS
 from ragdoll_ros.model.scene import above_ground
-from ragdoll_ros.model.shapes import SHAPES
+from ragdoll_ros.model.shapes import SHAPES, Box, Capsule, Part
 from ragdoll_ros.model.skeleton import Riders
 from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
@@ -279,6 +281,61 @@ def test_a_colour_is_changed_and_its_opacity_kept():
     assert fields['color'] == (51, 102, 153)
     fields['color'] = (255, 102, 153)
     assert bone_of(sheet.apply(clear, 'head', fields), 'head').color == (1, 0.4, 0.6, 0.5)
+
+
+def lop_sided():
+    """The shin of several shapes, nothing of it its own mirror image."""
+    shape = Compound((Part(Box((0.1, 0.05, 0.2)), (0.1, 0.02, 0), TURN),
+                      Part(Capsule(0.03, 0.1), (0, -0.05, 0.1))))
+    return changes.change_bone(DROP, 'left_shin', shape=shape, moments=(0.1, 0.15, 0.2))
+
+
+def test_several_shapes_are_moved_weighed_and_left_as_they_are():
+    """Their fields are not in the sheet; what it has of the body is."""
+    scene = lop_sided()
+    fields = sheet.read(scene, 'left_shin')
+    assert not {'shape', 'size', 'radius', 'length', 'parts'} & set(fields)
+    assert fields['inertia'] == '0.1, 0.15, 0.2'
+    moved = sheet.apply(scene, 'left_shin', {'position': (0, 0, 3.0), 'inertia': '1 2 2.5'})
+    before, after = bone_of(scene, 'left_shin'), bone_of(moved, 'left_shin')
+    assert after == dataclasses.replace(before, position=(0, 0, 3.0), moments=(1, 2, 2.5))
+    with pytest.raises(errors.WrongForm, match='compound'):
+        changes.set_size(scene, 'left_shin', (0.1, 0.1, 0.1))
+    with pytest.raises(errors.ModelErrors, match='OffCentre') as caught:
+        sheet.apply(scene, 'left_shin', {'inertia': ''})
+    assert [error.path for error in caught.value.errors] == ['inertia']
+
+
+def test_several_shapes_have_a_mirror_image():
+    """Along any direction the other shin reaches as far as this one along the image of it."""
+    scene = mirror.mirrored(lop_sided(), 'left_shin')
+    here, there = bone_of(scene, 'left_shin'), bone_of(scene, 'right_shin')
+    assert there.moments == here.moments
+    directions = rotation.normalized(np.random.default_rng(0).normal(size=(50, 3)))
+    reach = [bone.shape.reach(rotation.rotate(rotation.inverse(bone.orientation), seen))
+             for bone, seen in ((here, directions), (there, directions * (1, -1, 1)))]
+    assert reach[0] == pytest.approx(reach[1], abs=1e-12)
+    assert mirror.mirrored(scene, 'right_shin') == scene
+
+
+def test_an_inertia_turns_with_the_axes_of_another_shape():
+    """A bar along y becomes a cylinder: its long side is z then, and so are its moments."""
+    scene = changes.change_bone(DROP, 'head', shape=Box((0.1, 0.5, 0.2)), moments=(3, 1, 2.5))
+    bone = bone_of(changes.set_shape(scene, 'head', 'cylinder'), 'head')
+    axes = rotation.matrix(bone.orientation)
+    assert axes * bone.moments @ axes.T == pytest.approx(np.diag((3, 1, 2.5)), abs=1e-12)
+
+
+@pytest.mark.parametrize(('typed', 'words'), [
+    ('1, 2', '3 numbers'), ('a', 'three numbers'), ('1 1 3', 'sum of the other two'),
+    ('-1, 1, 1', 'above zero')])
+def test_a_faulty_inertia_is_told_at_its_field(typed, words):
+    with pytest.raises(errors.ModelErrors, match=words) as caught:
+        sheet.apply(DROP, 'head', {'inertia': typed})
+    assert [error.path for error in caught.value.errors] == ['inertia']
+    own = sheet.apply(DROP, 'head', {'inertia': '1, 2, 2.5'})
+    assert bone_of(own, 'head').inertia == (1, 2, 2.5)
+    assert sheet.apply(own, 'head', {'inertia': ' '}) == DROP
 
 
 def test_a_number_that_is_shown_rounded_stays_as_it_is():

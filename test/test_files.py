@@ -9,8 +9,9 @@ from ragdoll_ros.files.config import scene_names
 from ragdoll_ros.files.doll import load_doll, save_doll
 from ragdoll_ros.files.scene import load_scene, save_scene
 from ragdoll_ros.model import errors
+from ragdoll_ros.model.compound import Compound
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
-from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Sphere
+from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Part, Sphere
 from ragdoll_ros.physics.engine.bullet import BulletEngine
 from ragdoll_ros.physics.settings import NORMAL
 
@@ -59,10 +60,12 @@ def test_what_is_saved_is_loaded(tmp_path):
         Bone('b: x', Capsule(0.1, 0.2), 1e-3, (0, 0, 1e-9), (0.1, 0.2, 0.3, 0.4),
              color=(1, 0, 0, 1)),
         Bone('c', Cylinder(0.1, 0.2), 2, (1, 2, 3), restitution=0.25),
-        Bone('d', Sphere(0.1), 2, (1, 2, 4))), (
+        Bone('d', Sphere(0.1), 2, (1, 2, 4), moments=(0.1, 1 / 3, 0.3)),
+        Bone('e', Compound((Part(Box((0.1, 0.2, 1 / 3)), (1 / 3, 0, 0), (0.1, 0.2, 0.3, 0.4)),
+                            Part(Sphere(0.1)))), 1, (1, 2, 5), moments=(1, 1, 2))), (
         Joint('a', 'b: x', 'ball', (0, 0, 0), ((1, 2, 3),), ((-0.7, 0.7), (-0.123, 0.123)), 0.1),
         Joint('a', 'c', 'universal', (1, 0, 0), ((1, 0, 0), (0, 1, 0)), ((-1, 0.3), None)),
-        Joint('c', 'd', 'fixed', (1, 1, 1))))
+        Joint('c', 'd', 'fixed', (1, 1, 1)), Joint('d', 'e', 'fixed', (1, 1, 1))))
     save_doll(doll, tmp_path / 'doll.yaml')
     assert load_doll(str(tmp_path / 'doll.yaml')) == doll
     scene = dataclasses.replace(load_scene('crowd'), step=1 / 240, self_collision=False)
@@ -161,6 +164,26 @@ def test_a_misspelled_key_is_named(tmp_path):
     error, = caught.value.errors
     assert (error.path, error.value) == ('bones[0]', 'colour, masss')
     assert 'only name, shape, mass' in error.expected
+
+
+@pytest.mark.parametrize(('text', 'path', 'words'), [
+    ('', '', 'exactly one of shape, shapes'),
+    ('shape: {sphere: {radius: 1}}, shapes: [{sphere: {radius: 1}}]', '',
+     'exactly one of shape, shapes'),
+    ('shapes: []', '.shapes', 'at least 1'), ('shapes: [3]', '.shapes[0]', 'object'),
+    ('shapes: [{sphere: {radius: 1}, box: {size: [1, 1, 1]}}]', '.shapes[0]', 'exactly one of'),
+    ('shapes: [{sphere: {radius: 1}}, {sphere: {radius: .inf}}]', '.shapes[1].sphere', 'finite'),
+    ('shapes: [{sphere: {radius: 1}, position: [0, 0.5, 0]}]', '.shapes', 'centre of mass'),
+    ('shape: {sphere: {radius: 1}}, inertia: [1, 1]', '.inertia', '3'),
+    ('shape: {sphere: {radius: 1}}, inertia: [1, 1, 0]', '.inertia[2]', 'above 0'),
+    ('shape: {sphere: {radius: 1}}, inertia: [1, 1, 2.1]', '.inertia', 'sum of the other two')])
+def test_what_is_wrong_with_shapes_and_inertia_is_told_in_its_place(tmp_path, text, path, words):
+    (tmp_path / 'doll.yaml').write_text(
+        f'bones: [{{name: b, mass: 1, position: [0, 0, 0], {text}}}]')
+    with pytest.raises(errors.ModelErrors) as caught:
+        load_doll(str(tmp_path / 'doll.yaml'))
+    error, = caught.value.errors
+    assert error.path == 'bones[0]' + path and words in error.expected
 
 
 def test_numbers_may_be_written_as_1e3(tmp_path):

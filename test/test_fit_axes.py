@@ -6,6 +6,7 @@ from specimens import SPECIMENS
 from ragdoll_ros.fit.axes import STANDS_OUT, fit_axes, spread
 from ragdoll_ros.fit.overlap import filling
 from ragdoll_ros.fit.shapes import MAKERS, fit_best, fit_shape
+from ragdoll_ros.model.shapes import SHAPES
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -120,7 +121,7 @@ def test_distance_against_the_nearest_of_many_surface_points(solid):
     assert np.abs(solid.signed_distance(corners)).max() < 1e-9
 
 
-@pytest.mark.parametrize('solid', SPECIMENS.values(), ids=lambda solid: solid.kind)
+@pytest.mark.parametrize('solid', [SPECIMENS[kind] for kind in SHAPES], ids=SHAPES)
 def test_a_solid_is_recognised_by_its_skin(solid):
     corners, triangles = solid.mesh()
     weights = np.random.default_rng(1).dirichlet((1, 1, 1), size=(len(triangles), 12))

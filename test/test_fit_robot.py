@@ -4,14 +4,16 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from specimens import HAMMER
 
 from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.files.urdf import to_urdf
 from ragdoll_ros.fit.robot import doll_from_urdf, read_urdf
 from ragdoll_ros.model import errors, rotation
+from ragdoll_ros.model.compound import Compound
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.scene import above_ground
-from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Sphere
+from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Part, Sphere
 from ragdoll_ros.physics.simulation import Simulation
 
 TURN = rotation.from_rpy(0.3, -0.4, 0.5)
@@ -174,12 +176,87 @@ def test_a_world_with_a_shape_is_a_bone_of_another_name(tmp_path):
     assert [(rider.name, rider.bone) for rider in doll.riders] == [('world', 'world_'), ('b', 'b')]
 
 
-def test_several_shapes_become_the_one_that_holds_them(tmp_path):
+def test_several_shapes_of_a_link_stay_several(tmp_path):
     two = (link('a').replace('</link>', '') + '<collision><origin xyz="0.1 0 0"/><geometry>'
            '<box size="0.1 0.1 0.1"/></geometry></collision></link>')
     doll, _ = read(tmp_path, two)
-    assert sorted(doll.root.shape.size) == pytest.approx([0.1, 0.1, 0.2], abs=1e-9)
-    assert np.allclose(doll.root.position, (0.05, 0, 0), atol=1e-9)
+    assert [part.shape for part in doll.root.shape.parts] == [Box((0.1, 0.1, 0.1))] * 2
+    assert np.allclose(doll.root.position, (0.05, 0, 0), atol=1e-12)
+    # Side by side they are the uniform box of both.
+    assert doll.root.inertia == pytest.approx(Box((0.2, 0.1, 0.1)).inertia(1.0))
+
+
+def test_shapes_and_inertia_come_back():
+    """Bones of several shapes, capsules among them, in their own axes, and own inertias."""
+    doll = every_kind()
+    for name, changes in (('root', {'shape': HAMMER}), ('stuck', {'shape': HAMMER}),
+                          ('hinged', {'moments': (0.02, 0.03, 0.025)}),
+                          ('swung', {'shape': HAMMER, 'moments': (0.1, 0.2, 0.15)})):
+        doll = doll.replace_bone(name, **changes)
+    off = Compound((Part(Box((0.1, 0.2, 0.3)), (0.1, 0, 0), TURN),))
+    doll = doll.replace_bone('crossed', shape=off, moments=(0.1, 0.2, 0.15))
+    back = doll_from_urdf(to_urdf(doll))
+    for bone in doll.bones:
+        other = back.bone(bone.name)
+        assert other.inertia == pytest.approx(bone.inertia, rel=1e-9)
+        assert (other.moments is None) == (bone.moments is None)
+        assert np.allclose(from_root(back, other.position), from_root(doll, bone.position),
+                           atol=1e-12)
+        assert rotation.angle_between(np.array(other.orientation), bone.orientation) < 1e-9
+        assert [part.shape for part in other.shape.parts] == [
+            part.shape for part in bone.shape.parts]
+        for part, wanted in zip(other.shape.parts, bone.shape.parts, strict=True):
+            assert np.allclose(part.position, wanted.position, atol=1e-12)
+            assert rotation.angle_between(np.array(part.orientation), wanted.orientation) < 1e-9
+
+
+FLOATING = ('<link name="world"/><joint name="free" type="floating"><parent link="world"/>'
+            '<child link="a"/></joint>')
+
+
+def massive(name, inertia, xyz='0 0 0', rpy='0 0 0', mass=2.0, shape=''):
+    ixx, iyy, izz, ixy, ixz, iyz = inertia
+    return (f'<link name="{name}"><inertial><origin xyz="{xyz}" rpy="{rpy}"/><mass value="{mass}"/>'
+            f'<inertia ixx="{ixx}" iyy="{iyy}" izz="{izz}" ixy="{ixy}" ixz="{ixz}" iyz="{iyz}"/>'
+            f'</inertial>{shape}</link>')
+
+
+def test_mass_centre_and_inertia_are_those_of_the_link_and_what_it_carries(tmp_path):
+    """Against MuJoCo, which makes one body of links that are fixed to each other.
+
+    What is carried has no shape, and an inertia that no solid as dense as matter has.
+    """
+    mujoco = pytest.importorskip('mujoco')
+    box = '<collision><geometry><box size="0.2 0.1 0.3"/></geometry></collision>'
+    text = robot(FLOATING, massive('a', (0.03, 0.04, 0.05, 0.005, -0.004, 0.003), '0.01 0.02 0.03',
+                                   '0.3 -0.4 0.5', shape=box),
+                 massive('b', (1.0, 1.5, 1.2, 0.1, 0.2, 0), '0.1 0 0', '0 1 0', 0.7),
+                 '<joint name="to_b" type="fixed"><parent link="a"/><child link="b"/>'
+                 '<origin xyz="0 0 0.4" rpy="0.2 0 -0.7"/></joint>')
+    model = mujoco.MjModel.from_xml_string(text)
+    assert model.nbody == 2
+    axes = np.empty(9)
+    mujoco.mju_quat2Mat(axes, model.body_iquat[1])
+    axes = axes.reshape(3, 3)
+    bone = doll_from_urdf(text).root
+    assert bone.mass == pytest.approx(model.body_mass[1])
+    assert bone.position == pytest.approx(model.body_ipos[1], abs=1e-12)
+    turn = rotation.matrix(bone.orientation)
+    assert turn * bone.inertia @ turn.T == pytest.approx(
+        axes * model.body_inertia[1] @ axes.T, abs=1e-9)
+    # The box stays where it is: its faces are 0.1, 0.05 and 0.15 m from the link's frame.
+    part, = bone.shape.parts
+    assert part.shape == Box((0.2, 0.1, 0.3))
+    directions = np.concatenate([np.eye(3), -np.eye(3)])
+    reach = directions @ bone.position + bone.shape.reach(directions @ turn)
+    assert reach == pytest.approx([0.1, 0.05, 0.15] * 2)
+
+
+@pytest.mark.parametrize('inertia', [(0, 0, 0, 0, 0, 0), (1, 1, 3, 0, 0, 0), (-1, 1, 1, 0, 0, 0)])
+def test_an_inertia_that_no_body_has_is_told_and_left_out(tmp_path, inertia):
+    shape = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+    doll, notes = read(tmp_path, massive('a', inertia, shape=shape))
+    assert doll.root.moments is None and 'no body has its inertia' in notes[0]
 
 
 def test_what_is_only_a_mesh_becomes_the_box_of_the_same_inertia(tmp_path):

@@ -3,11 +3,12 @@ import math
 
 import numpy as np
 import pytest
-from specimens import SPECIMENS
+from specimens import HANDLE, HEAD, SPECIMENS
 
 from ragdoll_ros.model import errors
+from ragdoll_ros.model.compound import Compound
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
-from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Sphere
+from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Part, Sphere
 
 BALL = Sphere(0.1)
 
@@ -21,6 +22,14 @@ def hinge(parent, child, **changes):
                                    **changes})
 
 
+def in_hammer(x, y, z):
+    """Its parts have 74 % and 26 % of its volume: a capsule along x on top of a box."""
+    share = HEAD.volume / (HEAD.volume + HANDLE.volume)
+    top, bottom = 0.2 * (1 - share), -0.2 * share
+    head = np.maximum(0, np.abs(x) - 0.1) ** 2 + y * y + (z - top) ** 2 < 0.05 ** 2
+    return head | ((np.abs(x) < 0.02) & (np.abs(y) < 0.03) & (np.abs(z - bottom) < 0.15))
+
+
 @pytest.mark.parametrize('shape', SPECIMENS.values(), ids=SPECIMENS)
 def test_volume_and_inertia_are_those_of_the_uniform_solid(shape):
     """Against sums over a million random points of the bounding box: 1 % is four sigma."""
@@ -28,7 +37,9 @@ def test_volume_and_inertia_are_those_of_the_uniform_solid(shape):
     half = np.array(shape.half_extents)
     points = rng.uniform(-half, half, (1_000_000, 3))
     x, y, z = points.T
-    if shape.kind == 'sphere':
+    if shape.kind == 'compound':
+        inside = in_hammer(x, y, z)
+    elif shape.kind == 'sphere':
         inside = (points ** 2).sum(axis=1) < shape.radius ** 2
     elif shape.kind == 'box':
         inside = np.full(len(points), True)
@@ -53,6 +64,14 @@ def test_volume_and_inertia_are_those_of_the_uniform_solid(shape):
     (lambda: Capsule(1, math.inf), errors.NotFinite),
     (lambda: bone('a', mass=0), errors.NotPositive),
     (lambda: bone('world'), errors.DuplicateName),
+    (lambda: bone('a', moments=(1, 1)), errors.WrongForm),
+    (lambda: bone('a', moments=(1, 1, math.nan)), errors.NotFinite),
+    (lambda: bone('a', moments=(1, 1, 0)), errors.NotPositive),
+    (lambda: bone('a', moments=(3, 1, 1)), errors.OutOfRange),
+    (lambda: Compound(()), errors.WrongForm),
+    (lambda: Part(Compound((Part(BALL),))), errors.WrongForm),
+    (lambda: Part(BALL, (0, 0)), errors.WrongForm),
+    (lambda: Part(BALL, orientation=(0, 0, 0, 0)), errors.NotUnit),
     (lambda: bone('a', position=(0, math.nan, 0)), errors.NotFinite),
     (lambda: bone('a', orientation=(0, 0, 0, 0)), errors.NotUnit),
     (lambda: hinge('a', 'b', limits=((1, -1),)), errors.LimitsReversed),

@@ -16,6 +16,7 @@ from ragdoll_ros.model.push import ARROW, Push
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.ros.handles import GROWTH, Handles
 from ragdoll_ros.ros.markers import Markers
 from ragdoll_ros.ros.messages import to_joint_state, to_multi_dof, to_pose_array
 from ragdoll_ros.ros.packed import Packed
@@ -137,6 +138,18 @@ def test_markers_fill_the_shape_of_a_bone(lone):
     inner = rotation.rotate(rotation.inverse(turn), directions)
     expected = directions @ centre + lone.scene.bones[0].shape.reach(inner)
     np.testing.assert_allclose(reach, expected, atol=1e-12)
+
+
+def test_ghosts_to_drag_fill_the_shape_of_a_bone_too(lone):
+    """In the bone's own frame, each part larger by GROWTH about its own middle."""
+    handles = Handles(lone.scene, 'map')
+    directions = rotation.normalized(np.random.default_rng(4).normal(size=(50, 3)))
+    ghosts = handles.markers[0].controls[0].markers
+    for ghost in ghosts:
+        scale = ghost.scale
+        scale.x, scale.y, scale.z = scale.x / GROWTH, scale.y / GROWTH, scale.z / GROWTH
+    reach = np.max([_support(ghost, directions) for ghost in ghosts], axis=0)
+    np.testing.assert_allclose(reach, lone.scene.bones[0].shape.reach(directions), atol=1e-12)
 
 
 def _support(marker, directions):

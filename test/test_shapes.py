@@ -9,12 +9,13 @@ from ragdoll_ros import Bone, Ground, Placement, Ragdoll, Scene, Simulation, loa
 from ragdoll_ros.files.urdf import to_urdf
 from ragdoll_ros.files.urdf_tree import parse_urdf
 from ragdoll_ros.model import errors, rotation
+from ragdoll_ros.model.compound import Compound
 from ragdoll_ros.model.shapes import SHAPES, SIZES, Sphere
 
 TURN = tuple(rotation.normalized((.1, .5, -.3, .8)))
 
 
-@pytest.fixture(params=SHAPES)
+@pytest.fixture(params=SPECIMENS)
 def shape(request):
     return SPECIMENS[request.param]
 
@@ -25,7 +26,8 @@ def alone(shape, **placed):
 
 
 def test_every_kind_has_a_specimen():
-    assert set(SPECIMENS) == set(SHAPES) == set(SIZES)
+    assert set(SPECIMENS) == {*SHAPES, Compound.kind}
+    assert set(SHAPES) == set(SIZES)
 
 
 def test_a_file_reads_back_to_the_same_shape(shape, tmp_path):
@@ -63,8 +65,9 @@ def test_its_primitives_reach_as_far_as_it_does(shape):
     """What is drawn, box, cylinder and sphere alone, fills the shape's own surface."""
     directions = rotation.normalized(np.random.default_rng(2).normal(size=(50, 3)))
     assert {part.kind for part in shape.primitives} <= {'box', 'cylinder', 'sphere'}
-    found = np.max([directions @ np.array(part.offset) + part.shape.reach(directions)
-                    for part in shape.primitives], axis=0)
+    found = np.max([directions @ np.array(part.position) + part.shape.reach(
+        rotation.rotate(rotation.inverse(part.orientation), directions))
+        for part in shape.primitives], axis=0)
     assert found == pytest.approx(shape.reach(directions), abs=1e-12)
 
 
@@ -77,6 +80,7 @@ def test_the_editor_makes_each_kind_of_each_other(shape):
         changed = changes.set_shape(scene, 'bone', kind)
         assert changed.bones[0].shape.kind == kind
         assert sheet.apply(changed, 'bone', sheet.read(changed, 'bone')) == changed
+    assert sheet.apply(scene, 'bone', sheet.read(scene, 'bone')) == scene
 
 
 @pytest.mark.parametrize('number', [np.float64(0.1), np.float32(0.5), 1])

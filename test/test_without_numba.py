@@ -79,9 +79,8 @@ except RagdollError as error:
 
 @pytest.mark.slow
 def test_it_does_where_nothing_can_be_kept(tmp_path):
-    """As for a user without a home, the package being another's: numba finds no place for its
-    cache, and raises RuntimeError. A file stands here where the folders were to be. All kernels
-    are compiled; test_compiled_cache.py has one of them.
+    """As for a user without a home, the package being another's. A file stands here where the
+    folders were to be. All kernels are compiled; test_kernel_cache.py does it with two small ones.
     """
     pytest.importorskip('numba', reason='numba is not installed')
     package = tmp_path / 'ragdoll_ros'

@@ -8,10 +8,11 @@ import math
 import os
 from pathlib import Path
 
+from ..model.compound import Compound
 from ..model.errors import ModelError
 from ..model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame, carried_errors, tree_errors
 from ..model.rotation import IDENTITY
-from ..model.shapes import SHAPES, Shape
+from ..model.shapes import SHAPES, Part, Shape
 from . import yaml_text
 from .building import build_each, entries, raise_or_give, read_named
 from .schema import schema_errors
@@ -84,9 +85,22 @@ def _shape(data: dict) -> Shape:
     return SHAPES[kind](**sizes)
 
 
+def _part(data: dict) -> Part:
+    kind, = SHAPES.keys() & data.keys()
+    return Part(_shape({kind: data[kind]}),
+                **{key: value for key, value in data.items() if key != kind})
+
+
 def _bone(data: dict) -> Bone:
-    fields = dict(data)
-    return Bone(shape=_shape(fields.pop('shape')), **fields)
+    fields, found = dict(data), []
+    moments = fields.pop('inertia', None)
+    if 'shape' in data:
+        return Bone(shape=_shape(fields.pop('shape')), moments=moments, **fields)
+    parts = build_each(data, 'shapes', _part, found)
+    for error in found:
+        raise error
+    del fields['shapes']
+    return Bone(shape=Compound(parts), moments=moments, **fields)
 
 
 def _joint(data: dict) -> Joint:
@@ -102,11 +116,27 @@ def _joint(data: dict) -> Joint:
         raise type(error)(path, pairs, error.expected) from None
 
 
+def _shape_data(shape: Shape) -> dict:
+    return {shape.kind: {key: list(value) if isinstance(value, tuple) else value
+                         for key, value in vars(shape).items()}}
+
+
+def _part_data(part: Part) -> dict:
+    data = _shape_data(part.shape)
+    if any(part.position):
+        data['position'] = list(part.position)
+    if part.orientation != IDENTITY:
+        data['orientation'] = list(part.orientation)
+    return data
+
+
 def _bone_data(bone: Bone) -> dict:
-    sizes = {key: list(value) if isinstance(value, tuple) else value
-             for key, value in vars(bone.shape).items()}
-    data = {'name': bone.name, 'shape': {bone.shape.kind: sizes}, 'mass': bone.mass,
-            'position': list(bone.position)}
+    several = isinstance(bone.shape, Compound)
+    shape = {'shapes': [_part_data(part) for part in bone.shape.parts]} if several else {
+        'shape': _shape_data(bone.shape)}
+    data = {'name': bone.name, **shape, 'mass': bone.mass, 'position': list(bone.position)}
+    if bone.moments is not None:
+        data['inertia'] = list(bone.moments)
     if bone.orientation != IDENTITY:
         data['orientation'] = list(bone.orientation)
     for key in ('friction', 'rolling_friction', 'restitution'):

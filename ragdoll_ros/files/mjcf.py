@@ -22,7 +22,7 @@ from ..model import rotation
 from ..model.pose import Pose
 from ..model.ragdoll import Bone, Joint, joint_axes
 from ..model.scene import Placement, Scene, grip
-from ..model.shapes import Shape
+from ..model.shapes import Part, Shape
 
 CONTACT_TIME = 0.02
 """Time constant of a contact, s: MuJoCo's default; who knows the step sets one that goes with it.
@@ -108,10 +108,19 @@ def _add_bone(parent: ET.Element, scene: Scene, placement: Placement, bone: Bone
                   diaginertia=_text(bone.inertia))
     # bit 0: meets the ground and, with self-collision, each other; bit 1: meets the ground only
     mask = '1' if scene.self_collision else '2'
-    ET.SubElement(body, 'geom', name=name, type=bone.shape.kind, size=_text(_size(bone.shape)),
-                  contype=mask, conaffinity='1' if scene.self_collision else '0',
-                  **_material(scene, bone))
+    for number, part in enumerate(bone.shape.parts, 1):
+        # No bone has a slash in its own name.
+        ET.SubElement(body, 'geom', name=name if number == 1 else f'{name}/{number}',
+                      type=part.kind, size=_text(_size(part.shape)), **_placed(part),
+                      contype=mask, conaffinity='1' if scene.self_collision else '0',
+                      **_material(scene, bone))
     return body
+
+
+def _placed(part: Part) -> dict[str, str]:
+    """Where a part stands in its body; nothing where that is the body's own frame."""
+    return {} if part.is_centred else {'pos': _text(part.position),
+                                       'quat': _quaternion(part.orientation)}
 
 
 def _joints(joint: Joint, child: Bone) -> Iterable[dict[str, str]]:

@@ -18,6 +18,9 @@ def schema_errors(schema: str, data: object) -> list[ModelError]:
     """Find all that the schema ``schema`` ('scene' or 'doll') has against the data."""
     found = []
     for error in _validator(schema).iter_errors(data):
+        if error.validator == 'oneOf' and not isinstance(error.instance, dict):
+            # That it is no mapping is told already.
+            continue
         path = ''
         for part in error.absolute_path:
             path += f'[{part}]' if isinstance(part, int) else f'.{part}' if path else str(part)
@@ -27,7 +30,9 @@ def schema_errors(schema: str, data: object) -> list[ModelError]:
 
 
 def _wrong(error: jsonschema.ValidationError) -> object:
-    """What is wrong at the place of an error: of a mapping, the keys that none has."""
+    """What is wrong at the place of an error: of a mapping, its keys, or those that none has."""
+    if error.validator == 'oneOf':
+        return ', '.join(map(str, error.instance))
     if error.validator != 'additionalProperties':
         return error.instance
     return ', '.join(str(key) for key in error.instance if key not in error.schema['properties'])
@@ -39,6 +44,9 @@ def _expected(error: jsonschema.ValidationError) -> str:
     if error.validator == 'required':
         missing = [key for key in error.validator_value if key not in error.instance]
         return 'the missing ' + ', '.join(missing)
+    if error.validator == 'oneOf':
+        choices = [key for choice in error.validator_value for key in choice['required']]
+        return 'exactly one of ' + ', '.join(choices)
     if error.validator == 'additionalProperties':
         return 'only ' + ', '.join(error.schema['properties'])
     rule = {'enum': 'one of {}', 'type': 'a {}', 'minItems': 'at least {} items',

@@ -13,7 +13,7 @@ link of no mass with the joint's frame takes it, and the child is fixed to that.
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -86,8 +86,8 @@ def _link(bone: Bone, frame: Pose, dialect: str) -> list[str]:
              f'      <mass value="{bone.mass!r}"/>',
              f'      <inertia ixx="{ixx!r}" iyy="{iyy!r}" izz="{izz!r}" ixy="0" ixz="0" iyz="0"/>',
              '    </inertial>']
-    for position, geometry in _geometries(bone, pose, dialect):
-        origin = _origin(position, pose.orientation)
+    for place, geometry in _geometries(bone, pose, dialect):
+        origin = _origin(*place)
         lines += ['    <visual>', f'      {origin}', f'      {geometry}',
                   f'      <material name={_quoted(bone.name)}>'
                   f'<color rgba={_numbers(color)}/></material>', '    </visual>',
@@ -95,13 +95,16 @@ def _link(bone: Bone, frame: Pose, dialect: str) -> list[str]:
     return [*lines, '  </link>']
 
 
-def _geometries(bone: Bone, pose: Pose, dialect: str) -> list[tuple[np.ndarray, str]]:
-    """Places and XML of the primitives that make up a bone's shape."""
-    shape = bone.shape
-    if shape.kind == 'capsule' and dialect == 'ros':
-        # URDF has none: a cylinder between two balls.
-        return [(pose.outward(part.offset), _geometry(part.shape)) for part in shape.primitives]
-    return [(pose.position, _geometry(shape))]
+def _geometries(bone: Bone, pose: Pose, dialect: str) -> Iterator[tuple[Pose, str]]:
+    """Poses and XML of what makes up a bone's shape."""
+    for part in bone.shape.parts:
+        place = pose if part.is_centred else pose.compose(part.pose)
+        if part.kind == 'capsule' and dialect == 'ros':
+            # URDF has none: a cylinder between two balls.
+            for piece in part.shape.primitives:
+                yield Pose(place.outward(piece.position), place.orientation), _geometry(piece.shape)
+        else:
+            yield place, _geometry(part.shape)
 
 
 def _geometry(shape: Shape) -> str:

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import textwrap
 
+from ..model.compound import Compound
 from ..model.ragdoll import Ragdoll
 from ..model.shapes import Shape
 from .doubts import extent, find_doubts
@@ -52,7 +53,9 @@ def _quality(body: BodyFit) -> str:
             f'{"*" if body.axes.principal else " "}  ')
 
 
-def _size(shape: Shape) -> str:
+def _size(shape: Shape | Compound) -> str:
+    if isinstance(shape, Compound):
+        return f'{len(shape.parts)} shapes'
     edges = [edge for value in vars(shape).values()
              for edge in (value if isinstance(value, tuple) else (value,))]
     return ' x '.join(f'{edge:.4f}' for edge in edges)

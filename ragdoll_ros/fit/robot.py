@@ -2,9 +2,8 @@
 
 A link with a shape becomes a body; its joint becomes a hinge, or part of a universal or ball
 joint where links of no shape stand between (as to_urdf writes them). A link without a shape
-is carried by its parent and gives it its mass. Every link's frame is one of the doll's riders, so
-that it can be published. Bodies are uniform solids: of a link's inertia its mass remains, and
-where it has no plain shape, the box of the same inertia.
+is carried by its parent and gives it its mass and inertia. Every link's frame is one of the doll's
+riders, so that it can be published.
 """
 from __future__ import annotations
 
@@ -14,20 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..files.urdf_tree import LARGEST_TEXT, UrdfJoint, UrdfLink, UrdfTree, parse_urdf
+from ..files.urdf_tree import LARGEST_TEXT, UrdfJoint, UrdfTree, parse_urdf
 from ..model import errors, rotation
 from ..model.pose import Pose
 from ..model.ragdoll import LARGEST_SWING, WORLD, Bone, Joint, Ragdoll, SkeletonFrame
-from ..model.shapes import Box, Capsule, Shape
-from .axes import fit_axes
+from .link_bodies import link_shapes, make_bone
 from .names import plain_name
-from .shapes import fit_best
-
-DENSITY = 1000.0
-"""kg/m^3 of a link that moves and has a shape but no mass."""
-
-THINNEST = 0.005
-"""m; of a body that several shapes, or only its inertia, make up."""
 
 SAME_PLACE = 1e-6
 """m; axes in a row that meet this nearly are one joint."""
@@ -69,22 +60,16 @@ def _doll(tree: UrdfTree) -> tuple[Ragdoll, list[str]]:
     angles = {child: float(np.clip(0.0, *joint.limits)) for child, joint in tree.joints.items()
               if joint.limits}
     poses = tree.poses(angles)
-    solids = {name: _solid(link, notes) for name, link in tree.links.items()}
-    if not any(solids.values()):
+    shapes = {name: link_shapes(link, notes) for name, link in tree.links.items()}
+    if not any(shapes.values()):
         raise errors.WrongForm('link', list(tree.links)[:5], 'a link with a shape or an inertia')
-    carriers = _carriers(tree, solids)
+    carriers = _carriers(tree, shapes)
     names = _names([name for name in tree.links if carriers[name] == name], [WORLD])
     root = next(name for name in tree.order if carriers[name] == name)
-    masses = dict.fromkeys(names, 0.0)
-    for name, link in tree.links.items():
-        masses[carriers[name]] += link.mass
-    bones = []
-    for name, text in names.items():
-        shape, place = solids[name]
-        if masses[name] <= 0:
-            masses[name] = DENSITY * shape.volume
-            notes.append(f'{name} has no mass: that of water is taken, {masses[name]:.3g} kg')
-        bones.append(Bone(text, shape, masses[name], *poses[name].compose(place)))
+    bones = [make_bone(text, shapes[name], tree.links[name], poses[name],
+                       [(link, poses[other]) for other, link in tree.links.items()
+                        if carriers[other] == name != other and link.mass > 0], notes)
+             for name, text in names.items()]
     joints = [_joint(tree, name, carriers, names, poses, angles, notes)
               for name in names if name != root]
     above = root
@@ -96,72 +81,12 @@ def _doll(tree: UrdfTree) -> tuple[Ragdoll, list[str]]:
     return Ragdoll(plain_name(tree.name, 'link'), tuple(bones), tuple(joints), riders=frames), notes
 
 
-def _solid(link: UrdfLink, notes: list[str]) -> tuple[Shape, Pose] | None:
-    """A link's one shape and its pose in the link's frame; None if nothing gives one."""
-    if link.meshes and link.shapes:
-        notes.append(f'{link.name}: meshes left out, plain shapes taken')
-    if len(link.shapes) == 1:
-        return link.shapes[0]
-    if link.shapes:
-        return _capsule(link.shapes) or _around(link.shapes)
-    if link.mass <= 0 or (link.inertia is None and not link.meshes):
-        return None
-    box = _same_inertia(link)
-    if box is not None and DENSITY / 50 < link.mass / box[0].volume < DENSITY * 20:
-        if link.meshes:
-            notes.append(f'{link.name}: only meshes; the box of the same inertia is taken')
-        return box
-    if not link.meshes:
-        return None
-    notes.append(f'{link.name}: only meshes and no inertia that could be; a cube of water is taken')
-    return Box(((link.mass / DENSITY) ** (1 / 3),) * 3), link.centre
-
-
-def _capsule(shapes: list[tuple[Shape, Pose]]) -> tuple[Shape, Pose] | None:
-    """A cylinder with a ball of its radius at each end is a capsule: URDF has none."""
-    cylinders = [part for part in shapes if part[0].kind == 'cylinder']
-    balls = [part for part in shapes if part[0].kind == 'sphere']
-    if len(cylinders) != 1 or len(balls) != 2 or len(shapes) != 3:
-        return None
-    barrel, place = cylinders[0]
-    half = rotation.rotate(place.orientation, np.array([0, 0, barrel.length / 2]))
-    centres = np.stack([pose.position for _, pose in balls]) - place.position
-    fits = any(np.abs(centres - ends).max() < 1e-6 * barrel.length
-               for ends in (np.stack([half, -half]), np.stack([-half, half])))
-    if not fits or any(abs(ball.radius - barrel.radius) > 1e-9 for ball, _ in balls):
-        return None
-    return Capsule(barrel.radius, barrel.length), place
-
-
-def _around(shapes: list[tuple[Shape, Pose]]) -> tuple[Shape, Pose]:
-    """One shape around several."""
-    points = np.concatenate([pose.outward(shape.mesh()[0]) for shape, pose in shapes])
-    axes = fit_axes(points, np.ones(len(points)), np.array([0.0, 0.0, 1.0]))
-    local = points @ axes.frame
-    fitted, = fit_best([local], THINNEST, 0.0)
-    return fitted.shape, Pose(axes.frame @ fitted.centre, rotation.from_matrix(axes.frame))
-
-
-def _same_inertia(link: UrdfLink) -> tuple[Shape, Pose] | None:
-    """The uniform box of a link's mass and inertia: its edge a^2 = 6 (Iy + Iz - Ix) / m."""
-    if link.inertia is None:
-        return None
-    moments, axes = np.linalg.eigh(link.inertia)
-    squares = 6 * (moments.sum() - 2 * moments) / link.mass
-    if not np.isfinite(squares).all() or squares.max() <= THINNEST ** 2:
-        return None
-    if np.linalg.det(axes) < 0:
-        axes = axes * (1, 1, -1)
-    edges = np.sqrt(np.maximum(squares, THINNEST ** 2))
-    return Box(tuple(edges)), link.centre.compose(Pose(orientation=rotation.from_matrix(axes)))
-
-
-def _carriers(tree: UrdfTree, solids: dict) -> dict[str, str]:
+def _carriers(tree: UrdfTree, shapes: dict[str, list]) -> dict[str, str]:
     """Link whose body carries each link: itself where it has one, a bare root's child."""
     carriers: dict[str, str] = {}
     for name in tree.order:
         above = tree.joints[name].parent if name in tree.joints else None
-        own = solids[name] is not None and not (
+        own = bool(shapes[name]) and not (
             tree.links[name].mass <= 0 and above in carriers and carriers[above] is not None
             and tree.joints[name].kind == 'fixed')
         carriers[name] = name if own else carriers.get(above)

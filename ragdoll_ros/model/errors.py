@@ -58,6 +58,14 @@ class WrongAxes(ModelError):
     """A joint with another number of axes or limits than its kind has."""
 
 
+class OffCentre(ModelError):
+    """Shapes of a bone whose centre of mass is not the bone's."""
+
+
+class NotPrincipal(ModelError):
+    """Shapes of a bone whose principal axes of inertia are not the bone's."""
+
+
 class UnknownBone(ModelError):
     """A name that no bone bears."""
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import errors, rotation
+from .compound import Compound
 from .errors import set_fields
 from .pose import Pose
 from .rotation import IDENTITY
@@ -34,15 +35,16 @@ WORLD = 'world'
 
 @dataclass(frozen=True)
 class Bone:
-    """A rigid body: a uniform solid of ``mass`` kg with its centre of mass at ``position``.
+    """A rigid body of ``mass`` kg with its centre of mass at ``position``.
 
-    ``orientation`` turns the shape's own axes into the doll's. ``friction``,
-    ``rolling_friction`` (m) and ``restitution`` override the scene's material; None keeps it.
-    ``color`` is red, green, blue, alpha from 0 to 1.
+    ``orientation`` turns the shape's own axes, which are its principal axes of inertia, into the
+    doll's. ``friction``, ``rolling_friction`` (m) and ``restitution`` override the scene's
+    material; None keeps it. ``color`` is red, green, blue, alpha from 0 to 1. ``moments`` are
+    those about the centre of mass along its axes, kg m^2; None: those of the uniform solid.
     """
 
     name: str
-    shape: Shape
+    shape: Shape | Compound
     mass: float
     position: Vector
     orientation: Quaternion = IDENTITY
@@ -50,6 +52,7 @@ class Bone:
     rolling_friction: float | None = None
     restitution: float | None = None
     color: tuple[float, float, float, float] | None = None
+    moments: Vector | None = None
 
     def __post_init__(self) -> None:
         set_fields(self, mass=float(self.mass), position=finite('position', self.position),
@@ -65,6 +68,10 @@ class Bone:
             set_fields(self, color=finite('color', self.color, 4))
             for part in self.color:
                 errors.check_range('color', part, 0, 1)
+        if self.moments is not None:
+            set_fields(self, moments=_moments(finite('inertia', self.moments)))
+        elif isinstance(self.shape, Compound):
+            self.shape.check_principal()
 
     @property
     def pose(self) -> Pose:
@@ -74,7 +81,7 @@ class Bone:
     @property
     def inertia(self) -> Vector:
         """Principal moments about the centre of mass along the shape's axes, kg m^2."""
-        return self.shape.inertia(self.mass)
+        return self.shape.inertia(self.mass) if self.moments is None else self.moments
 
 
 LARGEST_SWING = math.radians(85)
@@ -364,6 +371,19 @@ def _reaches(parent_of: dict[str, str], start: str, goal: str) -> bool:
     while start != goal and start in parent_of:
         start = parent_of[start]
     return start == goal
+
+
+def _moments(moments: Vector) -> Vector:
+    """Principal moments that a body can have: each at most the sum of the other two.
+
+    Two make up the third of what is flat. What six digits have rounded beyond that is taken back,
+    as PyBullet takes such an inertia for zero and MuJoCo refuses it.
+    """
+    errors.check_positive('inertia', moments)
+    others = tuple(sum(moments[:axis] + moments[axis + 1:]) for axis in range(3))
+    if any(moment > most * (1 + 1e-6) for moment, most in zip(moments, others, strict=True)):
+        raise errors.OutOfRange('inertia', moments, 'each at most the sum of the other two')
+    return tuple(map(min, moments, others))
 
 
 def _angles(pair: Limits | None) -> Limits | None:

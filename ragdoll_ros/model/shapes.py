@@ -1,4 +1,7 @@
-"""Shapes of bones: sphere, box, cylinder, capsule; each a uniform solid in its own axes, in m."""
+"""Simple shapes of bones: sphere, box, cylinder, capsule; uniform solids in their own axes, in m.
+
+Several of them together are a Compound (compound.py).
+"""
 from __future__ import annotations
 
 import dataclasses
@@ -10,14 +13,16 @@ import numpy as np
 
 from . import errors
 from .errors import set_fields
-from .vectors import Vector, finite, floats
+from .pose import Pose
+from .rotation import IDENTITY
+from .vectors import Quaternion, Vector, finite, floats, unit
 
 SEGMENTS = 20
 """Corners of a circle in a mesh."""
 
 
 class Solid:
-    """What all shapes have in common.
+    """What the simple shapes have in common; a Compound has all of it too.
 
     Each has besides, in its own axes:
     - ``volume``, m^3, and ``half_extents``, m, half the size of its bounding box
@@ -30,9 +35,14 @@ class Solid:
     kind: ClassVar[str]
 
     @property
-    def primitives(self) -> tuple[Primitive, ...]:
-        """What it is drawn as."""
-        return (Primitive(self),)
+    def parts(self) -> tuple[Part, ...]:
+        """The simple shapes that it is for whatever collides with it: itself alone."""
+        return (Part(self),)
+
+    @property
+    def primitives(self) -> tuple[Part, ...]:
+        """What it is drawn as: boxes, cylinders and spheres, as every viewer knows just these."""
+        return (Part(self),)
 
     def reach(self, direction: np.ndarray) -> np.ndarray:
         """How far (...,) m it extends along unit directions (..., 3) of its own axes."""
@@ -40,24 +50,41 @@ class Solid:
 
 
 @dataclass(frozen=True)
-class Primitive:
-    """A box, cylinder or sphere with its centre at ``offset`` m along the shape's own axes.
+class Part:
+    """A simple shape within another one: its centre at ``position`` m along that one's own axes.
 
-    Every viewer knows these three alone, and every shape is made up of them.
+    ``orientation`` turns the part's axes into those of the whole.
     """
 
     shape: Shape
-    offset: Vector = (0.0, 0.0, 0.0)
+    position: Vector = (0.0, 0.0, 0.0)
+    orientation: Quaternion = IDENTITY
+
+    def __post_init__(self) -> None:
+        set_fields(self, position=finite('position', self.position),
+                   orientation=unit('orientation', self.orientation, count=4))
+        if not isinstance(self.shape, Solid):
+            raise errors.WrongForm('shape', self.shape, 'one of ' + ', '.join(SHAPES))
+
+    @property
+    def is_centred(self) -> bool:
+        """Whether its centre and axes are those of the whole."""
+        return not any(self.position) and self.orientation == IDENTITY
 
     @property
     def kind(self) -> str:
-        """'box', 'cylinder' (along z) or 'sphere'."""
+        """Its shape's."""
         return self.shape.kind
 
     @property
     def size(self) -> Vector:
         """Edges, or diameters and length, m."""
         return floats(2 * half for half in self.shape.half_extents)
+
+    @property
+    def pose(self) -> Pose:
+        """Of its centre and axes, in those of the whole."""
+        return Pose(np.array(self.position), np.array(self.orientation))
 
 
 @dataclass(frozen=True)
@@ -197,11 +224,11 @@ class Capsule(Solid):
         return (0.0, 0.0, 0.0, self.length / 2, self.radius, 0.0)
 
     @property
-    def primitives(self) -> tuple[Primitive, ...]:
+    def primitives(self) -> tuple[Part, ...]:
         """What it is drawn as: a cylinder between two balls."""
         end = self.length / 2
-        return (Primitive(Cylinder(self.radius, self.length)),
-                *(Primitive(Sphere(self.radius), (0.0, 0.0, z)) for z in (end, -end)))
+        return (Part(Cylinder(self.radius, self.length)),
+                *(Part(Sphere(self.radius), (0.0, 0.0, z)) for z in (end, -end)))
 
     def inertia(self, mass: float) -> Vector:
         """Principal moments of the uniform solid about its centre, kg m^2.

@@ -10,7 +10,7 @@ from visualization_msgs.msg import (
 
 from ..model.ragdoll import DEFAULT_COLOR, Bone
 from ..model.scene import Scene
-from ..model.shapes import Primitive
+from ..model.shapes import Part
 from ..model.state import State
 from .markers import KINDS, paint, place
 from .messages import to_vector
@@ -56,10 +56,10 @@ def _marker(name: str, bone: Bone, frame: str) -> InteractiveMarker:
     return marker
 
 
-def _ghost(bone: Bone, part: Primitive) -> Marker:
+def _ghost(bone: Bone, part: Part) -> Marker:
     """A part of a bone, relative to it: a frame of its own would be looked up."""
     ghost = Marker(type=KINDS[part.kind], action=Marker.ADD)
     ghost.scale = to_vector([GROWTH * side for side in part.size])
-    place(ghost.pose, list(part.offset), [0.0, 0.0, 0.0, 1.0])
+    place(ghost.pose, list(part.position), list(part.orientation))
     paint(ghost, (*(bone.color or DEFAULT_COLOR)[:3], OPACITY))
     return ghost

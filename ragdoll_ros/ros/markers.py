@@ -4,14 +4,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from geometry_msgs.msg import Pose
+from geometry_msgs.msg import Pose as PoseMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ..model import rotation
+from ..model.pose import Pose
 from ..model.push import Push
 from ..model.ragdoll import DEFAULT_COLOR, Bone
 from ..model.scene import Scene
-from ..model.shapes import Primitive
+from ..model.shapes import Part
 from ..model.state import State
 from ..physics.swing.pose import SwingState
 from .messages import to_header, to_point, to_vector
@@ -33,7 +34,8 @@ class Markers:
         parts = [(index, number, part) for index, bone in enumerate(scene.bones)
                  for number, part in enumerate(bone.shape.primitives)]
         self._bones = [index for index, _, _ in parts]
-        self._offsets = np.array([part.offset for _, _, part in parts])
+        self._within = Pose(np.array([part.position for _, _, part in parts]),
+                            np.array([part.orientation for _, _, part in parts]))
         self._markers = [_part(scene.bone_names[index], scene.bones[index], number, part)
                          for index, number, part in parts]
         self._arrows = 0
@@ -46,8 +48,7 @@ class Markers:
         The first message takes away whatever the scene before has left.
         """
         header = to_header(stamp, self._frame)
-        orientations = state.orientations[self._bones]
-        positions = state.positions[self._bones] + rotation.rotate(orientations, self._offsets)
+        positions, orientations = state.poses(self._bones).compose(self._within)
         for marker, position, orientation in zip(self._markers, positions.tolist(),
                                           orientations.tolist(), strict=True):
             marker.header = header
@@ -76,7 +77,7 @@ class Markers:
         return marker
 
 
-def _part(name: str, bone: Bone, number: int, part: Primitive) -> Marker:
+def _part(name: str, bone: Bone, number: int, part: Part) -> Marker:
     marker = Marker(ns=name, id=number, type=KINDS[part.kind], action=Marker.ADD)
     marker.scale = to_vector(part.size)
     paint(marker, bone.color or DEFAULT_COLOR)
@@ -94,7 +95,7 @@ def _rods(swings: SwingState) -> Marker:
     return marker
 
 
-def place(pose: Pose, position: list[float], orientation: list[float]) -> None:
+def place(pose: PoseMessage, position: list[float], orientation: list[float]) -> None:
     """Set a pose from m and x, y, z, w; the message stays the same object."""
     pose.position.x, pose.position.y, pose.position.z = position
     q = pose.orientation

@@ -153,10 +153,11 @@ class MujocoEngine(SubsteppedEngine):
         # a scene that explodes shall be seen to: MuJoCo would put it back to its start
         self._model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         self._bodies = np.array([self._model.body(name).id for name in self.scene.bone_names])
-        self._bone_of = {self._model.geom(name).id: bone
-                         for bone, name in enumerate(self.scene.bone_names)}
+        bones = {int(body): bone for bone, body in enumerate(self._bodies)}
+        self._bone_of = {geom: bones[body] for geom, body in enumerate(self._model.geom_bodyid)
+                         if body in bones}
         self._doll_of = np.full(self._model.ngeom, GROUND)
-        self._doll_of[list(self._bone_of)] = self.scene.doll_of_bone
+        self._doll_of[list(self._bone_of)] = self.scene.doll_of_bone[list(self._bone_of.values())]
         self._roots, self._balls = [], []
         for placement in self.scene.dolls:
             doll = placement.doll

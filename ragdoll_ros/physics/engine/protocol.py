@@ -158,4 +158,5 @@ class Engine(Protocol):
 
 def pressed(scene: Scene) -> float:
     """Depth, m, up to which a scene's bones may rest in each other and in the ground."""
-    return PRESSED * min(min(bone.shape.half_extents) for bone in scene.bones)
+    return PRESSED * min(min(part.shape.half_extents)
+                         for bone in scene.bones for part in bone.shape.parts)

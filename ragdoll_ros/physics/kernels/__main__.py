@@ -10,8 +10,7 @@ from . import problem
 EXAMPLE = """examples:
   python -m ragdoll_ros.physics.kernels
   NUMBA_CACHE_DIR=/var/cache/ragdoll python -m ragdoll_ros.physics.kernels  keeps the result there;
-                                           nodes that are to find it want the same variable,
-                                           and must be able to write there, as numba asks for it
+                                           nodes that are to find it want the same variable
 """
 
 NOT_READY = 'Nothing to compile with: {}; the node runs engine bullet then'
@@ -27,7 +26,8 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     began = time.monotonic()
     from . import cache, loaded  # noqa: F401  importing compiles
-    kept = f'kept in {cache.FOLDER}' if cache.KEPT else 'kept nowhere'
+    is_kept = cache.KEPT and cache.KernelCache.failure is None
+    kept = f'kept in {cache.FOLDER}' if is_kept else 'kept nowhere'
     print(f'The dynamics are compiled: {time.monotonic() - began:.1f} s, {kept}')
     return 0
 

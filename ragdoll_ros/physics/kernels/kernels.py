@@ -1,9 +1,5 @@
 """All that is compiled: vectors, kinematics and dynamics of dolls in the air, steps, sums.
 
-It stands in one file because numba, which keeps its code for the next process, notices a change of
-the file of the function that is called, but not of the files of those that this one calls. Of the
-numbers of dop853.py it is told by NUMBERS.
-
 Dynamics: Featherstone's articulated-body algorithm (Rigid Body Dynamics Algorithms, 2008, table
 7.1). All spatial vectors, angular part first, are along the world's axes about a point that stands
 where the doll's root is at that instant: nothing is transformed from bone to bone, and nothing
@@ -17,41 +13,15 @@ from __future__ import annotations
 
 import collections
 import math
-from collections.abc import Callable
 
 import numba
 import numpy as np
 
-from .cache import KEPT
 from .dop853 import CONTINUED, ERRORS, STAGES
-from .record import RECORD
-
-NUMBERS = 'b53d003a619a57bc'
-"""Digest of dop853.py, which a test holds against the file."""
+from .machine import ANY_ROW, COUNTS, FLAGS, REAL, ROW, TABLE, TREE, YES, compiled, entry, inlined
 
 SLOWEST = 0.1
 """s: an error of 1 in a velocity counts as much as one of this in its coordinate."""
-
-MATH = {'contract', 'nsz', 'arcp'}
-"""Freedoms of rounding: a product and a sum may be rounded once. Sums stay in their order."""
-
-compiled = numba.njit(error_model='numpy', fastmath=MATH)
-"""Machine code, for what other compiled code calls."""
-
-inlined = numba.njit(inline='always', error_model='numpy', fastmath=MATH)
-"""The same as a part of what calls it: twice as fast for what is called with many arrays."""
-
-REAL, YES, TREE = numba.float64, numba.boolean, numba.from_dtype(RECORD)[::1]
-ROW, TABLE, COUNTS, FLAGS = REAL[::1], REAL[:, ::1], numba.int64[::1], YES[::1]
-ANY_ROW = REAL[:]
-
-
-def entry(*types: numba.types.Type) -> Callable[[Callable], Callable]:
-    """Compile what Python calls, for these types of its arguments, when this file is imported.
-
-    The code is kept for the next process, so that no simulation ever waits in its midst.
-    """
-    return numba.njit([types], cache=KEPT, error_model='numpy', nogil=True, fastmath=MATH)
 
 
 @compiled

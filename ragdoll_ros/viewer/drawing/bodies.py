@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
-from ...model import rotation
+from ...model.pose import Pose
 from ...model.ragdoll import DEFAULT_COLOR
 from ...model.scene import Scene
 from ...model.state import State
@@ -21,11 +21,12 @@ WXYZ = [3, 0, 1, 2]
 
 @dataclass(frozen=True)
 class Batch:
-    """Parts of one kind: which bone each is of, and its offset from that (p, 3) m, bone axes."""
+    """Parts of one kind: which bone each is of, and its pose (p,) in that one's frame."""
 
     handle: viser.BatchedMeshHandle
     bones: np.ndarray
-    offsets: np.ndarray
+    within: Pose | None
+    """None where all are the bones themselves: most are, and this runs with every frame."""
 
 
 class Bodies:
@@ -41,18 +42,20 @@ class Bodies:
             if not mine:
                 continue
             bones = np.array([index for index, _ in mine])
-            offsets = np.array([part.offset for _, part in mine])
-            positions, wxyzs = _placed(state, bones, offsets)
+            within = None if all(part.is_centred for _, part in mine) else Pose(
+                np.array([part.position for _, part in mine]),
+                np.array([part.orientation for _, part in mine]))
+            positions, wxyzs = _placed(state, bones, within)
             handle = server.scene.add_batched_meshes_simple(
                 f'/scene/bodies/{kind}', vertices, faces, wxyzs, positions,
                 batched_scales=np.array([part.size for _, part in mine]),
                 batched_colors=np.round(colors[bones] * 255).astype(np.uint8), lod='off')
-            self.batches.append(Batch(handle, bones, offsets))
+            self.batches.append(Batch(handle, bones, within))
 
     def show(self, state: State) -> None:
         """Draw all where they are now."""
         for batch in self.batches:
-            positions, wxyzs = _placed(state, batch.bones, batch.offsets)
+            positions, wxyzs = _placed(state, batch.bones, batch.within)
             batch.handle.batched_positions = positions
             batch.handle.batched_wxyzs = wxyzs
 
@@ -63,10 +66,10 @@ class Bodies:
             batch.handle.opacity = GLASS if glass else None
 
 
-def _placed(state: State, bones: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _placed(state: State, bones: np.ndarray,
+            within: Pose | None) -> tuple[np.ndarray, np.ndarray]:
     """Positions (p, 3) m and orientations (p, 4) w, x, y, z of parts, float32."""
-    orientations = state.orientations[bones]
-    positions = state.positions[bones]
-    if offsets.any():
-        positions = positions + rotation.rotate(orientations, offsets)
-    return positions.astype(np.float32), orientations[:, WXYZ].astype(np.float32)
+    pose = state.poses(bones)
+    if within is not None:
+        pose = pose.compose(within)
+    return pose.position.astype(np.float32), pose.orientation[:, WXYZ].astype(np.float32)

@@ -57,4 +57,4 @@ def ball() -> Mesh:
 
 
 MESHES = {'box': box(), 'cylinder': cylinder(), 'sphere': ball()}
-"""By the kinds of model.shapes.Primitive."""
+"""By the kinds of the primitives of model.shapes."""

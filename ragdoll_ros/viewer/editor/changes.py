@@ -53,7 +53,7 @@ def replace_doll(scene: Scene, placement: Placement, **fields: object) -> Scene:
 def change_bone(scene: Scene, name: str, **fields: object) -> Scene:
     """Set fields of a bone: mass, friction, color, ...; a new size keeps the mass.
 
-    Inertia follows, as a bone is a uniform solid. To move or rotate one, see ``set_pose``.
+    Inertia follows where a bone is a uniform solid. To move or rotate one, see ``set_pose``.
     """
     placement, bone = find(scene, name)
     with _errors_at(name):
@@ -93,6 +93,8 @@ def set_size(scene: Scene, name: str, half_extents: Sequence[float]) -> Scene:
     _, bone = find(scene, name)
     with _errors_at(name):
         errors.check_positive('size', floats(half_extents))
+        if bone.shape.kind not in SHAPES:
+            raise errors.WrongForm('size', bone.shape.kind, 'one of ' + ', '.join(SHAPES))
         shape = shape_within(bone.shape.kind, half_extents)
     return change_bone(scene, name, shape=shape)
 
@@ -104,15 +106,15 @@ def set_shape(scene: Scene, name: str, kind: str) -> Scene:
         raise errors.WrongForm(f'{name}.shape', kind, 'one of ' + ', '.join(SHAPES))
     if kind == bone.shape.kind:
         return scene
-    half = np.array(bone.shape.half_extents)
+    half, moments = np.array(bone.shape.half_extents), bone.moments
     longest = int(np.argmax(half))
     if kind in ('cylinder', 'capsule') and half[longest] > half[2] * (1 + 1e-9):
         # A rotation by 120 degrees that brings the long side onto z keeps the axes right-handed.
         cycle = np.roll(np.eye(3), 2 - longest, axis=1).T
         orientation = rotation.multiply(bone.orientation, rotation.from_matrix(cycle.T))
         scene = set_pose(scene, name, orientation=orientation)
-        half = cycle @ half
-    return change_bone(scene, name, shape=shape_within(kind, half))
+        half, moments = cycle @ half, moments and tuple(cycle @ moments)
+    return change_bone(scene, name, shape=shape_within(kind, half), moments=moments)
 
 
 def shape_within(kind: str, half_extents: Sequence[float]) -> Shape:

@@ -9,6 +9,7 @@ import viser
 from ...model import rotation
 from ...model.ragdoll import Bone, Joint
 from ...model.scene import Placement, Scene, height
+from ...model.shapes import SHAPES
 from ..drawing.bodies import WXYZ
 from ..drawing.meshes import MESHES
 from .changes import find, joint_of
@@ -65,14 +66,16 @@ class Handles:
             if joint is not None:
                 self._add_pivot(joint, bone)
             self._add_body(bone, at)
-            self._add_size(bone)
+            if bone.shape.kind in SHAPES:
+                self._add_size(bone)
 
     def _add_ghost(self, bone: Bone) -> None:
         for number, part in enumerate(bone.shape.primitives):
             vertices, faces = MESHES[part.kind]
             self._server.scene.add_mesh_simple(
-                f'{ROOM}/own/ghost_{number}', vertices * part.size * GROWN + part.offset, faces,
-                color=YELLOW, wireframe=True, cast_shadow=False, receive_shadow=False)
+                f'{ROOM}/own/ghost_{number}', vertices * part.size * GROWN, faces, color=YELLOW,
+                wireframe=True, cast_shadow=False, receive_shadow=False,
+                position=part.position, wxyz=_wxyz(part.orientation))
 
     def _add_pivot(self, joint: Joint, bone: Bone) -> None:
         """Draw the joint: a ball where it is, a line along each axis, the first in blue."""

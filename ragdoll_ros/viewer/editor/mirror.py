@@ -7,8 +7,10 @@ import re
 import numpy as np
 
 from ...model import errors
+from ...model.compound import Compound
 from ...model.ragdoll import Bone, Joint, Ragdoll
 from ...model.scene import Scene
+from ...model.shapes import SHAPES, Part, Shape
 from ...model.vectors import Quaternion, Vector
 from .changes import change_bone, change_joint, find, joint_of, limb, set_pose
 
@@ -56,8 +58,8 @@ def _copied_over(scene: Scene, name: str, other: str, middle: float) -> Scene:
     (_, bone), joint = find(scene, name), joint_of(scene, name)
     scene = set_pose(scene, other, _point(bone.position, middle), _orientation(bone.orientation))
     kept = {key: getattr(bone, key) for key in (
-        'shape', 'mass', 'friction', 'rolling_friction', 'restitution')}
-    scene = change_bone(scene, other, **kept)
+        'mass', 'moments', 'friction', 'rolling_friction', 'restitution')}
+    scene = change_bone(scene, other, shape=_shape(bone.shape), **kept)
     theirs = joint_of(scene, other)
     if joint is None or theirs is None:
         return scene
@@ -85,8 +87,15 @@ def _point(point: Vector, middle: float) -> Vector:
 
 
 def _orientation(q: Quaternion) -> Quaternion:
-    """S R S with S = diag(1, -1, 1): the mirrored rotation; all shapes are symmetric under S."""
+    """S R S with S = diag(1, -1, 1): the mirrored rotation."""
     return (-q[0], q[1], -q[2], q[3])
+
+
+def _shape(shape: Shape | Compound) -> Shape | Compound:
+    """The mirror image in the body's own axes; each simple shape is its own."""
+    return shape if shape.kind in SHAPES else Compound(tuple(
+        Part(part.shape, _point(part.position, 0.0), _orientation(part.orientation))
+        for part in shape.parts))
 
 
 def _other_word(match: re.Match) -> str:

@@ -15,7 +15,7 @@ from ...model import errors, rotation
 from ...model.ragdoll import DEFAULT_COLOR, JOINT_KINDS, Joint
 from ...model.scene import Scene
 from ...model.shapes import SHAPES, SIZES, Shape
-from ...model.vectors import unit
+from ...model.vectors import floats, unit
 from . import changes
 
 Value = str | float | tuple[float, ...]
@@ -42,7 +42,9 @@ BODY = (
     Field('size', 'size, m', 'vector', 'full edges along the own x, y, z of the body'),
     Field('radius', 'radius, m', 'number', ''),
     Field('length', 'length, m', 'number', "along the body's z; a capsule's without its ends"),
-    Field('mass', 'mass, kg', 'number', 'inertia follows: a uniform solid'),
+    Field('mass', 'mass, kg', 'number', 'inertia follows, unless it has its own'),
+    Field('inertia', 'inertia, kg m²', 'text',
+          "moments about the body's x, y, z; empty: a uniform solid's"),
     Field('position', 'place, m', 'vector', "centre of mass, doll's frame (x forward, z up)"),
     Field('turn', 'turn, °', 'vector', 'roll, pitch, yaw about the fixed x, y, z'),
     Field('friction', 'friction', 'text', "coefficient, inf for no slip; empty: the scene's"),
@@ -62,9 +64,15 @@ JOINT = (
 
 
 def read(scene: Scene, name: str) -> Sheet:
-    """Fields of a bone and its joint; UnknownBone if there is no such bone."""
+    """Fields of a bone and its joint; UnknownBone if there is no such bone.
+
+    Those of its shape only where that is one: several are not edited here.
+    """
     _, bone = changes.find(scene, name)
-    sheet: Sheet = {'shape': bone.shape.kind, **vars(bone.shape), 'mass': bone.mass,
+    shape = {} if bone.shape.kind not in SHAPES else {
+        'shape': bone.shape.kind, **vars(bone.shape)}
+    sheet: Sheet = {**shape, 'mass': bone.mass,
+                    'inertia': ', '.join(f'{moment:.9g}' for moment in bone.moments or ()),
                     'position': bone.position, 'turn': _degrees(bone.orientation),
                     'color': tuple(round(255 * part) for part in (bone.color or DEFAULT_COLOR)[:3])}
     for key in SURFACE:
@@ -118,6 +126,7 @@ def _body_steps(name: str, limb: bool) -> list[Step]:
 
     return [bone('shape', 'size', 'radius', 'length', shape=_shape),
             bone('mass', mass=lambda new: new['mass']),
+            bone('inertia', moments=lambda new: _moments(new['inertia'])),
             (('position',), place), (('turn',), orientation),
             (('color',), color),
             *(bone(key, **{key: lambda new, key=key: _number_or_none(key, new[key])})
@@ -191,6 +200,15 @@ def _pair(key: str, text: str, symmetric: bool) -> tuple[float, float] | None:
     if len(numbers) != 2:
         raise errors.WrongForm(key, text, 'two angles in degrees, lower and upper, or nothing')
     return numbers[0], numbers[1]
+
+
+def _moments(text: str) -> tuple[float, ...] | None:
+    if not text.strip():
+        return None
+    try:
+        return floats(text.replace(',', ' ').split())
+    except ValueError:
+        raise errors.WrongForm('inertia', text, 'three numbers, or nothing') from None
 
 
 def _number_or_none(key: str, text: str) -> float | None:

@@ -1,0 +1,202 @@
+"""A stretch of a scene's motion from end to end: flight, touches, impacts, steps between them."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .contact import TOUCHING, all_gaps, find_contacts
+from .flight import (
+    ALONG,
+    EVENT,
+    KNOWN,
+    LENGTH,
+    TRY,
+    VALID,
+    PATH,
+    Path,
+    along,
+    begin_path,
+    find_event,
+    point_velocity,
+    time_free,
+)
+from .impact import SLOW, SLOW_TURN, contact_step, enter_work, impact, power
+from .kernels import pose
+from .machine import REAL, ROW, TABLE, YES, compiled, entry
+from .system import CONTACTS, ROOM, SYSTEM, Room, System
+
+APART = 5e-3
+"""m/s or rad/s at which what touches comes apart for a flight: to 1.3 um under gravity, which is
+what TOUCHING can tell."""
+
+WORTH = 6
+"""Steps on the ground that cost as much as one of flight."""
+
+LONGEST = 0.05
+"""s of a path."""
+
+SUNK = -1e-7
+"""m or rad: what is found deeper than this at a step's end has met on the way."""
+
+TRIES = 12
+"""At finding the instant of a touch within a step."""
+
+MOST_EVENTS = 400
+"""Impacts in one stretch; what would be more is taken on without restitution."""
+
+GAUSS = ((0.046910077030668, 0.118463442528095), (0.230765344947158, 0.239314335249683),
+         (0.5, 0.284444444444444), (0.769234655052842, 0.239314335249683),
+         (0.953089922969332, 0.118463442528095))
+"""Places and weights of Gauss and Legendre's rule of five points on (0, 1)."""
+
+
+@compiled
+def may_fly(s: System, r: Room, q: np.ndarray, v: np.ndarray, known: np.ndarray, path: Path,
+            step: float) -> bool:
+    """Whether all that touches comes apart, and for long enough; r.gaps are those at q."""
+    for i in range(r.counts[5]):
+        if r.counts[11] and known[i].impulse[0] > 0:
+            return False
+    pose(s.tree, q, v, r.work)
+    all_gaps(s, q, r, r.gaps, math.inf, r.gaps)
+    m = find_contacts(s, q, r, r.gaps, TOUCHING)
+    for i in range(m):
+        c = r.contacts[i]
+        if c.kind == 1:
+            rate = c.normal[0] * v[c.a]
+        else:
+            rate = point_velocity(s, r, q, c.a, c.point, c.normal)
+            if c.b >= 0:
+                rate -= point_velocity(s, r, q, c.b, c.point, c.normal)
+        if rate < APART:
+            return False
+    single = True
+    for i in range(len(s.tree)):
+        single &= s.tree[i].parent < 0
+    if single:
+        return True
+    g = math.sqrt(s.gravity[0] ** 2 + s.gravity[1] ** 2 + s.gravity[2] ** 2)
+    fast = 0.0
+    for k in range(len(s.geoms)):
+        move = r.work.moves[s.geoms[k].bone]
+        fast = max(fast, (move[0] ** 2 + move[1] ** 2 + move[2] ** 2) * s.geoms[k].reach)
+    return time_free(s, r, q, v, r.gaps, g + 2 * fast + 1e-3, path.ends) > WORTH * step
+
+
+@compiled
+def fly(s: System, r: Room, q: np.ndarray, v: np.ndarray, left: float, loads: np.ndarray,
+        path: Path, armed: np.ndarray) -> tuple[float, bool]:
+    """Go along the path by ``left`` s or to its end or its first touch; the time gone, and whether
+    something touches.
+    """
+    times = path.times
+    end = min(times[LENGTH], times[EVENT])
+    gone = min(left, end - times[ALONG])
+    if len(loads):
+        q2, v2 = r.states[1], r.vectors[0]
+        for place, weight in GAUSS:
+            along(s, path, times[ALONG] + place * gone, q2, v2)
+            pose(s.tree, q2, v2, r.work)
+            for k in range(len(loads)):
+                r.sums[0] += weight * gone * power(s, r, loads[k])
+    times[ALONG] += gone
+    along(s, path, times[ALONG], q, v)
+    if times[ALONG] < end - 1e-15:
+        return gone, False
+    times[VALID] = 0.0
+    touched = times[EVENT] <= times[LENGTH]
+    times[KNOWN] = 0.0 if touched else 1.0
+    if touched:
+        times[TRY] = 0.0
+    else:
+        for j in range(path.ends.shape[1]):
+            path.ends[0, j] = path.ends[1, j]
+    return gone, touched
+
+
+@compiled
+def step_or_touch(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loads: np.ndarray,
+                  springs: np.ndarray, since: float, known: np.ndarray,
+                  seek: bool) -> tuple[float, bool]:
+    """Go on by h s, or to the first touch that is fast; the time gone, and whether one was met.
+
+    r.gaps are those at q, and again at the end.
+    """
+    end_q, end_v = r.states[2], r.vectors[4]
+    early, late, low, hit = 0.0, h, 0.0, False
+    tries, m = 0, 0
+    while True:
+        m = contact_step(s, r, q, v, late, loads, springs, since, known, end_q, end_v)
+        pose(s.tree, end_q, end_v, r.work)
+        all_gaps(s, end_q, r, r.gaps, late, r.later)
+        share = first_touch(s, r, late)
+        if share > 1 or not seek or tries >= TRIES or late < 1e-9:
+            break
+        tries += 1
+        hit = True
+        late = max(1e-9, late * share * (1 + 1e-9) + 2e-9)
+    if len(loads) or len(springs):
+        enter_work(s, r, v, end_v, late, loads, springs, since)
+    if late > 0.1 * h:
+        for i in range(m):
+            known[i] = r.contacts[i]
+        r.counts[5], r.sums[4] = m, late
+    for j in range(len(q)):
+        q[j] = end_q[j]
+    for j in range(len(v)):
+        v[j] = end_v[j]
+    for j in range(len(r.gaps)):
+        r.gaps[j] = r.later[j]
+    return late, hit
+
+
+@compiled
+def first_touch(s: System, r: Room, h: float) -> float:
+    """Share of the step just gone at which something met that was apart; above 1: nothing."""
+    first, bounds = 2.0, len(r.gaps) - len(s.pairs) - 2 * len(s.bounds)
+    for j in range(len(r.gaps)):
+        if r.gaps[j] > TOUCHING and r.later[j] < SUNK:
+            fallen = r.gaps[j] - r.later[j]
+            slow = SLOW_TURN if bounds <= j < bounds + 2 * len(s.bounds) else SLOW
+            if fallen > slow * h:
+                first = min(first, r.gaps[j] / fallen)
+    return first
+
+
+@entry(SYSTEM, ROOM, ROW, ROW, REAL, TABLE, TABLE, REAL, REAL, YES, PATH, TABLE, ROW, ROW, CONTACTS)
+def advance(s: System, r: Room, q: np.ndarray, v: np.ndarray, duration: float,
+            loads: np.ndarray, springs: np.ndarray, step: float, tolerance: float, flies: bool,
+            path: Path, k: np.ndarray, y: np.ndarray, armed: np.ndarray,
+            known: np.ndarray) -> None:
+    """Go on by ``duration`` s: q and v, roots' angular velocities along their own axes, become
+    those at the end. ``step``: s of a step on the ground; ``tolerance``: m or rad by which a path's
+    end may err; ``flies``: whether damping and springs allow flights.
+    """
+    time, events = 0.0, 0
+    while time < duration - 1e-12:
+        left = duration - time
+        if path.times[VALID] == 0.0 and flies and events < MOST_EVENTS and may_fly(
+                s, r, q, v, known, path, step):
+            longest = min(left, LONGEST) if len(loads) else LONGEST
+            if begin_path(s, r, loads, q, v, tolerance, longest, path, k, y):
+                find_event(s, r, path, armed, r.states[1], r.vectors[0])
+                r.counts[5] = 0
+        if path.times[VALID] > 0.0:
+            gone, touched = fly(s, r, q, v, left, loads, path, armed)
+            if touched:
+                pose(s.tree, q, v, r.work)
+                all_gaps(s, q, r, r.gaps, math.inf, r.gaps)
+        else:
+            if not flies or events >= MOST_EVENTS:
+                pose(s.tree, q, v, r.work)
+                all_gaps(s, q, r, r.gaps, math.inf, r.gaps)
+            h = left / math.ceil(left / step - 1e-9)
+            gone, touched = step_or_touch(s, r, q, v, h, loads, springs, time, known,
+                                          events < MOST_EVENTS)
+            path.times[KNOWN] = path.times[TRY] = 0.0
+        time += gone
+        r.counts[11] = 0 if touched else 1
+        if touched:
+            impact(s, r, q, v)
+            events += 1

@@ -1,0 +1,275 @@
+"""The two ways to go on where something touches: the instant of an impact, and a step between.
+
+Both solve for impulses with the mass matrix at one pose; see response.py. The step is Moreau's,
+centred: forces, contacts and their rows at the middle of the way, so that it is of order 2 where
+no contact begins or ends (Moreau 1988; Studer, Numerics of Unilateral Contacts and Friction,
+2009). Joint damping and hands' springs are taken implicitly at the middle as well.
+"""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .contact import arms, find_contacts, place_geoms
+from .machine import compiled
+from .kernels import cross, pose, times, turned
+from .mass import (
+    bias_forces,
+    crba,
+    factor,
+    integrate,
+    root_axes,
+    solve_lower,
+    solve_upper,
+    turn_inertias,
+    update_moves,
+)
+from .response import respond
+from .system import Room, System
+
+STEP_TOLERANCE, IMPACT_TOLERANCE = 1e-7, 1e-10
+"""m/s to which contacts are solved."""
+
+SLOW = 0.02
+"""m/s, and SLOW_TURN rad/s: what meets more slowly where something touches already is taken on
+by the next step, without restitution, and not sought out."""
+
+SLOW_TURN = 0.1
+
+
+@compiled
+def impact(s: System, r: Room, q: np.ndarray, v: np.ndarray) -> int:
+    """Change v by the impulses of all that touches at q by r.gaps; how many contacts there are."""
+    pose(s.tree, q, v, r.work)
+    place_geoms(s, q, r)
+    m = find_contacts(s, q, r, r.gaps, 1e-6)
+    if m == 0:
+        return 0
+    root_axes(s.tree, q, r.work.axes)
+    turn_inertias(s.tree, r.work, r.own)
+    crba(s.tree, s.up, s.bone_of, r.work, r.own, r.composite, r.H)
+    factor(r.H, s.up)
+    for i in range(m):
+        for e in range(5):
+            r.contacts[i].impulse[e] = 0.0
+    change, shift = r.vectors[0], r.vectors[1]
+    respond(s, r, q, v, v, m, 0.0, IMPACT_TOLERANCE, change, shift)
+    for j in range(len(v)):
+        v[j] += change[j]
+    r.counts[2] += 1
+    return m
+
+
+@compiled
+def contact_step(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loads: np.ndarray,
+                 springs: np.ndarray, since: float, known: np.ndarray, end_q: np.ndarray,
+                 end_v: np.ndarray) -> int:
+    """Go on by h s from q and v to ``end_q`` and ``end_v``; the number of contacts.
+
+    ``since``: s since the hands of ``springs`` were where these say. ``known``: contacts of the
+    step before, r.counts[5] of them, whose impulses over r.sums[4] s are where to begin.
+    """
+    middle = r.states[0]
+    free, smooth, change, shift = r.vectors[0], r.vectors[1], r.vectors[2], r.vectors[3]
+    integrate(s.tree, q, v, h / 2, middle)
+    pose(s.tree, middle, v, r.work)
+    root_axes(s.tree, middle, r.work.axes)
+    turn_inertias(s.tree, r.work, r.own)
+    for k in range(len(springs)):
+        springs[k, 14] = 1.0
+    for turn in range(2 if len(springs) else 1):
+        crba(s.tree, s.up, s.bone_of, r.work, r.own, r.composite, r.H)
+        for j in range(len(v)):
+            r.H[j, j] += h * lag(s, r, j, h) * s.damping[j]
+        for k in range(len(springs)):
+            stiffen(s, r, middle, springs[k], h)
+        factor(r.H, s.up)
+        for stage in range(2):
+            if stage or turn:
+                for j in range(len(v)):
+                    smooth[j] = v[j] + (change[j] / 2 if stage else 0.0)
+                update_moves(s.tree, middle, smooth, r.work)
+            bias_forces(s.tree, s.gravity, loads, middle, smooth if stage else v, r.work, r.own,
+                        change)
+            for k in range(len(springs)):
+                pull(s, r, middle, v, springs[k], since + h / 2, change)
+            for j in range(len(v)):
+                change[j] = h * (change[j] - s.damping[j] * v[j])
+            solve_upper(r.H, s.up, change)
+            solve_lower(r.H, s.up, change)
+        for j in range(len(v)):
+            free[j] = v[j] + change[j]
+        if not weaken(s, r, middle, v, free, springs, since + h / 2, h):
+            break
+    place_geoms(s, middle, r)
+    m = find_contacts(s, middle, r, r.gaps, SLOW * h)
+    if m:
+        warm_start(r, m, known, h)
+        respond(s, r, middle, v, free, m, h, STEP_TOLERANCE, change, shift)
+        for j in range(len(v)):
+            end_v[j] = free[j] + change[j]
+    else:
+        for j in range(len(v)):
+            end_v[j] = free[j]
+    integrate(s.tree, middle, end_v, h / 2, end_q)
+    if m:
+        integrate(s.tree, end_q, shift, 1.0, end_q)
+    r.counts[1] += 1
+    return m
+
+
+@compiled
+def lag(s: System, r: Room, j: int, h: float) -> float:
+    """Share of a step's end at which damping is taken: the middle, later where it is stiff
+    (Liniger and Willoughby, SIAM J. Numer. Anal. 7, 1970).
+    """
+    fast = h * s.damping[j] / r.H[j, j]
+    return max(0.5, 1 - 1 / fast) if fast > 0 else 0.5
+
+
+@compiled
+def spring_point(s: System, r: Room, q: np.ndarray, bone: int, point: np.ndarray,
+                 ) -> tuple[int, float, float, float]:
+    """Record of a bone of the scene, and where a point of it is from its root, m."""
+    for i in range(len(s.tree)):
+        if s.tree[i].bone == bone:
+            t, b, c = r.work.turns[i], s.tree[i].bind, r.work.centres[i]
+            x, y, z, w = times(t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3])
+            x, y, z = turned(x, y, z, w, point[0], point[1], point[2])
+            return i, c[0] + x, c[1] + y, c[2] + z
+    return 0, 0.0, 0.0, 0.0
+
+
+@compiled
+def stiffen(s: System, r: Room, q: np.ndarray, spring: np.ndarray, h: float) -> None:
+    """Add to H what a spring's end resists: h (k h / 4 + c / 2) J^T J. A bone's velocities are of
+    one branch, so that H keeps its pattern.
+    """
+    i, x, y, z = spring_point(s, r, q, int(spring[0]), spring[1:4])
+    share = spring[14] * h * (spring[11] * h / 4 + spring[12] / 2)
+    a = s.last[i]
+    while a >= 0:
+        axis = r.work.axes[a]
+        ux, uy, uz = cross(axis[0], axis[1], axis[2], x, y, z)
+        ux, uy, uz = axis[3] + ux, axis[4] + uy, axis[5] + uz
+        b = a
+        while b >= 0:
+            axis = r.work.axes[b]
+            wx, wy, wz = cross(axis[0], axis[1], axis[2], x, y, z)
+            r.H[a, b] += share * (ux * (axis[3] + wx) + uy * (axis[4] + wy) + uz * (axis[5] + wz))
+            b = s.up[b]
+        a = s.up[a]
+
+
+@compiled
+def spring_force(s: System, r: Room, q: np.ndarray, v: np.ndarray, spring: np.ndarray,
+                 time: float) -> tuple[float, float, float, float, float, float]:
+    """Force, N, of a hand's spring on its point and the point's velocity, m/s, at q and v."""
+    i, x, y, z = spring_point(s, r, q, int(spring[0]), spring[1:4])
+    root = s.tree[s.root_of[i]].q
+    ux = uy = uz = 0.0
+    j = s.last[i]
+    while j >= 0:
+        axis = r.work.axes[j]
+        a, b, c = cross(axis[0], axis[1], axis[2], x, y, z)
+        ux, uy, uz = ux + (axis[3] + a) * v[j], uy + (axis[4] + b) * v[j], uz + (axis[5] + c) * v[j]
+        j = s.up[j]
+    gone = min(time, spring[10])
+    moving = 1.0 if time < spring[10] else 0.0
+    k, d = spring[14] * spring[11], spring[14] * spring[12]
+    fx = -k * (q[root] + x - spring[4] - gone * spring[7]) - d * (ux - moving * spring[7])
+    fy = -k * (q[root + 1] + y - spring[5] - gone * spring[8]) - d * (uy - moving * spring[8])
+    fz = -k * (q[root + 2] + z - spring[6] - gone * spring[9]) - d * (uz - moving * spring[9])
+    return fx, fy, fz, ux, uy, uz
+
+
+@compiled
+def pull(s: System, r: Room, q: np.ndarray, v: np.ndarray, spring: np.ndarray, time: float,
+         out: np.ndarray) -> None:
+    """Add a spring's generalised forces to ``out``."""
+    fx, fy, fz, _, _, _ = spring_force(s, r, q, v, spring, time)
+    i, x, y, z = spring_point(s, r, q, int(spring[0]), spring[1:4])
+    j = s.last[i]
+    while j >= 0:
+        axis = r.work.axes[j]
+        a, b, c = cross(axis[0], axis[1], axis[2], x, y, z)
+        out[j] += fx * (axis[3] + a) + fy * (axis[4] + b) + fz * (axis[5] + c)
+        j = s.up[j]
+
+
+@compiled
+def mean_force(s: System, r: Room, q: np.ndarray, v: np.ndarray, end_v: np.ndarray,
+               spring: np.ndarray, time: float,
+               h: float) -> tuple[float, float, float, float, float, float]:
+    """Mean force, N, of a spring in a step of h s, and its point's mean velocity, m/s."""
+    fx, fy, fz, ux, uy, uz = spring_force(s, r, q, v, spring, time)
+    _, _, _, wx, wy, wz = spring_force(s, r, q, end_v, spring, time)
+    share = spring[14] * (spring[11] * h / 4 + spring[12] / 2)
+    return (fx - share * (wx - ux), fy - share * (wy - uy), fz - share * (wz - uz),
+            (ux + wx) / 2, (uy + wy) / 2, (uz + wz) / 2)
+
+
+@compiled
+def weaken(s: System, r: Room, q: np.ndarray, v: np.ndarray, free: np.ndarray,
+           springs: np.ndarray, time: float, h: float) -> bool:
+    """Scale springs that pull with more than they may down to that; whether any does."""
+    some = False
+    for k in range(len(springs)):
+        fx, fy, fz, _, _, _ = mean_force(s, r, q, v, free, springs[k], time, h)
+        size = math.sqrt(fx * fx + fy * fy + fz * fz)
+        if size > springs[k, 13]:
+            springs[k, 14] *= springs[k, 13] / size
+            some = True
+    return some
+
+
+@compiled
+def warm_start(r: Room, m: int, known: np.ndarray, h: float) -> None:
+    """Begin with the impulses of the step before, of the contacts that there were."""
+    scale = h / r.sums[4] if r.sums[4] > 0 else 0.0
+    for i in range(m):
+        c = r.contacts[i]
+        for e in range(5):
+            c.impulse[e] = 0.0
+        for j in range(r.counts[5]):
+            old = known[j]
+            if old.key == c.key:
+                for e in range(5):
+                    c.impulse[e] = scale * old.impulse[e]
+                break
+
+
+@compiled
+def enter_work(s: System, r: Room, v: np.ndarray, end_v: np.ndarray, h: float,
+               loads: np.ndarray, springs: np.ndarray, since: float) -> None:
+    """Book the work, J, of loads (r.sums[0]) and hands (r.sums[1]) in a step of h s."""
+    middle, mean = r.states[0], r.vectors[0]
+    for j in range(len(v)):
+        mean[j] = (v[j] + end_v[j]) / 2
+    pose(s.tree, middle, mean, r.work)
+    for k in range(len(loads)):
+        r.sums[0] += h * power(s, r, loads[k])
+    if len(springs):
+        root_axes(s.tree, middle, r.work.axes)
+    for k in range(len(springs)):
+        fx, fy, fz, ux, uy, uz = mean_force(s, r, middle, v, end_v, springs[k], since + h / 2, h)
+        r.sums[1] += h * (fx * ux + fy * uy + fz * uz)
+
+
+@compiled
+def power(s: System, r: Room, load: np.ndarray) -> float:
+    """Power, W, of a load on what moves as work says."""
+    for i in range(len(s.tree)):
+        if s.tree[i].bone == load[0]:
+            t, b, c, move = r.work.turns[i], s.tree[i].bind, r.work.centres[i], r.work.moves[i]
+            x, y, z, w = times(t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3])
+            fx, fy, fz, nx, ny, nz = load[1], load[2], load[3], load[4], load[5], load[6]
+            if load[10] > 0:
+                fx, fy, fz = turned(x, y, z, w, fx, fy, fz)
+                nx, ny, nz = turned(x, y, z, w, nx, ny, nz)
+            x, y, z = turned(x, y, z, w, load[7], load[8], load[9])
+            ux, uy, uz = cross(move[0], move[1], move[2], c[0] + x, c[1] + y, c[2] + z)
+            return (fx * (move[3] + ux) + fy * (move[4] + uy) + fz * (move[5] + uz)
+                    + nx * move[0] + ny * move[1] + nz * move[2])
+    return 0.0

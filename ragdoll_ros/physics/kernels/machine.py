@@ -1,0 +1,38 @@
+"""How a function becomes machine code: three decorators, and short names of numba's types."""
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numba
+
+from .cache import keep
+from .record import RECORD
+
+MATH = {'contract', 'nsz', 'arcp'}
+"""Freedoms of rounding: a product and a sum may be rounded once. Sums stay in their order."""
+
+compiled = numba.njit(error_model='numpy', fastmath=MATH, no_cpython_wrapper=True,
+                      no_cfunc_wrapper=True)
+"""Machine code, for what other compiled code calls."""
+
+inlined = numba.njit(inline='always', error_model='numpy', fastmath=MATH)
+"""The same as a part of what calls it: twice as fast for what is called with many arrays."""
+
+REAL, YES, TREE = numba.float64, numba.boolean, numba.from_dtype(RECORD)[::1]
+ROW, TABLE, COUNTS, FLAGS = REAL[::1], REAL[:, ::1], numba.int64[::1], YES[::1]
+ANY_ROW = REAL[:]
+
+
+def entry(*types: numba.types.Type) -> Callable[[Callable], Callable]:
+    """Compile what Python calls, for these types of its arguments, when its file is imported.
+
+    The code is kept for the next process, so that no simulation ever waits in its midst. It is
+    kept by the function's name, so the function must be one of a module and not of a function.
+    """
+    def compile_at_once(function: Callable) -> Callable:
+        dispatcher = numba.njit(error_model='numpy', nogil=True, fastmath=MATH)(function)
+        keep(dispatcher)
+        dispatcher.compile(types)
+        dispatcher.disable_compile()
+        return dispatcher
+    return compile_at_once

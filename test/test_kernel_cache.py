@@ -1,0 +1,174 @@
+"""Machine code of a small package is kept, found again, thrown away, and done without."""
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('numba')
+
+from ragdoll_ros.physics.kernels import cache, notices
+
+KERNELS = Path(cache.__file__).parent
+FRAME = ('cache.py', 'machine.py', 'notices.py', 'record.py')
+INNER = """
+from .machine import compiled
+
+@compiled
+def doubled(x):
+    return 2 * x
+"""
+OUTER = """
+from .inner import doubled
+from .machine import REAL, entry
+
+@entry(REAL)
+def more(x):
+    return doubled(x) + 1
+
+@entry(REAL)
+def yet_more(x):
+    return more(x) + 10
+"""
+USE = """
+from tiny.cache import alone
+with alone():
+    from tiny.outer import more, yet_more
+print(more(3.0), yet_more(3.0))
+"""
+ONCE = notices.COMPILING.format(notices.ONCE)
+EVERY_TIME = notices.COMPILING.format(notices.EVERY_TIME)
+
+NO_RIGHTS = """
+import ctypes
+assert ctypes.CDLL(None).capset((ctypes.c_uint32 * 2)(0x20080522), (ctypes.c_uint32 * 6)()) == 0
+"""
+"""Root gives up its capabilities, so that it may write no more than a file's mode says: capset(2)
+with _LINUX_CAPABILITY_VERSION_3 and empty sets."""
+
+SMALL_FILES = """
+import resource
+resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+"""
+"""Writing a kernel fails after 1000 bytes, as on a disk that is full by then."""
+
+
+@pytest.fixture
+def tiny(tmp_path):
+    """A package of two kernels, one of which calls the other, in two files."""
+    package = tmp_path / 'tiny'
+    package.mkdir()
+    for name in FRAME:
+        shutil.copy(KERNELS / name, package)
+    (package / '__init__.py').touch()
+    (package / 'inner.py').write_text(INNER)
+    (package / 'outer.py').write_text(OUTER)
+    return package
+
+
+def run(tiny, code=USE):
+    """Run Python; give what it prints, and the lines it says beside that."""
+    done = subprocess.run(
+        [sys.executable, '-c', code], capture_output=True, text=True, cwd='/', timeout=120,
+        env={**os.environ, 'PYTHONPATH': os.pathsep.join([str(tiny.parent), *sys.path[1:]]),
+             'NUMBA_CACHE_DIR': str(tiny.parent / 'kept'), 'PYTHONDONTWRITEBYTECODE': '1'})
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip(), done.stderr.splitlines()
+
+
+def folder(tiny):
+    """Where the code is kept."""
+    found, = (tiny.parent / 'kept').iterdir()
+    return found
+
+
+def kept(tiny):
+    """The files of kernels that are kept."""
+    return sorted(folder(tiny).glob('*.nb*'))
+
+
+def test_code_is_compiled_once(tiny):
+    assert run(tiny) == ('7.0 17.0', [ONCE])
+    assert run(tiny) == ('7.0 17.0', [])
+    assert [path.name.partition('-')[0] for path in kept(tiny)] == ['outer.more', 'outer.yet_more']
+
+
+def test_a_change_of_any_file_is_noticed(tiny):
+    run(tiny)
+    before = kept(tiny)
+    (tiny / 'inner.py').write_text(INNER.replace('2 * x', '5 * x'))
+    assert run(tiny) == ('16.0 26.0', [ONCE])
+    assert len(kept(tiny)) == 2 and not set(before) & set(kept(tiny)), 'the old ones are gone'
+    (tiny / 'inner.py').rename(tiny / 'other.py')
+    (tiny / 'outer.py').write_text(OUTER.replace('.inner', '.other'))
+    assert run(tiny) == ('16.0 26.0', [ONCE])
+
+
+def test_what_others_keep_there_stays(tiny):
+    run(tiny)
+    notes, old, foreign = (folder(tiny) / name for name in (
+        'notes.txt', 'kernels.step-413.py311.1.nbc', 'kernels.nbc'))
+    for path in (notes, old, foreign):
+        path.touch()
+    (tiny / 'inner.py').write_text(INNER.replace('2 * x', '5 * x'))
+    run(tiny)
+    assert notes.exists() and foreign.exists() and not old.exists()
+
+
+def test_what_is_missing_or_damaged_is_compiled_again(tiny):
+    run(tiny)
+    first, second = kept(tiny)
+    whole = second.read_bytes()
+    second.write_bytes(whole[:len(whole) // 2])
+    assert run(tiny) == ('7.0 17.0', [ONCE])
+    first.unlink()
+    assert run(tiny) == ('7.0 17.0', [ONCE])
+    assert run(tiny) == ('7.0 17.0', [])
+
+
+def test_a_folder_that_is_read_only_is_done_without(tiny):
+    empty = tiny.parent / 'kept'
+    empty.mkdir(mode=0o555)
+    assert run(tiny, NO_RIGHTS + USE) == ('7.0 17.0', [EVERY_TIME])
+    assert not list(empty.iterdir())
+
+
+def test_what_is_kept_in_a_read_only_folder_is_used(tiny):
+    """As in an image that was made with other rights than those it is run with."""
+    run(tiny)
+    folder(tiny).chmod(0o555)
+    assert run(tiny, NO_RIGHTS + USE) == ('7.0 17.0', [])
+    kept(tiny)[0].chmod(0)
+    printed, said = run(tiny, NO_RIGHTS + USE)
+    assert printed == '7.0 17.0' and said[0] == ONCE and len(said) == 2
+    assert 'Permission denied' in said[1]
+
+
+def test_a_disk_that_is_full_is_told_once(tiny):
+    printed, (compiling, lost) = run(tiny, SMALL_FILES + USE)
+    assert (printed, compiling) == ('7.0 17.0', ONCE)
+    assert lost.startswith(notices.NOT_KEPT.partition('{')[0]) and 'File too large' in lost
+    assert not kept(tiny), 'nothing half-written stays'
+    assert run(tiny) == ('7.0 17.0', [ONCE]), 'and it is kept when there is room again'
+    assert run(tiny) == ('7.0 17.0', [])
+
+
+@pytest.mark.parametrize('file_instead', [False, True])
+def test_a_folder_may_go_while_it_runs(tiny, file_instead):
+    """It is made anew; where that is impossible nothing is kept."""
+    gone = 'import shutil, tiny.cache\nshutil.rmtree(tiny.cache.FOLDER)\n'
+    if file_instead:
+        gone += 'tiny.cache.FOLDER.touch()\n'
+    printed, said = run(tiny, gone + USE)
+    assert printed == '7.0 17.0' and said[0] == ONCE and len(said) == 1 + file_instead
+    assert len(list(folder(tiny).glob('*.nbc'))) == (0 if file_instead else 2)
+
+
+def test_other_functions_are_kept_as_numba_does(tiny):
+    (tiny.parent / 'alien.py').write_text(
+        'import numba\n\n@numba.njit(cache=True)\ndef half(x):\n    return x / 2\n')
+    run(tiny, USE + 'import alien\nalien.half(3.0)')
+    assert [path.name.partition('-')[0] for path in (tiny.parent / 'kept').rglob('*.nbi')] == [
+        'alien.half']
