@@ -1,4 +1,6 @@
 """How deep bones are in each other, against overlaps that are known."""
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -38,6 +40,12 @@ def test_what_starts_in_each_other_counts_from_when_it_is_apart():
     moved = Trajectory.of_poses(np.arange(4.0), places)
     assert scales.deepest(moved) == pytest.approx(0.01, abs=2e-6)
     assert scales.deepest(moved.part(slice(0, 3))) == 0
+
+
+def test_what_may_pass_through_each_other_has_no_depth():
+    scene = dataclasses.replace(pair(Sphere(0.1), Sphere(0.2)), self_collision=False)
+    places = np.zeros((1, 2, 3)), np.tile(rotation.IDENTITY, (1, 2, 1))
+    assert BoneDepth(scene).deepest(Trajectory.of_poses(np.zeros(1), *places)) == 0
 
 
 def test_neighbours_do_not_count():

@@ -18,7 +18,10 @@ SEARCHED = 0.01
 
 
 class BoneDepth:
-    """Depths of all pairs of a scene's bones that may collide: those without a joint between."""
+    """Depths of all pairs of a scene's bones that may collide: those without a joint between.
+
+    None may where the scene has no self-collision.
+    """
 
     def __init__(self, scene: Scene) -> None:
         import mujoco
@@ -31,8 +34,9 @@ class BoneDepth:
         jointed = {frozenset(scene.bone_index(scene.qualified(placement, name))
                              for name in (joint.parent, joint.child))
                    for placement in scene.dolls for joint in placement.doll.joints}
-        self._pairs = np.array([pair for pair in itertools.combinations(range(len(bodies)), 2)
-                                if frozenset(pair) not in jointed], int).reshape(-1, 2)
+        pairs = itertools.combinations(range(len(bodies)), 2) if scene.self_collision else ()
+        self._pairs = np.array([pair for pair in pairs if frozenset(pair) not in jointed],
+                               int).reshape(-1, 2)
 
     def depths(self, positions: np.ndarray, orientations: np.ndarray) -> np.ndarray:
         """Of each pair, m, at poses (n, 3) and (n, 4); 0 where they are apart."""
