@@ -9,8 +9,6 @@ import pytest
 
 pytest.importorskip('scipy')
 
-import impacts
-
 from ragdoll_ros import (
     Bone,
     Box,
@@ -23,6 +21,8 @@ from ragdoll_ros import (
     Sphere,
     load_doll,
 )
+from ragdoll_ros.accuracy.motions.impacts import impact_motions
+from ragdoll_ros.accuracy.references import closed_forms, impacts, sliding_disc
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.scene import Material
 
@@ -55,7 +55,9 @@ def test_each_impact_of_a_rocking_block_keeps_housners_share_of_energy():
     times = np.linspace(0, 3, 300001)
     angles = impacts.edge_angle(b, h, math.radians(5), G, times)
     turns = np.flatnonzero(np.diff(np.sign(np.diff(np.abs(angles)))) < 0) + 1
-    peaks = np.concatenate([[math.radians(5)], np.abs(angles[turns])])[:6]
+    peaks = np.concatenate([[math.radians(5)], impacts.peaks(angles)])[:6]
+    coarse = impacts.peaks(impacts.edge_angle(b, h, math.radians(5), G, times[::1000]))
+    assert coarse[8] == pytest.approx(impacts.peaks(angles)[8], rel=1e-3)
     heights = impacts.edge_centre(b, h, peaks)[:, 2] - h
     share = (1 - 1.5 * math.sin(math.atan(b / h)) ** 2) ** 2
     assert len(peaks) == 6
@@ -95,10 +97,61 @@ def test_balls_in_a_row_keep_momentum_and_part_as_newton_says(restitution):
     assert first[1] - first[0] == pytest.approx(restitution * 2, abs=1e-9)
 
 
+def test_a_ball_with_backspin_ends_rolling():
+    """At the end the rim is as fast as the ball; forward speed (5 v + 2 r w) / 7."""
+    t = np.array([3.0, 3.001])
+    x = closed_forms.ball_slide_then_roll(1.0, 0.3, G, t, -4.0)
+    angle = closed_forms.ball_slide_then_roll_angle(1.0, 0.3, G, 0.1, t, -4.0)
+    assert np.diff(x) / 0.001 == pytest.approx(-3 / 7, rel=1e-9)
+    assert np.diff(angle) * 0.1 == pytest.approx(np.diff(x), rel=1e-9)
+
+
 def test_a_disc_is_stopped_by_the_work_of_friction():
     """Half m r^2 w^2 / 2 against the mean of mu m g over the area times its way: 2/3 r angle."""
     angle = impacts.spin_down(0.2, 0.3, G, 10.0, np.array([5.0]))[0]
     assert pytest.approx(0.3 * G * 2 / 3 * 0.2 * angle, rel=1e-12) == 0.25 * 0.2 ** 2 * 10.0 ** 2
+
+
+@pytest.mark.parametrize('ratio', [0.0, 0.3, 0.99, 1.0, 1.01, 4.0])
+def test_friction_under_a_disc_is_the_mean_over_its_face(ratio):
+    """2000 rings of 2000 points; the ring through the point that stands still errs by 1e-3."""
+    rho = np.sqrt((np.arange(2000) + 0.5) / 2000)[:, None]
+    theta = (np.arange(2000) + 0.5) * math.pi / 1000
+    along, across = ratio - rho * np.sin(theta), rho * np.cos(theta)
+    size = np.hypot(along, across)
+    force = (along / size).mean()
+    torque = ((rho * np.cos(theta) * across - rho * np.sin(theta) * along) / size).mean()
+    assert sliding_disc.shares(ratio) == pytest.approx((force, torque), abs=2e-3)
+
+
+def test_a_disc_stops_sliding_and_spinning_at_once():
+    """At the ratio to which all discs tend both fall in proportion; and friction's work fits."""
+    force, torque = sliding_disc.shares(0.653)
+    assert force / (2 * torque) == pytest.approx(0.653, abs=1e-3)
+    times = np.linspace(0, 1, 100001)
+    for speed, rate in ((1.0, 10.0), (0.2, 10.0)):
+        slid, angle = sliding_disc.slide_and_spin(0.2, 0.3, G, speed, rate, times)
+        moving = np.flatnonzero(np.diff(slid) > 1e-8)[-10]
+        assert np.diff(angle)[moving + 20:].max() < 1e-7 * rate
+        v, w = np.gradient(slid, times), np.gradient(angle, times)
+        power = [0.3 * G * sum(np.array(sliding_disc.shares(a / (0.2 * b))) * (a, 0.2 * b))
+                 for a, b in zip(v[1:moving:50], w[1:moving:50], strict=True)]
+        energy = speed ** 2 / 2 + 0.2 ** 2 * rate ** 2 / 4
+        # a sum of rectangles 0.5 ms wide
+        assert sum(power) * 50e-5 == pytest.approx(energy, rel=3e-3)
+
+
+@pytest.mark.parametrize('motion', impact_motions(), ids=lambda motion: motion.name)
+def test_a_truth_begins_where_its_scene_does(motion):
+    """Position and orientation at the start, and velocity by a difference of 1 us."""
+    truth = motion.truth(np.array([0.0, 1e-6]))
+    scene = motion.trial.scene
+    for index, placement in enumerate(scene.dolls):
+        assert truth.positions[0, index] == pytest.approx(placement.position, abs=1e-12)
+        turned = abs(truth.orientations[0, index] @ np.array(placement.orientation))
+        assert turned == pytest.approx(1, abs=1e-12)
+        moved = (truth.positions[1, index] - truth.positions[0, index]) / 1e-6
+        assert moved == pytest.approx(placement.velocity, abs=1e-4)
 
 
 # The simulation
@@ -173,12 +226,7 @@ def test_a_block_rocks_as_housner_says():
     times = np.arange(0, 3.001, 0.01)
     truth = impacts.edge_angle(0.1, 0.4, lean, G, times)
     found = pitches(run(on_edge(size, lean), 3.0))
-
-    def peaks(angles):
-        size = np.abs(angles)
-        tops = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
-        return size[tops]
-    assert peaks(found)[8] == pytest.approx(peaks(truth)[8], rel=0.01)
+    assert impacts.peaks(found)[8] == pytest.approx(impacts.peaks(truth)[8], rel=0.01)
 
 
 @known('0.8 rad too far in 0.7 s: PyBullet spreads no pressure over a face')

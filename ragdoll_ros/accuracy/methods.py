@@ -4,7 +4,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import process_time
 from typing import Protocol
 
@@ -16,8 +16,9 @@ from ..physics import kernels
 from ..physics.engine.bullet import BulletEngine
 from ..physics.engine.mujoco import MujocoEngine
 from ..physics.engine.protocol import Engine
-from ..physics.settings import ACCURACIES, NORMAL, Accuracy
+from ..physics.settings import ACCURACIES, Accuracy
 from ..physics.simulation import Simulation
+from . import fineness
 from .quickstart import STEP as QUICKSTART_STEP
 from .quickstart import Quickstart
 from .trajectory import Trajectory
@@ -59,6 +60,8 @@ class Result:
 
     trajectory: Trajectory
     costs: np.ndarray
+    told: dict[str, float] = field(default_factory=dict)
+    """Simulation.measures() at the end; empty for others."""
 
     @property
     def rate(self) -> float:
@@ -72,7 +75,7 @@ class _FixedSteps:
     def __init__(self, trial: Trial, substeps: int, make: Callable[..., Engine]) -> None:
         self._trial = trial
         self._tick, self._count = trial.scene.step, 0
-        self._engine = make(trial.scene, plain(substeps, self._tick))
+        self._engine = make(trial.scene, fineness.of_step(self._tick / substeps))
         if trial.start is not None:
             self._engine.place(trial.start)
 
@@ -89,11 +92,6 @@ class _FixedSteps:
 
     def close(self) -> None:
         self._engine.close()
-
-
-def plain(substeps: int, tick: float) -> Accuracy:
-    """So many substeps in a tick, s, and nothing else."""
-    return dataclasses.replace(NORMAL, substeps=substeps * 0.01 / tick, energy=False, sleep=False)
 
 
 def simulated(trial: Trial, accuracy: str | Accuracy, engine: str = 'auto') -> Simulation:
@@ -118,9 +116,10 @@ def run(method: Method, trial: Trial) -> Result:
             state = motion.advance()
             costs[index] = process_time() - before
             states.append(state)
+        told = motion.measures() if isinstance(motion, Simulation) else {}
     finally:
         motion.close()
-    return Result(Trajectory.of(times, states), costs)
+    return Result(Trajectory.of(times, states), costs, told)
 
 
 def median_run(method: Method, trial: Trial, repeats: int) -> Result:
@@ -136,6 +135,20 @@ def ours(accuracy: str | Accuracy, name: str | None = None, engine: str = 'auto'
     order = kernels.ORDER if engine == 'auto' and kernels.ready() else 1
     return Method(name, name.replace('-', ' '), 'ours', functools.partial(
         simulated, accuracy=accuracy, engine=engine), order=order)
+
+
+def core(step: float) -> Method:
+    """The engine that solves impacts where they happen, with steps of ``step`` s."""
+    return Method(f'core-{step:g}', f'core, steps of {step * 1e6:g} µs', 'core', functools.partial(
+        simulated, accuracy=fineness.of_step(step), engine=fineness.CORE))
+
+
+def reference(parts: int) -> Method:
+    """What stands for the truth where there is no formula: the core, its step in ``parts``.
+
+    PyBullet at 128 substeps until there is a core; the label says which one it was.
+    """
+    return core(fineness.core_step() / parts) if fineness.has_core() else bullet(128)
 
 
 def quickstart() -> Method:
@@ -172,7 +185,18 @@ def every_method(substeps: Iterable[int] = SUBSTEPS) -> list[Method]:
 
 def by_name(name: str) -> Method:
     """The method of a name; OutOfRange names the families there are."""
-    methods = {method.name: method for method in every_method(range(1, 129))}
-    if name not in methods:
-        raise errors.OutOfRange('method', name, 'ours-*, quickstart, bullet-N, mujoco-*-N')
-    return methods[name]
+    family, _, rest = name.partition('-')
+    try:
+        if family == 'ours' and rest in ACCURACIES:
+            return ours(rest)
+        if name == 'quickstart':
+            return quickstart()
+        if family in ('bullet', 'core'):
+            return bullet(int(rest)) if family == 'bullet' else core(float(rest))
+        if family == 'mujoco':
+            integrator, _, count = rest.partition('-')
+            return mujoco(integrator, int(count))
+    except ValueError:
+        pass
+    raise errors.OutOfRange('method', name,
+                            'ours-*, quickstart, core-SECONDS, bullet-N, mujoco-*-N')

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ragdoll_ros.accuracy.references.integration import LONGEST, TOLERANCE
+from .integration import LONGEST, TOLERANCE
 
 STILL = 1e-9
 """rad/s below which a rocking block is taken to have come to rest."""
@@ -62,6 +62,14 @@ def edge_centre(half_width: float, half_height: float, angles: np.ndarray) -> np
     sin, cos = np.sin(angles), np.cos(angles)
     return np.stack([side - side * cos + half_height * sin, np.zeros(len(angles)),
                      side * sin + half_height * cos], axis=1)
+
+
+def peaks(angles: np.ndarray) -> np.ndarray:
+    """Peaks of |angle| between samples at even times, by the parabola through the three highest."""
+    size = np.abs(angles)
+    tops = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
+    before, here, after = size[tops - 1], size[tops], size[tops + 1]
+    return here + (after - before) ** 2 / (8 * (2 * here - before - after))
 
 
 def planar_impulse(arm: tuple[float, float], mass: float, inertia: float,
