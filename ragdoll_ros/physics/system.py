@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 
+from ..model import rotation
 from ..model.coordinates import DofLayout
 from ..model.scene import Scene
 from .kernels.system import BOUND, GEOM, PAIR, STICKS, System
@@ -55,9 +56,8 @@ def contact_law(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """
     out = np.empty(np.broadcast_shapes(a.shape, b.shape))
     low, high = np.minimum(a[..., 0], b[..., 0]), np.maximum(a[..., 0], b[..., 0])
-    finite = np.isfinite(high)
-    out[..., 0] = np.where(finite, np.sqrt(low * np.where(finite, high, 0.0)), low)
-    out[..., 0] = np.minimum(out[..., 0], STICKS)
+    mean = np.sqrt(np.minimum(low, STICKS) * np.minimum(high, STICKS))
+    out[..., 0] = np.where(np.isfinite(high), mean, np.minimum(low, STICKS))
     out[..., 1] = (a[..., 1] + b[..., 1]) / 2
     out[..., 2] = np.sqrt(a[..., 2] * b[..., 2])
     return out
@@ -84,7 +84,6 @@ def _dofs(tree: np.ndarray, count: int) -> dict[str, np.ndarray]:
 
 def _geoms(scene: Scene, tree: np.ndarray) -> np.ndarray:
     """All parts of all bones' shapes, in the scene's order of bones."""
-    from ..model import rotation
     record = {int(bone): place for place, bone in enumerate(tree['bone'])}
     base = np.array(scene.material.on(None))
     parts = [(index, bone, part) for index, bone in enumerate(scene.bones)

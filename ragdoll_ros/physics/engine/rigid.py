@@ -17,7 +17,6 @@ from ...model.scene import Scene
 from ...model.state import State
 from ..ground_heights import ground_heights
 from ..kernels.loaded import advance as kernels
-from ..kernels.loaded import kernels as sums
 from ..kernels.system import CONTACT, make_room
 from ..kernels.flight import Path
 from ..motion import Motion, damping_rate
@@ -68,16 +67,14 @@ class RigidEngine:
         self._doll_of = np.ascontiguousarray(scene.doll_of_bone, np.int64)
         self._spins = self.layout.root_spins
         self._size = sum(self.layout.sizes)
+        self._longest = math.inf
+        """s that a path of flight may be long, as far as neighbours are known."""
         self._stages, self._row = np.empty((16, self._size)), np.empty(self._size)
         self.place(self._placed())
 
     @property
     def state(self) -> State:
         """Poses and velocities of all bones now."""
-        if self._state is None:
-            rows = np.empty((len(self._masses), 13))
-            kernels.observe(self._system, self._room, self._q, self._v, rows)
-            self._state = State.of(rows)
         return self._state
 
     @property
@@ -91,11 +88,6 @@ class RigidEngine:
     @property
     def motion(self) -> Motion:
         """Sums over each doll now."""
-        if self._motion is None:
-            out = np.empty((len(self.scene.dolls), 20))
-            sums.motion(self._masses, self._inertias, self._doll_of, self._system.gravity,
-                        self.state.rows, out)
-            self._motion = Motion.of(out)
         return self._motion
 
     def place(self, coordinates: GeneralizedState) -> None:
@@ -104,10 +96,12 @@ class RigidEngine:
         self._v = np.array(coordinates.v, float)
         turns = self._q[self.layout.root_orientations]
         self._v[self._spins] = rotation.rotate(rotation.inverse(turns), self._v[self._spins])
+        self._path = Path(np.zeros((8, self._size)), np.zeros((2, self._size)), np.zeros(8))
         self._use(self._whole)
+        self._look()
         self._lift_out()
         self._exclude_overlaps()
-        self._path = Path(np.zeros((8, self._size)), np.zeros((2, self._size)), np.zeros(8))
+        self._look()
         self._neighbours.forget()
         self._start_energy = float(self.motion.energy.sum())
         self._departure = None
@@ -115,13 +109,14 @@ class RigidEngine:
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = ()) -> None:
         """Go on by ``duration`` s; see Engine."""
         self._departure = (self._q.copy(), self._v.copy(), duration, wrenches, springs)
+        self._meet(duration)
         self._go(duration, wrenches, springs, self.accuracy)
 
     def stop(self) -> None:
         """Bring all to rest where it is; the energy that is left is lost for good."""
         self._v[:] = 0.0
         self._path.times[:] = 0.0
-        self._forget_state()
+        self._look()
 
     def grounded(self) -> bool:
         """Whether anything rests on the ground."""
@@ -167,6 +162,7 @@ class RigidEngine:
         self._room.sums[:] = snapshot.sums
         self._start_energy = snapshot.start_energy
         self._neighbours.forget()
+        self._look()
 
     def forget(self, snapshot: object) -> None:
         """Nothing to release: the memory goes with the object."""
@@ -181,12 +177,13 @@ class RigidEngine:
 
     def _go(self, duration: float, wrenches: Wrenches, springs: Springs,
             accuracy: Accuracy) -> None:
-        self._meet(duration)
+        rows, sums = np.empty((len(self._masses), 13)), np.empty((len(self.scene.dolls), 20))
         kernels.advance(self._system, self._room, self._q, self._v, duration, _loads(wrenches),
                         _hands(springs), accuracy.step, accuracy.flight_error,
                         self._flies and not springs, self._longest, self._path, self._stages,
-                        self._row, self._armed, self._known)
-        self._forget_state()
+                        self._row, self._armed, self._known, self._masses, self._inertias,
+                        self._doll_of, rows, sums)
+        self._state, self._motion = State.of(rows), Motion.of(sums)
 
     def _meet(self, duration: float) -> None:
         """See that all geoms of two dolls that may meet within ``duration`` s are paired."""
@@ -211,11 +208,10 @@ class RigidEngine:
             self._room.counts[5] = 0
         self._known = np.zeros(contacts, CONTACT)
         self._armed = np.zeros(len(self._room.gaps))
-        self._forget_state()
 
-    def _forget_state(self) -> None:
-        self._state: State | None = None
-        self._motion: Motion | None = None
+    def _look(self) -> None:
+        """See where all is."""
+        self._go(0.0, (), (), self.accuracy)
 
     def _lift_out(self) -> None:
         """Set dolls that are in the ground onto it."""
@@ -225,7 +221,6 @@ class RigidEngine:
             if depth > pressed(self.scene):
                 at = self.layout.root_positions[doll]
                 self._q[at] += depth * np.array(self.scene.ground.normal)
-        self._forget_state()
 
     def _exclude_overlaps(self) -> None:
         """Let geoms of one doll that overlap by more than pressed() collide no more."""
@@ -276,7 +271,7 @@ class RigidEngine:
         self._q, self._v, self._path = here.q, here.v, here.path
         self._known[:] = here.known
         self._room.counts[:], self._room.sums[:] = here.counts, here.sums
-        self._forget_state()
+        self._look()
         return float(4 / 3 * missed)
 
 

@@ -22,13 +22,16 @@ from .flight import (
     time_free,
 )
 from .impact import SLOW, SLOW_TURN, contact_step, enter_work, impact, power
-from .kernels import cross, pose, times
-from .machine import REAL, ROW, TABLE, YES, compiled, entry
+from .kernels import cross, motion, pose, rates, times
+from .machine import COUNTS, REAL, ROW, TABLE, YES, compiled, entry
 from .system import CONTACTS, ROOM, SYSTEM, Room, System
 
 APART = 5e-3
 """m/s or rad/s at which what touches comes apart for a flight: to 1.3 um under gravity, which is
 what TOUCHING can tell."""
+
+STILL = 1e-6
+"""rad/s, or rad/s^2, at which a joint that leans on its limit does not press on it."""
 
 WORTH = 6
 """Steps on the ground that cost as much as one of flight."""
@@ -52,8 +55,8 @@ GAUSS = ((0.046910077030668, 0.118463442528095), (0.230765344947158, 0.239314335
 
 
 @compiled
-def may_fly(s: System, r: Room, q: np.ndarray, v: np.ndarray, known: np.ndarray, path: Path,
-            step: float) -> bool:
+def may_fly(s: System, r: Room, q: np.ndarray, v: np.ndarray, loads: np.ndarray,
+            known: np.ndarray, path: Path, armed: np.ndarray, step: float, rate: np.ndarray) -> bool:
     """Whether all that touches comes apart, and for long enough; r.gaps are those at q."""
     for i in range(r.counts[5]):
         if r.counts[11] and known[i].impulse[0] > 0:
@@ -61,16 +64,27 @@ def may_fly(s: System, r: Room, q: np.ndarray, v: np.ndarray, known: np.ndarray,
     pose(s.tree, q, v, r.work)
     all_gaps(s, q, r, r.gaps, math.inf, r.gaps)
     m = find_contacts(s, q, r, r.gaps, TOUCHING)
+    leaning = False
     for i in range(m):
         c = r.contacts[i]
         if c.kind == 1:
-            rate = c.normal[0] * v[c.a]
-        else:
-            rate = point_velocity(s, r, q, c.a, c.point, c.normal)
-            if c.b >= 0:
-                rate -= point_velocity(s, r, q, c.b, c.point, c.normal)
-        if rate < APART:
+            leaning |= c.normal[0] * v[c.a] < APART
+            if c.normal[0] * v[c.a] < -STILL:
+                return False
+            continue
+        apart = point_velocity(s, r, q, c.a, c.point, c.normal)
+        if c.b >= 0:
+            apart -= point_velocity(s, r, q, c.b, c.point, c.normal)
+        if apart < APART:
             return False
+    if leaning:
+        rates(s.tree, s.gravity, loads, q, v, r.work, rate)
+        for i in range(m):
+            c = r.contacts[i]
+            if c.kind == 1 and c.normal[0] * v[c.a] < APART and (
+                    c.normal[0] * rate[len(q) + c.a] < -STILL):
+                return False
+        pose(s.tree, q, v, r.work)
     single = True
     for i in range(len(s.tree)):
         single &= s.tree[i].parent < 0
@@ -81,7 +95,9 @@ def may_fly(s: System, r: Room, q: np.ndarray, v: np.ndarray, known: np.ndarray,
     for k in range(len(s.geoms)):
         move = r.work.moves[s.geoms[k].bone]
         fast = max(fast, (move[0] ** 2 + move[1] ** 2 + move[2] ** 2) * s.geoms[k].reach)
-    return time_free(s, r, q, v, r.gaps, g + 2 * fast + 1e-3, path.ends) > WORTH * step
+    for j in range(len(armed)):
+        armed[j] = 1.0 if r.gaps[j] > TOUCHING else 0.0
+    return time_free(s, r, q, v, r.gaps, armed, g + 2 * fast + 1e-3, path.ends) > WORTH * step
 
 
 @compiled
@@ -164,11 +180,29 @@ def first_touch(s: System, r: Room, h: float) -> float:
     return first
 
 
-@entry(SYSTEM, ROOM, ROW, ROW, REAL, TABLE, TABLE, REAL, REAL, YES, REAL, PATH, TABLE, ROW, ROW, CONTACTS)
+@compiled
+def observe(s: System, r: Room, q: np.ndarray, v: np.ndarray, rows: np.ndarray) -> None:
+    """Position, orientation, linear and angular velocity (n, 13) of all bones, world frame."""
+    pose(s.tree, q, v, r.work)
+    for i in range(len(s.tree)):
+        bone, row, move, centre = s.tree[i], rows[s.tree[i].bone], r.work.moves[i], r.work.centres[i]
+        root, turn, bind = s.tree[s.root_of[i]].q, r.work.turns[i], bone.bind
+        row[3], row[4], row[5], row[6] = times(turn[0], turn[1], turn[2], turn[3], bind[0],
+                                               bind[1], bind[2], bind[3])
+        x, y, z = cross(move[0], move[1], move[2], centre[0], centre[1], centre[2])
+        row[7], row[8], row[9] = move[3] + x, move[4] + y, move[5] + z
+        for k in range(3):
+            row[k] = q[root + k] + centre[k]
+            row[10 + k] = move[k]
+
+
+@entry(SYSTEM, ROOM, ROW, ROW, REAL, TABLE, TABLE, REAL, REAL, YES, REAL, PATH, TABLE, ROW, ROW, CONTACTS,
+       ROW, TABLE, COUNTS, TABLE, TABLE)
 def advance(s: System, r: Room, q: np.ndarray, v: np.ndarray, duration: float,
             loads: np.ndarray, springs: np.ndarray, step: float, tolerance: float, flies: bool,
             longest: float, path: Path, k: np.ndarray, y: np.ndarray, armed: np.ndarray,
-            known: np.ndarray) -> None:
+            known: np.ndarray, masses: np.ndarray, inertias: np.ndarray, doll_of: np.ndarray,
+            rows: np.ndarray, sums: np.ndarray) -> None:
     """Go on by ``duration`` s: q and v, roots' angular velocities along their own axes, become
     those at the end. ``step``: s of a step on the ground; ``tolerance``: m or rad by which a path's
     end may err; ``flies``: whether damping and springs allow flights.
@@ -177,7 +211,7 @@ def advance(s: System, r: Room, q: np.ndarray, v: np.ndarray, duration: float,
     while time < duration - 1e-12:
         left = duration - time
         if path.times[VALID] == 0.0 and flies and events < MOST_EVENTS and may_fly(
-                s, r, q, v, known, path, step):
+                s, r, q, v, loads, known, path, armed, step, y):
             most = min(left if len(loads) else longest, LONGEST)
             if begin_path(s, r, loads, q, v, tolerance, most, path, k, y):
                 find_event(s, r, path, armed, r.states[1], r.vectors[0])
@@ -200,22 +234,8 @@ def advance(s: System, r: Room, q: np.ndarray, v: np.ndarray, duration: float,
         if touched:
             impact(s, r, q, v)
             events += 1
-
-
-@entry(SYSTEM, ROOM, ROW, ROW, TABLE)
-def observe(s: System, r: Room, q: np.ndarray, v: np.ndarray, rows: np.ndarray) -> None:
-    """Position, orientation, linear and angular velocity (n, 13) of all bones, world frame."""
-    pose(s.tree, q, v, r.work)
-    for i in range(len(s.tree)):
-        bone, row, move, centre = s.tree[i], rows[s.tree[i].bone], r.work.moves[i], r.work.centres[i]
-        root, turn, bind = s.tree[s.root_of[i]].q, r.work.turns[i], bone.bind
-        row[3], row[4], row[5], row[6] = times(turn[0], turn[1], turn[2], turn[3], bind[0],
-                                               bind[1], bind[2], bind[3])
-        x, y, z = cross(move[0], move[1], move[2], centre[0], centre[1], centre[2])
-        row[7], row[8], row[9] = move[3] + x, move[4] + y, move[5] + z
-        for k in range(3):
-            row[k] = q[root + k] + centre[k]
-            row[10 + k] = move[k]
+    observe(s, r, q, v, rows)
+    motion(masses, inertias, doll_of, s.gravity, rows, sums)
 
 
 @entry(SYSTEM, ROOM, ROW, ROW, ROW)

@@ -44,6 +44,9 @@ MET = 1e-11
 SAMPLES = 400
 """Looks at one path."""
 
+LEAST_CHANGE = 1e-3
+"""rad/s^2 that a joint's acceleration may reach, however small it is at a path's ends."""
+
 STEADY = 1.5
 """Times the change of velocities along a path, over its length, that accelerations may reach."""
 
@@ -179,8 +182,14 @@ def time_to_close(gap: float, closing: float, acceleration: float) -> float:
 
 
 @compiled
+def due(gaps: np.ndarray, armed: np.ndarray, j: int) -> float:
+    """Gap that is left until a touch: of what touches at the start, until it has sunk."""
+    return gaps[j] if armed[j] > 0 else gaps[j] + 2 * TOUCHING
+
+
+@compiled
 def time_free(s: System, r: Room, q: np.ndarray, v: np.ndarray, gaps: np.ndarray,
-              acceleration: float, ends: np.ndarray) -> float:
+              armed: np.ndarray, acceleration: float, ends: np.ndarray) -> float:
     """Least time, s, until a gap may be gone; work is posed at q and v, geoms are placed.
 
     ``ends`` (2, nq + nv): rates at the path's ends, for those of the limited joints.
@@ -192,7 +201,7 @@ def time_free(s: System, r: Room, q: np.ndarray, v: np.ndarray, gaps: np.ndarray
             x, y, z, w = bone_velocity(r, geom.bone)
             falling = -(x * s.normal[0] + y * s.normal[1] + z * s.normal[2])
             for j in range(geom.count):
-                gap, closing = gaps[n + j], falling + w * geom.reach
+                gap, closing = due(gaps, armed, n + j), falling + w * geom.reach
                 if gap < FAR:
                     ground_point(geom, j, r.at[k], r.turn[k], s.normal, point)
                     closing = -point_velocity(s, r, q, geom.bone, point, s.normal)
@@ -201,15 +210,15 @@ def time_free(s: System, r: Room, q: np.ndarray, v: np.ndarray, gaps: np.ndarray
     for k in range(len(s.bounds)):
         bound, at = s.bounds[k], len(q) + s.bounds[k].v
         rate = v[bound.v]
-        change = STEADY * max(abs(ends[0, at]), abs(ends[1, at])) + 1.0
+        change = STEADY * max(abs(ends[0, at]), abs(ends[1, at])) + LEAST_CHANGE
         if gaps[n] < math.inf:
-            least = min(least, time_to_close(gaps[n], -rate, change))
+            least = min(least, time_to_close(due(gaps, armed, n), -rate, change))
         if gaps[n + 1] < math.inf:
-            least = min(least, time_to_close(gaps[n + 1], rate, change))
+            least = min(least, time_to_close(due(gaps, armed, n + 1), rate, change))
         n += 2
     for k in range(len(s.pairs)):
         closing = pair_closing(s, r, q, k, gaps[n + k])
-        least = min(least, time_to_close(gaps[n + k], closing, 2 * acceleration))
+        least = min(least, time_to_close(due(gaps, armed, n + k), closing, 2 * acceleration))
     return least
 
 
@@ -261,7 +270,7 @@ def find_event(s: System, r: Room, path: Path, armed: np.ndarray, q: np.ndarray,
         if least <= MET:
             path.times[EVENT] = time
             return
-        step = time_free(s, r, q, v, gaps, acceleration, path.ends)
+        step = time_free(s, r, q, v, gaps, armed, acceleration, path.ends)
         before = time
         time += max(step, 1e-9)
         if time >= length:
