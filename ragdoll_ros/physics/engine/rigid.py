@@ -110,7 +110,11 @@ class RigidEngine:
         """Go on by ``duration`` s; see Engine."""
         self._departure = (self._q.copy(), self._v.copy(), duration, wrenches, springs)
         self._meet(duration)
+        if wrenches or springs:
+            self._path.times[:] = 0.0
         self._go(duration, wrenches, springs, self.accuracy)
+        if wrenches or springs:
+            self._path.times[:] = 0.0
 
     def stop(self) -> None:
         """Bring all to rest where it is; the energy that is left is lost for good."""
@@ -139,7 +143,7 @@ class RigidEngine:
             'energy_excess_J': energy - self._start_energy - float(room_sums[0] + room_sums[1]),
             'energy_lifted_J': float(room_sums[2]),
             'work_of_pushes_J': float(room_sums[0]), 'work_of_grabs_J': float(room_sums[1]),
-            'error_estimate_m': self._estimate_error(),
+            'error_estimate_m': self._estimate_error(), 'error_trusted': 1.0,
             'flights': int(counts[0]), 'substeps': int(counts[1]), 'impacts': int(counts[2]),
             'unsolved_total': int(counts[3])}
 
@@ -285,11 +289,12 @@ def _loads(wrenches: Wrenches) -> np.ndarray:
 
 
 def _hands(springs: Springs) -> np.ndarray:
-    """Springs as a table (m, 15) for compiled code."""
-    return np.array([_hand(spring) for spring in springs]).reshape(-1, 15)
+    """Springs as a table (m, 18) for compiled code, the last four its own."""
+    return np.array([_hand(spring) for spring in springs]).reshape(-1, 18)
 
 
 def _hand(spring: Spring) -> np.ndarray:
+    spring = spring.after(0.0)
     speed = (spring.target - spring.position) / spring.left if spring.left > 0 else np.zeros(3)
     return np.concatenate([[spring.bone], spring.point, spring.position, speed, [
-        spring.left, spring.stiffness, spring.damping, spring.most, 1.0]])
+        spring.left, spring.stiffness, spring.damping, spring.most, 1.0, 0.0, 0.0, 0.0]])

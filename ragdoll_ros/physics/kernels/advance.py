@@ -23,6 +23,7 @@ from .flight import (
 )
 from .impact import SLOW, SLOW_TURN, contact_step, enter_work, impact, power
 from .kernels import cross, motion, pose, rates, times
+from .momentum import give_contacts, keep_momentum, sum_dolls
 from .machine import COUNTS, REAL, ROW, TABLE, YES, compiled, entry
 from .system import CONTACTS, ROOM, SYSTEM, Room, System
 
@@ -152,8 +153,16 @@ def step_or_touch(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, lo
         tries += 1
         hit = True
         late = max(1e-9, late * share * (1 + 1e-9) + 2e-9)
+    for d in range(len(r.given)):
+        for k in range(7):
+            r.given[d, k] = 0.0
+    give_contacts(s, r, m, r.given)
     if len(loads) or len(springs):
         enter_work(s, r, v, end_v, late, loads, springs, since)
+    if r.given[:, 6].min() == 0.0:
+        sum_dolls(s, q, v, r, r.before)
+        sum_dolls(s, end_q, end_v, r, r.after)
+        keep_momentum(s, r, late, r.before, r.after, r.given, end_q, end_v)
     if late > 0.1 * h:
         for i in range(m):
             known[i] = r.contacts[i]

@@ -25,6 +25,7 @@ from .mass import (
     turn_inertias,
     update_moves,
 )
+from .momentum import give
 from .response import respond
 from .system import Room, System
 
@@ -100,7 +101,7 @@ def contact_step(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loa
             solve_lower(r.H, s.up, change)
         for j in range(len(v)):
             free[j] = v[j] + change[j]
-        if not weaken(s, r, middle, v, free, springs, since + h / 2, h):
+        if turn or not weaken(s, r, middle, v, free, springs, since + h / 2, h):
             break
     place_geoms(s, middle, r)
     m = find_contacts(s, middle, r, r.gaps, SLOW * h)
@@ -161,7 +162,7 @@ def stiffen(s: System, r: Room, q: np.ndarray, spring: np.ndarray, h: float) -> 
     one branch, so that H keeps its pattern.
     """
     i, x, y, z = spring_point(s, r, q, int(spring[0]), spring[1:4])
-    share = spring[14] * h * (spring[11] * h / 4 + spring[12] / 2)
+    share = h * (spring[11] * h / 4 + spring[12] / 2) if spring[14] > 0 else 0.0
     a = s.last[i]
     while a >= 0:
         axis = r.work.axes[a]
@@ -189,9 +190,11 @@ def spring_force(s: System, r: Room, q: np.ndarray, v: np.ndarray, spring: np.nd
         a, b, c = cross(axis[0], axis[1], axis[2], x, y, z)
         ux, uy, uz = ux + (axis[3] + a) * v[j], uy + (axis[4] + b) * v[j], uz + (axis[5] + c) * v[j]
         j = s.up[j]
+    if spring[14] == 0.0:
+        return spring[15], spring[16], spring[17], ux, uy, uz
     gone = min(time, spring[10])
     moving = 1.0 if time < spring[10] else 0.0
-    k, d = spring[14] * spring[11], spring[14] * spring[12]
+    k, d = spring[11], spring[12]
     fx = -k * (q[root] + x - spring[4] - gone * spring[7]) - d * (ux - moving * spring[7])
     fy = -k * (q[root + 1] + y - spring[5] - gone * spring[8]) - d * (uy - moving * spring[8])
     fz = -k * (q[root + 2] + z - spring[6] - gone * spring[9]) - d * (uz - moving * spring[9])
@@ -219,7 +222,7 @@ def mean_force(s: System, r: Room, q: np.ndarray, v: np.ndarray, end_v: np.ndarr
     """Mean force, N, of a spring in a step of h s, and its point's mean velocity, m/s."""
     fx, fy, fz, ux, uy, uz = spring_force(s, r, q, v, spring, time)
     _, _, _, wx, wy, wz = spring_force(s, r, q, end_v, spring, time)
-    share = spring[14] * (spring[11] * h / 4 + spring[12] / 2)
+    share = spring[11] * h / 4 + spring[12] / 2 if spring[14] > 0 else 0.0
     return (fx - share * (wx - ux), fy - share * (wy - uy), fz - share * (wz - uz),
             (ux + wx) / 2, (uy + wy) / 2, (uz + wz) / 2)
 
@@ -227,13 +230,15 @@ def mean_force(s: System, r: Room, q: np.ndarray, v: np.ndarray, end_v: np.ndarr
 @compiled
 def weaken(s: System, r: Room, q: np.ndarray, v: np.ndarray, free: np.ndarray,
            springs: np.ndarray, time: float, h: float) -> bool:
-    """Scale springs that pull with more than they may down to that; whether any does."""
+    """Let springs that would pull with more than they may pull with that; whether any does."""
     some = False
     for k in range(len(springs)):
-        fx, fy, fz, _, _, _ = mean_force(s, r, q, v, free, springs[k], time, h)
+        spring = springs[k]
+        fx, fy, fz, _, _, _ = mean_force(s, r, q, v, free, spring, time, h)
         size = math.sqrt(fx * fx + fy * fy + fz * fz)
-        if size > springs[k, 13]:
-            springs[k, 14] *= springs[k, 13] / size
+        if size > spring[13]:
+            share = spring[13] / size
+            spring[14], spring[15], spring[16], spring[17] = 0.0, share * fx, share * fy, share * fz
             some = True
     return some
 
@@ -257,18 +262,42 @@ def warm_start(r: Room, m: int, known: np.ndarray, h: float) -> None:
 @compiled
 def enter_work(s: System, r: Room, v: np.ndarray, end_v: np.ndarray, h: float,
                loads: np.ndarray, springs: np.ndarray, since: float) -> None:
-    """Book the work, J, of loads (r.sums[0]) and hands (r.sums[1]) in a step of h s."""
+    """Book the work, J, of loads (r.sums[0]) and hands (r.sums[1]) in a step of h s, and their
+    impulses in r.given.
+    """
     middle, mean = r.states[0], r.vectors[0]
     for j in range(len(v)):
         mean[j] = (v[j] + end_v[j]) / 2
     pose(s.tree, middle, mean, r.work)
     for k in range(len(loads)):
         r.sums[0] += h * power(s, r, loads[k])
+        give_load(s, r, middle, loads[k], h)
     if len(springs):
         root_axes(s.tree, middle, r.work.axes)
     for k in range(len(springs)):
         fx, fy, fz, ux, uy, uz = mean_force(s, r, middle, v, end_v, springs[k], since + h / 2, h)
         r.sums[1] += h * (fx * ux + fy * uy + fz * uz)
+        i, x, y, z = spring_point(s, r, middle, int(springs[k, 0]), springs[k, 1:4])
+        root = s.tree[s.root_of[i]].q
+        give(r.given, s.doll_of[i], h, middle[root] + x, middle[root + 1] + y,
+             middle[root + 2] + z, fx, fy, fz)
+
+
+@compiled
+def give_load(s: System, r: Room, q: np.ndarray, load: np.ndarray, h: float) -> None:
+    """Enter what a load gives in h s into r.given."""
+    fx, fy, fz, nx, ny, nz = load[1], load[2], load[3], load[4], load[5], load[6]
+    i, x, y, z = spring_point(s, r, q, int(load[0]), load[7:10])
+    if load[10] > 0:
+        t, b = r.work.turns[i], s.tree[i].bind
+        ax, ay, az, aw = times(t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3])
+        fx, fy, fz = turned(ax, ay, az, aw, fx, fy, fz)
+        nx, ny, nz = turned(ax, ay, az, aw, nx, ny, nz)
+    root, doll = s.tree[s.root_of[i]].q, s.doll_of[i]
+    give(r.given, doll, h, q[root] + x, q[root + 1] + y, q[root + 2] + z, fx, fy, fz)
+    r.given[doll, 3] += h * nx
+    r.given[doll, 4] += h * ny
+    r.given[doll, 5] += h * nz
 
 
 @compiled

@@ -50,7 +50,7 @@ the record of its doll's root, ``doll_of`` (n,); ``damping`` (nv,) N m s; ``norm
 
 Room = collections.namedtuple(
     'Room', 'work own composite H contacts table at turn gaps later Y support W G p solver '
-    'kinds rows mu roll need label vectors states counts sums')
+    'kinds rows mu roll need label vectors states counts sums given before after')
 """Scratch of the rigid core."""
 
 STICKS = 1e5
@@ -63,7 +63,7 @@ def make_room(system: System, contacts: int) -> Room:
     """Room for a system with at most so many contacts at a time."""
     bones, nv = len(system.tree), len(system.up)
     nq = nv + int(system.tree['free'].sum())
-    geoms = len(system.geoms)
+    geoms, dolls = len(system.geoms), int(system.doll_of.max()) + 1
     rows = contacts * (5 if max(system.geoms['rolling'].max(initial=0.0),
                                 system.pairs['rolling'].max(initial=0.0)) > 0 else 3)
     gaps = int(system.geoms['count'].sum()) + 2 * len(system.bounds) + len(system.pairs)
@@ -79,9 +79,10 @@ def make_room(system: System, contacts: int) -> Room:
         W=np.zeros(rows * rows), G=np.zeros(rows * rows), p=np.zeros((5, rows)),
         solver=np.zeros((7, max(rows, 8))), kinds=np.zeros(contacts, np.int64),
         rows=np.zeros(contacts, np.int64), mu=np.zeros(contacts), roll=np.zeros(contacts),
-        need=np.zeros((2, contacts)), label=np.zeros(int(system.doll_of.max()) + 1, np.int64),
+        need=np.zeros((2, contacts)), label=np.zeros(dolls, np.int64),
         vectors=np.zeros((VECTORS, nv)), states=np.zeros((STATES, nq)),
-        counts=np.zeros(16, np.int64), sums=np.zeros(8))
+        counts=np.zeros(16, np.int64), sums=np.zeros(8), given=np.zeros((dolls, 7)),
+        before=np.zeros((dolls, 16)), after=np.zeros((dolls, 16)))
 
 
 def depth(system: System) -> int:
