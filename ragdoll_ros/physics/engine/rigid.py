@@ -39,6 +39,10 @@ CONTACTS_OF_GEOM = 12
 """Contacts for which there is room, for each part of a bone."""
 
 
+NO_HANDS = np.empty((0, 18))
+NO_LOADS = np.empty((0, 11))
+
+
 @dataclass
 class _Snapshot:
     """All that the next stretch depends on."""
@@ -183,11 +187,18 @@ class RigidEngine:
             accuracy: Accuracy) -> None:
         rows, sums = np.empty((len(self._masses), 13)), np.empty((len(self.scene.dolls), 20))
         kernels.advance(self._system, self._room, self._q, self._v, duration, _loads(wrenches),
-                        _hands(springs), accuracy.step, accuracy.flight_error,
+                        self._hands(springs), accuracy.step, accuracy.flight_error,
                         self._flies and not springs, self._longest, self._path, self._stages,
                         self._row, self._armed, self._known, self._masses, self._inertias,
                         self._doll_of, rows, sums)
         self._state, self._motion = State.of(rows), Motion.of(sums)
+
+    def _hands(self, springs: Springs) -> np.ndarray:
+        """Springs as a table (m, 18) for compiled code, the last four its own."""
+        if not springs:
+            return NO_HANDS
+        bones = self._system.tree['bone'].tolist()
+        return np.array([_hand(bones.index(spring.bone), spring) for spring in springs])
 
     def _meet(self, duration: float) -> None:
         """See that all geoms of two dolls that may meet within ``duration`` s are paired."""
@@ -281,6 +292,8 @@ class RigidEngine:
 
 def _loads(wrenches: Wrenches) -> np.ndarray:
     """Wrenches as a table (m, 11) for compiled code."""
+    if not wrenches:
+        return NO_LOADS
     rows = np.empty((len(wrenches), 11))
     for row, load in zip(rows, wrenches, strict=True):
         row[0], row[1:4], row[4:7], row[7:10], row[10] = (
@@ -288,13 +301,8 @@ def _loads(wrenches: Wrenches) -> np.ndarray:
     return rows
 
 
-def _hands(springs: Springs) -> np.ndarray:
-    """Springs as a table (m, 18) for compiled code, the last four its own."""
-    return np.array([_hand(spring) for spring in springs]).reshape(-1, 18)
-
-
-def _hand(spring: Spring) -> np.ndarray:
+def _hand(record: int, spring: Spring) -> np.ndarray:
     spring = spring.after(0.0)
     speed = (spring.target - spring.position) / spring.left if spring.left > 0 else np.zeros(3)
-    return np.concatenate([[spring.bone], spring.point, spring.position, speed, [
+    return np.concatenate([[record], spring.point, spring.position, speed, [
         spring.left, spring.stiffness, spring.damping, spring.most, 1.0, 0.0, 0.0, 0.0]])

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from .contact import TOUCHING, all_gaps, find_contacts
+from .contact import TOUCHING, find_contacts, look
 from .flight import (
     ALONG,
     EVENT,
@@ -62,8 +62,7 @@ def may_fly(s: System, r: Room, q: np.ndarray, v: np.ndarray, loads: np.ndarray,
     for i in range(r.counts[5]):
         if r.counts[11] and known[i].impulse[0] > 0:
             return False
-    pose(s.tree, q, v, r.work)
-    all_gaps(s, q, r, r.gaps, math.inf, r.gaps)
+    look(s, r, q, v, r.gaps, math.inf, r.gaps)
     m = find_contacts(s, q, r, r.gaps, TOUCHING)
     leaning = False
     for i in range(m):
@@ -73,9 +72,9 @@ def may_fly(s: System, r: Room, q: np.ndarray, v: np.ndarray, loads: np.ndarray,
             if c.normal[0] * v[c.a] < -STILL:
                 return False
             continue
-        apart = point_velocity(s, r, q, c.a, c.point, c.normal)
+        apart = point_velocity(r.work, c.a, q, s.tree[s.root_of[c.a]].q, c.point, c.normal)
         if c.b >= 0:
-            apart -= point_velocity(s, r, q, c.b, c.point, c.normal)
+            apart -= point_velocity(r.work, c.b, q, s.tree[s.root_of[c.b]].q, c.point, c.normal)
         if apart < APART:
             return False
     if leaning:
@@ -113,12 +112,12 @@ def fly(s: System, r: Room, q: np.ndarray, v: np.ndarray, left: float, loads: np
     if len(loads):
         q2, v2 = r.states[1], r.vectors[0]
         for place, weight in GAUSS:
-            along(s, path, times[ALONG] + place * gone, q2, v2)
+            along(s.tree, path, times[ALONG] + place * gone, q2, v2)
             pose(s.tree, q2, v2, r.work)
             for k in range(len(loads)):
-                r.sums[0] += weight * gone * power(s, r, loads[k])
+                r.sums[0] += weight * gone * power(s.tree, r.work, loads[k])
     times[ALONG] += gone
-    along(s, path, times[ALONG], q, v)
+    along(s.tree, path, times[ALONG], q, v)
     if times[ALONG] < end - 1e-15:
         return gone, False
     times[VALID] = 0.0
@@ -145,8 +144,7 @@ def step_or_touch(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, lo
     tries, m = 0, 0
     while True:
         m = contact_step(s, r, q, v, late, loads, springs, since, known, end_q, end_v)
-        pose(s.tree, end_q, end_v, r.work)
-        all_gaps(s, end_q, r, r.gaps, late, r.later)
+        look(s, r, end_q, end_v, r.gaps, late, r.later)
         share = first_touch(s, r, late)
         if share > 1 or not seek or tries >= TRIES or late < 1e-9:
             break
@@ -228,12 +226,10 @@ def advance(s: System, r: Room, q: np.ndarray, v: np.ndarray, duration: float,
         if path.times[VALID] > 0.0:
             gone, touched = fly(s, r, q, v, left, loads, path, armed)
             if touched:
-                pose(s.tree, q, v, r.work)
-                all_gaps(s, q, r, r.gaps, math.inf, r.gaps)
+                look(s, r, q, v, r.gaps, math.inf, r.gaps)
         else:
             if not flies or events >= MOST_EVENTS:
-                pose(s.tree, q, v, r.work)
-                all_gaps(s, q, r, r.gaps, math.inf, r.gaps)
+                look(s, r, q, v, r.gaps, math.inf, r.gaps)
             h = left / math.ceil(left / step - 1e-9)
             gone, touched = step_or_touch(s, r, q, v, h, loads, springs, time, known,
                                           events < MOST_EVENTS)
@@ -250,5 +246,4 @@ def advance(s: System, r: Room, q: np.ndarray, v: np.ndarray, duration: float,
 @entry(SYSTEM, ROOM, ROW, ROW, ROW)
 def gaps_at(s: System, r: Room, q: np.ndarray, v: np.ndarray, out: np.ndarray) -> None:
     """All gaps at a pose; see contact.py."""
-    pose(s.tree, q, v, r.work)
-    all_gaps(s, q, r, out, math.inf, out)
+    look(s, r, q, v, out, math.inf, out)

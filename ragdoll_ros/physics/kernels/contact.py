@@ -11,7 +11,7 @@ import numpy as np
 
 from .collision import collide, separation
 from .machine import compiled
-from .kernels import cross, times, to_matrix, turned
+from .kernels import Work, cross, pose, times, to_matrix, turned
 from .system import Room, System
 
 TOUCHING = 1e-6
@@ -28,18 +28,19 @@ SEGMENT = 0.5
 
 
 @compiled
-def place_geoms(s: System, q: np.ndarray, r: Room) -> None:
+def place_geoms(tree: np.ndarray, root_of: np.ndarray, geoms: np.ndarray, work: Work,
+                q: np.ndarray, centres: np.ndarray, turns: np.ndarray) -> None:
     """Centres (g, 3) m and rotation matrices (g, 3, 3) of all geoms; work is posed at q."""
-    for k in range(len(s.geoms)):
-        geom = s.geoms[k]
+    for k in range(len(geoms)):
+        geom = geoms[k]
         i = geom.bone
-        t, c, root = r.work.turns[i], r.work.centres[i], s.tree[s.root_of[i]].q
+        t, c, root = work.turns[i], work.centres[i], tree[root_of[i]].q
         x, y, z = turned(t[0], t[1], t[2], t[3], geom.offset[0], geom.offset[1], geom.offset[2])
-        at = r.at[k]
+        at = centres[k]
         at[0], at[1], at[2] = q[root] + c[0] + x, q[root + 1] + c[1] + y, q[root + 2] + c[2] + z
         x, y, z, w = times(t[0], t[1], t[2], t[3], geom.turn[0], geom.turn[1], geom.turn[2],
                            geom.turn[3])
-        to_matrix(x, y, z, w, r.turn[k])
+        to_matrix(x, y, z, w, turns[k])
 
 
 @compiled
@@ -115,7 +116,7 @@ def ground_point(geom: np.record, k: int, at: np.ndarray, turn: np.ndarray, n: n
 def all_gaps(s: System, q: np.ndarray, r: Room, before: np.ndarray, h: float,
              out: np.ndarray) -> None:
     """All gaps; work is posed at q. ``before``: those h s earlier; h infinite: unknown."""
-    place_geoms(s, q, r)
+    place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
     n = 0
     for k in range(len(s.geoms)):
         if s.offset[0] > -math.inf:
@@ -127,35 +128,35 @@ def all_gaps(s: System, q: np.ndarray, r: Room, before: np.ndarray, h: float,
         n += 2
     if len(s.pairs):
         for i in range(len(s.tree)):
-            x, y, z, w = bone_velocity(r, i)
+            x, y, z, w = bone_velocity(r.work, i)
             r.own[i, 0], r.own[i, 1] = math.sqrt(x * x + y * y + z * z), w
     for k in range(len(s.pairs)):
         a, b = s.geoms[s.pairs[k].a], s.geoms[s.pairs[k].b]
         least = before[n + k] - 2 * h * (
             r.own[a.bone, 0] + r.own[b.bone, 0] + r.own[a.bone, 1] * a.reach
             + r.own[b.bone, 1] * b.reach)
-        out[n + k] = least if least > NEAR else pair_gap(s, k, r)
+        out[n + k] = least if least > NEAR else pair_gap(
+            a, b, r.at[s.pairs[k].a], r.turn[s.pairs[k].a], r.at[s.pairs[k].b],
+            r.turn[s.pairs[k].b])
 
 
 @compiled
-def bone_velocity(r: Room, i: int) -> tuple[float, float, float, float]:
+def bone_velocity(work: Work, i: int) -> tuple[float, float, float, float]:
     """Velocity (3) m/s of a bone's centre and its angular speed, rad/s; work is posed."""
-    m, c = r.work.moves[i], r.work.centres[i]
+    m, c = work.moves[i], work.centres[i]
     x, y, z = cross(m[0], m[1], m[2], c[0], c[1], c[2])
     return (m[3] + x, m[4] + y, m[5] + z, math.sqrt(m[0] ** 2 + m[1] ** 2 + m[2] ** 2))
 
 
 @compiled
-def pair_gap(s: System, k: int, r: Room) -> float:
-    """Separation of a pair, m; of what is farther apart than FAR, a bound below it."""
-    pair = s.pairs[k]
-    a, b = s.geoms[pair.a], s.geoms[pair.b]
-    pa, pb = r.at[pair.a], r.at[pair.b]
+def pair_gap(a: np.record, b: np.record, pa: np.ndarray, ra: np.ndarray, pb: np.ndarray,
+             rb: np.ndarray) -> float:
+    """Separation of two geoms, m; of what is farther apart than NEAR, a bound below it."""
     far = math.sqrt((pa[0] - pb[0]) ** 2 + (pa[1] - pb[1]) ** 2 + (pa[2] - pb[2]) ** 2) - (
         a.radius + b.radius)
     if far > NEAR:
         return far
-    return separation(a.kind, a.size, pa, r.turn[pair.a], b.kind, b.size, pb, r.turn[pair.b])
+    return separation(a.kind, a.size, pa, ra, b.kind, b.size, pb, rb)
 
 
 @compiled
@@ -345,10 +346,10 @@ def jacobian(s: System, q: np.ndarray, r: Room, c: np.record, index: int, v: np.
         list_[n] = j
         n += 1
         if i == j:
-            add_column(s, q, r, c, c.a, 1.0, j)
+            add_column(r.work.axes[j], q, s.tree[s.root_of[c.a]].q, c, 1.0, Y, j)
             i = s.up[i]
         if k == j:
-            add_column(s, q, r, c, c.b, -1.0, j)
+            add_column(r.work.axes[j], q, s.tree[s.root_of[c.b]].q, c, -1.0, Y, j)
             k = s.up[k]
         for e in range(c.kind):
             b[row + e] += Y[row + e, j] * free[j]
@@ -357,32 +358,41 @@ def jacobian(s: System, q: np.ndarray, r: Room, c: np.record, index: int, v: np.
 
 
 @compiled
-def add_column(s: System, q: np.ndarray, r: Room, c: np.record, bone: int, sign: float,
-               j: int) -> None:
-    """Add what velocity j of a bone does to a contact's rows."""
-    axis, at, row = r.work.axes[j], s.tree[s.root_of[bone]].q, c.row
+def add_column(axis: np.ndarray, q: np.ndarray, at: int, c: np.record, sign: float,
+               Y: np.ndarray, j: int) -> None:
+    """Add what a velocity of a bone, whose root stands in q at ``at``, does to a contact's rows."""
+    row = c.row
     n, t, w = c.normal, c.across[0], c.across[1]
     x, y, z = cross(axis[0], axis[1], axis[2], c.point[0] - q[at], c.point[1] - q[at + 1],
                     c.point[2] - q[at + 2])
-    r.Y[row, j] += sign * (n[0] * (axis[3] + x) + n[1] * (axis[4] + y) + n[2] * (axis[5] + z))
+    Y[row, j] += sign * (n[0] * (axis[3] + x) + n[1] * (axis[4] + y) + n[2] * (axis[5] + z))
     x, y, z = cross(axis[0], axis[1], axis[2], c.arm[0] - q[at], c.arm[1] - q[at + 1],
                     c.arm[2] - q[at + 2])
     x, y, z = axis[3] + x, axis[4] + y, axis[5] + z
-    r.Y[row + 1, j] += sign * (t[0] * x + t[1] * y + t[2] * z)
-    r.Y[row + 2, j] += sign * (w[0] * x + w[1] * y + w[2] * z)
+    Y[row + 1, j] += sign * (t[0] * x + t[1] * y + t[2] * z)
+    Y[row + 2, j] += sign * (w[0] * x + w[1] * y + w[2] * z)
     if c.kind == 5:
-        r.Y[row + 3, j] += sign * (t[0] * axis[0] + t[1] * axis[1] + t[2] * axis[2])
-        r.Y[row + 4, j] += sign * (w[0] * axis[0] + w[1] * axis[1] + w[2] * axis[2])
+        Y[row + 3, j] += sign * (t[0] * axis[0] + t[1] * axis[1] + t[2] * axis[2])
+        Y[row + 4, j] += sign * (w[0] * axis[0] + w[1] * axis[1] + w[2] * axis[2])
 
 
 @compiled
-def through_factor(s: System, r: Room, c: np.record, index: int) -> None:
-    """Put L^-T J^T in place of a contact's rows."""
+def through_factor(up: np.ndarray, H: np.ndarray, Y: np.ndarray, seen: np.ndarray,
+                   c: np.record) -> None:
+    """Put L^-T J^T in place of a contact's rows; ``seen``: the velocities that they see."""
     for e in range(c.row, c.row + c.kind):
         for n in range(c.support):
-            i = r.support[index, n]
-            r.Y[e, i] /= r.H[i, i]
-            f, j = r.Y[e, i], s.up[i]
+            i = seen[n]
+            Y[e, i] /= H[i, i]
+            f, j = Y[e, i], up[i]
             while j >= 0:
-                r.Y[e, j] -= r.H[i, j] * f
-                j = s.up[j]
+                Y[e, j] -= H[i, j] * f
+                j = up[j]
+
+
+@compiled
+def look(s: System, r: Room, q: np.ndarray, v: np.ndarray, before: np.ndarray, h: float,
+         out: np.ndarray) -> None:
+    """Pose all at q and v, and enter all gaps; see all_gaps()."""
+    pose(s.tree, q, v, r.work)
+    all_gaps(s, q, r, before, h, out)

@@ -11,10 +11,10 @@ import math
 import numba
 import numpy as np
 
-from .contact import FAR, NEAR, TOUCHING, all_gaps, bone_velocity, ground_point
+from .contact import FAR, NEAR, TOUCHING, bone_velocity, ground_point, look
 from .collision import collide
 from .dop853 import CONTINUED, STAGES
-from .kernels import _error, _sum, cross, normalize, pose, rates
+from .kernels import Work, _error, _sum, cross, normalize, pose, rates
 from .machine import compiled
 from .system import Room, System
 
@@ -52,7 +52,7 @@ STEADY = 1.5
 
 
 @compiled
-def path_step(s: System, r: Room, loads: np.ndarray, q: np.ndarray, v: np.ndarray, h: float,
+def path_step(tree: np.ndarray, gravity: np.ndarray, work: Work, loads: np.ndarray, q: np.ndarray, v: np.ndarray, h: float,
               path: Path, k: np.ndarray, y: np.ndarray) -> float:
     """Enter the step of h s from q and v into ``path``; its error. k (16, nq + nv), y: room."""
     nq, size, dense = len(q), len(q) + len(v), path.dense
@@ -61,21 +61,21 @@ def path_step(s: System, r: Room, loads: np.ndarray, q: np.ndarray, v: np.ndarra
         start[j] = q[j]
     for j in range(nq, size):
         start[j] = v[j - nq]
-    normalize(s.tree, start[:nq])
+    normalize(tree, start[:nq])
     if path.times[KNOWN] > 0:
         for j in range(size):
             k[0, j] = path.ends[0, j]
     else:
-        rates(s.tree, s.gravity, loads, start[:nq], start[nq:], r.work, k[0])
+        rates(tree, gravity, loads, start[:nq], start[nq:], work, k[0])
     for stage in range(1, 16):
         _sum(STAGES[stage], stage, k, h, y)
         for j in range(size):
             y[j] += start[j]
-        normalize(s.tree, y[:nq])
+        normalize(tree, y[:nq])
         if stage == 12:
             for j in range(size):
                 dense[1, j] = y[j]
-        rates(s.tree, s.gravity, loads, y[:nq], y[nq:], r.work, k[stage])
+        rates(tree, gravity, loads, y[:nq], y[nq:], work, k[stage])
     for j in range(size):
         dense[1, j] -= start[j]
         dense[2, j] = h * k[0, j] - dense[1, j]
@@ -87,7 +87,7 @@ def path_step(s: System, r: Room, loads: np.ndarray, q: np.ndarray, v: np.ndarra
 
 
 @compiled
-def along(s: System, path: Path, time: float, q: np.ndarray, v: np.ndarray) -> None:
+def along(tree: np.ndarray, path: Path, time: float, q: np.ndarray, v: np.ndarray) -> None:
     """Coordinates and velocities at an instant of the path, s from its start."""
     nq, dense = len(q), path.dense
     share = time / path.times[LENGTH]
@@ -100,7 +100,7 @@ def along(s: System, path: Path, time: float, q: np.ndarray, v: np.ndarray) -> N
             q[j] = y
         else:
             v[j - nq] = y
-    normalize(s.tree, q)
+    normalize(tree, q)
 
 
 @compiled
@@ -120,7 +120,7 @@ def begin_path(s: System, r: Room, loads: np.ndarray, q: np.ndarray, v: np.ndarr
         times[TRY] = FIRST_TURN / math.sqrt(fast)
     h, before = min(longest, times[TRY]), math.inf
     for _ in range(30):
-        error = path_step(s, r, loads, q, v, h, path, k, y)
+        error = path_step(s.tree, s.gravity, r.work, loads, q, v, h, path, k, y)
         r.counts[0] += 1
         ratio = error / tolerance
         factor = SAFETY * ratio ** -0.125 if ratio > 0 else LONGER
@@ -137,10 +137,12 @@ def begin_path(s: System, r: Room, loads: np.ndarray, q: np.ndarray, v: np.ndarr
 
 
 @compiled
-def point_velocity(s: System, r: Room, q: np.ndarray, i: int, point: np.ndarray,
+def point_velocity(work: Work, i: int, q: np.ndarray, root: int, point: np.ndarray,
                    n: np.ndarray) -> float:
-    """Velocity of a bone's point (3,) m in the world along n; work is posed."""
-    m, root = r.work.moves[i], s.tree[s.root_of[i]].q
+    """Velocity of a bone's point (3,) m in the world along n; ``root``: where in q its doll's root
+    stands. Work is posed.
+    """
+    m = work.moves[i]
     x, y, z = cross(m[0], m[1], m[2], point[0] - q[root], point[1] - q[root + 1],
                     point[2] - q[root + 2])
     return n[0] * (m[3] + x) + n[1] * (m[4] + y) + n[2] * (m[5] + z)
@@ -150,20 +152,20 @@ def point_velocity(s: System, r: Room, q: np.ndarray, i: int, point: np.ndarray,
 def accelerations_of(s: System, r: Room, q: np.ndarray, v: np.ndarray, path: Path) -> float:
     """Acceleration, m/s^2, that no point exceeds on the path, as its ends tell; q, v: room."""
     bones, h = len(s.tree), path.times[LENGTH]
-    along(s, path, 0.0, q, v)
+    along(s.tree, path, 0.0, q, v)
     pose(s.tree, q, v, r.work)
     for i in range(bones):
-        x, y, z, w = bone_velocity(r, i)
+        x, y, z, w = bone_velocity(r.work, i)
         r.own[i, 0], r.own[i, 1], r.own[i, 2], r.own[i, 3] = x, y, z, w
         r.own[i, 4] = 0.0
-    along(s, path, h, q, v)
+    along(s.tree, path, h, q, v)
     pose(s.tree, q, v, r.work)
     for k in range(len(s.geoms)):
         i = s.geoms[k].bone
         r.own[i, 4] = max(r.own[i, 4], s.geoms[k].reach)
     most = 0.0
     for i in range(bones):
-        x, y, z, w = bone_velocity(r, i)
+        x, y, z, w = bone_velocity(r.work, i)
         own, reach = r.own[i], r.own[i, 4]
         size = math.sqrt((x - own[0]) ** 2 + (y - own[1]) ** 2 + (z - own[2]) ** 2) / h
         size += abs(w - own[3]) / h * reach + 2 * max(w, own[3]) ** 2 * reach
@@ -198,13 +200,14 @@ def time_free(s: System, r: Room, q: np.ndarray, v: np.ndarray, gaps: np.ndarray
     for k in range(len(s.geoms)):
         geom = s.geoms[k]
         if s.offset[0] > -math.inf:
-            x, y, z, w = bone_velocity(r, geom.bone)
+            x, y, z, w = bone_velocity(r.work, geom.bone)
             falling = -(x * s.normal[0] + y * s.normal[1] + z * s.normal[2])
             for j in range(geom.count):
                 gap, closing = due(gaps, armed, n + j), falling + w * geom.reach
                 if gap < FAR:
                     ground_point(geom, j, r.at[k], r.turn[k], s.normal, point)
-                    closing = -point_velocity(s, r, q, geom.bone, point, s.normal)
+                    closing = -point_velocity(r.work, geom.bone, q, s.tree[s.root_of[geom.bone]].q,
+                                              point, s.normal)
                 least = min(least, time_to_close(gap, closing, acceleration))
         n += geom.count
     for k in range(len(s.bounds)):
@@ -236,10 +239,10 @@ def pair_closing(s: System, r: Room, q: np.ndarray, k: int, gap: float) -> float
                 if r.table[j, 6] < r.table[best, 6]:
                     best = j
             point, n = r.table[best, :3], r.table[best, 3:6]
-            return (point_velocity(s, r, q, b.bone, point, n)
-                    - point_velocity(s, r, q, a.bone, point, n))
-    ax, ay, az, aw = bone_velocity(r, a.bone)
-    bx, by, bz, bw = bone_velocity(r, b.bone)
+            return (point_velocity(r.work, b.bone, q, s.tree[s.root_of[b.bone]].q, point, n)
+                    - point_velocity(r.work, a.bone, q, s.tree[s.root_of[a.bone]].q, point, n))
+    ax, ay, az, aw = bone_velocity(r.work, a.bone)
+    bx, by, bz, bw = bone_velocity(r.work, b.bone)
     return (math.sqrt((ax - bx) ** 2 + (ay - by) ** 2 + (az - bz) ** 2) + aw * a.reach
             + bw * b.reach)
 
@@ -260,9 +263,8 @@ def find_event(s: System, r: Room, path: Path, armed: np.ndarray, q: np.ndarray,
         armed[j] = 1.0 if r.gaps[j] > TOUCHING else 0.0
     time = before = 0.0
     for _ in range(SAMPLES):
-        along(s, path, time, q, v)
-        pose(s.tree, q, v, r.work)
-        all_gaps(s, q, r, gaps, math.inf, gaps)
+        along(s.tree, path, time, q, v)
+        look(s, r, q, v, gaps, math.inf, gaps)
         least = closest(gaps, armed)
         if least < -MET:
             path.times[EVENT] = go_back(s, r, path, armed, before, time, q, v)
@@ -299,29 +301,24 @@ def closest(gaps: np.ndarray, armed: np.ndarray) -> float:
 def go_back(s: System, r: Room, path: Path, armed: np.ndarray, early: float, late: float,
             q: np.ndarray, v: np.ndarray) -> float:
     """Instant, s, between two at which the least gap is gone."""
-    along(s, path, early, q, v)
-    pose(s.tree, q, v, r.work)
-    all_gaps(s, q, r, r.later, math.inf, r.later)
-    above = closest(r.later, armed)
-    along(s, path, late, q, v)
-    pose(s.tree, q, v, r.work)
-    all_gaps(s, q, r, r.later, math.inf, r.later)
-    below = closest(r.later, armed)
-    if above <= 0:
-        return early
-    time = late
-    for _ in range(60):
-        time = (early * below - late * above) / (below - above)
-        along(s, path, time, q, v)
-        pose(s.tree, q, v, r.work)
-        all_gaps(s, q, r, r.later, math.inf, r.later)
+    above = below = 0.0
+    time = early
+    for turn in range(62):
+        along(s.tree, path, time, q, v)
+        look(s, r, q, v, r.later, math.inf, r.later)
         gap = closest(r.later, armed)
-        if abs(gap) <= MET or late - early < 1e-13:
+        if turn == 0:
+            if gap <= 0:
+                break
+            above, time = gap, late
+            continue
+        if turn > 1 and (abs(gap) <= MET or late - early < 1e-13):
             break
         if gap > 0:
             early, above = time, gap
             below /= 2
         else:
             late, below = time, gap
-            above /= 2
+            above = above / 2 if turn > 1 else above
+        time = (early * below - late * above) / (below - above)
     return time

@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
-from .contact import arms, find_contacts, place_geoms
+from .contact import find_contacts, place_geoms
 from .machine import compiled
-from .kernels import cross, pose, times, turned
+from .kernels import Work, cross, pose, times, turned
 from .mass import (
     bias_forces,
     crba,
@@ -43,7 +43,7 @@ SLOW_TURN = 0.1
 def impact(s: System, r: Room, q: np.ndarray, v: np.ndarray) -> int:
     """Change v by the impulses of all that touches at q by r.gaps; how many contacts there are."""
     pose(s.tree, q, v, r.work)
-    place_geoms(s, q, r)
+    place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
     m = find_contacts(s, q, r, r.gaps, 1e-6)
     if m == 0:
         return 0
@@ -82,9 +82,9 @@ def contact_step(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loa
     for turn in range(2 if len(springs) else 1):
         crba(s.tree, s.up, s.bone_of, r.work, r.own, r.composite, r.H)
         for j in range(len(v)):
-            r.H[j, j] += h * lag(s, r, j, h) * s.damping[j]
+            r.H[j, j] += h * lag(h * s.damping[j] / r.H[j, j]) * s.damping[j]
         for k in range(len(springs)):
-            stiffen(s, r, middle, springs[k], h)
+            stiffen(s.tree, s.up, s.last, r.work, r.H, springs[k], h)
         factor(r.H, s.up)
         for stage in range(2):
             if stage or turn:
@@ -94,7 +94,8 @@ def contact_step(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loa
             bias_forces(s.tree, s.gravity, loads, middle, smooth if stage else v, r.work, r.own,
                         change)
             for k in range(len(springs)):
-                pull(s, r, middle, v, springs[k], since + h / 2, change)
+                pull(s.tree, s.up, s.last, r.work, middle, root_q(s, springs[k]), v, springs[k],
+                     since + h / 2, change)
             for j in range(len(v)):
                 change[j] = h * (change[j] - s.damping[j] * v[j])
             solve_upper(r.H, s.up, change)
@@ -103,7 +104,7 @@ def contact_step(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loa
             free[j] = v[j] + change[j]
         if turn or not weaken(s, r, middle, v, free, springs, since + h / 2, h):
             break
-    place_geoms(s, middle, r)
+    place_geoms(s.tree, s.root_of, s.geoms, r.work, middle, r.at, r.turn)
     m = find_contacts(s, middle, r, r.gaps, SLOW * h)
     if m:
         warm_start(r, m, known, h)
@@ -135,61 +136,65 @@ def lifted(s: System, r: Room, shift: np.ndarray) -> float:
 
 
 @compiled
-def lag(s: System, r: Room, j: int, h: float) -> float:
+def lag(fast: float) -> float:
     """Share of a step's end at which damping is taken: the middle, later where it is stiff
     (Liniger and Willoughby, SIAM J. Numer. Anal. 7, 1970).
     """
-    fast = h * s.damping[j] / r.H[j, j]
     return max(0.5, 1 - 1 / fast) if fast > 0 else 0.5
 
 
 @compiled
-def spring_point(s: System, r: Room, q: np.ndarray, bone: int, point: np.ndarray,
-                 ) -> tuple[int, float, float, float]:
-    """Record of a bone of the scene, and where a point of it is from its root, m."""
-    for i in range(len(s.tree)):
-        if s.tree[i].bone == bone:
-            t, b, c = r.work.turns[i], s.tree[i].bind, r.work.centres[i]
-            x, y, z, w = times(t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3])
-            x, y, z = turned(x, y, z, w, point[0], point[1], point[2])
-            return i, c[0] + x, c[1] + y, c[2] + z
-    return 0, 0.0, 0.0, 0.0
+def spring_point(bone: np.record, work: Work, i: int,
+                 point: np.ndarray) -> tuple[float, float, float]:
+    """Where a point of bone i, along its axes from its centre, is from its root, m."""
+    t, b, c = work.turns[i], bone.bind, work.centres[i]
+    x, y, z, w = times(t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3])
+    x, y, z = turned(x, y, z, w, point[0], point[1], point[2])
+    return c[0] + x, c[1] + y, c[2] + z
 
 
 @compiled
-def stiffen(s: System, r: Room, q: np.ndarray, spring: np.ndarray, h: float) -> None:
+def stiffen(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, H: np.ndarray,
+            spring: np.ndarray, h: float) -> None:
     """Add to H what a spring's end resists: h (k h / 4 + c / 2) J^T J. A bone's velocities are of
     one branch, so that H keeps its pattern.
     """
-    i, x, y, z = spring_point(s, r, q, int(spring[0]), spring[1:4])
+    i = int(spring[0])
+    x, y, z = spring_point(tree[i], work, i, spring[1:4])
     share = h * (spring[11] * h / 4 + spring[12] / 2) if spring[14] > 0 else 0.0
-    a = s.last[i]
+    a = last[i]
     while a >= 0:
-        axis = r.work.axes[a]
+        axis = work.axes[a]
         ux, uy, uz = cross(axis[0], axis[1], axis[2], x, y, z)
         ux, uy, uz = axis[3] + ux, axis[4] + uy, axis[5] + uz
         b = a
         while b >= 0:
-            axis = r.work.axes[b]
+            axis = work.axes[b]
             wx, wy, wz = cross(axis[0], axis[1], axis[2], x, y, z)
-            r.H[a, b] += share * (ux * (axis[3] + wx) + uy * (axis[4] + wy) + uz * (axis[5] + wz))
-            b = s.up[b]
-        a = s.up[a]
+            H[a, b] += share * (ux * (axis[3] + wx) + uy * (axis[4] + wy) + uz * (axis[5] + wz))
+            b = up[b]
+        a = up[a]
 
 
 @compiled
-def spring_force(s: System, r: Room, q: np.ndarray, v: np.ndarray, spring: np.ndarray,
-                 time: float) -> tuple[float, float, float, float, float, float]:
+def root_q(s: System, spring: np.ndarray) -> int:
+    """Where in q the root stands of the doll that a spring pulls."""
+    return s.tree[s.root_of[int(spring[0])]].q
+
+
+@compiled
+def spring_force(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, q: np.ndarray,
+                 root: int, v: np.ndarray, spring: np.ndarray, time: float) -> tuple[float, float, float, float, float, float]:
     """Force, N, of a hand's spring on its point and the point's velocity, m/s, at q and v."""
-    i, x, y, z = spring_point(s, r, q, int(spring[0]), spring[1:4])
-    root = s.tree[s.root_of[i]].q
+    i = int(spring[0])
+    x, y, z = spring_point(tree[i], work, i, spring[1:4])
     ux = uy = uz = 0.0
-    j = s.last[i]
+    j = last[i]
     while j >= 0:
-        axis = r.work.axes[j]
+        axis = work.axes[j]
         a, b, c = cross(axis[0], axis[1], axis[2], x, y, z)
         ux, uy, uz = ux + (axis[3] + a) * v[j], uy + (axis[4] + b) * v[j], uz + (axis[5] + c) * v[j]
-        j = s.up[j]
+        j = up[j]
     if spring[14] == 0.0:
         return spring[15], spring[16], spring[17], ux, uy, uz
     gone = min(time, spring[10])
@@ -202,26 +207,27 @@ def spring_force(s: System, r: Room, q: np.ndarray, v: np.ndarray, spring: np.nd
 
 
 @compiled
-def pull(s: System, r: Room, q: np.ndarray, v: np.ndarray, spring: np.ndarray, time: float,
-         out: np.ndarray) -> None:
+def pull(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, q: np.ndarray,
+         root: int, v: np.ndarray, spring: np.ndarray, time: float, out: np.ndarray) -> None:
     """Add a spring's generalised forces to ``out``."""
-    fx, fy, fz, _, _, _ = spring_force(s, r, q, v, spring, time)
-    i, x, y, z = spring_point(s, r, q, int(spring[0]), spring[1:4])
-    j = s.last[i]
+    fx, fy, fz, _, _, _ = spring_force(tree, up, last, work, q, root, v, spring, time)
+    i = int(spring[0])
+    x, y, z = spring_point(tree[i], work, i, spring[1:4])
+    j = last[i]
     while j >= 0:
-        axis = r.work.axes[j]
+        axis = work.axes[j]
         a, b, c = cross(axis[0], axis[1], axis[2], x, y, z)
         out[j] += fx * (axis[3] + a) + fy * (axis[4] + b) + fz * (axis[5] + c)
-        j = s.up[j]
+        j = up[j]
 
 
 @compiled
-def mean_force(s: System, r: Room, q: np.ndarray, v: np.ndarray, end_v: np.ndarray,
-               spring: np.ndarray, time: float,
+def mean_force(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, q: np.ndarray,
+               root: int, v: np.ndarray, end_v: np.ndarray, spring: np.ndarray, time: float,
                h: float) -> tuple[float, float, float, float, float, float]:
     """Mean force, N, of a spring in a step of h s, and its point's mean velocity, m/s."""
-    fx, fy, fz, ux, uy, uz = spring_force(s, r, q, v, spring, time)
-    _, _, _, wx, wy, wz = spring_force(s, r, q, end_v, spring, time)
+    fx, fy, fz, ux, uy, uz = spring_force(tree, up, last, work, q, root, v, spring, time)
+    _, _, _, wx, wy, wz = spring_force(tree, up, last, work, q, root, end_v, spring, time)
     share = spring[11] * h / 4 + spring[12] / 2 if spring[14] > 0 else 0.0
     return (fx - share * (wx - ux), fy - share * (wy - uy), fz - share * (wz - uz),
             (ux + wx) / 2, (uy + wy) / 2, (uz + wz) / 2)
@@ -234,7 +240,8 @@ def weaken(s: System, r: Room, q: np.ndarray, v: np.ndarray, free: np.ndarray,
     some = False
     for k in range(len(springs)):
         spring = springs[k]
-        fx, fy, fz, _, _, _ = mean_force(s, r, q, v, free, spring, time, h)
+        fx, fy, fz, _, _, _ = mean_force(s.tree, s.up, s.last, r.work, q, root_q(s, spring), v,
+                                            free, spring, time, h)
         size = math.sqrt(fx * fx + fy * fy + fz * fz)
         if size > spring[13]:
             share = spring[13] / size
@@ -270,49 +277,65 @@ def enter_work(s: System, r: Room, v: np.ndarray, end_v: np.ndarray, h: float,
         mean[j] = (v[j] + end_v[j]) / 2
     pose(s.tree, middle, mean, r.work)
     for k in range(len(loads)):
-        r.sums[0] += h * power(s, r, loads[k])
-        give_load(s, r, middle, loads[k], h)
+        r.sums[0] += h * power(s.tree, r.work, loads[k])
+        give_load(s.tree, s.root_of, s.doll_of, r.work, r.given, middle, loads[k], h)
     if len(springs):
         root_axes(s.tree, middle, r.work.axes)
     for k in range(len(springs)):
-        fx, fy, fz, ux, uy, uz = mean_force(s, r, middle, v, end_v, springs[k], since + h / 2, h)
+        fx, fy, fz, ux, uy, uz = mean_force(
+            s.tree, s.up, s.last, r.work, middle, root_q(s, springs[k]), v, end_v, springs[k],
+            since + h / 2, h)
         r.sums[1] += h * (fx * ux + fy * uy + fz * uz)
-        i, x, y, z = spring_point(s, r, middle, int(springs[k, 0]), springs[k, 1:4])
+        i = int(springs[k, 0])
+        x, y, z = spring_point(s.tree[i], r.work, i, springs[k, 1:4])
         root = s.tree[s.root_of[i]].q
         give(r.given, s.doll_of[i], h, middle[root] + x, middle[root + 1] + y,
              middle[root + 2] + z, fx, fy, fz)
 
 
 @compiled
-def give_load(s: System, r: Room, q: np.ndarray, load: np.ndarray, h: float) -> None:
-    """Enter what a load gives in h s into r.given."""
-    fx, fy, fz, nx, ny, nz = load[1], load[2], load[3], load[4], load[5], load[6]
-    i, x, y, z = spring_point(s, r, q, int(load[0]), load[7:10])
-    if load[10] > 0:
-        t, b = r.work.turns[i], s.tree[i].bind
-        ax, ay, az, aw = times(t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3])
-        fx, fy, fz = turned(ax, ay, az, aw, fx, fy, fz)
-        nx, ny, nz = turned(ax, ay, az, aw, nx, ny, nz)
-    root, doll = s.tree[s.root_of[i]].q, s.doll_of[i]
-    give(r.given, doll, h, q[root] + x, q[root + 1] + y, q[root + 2] + z, fx, fy, fz)
-    r.given[doll, 3] += h * nx
-    r.given[doll, 4] += h * ny
-    r.given[doll, 5] += h * nz
+def record_of(tree: np.ndarray, bone: int) -> int:
+    """Record of a bone of the scene."""
+    for i in range(len(tree)):
+        if tree[i].bone == bone:
+            return i
+    return 0
 
 
 @compiled
-def power(s: System, r: Room, load: np.ndarray) -> float:
+def turned_load(bone: np.record, work: Work, i: int,
+                load: np.ndarray) -> tuple[float, float, float, float, float, float]:
+    """Force, N, and torque, N m, of a load on bone i along the world's axes."""
+    if load[10] == 0:
+        return load[1], load[2], load[3], load[4], load[5], load[6]
+    t, b = work.turns[i], bone.bind
+    x, y, z, w = times(t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3])
+    fx, fy, fz = turned(x, y, z, w, load[1], load[2], load[3])
+    nx, ny, nz = turned(x, y, z, w, load[4], load[5], load[6])
+    return fx, fy, fz, nx, ny, nz
+
+
+@compiled
+def give_load(tree: np.ndarray, root_of: np.ndarray, doll_of: np.ndarray, work: Work,
+              given: np.ndarray, q: np.ndarray, load: np.ndarray, h: float) -> None:
+    """Enter what a load gives in h s."""
+    i = record_of(tree, int(load[0]))
+    x, y, z = spring_point(tree[i], work, i, load[7:10])
+    fx, fy, fz, nx, ny, nz = turned_load(tree[i], work, i, load)
+    root, doll = tree[root_of[i]].q, doll_of[i]
+    give(given, doll, h, q[root] + x, q[root + 1] + y, q[root + 2] + z, fx, fy, fz)
+    given[doll, 3] += h * nx
+    given[doll, 4] += h * ny
+    given[doll, 5] += h * nz
+
+
+@compiled
+def power(tree: np.ndarray, work: Work, load: np.ndarray) -> float:
     """Power, W, of a load on what moves as work says."""
-    for i in range(len(s.tree)):
-        if s.tree[i].bone == load[0]:
-            t, b, c, move = r.work.turns[i], s.tree[i].bind, r.work.centres[i], r.work.moves[i]
-            x, y, z, w = times(t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3])
-            fx, fy, fz, nx, ny, nz = load[1], load[2], load[3], load[4], load[5], load[6]
-            if load[10] > 0:
-                fx, fy, fz = turned(x, y, z, w, fx, fy, fz)
-                nx, ny, nz = turned(x, y, z, w, nx, ny, nz)
-            x, y, z = turned(x, y, z, w, load[7], load[8], load[9])
-            ux, uy, uz = cross(move[0], move[1], move[2], c[0] + x, c[1] + y, c[2] + z)
-            return (fx * (move[3] + ux) + fy * (move[4] + uy) + fz * (move[5] + uz)
-                    + nx * move[0] + ny * move[1] + nz * move[2])
-    return 0.0
+    i = record_of(tree, int(load[0]))
+    move = work.moves[i]
+    x, y, z = spring_point(tree[i], work, i, load[7:10])
+    fx, fy, fz, nx, ny, nz = turned_load(tree[i], work, i, load)
+    ux, uy, uz = cross(move[0], move[1], move[2], x, y, z)
+    return (fx * (move[3] + ux) + fy * (move[4] + uy) + fz * (move[5] + uz)
+            + nx * move[0] + ny * move[1] + nz * move[2])

@@ -102,7 +102,7 @@ def factor_island(s: System, r: Room, count: int, n: int) -> None:
     for k in range(count):
         i = int(r.need[1, k])
         c = r.contacts[i]
-        through_factor(s, r, c, i)
+        through_factor(s.up, r.H, Y, r.support[i], c)
         for e in range(c.row, c.row + c.kind):
             for g in range(e + 1):
                 total = 0.0
