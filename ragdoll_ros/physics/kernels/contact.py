@@ -192,7 +192,7 @@ def find_contacts(s: System, q: np.ndarray, r: Room, gaps: np.ndarray, margin: f
                 c.kind, c.a, c.b, c.key, c.group = 1, bound.v, -1, n + side, -1
                 c.normal[0] = 1.0 if side == 0 else -1.0
                 c.gap = q[bound.q] - bound.lower if side == 0 else bound.upper - q[bound.q]
-                c.restitution = 0.0
+                c.friction = c.rolling = c.restitution = 0.0
                 m += 1
         n += 2
     for k in range(len(s.pairs)):

@@ -14,8 +14,8 @@ from .mass import solve_lower
 from .solver import solve_impulses, solve_normals
 from .system import Room, System
 
-SWEEPS_STEP, SWEEPS_IMPACT = 25, 40
-"""Sweeps before Newton's method is asked."""
+SWEEPS = 4
+"""Sweeps before Newton's method is asked for the first time."""
 
 GIVEN_BACK = 0.5
 """Share of a depth that one step gives back, in position alone."""
@@ -136,20 +136,18 @@ def solve_island(s: System, r: Room, count: int, n: int, h: float, tolerance: fl
             deep |= r.need[0, k] > 0
         for e in range(c.kind):
             p[c.row + e] = c.impulse[e]
-    sweeps = SWEEPS_STEP if h > 0 else SWEEPS_IMPACT
     left, turns = solve_impulses(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, b, p, tolerance,
-                                 sweeps, r.solver, r.G)
+                                 SWEEPS, r.solver, r.G)
     if thrown and gained(r.W, start, p, n) > 0:
         for j in range(n):
             soft[j] = p[j]
-        solve_impulses(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, start, soft, tolerance, sweeps,
+        solve_impulses(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, start, soft, tolerance, SWEEPS,
                        r.solver, r.G)
         hold_energy(r.W, start, soft, p, n)
         r.counts[8] += 1
     r.counts[4] += turns
     if left > 1e-5:
         r.counts[3] += 1
-        r.counts[9], r.counts[10] = count, n
     r.sums[3] = max(r.sums[3], left)
     if deep:
         solve_normals(r.rows, count, n, r.W, r.need[0], out)

@@ -23,12 +23,16 @@ LIMIT, TOUCH, ROLLING = 1, 3, 5
 ALTERNATIONS = 12
 """Turns that a sliding contact takes between its normal and its friction in one sweep."""
 
-NEWTON_STEPS = 25
-"""At the most; from the sweeps' end some three are."""
+NEWTON_STEPS = 12
+"""At the most; from the sweeps' end some three are. All are taken in full: on the way the residual
+may grow, as contacts change sides. The best is kept."""
 
-SOFT = 1e-11
+SOFT = 1e-6
 """Compliance of Newton's rows, as a share of their own W: where several contacts bear what one
-could, it makes them share."""
+could, W is singular, and this keeps its steps short across what nothing decides."""
+
+OPENING = 1e-4
+"""m/s from which a contact without friction's limit is let go as open."""
 
 
 @compiled
@@ -243,8 +247,11 @@ def newton(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray
            W: np.ndarray, b: np.ndarray, p: np.ndarray, tolerance: float, room: np.ndarray,
            G: np.ndarray) -> float:
     """Newton's method from p on; p becomes the best found, the largest residual, m/s, is given."""
-    u, phi, way, trial, u2, phi2 = (room[0], room[1], room[2], room[3], room[4], room[5])
+    u, phi, way, keep = room[0], room[1], room[2], room[3]
     worst = residual(kinds, rows, mu, roll, m, n, W, b, p, u, phi)
+    best = worst
+    for i in range(n):
+        keep[i] = p[i]
     for _ in range(NEWTON_STEPS):
         if worst <= tolerance:
             break
@@ -253,21 +260,16 @@ def newton(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray
             way[i] = -phi[i]
         if not gauss(G, n, way):
             break
-        length, found = 1.0, False
-        for _ in range(7):
-            for i in range(n):
-                trial[i] = p[i] + length * way[i]
-            reached = residual(kinds, rows, mu, roll, m, n, W, b, trial, u2, phi2)
-            if reached < worst * (1 - 1e-3 * length):
-                found = True
-                break
-            length /= 2
-        if not found:
-            break
-        worst = reached
         for i in range(n):
-            p[i], u[i], phi[i] = trial[i], u2[i], phi2[i]
-    return worst
+            p[i] += way[i]
+        worst = residual(kinds, rows, mu, roll, m, n, W, b, p, u, phi)
+        if worst < best:
+            best = worst
+            for i in range(n):
+                keep[i] = p[i]
+    for i in range(n):
+        p[i] = keep[i]
+    return best
 
 
 @compiled
@@ -290,8 +292,8 @@ def solve_cones(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.nd
                 sweeps: int, room: np.ndarray, G: np.ndarray) -> tuple[float, int]:
     """Solve for p (n,), from where it stands; the largest residual left, m/s, and the sweeps."""
     done, worst = 0, math.inf
-    for turn in range(4):
-        for _ in range(sweeps):
+    for _ in range(4):
+        for _ in range(min(sweeps, 100)):
             done += 1
             worst = sweep(kinds, rows, mu, roll, m, n, W, b, p)
             if worst <= tolerance:
@@ -301,8 +303,17 @@ def solve_cones(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.nd
         if left <= 10 * tolerance:
             return left, done
         worst = min(worst, left)
-        sweeps *= 2
+        sweeps *= 4
     return worst, done
+
+
+@compiled
+def opens(W: np.ndarray, n: int, a: int, b: np.ndarray, p: np.ndarray) -> bool:
+    """Whether a contact comes apart."""
+    u = b[a]
+    for j in range(n):
+        u += W[a * n + j] * p[j]
+    return u > OPENING
 
 
 @compiled
@@ -320,8 +331,10 @@ def solve_impulses(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np
         some = False
         for c in range(m):
             a = rows[c]
+            if kinds[c] == LIMIT:
+                continue
             if turn == 0 and mu[c] >= STICKS and p[a] <= 0.0 and (
-                    p[a + 1] != 0.0 or p[a + 2] != 0.0):
+                    p[a + 1] != 0.0 or p[a + 2] != 0.0) and opens(W, n, a, b, p):
                 mu[c] = -1.0
                 p[a] = p[a + 1] = p[a + 2] = 0.0
                 some = True
