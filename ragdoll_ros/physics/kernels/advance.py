@@ -21,7 +21,7 @@ from .flight import (
     point_velocity,
     time_free,
 )
-from .impact import SLOW, SLOW_TURN, contact_step, enter_work, impact, power
+from .impact import SLOW, SLOW_TURN, contact_step, energy, enter_work, impact, power
 from .kernels import cross, motion, pose, rates, times
 from .momentum import give_contacts, keep_momentum, sum_dolls
 from .machine import COUNTS, REAL, ROW, TABLE, YES, compiled, entry
@@ -43,11 +43,21 @@ LONGEST = 0.05
 SUNK = -1e-7
 """m or rad: what is found deeper than this at a step's end has met on the way."""
 
-TRIES = 12
-"""At finding the instant of a touch within a step."""
+TRIES = 16
+"""At a step that is to end at a touch, and is to make no energy."""
 
-MOST_EVENTS = 400
-"""Impacts in one stretch; what would be more is taken on without restitution."""
+SHORTEST = 1e-9
+"""s: no step is made shorter to find a touch."""
+
+FINEST = 0.01
+"""Share of a step below which it is not made shorter to make no energy: what still does is counted."""
+
+GAIN = 1e-6
+"""Share of the kinetic energy that a step may gain."""
+
+MOST_BOUNCES, MOST_EVENTS = 60, 1000
+"""Impacts in one stretch: from the first number on nothing is thrown back, from the second on no
+instant of a touch is sought."""
 
 GAUSS = ((0.046910077030668, 0.118463442528095), (0.230765344947158, 0.239314335249683),
          (0.5, 0.284444444444444), (0.769234655052842, 0.239314335249683),
@@ -85,10 +95,7 @@ def may_fly(s: System, r: Room, q: np.ndarray, v: np.ndarray, loads: np.ndarray,
                     c.normal[0] * rate[len(q) + c.a] < -STILL):
                 return False
         pose(s.tree, q, v, r.work)
-    single = True
-    for i in range(len(s.tree)):
-        single &= s.tree[i].parent < 0
-    if single:
+    if m == 0 or len(s.tree) == len(r.given):
         return True
     g = math.sqrt(s.gravity[0] ** 2 + s.gravity[1] ** 2 + s.gravity[2] ** 2)
     fast = 0.0
@@ -133,58 +140,85 @@ def fly(s: System, r: Room, q: np.ndarray, v: np.ndarray, left: float, loads: np
 
 @compiled
 def step_or_touch(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loads: np.ndarray,
-                  springs: np.ndarray, since: float, known: np.ndarray,
+                  springs: np.ndarray, since: float, known: np.ndarray, step: float,
                   seek: bool) -> tuple[float, bool]:
     """Go on by h s, or to the first touch that is fast; the time gone, and whether one was met.
 
-    r.gaps are those at q, and again at the end.
+    r.gaps are those at q, and again at the end. A step that makes energy is too long for what
+    turns: it is gone again, half as long.
     """
     end_q, end_v = r.states[2], r.vectors[4]
-    early, late, low, hit = 0.0, h, 0.0, False
-    tries, m = 0, 0
-    while True:
-        m = contact_step(s, r, q, v, late, loads, springs, since, known, end_q, end_v)
-        look(s, r, end_q, end_v, r.gaps, late, r.later)
-        share = first_touch(s, r, late)
-        if share > 1 or not seek or tries >= TRIES or late < 1e-9:
+    length, hit, m = min(h, r.sums[6]) if r.sums[6] > 0 else h, False, 0
+    r.sums[6] = 2 * length if 2 * length < step else 0.0
+    pose(s.tree, q, v, r.work)
+    held, moving = energy(s, q, r)
+    done, handed, lifted = r.sums[0], r.sums[1], r.sums[2]
+    for turn in range(TRIES):
+        r.sums[0], r.sums[1], r.sums[2] = done, handed, lifted
+        m = contact_step(s, r, q, v, length, loads, springs, since, known, end_q, end_v)
+        settle_momentum(s, r, q, v, length, loads, springs, since, m, end_q, end_v)
+        look(s, r, end_q, end_v, r.gaps, length, r.later)
+        if turn == TRIES - 1:
             break
-        tries += 1
-        hit = True
-        late = max(1e-9, late * share * (1 + 1e-9) + 2e-9)
-    for d in range(len(r.given)):
-        for k in range(7):
-            r.given[d, k] = 0.0
-    give_contacts(s, r, m, r.given)
-    if len(loads) or len(springs):
-        enter_work(s, r, v, end_v, late, loads, springs, since)
-    if r.given[:, 6].min() == 0.0:
-        sum_dolls(s, q, v, r, r.before)
-        sum_dolls(s, end_q, end_v, r, r.after)
-        keep_momentum(s, r, late, r.before, r.after, r.given, end_q, end_v)
-    if late > 0.1 * h:
+        now, speed = energy(s, end_q, r)
+        work = r.sums[0] - done + r.sums[1] - handed
+        gained = now - held - work - (r.sums[2] - lifted)
+        if not gained <= GAIN * (max(moving, speed) + abs(work)) + 1e-12 * abs(now):
+            if length > FINEST * step:
+                length, hit = length / 2, False
+                r.sums[6] = length
+                continue
+            r.counts[9] += 1
+        share, landed = first_touch(s, r, length)
+        hit = seek and (landed or share <= 1)
+        if share > 1 or not seek:
+            break
+        length = max(SHORTEST, length * share * (1 + 1e-9) + 2e-9)
+    if length > 0.1 * h:
         for i in range(m):
             known[i] = r.contacts[i]
-        r.counts[5], r.sums[4] = m, late
+        r.counts[5], r.sums[4] = m, length
     for j in range(len(q)):
         q[j] = end_q[j]
     for j in range(len(v)):
         v[j] = end_v[j]
     for j in range(len(r.gaps)):
         r.gaps[j] = r.later[j]
-    return late, hit
+    return length, hit
 
 
 @compiled
-def first_touch(s: System, r: Room, h: float) -> float:
-    """Share of the step just gone at which something met that was apart; above 1: nothing."""
-    first, bounds = 2.0, len(r.gaps) - len(s.pairs) - 2 * len(s.bounds)
+def settle_momentum(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loads: np.ndarray,
+                    springs: np.ndarray, since: float, m: int, end_q: np.ndarray,
+                    end_v: np.ndarray) -> None:
+    """Book the work of a step of h s, and keep the momentum of what the ground does not bear."""
+    for d in range(len(r.given)):
+        for k in range(7):
+            r.given[d, k] = 0.0
+    give_contacts(s, r, m, r.given)
+    if len(loads) or len(springs):
+        enter_work(s, r, v, end_v, h, loads, springs, since)
+    if r.given[:, 6].min() == 0.0:
+        sum_dolls(s, q, v, r, r.before)
+        sum_dolls(s, end_q, end_v, r, r.after)
+        keep_momentum(s, r, h, r.before, r.after, r.given, end_q, end_v)
+
+
+@compiled
+def first_touch(s: System, r: Room, h: float) -> tuple[float, bool]:
+    """Share of the step just gone at which something met that was apart, above 1: nothing; and
+    whether something touches at its end that came fast.
+    """
+    first, landed, bounds = 2.0, False, len(r.gaps) - len(s.pairs) - 2 * len(s.bounds)
     for j in range(len(r.gaps)):
-        if r.gaps[j] > TOUCHING and r.later[j] < SUNK:
+        if r.gaps[j] > TOUCHING and r.later[j] <= TOUCHING:
             fallen = r.gaps[j] - r.later[j]
             slow = SLOW_TURN if bounds <= j < bounds + 2 * len(s.bounds) else SLOW
             if fallen > slow * h:
-                first = min(first, r.gaps[j] / fallen)
-    return first
+                landed = True
+                if r.later[j] < SUNK:
+                    first = min(first, r.gaps[j] / fallen)
+    return first, landed
 
 
 @compiled
@@ -231,13 +265,13 @@ def advance(s: System, r: Room, q: np.ndarray, v: np.ndarray, duration: float,
             if not flies or events >= MOST_EVENTS:
                 look(s, r, q, v, r.gaps, math.inf, r.gaps)
             h = left / math.ceil(left / step - 1e-9)
-            gone, touched = step_or_touch(s, r, q, v, h, loads, springs, time, known,
+            gone, touched = step_or_touch(s, r, q, v, h, loads, springs, time, known, step,
                                           events < MOST_EVENTS)
             path.times[KNOWN] = path.times[TRY] = 0.0
         time += gone
         r.counts[11] = 0 if touched else 1
         if touched:
-            impact(s, r, q, v)
+            impact(s, r, q, v, events < MOST_BOUNCES)
             events += 1
     observe(s, r, q, v, rows)
     motion(masses, inertias, doll_of, s.gravity, rows, sums)

@@ -198,7 +198,7 @@ def find_contacts(s: System, q: np.ndarray, r: Room, gaps: np.ndarray, margin: f
     for k in range(len(s.pairs)):
         if gaps[n + k] <= TOUCHING:
             m = enter_pair(s, k, r, m, margin, n + len(s.pairs) + 4096 * k)
-    arms(r, m)
+    arms(s, r, m)
     return m
 
 
@@ -224,7 +224,7 @@ def enter_pair(s: System, k: int, r: Room, m: int, margin: float, key: int) -> i
 
 
 @compiled
-def arms(r: Room, m: int) -> None:
+def arms(s: System, r: Room, m: int) -> None:
     """Where friction acts: in a patch nearer its middle than the points that bear it.
 
     Under an even pressure p a patch that turns about its middle brakes with mu times the integral
@@ -240,9 +240,27 @@ def arms(r: Room, m: int) -> None:
             basis(r.contacts[e])
             for k in range(3):
                 r.contacts[e].arm[k] = r.contacts[e].point[k]
-        if d - c > 1:
+        if d - c > 2 and group < len(s.geoms) and s.geoms[group].kind == 3:
+            on_disc(s.geoms[group], r.at[group], r.turn[group], r.contacts, c, d)
+        elif d - c > 1:
             shrink(r, c, d)
         c = d
+
+
+@compiled
+def on_disc(geom: np.record, at: np.ndarray, turn: np.ndarray, contacts: np.ndarray, begin: int,
+            end: int) -> None:
+    """Draw the arms of a cylinder's face, which stands on the ground, to two thirds of its radius,
+    the mean distance of a disc.
+    """
+    c = contacts[begin]
+    side = turn[0, 2] * c.normal[0] + turn[1, 2] * c.normal[1] + turn[2, 2] * c.normal[2]
+    low = -geom.size[1] if side > 0 else geom.size[1]
+    for e in range(begin, end):
+        c = contacts[e]
+        for k in range(3):
+            middle = at[k] + turn[k, 2] * low
+            c.arm[k] = middle + 2 / 3 * (c.point[k] - middle)
 
 
 @compiled

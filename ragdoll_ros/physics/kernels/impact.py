@@ -40,8 +40,11 @@ SLOW_TURN = 0.1
 
 
 @compiled
-def impact(s: System, r: Room, q: np.ndarray, v: np.ndarray) -> int:
-    """Change v by the impulses of all that touches at q by r.gaps; how many contacts there are."""
+def impact(s: System, r: Room, q: np.ndarray, v: np.ndarray, bounces: bool) -> int:
+    """Change v by the impulses of all that touches at q by r.gaps; how many contacts there are.
+
+    Not ``bounces``: nothing is thrown back.
+    """
     pose(s.tree, q, v, r.work)
     place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
     m = find_contacts(s, q, r, r.gaps, 1e-6)
@@ -54,6 +57,8 @@ def impact(s: System, r: Room, q: np.ndarray, v: np.ndarray) -> int:
     for i in range(m):
         for e in range(5):
             r.contacts[i].impulse[e] = 0.0
+        if not bounces:
+            r.contacts[i].restitution = 0.0
     change, shift = r.vectors[0], r.vectors[1]
     respond(s, r, q, v, v, m, 0.0, IMPACT_TOLERANCE, change, shift)
     for j in range(len(v)):
@@ -133,6 +138,24 @@ def lifted(s: System, r: Room, shift: np.ndarray) -> float:
             total -= shift[j] * (g[0] * (c[0] * a[3] + x) + g[1] * (c[0] * a[4] + y)
                                  + g[2] * (c[0] * a[5] + z))
     return total
+
+
+@compiled
+def energy(s: System, q: np.ndarray, r: Room) -> tuple[float, float]:
+    """Energy of all bones, J, and the kinetic part of it; work is posed."""
+    kinetic = height = 0.0
+    for i in range(len(s.tree)):
+        bone, move, c, t = s.tree[i], r.work.moves[i], r.work.centres[i], r.work.turns[i]
+        root, b = s.tree[s.root_of[i]].q, s.tree[i].bind
+        x, y, z = cross(move[0], move[1], move[2], c[0], c[1], c[2])
+        x, y, z = move[3] + x, move[4] + y, move[5] + z
+        ax, ay, az, aw = times(t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3])
+        wx, wy, wz = turned(ax, ay, az, -aw, move[0], move[1], move[2])
+        kinetic += 0.5 * (bone.mass * (x * x + y * y + z * z) + bone.inertia[0] * wx * wx
+                          + bone.inertia[1] * wy * wy + bone.inertia[2] * wz * wz)
+        height -= bone.mass * (s.gravity[0] * (q[root] + c[0]) + s.gravity[1] * (q[root + 1] + c[1])
+                               + s.gravity[2] * (q[root + 2] + c[2]))
+    return kinetic + height, kinetic
 
 
 @compiled
@@ -244,7 +267,9 @@ def weaken(s: System, r: Room, q: np.ndarray, v: np.ndarray, free: np.ndarray,
                                             free, spring, time, h)
         size = math.sqrt(fx * fx + fy * fy + fz * fz)
         if size > spring[13]:
-            share = spring[13] / size
+            fx, fy, fz, _, _, _ = spring_force(s.tree, s.up, s.last, r.work, q,
+                                               root_q(s, spring), v, spring, time)
+            share = spring[13] / math.sqrt(fx * fx + fy * fy + fz * fz)
             spring[14], spring[15], spring[16], spring[17] = 0.0, share * fx, share * fy, share * fz
             some = True
     return some

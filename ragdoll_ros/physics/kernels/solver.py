@@ -61,8 +61,8 @@ def one_contact(W: np.ndarray, n: int, a: int, c0: float, c1: float, c2: float, 
         before = x
         x = max(0.0, -(c0 + w01 * y + w02 * z) / w00)
         y0, z0 = y, z
-        y -= rho * (c1 + w01 * x + w11 * y + w12 * z)
-        z -= rho * (c2 + w02 * x + w12 * y + w22 * z)
+        y -= rho * (c1 + w01 * x + w11 * y0 + w12 * z0)
+        z -= rho * (c2 + w02 * x + w12 * y0 + w22 * z0)
         y, z = on_disc(y, z, mu * x)
         if abs(x - before) + abs(y - y0) + abs(z - z0) <= 1e-13 * abs(x):
             break
