@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
-from .contact import arms, find_contacts, place_geoms
+from .contact import find_contacts, place_geoms
+from .dynamics import pose
 from .machine import compiled
-from .kernels import cross, pose, times, turned
 from .mass import (
     bias_forces,
     crba,
@@ -26,6 +26,7 @@ from .mass import (
     update_moves,
 )
 from .momentum import give
+from .quaternion import cross, times, turned
 from .response import respond
 from .system import Room, System
 
@@ -123,7 +124,7 @@ def contact_step(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loa
 
 @compiled
 def lifted(s: System, r: Room, shift: np.ndarray) -> float:
-    """Energy of height, J, that a displacement (nv,) gives; axes and composites are those of now."""
+    """Energy of height, J, that a displacement (nv,) gives; axes, composites are those of now."""
     total, g = 0.0, s.gravity
     for j in range(len(shift)):
         if shift[j] != 0.0:

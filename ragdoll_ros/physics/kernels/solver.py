@@ -290,7 +290,7 @@ def solve_cones(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.nd
                 sweeps: int, room: np.ndarray, G: np.ndarray) -> tuple[float, int]:
     """Solve for p (n,), from where it stands; the largest residual left, m/s, and the sweeps."""
     done, worst = 0, math.inf
-    for turn in range(4):
+    for _restart in range(4):
         for _ in range(sweeps):
             done += 1
             worst = sweep(kinds, rows, mu, roll, m, n, W, b, p)
