@@ -2,6 +2,7 @@
 
 What is known to come out wrong is marked so, strictly: whoever mends it is told by a failing test.
 """
+import dataclasses
 import math
 
 import numpy as np
@@ -252,6 +253,21 @@ def test_a_rod_falls_over_about_its_edge():
     truth = impacts.edge_angle(0.01, 0.5, math.radians(5), G, np.array([0.0, 0.95]), rocks=False)
     assert pitches(run(on_edge(ROD, math.radians(5)), 0.95))[-1] == pytest.approx(
         truth[-1], abs=math.radians(0.05))
+
+
+@pytest.mark.parametrize('lean', [5, 20, 30])
+@pytest.mark.parametrize('accuracy', ['draft', 'normal', 'exact'])
+def test_a_tick_on_the_ground_tells_its_error(accuracy, lean):
+    """A rod on its edge, one tick of 0.2 s: the estimate takes order 2 for granted, and steps whose
+    velocities lag behind the edge, of order 1, err by half as much again.
+    """
+    scene = dataclasses.replace(on_edge(ROD, math.radians(lean)), step=0.2)
+    angles = impacts.edge_angle(0.01, 0.5, math.radians(lean), G, np.array([0.0, 0.2]), rocks=False)
+    truth = impacts.edge_centre(0.01, 0.5, angles)[-1]
+    with Simulation(scene, accuracy=accuracy) as simulation:
+        missed = np.linalg.norm(simulation.advance().positions[0] - truth)
+        found = simulation.measures()
+    assert found['error_trusted'] and found['error_estimate_m'] == pytest.approx(missed, rel=0.9)
 
 
 def test_a_light_ball_that_hits_the_doll_goes_on():
