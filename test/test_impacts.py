@@ -267,7 +267,7 @@ def test_a_tick_on_the_ground_tells_its_error(accuracy, lean):
     with Simulation(scene, accuracy=accuracy) as simulation:
         missed = np.linalg.norm(simulation.advance().positions[0] - truth)
         found = simulation.measures()
-    assert found['error_trusted'] and found['error_estimate_m'] == pytest.approx(missed, rel=0.9)
+    assert found['error_trusted'] and 0.5 < found['error_estimate_m'] / missed < 2
 
 
 def test_a_light_ball_that_hits_the_doll_goes_on():
