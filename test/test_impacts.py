@@ -1,13 +1,15 @@
-"""Impacts, edges and faces whose motion is known, and how near the simulation comes to it.
+"""Impacts, edges and faces whose motion is known, and how near the rigid engine comes to it.
 
 What is known to come out wrong is marked so, strictly: whoever mends it is told by a failing test.
 """
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 
 pytest.importorskip('scipy')
+pytest.importorskip('numba', reason='numba is not installed: there is no rigid engine')
 
 from ragdoll_ros import (
     Bone,
@@ -156,6 +158,11 @@ def test_a_truth_begins_where_its_scene_does(motion):
 
 # The simulation
 
+def known(reason):
+    """What is known to come out wrong, with the figure that was seen."""
+    return pytest.mark.xfail(reason=reason, strict=True)
+
+
 def body(shape, position, orientation=rotation.IDENTITY, material=None, mass=1.0, **placed):
     """One body over level ground."""
     doll = Ragdoll('body', (Bone('body', shape, mass, (0, 0, 0)),))
@@ -185,9 +192,11 @@ def on_edge(size, lean):
 ROD, LEAN, DROP, SPEED = (0.02, 0.2, 1.0), math.radians(30), 0.2, 0.5
 
 
-@pytest.mark.parametrize(('friction', 'restitution'), [(0.0, 0.5), (0.1, 0.5), (0.0, 0.9)])
+@pytest.mark.parametrize(('friction', 'restitution'), [
+    (0.0, 0.5), (0.0, 0.9), pytest.param(0.1, 0.5, marks=known(
+        '0.2 um off: friction of the two points of an edge is askew of their slip'))])
 def test_a_dropped_rod_is_thrown_back_as_newton_and_coulomb_say(friction, restitution):
-    """Centre and angle 0.1 s after the blow: 3 mm and 0.01 rad is what a step of 1.25 ms gives."""
+    """Centre and angle 0.1 s after a blow that is located to 1e-11 m and solved to 1e-10 m/s."""
     turn = rotation.from_axis_angle((0, 1, 0), LEAN)
     arm = rotation.rotate(turn, np.array((ROD[0] / 2, 0, -ROD[2] / 2)))
     struck, inertia = math.sqrt(2 * DROP / G), (ROD[0] ** 2 + ROD[2] ** 2) / 12
@@ -200,36 +209,34 @@ def test_a_dropped_rod_is_thrown_back_as_newton_and_coulomb_say(friction, restit
     scene = body(Box(ROD), (0, 0, DROP - arm[2]), turn, Material(friction, 0.0, restitution),
                  velocity=(SPEED, 0, 0))
     end = run(scene, 0.3)[-1]
-    assert end.positions[0] == pytest.approx((x, 0, z), abs=3e-3)
-    assert pitches([end])[0] == pytest.approx(angle, abs=0.01)
+    assert end.positions[0] == pytest.approx((x, 0, z), abs=1e-10)
+    assert pitches([end])[0] == pytest.approx(angle, abs=1e-10)
 
 
 def test_three_balls_strike_one_after_the_other():
-    """E = 1, equal masses: the first two stop, the last has it all, to 1 mm after 0.5 s."""
+    """E = 1, equal masses: the first two stop, the last has it all; the instants are located."""
     balls = tuple(Placement(Ragdoll(f'ball_{k}', (Bone('ball', Sphere(0.1), 1.0, (0, 0, 0)),)),
                             position=(0.25 * k, 0, 0), velocity=(2.0 * (k == 0), 0, 0))
                   for k in range(3))
     scene = Scene('row', balls, None, Material(0.0, 0.0, 1.0), gravity=(0, 0, 0))
     places = impacts.balls_in_a_row(0.1, (1, 1, 1), (0, 0.25, 0.5), (2, 0, 0), 1.0,
                                     np.array([0.0, 0.5]))[-1]
-    assert run(scene, 0.5)[-1].positions[:, 0] == pytest.approx(places, abs=1e-3)
+    assert run(scene, 0.5)[-1].positions[:, 0] == pytest.approx(places, abs=1e-10)
 
 
-def known(reason):
-    """What is known to come out wrong, with the figure that was seen."""
-    return pytest.mark.xfail(reason=reason, strict=True)
-
-
-@known('the ninth peak is 14 % too high: each edge strikes before the other one has let go')
-def test_a_block_rocks_as_housner_says():
+@pytest.mark.parametrize('accuracy', ['draft', 'normal', 'exact'])
+def test_a_block_rocks_as_housner_says(accuracy):
+    """Nine peaks, seen at ticks, which is good to 1e-3; the first step after each of nine impacts
+    may be off by as much as what touches comes apart at, 5 mm/s of some 0.3 m/s, and draft by more.
+    """
     size, lean = (0.2, 0.4, 0.8), math.radians(5)
     times = np.arange(0, 3.001, 0.01)
-    truth = impacts.edge_angle(0.1, 0.4, lean, G, times)
-    found = pitches(run(on_edge(size, lean), 3.0))
-    assert impacts.peaks(found)[8] == pytest.approx(impacts.peaks(truth)[8], rel=0.01)
+    truth = impacts.peaks(impacts.edge_angle(0.1, 0.4, lean, G, times))
+    found = impacts.peaks(pitches(run(on_edge(size, lean), 3.0, accuracy)))
+    assert found[:9] == pytest.approx(truth[:9], rel=0.005)
 
 
-@known('0.8 rad too far in 0.7 s: PyBullet spreads no pressure over a face')
+@known('0.3 rad too far in 0.7 s: a face is taken for the square between four points of its rim')
 def test_a_disc_that_spins_on_its_face_brakes_evenly():
     scene = body(Cylinder(0.2, 0.05), (0, 0, 0.025), material=Material(0.3, 0.0, 0.0),
                  spin=(0, 0, 10))
@@ -239,11 +246,28 @@ def test_a_disc_that_spins_on_its_face_brakes_evenly():
                                   abs=0.02)
 
 
-@known('friction without limit is a coefficient of 0.7, and the edge slips')
 def test_a_rod_falls_over_about_its_edge():
+    """Without slip, by 45 degrees in a thousand steps; a lean grows 40 times in that time, and so
+    does what a step errs by.
+    """
     truth = impacts.edge_angle(0.01, 0.5, math.radians(5), G, np.array([0.0, 0.95]), rocks=False)
     assert pitches(run(on_edge(ROD, math.radians(5)), 0.95))[-1] == pytest.approx(
         truth[-1], abs=math.radians(0.05))
+
+
+@pytest.mark.parametrize('lean', [5, 20, 30])
+@pytest.mark.parametrize('accuracy', ['draft', 'normal', 'exact'])
+def test_a_tick_on_the_ground_tells_its_error(accuracy, lean):
+    """A rod on its edge, one tick of 0.2 s: the estimate takes order 2 for granted, and steps whose
+    velocities lag behind the edge, of order 1, err by half as much again.
+    """
+    scene = dataclasses.replace(on_edge(ROD, math.radians(lean)), step=0.2)
+    angles = impacts.edge_angle(0.01, 0.5, math.radians(lean), G, np.array([0.0, 0.2]), rocks=False)
+    truth = impacts.edge_centre(0.01, 0.5, angles)[-1]
+    with Simulation(scene, accuracy=accuracy) as simulation:
+        missed = np.linalg.norm(simulation.advance().positions[0] - truth)
+        found = simulation.measures()
+    assert found['error_trusted'] and 0.5 < found['error_estimate_m'] / missed < 2
 
 
 def test_a_light_ball_that_hits_the_doll_goes_on():
@@ -255,8 +279,8 @@ def test_a_light_ball_that_hits_the_doll_goes_on():
     assert lowest < 0.06  # on the ground, not in the air for ever
 
 
-@known('bones are pushed apart doll by doll: 0.2 to 2 % of the momentum are lost')
 def test_dolls_that_collide_in_the_air_keep_their_momentum():
+    """To rounding: impulses are equal and opposite, and flights keep it."""
     doll = load_doll('doll')
     scene = Scene('pair', (Placement(doll, 'a', (0, 1.2, 0), velocity=(0, -3, 0)),
                            Placement(doll, 'b', (0, -1.2, 0), velocity=(0, 3.5, 0))), None,
@@ -265,4 +289,4 @@ def test_dolls_that_collide_in_the_air_keep_their_momentum():
     states = run(scene, 0.6)
     before, after = (masses @ state.linear_velocities for state in (states[0], states[-1]))
     assert np.abs(states[-1].angular_velocities).max() > 0.5  # they did collide
-    assert after == pytest.approx(before, abs=1e-9 * masses.sum() * 3)
+    assert after == pytest.approx(before, abs=1e-12 * masses.sum() * 3)

@@ -146,7 +146,7 @@ def test_finer_steps_bend_joints_less():
 
 def test_falls_part_at_the_touch():
     apart = run(experiment('Chaos'))['apart']
-    assert apart[27] < 1e-9 and apart[39] > 0.01 and apart[99] > 0.1
+    assert apart[27] < 2e-5 and apart[39] > 0.01 and apart[99] > 0.1
 
 
 @pytest.mark.parametrize('text', blocks('yaml'))

@@ -183,11 +183,15 @@ def test_a_scene_that_is_refused_is_not_chosen():
     with served(Playback(Recording(DROP, np.zeros(1), np.zeros((1, 10, 3)), unturned))) as page:
         client, handle, seen = page.open(), page.controls.scene, []
         wait(lambda: handle.value == 'drop')
-        handle.on_update(lambda event: seen.append(handle.value))
+
+        async def note(event):  # at once, before the page takes the choice back
+            seen.append(event.target.value)
+
+        handle.on_update(note)
         client.update(handle, 'crowd')
         wait(lambda: 'crowd' in seen and handle.value == 'drop')
         engine = page.controls.engine
-        engine.on_update(lambda event: seen.append(engine.value))
+        engine.on_update(note)
         client.update(engine, 'bullet')
         wait(lambda: 'bullet' in seen and engine.value == 'auto')
 

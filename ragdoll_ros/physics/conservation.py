@@ -15,7 +15,7 @@ from ..model.scene import Scene
 from ..model.state import State
 from .account import Account
 from .engine.protocol import Wrenches
-from .kernels.loaded import kernels
+from .kernels.loaded import sums as kernels
 from .motion import Motion, cross
 from .sums import DollSums
 from .work import mean_load

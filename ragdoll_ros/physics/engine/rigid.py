@@ -16,9 +16,9 @@ from ...model.coordinates import DofLayout, GeneralizedState
 from ...model.scene import Scene
 from ...model.state import State
 from ..ground_heights import ground_heights
+from ..kernels.flight import Path
 from ..kernels.loaded import advance as kernels
 from ..kernels.system import CONTACT, make_room
-from ..kernels.flight import Path
 from ..motion import Motion, damping_rate
 from ..settings import Accuracy
 from ..system import pairs_between, system_of

@@ -6,14 +6,15 @@ import math
 import numpy as np
 
 from .contact import TOUCHING, find_contacts, look
+from .dynamics import pose, rates
 from .flight import (
     ALONG,
     EVENT,
     KNOWN,
     LENGTH,
+    PATH,
     TRY,
     VALID,
-    PATH,
     Path,
     along,
     begin_path,
@@ -22,9 +23,10 @@ from .flight import (
     time_free,
 )
 from .impact import SLOW, SLOW_TURN, contact_step, energy, enter_work, impact, power
-from .kernels import cross, motion, pose, rates, times
-from .momentum import give_contacts, keep_momentum, sum_dolls
 from .machine import COUNTS, REAL, ROW, TABLE, YES, compiled, entry
+from .momentum import give_contacts, keep_momentum, sum_dolls
+from .quaternion import cross, times
+from .sums import motion
 from .system import CONTACTS, ROOM, SYSTEM, Room, System
 
 APART = 5e-3
@@ -50,7 +52,8 @@ SHORTEST = 1e-9
 """s: no step is made shorter to find a touch."""
 
 FINEST = 0.01
-"""Share of a step below which it is not made shorter to make no energy: what still does is counted."""
+"""Share of a step below which it is not made shorter to make no energy; what makes some all the
+same is counted."""
 
 GAIN = 1e-6
 """Share of the kinetic energy that a step may gain."""
@@ -67,7 +70,8 @@ GAUSS = ((0.046910077030668, 0.118463442528095), (0.230765344947158, 0.239314335
 
 @compiled
 def may_fly(s: System, r: Room, q: np.ndarray, v: np.ndarray, loads: np.ndarray,
-            known: np.ndarray, path: Path, armed: np.ndarray, step: float, rate: np.ndarray) -> bool:
+            known: np.ndarray, path: Path, armed: np.ndarray, step: float,
+            rate: np.ndarray) -> bool:
     """Whether all that touches comes apart, and for long enough; r.gaps are those at q."""
     for i in range(r.counts[5]):
         if r.counts[11] and known[i].impulse[0] > 0:
@@ -226,8 +230,8 @@ def observe(s: System, r: Room, q: np.ndarray, v: np.ndarray, rows: np.ndarray) 
     """Position, orientation, linear and angular velocity (n, 13) of all bones, world frame."""
     pose(s.tree, q, v, r.work)
     for i in range(len(s.tree)):
-        bone, row, move, centre = s.tree[i], rows[s.tree[i].bone], r.work.moves[i], r.work.centres[i]
-        root, turn, bind = s.tree[s.root_of[i]].q, r.work.turns[i], bone.bind
+        bone, turn, move, centre = s.tree[i], r.work.turns[i], r.work.moves[i], r.work.centres[i]
+        row, root, bind = rows[bone.bone], s.tree[s.root_of[i]].q, bone.bind
         row[3], row[4], row[5], row[6] = times(turn[0], turn[1], turn[2], turn[3], bind[0],
                                                bind[1], bind[2], bind[3])
         x, y, z = cross(move[0], move[1], move[2], centre[0], centre[1], centre[2])
@@ -237,8 +241,8 @@ def observe(s: System, r: Room, q: np.ndarray, v: np.ndarray, rows: np.ndarray) 
             row[10 + k] = move[k]
 
 
-@entry(SYSTEM, ROOM, ROW, ROW, REAL, TABLE, TABLE, REAL, REAL, YES, REAL, PATH, TABLE, ROW, ROW, CONTACTS,
-       ROW, TABLE, COUNTS, TABLE, TABLE)
+@entry(SYSTEM, ROOM, ROW, ROW, REAL, TABLE, TABLE, REAL, REAL, YES, REAL, PATH, TABLE, ROW, ROW,
+       CONTACTS, ROW, TABLE, COUNTS, TABLE, TABLE)
 def advance(s: System, r: Room, q: np.ndarray, v: np.ndarray, duration: float,
             loads: np.ndarray, springs: np.ndarray, step: float, tolerance: float, flies: bool,
             longest: float, path: Path, k: np.ndarray, y: np.ndarray, armed: np.ndarray,

@@ -12,7 +12,8 @@ from .collision_axes import widest_axis
 from .collision_clip import MOST
 from .collision_flat import flat_contacts
 from .collision_round import round_contacts, round_separation
-from .collision_shapes import BOX, CAPSULE, CYLINDER, SPHERE, bound, compiled
+from .collision_shapes import BOX, CAPSULE, CYLINDER, SPHERE, bound
+from .machine import compiled
 
 __all__ = ['BOX', 'CAPSULE', 'CYLINDER', 'MOST', 'POINT', 'SPHERE', 'collide', 'separation']
 

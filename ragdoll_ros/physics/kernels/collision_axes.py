@@ -20,8 +20,9 @@ import math
 
 import numpy as np
 
-from .collision_shapes import BOX, CAPSULE, CYLINDER, bound, compiled, extent
+from .collision_shapes import BOX, CAPSULE, CYLINDER, bound, extent
 from .gjk import Direction, nearest_direction
+from .machine import compiled
 
 PARALLEL = 1e-8
 """Sine between two edges below which the normals of faces do for their cross product."""

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from .collision_outline import CORNERS
-from .collision_shapes import compiled
+from .machine import compiled
 
 MOST = 8
 """Contacts of a pair."""

@@ -13,7 +13,8 @@ import numpy as np
 from .collision_axes import BIAS, BIAS_PART, Axis, best_axis, refined
 from .collision_clip import ROOM, clip, merge, spread
 from .collision_outline import CORNERS, SQUARE, line, outline, squareness
-from .collision_shapes import BOX, CYLINDER, bound, compiled, support
+from .collision_shapes import BOX, CYLINDER, bound, support
+from .machine import compiled
 
 STRAIGHT = math.sqrt(1 - SQUARE * SQUARE)
 

@@ -5,7 +5,8 @@ import math
 
 import numpy as np
 
-from .collision_shapes import BOX, compiled, into, out_of
+from .collision_shapes import BOX, into, out_of
+from .machine import compiled
 
 SQUARE = 0.1
 """Sine of the angle to n up to which a face, an edge or a line of a side counts as square to n."""

@@ -12,7 +12,8 @@ import math
 import numpy as np
 
 from .collision_axes import widest_axis
-from .collision_shapes import BOX, CAPSULE, CYLINDER, SPHERE, compiled, distance, into, out_of
+from .collision_shapes import BOX, CAPSULE, CYLINDER, SPHERE, distance, into, out_of
+from .machine import compiled
 
 STEEP = 0.7
 """Of a normal along a cylinder's axis from which on its cap, not its side, is what is lain on."""

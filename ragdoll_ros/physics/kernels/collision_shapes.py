@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
-SPHERE, CAPSULE, BOX, CYLINDER = 0, 1, 2, 3
+from .machine import compiled
 
-compiled = numba.njit(error_model='numpy', fastmath={'contract', 'nsz', 'arcp'})
-"""Machine code, for what other compiled code calls; sums stay in their order."""
+SPHERE, CAPSULE, BOX, CYLINDER = 0, 1, 2, 3
 
 
 @compiled

@@ -10,8 +10,9 @@ import math
 import numpy as np
 
 from .collision import collide, separation
+from .dynamics import Work, pose
 from .machine import compiled
-from .kernels import Work, cross, pose, times, to_matrix, turned
+from .quaternion import cross, times, to_matrix, turned
 from .system import Room, System
 
 TOUCHING = 1e-6
@@ -332,7 +333,7 @@ def triangle(ax: float, ay: float, bx: float, by: float) -> tuple[float, float]:
 
 @compiled
 def sector(tangent: float) -> float:
-    """sec tan + ln(sec + tan) of the angle of that tangent."""
+    """The sum sec tan + ln(sec + tan) of the angle of that tangent."""
     return tangent * math.sqrt(1 + tangent * tangent) + math.asinh(tangent)
 
 

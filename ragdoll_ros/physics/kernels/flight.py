@@ -11,11 +11,12 @@ import math
 import numba
 import numpy as np
 
-from .contact import FAR, NEAR, TOUCHING, bone_velocity, ground_point, look
 from .collision import collide
-from .dop853 import CONTINUED, STAGES
-from .kernels import Work, _error, _sum, cross, normalize, pose, rates
+from .contact import FAR, NEAR, TOUCHING, bone_velocity, ground_point, look
+from .dop853 import CONTINUED, STAGES, add_up, step_error
+from .dynamics import Work, normalize, pose, rates
 from .machine import compiled
+from .quaternion import cross
 from .system import Room, System
 
 Path = collections.namedtuple('Path', 'dense ends times')
@@ -52,8 +53,8 @@ STEADY = 1.5
 
 
 @compiled
-def path_step(tree: np.ndarray, gravity: np.ndarray, work: Work, loads: np.ndarray, q: np.ndarray, v: np.ndarray, h: float,
-              path: Path, k: np.ndarray, y: np.ndarray) -> float:
+def path_step(tree: np.ndarray, gravity: np.ndarray, work: Work, loads: np.ndarray, q: np.ndarray,
+              v: np.ndarray, h: float, path: Path, k: np.ndarray, y: np.ndarray) -> float:
     """Enter the step of h s from q and v into ``path``; its error. k (16, nq + nv), y: room."""
     nq, size, dense = len(q), len(q) + len(v), path.dense
     start = dense[0]
@@ -68,7 +69,7 @@ def path_step(tree: np.ndarray, gravity: np.ndarray, work: Work, loads: np.ndarr
     else:
         rates(tree, gravity, loads, start[:nq], start[nq:], work, k[0])
     for stage in range(1, 16):
-        _sum(STAGES[stage], stage, k, h, y)
+        add_up(STAGES[stage], stage, k, h, y)
         for j in range(size):
             y[j] += start[j]
         normalize(tree, y[:nq])
@@ -82,8 +83,8 @@ def path_step(tree: np.ndarray, gravity: np.ndarray, work: Work, loads: np.ndarr
         dense[3, j] = 2 * dense[1, j] - h * (k[12, j] + k[0, j])
         path.ends[0, j], path.ends[1, j] = k[0, j], k[12, j]
     for row in range(4):
-        _sum(CONTINUED[row], 16, k, h, dense[4 + row])
-    return _error(k, h, nq, y)
+        add_up(CONTINUED[row], 16, k, h, dense[4 + row])
+    return step_error(k, h, nq, y)
 
 
 @compiled

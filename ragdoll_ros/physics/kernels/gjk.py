@@ -8,7 +8,8 @@ import math
 
 import numpy as np
 
-from .collision_shapes import compiled, support
+from .collision_shapes import support
+from .machine import compiled
 
 STEPS = 60
 """After which the best direction so far must do; 5 to 20 are usual, most where rims meet."""

@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from .contact import find_contacts, place_geoms
+from .dynamics import Work, pose
 from .machine import compiled
-from .kernels import Work, cross, pose, times, turned
 from .mass import (
     bias_forces,
     crba,
@@ -26,6 +26,7 @@ from .mass import (
     update_moves,
 )
 from .momentum import give
+from .quaternion import cross, times, turned
 from .response import respond
 from .system import Room, System
 
@@ -129,7 +130,7 @@ def contact_step(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loa
 
 @compiled
 def lifted(s: System, r: Room, shift: np.ndarray) -> float:
-    """Energy of height, J, that a displacement (nv,) gives; axes and composites are those of now."""
+    """Energy of height, J, that a displacement (nv,) gives; axes, composites are those of now."""
     total, g = 0.0, s.gravity
     for j in range(len(shift)):
         if shift[j] != 0.0:
@@ -207,7 +208,8 @@ def root_q(s: System, spring: np.ndarray) -> int:
 
 @compiled
 def spring_force(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, q: np.ndarray,
-                 root: int, v: np.ndarray, spring: np.ndarray, time: float) -> tuple[float, float, float, float, float, float]:
+                 root: int, v: np.ndarray, spring: np.ndarray, time: float,
+                 ) -> tuple[float, float, float, float, float, float]:
     """Force, N, of a hand's spring on its point and the point's velocity, m/s, at q and v."""
     i = int(spring[0])
     x, y, z = spring_point(tree[i], work, i, spring[1:4])

@@ -2,6 +2,6 @@
 from .cache import alone
 
 with alone():
-    from . import advance, kernels
+    from . import advance, sums
 
-__all__ = ['advance', 'kernels']
+__all__ = ['advance', 'sums']

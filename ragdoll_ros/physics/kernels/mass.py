@@ -1,6 +1,6 @@
 """Mass matrix, its factors along the tree, and the forces that a motion asks for.
 
-Spatial vectors as in kernels.py: about the doll's root, along the world's axes. H is built by the
+Spatial vectors as in dynamics.py: about the doll's root, along the world's axes. H is built by the
 composite-rigid-body algorithm, factored as L^T L without fill-in, and the bias forces come from
 the recursive Newton-Euler algorithm (Featherstone, Rigid Body Dynamics Algorithms, 2008, tables
 6.2, 6.3 and 5.1).
@@ -11,8 +11,9 @@ import math
 
 import numpy as np
 
+from .dynamics import Work
 from .machine import compiled
-from .kernels import Work, cross, times, to_matrix, turned
+from .quaternion import cross, times, to_matrix, turned
 
 
 @compiled
@@ -128,11 +129,11 @@ def solve_upper(L: np.ndarray, up: np.ndarray, x: np.ndarray) -> None:
 def bias_forces(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray,
                 v: np.ndarray, work: Work, own: np.ndarray, out: np.ndarray) -> None:
     """Generalised forces (nv,) of gravity, loads and the motion itself: H dv/dt where no joint
-    resists. work is posed at q and v; its biases and drifts are lost.
+    resists. work is posed at q and v; its biases and inertias are lost.
 
-    ``loads`` (m, 11) are those of kernels.accelerations().
+    ``loads`` (m, 11) are those of dynamics.accelerations().
     """
-    rates, forces, moves = work.drifts, work.biases, work.moves
+    forces, moves = work.biases, work.moves
     acceleration = work.inertias  # room: (n, 6) of it, a bone's spatial acceleration
     for i in range(len(tree)):
         bone, move, here = tree[i], moves[i], acceleration[i, 0]

@@ -10,9 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kernels import cross, pose, solve, turned
+from .cholesky import solve
+from .dynamics import pose
 from .machine import compiled
 from .mass import turn_inertias
+from .quaternion import cross, turned
 from .system import Room, System
 
 SUMS = 16
@@ -29,7 +31,8 @@ def sum_dolls(s: System, q: np.ndarray, v: np.ndarray, r: Room, out: np.ndarray)
         for k in range(SUMS):
             out[d, k] = 0.0
     for i in range(len(s.tree)):
-        row, c, root, m = out[s.doll_of[i]], r.work.centres[i], s.tree[s.root_of[i]].q, s.tree[i].mass
+        row, c, m = out[s.doll_of[i]], r.work.centres[i], s.tree[i].mass
+        root = s.tree[s.root_of[i]].q
         move = r.work.moves[i]
         x, y, z = cross(move[0], move[1], move[2], c[0], c[1], c[2])
         row[0] += m
@@ -42,7 +45,8 @@ def sum_dolls(s: System, q: np.ndarray, v: np.ndarray, r: Room, out: np.ndarray)
         for k in range(3):
             out[d, 1 + k] /= out[d, 0]
     for i in range(len(s.tree)):
-        row, c, root, m = out[s.doll_of[i]], r.work.centres[i], s.tree[s.root_of[i]].q, s.tree[i].mass
+        row, c, m = out[s.doll_of[i]], r.work.centres[i], s.tree[i].mass
+        root = s.tree[s.root_of[i]].q
         move, I = r.work.moves[i], r.own[i]
         x, y, z = cross(move[0], move[1], move[2], c[0], c[1], c[2])
         a, b, e = q[root] + c[0] - row[1], q[root + 1] + c[1] - row[2], q[root + 2] + c[2] - row[3]

@@ -6,7 +6,7 @@ import collections
 import numba
 import numpy as np
 
-from .kernels import Work
+from .dynamics import Work
 from .record import RECORD
 
 GEOM = np.dtype([
