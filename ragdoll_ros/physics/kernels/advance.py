@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from .contact import TOUCHING, find_contacts, look
+from .contact import TOUCHING, contact_rates, find_contacts, look, place_geoms
 from .dynamics import pose, rates
 from .flight import (
     ALONG,
@@ -22,9 +22,19 @@ from .flight import (
     point_velocity,
     time_free,
 )
-from .impact import SLOW, SLOW_TURN, contact_step, energy, enter_work, impact, power
+from .impact import (
+    SLOW,
+    SLOW_TURN,
+    STEP_TOLERANCE,
+    contact_step,
+    energy,
+    enter_work,
+    impact,
+    power,
+)
 from .machine import COUNTS, REAL, ROW, TABLE, YES, compiled, entry
-from .momentum import give_contacts, keep_momentum, sum_dolls
+from .mass import integrate
+from .momentum import give_contacts, keep_energy, keep_momentum, sum_dolls
 from .quaternion import cross, times
 from .sums import motion
 from .system import CONTACTS, ROOM, SYSTEM, Room, System
@@ -55,7 +65,10 @@ FINEST = 0.01
 """Share of a step below which it is not made shorter to make no energy; what makes some all the
 same is counted."""
 
-GAIN = 1e-6
+NOISE = 1e-10
+"""Share of the weights times the largest reach that solving to a tolerance may give a step."""
+
+GAIN = 2e-7
 """Share of the kinetic energy that a step may gain."""
 
 MOST_BOUNCES, MOST_EVENTS = 60, 1000
@@ -154,20 +167,26 @@ def step_or_touch(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, lo
     end_q, end_v = r.states[2], r.vectors[4]
     length, hit, m = min(h, r.sums[6]) if r.sums[6] > 0 else h, False, 0
     r.sums[6] = 2 * length if 2 * length < step else 0.0
-    pose(s.tree, q, v, r.work)
+    begin_step(s, r, q, v)
     held, moving = energy(s, q, r)
     done, handed, lifted = r.sums[0], r.sums[1], r.sums[2]
     for turn in range(TRIES):
         r.sums[0], r.sums[1], r.sums[2] = done, handed, lifted
         m = contact_step(s, r, q, v, length, loads, springs, since, known, end_q, end_v)
         settle_momentum(s, r, q, v, length, loads, springs, since, m, end_q, end_v)
+        integrate(s.tree, end_q, r.vectors[3], 1.0, end_q)
         look(s, r, end_q, end_v, r.gaps, length, r.later)
         if turn == TRIES - 1:
             break
         now, speed = energy(s, end_q, r)
         work = r.sums[0] - done + r.sums[1] - handed
         gained = now - held - work - (r.sums[2] - lifted)
-        if not gained <= GAIN * (max(moving, speed) + abs(work)) + 1e-12 * abs(now):
+        noise = NOISE * weight(s) + 10 * STEP_TOLERANCE * pressure(r, m)
+        if gained > 1e-14 * abs(now) and r.given[:, 6].min() == 0.0:
+            sum_dolls(s, end_q, end_v, r, r.after)
+            if keep_energy(s, r, gained, r.after, r.given, end_q, end_v):
+                gained = 0.0
+        if not gained <= GAIN * (max(moving, speed) + abs(work)) + noise:
             if length > FINEST * step:
                 length, hit = length / 2, False
                 r.sums[6] = length
@@ -189,6 +208,45 @@ def step_or_touch(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, lo
     for j in range(len(r.gaps)):
         r.gaps[j] = r.later[j]
     return length, hit
+
+
+@compiled
+def pressure(r: Room, m: int) -> float:
+    """Sum of the sizes of all impulses of m contacts, N s or N m s: times the tolerance to which
+    they are solved, the energy that they may make.
+    """
+    total = 0.0
+    for i in range(m):
+        for e in range(r.contacts[i].kind):
+            total += abs(r.contacts[i].impulse[e])
+    return total
+
+
+@compiled
+def weight(s: System) -> float:
+    """Weight of all, N, times the largest reach of a geom, m."""
+    mass = reach = 0.0
+    for i in range(len(s.tree)):
+        mass += s.tree[i].mass
+    for k in range(len(s.geoms)):
+        reach = max(reach, s.geoms[k].reach)
+    return mass * reach * math.sqrt(s.gravity[0] ** 2 + s.gravity[1] ** 2 + s.gravity[2] ** 2)
+
+
+@compiled
+def begin_step(s: System, r: Room, q: np.ndarray, v: np.ndarray) -> None:
+    """Note what touches as a step begins, and how it moves; poses work and geoms at q and v.
+
+    On a curved way the rows at the step's middle see J v as h/2 dJ/dt v where it is zero at the
+    start: what they see of v' is to be its opposite, for it to be zero at the end.
+    """
+    pose(s.tree, q, v, r.work)
+    place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
+    m = find_contacts(s, q, r, r.gaps, TOUCHING)
+    for i in range(m):
+        contact_rates(s, r, q, v, r.contacts[i])
+        r.begun[i] = r.contacts[i]
+    r.counts[13] = m
 
 
 @compiled

@@ -339,18 +339,17 @@ def sector(tangent: float) -> float:
 
 @compiled
 def jacobian(s: System, q: np.ndarray, r: Room, c: np.record, index: int, v: np.ndarray,
-             free: np.ndarray, b: np.ndarray) -> None:
+             free: np.ndarray, b: np.ndarray, was: np.ndarray) -> None:
     """Rows of a contact into r.Y from c.row on, the velocities that they see, descending, into
-    r.support; its velocities under ``free`` into b, and under v, along the normal, c.before.
+    r.support; its velocities under ``free`` into b, those under v into ``was``.
     """
     row, Y, list_ = c.row, r.Y, r.support[index]
     for k in range(c.kind):
-        b[row + k] = 0.0
-    c.before = 0.0
+        b[row + k] = was[row + k] = 0.0
     if c.kind == 1:
         j, n = c.a, 0
         Y[row, j] = c.normal[0]
-        b[row], c.before = c.normal[0] * free[j], c.normal[0] * v[j]
+        b[row], was[row] = c.normal[0] * free[j], c.normal[0] * v[j]
         while j >= 0:
             list_[n] = j
             n, j = n + 1, s.up[j]
@@ -372,7 +371,7 @@ def jacobian(s: System, q: np.ndarray, r: Room, c: np.record, index: int, v: np.
             k = s.up[k]
         for e in range(c.kind):
             b[row + e] += Y[row + e, j] * free[j]
-        c.before += Y[row, j] * v[j]
+            was[row + e] += Y[row + e, j] * v[j]
     c.support = n
 
 
@@ -407,6 +406,30 @@ def through_factor(up: np.ndarray, H: np.ndarray, Y: np.ndarray, seen: np.ndarra
             while j >= 0:
                 Y[e, j] -= H[i, j] * f
                 j = up[j]
+
+
+@compiled
+def contact_rates(s: System, r: Room, q: np.ndarray, v: np.ndarray, c: np.record) -> None:
+    """Enter a contact's velocities along its rows into c.start; work is posed at q and v."""
+    if c.kind == 1:
+        c.start[0] = c.normal[0] * v[c.a]
+        return
+    n, t, w = c.normal, c.across[0], c.across[1]
+    for e in range(5):
+        c.start[e] = 0.0
+    for side in range(2 if c.b >= 0 else 1):
+        i, sign = (c.a, 1.0) if side == 0 else (c.b, -1.0)
+        m, root = r.work.moves[i], s.tree[s.root_of[i]].q
+        x, y, z = cross(m[0], m[1], m[2], c.point[0] - q[root], c.point[1] - q[root + 1],
+                        c.point[2] - q[root + 2])
+        c.start[0] += sign * (n[0] * (m[3] + x) + n[1] * (m[4] + y) + n[2] * (m[5] + z))
+        x, y, z = cross(m[0], m[1], m[2], c.arm[0] - q[root], c.arm[1] - q[root + 1],
+                        c.arm[2] - q[root + 2])
+        x, y, z = m[3] + x, m[4] + y, m[5] + z
+        c.start[1] += sign * (t[0] * x + t[1] * y + t[2] * z)
+        c.start[2] += sign * (w[0] * x + w[1] * y + w[2] * z)
+        c.start[3] += sign * (t[0] * m[0] + t[1] * m[1] + t[2] * m[2])
+        c.start[4] += sign * (w[0] * m[0] + w[1] * m[1] + w[2] * m[2])
 
 
 @compiled

@@ -30,7 +30,7 @@ from .quaternion import cross, times, turned
 from .response import respond
 from .system import Room, System
 
-STEP_TOLERANCE, IMPACT_TOLERANCE = 1e-7, 1e-10
+STEP_TOLERANCE, IMPACT_TOLERANCE = 1e-8, 1e-10
 """m/s to which contacts are solved."""
 
 SLOW = 0.02
@@ -72,7 +72,8 @@ def impact(s: System, r: Room, q: np.ndarray, v: np.ndarray, bounces: bool) -> i
 def contact_step(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loads: np.ndarray,
                  springs: np.ndarray, since: float, known: np.ndarray, end_q: np.ndarray,
                  end_v: np.ndarray) -> int:
-    """Go on by h s from q and v to ``end_q`` and ``end_v``; the number of contacts.
+    """Go on by h s from q and v to ``end_q`` and ``end_v``; the number of contacts. What gives
+    depths back is still to come: r.vectors[3].
 
     ``since``: s since the hands of ``springs`` were where these say. ``known``: contacts of the
     step before, r.counts[5] of them, whose impulses over r.sums[4] s are where to begin.
@@ -119,10 +120,9 @@ def contact_step(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loa
             end_v[j] = free[j] + change[j]
     else:
         for j in range(len(v)):
-            end_v[j] = free[j]
+            end_v[j], shift[j] = free[j], 0.0
     integrate(s.tree, middle, end_v, h / 2, end_q)
     if m:
-        integrate(s.tree, end_q, shift, 1.0, end_q)
         r.sums[2] += lifted(s, r, shift)
     r.counts[1] += 1
     return m
@@ -290,6 +290,14 @@ def warm_start(r: Room, m: int, known: np.ndarray, h: float) -> None:
             if old.key == c.key:
                 for e in range(5):
                     c.impulse[e] = scale * old.impulse[e]
+                break
+        c.begun = 0
+        for j in range(r.counts[13]):
+            old = r.begun[j]
+            if old.key == c.key:
+                c.begun, c.gap = 1, old.gap
+                for e in range(5):
+                    c.start[e] = old.start[e]
                 break
 
 

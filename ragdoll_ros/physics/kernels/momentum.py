@@ -8,6 +8,8 @@ mass C. So the sums over dolls that touch each other are kept as well.
 """
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from .cholesky import solve
@@ -17,9 +19,12 @@ from .mass import turn_inertias
 from .quaternion import cross, turned
 from .system import Room, System
 
-SUMS = 16
+SMALL = 0.01
+"""Share of the energy of the bones against each other that a step may be corrected by."""
+
+SUMS = 17
 """Of a doll: mass, centre (3) m, momentum (3), angular momentum (3) about the centre, and the
-inertia (6) about it as if its joints were locked: xx, xy, xz, yy, yz, zz."""
+inertia (6) about it as if its joints were locked: xx, xy, xz, yy, yz, zz; the kinetic energy, J."""
 
 
 @compiled
@@ -50,11 +55,16 @@ def sum_dolls(s: System, q: np.ndarray, v: np.ndarray, r: Room, out: np.ndarray)
         move, I = r.work.moves[i], r.own[i]
         x, y, z = cross(move[0], move[1], move[2], c[0], c[1], c[2])
         a, b, e = q[root] + c[0] - row[1], q[root + 1] + c[1] - row[2], q[root + 2] + c[2] - row[3]
-        x, y, z = cross(a, b, e, m * (move[3] + x), m * (move[4] + y), m * (move[5] + z))
         wx, wy, wz = move[0], move[1], move[2]
-        row[7] += x + I[0] * wx + I[1] * wy + I[2] * wz
-        row[8] += y + I[1] * wx + I[3] * wy + I[4] * wz
-        row[9] += z + I[2] * wx + I[4] * wy + I[5] * wz
+        lx = I[0] * wx + I[1] * wy + I[2] * wz
+        ly = I[1] * wx + I[3] * wy + I[4] * wz
+        lz = I[2] * wx + I[4] * wy + I[5] * wz
+        x, y, z = move[3] + x, move[4] + y, move[5] + z
+        row[16] += (m * (x * x + y * y + z * z) + lx * wx + ly * wy + lz * wz) / 2
+        x, y, z = cross(a, b, e, m * x, m * y, m * z)
+        row[7] += x + lx
+        row[8] += y + ly
+        row[9] += z + lz
         row[10] += I[0] + m * (b * b + e * e)
         row[11] += I[1] - m * a * b
         row[12] += I[2] - m * a * e
@@ -144,3 +154,62 @@ def keep_momentum(s: System, r: Room, h: float, before: np.ndarray, after: np.nd
         v[rate + 5] += z
         for k in range(3):
             q[at + k] += mean[3 + k]
+
+
+@compiled
+def keep_energy(s: System, r: Room, gained: float, after: np.ndarray, given: np.ndarray,
+                q: np.ndarray, v: np.ndarray) -> bool:
+    """Take energy that came from nothing out of how the bones of dolls that the ground does not
+    bear move against each other; momenta stay. Whether it was but a small part of that.
+
+    ``after``: sums (d, SUMS) at q and v. v becomes w + s (v - w), w the doll's motion as one rigid
+    body; the energy of v - w is what is left beside the rigid body's.
+    """
+    matrix, spin, inner = r.work.matrix, r.table[14], 0.0
+    for d in range(len(after)):
+        if given[d, 6] == 0.0:
+            lock(after[d], matrix, spin)
+            inner += after[d, 16] - rigid_energy(after[d], spin)
+    if not inner * SMALL > gained:
+        return False
+    share = math.sqrt(1 - gained / inner)
+    for i in range(len(s.tree)):
+        bone, d = s.tree[i], s.doll_of[i]
+        if given[d, 6] > 0:
+            continue
+        if bone.parent >= 0:
+            for k in range(bone.dof):
+                v[bone.v + k] *= share
+            continue
+        new, at, rate = after[d], bone.q, bone.v
+        lock(new, matrix, spin)
+        x, y, z = cross(spin[0], spin[1], spin[2], q[at] - new[1], q[at + 1] - new[2],
+                        q[at + 2] - new[3])
+        x, y, z = new[4] / new[0] + x, new[5] / new[0] + y, new[6] / new[0] + z
+        v[rate] = x + share * (v[rate] - x)
+        v[rate + 1] = y + share * (v[rate + 1] - y)
+        v[rate + 2] = z + share * (v[rate + 2] - z)
+        x, y, z = turned(q[at + 3], q[at + 4], q[at + 5], -q[at + 6], spin[0], spin[1], spin[2])
+        v[rate + 3] = x + share * (v[rate + 3] - x)
+        v[rate + 4] = y + share * (v[rate + 4] - y)
+        v[rate + 5] = z + share * (v[rate + 5] - z)
+    return True
+
+
+@compiled
+def lock(row: np.ndarray, matrix: np.ndarray, spin: np.ndarray) -> None:
+    """Angular velocity (3,) rad/s of a doll with its momentum as one rigid body."""
+    matrix[0, 0], matrix[1, 1], matrix[2, 2] = row[10], row[13], row[15]
+    matrix[0, 1] = matrix[1, 0] = row[11]
+    matrix[0, 2] = matrix[2, 0] = row[12]
+    matrix[1, 2] = matrix[2, 1] = row[14]
+    for k in range(3):
+        spin[k] = row[7 + k]
+    solve(matrix, spin[:3])
+
+
+@compiled
+def rigid_energy(row: np.ndarray, spin: np.ndarray) -> float:
+    """Kinetic energy, J, of that body."""
+    return ((row[4] ** 2 + row[5] ** 2 + row[6] ** 2) / row[0] + spin[0] * row[7]
+            + spin[1] * row[8] + spin[2] * row[9]) / 2

@@ -23,6 +23,9 @@ GIVEN_BACK = 0.5
 FASTEST_OUT = 1.0
 """m/s or rad/s at which what began far inside is brought out at the most."""
 
+UNSOLVED = 1e-5
+"""m/s: what is left by more is counted, and its impulses are kept from making energy."""
+
 SLACK = 1e-9
 """m or rad that nobody gives back."""
 
@@ -64,7 +67,8 @@ def respond(s: System, r: Room, q: np.ndarray, v: np.ndarray, free: np.ndarray, 
         count, rows = collect(r, begin, m, island)
         for k in range(count):
             i = r.need[1, k]
-            jacobian(s, q, r, r.contacts[int(i)], int(i), v, free, r.p[0])
+            jacobian(s, q, r, r.contacts[int(i)], int(i), v, free, r.p[0],
+                     r.p[5])
         factor_island(s, r, count, rows)
         solve_island(s, r, count, rows, h, tolerance, change, shift)
     solve_lower(r.H, s.up, change)
@@ -119,19 +123,23 @@ def solve_island(s: System, r: Room, count: int, n: int, h: float, tolerance: fl
     still to go through L; clears r.Y.
     """
     b, p, out, start, soft = r.p[0], r.p[1], r.p[2], r.p[3], r.p[4]
-    thrown = deep = False
+    was, thrown, deep = r.p[5], False, False
     for j in range(n):
         start[j] = b[j]
     for k in range(count):
         c = r.contacts[int(r.need[1, k])]
         r.need[0, k] = 0.0
+        c.before = was[c.row]
         if h == 0.0:
             if c.restitution > 0 and c.before < -s.bounce_speed[0]:
                 b[c.row] += c.restitution * c.before
                 thrown = True
+        elif c.begun:
+            for e in range(c.kind):
+                b[c.row + e] += was[c.row + e] - c.start[e]
         elif c.gap > 0:
             b[c.row] += c.gap / h
-        else:
+        if h > 0 and c.gap < 0:
             r.need[0, k] = min(GIVEN_BACK * max(0.0, -c.gap - SLACK), FASTEST_OUT * h)
             deep |= r.need[0, k] > 0
         for e in range(c.kind):
@@ -146,11 +154,12 @@ def solve_island(s: System, r: Room, count: int, n: int, h: float, tolerance: fl
         hold_energy(r.W, start, soft, p, n)
         r.counts[8] += 1
     r.counts[4] += turns
-    if left > 1e-5:
+    if not left <= UNSOLVED:
         r.counts[3] += 1
+        weaken_impulses(r.W, start, p, n)
     r.sums[3] = max(r.sums[3], left)
     if deep:
-        solve_normals(r.rows, count, n, r.W, r.need[0], out)
+        solve_normals(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, r.need[0], out, r.solver, r.G)
     for k in range(count):
         i = int(r.need[1, k])
         c = r.contacts[i]
@@ -179,6 +188,24 @@ def gained(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> float:
         total += p[i] * (u[i] + w / 2)
         size += abs(p[i] * u[i])
     return total if total > 1e-12 * size else 0.0
+
+
+@compiled
+def weaken_impulses(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> None:
+    """Scale impulses that are no solution so that they make no energy; none for what is no number.
+    """
+    work = spent = 0.0
+    for i in range(n):
+        w = 0.0
+        for j in range(n):
+            w += W[i * n + j] * p[j]
+        work += p[i] * u[i]
+        spent += p[i] * w
+    share = min(1.0, max(0.0, -2 * work / spent)) if spent > 0 else 0.0
+    if not math.isfinite(share) or not math.isfinite(work):
+        share = 0.0
+    for i in range(n):
+        p[i] = share * p[i] if share > 0 else 0.0
 
 
 @compiled

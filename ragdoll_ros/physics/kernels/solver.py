@@ -260,6 +260,11 @@ def newton(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray
             way[i] = -phi[i]
         if not gauss(G, n, way):
             break
+        total = 0.0
+        for i in range(n):
+            total += way[i]
+        if not math.isfinite(total):
+            break
         for i in range(n):
             p[i] += way[i]
         worst = residual(kinds, rows, mu, roll, m, n, W, b, p, u, phi)
@@ -349,20 +354,22 @@ def solve_impulses(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np
 
 
 @compiled
-def solve_normals(rows: np.ndarray, m: int, n: int, W: np.ndarray, need: np.ndarray,
-                  p: np.ndarray) -> None:
-    """Least normal impulses p (n,) that give each contact its velocity ``need`` (m,) or more."""
+def solve_normals(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
+                  n: int, W: np.ndarray, need: np.ndarray, p: np.ndarray, room: np.ndarray,
+                  G: np.ndarray) -> None:
+    """Least normal impulses p (n,) that give each contact its velocity ``need`` (m,) or more.
+
+    W, kinds and rows are lost: the normals' own W takes their place.
+    """
+    b, own = room[4], room[5]
+    for c in range(m):
+        for e in range(m):
+            W[c * m + e] = W[rows[c] * n + rows[e]]
     for i in range(n):
         p[i] = 0.0
-    for _ in range(60):
-        worst = 0.0
-        for c in range(m):
-            a = rows[c]
-            u = -need[c]
-            for e in range(m):
-                u += W[a * n + rows[e]] * p[rows[e]]
-            x = max(0.0, p[a] - u / W[a * n + a])
-            worst = max(worst, abs(x - p[a]) * W[a * n + a])
-            p[a] = x
-        if worst < 1e-10:
-            break
+    for c in range(m):
+        b[c], own[c], room[6, c] = -need[c], 0.0, rows[c]
+        kinds[c], rows[c], mu[c], roll[c] = LIMIT, c, 0.0, 0.0
+    solve_cones(kinds, rows, mu, roll, m, m, W, b, own, 1e-9, 4, room, G)
+    for c in range(m):
+        p[int(room[6, c])] = max(0.0, own[c])

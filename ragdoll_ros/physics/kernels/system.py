@@ -33,12 +33,13 @@ CONTACT = np.dtype([
     ('island', np.int64), ('row', np.int64), ('support', np.int64), ('point', float, 3),
     ('arm', float, 3), ('normal', float, 3), ('across', float, (2, 3)), ('gap', float),
     ('friction', float), ('rolling', float), ('restitution', float), ('before', float),
-    ('impulse', float, 5)], align=True)
+    ('impulse', float, 5), ('begun', np.int64), ('start', float, 5)], align=True)
 """A contact of bone ``a`` (a record of the tree) with ``b`` (-1: the ground), or a joint at its
 limit: ``a`` its velocity, ``normal[0]`` the sign of the way out. ``point``, where the normal force
 acts, and ``arm``, where friction does, are in the world, m; ``normal`` is from b to a, ``across``
 two directions along the surface. ``key`` tells it from all others at all times, ``group`` those of
-one patch. ``before``: its normal velocity, m/s."""
+one patch. ``before``: its normal velocity, m/s. ``begun``: whether it was there when the step
+began, with the velocities ``start`` along its rows."""
 
 System = collections.namedtuple(
     'System', 'tree gravity up last bone_of root_of doll_of damping geoms pairs bounds normal '
@@ -50,7 +51,7 @@ the record of its doll's root, ``doll_of`` (n,); ``damping`` (nv,) N m s; ``norm
 
 Room = collections.namedtuple(
     'Room', 'work own composite H contacts table at turn gaps later Y support W G p solver '
-    'kinds rows mu roll need label vectors states counts sums given before after')
+    'kinds rows mu roll need label vectors states counts sums given before after begun')
 """Scratch of the rigid core."""
 
 STICKS = 1e5
@@ -76,13 +77,14 @@ def make_room(system: System, contacts: int) -> Room:
         at=np.zeros((geoms, 3)), turn=np.zeros((geoms, 3, 3)), gaps=np.zeros(gaps),
         later=np.zeros(gaps), Y=np.zeros((rows, nv)),
         support=np.zeros((contacts, min(nv, 2 * depth(system)) + 1), np.int64),
-        W=np.zeros(rows * rows), G=np.zeros(rows * rows), p=np.zeros((5, rows)),
+        W=np.zeros(rows * rows), G=np.zeros(rows * rows), p=np.zeros((6, rows)),
         solver=np.zeros((7, max(rows, 8))), kinds=np.zeros(contacts, np.int64),
         rows=np.zeros(contacts, np.int64), mu=np.zeros(contacts), roll=np.zeros(contacts),
         need=np.zeros((2, contacts)), label=np.zeros(dolls, np.int64),
         vectors=np.zeros((VECTORS, nv)), states=np.zeros((STATES, nq)),
         counts=np.zeros(16, np.int64), sums=np.zeros(8), given=np.zeros((dolls, 7)),
-        before=np.zeros((dolls, 16)), after=np.zeros((dolls, 16)))
+        before=np.zeros((dolls, 17)), after=np.zeros((dolls, 17)),
+        begun=np.zeros(contacts, CONTACT))
 
 
 def depth(system: System) -> int:
