@@ -32,12 +32,12 @@ def _integrate(s, q, v, h, out):
 
 @numba.njit
 def _step(s, r, loads, q, v, h, path, k, y):
-    path_step(s, r, loads, q, v, h, path, k, y)
+    path_step(s.tree, s.gravity, r.work, loads, q, v, h, path, k, y)
 
 
 @numba.njit
 def _along(s, path, time, q, v):
-    along(s, path, time, q, v)
+    along(s.tree, path, time, q, v)
 
 
 class KernelDynamics:

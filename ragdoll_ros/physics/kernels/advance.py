@@ -174,7 +174,6 @@ def step_or_touch(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, lo
         r.sums[0], r.sums[1], r.sums[2] = done, handed, lifted
         m = contact_step(s, r, q, v, length, loads, springs, since, known, end_q, end_v)
         settle_momentum(s, r, q, v, length, loads, springs, since, m, end_q, end_v)
-        integrate(s.tree, end_q, r.vectors[3], 1.0, end_q)
         look(s, r, end_q, end_v, r.gaps, length, r.later)
         if turn == TRIES - 1:
             break
@@ -253,15 +252,22 @@ def begin_step(s: System, r: Room, q: np.ndarray, v: np.ndarray) -> None:
 def settle_momentum(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loads: np.ndarray,
                     springs: np.ndarray, since: float, m: int, end_q: np.ndarray,
                     end_v: np.ndarray) -> None:
-    """Book the work of a step of h s, and keep the momentum of what the ground does not bear."""
-    for d in range(len(r.given)):
-        for k in range(7):
-            r.given[d, k] = 0.0
+    """Book the work of a step of h s, give depths back by r.vectors[3], and keep the momentum of
+    what the ground does not bear.
+    """
+    r.given[:] = 0.0
     give_contacts(s, r, m, r.given)
     if len(loads) or len(springs):
         enter_work(s, r, v, end_v, h, loads, springs, since)
-    if r.given[:, 6].min() == 0.0:
+    free = r.given[:, 6].min() == 0.0
+    if free:
         sum_dolls(s, q, v, r, r.before)
+        sum_dolls(s, end_q, end_v, r, r.after)
+        for d in range(len(r.given)):
+            for k in range(3):
+                r.given[d, 7 + k] = r.after[d, 1 + k]
+    integrate(s.tree, end_q, r.vectors[3], 1.0, end_q)
+    if free:
         sum_dolls(s, end_q, end_v, r, r.after)
         keep_momentum(s, r, h, r.before, r.after, r.given, end_q, end_v)
 

@@ -39,6 +39,9 @@ by the next step, without restitution, and not sought out."""
 
 SLOW_TURN = 0.1
 
+OPENING = 1e-3
+"""m/s: what comes apart faster as a step begins is not held sideways in it."""
+
 
 @compiled
 def impact(s: System, r: Room, q: np.ndarray, v: np.ndarray, bounces: bool) -> int:
@@ -298,6 +301,10 @@ def warm_start(r: Room, m: int, known: np.ndarray, h: float) -> None:
                 c.begun, c.gap = 1, old.gap
                 for e in range(5):
                     c.start[e] = old.start[e]
+                if c.kind > 1 and old.start[0] > OPENING:
+                    c.friction = c.rolling = 0.0
+                    for e in range(1, 5):
+                        c.impulse[e] = 0.0
                 break
 
 

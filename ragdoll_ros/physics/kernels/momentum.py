@@ -76,7 +76,7 @@ def sum_dolls(s: System, q: np.ndarray, v: np.ndarray, r: Room, out: np.ndarray)
 @compiled
 def give(given: np.ndarray, doll: int, sign: float, x: float, y: float, z: float, jx: float,
          jy: float, jz: float) -> None:
-    """Enter an impulse, N s, at a point of the world, m, into a doll's row of ``given`` (d, 7)."""
+    """Enter an impulse, N s, at a point of the world, m, into a doll's row of ``given`` (d, 10)."""
     row = given[doll]
     row[0] += sign * jx
     row[1] += sign * jy
@@ -116,8 +116,9 @@ def give_contacts(s: System, r: Room, m: int, given: np.ndarray) -> None:
 @compiled
 def keep_momentum(s: System, r: Room, h: float, before: np.ndarray, after: np.ndarray,
                   given: np.ndarray, q: np.ndarray, v: np.ndarray) -> None:
-    """Change q and v at a step's end so that each doll which the ground does not bear has the
-    momentum and the place that are due; ``before``, ``after``: sums (d, SUMS).
+    """Change q and v at a step's end, before which the centres were at given[:, 7:10], so that each
+    doll which the ground does not bear has the momentum and the place that are due; ``before``,
+    ``after``: sums (d, SUMS).
     """
     matrix, turn = r.work.matrix, r.table[14]
     for i in range(len(s.tree)):
@@ -132,7 +133,7 @@ def keep_momentum(s: System, r: Room, h: float, before: np.ndarray, after: np.nd
             due = old[4 + k] + row[k] + m * s.gravity[k] * h
             place = old[1 + k] + h * (old[4 + k] + due) / (2 * m)
             mean[k] = (old[1 + k] + place) / 2
-            mean[3 + k] = place - new[1 + k]
+            mean[3 + k] = place - row[7 + k]
             gained[k] = (due - new[4 + k]) / m
         x, y, z = cross(mean[0], mean[1], mean[2], row[0], row[1], row[2])
         turn[0] = old[7] + row[3] - x - new[7]

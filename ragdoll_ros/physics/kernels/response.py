@@ -153,6 +153,9 @@ def solve_island(s: System, r: Room, count: int, n: int, h: float, tolerance: fl
                        r.solver, r.G)
         hold_energy(r.W, start, soft, p, n)
         r.counts[8] += 1
+    if not left <= UNSOLVED and h > 0:
+        left, more = solve_straight(r, count, n, h, tolerance)
+        turns += more
     r.counts[4] += turns
     if not left <= UNSOLVED:
         r.counts[3] += 1
@@ -176,6 +179,23 @@ def solve_island(s: System, r: Room, count: int, n: int, h: float, tolerance: fl
 
 
 @compiled
+def solve_straight(r: Room, count: int, n: int, h: float, tolerance: float) -> tuple[float, int]:
+    """Solve an island again as if its way were straight: more contacts than a body has freedoms
+    may see a curved way as no motion of the body at all.
+    """
+    b, p = r.p[0], r.p[1]
+    for j in range(n):
+        b[j], p[j] = r.p[3, j], 0.0
+    for k in range(count):
+        c = r.contacts[int(r.need[1, k])]
+        r.mu[k] = c.friction
+        if c.gap > 0 and not c.begun:
+            b[c.row] += c.gap / h
+    return solve_impulses(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, b, p, tolerance, SWEEPS,
+                          r.solver, r.G)
+
+
+@compiled
 def gained(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> float:
     """Kinetic energy, J, that impulses p give to what moves at u: p (u + W p / 2); 0 if that is
     rounding.
@@ -192,8 +212,7 @@ def gained(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> float:
 
 @compiled
 def weaken_impulses(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> None:
-    """Scale impulses that are no solution so that they make no energy; none for what is no number.
-    """
+    """Scale impulses that are no solution so that they make no energy; no number becomes none."""
     work = spent = 0.0
     for i in range(n):
         w = 0.0

@@ -82,7 +82,7 @@ def make_room(system: System, contacts: int) -> Room:
         rows=np.zeros(contacts, np.int64), mu=np.zeros(contacts), roll=np.zeros(contacts),
         need=np.zeros((2, contacts)), label=np.zeros(dolls, np.int64),
         vectors=np.zeros((VECTORS, nv)), states=np.zeros((STATES, nq)),
-        counts=np.zeros(16, np.int64), sums=np.zeros(8), given=np.zeros((dolls, 7)),
+        counts=np.zeros(16, np.int64), sums=np.zeros(8), given=np.zeros((dolls, 10)),
         before=np.zeros((dolls, 17)), after=np.zeros((dolls, 17)),
         begun=np.zeros(contacts, CONTACT))
 
