@@ -1,7 +1,7 @@
 # Wants GNU make and a python3 of 3.10 or newer with its venv module; sets up the rest in .venv,
 # with ROS 2 Jazzy from PyPI's wheels, or with the ROS that the shell has sourced.
 PYTHON ?= python3
-EXTRAS := test,report,fit,viewer,fast
+EXTRAS := test,report,fit,viewer
 VENV := .venv
 BIN := $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check
@@ -20,7 +20,7 @@ else
 VENV_FLAGS := --system-site-packages
 endif
 
-.PHONY: help run test plain pictures lint slow bench hard report colcon users-versions clean
+.PHONY: help run test pictures lint slow bench hard report colcon users-versions clean
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 22
 
@@ -30,11 +30,6 @@ run: $(COMPILED) ## the doll falls, arrow keys push it; SCENE=crowd: another sce
 # A file's tests stay together: those of one ROS domain, and those that time, go one by one.
 test: $(COMPILED) chromium ## the tests, two and a half minutes on two cores
 	@$(BIN)/python -m pytest -n 3 --dist loadfile
-
-# What numpy and PyBullet do where numba is not.
-CORE := simulation pushes contact conservation mechanics flight grab conventions riders measure references ragdoll
-plain: $(READY) ## the core's tests without compiled code
-	@RAGDOLL_COMPILED=0 $(BIN)/python -m pytest -n 3 --dist loadfile $(CORE:%=test/test_%.py)
 
 # For the tests of the page: of Playwright only the driver comes from PyPI. Where there is none to
 # be had, those tests are skipped and say so.
@@ -113,7 +108,7 @@ $(READY): setup.py pyproject.toml
 
 # Once, and after a change, with a word on it: else the first programs that need it would.
 $(COMPILED): $(READY) $(wildcard ragdoll_ros/physics/kernels/*.py)
-	@test "$$RAGDOLL_COMPILED" = 0 || $(BIN)/python -m ragdoll_ros.physics.kernels >/dev/null
+	@$(BIN)/python -m ragdoll_ros.physics.kernels >/dev/null
 	@touch $@
 
 .PHONY: pybullet-from-source

@@ -60,8 +60,7 @@ class InstallDataWithLaunchers(Distribution().get_command_class('install_data'))
 setup(
     name=NAME,
     version='0.1.0',
-    description='A passive doll simulated in PyBullet: takes pushes, publishes the pose of every '
-                'bone.',
+    description='A passive doll of rigid bodies: takes pushes, publishes the pose of every bone.',
     license='Apache-2.0',
     maintainer='ragdoll_ros maintainers',
     maintainer_email='maintainers@users.noreply.github.com',
@@ -74,12 +73,11 @@ setup(
     ],
     cmdclass={'build_py': BuildWithConfig, 'install_data': InstallDataWithLaunchers},
     entry_points={'console_scripts': [f'{name} = {place}' for name, place in EXECUTABLES.items()]},
-    install_requires=['numpy', 'pyyaml', 'jsonschema', 'pybullet'],
+    # numba 0.59 is the first for Ubuntu 24.04's Python.
+    install_requires=['numpy', 'pyyaml', 'jsonschema', 'pybullet', 'numba>=0.59'],
     extras_require={
         'ros': ['ros-jazzy-rclpy', 'ros-jazzy-rmw-fastrtps-cpp', 'ros-jazzy-common-interfaces'],
-        # Machine code for the sums of every tick; 0.59 is the first for Ubuntu 24.04's Python.
-        'fast': ['numba>=0.59'],
-        'report': ['scipy', 'matplotlib', 'mujoco', 'numba>=0.59'],
+        'report': ['scipy', 'matplotlib', 'mujoco'],
         'fit': ['matplotlib'],
         # The page: 3D, panels and plots in a browser, served from Python, with no build of its own.
         'viewer': ['viser', 'imageio'],

@@ -35,11 +35,11 @@ def pytest_collection_modifyitems(items):
 
 
 def light():
-    """Environment of a process that is looked at, not measured: it need not load machine code.
+    """Environment of a process that is looked at, not measured: PyBullet plainly will do.
 
-    That takes a second of a processor's time, more than the rest of its start.
+    To load machine code takes a second of a processor's time, more than the rest of its start.
     """
-    return {**os.environ, 'RAGDOLL_COMPILED': '0'}
+    return {**os.environ, 'NUMBA_DISABLE_JIT': '1'}
 
 
 @pytest.fixture(scope='session')

@@ -6,12 +6,11 @@ import numpy as np
 from ragdoll_ros.accuracy.references.articulated import Articulated
 from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.model import rotation
-from ragdoll_ros.model.coordinates import GeneralizedState
+from ragdoll_ros.model.coordinates import DofLayout, GeneralizedState
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Sphere
 from ragdoll_ros.model.state import State
-from ragdoll_ros.physics.engine.bullet import BulletEngine
 
 GRAVITY = (0.3, -0.2, -9.8)
 TURN = tuple(rotation.normalized((.1, .5, -.3, .8)))
@@ -95,9 +94,7 @@ def random_state(scene, seed, height=0.0):
 
 
 def layout_of(scene):
-    engine = BulletEngine(scene, free=True)
-    engine.close()
-    return engine.layout
+    return DofLayout([placement.doll for placement in scene.dolls])
 
 
 def apart(state, other):

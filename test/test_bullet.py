@@ -1,12 +1,11 @@
-"""PyBullet behind the protocol: contacts, and giants in the unit of mass that they are built in."""
+"""PyBullet behind the protocol: contacts, loads, and what it would cut off without a word."""
 import dataclasses
 
 import numpy as np
 import pytest
-from samples import GRAVITY, every_kind, random_coordinates, scene_of
+from oracles import PLAIN
 
-from ragdoll_ros.accuracy.references.articulated import Articulated
-from ragdoll_ros.model import rotation
+from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.scene import Ground, Material, Placement, Scene
 from ragdoll_ros.model.shapes import Box, Sphere
@@ -18,24 +17,25 @@ def one(shape, mass, **scene):
     """An engine with a single bone."""
     placement = {name: scene.pop(name) for name in ('position', 'orientation') if name in scene}
     doll = Ragdoll('one', (Bone('bone', shape, mass, (0, 0, 0)),))
-    return BulletEngine(Scene('one', (Placement(doll, **placement),), **scene))
+    return BulletEngine(Scene('one', (Placement(doll, **placement),), **scene), PLAIN)
 
 
-@pytest.mark.parametrize('mass', [2.0, 1e6])
+@pytest.mark.parametrize('substeps', [1, 4])
 @pytest.mark.parametrize('shape', [Sphere(.1), Box((.2, .2, .2))])
-def test_what_rests_on_a_tilted_ground_tells_of_it(shape, mass):
-    """Contacts of bone 0 with the GROUND: out of it, on the bone's surface, as heavy as the bone.
-
-    Under a box the ground is a slab, which PyBullet names before the box.
+def test_what_rests_on_a_tilted_ground_tells_of_it(shape, substeps):
+    """Contacts of bone 0 with the GROUND: out of it, on the bone's surface, as heavy as the bone,
+    however many substeps there are in a step.
     """
+    mass = 2.0
     ground = Ground(normal=(.6, 0, .8), offset=1.0)
     normal = np.array(ground.normal)
     engine = one(shape, mass, position=normal * 1.1, ground=ground, gravity=-9.8 * normal,
                  orientation=rotation.shortest_arc((0, 0, 1), normal),
                  material=Material(restitution=0))
+    engine.accuracy = dataclasses.replace(PLAIN, substeps=substeps / .2)
     for _ in range(500):
-        engine.step(1e-3, 1)
-    found, centre = engine.contacts(), engine.read().positions[0]
+        engine.advance(2e-3)
+    found, centre = engine.contacts(), engine.state.positions[0]
     engine.close()
     assert found and all((contact.a, contact.b) == (0, GROUND) for contact in found)
     assert sum(contact.force for contact in found) == pytest.approx(mass * 9.8, rel=1e-3)
@@ -46,15 +46,15 @@ def test_what_rests_on_a_tilted_ground_tells_of_it(shape, mass):
 
 
 @pytest.mark.parametrize('local', [False, True])
-@pytest.mark.parametrize('mass', [2.0, 1e6])
-def test_a_wrench_is_in_newtons_whatever_the_mass(mass, local):
+@pytest.mark.parametrize('mass', [2.0, 1e3])
+def test_a_wrench_is_in_newtons(mass, local):
     """F h / m and I^-1 (tau + r x F) h, in the bone's axes where it is local."""
     turn = (.6, 0, 0, .8)
     engine = one(Sphere(.1), mass, orientation=turn, ground=None, gravity=(0, 0, 0))
     force, torque, point = mass * np.array([[1, 2, -3], [.1, 0, .3], [0, .05, .02]])
     point = point / mass
-    engine.step(1e-3, 1, [AppliedWrench(0, force, torque, point, local=local)])
-    state = engine.read()
+    engine.advance(1e-3, [AppliedWrench(0, force, torque, point, local=local)])
+    state = engine.state
     engine.close()
     arm = rotation.rotate(turn, point)
     if local:
@@ -63,21 +63,6 @@ def test_a_wrench_is_in_newtons_whatever_the_mass(mass, local):
     inertia = .4 * mass * .1 ** 2
     assert state.angular_velocities[0] == pytest.approx(
         (torque + np.cross(arm, force)) * 1e-3 / inertia, rel=1e-6)
-
-
-def test_a_giant_accelerates_by_the_equations_of_motion():
-    """A million times as heavy and as damped as usual, it moves as usual."""
-    doll = every_kind()
-    giant = dataclasses.replace(
-        doll, bones=tuple(dataclasses.replace(bone, mass=1e6 * bone.mass) for bone in doll.bones),
-        joints=tuple(dataclasses.replace(joint, damping=1e6 * joint.damping)
-                     for joint in doll.joints))
-    scene = scene_of(giant)
-    here, engine = random_coordinates(scene, 1), BulletEngine(scene, free=True)
-    found = engine.acceleration(here)
-    engine.close()
-    right = Articulated(giant, GRAVITY).acceleration(here.q, here.v)
-    assert np.abs(found - right).max() < 1e-8 * np.abs(right).max()
 
 
 @pytest.mark.parametrize(('dolls', 'overlap', 'touch'), [(1, .5, True), (1, 1.5, False),
@@ -95,8 +80,8 @@ def test_bones_of_one_doll_that_overlap_at_the_start_do_not_collide(dolls, overl
         placements = (Placement(Ragdoll('all', bones, joints)),)
     else:
         placements = tuple(Placement(Ragdoll(bone.name, (bone,)), bone.name) for bone in bones)
-    engine = BulletEngine(Scene('overlap', placements, ground=None, gravity=(0, 0, 0)))
-    engine.step(1e-5, 1)
+    engine = BulletEngine(Scene('overlap', placements, ground=None, gravity=(0, 0, 0)), PLAIN)
+    engine.advance(1e-5)
     found = {frozenset((contact.a, contact.b)) for contact in engine.contacts()}
     engine.close()
     assert found == ({frozenset((0, 2))} if touch else set())
@@ -106,9 +91,20 @@ def test_what_rests_does_not_bounce_at_long_steps():
     """A step of 20 ms alone gives 0.2 m/s, which a bouncing ball would give back nine tenths of."""
     engine = one(Sphere(.1), 1.0, position=(0, 0, .1), ground=Ground(),
                  material=Material(restitution=.9))
+    engine.accuracy = dataclasses.replace(PLAIN, substeps=.5)
     heights = []
     for _ in range(100):
-        engine.step(.02, 1)
-        heights.append(engine.read().positions[0, 2])
+        engine.advance(.02)
+        heights.append(engine.state.positions[0, 2])
     engine.close()
     assert heights == pytest.approx([.1] * 100, abs=2e-4)
+
+
+def test_more_joints_than_pybullet_tells_of_are_refused():
+    """Of 128 coordinates at the most: of a chain of 31 free balls it would drop some silently."""
+    balls = tuple(Bone(f'b{k}', Sphere(0.04), 0.1, (0.1 * k, 0.0, 0.0)) for k in range(32))
+    joints = tuple(Joint(f'b{k}', f'b{k + 1}', 'ball', (0.1 * k + 0.05, 0.0, 0.0),
+                         ((1.0, 0.0, 0.0),)) for k in range(31))
+    scene = Scene('chain', (Placement(Ragdoll('chain', balls, joints)),), ground=None)
+    with pytest.raises(errors.OutOfRange, match='at most 128'):
+        BulletEngine(scene, PLAIN)

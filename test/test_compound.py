@@ -5,6 +5,7 @@ from importlib.util import find_spec
 import numpy as np
 import pybullet
 import pytest
+from oracles import PLAIN, bullet_acceleration, mujoco_acceleration
 from samples import GRAVITY, TURN, every_kind, random_coordinates, scene_of
 from specimens import HAMMER
 
@@ -17,6 +18,7 @@ from ragdoll_ros.model.pose import Pose
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Ground, Placement, Scene
 from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Part, Sphere
+from ragdoll_ros.physics import kernels
 from ragdoll_ros.physics.engine.bullet import BulletEngine
 from ragdoll_ros.physics.engine.mujoco import MujocoEngine
 from ragdoll_ros.physics.engine.protocol import GROUND
@@ -27,8 +29,23 @@ ASKEW = Compound((Part(Box((0.1, 0.2, 0.4)), (0.3, 0, -0.1), TURN),
 """Nothing aligned, its centre of mass off the origin."""
 
 DUMBBELL = Compound((Part(Sphere(0.1), (0.3, 0, 0)), Part(Sphere(0.1), (-0.3, 0, 0))))
-ENGINES = [BulletEngine, pytest.param(
-    MujocoEngine, marks=pytest.mark.skipif(find_spec('mujoco') is None, reason='no MuJoCo'))]
+
+ENGINES = {BulletEngine: bullet_acceleration, MujocoEngine: mujoco_acceleration}
+"""Whom to ask for accelerations, and how."""
+
+if kernels.ready():
+    from kernel_dynamics import KernelDynamics
+
+    from ragdoll_ros.physics.engine.rigid import RigidEngine
+
+    ENGINES[RigidEngine] = lambda engine, coordinates: KernelDynamics(
+        engine.scene).acceleration(coordinates)
+
+
+def each_engine(function):
+    return pytest.mark.parametrize('engine', [pytest.param(engine, marks=pytest.mark.skipif(
+        engine is MujocoEngine and find_spec('mujoco') is None, reason='no MuJoCo'))
+        for engine in ENGINES])(function)
 
 
 def alone(shape, **fields):
@@ -127,10 +144,10 @@ def of_their_own():
     return dataclasses.replace(doll, bones=tuple(bones))
 
 
-@pytest.mark.parametrize('engine', ENGINES)
+@each_engine
 @pytest.mark.parametrize('mass', [1.0, 1e6])
 def test_engines_accelerate_as_its_inertia_says(engine, mass):
-    """Against the equations of motion; of giants too, which PyBullet has in another unit."""
+    """Against the equations of motion; of giants too."""
     doll = of_their_own()
     doll = dataclasses.replace(doll, bones=tuple(dataclasses.replace(
         bone, mass=bone.mass * mass, moments=tuple(mass * moment for moment in bone.moments))
@@ -138,18 +155,19 @@ def test_engines_accelerate_as_its_inertia_says(engine, mass):
     scene = scene_of(doll)
     placed = random_coordinates(scene, 5, bend=0.4)
     truth = Articulated(doll, GRAVITY).acceleration(placed.q, placed.v)
-    made = engine(scene)
-    found = made.acceleration(placed)
+    made = engine(scene, PLAIN)
+    found = ENGINES[engine](made, placed)
     made.close()
     assert np.abs(found - truth).max() < 1e-8 * np.abs(truth).max()
 
 
-@pytest.mark.parametrize('engine', ENGINES)
+@each_engine
 def test_each_part_meets_the_ground_and_other_bones(engine):
     """A dumbbell 2 mm deep: under both balls, on the middle lines; its ends apart meet a block."""
     doll = Ragdoll('dumbbell', (Bone('bone', DUMBBELL, 2.0, (0, 0, 0)),))
-    made = engine(Scene('deep', (Placement(doll, position=(0, 0, 0.098)),), Ground()))
-    made.step(1e-5, 1)
+    made = engine(Scene('deep', (Placement(doll, position=(0, 0, 0.098)),), Ground()), PLAIN)
+    if engine is not MujocoEngine:  # its contacts, stiff in steps so short, have thrown it out then
+        made.advance(1e-5)
     found = sorted(made.contacts(), key=lambda contact: contact.position[0])
     made.close()
     assert [(contact.a, contact.b) for contact in found] == [(0, GROUND)] * 2
@@ -157,19 +175,20 @@ def test_each_part_meets_the_ground_and_other_bones(engine):
         assert contact.position == pytest.approx((x, 0, -0.002), abs=1e-6)
         assert contact.depth == pytest.approx(0.002, abs=1e-6)
     block = Ragdoll('block', (Bone('block', Box((0.1, 0.1, 0.1)), 1.0, (-0.448, 0, 0)),))
-    made = engine(Scene('pair', (Placement(doll), Placement(block)), gravity=(0, 0, 0)))
-    made.step(1e-5, 1)
+    made = engine(Scene('pair', (Placement(doll), Placement(block)), gravity=(0, 0, 0)), PLAIN)
+    made.advance(1e-5)
     contact, = made.contacts()
     made.close()
     assert {contact.a, contact.b} == {0, 1}
     assert contact.position[0] == pytest.approx(-0.399, abs=2e-3)
 
 
-def test_nothing_is_between_the_parts_of_a_dumbbell():
+@each_engine
+def test_nothing_is_between_the_parts_of_a_dumbbell(engine):
     """A ball that passes between its ends touches neither."""
     doll = Ragdoll('dumbbell', (Bone('bone', DUMBBELL, 2.0, (0, 0, 0)),))
     ball = Ragdoll('ball', (Bone('ball', Sphere(0.15), 1.0, (0, 0, 0)),))
-    made = BulletEngine(Scene('through', (Placement(doll), Placement(ball)), gravity=(0, 0, 0)))
-    made.step(1e-5, 1)
+    made = engine(Scene('through', (Placement(doll), Placement(ball)), gravity=(0, 0, 0)), PLAIN)
+    made.advance(1e-5)
     assert not made.contacts()
     made.close()

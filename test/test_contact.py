@@ -47,18 +47,20 @@ def turned_start(seed):
     return dataclasses.replace(DROP, dolls=(placement,))
 
 
-@pytest.mark.parametrize('seed', range(20))
-def test_a_fall_makes_no_energy_keeps_together_and_ends(seed):
-    scene = turned_start(seed)
+@pytest.mark.parametrize(('engine', 'seed'), [
+    *(('auto', seed) for seed in range(20)), *(('bullet', seed) for seed in range(5))])
+def test_a_fall_makes_no_energy_keeps_together_and_ends(engine, seed):
+    """Bullet's account leaves 0.1 % alone, and its bones sink; the rigid engine's are lifted."""
+    scene, rigid = turned_start(seed), engine == 'auto'
     gap = JointGap(scene)
-    with Simulation(scene) as simulation:
+    with Simulation(scene, engine=engine) as simulation:
         start = conserved(scene, simulation.state).energy
         while not simulation.asleep:
             state = simulation.advance()
-            assert conserved(scene, state).energy <= start * 1.001
-            assert gap.gaps(state).max() <= 1e-6
+            assert conserved(scene, state).energy <= start * (1 + (1e-5 if rigid else 1e-3))
+            assert gap.gaps(state).max() <= (1e-12 if rigid else 1e-6)
             assert simulation.time <= 10 * SECOND
-        assert -0.005 <= lowest(scene, state) <= 0.002
+        assert -(0.001 if rigid else 0.005) <= lowest(scene, state) <= 0.002
 
 
 def test_the_crowd_makes_no_energy():
@@ -75,7 +77,7 @@ def test_the_crowd_makes_no_energy():
 
 @pytest.mark.parametrize('friction', [0.3, 0.5, math.inf])
 def test_rolling_friction_is_a_lever_arm(friction):
-    """A ball that rolls slows down by 5/7 g b / R."""
+    """A ball that rolls slows down by 5/7 g b / R; an even deceleration is exact in any step."""
     radius, arm = 0.1, 0.01
     scene = Scene('roll', (Placement(BALL, position=(0.0, 0.0, radius), velocity=(2.0, 0.0, 0.0),
                                      spin=(0.0, 2 / radius, 0.0)),), Ground(),
@@ -85,7 +87,7 @@ def test_rolling_friction_is_a_lever_arm(friction):
             first = simulation.advance().linear_velocities[0, 0]
         for _ in range(40):
             last = simulation.advance().linear_velocities[0, 0]
-    assert (first - last) / 0.4 == pytest.approx(5 / 7 * 9.8 * arm / radius, rel=1e-6)
+    assert (first - last) / 0.4 == pytest.approx(5 / 7 * 9.8 * arm / radius, rel=1e-9)
 
 
 def test_a_ball_that_spins_on_the_spot_goes_on():
@@ -94,7 +96,7 @@ def test_a_ball_that_spins_on_the_spot_goes_on():
     with Simulation(scene) as simulation:
         for _ in range(60):
             state = simulation.advance()
-    assert state.angular_velocities[0] == pytest.approx((0, 0, 10), abs=1e-3)
+    assert state.angular_velocities[0] == pytest.approx((0, 0, 10), abs=1e-12)
 
 
 @pytest.mark.parametrize('accuracy', ['draft', 'normal', 'exact'])
@@ -108,13 +110,10 @@ def test_a_ball_hands_its_momentum_on_to_another(accuracy, apart):
     with Simulation(scene, accuracy=accuracy) as simulation:
         for _ in range(30):
             state = simulation.advance()
-    # They overlap by 0.02 mm at the most when they are found to touch, which the engine returns
-    # at depth over 0.01 s: 0.002 m/s between the two.
-    assert state.linear_velocities[:, 0] == pytest.approx([0.75, 2.25], abs=0.002)
-    assert state.linear_velocities[:, 0].sum() == pytest.approx(3.0, abs=1e-6)
+    assert state.linear_velocities[:, 0] == pytest.approx([0.75, 2.25], abs=1e-12)
 
 
-def on_a_slope(degrees, friction):
+def on_a_slope(degrees, friction, engine='auto'):
     """Way, m, that a box slides down a slope within a second."""
     tilt = math.radians(degrees)
     box = Ragdoll('box', (Bone('box', Box((0.4, 0.4, 0.1)), 5.0, (0.0, 0.0, 0.0)),))
@@ -122,38 +121,53 @@ def on_a_slope(degrees, friction):
     placement = Placement(box, position=tuple(0.05 * n for n in normal),
                           orientation=tuple(rotation.from_rpy(0.0, tilt, 0.0)))
     scene = Scene('slope', (placement,), Ground(normal), material=Material(friction, 0.0, 0.0))
-    with Simulation(scene) as simulation:
+    with Simulation(scene, engine=engine) as simulation:
         start = simulation.state.positions[0]
         for _ in range(100):
             state = simulation.advance()
     return float(np.linalg.norm(state.positions[0] - start))
 
 
-def test_friction_without_limit_holds_up_to_its_angle():
-    """Coulomb's: no slip below atan(NO_SLIP) = 35 degrees, above g (sin - mu cos) t^2 / 2."""
-    # While it settles it may give way by as much as it sinks.
-    assert on_a_slope(30, math.inf) < 0.004
+@pytest.mark.parametrize(('engine', 'settling', 'error'), [
+    ('auto', 1e-9, 1e-9), ('bullet', 0.004, 0.02)])
+def test_friction_holds_up_to_its_angle(engine, settling, error):
+    """Coulomb's: no slip below atan(mu), above g (sin - mu cos) t^2 / 2.
+
+    In bullet the box settles, by as much as it sinks; for rigid an even acceleration is exact.
+    """
+    assert on_a_slope(30, 0.7, engine) < settling
+    assert on_a_slope(50, 2.0, engine) < settling
     tilt = math.radians(50)
-    way = 9.8 * (math.sin(tilt) - NO_SLIP * math.cos(tilt)) / 2
-    assert on_a_slope(50, math.inf) == pytest.approx(way, rel=0.02)
-    assert on_a_slope(50, 2.0) < 0.004
+    way = 9.8 * (math.sin(tilt) - 0.7 * math.cos(tilt)) / 2
+    assert on_a_slope(50, 0.7, engine) == pytest.approx(way, rel=error)
 
 
-def test_the_longest_tick_may_ask_for_any_number_of_substeps():
-    """Found by a fall at 28 m/s in ticks of 0.2 s: the table of counts ended too early.
+def test_friction_without_limit_holds_on_any_slope():
+    assert on_a_slope(70, math.inf, 'rigid') < 1e-9
 
-    The blow takes most of its 22 kJ, and it lies on the ground from then on.
+
+def test_friction_without_limit_is_a_large_one_for_bullet():
+    """Its solver does not end with larger ones."""
+    assert on_a_slope(50, math.inf, 'bullet') == on_a_slope(50, NO_SLIP, 'bullet')
+
+
+@pytest.mark.parametrize('engine', ['auto', 'bullet'])
+def test_the_longest_tick_ends_a_fast_fall_on_the_ground(engine):
+    """At 28 m/s, in ticks of 0.2 s: the blow takes most of its 22 kJ, and what is left, of half
+    the speed at the most, throws it up and about until it lies.
     """
     scene = load_scene('drop')
     fast = dataclasses.replace(scene.dolls[0], velocity=(0.0, 0.0, -28.0))
     scene = dataclasses.replace(scene, dolls=(fast,), step=0.2)
-    with Simulation(scene, accuracy='exact') as simulation:
+    with Simulation(scene, accuracy='exact', engine=engine) as simulation:
         energies = [conserved(scene, simulation.state).energy]
-        for _ in range(5):
+        while not simulation.asleep:
             state = simulation.advance()
             energies.append(conserved(scene, state).energy)
-            assert -0.005 <= lowest(scene, state) < 0.2
-    assert np.diff(energies).max() < 0.1
+            assert lowest(scene, state) >= -0.005
+            assert simulation.time <= 10 * SECOND
+    assert lowest(scene, state) < 0.005
+    assert np.diff(energies).max() < 1e-5 * energies[0]
     assert energies[1] < 0.1 * energies[0]
 
 
@@ -172,7 +186,7 @@ def test_what_turns_fast_hits_the_ground_at_long_ticks_too(tick):
 
 @pytest.mark.parametrize('direction', range(6))
 def test_a_doll_dragged_over_the_ground_is_borne_by_it(direction):
-    """At up to 80 m/s; with friction that the solver cannot settle, heads sank by 40 to 60 mm."""
+    """At up to 80 m/s; what is found past a limit or in the ground is what one step errs by."""
     turn = math.radians(60 * direction + 10)
     with Simulation(DROP) as simulation:
         simulation.push(Push('torso', (2000 * math.cos(turn), 2000 * math.sin(turn), 0.0),
@@ -180,8 +194,8 @@ def test_a_doll_dragged_over_the_ground_is_borne_by_it(direction):
         for _ in range(250):
             simulation.advance()
             measures = simulation.measures()
-            assert measures['sinking_m'] < 0.02
-            assert math.degrees(measures['limit_overshoot_rad']) < 5
+            assert measures['sinking_m'] < 0.001
+            assert math.degrees(measures['limit_overshoot_rad']) < 0.2
 
 
 def test_a_doll_in_the_floor_starts_on_it_and_stays_calm():

@@ -12,6 +12,7 @@ from ragdoll_ros.model import rotation
 from ragdoll_ros.model.coordinates import GeneralizedState
 from ragdoll_ros.model.scene import Placement
 from ragdoll_ros.physics.engine.bullet import BulletEngine
+from ragdoll_ros.physics.settings import NORMAL
 
 ARTICLE_CM = {
     # Centres in the article's axes (x left, y up, z forward) and centimetres.
@@ -36,7 +37,7 @@ LIFTS = [
 
 @pytest.fixture(scope='module')
 def engine():
-    engine = BulletEngine(load_scene('flight'))
+    engine = BulletEngine(load_scene('flight'), NORMAL)
     yield engine
     engine.close()
 
@@ -44,15 +45,15 @@ def engine():
 def turned(engine, angles_deg):
     """The engine's state with joint angles set by name, in degrees."""
     scene = engine.scene
-    start = BulletEngine(scene)
-    base = start.coordinates()
+    start = BulletEngine(scene, NORMAL)
+    base = start.coordinates
     start.close()
     q = base.q.copy()
     names = scene.angle_names
     for name, angle in angles_deg.items():
         q[7 + names.index(name)] = math.radians(angle)
     engine.place(GeneralizedState(q, np.zeros_like(base.v)))
-    return engine.read()
+    return engine.state
 
 
 @pytest.mark.parametrize('name', ['doll', 'article_doll'])
@@ -91,7 +92,8 @@ def test_angles_are_read_where_they_are_set(engine):
     names = engine.scene.angle_names
     angles = {name: 3.0 * (index + 1) for index, name in enumerate(names)}
     turned(engine, angles)
-    assert np.degrees(engine.joint_angles()) == pytest.approx(list(angles.values()), abs=1e-9)
+    found = engine.layout.joint_angles(engine.coordinates.q)
+    assert np.degrees(found) == pytest.approx(list(angles.values()), abs=1e-9)
 
 
 def test_a_universal_joints_first_axis_is_the_parents(engine):
@@ -109,8 +111,8 @@ def test_quaternions_are_xyzw_and_right_handed():
     assert rotation.rotate(quarter, (1, 0, 0)) == pytest.approx((0, 1, 0), abs=1e-15)
     scene = load_scene('flight')
     placed = Placement(scene.dolls[0].doll, position=(1, 2, 3), orientation=quarter)
-    engine = BulletEngine(dataclasses.replace(scene, dolls=(placed,)))
-    hand = engine.read().positions[scene.bone_index('left_forearm')]
+    engine = BulletEngine(dataclasses.replace(scene, dolls=(placed,)), NORMAL)
+    hand = engine.state.positions[scene.bone_index('left_forearm')]
     engine.close()
     # The left hand, 0.5 m to +y of the doll, is turned to -x.
     assert hand == pytest.approx((1 - 0.5, 2, 3 + 1.3), abs=1e-12)
@@ -119,8 +121,8 @@ def test_quaternions_are_xyzw_and_right_handed():
 def test_velocities_are_of_the_centre_of_mass_in_world_axes():
     scene = load_scene('flight')
     spun = dataclasses.replace(scene.dolls[0], spin=(1, -3, 2), velocity=(1, 0, 0))
-    engine = BulletEngine(dataclasses.replace(scene, dolls=(spun,)))
-    state = engine.read()
+    engine = BulletEngine(dataclasses.replace(scene, dolls=(spun,)), NORMAL)
+    state = engine.state
     engine.close()
     # All turns about the doll's centre of mass, which moves with the velocity.
     arms = state.positions - conserved(scene, state).centre

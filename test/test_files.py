@@ -13,6 +13,7 @@ from ragdoll_ros.model.compound import Compound
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Part, Sphere
 from ragdoll_ros.physics.engine.bullet import BulletEngine
+from ragdoll_ros.physics.settings import NORMAL
 
 FIVE = """
 gravity: [0, 0, -9.8]
@@ -39,8 +40,8 @@ def test_the_shipped_scenes_load():
 
 
 def test_the_crowd_does_not_overlap():
-    engine = BulletEngine(load_scene('crowd'))
-    assert not engine.touching()
+    engine = BulletEngine(load_scene('crowd'), NORMAL)
+    assert not engine.contacts()
     engine.close()
 
 

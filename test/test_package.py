@@ -25,13 +25,14 @@ SCENES = ('import ragdoll_ros; from ragdoll_ros.files import config; '
           'ragdoll_ros.load_scene("drop"); print(config.__file__); print(config.config_folder())')
 
 ROSDEP_KEYS = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml',
-               'jsonschema': 'python3-jsonschema', 'pybullet': 'python3-pybullet-pip'}
+               'jsonschema': 'python3-jsonschema', 'numba': 'python3-numba',
+               'pybullet': 'python3-pybullet-pip'}
 DISTRIBUTIONS = {'yaml': 'pyyaml', 'mpl_toolkits': 'matplotlib'}
 """Where a package on PyPI is called otherwise than its module."""
 
 ROBOT = ('model', 'files', 'physics', 'ros')
 """Rooms that run on a robot, with OPTIONAL modules or without."""
-OPTIONAL = {'mujoco', 'numba'}
+OPTIONAL = {'mujoco'}
 EXTRAS = {'fit': 'fit', 'viewer': 'viewer', 'accuracy': 'report'}
 """The other rooms, and the extra that brings what each needs beyond that."""
 
@@ -167,7 +168,7 @@ def test_manifest_names_what_a_robot_needs_and_nothing_else():
 
 
 def test_pip_brings_what_the_core_imports_and_extras_what_their_rooms_do(wheel):
-    """ROS is an extra too; what numba makes faster may have it as well."""
+    """ROS is an extra too."""
     core = imported('model', 'files', 'physics') - OPTIONAL
     assert required(wheel) == distributions(core)
     rooms = {path.name for path in (ROOT / 'ragdoll_ros').iterdir() if any(path.glob('*.py'))}

@@ -140,13 +140,13 @@ def test_finer_steps_bend_joints_less():
     printed = run(experiment('Step size'))['printed']
     rows = [line.split() for line in printed.splitlines()]
     assert [row[0] for row in rows] == ['draft', 'normal', 'exact']
-    substeps, overshoot = [int(row[1]) for row in rows], [float(row[3]) for row in rows]
+    substeps, overshoot = [float(row[1]) for row in rows], [float(row[3]) for row in rows]
     assert substeps == sorted(substeps) and overshoot == sorted(overshoot, reverse=True)
 
 
 def test_falls_part_at_the_touch():
     apart = run(experiment('Chaos'))['apart']
-    assert apart[27] < 1e-9 and apart[39] > 0.01 and apart[99] > 0.1
+    assert apart[27] < 2e-5 and apart[39] > 0.01 and apart[99] > 0.1
 
 
 @pytest.mark.parametrize('text', blocks('yaml'))
@@ -180,8 +180,11 @@ def keys(schema):
 
 def test_measures_are_told_one_by_one():
     told = coded(table('docs/accuracy_explained.md', 'What the simulation reports about itself'))
-    with ragdoll_ros.Simulation(ragdoll_ros.load_scene('drop')) as simulation:
-        assert told == set(simulation.measures())
+    found = set()
+    for engine in ('auto', 'bullet'):
+        with ragdoll_ros.Simulation(ragdoll_ros.load_scene('drop'), engine=engine) as simulation:
+            found |= set(simulation.measures())
+    assert told == found
 
 
 def test_every_target_and_every_command_has_its_line():
@@ -236,7 +239,7 @@ def check_installed(words):
         if extras:
             assert set(extras[1].split(',')) <= set(EXTRAS), word
         elif not word.startswith('-'):
-            assert re.search(rf"'{word}\b", ''.join(EXTRAS.values())), word
+            assert word == '.' or re.search(rf"'{word}\b", SETUP), word
 
 
 def check_python(first, *rest):

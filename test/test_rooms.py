@@ -30,7 +30,7 @@ Edges = list[tuple[str, str]]
 
 MACHINE_CODE = {'numba', 'numpy', *sys.stdlib_module_names}
 
-REPORTS_OWN = {'accuracy/quickstart.py': {'pybullet'}}
+REPORTS_OWN = {'accuracy/quickstart.py': {'pybullet'}, 'accuracy/depth.py': {'mujoco'}}
 
 
 def modules(package: Path) -> dict[str, Path]:

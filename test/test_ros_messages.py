@@ -227,11 +227,13 @@ def test_another_scene_leaves_nothing_of_the_last_one():
             assert Marker.DELETEALL not in {marker.action for marker in array.markers}
 
 
-def test_the_benchmark_times_an_engine_that_works():
-    """Its methods by name are those that an engine has, and what it spends is added up."""
-    from ragdoll_ros.ros.bench import timed_engine
-    engine = timed_engine()
-    with Simulation(load_scene('drop'), engine=engine, accuracy='draft') as simulation:
-        for _ in range(40):
-            simulation.advance()
-    assert engine.spent['of it engine'] > 0 and engine.spent['of it reading'] > 0
+def test_the_benchmark_times_all_parts(ros, monkeypatch):
+    import rclpy
+
+    from ragdoll_ros.ros import bench
+    monkeypatch.setattr(bench, 'ROUNDS', 1)
+    node = rclpy.create_node('bench')
+    costs = bench.row(node, load_scene('drop'), 'draft', 0)
+    node.destroy_node()
+    assert set(costs) == {'simulation', 'conversion', 'messages', 'bare engine', 'bare publish'}
+    assert min(costs.values()) > 0

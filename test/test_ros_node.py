@@ -332,7 +332,8 @@ def test_a_state_that_is_not_finite_is_not_shown_and_the_doll_goes_on(make_node,
     got = peer.collect(PoseArray, 'ragdoll/poses')
     peer.wait_heard(node, POSES)
     coordinates = node.simulation.coordinates
-    node.simulation.place(dataclasses.replace(coordinates, v=np.nan * coordinates.v))
+    node.simulation.place(dataclasses.replace(
+        coordinates, v=np.full_like(coordinates.v, 1e300)))
     for _ in range(3):
         node.tick()
     assert node.tally.refused == {'state': 1}

@@ -12,6 +12,7 @@ from std_msgs.msg import String
 from ragdoll_ros.files.scene import load_scene, save_scene
 from ragdoll_ros.files.urdf_tree import parse_urdf
 from ragdoll_ros.model.errors import ModelErrors, RagdollError
+from ragdoll_ros.physics.settings import EXACT
 from ragdoll_ros.ros.outputs import LATCHED
 from ragdoll_ros.ros.parameters import SPECS, Settings
 
@@ -68,7 +69,8 @@ def test_a_wrong_type_is_refused_and_counted(node, name):
 
 
 @pytest.mark.parametrize('name, bad, reason', [
-    ('accuracy', 'perfect', 'draft, normal, exact'), ('pushed_bone', 'tail', 'torso, head'),
+    ('accuracy', 'perfect', 'draft, normal, exact'), ('engine', 'steam', 'rigid, bullet, mujoco'),
+    ('pushed_bone', 'tail', 'torso, head'),
     ('pushed_bone', '', 'torso'), ('frame_id', '', 'a name'), ('frame_id', '/world', 'slash'),
     ('frame_id', 'left_shin', 'no bone'), ('scene', 'nowhere', 'crowd'), ('scene', '', 'crowd'),
     ('scene', 'x' * 5000, 'Unreadable'), ('scene', '~nobody/x', 'Unreadable'),
@@ -103,7 +105,18 @@ def test_pace_and_rate_change_live(node):
 
 def test_accuracy_changes_live(node):
     assert put(node, accuracy='exact').successful
-    assert node.simulation.accuracy.order == 4
+    assert node.simulation.accuracy is EXACT
+
+
+def test_another_engine_starts_the_scene_anew(node):
+    node.tick()
+    before = node.simulation
+    assert put(node, engine='bullet').successful
+    assert node.simulation is not before and node.simulation.engine_name == 'bullet'
+    assert node.simulation.time == 0 and node.simulation.scene == before.scene
+    node.tick()
+    assert put(node, accuracy='draft').successful
+    assert node.simulation.time > 0
 
 
 def test_a_scene_brings_its_bones_its_pace_and_its_root(node):

@@ -11,8 +11,6 @@ from ragdoll_ros.files.urdf_tree import parse_urdf
 from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.compound import Compound
 from ragdoll_ros.model.shapes import SHAPES, SIZES, Sphere
-from ragdoll_ros.model.state import State
-from ragdoll_ros.physics.plain.reach import Reach
 
 TURN = tuple(rotation.normalized((.1, .5, -.3, .8)))
 
@@ -61,21 +59,6 @@ def test_it_comes_to_lie_on_its_surface(shape, engine):
             state = simulation.advance()
     down = rotation.rotate(rotation.inverse(state.orientations[0]), np.array((0, 0, -1.0)))
     assert state.positions[0, 2] - shape.reach(down) == pytest.approx(0, abs=5e-3)
-
-
-def test_compiled_heights_are_those_of_its_support(shape):
-    if shape.kind == 'compound':
-        pytest.skip('six terms cannot say how far it reaches')
-    pytest.importorskip('numba')
-    from ragdoll_ros.physics.reach import CompiledReach
-    scene, rng = alone(shape), np.random.default_rng(1)
-    for _ in range(20):
-        state = State(rng.normal(size=(1, 3)), rotation.normalized(rng.normal(size=(1, 4))),
-                      *np.zeros((2, 1, 3)))
-        down = rotation.rotate(rotation.inverse(state.orientations[0]), np.array((0, 0, -1.0)))
-        expected = state.positions[0, 2] - shape.reach(down)
-        for reach in (CompiledReach(scene), Reach(scene)):
-            assert reach.heights(state)[0] == pytest.approx(expected, abs=1e-12)
 
 
 def test_its_primitives_reach_as_far_as_it_does(shape):

@@ -164,15 +164,36 @@ def test_another_scene_by_the_dropdown(page):
     assert rods.shape == (8, 2, 3) and np.allclose(rods[1:, 0], rods[:-1, 1])
 
 
+def test_another_engine_by_the_dropdown(page):
+    """The scene starts anew in it; and another scene begins in the same."""
+    client = page.open()
+    wait(lambda: page.stage and page.frame and page.frame.time > 0.2)
+    scene = page.frame.scene
+    client.update(page.controls.engine, 'bullet')
+    wait(lambda: page.source.report.engine == 'bullet' and page.frame.time < 0.2)
+    assert page.frame.scene is scene
+    client.update(page.controls.scene, 'flight')
+    wait(lambda: page.stage.scene.name == 'flight')
+    assert page.source.report.engine == page.controls.engine.value == 'bullet'
+
+
 def test_a_scene_that_is_refused_is_not_chosen():
     """The list goes on naming the scene that is shown, and the page that chose is told why."""
     unturned = np.tile((0, 0, 0, 1.0), (1, 10, 1))
     with served(Playback(Recording(DROP, np.zeros(1), np.zeros((1, 10, 3)), unturned))) as page:
         client, handle, seen = page.open(), page.controls.scene, []
         wait(lambda: handle.value == 'drop')
-        handle.on_update(lambda event: seen.append(handle.value))
+
+        async def note(event):  # at once, before the page takes the choice back
+            seen.append(event.target.value)
+
+        handle.on_update(note)
         client.update(handle, 'crowd')
         wait(lambda: 'crowd' in seen and handle.value == 'drop')
+        engine = page.controls.engine
+        engine.on_update(note)
+        client.update(engine, 'bullet')
+        wait(lambda: 'bullet' in seen and engine.value == 'auto')
 
 
 def test_what_was_sent_is_text_on_the_page(page):

@@ -86,6 +86,8 @@ def signals():
     (('--scene', 'drop', '--host', 'no such host'), ['no such host']),
     (('--scene', 'drop', '--port', '99999'), ['99999', '65535']),
     (('--scene', 'drop', '--port', 'x'), ['--port', "'x'"]),
+    (('--scene', 'drop', '--engine', 'steam'), ['steam', 'rigid', 'bullet']),
+    (('--engine', 'bullet'), ['--engine', '--scene']),
     (('--scene', 'drop', '--ros-args', '-r', '__ns:=/a'), ['--ros-args', '--scene']),
     (('--scene', 'drop', '--folder', '/nonexistent'), ['/nonexistent', 'folder'])])
 def test_refuses_with_exit_code_two(arguments, words, signals, capsys):

@@ -1,4 +1,4 @@
-"""All works without numba too: where it is missing, broken or switched off."""
+"""All works without numba too, by PyBullet plainly: where it is missing, broken or told to rest."""
 from __future__ import annotations
 
 import os
@@ -14,33 +14,30 @@ FALL = """
 import sys
 import numpy as np
 from ragdoll_ros import Push, Simulation, load_scene
-from ragdoll_ros.physics import kernels
 with Simulation(load_scene('flight')) as simulation:
     simulation.push(Push('torso', force=(100, 0, 50), duration=0.05))
     for _ in range(10):
         state = simulation.advance()
     masses = [bone.mass for bone in simulation.scene.bones]
-    assert np.allclose(masses @ state.linear_velocities, (5, 0, 2.5), rtol=0, atol=1e-9)
-    assert simulation.measures()['error_estimate_m'] < 1e-4
+    momentum = masses @ state.linear_velocities
+    assert np.allclose(momentum, (5, 0, 2.5), rtol=0, atol=0.05), momentum
 with Simulation(load_scene('drop')) as simulation:
     head = simulation.scene.bone_index('head')
     height = simulation.state.positions[head, 2]
     simulation.grab('hand', 'head')
     for _ in range(30):
         fallen = height - simulation.advance().positions[head, 2]
-    assert 0.005 < fallen < 0.02, 'held, it sags by some 11 mm; let go it would fall by 0.44 m'
+    assert 0.005 < fallen < 0.05, 'held, it sags; let go it would fall by 0.44 m'
     simulation.let_go('hand')
     for _ in range(90):
         simulation.advance()
     assert simulation.state.positions[:, 2].max() < 1 and simulation.contacts, 'it is down'
     measures = simulation.measures()
     assert measures['joint_gap_m'] < 1e-6 and measures['sinking_m'] < 0.01
-    assert measures['energy_excess_J'] < 1 and measures['stopped_total'] == 0
-print(kernels.ready(), sys.modules.get('numba') is not None)
+    assert measures['energy_excess_J'] < 1
+print(simulation.engine_name, simulation.engine_reason)
 """
-"""A push in the air, against force times time; a hang by a hand, and a fall, within the bounds of
-test_grab.py and test_simulation.py.
-"""
+"""A push in the air, against force times time to 1 %; a hang by a hand, and a fall."""
 GONE = "import sys; sys.modules['numba'] = None\n"
 
 
@@ -50,24 +47,34 @@ def told(code, **environment):
     done = subprocess.run([sys.executable, '-c', code], check=False, capture_output=True, text=True,
                           env={**os.environ, 'PYTHONPATH': path, **environment})
     assert done.returncode == 0, done.stderr
-    return done.stdout.splitlines()[-1]
+    return done.stdout.splitlines()[-1].strip()
 
 
-def test_the_switch_turns_it_off():
-    """And numba is not so much as imported, which takes a third of a second."""
-    assert told(FALL, RAGDOLL_COMPILED='0') == 'False False'
+def test_it_does_without_numba():
+    assert told(GONE + FALL) == 'bullet numba is missing'
 
 
-@pytest.mark.parametrize('switch', ['', '1'])
-def test_it_does_without_numba(switch):
-    assert told(GONE + FALL, RAGDOLL_COMPILED=switch) == 'False False'
+def test_it_does_where_numba_is_told_to_rest():
+    assert told(FALL, NUMBA_DISABLE_JIT='1') == 'bullet NUMBA_DISABLE_JIT is set'
 
 
-def test_it_does_with_a_broken_numba(tmp_path):
-    """As where numpy is too new for it: numba is there, and raises ImportError."""
-    (tmp_path / 'numba.py').write_text("raise ImportError('Numba needs NumPy 2.2 or less')\n")
+@pytest.mark.parametrize('error', ['ImportError', 'AttributeError', 'SystemError'])
+def test_it_does_with_a_broken_numba(tmp_path, error):
+    """As where numpy or Python is too new for it: numba is there, and raises this or that."""
+    (tmp_path / 'numba.py').write_text(f"raise {error}('Numba needs NumPy 2.2 or less')\n")
     code = f'import sys; sys.path.insert(0, {str(tmp_path)!r})\n' + FALL
-    assert told(code, RAGDOLL_COMPILED='1') == 'False False'
+    assert told(code) == 'bullet numba does not work here: Numba needs NumPy 2.2 or less'
+
+
+def test_the_rigid_engine_says_what_it_lacks():
+    code = GONE + """
+from ragdoll_ros import RagdollError, Simulation, load_scene
+try:
+    Simulation(load_scene('drop'), engine='rigid')
+except RagdollError as error:
+    print(error)
+"""
+    assert told(code).startswith('engine rigid: numba is missing; expected')
 
 
 @pytest.mark.slow
@@ -81,10 +88,10 @@ def test_it_does_where_nothing_can_be_kept(tmp_path):
     (package / 'config').symlink_to(ROOT / 'config')
     (package / 'physics' / 'kernels' / '__pycache__').write_text('')
     code = f'import sys; sys.path.insert(0, {str(tmp_path)!r})\n' + FALL
-    assert told(code, HOME='/dev/null', XDG_CACHE_HOME='/dev/null', PYTHONDONTWRITEBYTECODE='1',
-                RAGDOLL_COMPILED='1') == 'True True'
+    assert told(code, HOME='/dev/null', XDG_CACHE_HOME='/dev/null',
+                PYTHONDONTWRITEBYTECODE='1') == 'rigid'
 
 
 def test_it_is_used_where_it_is():
     pytest.importorskip('numba', reason='numba is not installed')
-    assert told(FALL, RAGDOLL_COMPILED='1') == 'True True'
+    assert told(FALL) == 'rigid'

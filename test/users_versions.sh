@@ -28,13 +28,10 @@ rm -rf "$folder/source" && mkdir "$folder/source"
 (cd "$here" && cp -r setup.py setup.cfg pyproject.toml package.xml config resource ragdoll_ros \
     "$folder/source")
 pip install --no-build-isolation --constraint "$folder/versions.txt" \
-    "$folder/source[ros,report,fit,fast]" pytest
+    "$folder/source[ros,report,fit]" pytest
 "$folder/venv/bin/python" -m pip list |
     grep -i '^\(numpy\|numba\|llvmlite\|scipy\|setuptools\|pybullet\|pyyaml\|jsonschema\|ragdoll\)'
 cd "$here"
 export PYTHONSAFEPATH=1 AMENT_PREFIX_PATH="$folder/venv"
 "$folder/venv/bin/python" -m ragdoll_ros.physics.kernels
 "$folder/venv/bin/python" -m pytest
-echo "Without compiled code: the core's tests"
-core=$(sed -n 's/^CORE := //p' Makefile)
-RAGDOLL_COMPILED=0 "$folder/venv/bin/python" -m pytest $(printf 'test/test_%s.py ' $core)

@@ -11,23 +11,27 @@ from pathlib import Path
 from . import figures
 from .parts import (
     classes,
+    collisions,
+    convergence,
     costs,
     drop,
+    drops,
     estimate,
     hard,
     orders,
     pieces,
     precision,
-    projection,
+    restitution,
     swing,
 )
 from .plots import draw_all
 from .runner import Job, Options, run_jobs
 from .sections import markdown
 
-PARTS = {'precision': precision, 'orders': orders, 'pieces': pieces, 'drop': drop,
-         'classes': classes, 'projection': projection, 'hard': hard, 'costs': costs,
-         'estimate': estimate, 'swing': swing}
+PARTS = {'precision': precision, 'orders': orders, 'restitution': restitution,
+         'convergence': convergence, 'pieces': pieces, 'drop': drop, 'drops': drops,
+         'classes': classes, 'collisions': collisions, 'hard': hard,
+         'costs': costs, 'estimate': estimate, 'swing': swing}
 """Modules by the names that --case takes: each says by jobs() what it has to run."""
 
 NEEDED = ('scipy', 'matplotlib', 'mujoco')
@@ -59,7 +63,7 @@ def parser() -> argparse.ArgumentParser:
         prog='ragdoll_report', description='Measure how wrong and how fast the simulation is, '
         'beside PyBullet and MuJoCo. Writes accuracy.json, accuracy.md and pictures.',
         epilog='example: ragdoll_report --quick --out /tmp/report; '
-        'ragdoll_report --case classes --starts 10000')
+        'ragdoll_report --case classes --starts 300')
     made.add_argument('--quick', action='store_true',
                       help='fewer motions, methods and starts: at most 90 s (else 20 min)')
     made.add_argument('--case', action='append', metavar='NAME', default=[],
@@ -99,9 +103,9 @@ def measured(options: argparse.Namespace) -> dict:
         raise WrongCall(f'--starts {options.starts}: expected 1 or more')
     began = time.monotonic()
     rows = run_jobs(chosen(options.case, Options(options.quick, options.starts)))
-    for part in (classes.NAME, classes.SWITCHES):
+    for part, join in ((classes.NAME, classes.merged), (drops.NAME, drops.merged)):
         if part in rows:
-            rows[part] = classes.merged(rows[part])
+            rows[part] = join(rows[part])
     words = ['ragdoll_report', *(['--quick'] if options.quick else []),
              *(f'--case {name}' for name in options.case),
              *([f'--starts {options.starts}'] if options.starts != 100 else [])]

@@ -90,18 +90,21 @@ class Measure:
             work[1:] += np.cumsum(gained * acts)
         return work
 
-    def energy_excess(self, trial: Trial, trajectory: Trajectory) -> float:
-        """Worst max(E - E0 - W) / max(E0 + W): energy from nothing, as a share of the doll's own.
+    def energy_excess(self, trial: Trial, trajectory: Trajectory, given: float = 0.0) -> float:
+        """Energy from nothing: the largest rise of E - W above what it had come down to.
 
-        NaN where there is no energy to compare it with.
+        As a share of max(E0 + W); ``given``, J, is what the start itself may give back. NaN where
+        there is no energy to compare it with.
         """
         energy, work = self.energy(trajectory), self.work(trial, trajectory)
-        own = np.maximum.accumulate(energy[0] + work)
+        own = np.maximum.accumulate(energy[0] + given + work)
         if not own[-1] > 0:
             return math.nan
+        left = energy - work
+        risen = left - np.minimum.accumulate(left) - given
         with np.errstate(invalid='ignore', divide='ignore'):
-            shares = np.where(own > 0, (energy - energy[0] - work) / own, 0.0)
-        return float(shares.max()) if np.isfinite(shares).all() else math.inf
+            shares = np.where(own > 0, risen / own, 0.0)
+        return max(0.0, float(shares.max())) if np.isfinite(shares).all() else math.inf
 
     def momentum_drift(self, trial: Trial, trajectory: Trajectory) -> float:
         """Worst momentum that no force accounts for, as a share of sum m |v|."""
@@ -143,13 +146,17 @@ class Measure:
 
     def overshoot(self, trajectory: Trajectory) -> float:
         """Worst angle in rad past a limit; 0 where none is passed."""
+        return float(self.overshoots(trajectory).max())
+
+    def overshoots(self, trajectory: Trajectory) -> np.ndarray:
+        """Angle (t,) rad of the joint that is furthest past a limit; 0 where none is."""
         limits = [pair or (-math.inf, math.inf) for joint, _ in self._joints
                   for pair in joint.angle_limits]
         if not limits:
-            return 0.0
+            return np.zeros(len(trajectory.times))
         lower, upper = np.array(limits).T
         angles = self.joint_angles(trajectory)
-        return float(max(0.0, np.maximum(angles - upper, lower - angles).max()))
+        return np.maximum(angles - upper, lower - angles).max(axis=1).clip(min=0.0)
 
     def sinking(self, trajectory: Trajectory) -> float:
         """Deepest place in m of any bone's lowest point below the ground; 0 above it."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import process_time
 from typing import Protocol
 
@@ -18,6 +18,7 @@ from ..physics.engine.mujoco import MujocoEngine
 from ..physics.engine.protocol import Engine
 from ..physics.settings import ACCURACIES, Accuracy
 from ..physics.simulation import Simulation
+from . import fineness
 from .quickstart import STEP as QUICKSTART_STEP
 from .quickstart import Quickstart
 from .trajectory import Trajectory
@@ -59,6 +60,8 @@ class Result:
 
     trajectory: Trajectory
     costs: np.ndarray
+    told: dict[str, float] = field(default_factory=dict)
+    """Simulation.measures() at the end; empty for others."""
 
     @property
     def rate(self) -> float:
@@ -70,20 +73,20 @@ class _FixedSteps:
     """An engine driven with the same number of substeps in each tick."""
 
     def __init__(self, trial: Trial, substeps: int, make: Callable[..., Engine]) -> None:
-        self._trial, self._substeps = trial, substeps
-        self._engine = make(trial.scene)
+        self._trial = trial
         self._tick, self._count = trial.scene.step, 0
+        self._engine = make(trial.scene, fineness.of_step(self._tick / substeps))
         if trial.start is not None:
             self._engine.place(trial.start)
 
     @property
     def state(self) -> State:
-        return self._engine.read()
+        return self._engine.state
 
     def advance(self) -> State:
         begin = self._count * self._tick
         loads = self._trial.loads(begin, begin + self._tick) if self._trial.pushes else ()
-        self._engine.step(self._tick, self._substeps, loads)
+        self._engine.advance(self._tick, loads)
         self._count += 1
         return self.state
 
@@ -91,9 +94,9 @@ class _FixedSteps:
         self._engine.close()
 
 
-def simulated(trial: Trial, accuracy: str | Accuracy) -> Simulation:
+def simulated(trial: Trial, accuracy: str | Accuracy, engine: str = 'auto') -> Simulation:
     """A trial's simulation, as the node runs it."""
-    simulation = Simulation(trial.scene, accuracy=accuracy)
+    simulation = Simulation(trial.scene, accuracy=accuracy, engine=engine)
     if trial.start is not None:
         simulation.place(trial.start)
     for push in trial.pushes:
@@ -113,9 +116,10 @@ def run(method: Method, trial: Trial) -> Result:
             state = motion.advance()
             costs[index] = process_time() - before
             states.append(state)
+        told = motion.measures() if isinstance(motion, Simulation) else {}
     finally:
         motion.close()
-    return Result(Trajectory.of(times, states), costs)
+    return Result(Trajectory.of(times, states), costs, told)
 
 
 def median_run(method: Method, trial: Trial, repeats: int) -> Result:
@@ -125,13 +129,26 @@ def median_run(method: Method, trial: Trial, repeats: int) -> Result:
     return dataclasses.replace(results[0], costs=costs)
 
 
-def ours(accuracy: str | Accuracy, name: str | None = None) -> Method:
+def ours(accuracy: str | Accuracy, name: str | None = None, engine: str = 'auto') -> Method:
     """Our simulation at one of its settings, or with settings of one's own."""
     name = name or f'ours-{accuracy}'
-    order = (ACCURACIES[accuracy] if isinstance(accuracy, str) else accuracy).order
-    order = kernels.ORDER if order and kernels.ready() else order or 1
+    order = kernels.ORDER if engine == 'auto' and kernels.ready() else 1
     return Method(name, name.replace('-', ' '), 'ours', functools.partial(
-        simulated, accuracy=accuracy), order=order)
+        simulated, accuracy=accuracy, engine=engine), order=order)
+
+
+def core(step: float) -> Method:
+    """The engine that solves impacts where they happen, with steps of ``step`` s."""
+    return Method(f'core-{step:g}', f'core, steps of {step * 1e6:g} µs', 'core', functools.partial(
+        simulated, accuracy=fineness.of_step(step), engine=fineness.CORE))
+
+
+def reference(parts: int) -> Method:
+    """What stands for the truth where there is no formula: the core, its step in ``parts``.
+
+    PyBullet at 128 substeps until there is a core; the label says which one it was.
+    """
+    return core(fineness.core_step() / parts) if fineness.has_core() else bullet(128)
 
 
 def quickstart() -> Method:
@@ -168,7 +185,18 @@ def every_method(substeps: Iterable[int] = SUBSTEPS) -> list[Method]:
 
 def by_name(name: str) -> Method:
     """The method of a name; OutOfRange names the families there are."""
-    methods = {method.name: method for method in every_method(range(1, 129))}
-    if name not in methods:
-        raise errors.OutOfRange('method', name, 'ours-*, quickstart, bullet-N, mujoco-*-N')
-    return methods[name]
+    family, _, rest = name.partition('-')
+    try:
+        if family == 'ours' and rest in ACCURACIES:
+            return ours(rest)
+        if name == 'quickstart':
+            return quickstart()
+        if family in ('bullet', 'core'):
+            return bullet(int(rest)) if family == 'bullet' else core(float(rest))
+        if family == 'mujoco':
+            integrator, _, count = rest.partition('-')
+            return mujoco(integrator, int(count))
+    except ValueError:
+        pass
+    raise errors.OutOfRange('method', name,
+                            'ours-*, quickstart, core-SECONDS, bullet-N, mujoco-*-N')

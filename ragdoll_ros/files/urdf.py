@@ -29,12 +29,9 @@ ESCAPES = str.maketrans({'&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;',
                          '\t': '&#9;', '\n': '&#10;', '\r': '&#13;'})
 
 
-def to_urdf(doll: Ragdoll, dialect: str = 'ros', limited: bool = True) -> str:
-    """Write a doll as URDF; angles in rad, lengths in m, masses in kg.
-
-    Not ``limited``: the same joints, but every one of them free.
-    """
-    return _document(doll.name, _tree(doll, dialect, limited))
+def to_urdf(doll: Ragdoll, dialect: str = 'ros') -> str:
+    """Write a doll as URDF; angles in rad, lengths in m, masses in kg."""
+    return _document(doll.name, _tree(doll, dialect))
 
 
 def scene_to_urdf(scene: Scene, frame: str = WORLD) -> str:
@@ -53,7 +50,7 @@ def scene_to_urdf(scene: Scene, frame: str = WORLD) -> str:
                   f'    <parent link={_quoted(frame)}/>',
                   f'    <child link={_quoted(doll.root.name)}/>',
                   f'    {_origin(position, np.array(placement.orientation))}', '  </joint>',
-                  *_tree(doll, 'ros', limited=True)]
+                  *_tree(doll, 'ros')]
     return _document(scene.name, lines)
 
 
@@ -62,12 +59,12 @@ def _document(name: str, lines: list[str]) -> str:
                       '</robot>', ''])
 
 
-def _tree(doll: Ragdoll, dialect: str, limited: bool) -> list[str]:
+def _tree(doll: Ragdoll, dialect: str) -> list[str]:
     frames = {doll.root.name: Pose(np.array(doll.root.position))}
     lines = _link(doll.root, frames[doll.root.name], dialect)
     for joint in doll.joints_from_root():
         frames[joint.child] = Pose(np.array(joint.anchor), joint_frame(joint))
-        lines += _joint(joint, frames, dialect, limited)
+        lines += _joint(joint, frames, dialect)
         lines += _link(doll.bone(joint.child), frames[joint.child], dialect)
     return lines
 
@@ -117,7 +114,7 @@ def _geometry(shape: Shape) -> str:
     return f'<geometry><{shape.kind} {sizes}/></geometry>'
 
 
-def _joint(joint: Joint, frames: dict[str, Pose], dialect: str, limited: bool) -> list[str]:
+def _joint(joint: Joint, frames: dict[str, Pose], dialect: str) -> list[str]:
     """Write a joint and, where it has several axes, the links between."""
     place = frames[joint.parent].relative(frames[joint.child])
     if joint.kind == 'fixed':
@@ -129,7 +126,6 @@ def _joint(joint: Joint, frames: dict[str, Pose], dialect: str, limited: bool) -
     axes = np.eye(3) if joint.kind == 'ball' else joint.axes
     row = []
     for name, axis, pair in zip(joint.angle_names, axes, joint.angle_limits, strict=True):
-        pair = pair if limited else None
         limit = pair and f'<limit lower="{pair[0]!r}" upper="{pair[1]!r}" effort="0" velocity="0"/>'
         row.append((name, 'revolute' if pair else UNLIMITED, axis, limit))
     return _row(joint, row, place, dialect)

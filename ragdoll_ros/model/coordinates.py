@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import rotation
+from . import errors, rotation
 from .ragdoll import Limits, Ragdoll
 
 UNLIMITED: Limits = (-math.inf, math.inf)
@@ -37,18 +37,21 @@ class DofLayout:
         plain_v: list[int] = []
         roots: list[tuple[int, int]] = []
         balls: list[tuple[int, int]] = []
+        self._angles: list[slice] = []
+        """Where in q each joint stands, in the order of Scene.angle_names."""
         v = 0
         self.own_q: list[slice] = []
         self.own_v: list[slice] = []
         """What of q and of v is each doll's."""
         for doll in dolls:
-            q, first_v = len(bounds), v
+            q, first_v, at = len(bounds), v, {}
             plain_q += range(q, q + 3)
             plain_v += range(v, v + 3)
             roots.append((q + 3, v + 3))
             bounds += [UNLIMITED] * 7
             v += 6
             for joint in doll.joints_depth_first():
+                at[joint.child] = len(bounds)
                 if joint.is_free_ball:
                     balls.append((len(bounds), v))
                     bounds += [UNLIMITED] * 4
@@ -57,6 +60,8 @@ class DofLayout:
                     plain_v += range(v, v + joint.dof)
                     bounds += [pair or UNLIMITED for pair in joint.angle_limits]
                 v += joint.dof
+            self._angles += [slice(at[joint.child], at[joint.child] + (
+                4 if joint.is_free_ball else joint.dof)) for joint in doll.joints]
             self.own_q.append(slice(q, len(bounds)))
             self.own_v.append(slice(first_v, v))
         self.sizes = (len(bounds), v)
@@ -74,54 +79,28 @@ class DofLayout:
         """Where the limited angles stand in q and their rates in v."""
         self.limits = (low[some], high[some])
 
-    def root_turns(self, q: np.ndarray) -> np.ndarray:
-        """Rotation matrices (d, 3, 3) of the roots."""
-        return rotation.matrix(q[self.root_orientations])
-
-    def with_spins_turned(self, v: np.ndarray, turns: np.ndarray) -> np.ndarray:
-        """v, or its rate, with the roots' angular part turned by matrices (d, 3, 3)."""
-        v, spin = v.copy(), self.root_spins
-        v[spin] = np.matmul(turns, v[spin][:, :, None])[:, :, 0]
-        return v
-
-    def derivative(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Rate of change of q, q w / 2 for quaternions: in ``v`` here, roots too have their
-        angular velocity along their own axes.
-        """
-        rate = np.empty_like(q)
-        rate[self._plain[0]] = v[self._plain[1]]
-        at, spin = self._turning
-        pure = np.concatenate([v[spin], np.zeros((len(spin), 1))], axis=1)
-        rate[at] = 0.5 * rotation.multiply(q[at], pure)
-        return rate
-
     def normalized(self, q: np.ndarray) -> np.ndarray:
         """The same coordinates with every quaternion of length one."""
         q, at = q.copy(), self._turning[0]
         q[at] = rotation.normalized(q[at])
         return q
 
-    def integrate_configuration(self, coordinates: GeneralizedState,
-                                displacement: np.ndarray) -> GeneralizedState:
-        """The coordinates after a small displacement (nv,), m and rad along the directions of v."""
-        q = coordinates.q.copy()
-        q[self._plain[0]] += displacement[self._plain[1]]
-        at, turn = self._turning
-        turns = rotation.from_rotation_vector(displacement[turn])
-        roots = len(self.own_q)
-        q[at[:roots]] = rotation.multiply(turns[:roots], q[at[:roots]])
-        q[at[roots:]] = rotation.multiply(q[at[roots:]], turns[roots:])
-        return GeneralizedState(q, coordinates.v)
+    def check_orientations(self, q: np.ndarray) -> None:
+        """Raise NotUnit for a quaternion of length zero."""
+        if (np.linalg.norm(q[self._turning[0]], axis=1) < 1e-9).any():
+            raise errors.NotUnit('coordinates', 0.0, 'quaternions x, y, z, w, not zero')
+
+    def joint_angles(self, q: np.ndarray) -> np.ndarray:
+        """All joint angles, rad, in the order of Scene.angle_names; of a free ball joint those
+        about x, then y, then z.
+        """
+        return np.array([angle for at in self._angles for angle in (
+            rotation.to_xyz(q[at]) if at.stop - at.start == 4 else q[at])])
 
     def past_limits(self, q: np.ndarray) -> np.ndarray:
         """Angles (k,) rad by which the limited joints are past their limits; negative inside."""
         angles = q[self.limited[0]]
         return np.maximum(angles - self.limits[1], self.limits[0] - angles)
-
-    def limit_speeds(self, coordinates: GeneralizedState) -> np.ndarray:
-        """Rates (k,) rad/s at which the limited joints move toward their nearer limit."""
-        angles, rates = coordinates.q[self.limited[0]], coordinates.v[self.limited[1]]
-        return np.where(angles - self.limits[1] > self.limits[0] - angles, rates, -rates)
 
     @staticmethod
     def _indices(starts: list[tuple[int, int]]) -> tuple[np.ndarray, np.ndarray]:

@@ -30,6 +30,10 @@ class ModelError(RagdollError):
         return f'{where}{type(self).__name__}: {shown}; expected {self.expected}'
 
 
+class Closed(RagdollError):
+    """Something is asked of a simulation that was closed."""
+
+
 class NotPositive(ModelError):
     """A size, a mass or a duration that is not above zero."""
 

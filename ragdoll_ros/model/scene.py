@@ -26,10 +26,11 @@ STEP_RANGE = (0.0002, 0.2)
 """Shortest and longest tick, s."""
 
 NO_SLIP = 0.7
-"""Coefficient that stands for friction without limit: no slip up to 35 degrees. PyBullet's solver
-takes turns between a contact's normal and its friction, and where a larger one pulls the contact
-open (from 4/3 on for a rod, from less for a chain) they swing ever wider: at 10, and now and then
-at 0.8, a sliding contact bore nothing in every solution with an even number of turns."""
+"""Coefficient that stands for friction without limit in PyBullet and MuJoCo: no slip up to 35
+degrees. PyBullet's solver takes turns between a contact's normal and its friction, and where a
+larger one pulls the contact open (from 4/3 on for a rod, from less for a chain) they swing ever
+wider: at 10, and now and then at 0.8, a sliding contact bore nothing in every solution with an even
+number of turns."""
 
 LARGEST_FRICTION = 10.0
 """Coefficient that finite ones are capped at, as PyBullet does."""
@@ -39,7 +40,7 @@ LARGEST_FRICTION = 10.0
 class Material:
     """Contact of everything with everything, unless a bone has its own.
 
-    ``friction`` is Coulomb's coefficient (infinity: no slip, as far as an engine can: NO_SLIP),
+    ``friction`` is Coulomb's coefficient (infinity: no slip; in PyBullet and MuJoCo NO_SLIP),
     ``rolling_friction`` a lever arm in m, ``restitution`` the speed after over the speed
     before a bounce, which acts above an approach speed of ``restitution_speed`` m/s.
     """
@@ -203,5 +204,5 @@ def above_ground(doll: Ragdoll, clearance: float = 0.4) -> Scene:
 
 
 def grip(friction: float) -> float:
-    """The coefficient of friction that an engine is to work with."""
+    """The coefficient of friction that PyBullet and MuJoCo are to work with."""
     return NO_SLIP if math.isinf(friction) else min(friction, LARGEST_FRICTION)

@@ -1,8 +1,6 @@
 """How dolls move as a whole, and how points of bones do: values, and sums over rigid bodies."""
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..model import rotation
@@ -55,23 +53,6 @@ class Motion:
     def inertia(self) -> np.ndarray:
         """(d, 3, 3) kg m^2 about that centre, as if the doll's joints were locked in its pose."""
         return self.sums[:, 11:20].reshape(-1, 3, 3)
-
-
-@dataclass(frozen=True)
-class Shift:
-    """A displacement of d dolls and a motion of each as one rigid body, to be added.
-
-    What is a single body may be turned before.
-    """
-
-    displacement: np.ndarray
-    """(d, 3) m."""
-    velocity: np.ndarray
-    """(d, 3) m/s, of the centres of mass."""
-    angular_velocity: np.ndarray
-    """(d, 3) rad/s about the centres of mass."""
-    rotation: np.ndarray | None = None
-    """(d, 4) quaternions, no turn for dolls of several bones; None: no turn at all."""
 
 
 def damping_rate(scene: Scene) -> float:

@@ -10,27 +10,16 @@ from ..model.coordinates import GeneralizedState
 from ..model.push import Push
 from ..model.scene import SECOND, STEP_RANGE, Scene
 from ..model.state import State
-from .conserving import ConservingStepper
-from .engine.protocol import GROUND, Contact, Engine, Wrenches
+from .engine.protocol import Contact, Engine
 from .engine.registry import resolve_engine
 from .grab import EVENLY, Grab, Hands
+from .ground_heights import ground_heights
 from .joint_gap import JointGap
 from .push_queue import PushQueue
-from .settings import Accuracy, firm, resolve_accuracy
+from .settings import Accuracy, resolve_accuracy
 from .sleeping import SleepDetector
-from .stepping import StepStats
 from .swing.pose import SwingState
 from .swing.simulation import SwingSimulation
-from .work import longest_stretch
-
-THROWN = SECOND
-"""ns for which a doll that was let go is stepped as finely as one that is held."""
-
-LONGEST_THROWN = 0.01
-"""s that are gone through at once then: what fails is done again by itself."""
-
-LEAST_SHARE = 0.01
-"""Of a tick: stretches under such loads are no shorter, however fast the bone spins."""
 
 
 class Simulation:
@@ -47,12 +36,11 @@ class Simulation:
         errors.check_range('workers', workers, 1, 1)
         self.scene = scene
         self.step = scene.step if step is None else step
-        self._accuracy = resolve_accuracy(accuracy)
-        self._moving = ConservingStepper(scene, resolve_engine(engine), self._accuracy)
-        self._stepper = self._moving.stepper
-        self.mechanics = self._moving.mechanics
-        self._moving.lift_out()
-        self._start = (self._stepper.engine.save(), self._stepper.coordinates)
+        choice = resolve_engine(engine)
+        self.engine_name, self.engine_reason = choice.name, choice.reason
+        """The engine that is taken; why it is not the one that 'auto' takes first."""
+        self._engine: Engine = choice.make(scene, resolve_accuracy(accuracy))
+        self._start = self._engine.save()
         self._gap = JointGap(scene)
         self._sleep_detector = SleepDetector(scene)
         self._swings = SwingSimulation(scene) if any(
@@ -68,7 +56,7 @@ class Simulation:
     @property
     def state(self) -> State:
         """Poses and velocities of all bones now."""
-        return self._moving.state
+        return self._engine.state
 
     @property
     def swings(self) -> SwingState | None:
@@ -89,11 +77,11 @@ class Simulation:
     @property
     def accuracy(self) -> Accuracy:
         """How fine; may be changed between ticks."""
-        return self._accuracy
+        return self._engine.accuracy
 
     @accuracy.setter
     def accuracy(self, accuracy: str | Accuracy) -> None:
-        self._accuracy = self._stepper.accuracy = resolve_accuracy(accuracy)
+        self._engine.accuracy = resolve_accuracy(accuracy)
 
     @property
     def pushes(self) -> tuple[Push, ...]:
@@ -108,17 +96,17 @@ class Simulation:
     @property
     def contacts(self) -> list[Contact]:
         """What touches now."""
-        return self._stepper.sync_engine().contacts()
+        return self._engine.contacts()
 
     @property
     def coordinates(self) -> GeneralizedState:
         """Generalised coordinates and velocities of all dolls now."""
-        return self._stepper.coordinates
+        return self._engine.coordinates
 
     @property
     def joint_angles(self) -> np.ndarray:
         """All joint angles, rad, in the order of Scene.angle_names."""
-        return self._stepper.sync_engine().joint_angles()
+        return self._engine.layout.joint_angles(self.coordinates.q)
 
     def push(self, push: Push, channel: str | None = None) -> None:
         """Let a push act from its start on; on a ``channel`` it takes the place of the last.
@@ -153,14 +141,11 @@ class Simulation:
         self._hands.let_go(hand)
 
     def advance(self) -> State:
-        """Go on by one tick; the state at its end."""
-        self._stepper.begin_tick(self.step)
-        self.stats = self._stepper.stats
+        """Go on by one tick; the state at its end. Raises Closed after close()."""
         end = self.time + self.tick
         while self.time < end:
             change = self._pushes.next_change(self.time)
             self._advance_until(end if change is None else min(end, change))
-        self._redone += self.stats.redone
         self._pushes.drop_ended(self.time)
         self._fall_asleep()
         if self._swings:
@@ -172,103 +157,78 @@ class Simulation:
 
         Bones that overlap there do not collide from then on, and what is in the ground is lifted;
         what merely rests on something, up to pressed() deep in it, rests on. Raises OutOfRange for
-        coordinates of other lengths than the scene's.
+        coordinates of other lengths than the scene's, NotFinite or NotUnit for what is no pose.
         """
-        stepper = self._stepper
+        layout = self._engine.layout
         q, v = np.array(coordinates.q, float), np.array(coordinates.v, float)
-        sizes = stepper.engine.layout.sizes
-        if (q.shape, v.shape) != ((sizes[0],), (sizes[1],)):
-            raise errors.OutOfRange('coordinates', (q.shape, v.shape), f'{sizes} numbers')
-        stepper.place(GeneralizedState(q, v))
-        engine = stepper.sync_engine()
-        engine.exclude_initial_penetrations()
-        stepper.begin()
-        self._moving.lift_out()
-        engine.forget(self._start[0])
-        self._start = (engine.save(), stepper.coordinates)
+        if (q.shape, v.shape) != ((layout.sizes[0],), (layout.sizes[1],)):
+            raise errors.OutOfRange('coordinates', (q.shape, v.shape), f'{layout.sizes} numbers')
+        errors.check_finite('coordinates', (*q.tolist(), *v.tolist()))
+        layout.check_orientations(q)
+        self._engine.place(GeneralizedState(q, v))
+        self._engine.forget(self._start)
+        self._start = self._engine.save()
         return self.reset()
 
     def reset(self) -> State:
         """Go back to the start, to the bit; pushes that wait are dropped, and hands let go."""
-        snapshot, coordinates = self._start
-        self._stepper.engine.restore(snapshot)
-        self._stepper.place(coordinates)
-        self._stepper.begin()
-        self._moving.begin()
+        self._engine.restore(self._start)
         self.time = 0
         """Nanoseconds simulated since the start."""
         self._pushes = PushQueue(self.scene)
-        self._hands = Hands(self.scene, self.mechanics)
-        self._thrown_until = 0
+        self._hands = Hands(self.scene)
         self._sleep_detector.disturb()
-        self._redone = 0
         self.asleep = False
         """Whether all is at rest and the engine stands."""
-        self.stats = StepStats()
-        """What the last tick took."""
         if self._swings:
             self._swings.begin(self.time, self.state)
         return self.state
 
     def measures(self) -> dict[str, float]:
         """What went wrong so far, and what the last tick took: names end in their units."""
-        stepper = self._stepper
-        sunk = -float(stepper.reach.heights(self.state).min())
-        error = 0.0 if self.asleep else stepper.estimate_error()
+        engine = self._engine
         return {
-            **self._moving.measures(),
-            'error_estimate_m': error or 0.0,
-            'error_trusted': float(error is not None),
+            **engine.measures(),
             'joint_gap_m': float(self._gap.gaps(self.state).max(initial=0.0)),
-            'limit_overshoot_rad': float(
-                stepper.engine.layout.past_limits(self.coordinates.q).max(initial=0.0)),
-            'sinking_m': max(0.0, sunk),
-            'flights': self.stats.flights,
-            'substeps': self.stats.substeps,
-            'redone_total': self._redone,
+            'limit_overshoot_rad': max(0.0, float(
+                engine.layout.past_limits(self.coordinates.q).max(initial=0.0))),
+            'sinking_m': max(0.0, -float(ground_heights(self.scene, self.state).min())),
             'asleep': float(self.asleep)}
 
     def close(self) -> None:
         """Release the engine; a second time does nothing."""
-        self._stepper.close()
+        self._engine.close()
+        self._engine = _ClosedEngine()
 
     def _advance_until(self, end: int) -> None:
         """Go on to an instant, ns, before which no push begins or ends."""
-        loads = self._pushes.wrenches(self.time, self.state)
-        if loads or self._hands:
+        wrenches = self._pushes.wrenches(self.time, self.state)
+        if wrenches or self._hands:
             self.asleep = False
             self._sleep_detector.disturb()
-        if self._hands:
-            self._thrown_until = end + THROWN
-        thrown = self.time < self._thrown_until
-        self._stepper.accuracy = firm(self._accuracy) if thrown else self._accuracy
-        substep = self._pulled_substep if self._hands else self._moving.substep
-        remaining = (end - self.time) / SECOND
-        least = LEAST_SHARE * remaining
-        while remaining > 1e-12 and not self.asleep:
-            length = min(remaining, LONGEST_THROWN) if thrown else remaining
-            if loads:
-                length = min(length, max(least, min(
-                    longest_stretch(load, self.state, self.mechanics.inertias[load.bone])
-                    for load in loads)))
-            remaining -= substep(length, loads)
+        if not self.asleep:
+            duration = (end - self.time) / SECOND
+            self._engine.advance(duration, wrenches, self._hands.springs)
+            self._hands.move(duration)
         self.time = end
-
-    def _pulled_substep(self, duration: float, loads: Wrenches) -> float:
-        """Go through a stretch as short as hands need it; its length, s."""
-        stepper, length = self._stepper, self._hands.stretch(duration)
-        pulls = self._hands.pulls(stepper.dynamics, stepper.coordinates, self.state, length)
-        length = self._moving.substep(length, [*loads, *pulls])
-        self._hands.move(length)
-        return length
 
     def _fall_asleep(self) -> None:
         """Sleep when all has been still for a while with something to rest on."""
-        if self.asleep or not self._stepper.accuracy.sleep:
+        if self.asleep or not self.accuracy.sleep:
             return
         if self._pushes or self._hands:
             self._sleep_detector.disturb()
-        elif (self._sleep_detector.update(self.state, self._moving.motion.kinetic, self.tick)
-                and any(GROUND in pair for pair in self._stepper.touching)):
-            self._moving.stop()
+        elif (self._sleep_detector.update(self.state, self._engine.motion.kinetic, self.tick)
+                and self._engine.grounded()):
+            self._engine.stop()
             self.asleep = True
+
+
+class _ClosedEngine:
+    """Stands where an engine was that is closed."""
+
+    def close(self) -> None:
+        """Nothing is left to release."""
+
+    def __getattr__(self, name: str) -> object:
+        raise errors.Closed('the simulation is closed: build another one')

@@ -8,7 +8,9 @@ import numpy as np
 from ..model import rotation
 from ..model.scene import SECOND, Scene
 from ..model.state import State
-from .settings import HUMAN
+
+HUMAN = 1.4
+"""m: extent of the default doll, for which the next two were measured."""
 
 REST_SPEED = 0.05
 """m/s, and rad/s times the bone's size, below which a bone of the default doll counts as still:

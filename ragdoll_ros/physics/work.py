@@ -9,7 +9,6 @@ from ..model import rotation
 from ..model.state import State
 from .engine.protocol import AppliedWrench
 from .motion import cross, point_motion
-from .stepping import StepResult
 
 STEADY = 0.2
 """rad that a bone may turn while a torque, or a force along its axes, is entered as one."""
@@ -39,15 +38,16 @@ def mean_load(load: AppliedWrench, before: State, after: State) -> tuple[np.ndar
     return turn @ load.force, turn @ load.torque
 
 
-def work(load: AppliedWrench, before: State, after: State, piece: StepResult) -> float:
-    """Work, J: of the force along its point's displacement, and of the torque through its bone's
-    rotation.
+def work(load: AppliedWrench, before: State, after: State, duration: float,
+         substep: float) -> float:
+    """Work, J, in a stretch of ``duration`` s: of the force along its point's displacement, and of
+    the torque through its bone's rotation.
 
-    A step that takes the velocity first (semi-implicit Euler, a substep h long) moves a point by h
-    v' where its energy grows by F (v + v') h / 2: the difference adds up to F (v_end - v_start) h /
-    2 and is left out. Where the load turns with its bone, what it does beyond mean times
-    displacement is that of two even changes, t dF dv / 12. Turns are no vectors: the integral of w
-    is the turn's plus t^2 / 12 w_start x w_end (Magnus).
+    A step that takes the velocity first (semi-implicit Euler, ``substep`` h s long) moves a point
+    by h v' where its energy grows by F (v + v') h / 2: the difference adds up to
+    F (v_end - v_start) h / 2 and is left out. Where the load turns with its bone, what it does
+    beyond mean times displacement is that of two even changes, t dF dv / 12. Turns are no vectors:
+    the integral of w is the turn's plus t^2 / 12 w_start x w_end (Magnus).
     """
     bone = load.bone
     force, torque = mean_load(load, before, after)
@@ -55,14 +55,14 @@ def work(load: AppliedWrench, before: State, after: State, piece: StepResult) ->
         point_motion(state, bone, load.point) for state in (before, after))
     faster = end_speed - speed
     spun = after.angular_velocities[bone] - before.angular_velocities[bone]
-    done = force @ (end - place - piece.lag / 2 * faster)
+    done = force @ (end - place - substep / 2 * faster)
     if torque.any():
-        swept = _turned(bone, before, after) + piece.duration ** 2 / 12 * cross(
+        swept = _turned(bone, before, after) + duration ** 2 / 12 * cross(
             before.angular_velocities[bone], after.angular_velocities[bone])
-        done += torque @ (swept - piece.lag / 2 * spun)
+        done += torque @ (swept - substep / 2 * spun)
     if load.local:
         change = after.rotation_matrices[bone] - before.rotation_matrices[bone]
-        done += piece.duration / 12 * (change @ load.force @ faster + change @ load.torque @ spun)
+        done += duration / 12 * (change @ load.force @ faster + change @ load.torque @ spun)
     return float(done)
 
 

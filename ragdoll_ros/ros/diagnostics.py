@@ -11,7 +11,6 @@ from rclpy.node import Node
 
 from ..model.push import Push
 from ..model.scene import SECOND
-from ..physics import kernels
 from .messages import to_time
 from .tally import Tally
 
@@ -91,7 +90,8 @@ class Diagnostics:
         simulation, tally = self.simulation, self._tally
         return {
             **self._last,
-            'compiled': kernels.ready(),
+            'engine': simulation.engine_name,
+            'engine_reason': simulation.engine_reason,
             'simulated_time': simulation.time / SECOND,
             'push': pushes_text(simulation.pushes),
             **self._facts(),

@@ -71,6 +71,7 @@ class RagdollNode(Node):
         self.create_service(SetBool, '~/pause', self._serve_pause)
         self.paused = False
         self._use(self.simulation)
+        self._tell_engine()
         self._outputs.be_clock(self.settings.publish_clock)
         self._ticker = Ticker(self, self._steady, self.tick)
         self.create_timer(STANDING_CLOCK, self._repeat_clock, clock=self._steady)
@@ -177,6 +178,11 @@ class RagdollNode(Node):
         self._outputs.describe(simulation.scene, self.settings.frame_id)
         self.interactive.use(simulation, self.settings)
 
+    def _tell_engine(self) -> None:
+        """Say which engine simulates, and why it is not the rigid one where that was wanted."""
+        name, reason = self.simulation.engine_name, self.simulation.engine_reason
+        self.get_logger().info(f'engine {name}' + (f', as {reason}' if reason else ''))
+
     def _replace(self, simulation: Simulation) -> None:
         self._stamps.begin_again(self.simulation.time, self.simulation.tick)
         self.simulation.close()
@@ -186,7 +192,8 @@ class RagdollNode(Node):
         """Build what may fail before the change is accepted."""
         if self._prepared is not None:
             self._prepared.close()
-        self._prepared = make_simulation(scene, settings) if 'scene' in changed else None
+        self._prepared = (make_simulation(scene, settings)
+                          if changed & {'scene', 'engine'} else None)
 
     def _apply(self, changed: set[str]) -> None:
         """Carry a change of the settings out."""
@@ -195,6 +202,7 @@ class RagdollNode(Node):
         if self._prepared is not None:
             simulation, self._prepared = self._prepared, None
             self._replace(simulation)
+            self._tell_engine()
             self._begin()
         elif 'frame_id' in changed:
             self._use(self.simulation)
@@ -245,7 +253,7 @@ def step_of(settings: Settings) -> float:
 
 def make_simulation(scene: Scene, settings: Settings) -> Simulation:
     """Build the simulation that the settings ask for."""
-    return Simulation(scene, step_of(settings), settings.accuracy)
+    return Simulation(scene, step_of(settings), settings.accuracy, settings.engine)
 
 
 def main(arguments: list[str] | None = None) -> int:

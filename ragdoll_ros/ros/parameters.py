@@ -15,6 +15,7 @@ from ..model import errors
 from ..model.errors import RagdollError
 from ..model.ragdoll import WORLD
 from ..model.scene import STEP_RANGE, Scene
+from ..physics.engine.registry import ENGINES, check_engine
 from ..physics.settings import ACCURACIES
 
 
@@ -58,6 +59,8 @@ class Settings:
     publish_clock: bool = _setting(False, 'Publish simulated time on /clock and stamp by it')
     accuracy: str = _setting('normal', 'How finely to simulate',
                              constraints='one of ' + ', '.join(ACCURACIES))
+    engine: str = _setting('auto', 'What simulates; another one starts anew',
+                           constraints='one of ' + ', '.join(ENGINES))
 
 
 SPECS = {field.name: field for field in fields(Settings)}
@@ -169,6 +172,7 @@ def check(settings: Settings, scene: Scene) -> None:
     """Raise a RagdollError for what no range can tell."""
     if settings.accuracy not in ACCURACIES:
         raise errors.OutOfRange('accuracy', settings.accuracy, 'one of ' + ', '.join(ACCURACIES))
+    check_engine(settings.engine)
     names = scene.bone_names
     if settings.pushed_bone not in names:
         raise errors.UnknownBone('pushed_bone', settings.pushed_bone, 'one of ' + ', '.join(names))

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from ..files.scene import load_scene
 from ..model import errors
+from ..physics.engine.registry import ENGINES
 from .sources.source import Source
 
 PORT = 8080
@@ -27,7 +28,7 @@ EXAMPLE = """examples:
   ragdoll_viewer                          show the node `ragdoll`
   ragdoll_viewer --ros-args -r __ns:=/stage     ... in another namespace
   ragdoll_viewer --scene doll.yaml        simulate a doll or scene here
-  ragdoll_viewer --scene crowd --port 9000
+  ragdoll_viewer --scene crowd --port 9000 --engine bullet
   ragdoll_viewer --play run.json          show a recording
 """
 
@@ -67,6 +68,8 @@ def parser() -> argparse.ArgumentParser:
     shown.add_argument('--play', metavar='RUN.json', help='show what the page has recorded')
     shown.add_argument('--scene', help='a name in config/ or a path: simulate it here, without '
                         'ROS (else: listen to the node `ragdoll`)')
+    parser.add_argument('--engine', choices=ENGINES, help='with --scene: what simulates (auto); a '
+                        'node has a parameter for it')
     parser.add_argument('--host', default=HOST, help='address to serve at (%(default)s: this '
                         'machine alone; 0.0.0.0: whoever reaches this machine may steer)')
     parser.add_argument('--port', type=port, help=f'port to serve at; it must be free ({PORT}, or '
@@ -115,6 +118,8 @@ def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
     alone = next((f'--{key}' for key in ('scene', 'play') if getattr(options, key) is not None), '')
     if alone and for_ros:
         raise CannotServe(f'{" ".join(for_ros)}: not with {alone}, which does without ROS')
+    if options.engine is not None and options.scene is None:
+        raise CannotServe(f'--engine {options.engine}: only with --scene')
     if options.play is not None:
         from .sources.playback import Playback
         from .sources.recording_file import load_recording
@@ -122,7 +127,7 @@ def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
     if options.scene is not None:
         scene = load_scene(options.scene)
         from .sources.simulated import Simulated
-        return Simulated(scene)
+        return Simulated(scene, options.engine or 'auto')
     try:
         from .sources.remote import Remote
     except ImportError as error:

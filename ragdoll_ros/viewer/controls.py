@@ -10,6 +10,7 @@ import viser
 from ..files.config import scene_names
 from ..model.errors import RagdollError
 from ..physics.arrow_keys import Held, total
+from ..physics.engine.registry import ENGINES
 from .sources.source import Report, Source
 
 ARROWS = {'←': 'left', '↑': 'up', '↓': 'down', '→': 'right'}
@@ -61,9 +62,12 @@ class Controls:
         self.pace = gui.add_slider('Pace', *PACES, step=0.05, initial_value=1.0,
                                    hint='simulated seconds for each second on the wall')
         self.scene = gui.add_dropdown('Scene', (OTHER, *scene_names()), initial_value=OTHER)
+        self.engine = gui.add_dropdown('Engine', ENGINES, initial_value=ENGINES[0],
+                                       hint='what simulates; another one starts anew')
         pushes.on_click(lambda event: self.push(ARROWS[event.target.value]))
         self.pace.on_update(lambda event: event.client and self.source.set_pace(self.pace.value))
         self.scene.on_update(self._choose)
+        self.engine.on_update(self._choose_engine)
         for arrow in ARROWS.values():
             command = gui.add_command(f'Push {arrow}', hotkey=f'arrow{arrow}')
             command.on_trigger(lambda _, arrow=arrow: self.push(arrow))
@@ -95,6 +99,8 @@ class Controls:
             self.pause.label = 'Go on' if report.paused else 'Pause'
             self.pause.icon = 'player-play' if report.paused else 'player-pause'
             self.step_button.disabled = not report.paused
+        if report.engine != self._shown.engine:
+            self._show_engine(report.engine)
         if report.pace != self._shown.pace:
             self.pace.value = min(max(report.pace, PACES[0]), PACES[1])
         self._shown = report
@@ -114,9 +120,30 @@ class Controls:
         if event.client is not None and name != OTHER:
             asyncio.get_running_loop().run_in_executor(None, self._load, name, event.client)
 
+    async def _choose_engine(self, event: viser.GuiEvent) -> None:
+        """Take the chosen engine; see _choose."""
+        if event.client is not None:
+            asyncio.get_running_loop().run_in_executor(
+                None, self._take_engine, event.target.value, event.client)
+
+    def _take_engine(self, name: str, client: viser.ClientHandle) -> None:
+        self._ask(client, lambda: self.source.take_engine(name),
+                  lambda: self._show_engine(self.source.report.engine))
+
+    def _show_engine(self, name: str) -> None:
+        shown = name if name in ENGINES else ENGINES[0]
+        self._loop.call_soon_threadsafe(setattr, self.engine, 'value', shown)
+
     def _load(self, name: str, client: viser.ClientHandle) -> None:
+        self._ask(client, lambda: self.source.load(name),
+                  lambda: self.show_scene(self._scene_shown))
+
+    @staticmethod
+    def _ask(client: viser.ClientHandle, change: Callable[[], None],
+             take_back: Callable[[], None]) -> None:
+        """Ask for a change; where it is refused, take back what the page shows, and say why."""
         try:
-            self.source.load(name)
+            change()
         except RagdollError as error:
-            self.show_scene(self._scene_shown)
+            take_back()
             client.add_notification('Refused', str(error), color='red')

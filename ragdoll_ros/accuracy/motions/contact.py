@@ -21,8 +21,13 @@ RADIUS = 0.1
 
 def contact_motions() -> list[Motion]:
     """All motions on the ground."""
-    return [bounce(), incline('incline_stick', 'Block that sticks', 0.6),
-            incline('incline_slip', 'Block that slips', 0.2), rolling_ball()]
+    return [*map(bounce, (0.1, 0.5, 0.9, 1.0)), incline('incline_stick', 'Block that sticks', 0.6),
+            incline('incline_slip', 'Block that slips', 0.2),
+            incline('tilted_stick', 'Block that sticks under tilted gravity', 0.6, tilted=True),
+            incline('tilted_slip', 'Block that slips under tilted gravity', 0.2, tilted=True),
+            rolling_ball(),
+            rolling_ball('backspin_ball', 'Ball with backspin that comes back',
+                         'v falls to (5 v + 2 r w) / 7', 1.0, -4.0)]
 
 
 def _ball(material: Material, height: float, **placed: object) -> Scene:
@@ -31,7 +36,7 @@ def _ball(material: Material, height: float, **placed: object) -> Scene:
     return Scene('ball', (placement,), Ground(), material)
 
 
-def bounce(height: float = 1.0, restitution: float = 0.5, bounces: int = 3) -> Motion:
+def bounce(restitution: float = 0.5, height: float = 1.0, bounces: int = 3) -> Motion:
     """A ball let fall from 1 m; the heights it comes back to are e^(2 n) of it."""
     impacts = closed_forms.bounce_times(height, restitution, GRAVITY, bounces + 1)
 
@@ -51,7 +56,8 @@ def bounce(height: float = 1.0, restitution: float = 0.5, bounces: int = 3) -> M
         return {f'apex_{n}_error': error for n, error in enumerate(errors, start=1)}
     scene = _ball(Material(friction=0.0, restitution=restitution), height)
     duration = round(impacts[bounces] - 0.01, 2)
-    return Motion('bounce', f'Ball that bounces {bounces} times, e = {restitution:g}',
+    name = 'bounce' if restitution == 0.5 else f'bounce_{restitution:g}'
+    return Motion(name, f'Ball that bounces {bounces} times, e = {restitution:g}',
                   'parabolas, heights e²ⁿ h', Trial(scene, duration), truth, in_air=False,
                   extra=apexes)
 
@@ -72,35 +78,43 @@ def _flight_height(t: float, height: float, restitution: float, impacts: list[fl
     return max(0.0, speed * since - GRAVITY * since * since / 2)
 
 
-def incline(name: str, title: str, friction: float, slope: float = math.radians(20)) -> Motion:
-    """A flat block laid on a slope of 20 degrees."""
-    normal = (math.sin(slope), 0.0, math.cos(slope))
-    downhill = np.array((math.cos(slope), 0.0, -math.sin(slope)))
+def incline(name: str, title: str, friction: float, slope: float = math.radians(20),
+            tilted: bool = False) -> Motion:
+    """A flat block laid on a slope of 20 degrees; or on level ground, gravity ``tilted``."""
+    lean = 0.0 if tilted else slope
+    normal = (math.sin(lean), 0.0, math.cos(lean))
+    downhill = np.array((math.cos(lean), 0.0, -math.sin(lean)))
+    pull = GRAVITY * np.array((math.sin(slope - lean), 0.0, -math.cos(slope - lean)))
     doll = Ragdoll('block', (Bone('block', Box((0.3, 0.3, 0.1)), 1.0, (0.0, 0.0, 0.0)),))
-    orientation = tuple(rotation.from_axis_angle((0, 1, 0), slope))
+    orientation = tuple(rotation.from_axis_angle((0, 1, 0), lean))
     start = 0.05 * np.array(normal)
     scene = Scene('incline', (Placement(doll, position=start, orientation=orientation),),
-                  Ground(normal), Material(friction=friction, restitution=0.0))
+                  Ground(normal), Material(friction=friction, restitution=0.0), tuple(pull))
 
     def truth(times: np.ndarray) -> Trajectory:
         slid = closed_forms.incline_slide(slope, friction, GRAVITY, times)
         return Trajectory.of_poses(times, (start + slid[:, None] * downhill)[:, None],
                                    np.tile(orientation, (len(times), 1, 1)))
-    return Motion(name, f'{title} on a slope of 20°, µ = {friction:g}, 1 s', "Coulomb's law",
+    where = 'of 20°' if tilted else 'on a slope of 20°'
+    return Motion(name, f'{title} {where}, µ = {friction:g}, 1 s', "Coulomb's law",
                   Trial(scene, 1.0), truth, in_air=False)
 
 
-def rolling_ball(speed: float = 2.0, friction: float = 0.3) -> Motion:
-    """A ball thrown flat without spin: it slides, then rolls."""
-    scene = _ball(Material(friction=friction, restitution=0.0), 0.0, velocity=(speed, 0.0, 0.0))
+def rolling_ball(name: str = 'rolling_ball', title: str = 'Ball that slides, then rolls',
+                 reference: str = 'v falls to 5/7, then stays', speed: float = 2.0,
+                 rim: float = 0.0, friction: float = 0.3) -> Motion:
+    """A ball thrown flat, its rim spinning at ``rim`` m/s, forwards if positive."""
+    scene = _ball(Material(friction=friction, restitution=0.0), 0.0, velocity=(speed, 0.0, 0.0),
+                  spin=(0.0, rim / RADIUS, 0.0))
 
     def truth(times: np.ndarray) -> Trajectory:
         positions = np.zeros((len(times), 1, 3))
-        positions[:, 0, 0] = closed_forms.ball_slide_then_roll(speed, friction, GRAVITY, times)
+        positions[:, 0, 0] = closed_forms.ball_slide_then_roll(speed, friction, GRAVITY, times, rim)
         positions[:, 0, 2] = RADIUS
-        angles = closed_forms.ball_slide_then_roll_angle(speed, friction, GRAVITY, RADIUS, times)
+        angles = closed_forms.ball_slide_then_roll_angle(speed, friction, GRAVITY, RADIUS, times,
+                                                         rim)
         return Trajectory.of_poses(
             times, positions, orientations_about((0.0, 1.0, 0.0), angles[:, None]))
     start = posed(scene.dolls[0])
-    return Motion('rolling_ball', f'Ball that slides, then rolls, µ = {friction:g}, 1.5 s',
-                  'v falls to 5/7, then stays', Trial(scene, 1.5, start), truth, in_air=False)
+    return Motion(name, f'{title}, µ = {friction:g}, 1.5 s', reference, Trial(scene, 1.5, start),
+                  truth, in_air=False)

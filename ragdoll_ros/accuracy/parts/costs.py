@@ -26,7 +26,7 @@ def jobs(options: Options) -> list[Job]:
 
 
 def measure_all(repeats: int) -> list[Row]:
-    """Median cost of a tick of each scene, at the setting normal; the scenes take turns."""
+    """Cost of the median tick of each scene, each tick with the least of its runs, at normal."""
     rounds = [[make() for _, make in SCENES] for _ in range(repeats)]
     rows = []
     for (text, _), costs in zip(SCENES, zip(*rounds, strict=True), strict=True):

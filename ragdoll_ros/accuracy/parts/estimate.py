@@ -17,8 +17,9 @@ from .precision import motions
 NAME = 'estimate'
 MOTIONS = ('flight_gentle', 'flight_fast', 'flight_long')
 FACTOR = 3.0
-NOISE = 1e-14
-"""m: rounding of positions; below it neither error nor estimate means anything."""
+NOISE = 3e-14
+"""m: rounding of positions and of the truth. Ticks whose error and estimate are both within a
+FACTOR of it tell nothing, and do not count."""
 
 
 def jobs(options: Options) -> list[Job]:
@@ -46,8 +47,9 @@ def measure(accuracy: str, names: tuple[str, ...]) -> list[Row]:
             true.append(float(np.linalg.norm(state.positions - truth, axis=-1).max()))
             estimated.append(float(found['error_estimate_m']))
         simulation.close()
-    pairs = [(t, e) for t, e in zip(true, estimated, strict=True) if max(t, e) > NOISE]
-    within = [max(t, e) <= FACTOR * max(min(t, e), NOISE) for t, e in pairs]
+    pairs = [(t, e) for t, e in zip(true, estimated, strict=True) if max(t, e) > FACTOR * NOISE]
+    within = [max(t, e) <= FACTOR * min(t, e) for t, e in pairs]
     return [{'label': accuracy, 'ticks': len(pairs), 'distrusted': distrusted,
+             'rounding': len(true) - len(pairs),
              'within_3': float(np.mean(within)) if within else None,
              'true': [t for t, _ in pairs], 'estimated': [e for _, e in pairs]}]

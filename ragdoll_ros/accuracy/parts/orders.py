@@ -35,7 +35,7 @@ CEILING = 0.3
 
 def methods() -> list[Method]:
     """One method of each family, a single step to a tick where we have the choice."""
-    mine = [ours(dataclasses.replace(setting, longest=0.0, flight_error=math.inf), f'ours-{name}')
+    mine = [ours(dataclasses.replace(setting, flight_error=math.inf), f'ours-{name}')
             for name, setting in ACCURACIES.items()]
     # compiled, the settings differ in the steps alone
     return [*(mine[-1:] if kernels.ready() else mine), bullet(1),

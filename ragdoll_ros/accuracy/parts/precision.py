@@ -9,14 +9,16 @@ from ..measure import Measure, compare
 from ..methods import Method, Result, by_name, every_method, median_run
 from ..motions.contact import contact_motions
 from ..motions.flight import flight_motions
+from ..motions.impacts import impact_motions
 from ..motions.mechanisms import mechanism_motions
 from ..motions.motion import Motion
+from ..motions.planar_doll import planar_motions
 from ..runner import Job, Options, Row
 from ..trajectory import Trajectory
 
 NAME = 'precision'
 QUICK_MOTIONS = ('free_fall', 'projectile', 'pendulum_large', 'tumbling_box', 'flight_gentle',
-                 'flight_fast', 'bounce')
+                 'flight_fast', 'bounce', 'rod_slides', 'rocking_block')
 
 
 def jobs(options: Options) -> list[Job]:
@@ -35,7 +37,8 @@ def jobs(options: Options) -> list[Job]:
 def motions() -> dict[str, Motion]:
     """All motions by name, simple ones first, built once in each process."""
     return {motion.name: motion
-            for motion in (*flight_motions(), *mechanism_motions(), *contact_motions())}
+            for motion in (*flight_motions(), *mechanism_motions(), *contact_motions(),
+                           *impact_motions(), *planar_motions())}
 
 
 def measure_all(motion_name: str, method_names: list[str], repeats: int) -> list[Row]:

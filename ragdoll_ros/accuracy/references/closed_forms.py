@@ -43,23 +43,25 @@ def incline_slide(slope: float, friction: float, gravity: float, t: np.ndarray) 
     return max(0.0, pull) * np.asarray(t, float) ** 2 / 2
 
 
-def ball_slide_then_roll(speed: float, friction: float, gravity: float,
-                         t: np.ndarray) -> np.ndarray:
-    """Distance in m of a solid ball thrown flat without spin.
+def ball_slide_then_roll(speed: float, friction: float, gravity: float, t: np.ndarray,
+                         rim: float = 0.0) -> np.ndarray:
+    """Distance in m of a solid ball thrown flat, its rim spinning at ``rim`` m/s: r w, rolling > 0.
 
-    It slides with -mu g until 2 v0 / (7 mu g), then rolls on at 5/7 of its first speed.
+    It slides with -mu g until 2 (v0 - r w0) / (7 mu g), then rolls on as fast as it is.
     """
     t = np.asarray(t, float)
-    grip = 2 * speed / (7 * friction * gravity)
+    grip = 2 * (speed - rim) / (7 * friction * gravity)
     slid = np.minimum(t, grip)
     rolled = np.maximum(t - grip, 0.0)
-    return speed * slid - friction * gravity * slid ** 2 / 2 + 5 / 7 * speed * rolled
+    rolling = (5 * speed + 2 * rim) / 7
+    return speed * slid - friction * gravity * slid ** 2 / 2 + rolling * rolled
 
 
 def ball_slide_then_roll_angle(speed: float, friction: float, gravity: float, radius: float,
-                               t: np.ndarray) -> np.ndarray:
+                               t: np.ndarray, rim: float = 0.0) -> np.ndarray:
     """Angle in rad by which the same ball has rotated: 5/2 mu g / r until it rolls, then v / r."""
     t = np.asarray(t, float)
-    grip = 2 * speed / (7 * friction * gravity)
+    grip = 2 * (speed - rim) / (7 * friction * gravity)
     slid, rolled = np.minimum(t, grip), np.maximum(t - grip, 0.0)
-    return 5 / 4 * friction * gravity / radius * slid ** 2 + 5 / 7 * speed / radius * rolled
+    rolling = (5 * speed + 2 * rim) / 7
+    return (rim * slid + 5 / 4 * friction * gravity * slid ** 2 + rolling * rolled) / radius

@@ -1,15 +1,19 @@
 """What an engine must be able to do. Everything is SI, world frame, quaternions x, y, z, w."""
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
+from ...model import errors
 from ...model.coordinates import DofLayout, GeneralizedState
 from ...model.scene import Scene
 from ...model.state import State
+from ..motion import Motion
+from ..settings import Accuracy
 
 GROUND = -1
 """Index that stands for the ground where a bone's would stand."""
@@ -17,6 +21,10 @@ GROUND = -1
 PRESSED = 0.025
 """Overlap, as a share of half the thinnest bone's thickness, up to which bones rest or slide on
 each other where a motion starts. What overlaps by more was put there, and would burst apart."""
+
+
+class MissingEngine(errors.RagdollError):
+    """An engine whose library is not installed, or does not work here."""
 
 
 @dataclass(frozen=True)
@@ -54,52 +62,89 @@ Wrenches = Sequence[AppliedWrench]
 """All that acts during one step."""
 
 
+@dataclass(frozen=True)
+class Spring:
+    """A hand's spring: it pulls a bone with -k (x - hand) - c (v - hand's velocity), ``most`` N at
+    the most, where x and v are position and velocity of the ``point``.
+    """
+
+    bone: int
+    point: np.ndarray
+    """(3,) m from the bone's centre of mass along the bone's axes."""
+    position: np.ndarray
+    """(3,) m where the hand is now."""
+    target: np.ndarray
+    """(3,) m where it goes, evenly."""
+    left: float
+    """s until it is there."""
+    stiffness: float
+    """k, N/m."""
+    damping: float
+    """c, N s/m."""
+    most: float
+
+    def after(self, duration: float) -> Spring:
+        """The same ``duration`` s later, its hand farther on."""
+        if duration >= self.left:
+            return dataclasses.replace(self, position=self.target, left=0.0)
+        way = (self.target - self.position) * (duration / self.left)
+        return dataclasses.replace(self, position=self.position + way, left=self.left - duration)
+
+
+Springs = Sequence[Spring]
+
+
 class Engine(Protocol):
-    """A scene in motion. ``free``: nothing touches and no joint has a limit."""
+    """A scene in motion: where it is, what moves it on, what went wrong.
+
+    It begins where the scene's placements say, as after place().
+    """
 
     scene: Scene
     layout: DofLayout
+    accuracy: Accuracy
+    """May be changed between ticks."""
 
-    def __init__(self, scene: Scene, free: bool = False) -> None: ...
+    def __init__(self, scene: Scene, accuracy: Accuracy) -> None: ...
 
-    def step(self, duration: float, substeps: int, loads: Wrenches = ()) -> None:
-        """Go on by ``duration`` s in equal substeps, under ``loads`` that do not turn."""
+    @property
+    def state(self) -> State:
+        """Poses and velocities of all bones now."""
 
-    def acceleration(self, coordinates: GeneralizedState, loads: Wrenches = ()) -> np.ndarray:
-        """Rates of change of ``coordinates.v``; leaves the engine in no state to go on from."""
-
-    def read(self) -> State:
-        """Poses and velocities of all bones."""
-
+    @property
     def coordinates(self) -> GeneralizedState:
-        """Generalised coordinates of all dolls."""
+        """Generalised coordinates and velocities of all dolls now."""
+
+    @property
+    def motion(self) -> Motion:
+        """Sums over each doll now."""
 
     def place(self, coordinates: GeneralizedState) -> None:
-        """Put all dolls where ``coordinates`` says."""
+        """Put all dolls there and begin: nothing has been gained or lost yet.
 
-    def joint_angles(self) -> np.ndarray:
-        """All joint angles in rad, in the order of Scene.angle_names."""
+        Bones of one doll that overlap by more than pressed() collide no more, for good or until
+        they have come apart; a doll that is deeper in the ground is lifted onto it.
+        """
 
-    def touching(self) -> set[tuple[int, int]]:
-        """Pairs of dolls that touch where they are now; GROUND stands for the ground."""
+    def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = ()) -> None:
+        """Go on by ``duration`` s under wrenches that neither begin nor end within it, and springs
+        of hands.
+        """
 
-    def touched(self) -> set[tuple[int, int]]:
-        """Pairs of dolls that touched in the last substep, as it saw them."""
+    def stop(self) -> None:
+        """Bring all to rest where it is; the energy that is left is lost for good."""
 
-    def set_solver_iterations(self, wanted: bool) -> None:
-        """Solve contacts that bear on each other, or as fast as is enough for others."""
-
-    def set_ground_friction(self, wanted: bool) -> None:
-        """Take the ground's friction away, or give it back."""
-
-    def exclude_initial_penetrations(self) -> None:
-        """Let bones of one doll that overlap by more than pressed() now collide no more."""
+    def grounded(self) -> bool:
+        """Whether anything rests on the ground."""
 
     def contacts(self) -> list[Contact]:
-        """What touches at the end of the last substep."""
+        """What touches now."""
+
+    def measures(self) -> dict[str, float]:
+        """What went wrong since the start: names end in their units."""
 
     def save(self) -> object:
-        """A snapshot that restore brings back to the bit."""
+        """A snapshot that restore brings back to the bit, accounts included."""
 
     def restore(self, snapshot: object) -> None:
         """Go back to a snapshot."""
@@ -108,7 +153,7 @@ class Engine(Protocol):
         """Release what a snapshot holds."""
 
     def close(self) -> None:
-        """Release everything."""
+        """Release everything; a second time does nothing."""
 
 
 def pressed(scene: Scene) -> float:

@@ -5,7 +5,7 @@ import argparse
 import sys
 import time
 
-from . import SWITCH, ready
+from . import problem
 
 EXAMPLE = """examples:
   python -m ragdoll_ros.physics.kernels
@@ -13,8 +13,7 @@ EXAMPLE = """examples:
                                            nodes that are to find it want the same variable
 """
 
-NOT_READY = ("Nothing to compile with: pip install 'ragdoll_ros[fast]' gets numba, and all works "
-             f'without. (Or {SWITCH}=0 is set.)')
+NOT_READY = 'Nothing to compile with: {}; the node runs engine bullet then'
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -22,8 +21,8 @@ def main(arguments: list[str] | None = None) -> int:
     argparse.ArgumentParser(
         'python -m ragdoll_ros.physics.kernels', description=__doc__, epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter).parse_args(arguments)
-    if not ready():
-        print(NOT_READY, file=sys.stderr)
+    if problem():
+        print(NOT_READY.format(problem()), file=sys.stderr)
         return 2
     began = time.monotonic()
     from . import cache, loaded  # noqa: F401  importing compiles

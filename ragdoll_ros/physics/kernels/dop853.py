@@ -5,7 +5,11 @@ Differential Equations I, 2nd edition, II.5 and II.6, whose code gives these dig
 """
 from __future__ import annotations
 
+import math
+
 import numpy as np
+
+from .machine import compiled
 
 _STAGES = (
     ((0, 0.05260015195876773),),
@@ -87,3 +91,39 @@ CONTINUED = _filled(_CONTINUED, 16)
 
 ERRORS = _filled(_ERRORS, 16)
 """(2, 16): from the rates of all stages to the differences from methods of order 5 and 3."""
+
+SLOWEST = 0.1
+"""s: an error of 1 in a velocity counts as much as one of this in its coordinate."""
+
+
+@compiled
+def add_up(shares: np.ndarray, count: int, k: np.ndarray, h: float, out: np.ndarray) -> None:
+    """Add up the rates of ``count`` stages, times h."""
+    for j in range(len(out)):
+        out[j] = 0.0
+    for stage in range(count):
+        if shares[stage] != 0.0:
+            share = h * shares[stage]
+            for j in range(len(out)):
+                out[j] += share * k[stage, j]
+
+
+@compiled
+def step_error(k: np.ndarray, h: float, nq: int, room: np.ndarray) -> float:
+    """The error that DOP853 takes for that of its order 8 (Hairer, Norsett, Wanner, II.10);
+    infinity if a number was none.
+    """
+    fifth, third, all_of_it = 0.0, 0.0, 0.0
+    add_up(ERRORS[0], 16, k, h, room)
+    for j in range(len(room)):
+        fifth = max(fifth, abs(room[j]) * (1.0 if j < nq else SLOWEST))
+        all_of_it += room[j]
+    add_up(ERRORS[1], 16, k, h, room)
+    for j in range(len(room)):
+        third = max(third, abs(room[j]) * (1.0 if j < nq else SLOWEST))
+        all_of_it += room[j]
+    if not math.isfinite(all_of_it):
+        return math.inf
+    if fifth == 0.0:
+        return 0.0
+    return fifth * fifth / np.sqrt(fifth * fifth + 0.01 * third * third)

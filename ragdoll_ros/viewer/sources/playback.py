@@ -84,6 +84,9 @@ class Playback(Source):
     def load(self, name: str) -> None:
         raise Fixed(f'a recording has one scene; for another: ragdoll_viewer --scene {name}')
 
+    def take_engine(self, name: str) -> None:
+        raise Fixed('a recording was simulated once and for all')
+
     def use(self, scene: Scene) -> None:
         raise Fixed('a recording has one scene; to change it: ragdoll_viewer --scene')
 

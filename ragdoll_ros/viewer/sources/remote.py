@@ -104,7 +104,8 @@ class Remote(Source):
             problem = MISSING.format(self._full) if silence > 1.0 else ''
         elif silence > SILENCE:
             problem = SILENT.format(self._full, silence)
-        return dataclasses.replace(self._told, problem=problem, note=self._known.note)
+        return dataclasses.replace(self._told, problem=problem, note=self._known.note,
+                                   engine=self._known.settings.engine)
 
     def want(self, wanted: Wanted) -> None:
         if wanted != self._wanted:
@@ -132,6 +133,10 @@ class Remote(Source):
     def load(self, name: str) -> None:
         """Set the parameter `scene`; Refused if the node will not take it."""
         self._ask.set_and_wait('scene', name)
+
+    def take_engine(self, name: str) -> None:
+        """Set the parameter `engine`; Refused if the node will not take it."""
+        self._ask.set_and_wait('engine', name)
 
     def use(self, scene: Scene) -> None:
         """Write a scene to a file and have the node take that, if it can read it."""

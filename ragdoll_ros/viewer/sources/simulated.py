@@ -39,12 +39,12 @@ class Simulated(Source):
     The first doll's root is pushed.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, engine: str = 'auto') -> None:
         self._commands: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         self._wanted = Wanted()
         self._frame: Frame | None = None
-        self._report = Report(pace=_pace_of(scene))
-        self._simulation = Simulation(scene)
+        self._report = Report(pace=_pace_of(scene), engine=engine)
+        self._simulation = Simulation(scene, engine=engine)
         self._pacer = Pacer(1.0, 0)
         self._next_measure = 0.0
         self._show()
@@ -83,17 +83,11 @@ class Simulated(Source):
     def load(self, name: str) -> None:
         self.use(load_scene(name))
 
+    def take_engine(self, name: str) -> None:
+        self._wait_for(lambda: self._replace(self._simulation.scene, name))
+
     def use(self, scene: Scene) -> None:
-        done: Future[None] = Future()
-
-        def replace() -> None:
-            try:
-                done.set_result(self._replace(scene))
-            except Exception as error:
-                done.set_exception(error)
-
-        self._commands.put(replace)
-        done.result(PATIENCE)
+        self._wait_for(lambda: self._replace(scene, self._report.engine))
 
     def grab(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
         self._commands.put(lambda: self._simulation.grab(hand, bone, point, target))
@@ -108,6 +102,19 @@ class Simulated(Source):
         self._commands.put(None)
         self._thread.join(ENDING)
         self._simulation.close()
+
+    def _wait_for(self, change: Callable[[], None]) -> None:
+        """Have the simulation's thread do something; what it raises is raised here."""
+        done: Future[None] = Future()
+
+        def run() -> None:
+            try:
+                done.set_result(change())
+            except Exception as error:
+                done.set_exception(error)
+
+        self._commands.put(run)
+        done.result(PATIENCE)
 
     def _run(self) -> None:
         while True:
@@ -155,11 +162,12 @@ class Simulated(Source):
         bone = scene.qualified(doll, doll.doll.root.name)
         self._simulation.push(Push(bone, force, duration=HOLD), 'page')
 
-    def _replace(self, scene: Scene) -> None:
-        simulation = Simulation(scene)
+    def _replace(self, scene: Scene, engine: str) -> None:
+        simulation = Simulation(scene, engine=engine)
+        pace = self._report.pace if scene is self._simulation.scene else _pace_of(scene)
         self._simulation.close()
         self._simulation = simulation
-        self._tell(pace=_pace_of(scene), problem='')
+        self._tell(pace=pace, problem='', engine=engine)
         self._show()
 
     def _tick(self) -> None:
@@ -170,7 +178,7 @@ class Simulated(Source):
         except (ArithmeticError, ValueError):
             finite = False
         if not finite:
-            self._replace(self._simulation.scene)
+            self._replace(self._simulation.scene, self._report.engine)
             self._tell(problem='the numbers ran away; the scene was started anew')
         self._show()
 

@@ -59,6 +59,8 @@ class Report:
     paused: bool = False
     pace: float = 1.0
     """s simulated for each s on the wall that are asked for."""
+    engine: str = ''
+    """The engine that was asked for, by its name; empty where there is none."""
     measures: dict[str, float] = field(default_factory=dict)
     """As Simulation.measures() has them, no older than a second."""
 
@@ -107,6 +109,9 @@ class Source(Protocol):
 
     def load(self, name: str) -> None:
         """Take another scene, by its name in config/ or its path; waits; RagdollError if not."""
+
+    def take_engine(self, name: str) -> None:
+        """Start anew with another engine, by its name; waits; RagdollError if not."""
 
     def use(self, scene: Scene) -> None:
         """Start anew with a scene; waits until it is so; RagdollError with the reason if not."""

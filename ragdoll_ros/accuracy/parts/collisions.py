@@ -1,0 +1,41 @@
+"""Two dolls that collide in the air: their momentum together, and how deep bones get in bones."""
+from __future__ import annotations
+
+import functools
+import math
+
+from ...physics.settings import ACCURACIES
+from ..contact_cases import COLLISIONS, two_dolls
+from ..depth import BoneDepth
+from ..measure import Measure
+from ..methods import by_name, run
+from ..runner import Job, Options, Row
+
+NAME = 'collisions'
+OTHERS = ('bullet-4', 'bullet-10', 'mujoco-implicitfast-4', 'mujoco-implicitfast-10')
+
+
+def jobs(options: Options) -> list[Job]:
+    """One job for each method."""
+    names = [*(f'ours-{accuracy}' for accuracy in ACCURACIES),
+             *(OTHERS[1:2] if options.quick else OTHERS)]
+    return [Job(NAME, f'collisions, {name}', functools.partial(measure, name), 2.0)
+            for name in names]
+
+
+def measure(name: str) -> list[Row]:
+    """One row for each speed of approach."""
+    method, rows = by_name(name), []
+    for speed in COLLISIONS:
+        trial = two_dolls(speed)
+        moved, scales = run(method, trial).trajectory, Measure(trial.scene)
+        row: Row = {'method': name, 'label': method.label, 'speed_m_s': speed}
+        rows.append(row | (dict.fromkeys(FIGURES, math.inf) if not moved.finite else {
+            'momentum_drift': scales.momentum_drift(trial, moved),
+            'angular_momentum_drift': scales.angular_momentum_drift(moved),
+            'depth_m': BoneDepth(trial.scene).deepest(moved),
+            'energy_excess': scales.energy_excess(trial, moved)}))
+    return rows
+
+
+FIGURES = ('momentum_drift', 'angular_momentum_drift', 'depth_m', 'energy_excess')

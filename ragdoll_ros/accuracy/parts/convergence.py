@@ -1,0 +1,71 @@
+"""Error against step on the motions with contacts: whether an engine comes to the truth at all.
+
+An engine that comes ever nearer to its own finest run may still come to something else: a
+restitution that was not asked for, a contact that gives way. So the difference to its own finest
+run stands only beside the error.
+"""
+from __future__ import annotations
+
+import functools
+
+from .. import fineness
+from ..measure import compare
+from ..methods import Method, bullet, core, mujoco, run
+from ..motions.contact import contact_motions
+from ..motions.impacts import impact_motions
+from ..motions.planar_doll import planar_motions
+from ..runner import Job, Options, Row
+from .orders import slope
+from .precision import motions
+
+NAME = 'convergence'
+HALVINGS = 6
+"""Steps from h down to h / 64."""
+
+QUICK_MOTIONS = ('bounce', 'rod_slides', 'rocking_block', 'planar_ice')
+FLOOR = 1e-11
+"""m or rad: errors below are the reference's, or rounding's."""
+
+
+def jobs(options: Options) -> list[Job]:
+    """One job for each motion with contacts."""
+    names = [motion.name for make in (contact_motions, impact_motions, planar_motions)
+             for motion in make()]
+    chosen = [name for name in names if not options.quick or name in QUICK_MOTIONS]
+    return [Job(NAME, f'convergence, {name}', functools.partial(
+        measure, name, 4 if options.quick else HALVINGS),
+        1 + 2 * motions()[name].trial.duration) for name in chosen]
+
+
+def families(halvings: int) -> dict[str, list[Method]]:
+    """The engines there are, each with ever halved steps, the coarsest first.
+
+    The core begins at draft's step, the others at one substep a tick.
+    """
+    counts = [2 ** k for k in range(halvings + 1)]
+    found = {'PyBullet': [*map(bullet, counts)],
+             'MuJoCo implicitfast': [mujoco('implicitfast', count) for count in counts]}
+    if fineness.has_core():
+        first = fineness.core_step('draft')
+        return {'core': [core(first / count) for count in counts], **found}
+    return found
+
+
+def measure(motion_name: str, halvings: int) -> list[Row]:
+    """Errors of a motion at all steps: against the truth, and against the engine's own finest."""
+    motion, rows = motions()[motion_name], []
+    truth = motion.truth(motion.trial.times())
+    for family, methods in families(halvings).items():
+        steps = [_step(method) for method in methods]
+        found = [run(method, motion.trial).trajectory for method in methods]
+        errors, own = ([compare(trajectory, exact)[motion.yardstick] for trajectory in found]
+                       for exact in (truth, found[-1]))
+        rows.append({'motion': motion_name, 'title': motion.title, 'label': family,
+                     'yardstick': motion.yardstick, 'steps_s': steps, 'errors': errors,
+                     'own': own[:-1], **slope(tuple(steps), errors, FLOOR)})
+    return rows
+
+
+def _step(method: Method) -> float:
+    return fineness.TICK / method.substeps if method.substeps else float(
+        method.name.removeprefix('core-'))

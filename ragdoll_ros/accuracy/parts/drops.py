@@ -1,0 +1,137 @@
+"""Many drops as a cloud: a single one is chaotic, but the distribution of many has a truth.
+
+Two populations: drops of any orientation and pose, and the default drop tilted by thousandths of a
+radian. Each cloud is held against the reference's by the two-sample test of Kolmogorov and Smirnov.
+"""
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+
+import numpy as np
+
+from ...files.scene import load_scene
+from ...model import rotation
+from ...physics.settings import ACCURACIES
+from .. import starts
+from ..measure import Measure
+from ..methods import by_name, reference, run
+from ..runner import Job, Options, Row
+from ..trajectory import Trajectory
+from ..trial import Trial
+
+NAME = 'drops'
+PARTS = 50
+"""Of normal's step is the reference's."""
+
+DURATION, CHUNK = 3.0, 10
+"""s of each drop, and drops in a job."""
+
+OTHERS = ('bullet-4', 'bullet-10', 'mujoco-implicitfast-4', 'mujoco-implicitfast-10')
+INSTANTS = (0.3, 0.5, 1.0)
+"""s after letting go at which energy is compared; the first touch is at 0.286 s."""
+
+QUANTITIES = (*(f'energy_{instant:g}s' for instant in INSTANTS), 'slide_m', 'settled_s', 'spread_m')
+TILT = 4e-3
+"""rad, largest about x and y."""
+
+
+def random_drop(number: int) -> Trial:
+    """The doll let go 0.4 m above the ground in any orientation and pose."""
+    return dataclasses.replace(starts.trial('drop .4 m', number), duration=DURATION)
+
+
+def tilted_drop(number: int) -> Trial:
+    """The default drop, hardly tilted."""
+    rng, scene = np.random.default_rng([20, number]), load_scene('drop')
+    tilt = (*rng.uniform(-TILT, TILT, 2), 0.0)
+    placement = dataclasses.replace(scene.dolls[0], orientation=tuple(
+        rotation.from_rotation_vector(np.array(tilt))))
+    return Trial(dataclasses.replace(scene, dolls=(placement,)), DURATION)
+
+
+POPULATIONS = {'random': random_drop, 'default, tilted': tilted_drop}
+COUNTS = {'random': 300, 'default, tilted': 30}
+QUICK_COUNTS = {'random': 4}
+
+
+def jobs(options: Options) -> list[Job]:
+    """Jobs of CHUNK drops by each method; the reference, which takes longest, first."""
+    counts = QUICK_COUNTS if options.quick else COUNTS
+    names = [reference(PARTS).name, *(f'ours-{accuracy}' for accuracy in ACCURACIES),
+             *(OTHERS[1:2] if options.quick else OTHERS)]
+    made = []
+    for name in names:
+        for population, count in counts.items():
+            for first in range(0, count, CHUNK):
+                end = min(first + CHUNK, count)
+                made.append(Job(NAME, f'{population} drops, {name}', functools.partial(
+                    measure, population, name, first, end),
+                    (end - first) * (2.0 if name == names[0] else 0.15)))
+    return made
+
+
+def measure(population: str, name: str, first: int, end: int) -> list[Row]:
+    """What the drops first ... end - 1 came to, one row."""
+    method, found = by_name(name), []
+    for number in range(first, end):
+        trial = POPULATIONS[population](number)
+        found.append(quantities(trial, run(method, trial).trajectory))
+    return [{'population': population, 'method': name, 'label': method.label, 'drops': end - first,
+             'values': {key: [row[key] for row in found] for key in QUANTITIES}}]
+
+
+def quantities(trial: Trial, trajectory: Trajectory) -> dict[str, float]:
+    """Shares of energy left, how far the centre of mass went and the bones lie apart (rms)."""
+    measure = Measure(trial.scene)
+    masses = np.array([bone.mass for bone in trial.scene.bones])
+    energy = measure.energy(trajectory)
+    centres = np.einsum('n,tnd->td', masses, trajectory.positions) / masses.sum()
+    apart = trajectory.positions[-1] - trajectory.positions[-1].mean(axis=0)
+    left = {f'energy_{instant:g}s': float(np.interp(instant, trajectory.times, energy) / energy[0])
+            for instant in INSTANTS}
+    return {**left, 'slide_m': float(np.hypot(*(centres[-1] - centres[0])[:2])),
+            'settled_s': measure.settling_time(trajectory),
+            'spread_m': float(np.sqrt((apart ** 2).sum(axis=1).mean()))}
+
+
+def merged(rows: list[Row]) -> list[Row]:
+    """A row for each population and method, the reference first, with what tells it from it."""
+    found: dict[tuple, Row] = {}
+    for row in rows:
+        if 'failed' in row:
+            found[(row['job'], len(found))] = row
+            continue
+        whole = found.setdefault((row['population'], row['method']), {
+            **row, 'drops': 0, 'values': {key: [] for key in QUANTITIES}})
+        whole['drops'] += row['drops']
+        for key in QUANTITIES:
+            whole['values'][key] += row['values'][key]
+    clouds: dict[str, Row] = {}
+    for row in found.values():
+        if 'failed' not in row:
+            row |= told_apart(row, clouds.setdefault(row['population'], row))
+    return list(found.values())
+
+
+def told_apart(row: Row, truth: Row) -> Row:
+    """Mean, its standard error, and p of Kolmogorov and Smirnov for each quantity.
+
+    ``off``: how many standard errors of their difference the means lie apart. What has not settled
+    at the end counts as settling then.
+    """
+    from scipy.stats import ks_2samp
+    found: Row = {}
+    for key in QUANTITIES:
+        own, other = (np.minimum(np.nan_to_num(cloud['values'][key], nan=1e9), 1e9)
+                      for cloud in (row, truth))
+        if key == 'settled_s':
+            own, other = np.minimum(own, DURATION), np.minimum(other, DURATION)
+        errors = [float(cloud.std(ddof=1)) / math.sqrt(len(cloud)) if len(cloud) > 1 else 0.0
+                  for cloud in (own, other)]
+        apart, scale = float(own.mean() - other.mean()), math.hypot(*errors)
+        found |= {f'{key}_mean': float(own.mean()), f'{key}_error': errors[0],
+                  f'{key}_off': abs(apart) / scale if apart else 0.0,
+                  f'{key}_p': float(ks_2samp(own, other).pvalue)}
+    return found

@@ -1,0 +1,308 @@
+"""The package's own engine: rigid bodies, machine code from a stretch's start to its end.
+
+What it does is in kernels/: advance.py reads as the algorithm. Here are only its tables, its state
+and what is told of it.
+"""
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model import rotation
+from ...model.coordinates import DofLayout, GeneralizedState
+from ...model.scene import Scene
+from ...model.state import State
+from ..ground_heights import ground_heights
+from ..kernels.flight import Path
+from ..kernels.loaded import advance as kernels
+from ..kernels.system import CONTACT, make_room
+from ..motion import Motion, damping_rate
+from ..settings import Accuracy
+from ..system import pairs_between, system_of
+from .neighbours import Neighbours
+from .protocol import GROUND, Contact, Spring, Springs, Wrenches, pressed
+
+STIFFEST = 1000.0
+"""1/s at which joint damping may end a motion for it to be flown; above, steps take it
+implicitly."""
+
+MOST_CONTACTS = 400
+"""Contacts at a time; those beyond are counted and left out."""
+
+FINER = 0.25
+"""Share of the step by which the last stretch is gone again to tell its error."""
+
+CONTACTS_OF_GEOM = 12
+"""Contacts for which there is room, for each part of a bone."""
+
+
+NO_HANDS = np.empty((0, 18))
+NO_LOADS = np.empty((0, 11))
+
+
+@dataclass
+class _Snapshot:
+    """All that the next stretch depends on."""
+
+    q: np.ndarray
+    v: np.ndarray
+    path: Path
+    known: np.ndarray
+    counts: np.ndarray
+    sums: np.ndarray
+    excluded: frozenset
+    start_energy: float
+
+
+class RigidEngine:
+    """An Engine by the rigid core; see Engine."""
+
+    def __init__(self, scene: Scene, accuracy: Accuracy) -> None:
+        self.scene, self.accuracy = scene, accuracy
+        self.layout = DofLayout([placement.doll for placement in scene.dolls])
+        self._whole = self._system = system_of(scene)
+        self._neighbours = Neighbours(scene, self._whole)
+        self._flies = damping_rate(scene) < STIFFEST
+        self._masses = np.array([bone.mass for bone in scene.bones])
+        self._inertias = np.array([bone.inertia for bone in scene.bones], float)
+        self._doll_of = np.ascontiguousarray(scene.doll_of_bone, np.int64)
+        self._spins = self.layout.root_spins
+        self._size = sum(self.layout.sizes)
+        self._longest = math.inf
+        """s that a path of flight may be long, as far as neighbours are known."""
+        self._stages, self._row = np.empty((16, self._size)), np.empty(self._size)
+        self.place(self._placed())
+
+    @property
+    def state(self) -> State:
+        """Poses and velocities of all bones now."""
+        return self._state
+
+    @property
+    def coordinates(self) -> GeneralizedState:
+        """Generalised coordinates and velocities of all dolls now."""
+        v = self._v.copy()
+        turns = self._q[self.layout.root_orientations]
+        v[self._spins] = rotation.rotate(turns, v[self._spins])
+        return GeneralizedState(self._q.copy(), v)
+
+    @property
+    def motion(self) -> Motion:
+        """Sums over each doll now."""
+        return self._motion
+
+    def place(self, coordinates: GeneralizedState) -> None:
+        """Put all dolls there and begin; see Engine."""
+        self._q = np.array(coordinates.q, float)
+        self._v = np.array(coordinates.v, float)
+        turns = self._q[self.layout.root_orientations]
+        self._v[self._spins] = rotation.rotate(rotation.inverse(turns), self._v[self._spins])
+        self._path = Path(np.zeros((8, self._size)), np.zeros((2, self._size)), np.zeros(8))
+        self._use(self._whole)
+        self._look()
+        self._lift_out()
+        self._exclude_overlaps()
+        self._look()
+        self._neighbours.forget()
+        self._start_energy = float(self.motion.energy.sum())
+        self._departure = None
+
+    def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = ()) -> None:
+        """Go on by ``duration`` s; see Engine."""
+        self._departure = (self._q.copy(), self._v.copy(), duration, wrenches, springs)
+        self._meet(duration)
+        if wrenches or springs:
+            self._path.times[:] = 0.0
+        self._go(duration, wrenches, springs, self.accuracy)
+        if wrenches or springs:
+            self._path.times[:] = 0.0
+
+    def stop(self) -> None:
+        """Bring all to rest where it is; the energy that is left is lost for good."""
+        self._v[:] = 0.0
+        self._path.times[:] = 0.0
+        self._look()
+
+    def grounded(self) -> bool:
+        """Whether anything rests on the ground."""
+        now = self._contacts
+        return bool(((now['kind'] > 1) & (now['b'] < 0) & (now['impulse'][:, 0] > 0)).any())
+
+    def contacts(self) -> list[Contact]:
+        """What touches now."""
+        bones, lasted = self._system.tree['bone'], self._room.sums[4] or 1.0
+        return [Contact(int(bones[c['a']]), int(bones[c['b']]) if c['b'] >= 0 else GROUND,
+                        c['point'].copy(), c['normal'].copy(), -float(c['gap']),
+                        float(c['impulse'][0]) / lasted)
+                for c in self._contacts if c['kind'] > 1]
+
+    def measures(self) -> dict[str, float]:
+        """What went wrong since the start, and what was done: names end in their units."""
+        counts, room_sums = self._room.counts, self._room.sums
+        energy = float(self.motion.energy.sum())
+        return {
+            'energy_excess_J': energy - self._start_energy - float(room_sums[0] + room_sums[1]),
+            'energy_lifted_J': float(room_sums[2]),
+            'work_of_pushes_J': float(room_sums[0]), 'work_of_grabs_J': float(room_sums[1]),
+            'error_estimate_m': self._estimate_error(), 'error_trusted': 1.0,
+            'flights': int(counts[0]), 'substeps': int(counts[1]), 'impacts': int(counts[2]),
+            'unsolved_total': int(counts[3])}
+
+    def save(self) -> object:
+        """A snapshot that restore brings back to the bit."""
+        return _Snapshot(
+            self._q.copy(), self._v.copy(), Path(*(part.copy() for part in self._path)),
+            self._known.copy(), self._room.counts.copy(), self._room.sums.copy(),
+            self._excluded, self._start_energy)
+
+    def restore(self, snapshot: _Snapshot) -> None:
+        """Go back to a snapshot."""
+        self._q, self._v = snapshot.q.copy(), snapshot.v.copy()
+        self._path = Path(*(part.copy() for part in snapshot.path))
+        self._excluded = snapshot.excluded
+        self._use(self._whole)
+        self._drop_excluded()
+        self._known[:] = snapshot.known
+        self._room.counts[:] = snapshot.counts
+        self._room.sums[:] = snapshot.sums
+        self._start_energy = snapshot.start_energy
+        self._neighbours.forget()
+        self._look()
+
+    def forget(self, snapshot: object) -> None:
+        """Nothing to release: the memory goes with the object."""
+
+    def close(self) -> None:
+        """Nothing to release: the memory goes with the object."""
+
+    @property
+    def _contacts(self) -> np.ndarray:
+        """Contacts of the last step; none in flight."""
+        return self._known[:0 if self._path.times[0] else int(self._room.counts[5])]
+
+    def _go(self, duration: float, wrenches: Wrenches, springs: Springs,
+            accuracy: Accuracy) -> None:
+        rows, sums = np.empty((len(self._masses), 13)), np.empty((len(self.scene.dolls), 20))
+        kernels.advance(self._system, self._room, self._q, self._v, duration, _loads(wrenches),
+                        self._hands(springs), accuracy.step, accuracy.flight_error,
+                        self._flies and not springs, self._longest, self._path, self._stages,
+                        self._row, self._armed, self._known, self._masses, self._inertias,
+                        self._doll_of, rows, sums)
+        self._state, self._motion = State.of(rows), Motion.of(sums)
+
+    def _hands(self, springs: Springs) -> np.ndarray:
+        """Springs as a table (m, 18) for compiled code, the last four its own."""
+        if not springs:
+            return NO_HANDS
+        bones = self._system.tree['bone'].tolist()
+        return np.array([_hand(bones.index(spring.bone), spring) for spring in springs])
+
+    def _meet(self, duration: float) -> None:
+        """See that all geoms of two dolls that may meet within ``duration`` s are paired."""
+        self._longest = math.inf
+        if len(self.scene.dolls) > 1:
+            couples = self._neighbours.update(self.state, duration)
+            if couples is not None:
+                pairs = np.concatenate([self._own_pairs,
+                                        pairs_between(self.scene, self._whole.geoms, couples)])
+                self._use(self._system._replace(pairs=pairs), keep=True)
+                self._path.times[:] = 0.0
+            self._longest = duration
+
+    def _use(self, system: object, keep: bool = False) -> None:
+        """Work with these tables from now on; ``keep``: what is counted and known so far."""
+        self._system = system
+        contacts = min(MOST_CONTACTS, CONTACTS_OF_GEOM * len(system.geoms) + len(system.bounds))
+        counts, totals = (self._room.counts, self._room.sums) if keep else (None, None)
+        self._room = make_room(system, contacts)
+        if keep:
+            self._room.counts[:], self._room.sums[:] = counts, totals
+            self._room.counts[5] = 0
+        self._known = np.zeros(contacts, CONTACT)
+        self._armed = np.zeros(len(self._room.gaps))
+
+    def _look(self) -> None:
+        """See where all is."""
+        self._go(0.0, (), (), self.accuracy)
+
+    def _lift_out(self) -> None:
+        """Set dolls that are in the ground onto it."""
+        heights = ground_heights(self.scene, self.state)
+        for doll, own in enumerate(self.scene.bone_slices):
+            depth = -heights[own].min()
+            if depth > pressed(self.scene):
+                at = self.layout.root_positions[doll]
+                self._q[at] += depth * np.array(self.scene.ground.normal)
+
+    def _exclude_overlaps(self) -> None:
+        """Let geoms of one doll that overlap by more than pressed() collide no more."""
+        kernels.gaps_at(self._system, self._room, self._q, self._v, self._room.gaps)
+        count = len(self._system.pairs)
+        gaps = self._room.gaps[len(self._room.gaps) - count:]
+        deep = self._system.pairs[gaps < -pressed(self.scene)]
+        self._excluded = frozenset(zip(deep['a'].tolist(), deep['b'].tolist(), strict=True))
+        self._drop_excluded()
+
+    def _drop_excluded(self) -> None:
+        pairs = self._whole.pairs
+        self._own_pairs = pairs[[(a, b) not in self._excluded for a, b in
+                                 zip(pairs['a'].tolist(), pairs['b'].tolist(), strict=True)]]
+        self._use(self._whole._replace(pairs=self._own_pairs))
+
+    def _placed(self) -> GeneralizedState:
+        """Where the scene's placements stand."""
+        q, v = np.zeros(self.layout.sizes[0]), np.zeros(self.layout.sizes[1])
+        for bone in self._whole.tree:
+            if bone['free'] and bone['parent'] >= 0:
+                q[bone['q'] + 3] = 1.0
+        for doll, placement in enumerate(self.scene.dolls):
+            pose = placement.bone_pose(placement.doll.root)
+            q[self.layout.root_positions[doll]] = pose.position
+            q[self.layout.root_orientations[doll]] = pose.orientation
+            v[self.layout.root_velocities[doll]] = placement.root_velocity()
+            v[self._spins[doll]] = placement.spin
+        return GeneralizedState(q, v)
+
+    def _estimate_error(self) -> float:
+        """Error, m, that the last stretch added to the worst position.
+
+        It is gone again in steps a quarter as long, flights with a hundredth of the error: what is
+        of order 2 then errs by a sixteenth.
+        """
+        if self._departure is None:
+            return 0.0
+        q, v, duration, wrenches, springs = self._departure
+        finer = dataclasses.replace(self.accuracy, step=FINER * self.accuracy.step,
+                                    flight_error=self.accuracy.flight_error / 100)
+        here, there = self.save(), self.state.positions
+        self._q, self._v = q.copy(), v.copy()
+        self._path.times[:] = 0.0
+        self._room.counts[5] = 0
+        self._go(duration, wrenches, springs, finer)
+        missed = np.linalg.norm(self.state.positions - there, axis=1).max()
+        self._q, self._v, self._path = here.q, here.v, here.path
+        self._known[:] = here.known
+        self._room.counts[:], self._room.sums[:] = here.counts, here.sums
+        self._look()
+        return float(missed / (1 - FINER ** 2))
+
+
+def _loads(wrenches: Wrenches) -> np.ndarray:
+    """Wrenches as a table (m, 11) for compiled code."""
+    if not wrenches:
+        return NO_LOADS
+    rows = np.empty((len(wrenches), 11))
+    for row, load in zip(rows, wrenches, strict=True):
+        row[0], row[1:4], row[4:7], row[7:10], row[10] = (
+            load.bone, load.force, load.torque, load.point, load.local)
+    return rows
+
+
+def _hand(record: int, spring: Spring) -> np.ndarray:
+    spring = spring.after(0.0)
+    speed = (spring.target - spring.position) / spring.left if spring.left > 0 else np.zeros(3)
+    return np.concatenate([[record], spring.point, spring.position, speed, [
+        spring.left, spring.stiffness, spring.damping, spring.most, 1.0, 0.0, 0.0, 0.0]])

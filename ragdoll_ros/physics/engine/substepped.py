@@ -1,0 +1,205 @@
+"""What engines that go in equal substeps share: stretches, loads and their work, the account."""
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...model.coordinates import DofLayout, GeneralizedState
+from ...model.scene import Scene
+from ...model.state import State
+from ..account import Account
+from ..ground_heights import ground_heights
+from ..motion import Motion
+from ..settings import Accuracy
+from ..sums import DollSums
+from ..work import longest_stretch, work
+from .protocol import GROUND, Springs, Wrenches, pressed
+from .pull import LONGEST, Pull, pulls
+
+SPAN = 0.01
+"""s for which Accuracy counts substeps, and the longest stretch of which work or an account is
+taken."""
+
+LEAST_SHARE = 0.01
+"""Of what is asked for: stretches under loads are no shorter, however fast the bone spins."""
+
+
+class SubsteppedEngine(ABC):
+    """An Engine but for its library: how that steps, reads, places and tells what touches.
+
+    A stretch is some substeps under loads that are taken to be steady.
+    """
+
+    lags = True
+    """Whether a substep moves all by the velocity at its end (semi-implicit Euler)."""
+
+    def __init__(self, scene: Scene, accuracy: Accuracy) -> None:
+        self.scene, self.accuracy = scene, accuracy
+        self.layout = DofLayout([placement.doll for placement in scene.dolls])
+        self._sums = DollSums(scene)
+        self._taken = 0
+        """Substeps that the last advance took."""
+        self._changed()
+
+    @property
+    def state(self) -> State:
+        """Poses and velocities of all bones now."""
+        if self._state is None:
+            self._state = self._read_state()
+        return self._state
+
+    @property
+    def coordinates(self) -> GeneralizedState:
+        """Generalised coordinates and velocities of all dolls now."""
+        if self._coordinates is None:
+            self._coordinates = self._read_coordinates()
+        return self._coordinates
+
+    @property
+    def motion(self) -> Motion:
+        """Sums over each doll now."""
+        if self._motion is None:
+            self._motion = self._sum(self.state)
+        return self._motion
+
+    def place(self, coordinates: GeneralizedState) -> None:
+        """Put all dolls there and begin; see Engine."""
+        self._put(coordinates)
+        self._lift_out()
+        self._exclude_overlaps()
+        self._changed()
+        self._account = Account.opened(self.motion.energy)
+        self._taken = 0
+
+    def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = ()) -> None:
+        """Go on by ``duration`` s; see Engine."""
+        self._taken, least, left = 0, LEAST_SHARE * duration, duration
+        while left > 1e-12 * duration:
+            longest = max(least, min(left, *self._steady(wrenches, springs)))
+            length = left / math.ceil(left / longest - 1e-6)
+            self._stretch(length, [*wrenches, *pulls(springs, self._sums, self.state, length)])
+            springs = [spring.after(length) for spring in springs]
+            left -= length
+
+    def stop(self) -> None:
+        """Bring all to rest where it is; the energy that is left is lost for good."""
+        here = self.coordinates
+        self._put(GeneralizedState(here.q, np.zeros_like(here.v)))
+        self._account.lower(self.motion.energy)
+        self._taken = 0
+
+    def grounded(self) -> bool:
+        """Whether anything touches the ground."""
+        return any(GROUND in pair for pair in self._touched())
+
+    def measures(self) -> dict[str, float]:
+        """What the account says, and the substeps that the last advance took."""
+        return {**self._account.measures(self.motion.energy), 'substeps': self._taken}
+
+    def save(self) -> object:
+        """A snapshot that restore brings back to the bit."""
+        return self._save(), self._account.copy()
+
+    def restore(self, snapshot: object) -> None:
+        """Go back to a snapshot."""
+        held, account = snapshot
+        self._restore(held)
+        self._account, self._taken = account.copy(), 0
+        self._changed()
+
+    def forget(self, snapshot: object) -> None:
+        """Release what a snapshot holds."""
+        self._forget(snapshot[0])
+
+    @property
+    def _accounts(self) -> bool:
+        """Whether an account is closed after each stretch."""
+        return False
+
+    def _steady(self, wrenches: Wrenches, springs: Springs) -> Iterator[float]:
+        """For how long loads may be taken as steady, and an account may wait, s."""
+        yield SPAN if wrenches or springs or self._accounts else math.inf
+        yield LONGEST if springs else math.inf
+        for wrench in wrenches:
+            yield longest_stretch(wrench, self.state, self._sums.inertias[wrench.bone])
+
+    def _stretch(self, duration: float, loads: Wrenches) -> None:
+        """Go through substeps under steady loads, and enter their work."""
+        before, substeps = self.state, max(self._least_substeps(duration), math.ceil(
+            self.accuracy.substeps * duration / SPAN - 1e-6))
+        touched = self._run(duration, substeps, loads)
+        self._taken += substeps
+        self._changed()
+        for load in loads:
+            joules = work(load, before, self.state, duration,
+                          duration / substeps if self.lags else 0.0)
+            self._account.add_work(self._sums.doll_of[load.bone], joules, isinstance(load, Pull))
+        if self._accounts:
+            self._conserve(before, duration, loads, touched)
+
+    def _conserve(self, before: State, duration: float, loads: Wrenches,
+                  touched: set[tuple[int, int]]) -> None:
+        """Close the account of a stretch in which pairs of dolls ``touched``, where one is kept."""
+        raise NotImplementedError
+
+    def _lift_out(self) -> None:
+        """Set dolls that are in the ground onto it: else they stay, or are thrown out."""
+        heights = ground_heights(self.scene, self.state)
+        depths = -np.array([heights[own].min() for own in self.scene.bone_slices])
+        sunk = depths > pressed(self.scene)
+        if sunk.any():
+            q = self.coordinates.q.copy()
+            q[self.layout.root_positions] += np.outer(np.where(sunk, depths, 0),
+                                                      self.scene.ground.normal)
+            self._put(GeneralizedState(q, self.coordinates.v))
+
+    def _put(self, coordinates: GeneralizedState) -> None:
+        self._set(coordinates)
+        self._changed()
+
+    def _changed(self) -> None:
+        """Forget what was read."""
+        self._state: State | None = None
+        self._coordinates: GeneralizedState | None = None
+        self._motion: Motion | None = None
+
+    def _sum(self, state: State) -> Motion:
+        return self._sums.motion(state)
+
+    def _least_substeps(self, duration: float) -> int:
+        """Substeps that a stretch must have, whatever the accuracy says."""
+        return 1
+
+    @abstractmethod
+    def _run(self, duration: float, substeps: int, loads: Wrenches) -> set[tuple[int, int]]:
+        """Go on in equal substeps; pairs of dolls, or of a doll and GROUND, that touched."""
+
+    @abstractmethod
+    def _touched(self) -> set[tuple[int, int]]:
+        """Such pairs in the last substep."""
+
+    @abstractmethod
+    def _read_state(self) -> State: ...
+
+    @abstractmethod
+    def _read_coordinates(self) -> GeneralizedState: ...
+
+    @abstractmethod
+    def _set(self, coordinates: GeneralizedState) -> None:
+        """Put the dolls there."""
+
+    @abstractmethod
+    def _exclude_overlaps(self) -> None:
+        """Let bones of one doll that overlap by more than pressed() now collide no more."""
+
+    @abstractmethod
+    def _save(self) -> object: ...
+
+    @abstractmethod
+    def _restore(self, held: object) -> None: ...
+
+    @abstractmethod
+    def _forget(self, held: object) -> None: ...

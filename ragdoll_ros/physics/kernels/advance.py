@@ -1,0 +1,351 @@
+"""A stretch of a scene's motion from end to end: flight, touches, impacts, steps between them."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .contact import TOUCHING, contact_rates, find_contacts, look, place_geoms
+from .dynamics import pose, rates
+from .flight import (
+    ALONG,
+    EVENT,
+    KNOWN,
+    LENGTH,
+    PATH,
+    TRY,
+    VALID,
+    Path,
+    along,
+    begin_path,
+    find_event,
+    point_velocity,
+    time_free,
+)
+from .impact import (
+    SLOW,
+    SLOW_TURN,
+    STEP_TOLERANCE,
+    contact_step,
+    energy,
+    enter_work,
+    impact,
+    power,
+)
+from .machine import COUNTS, REAL, ROW, TABLE, YES, compiled, entry
+from .mass import integrate
+from .momentum import give_contacts, keep_energy, keep_momentum, sum_dolls
+from .quaternion import cross, times
+from .sums import motion
+from .system import CONTACTS, ROOM, SYSTEM, Room, System
+
+APART = 5e-3
+"""m/s or rad/s at which what touches comes apart for a flight: to 1.3 um under gravity, which is
+what TOUCHING can tell."""
+
+STILL = 1e-6
+"""rad/s, or rad/s^2, at which a joint that leans on its limit does not press on it."""
+
+WORTH = 6
+"""Steps on the ground that cost as much as one of flight."""
+
+LONGEST = 0.05
+"""s of a path."""
+
+SUNK = -1e-7
+"""m or rad: what is found deeper than this at a step's end has met on the way."""
+
+TRIES = 16
+"""At a step that is to end at a touch, and is to make no energy."""
+
+SHORTEST = 1e-9
+"""s: no step is made shorter to find a touch."""
+
+FINEST = 0.01
+"""Share of a step below which it is not made shorter to make no energy; what makes some all the
+same is counted."""
+
+NOISE = 1e-10
+"""Share of the weights times the largest reach that solving to a tolerance may give a step."""
+
+GAIN = 2e-7
+"""Share of the kinetic energy that a step may gain."""
+
+MOST_BOUNCES, MOST_EVENTS = 60, 1000
+"""Impacts in one stretch: from the first number on nothing is thrown back, from the second on no
+instant of a touch is sought."""
+
+GAUSS = ((0.046910077030668, 0.118463442528095), (0.230765344947158, 0.239314335249683),
+         (0.5, 0.284444444444444), (0.769234655052842, 0.239314335249683),
+         (0.953089922969332, 0.118463442528095))
+"""Places and weights of Gauss and Legendre's rule of five points on (0, 1)."""
+
+
+@compiled
+def may_fly(s: System, r: Room, q: np.ndarray, v: np.ndarray, loads: np.ndarray,
+            known: np.ndarray, path: Path, armed: np.ndarray, step: float,
+            rate: np.ndarray) -> bool:
+    """Whether all that touches comes apart, and for long enough; r.gaps are those at q."""
+    for i in range(r.counts[5]):
+        if r.counts[11] and known[i].impulse[0] > 0:
+            return False
+    look(s, r, q, v, r.gaps, math.inf, r.gaps)
+    m = find_contacts(s, q, r, r.gaps, TOUCHING)
+    leaning = False
+    for i in range(m):
+        c = r.contacts[i]
+        if c.kind == 1:
+            leaning |= c.normal[0] * v[c.a] < APART
+            if c.normal[0] * v[c.a] < -STILL:
+                return False
+            continue
+        apart = point_velocity(r.work, c.a, q, s.tree[s.root_of[c.a]].q, c.point, c.normal)
+        if c.b >= 0:
+            apart -= point_velocity(r.work, c.b, q, s.tree[s.root_of[c.b]].q, c.point, c.normal)
+        if apart < APART:
+            return False
+    if leaning:
+        rates(s.tree, s.gravity, loads, q, v, r.work, rate)
+        for i in range(m):
+            c = r.contacts[i]
+            if c.kind == 1 and c.normal[0] * v[c.a] < APART and (
+                    c.normal[0] * rate[len(q) + c.a] < -STILL):
+                return False
+        pose(s.tree, q, v, r.work)
+    if m == 0 or len(s.tree) == len(r.given):
+        return True
+    g = math.sqrt(s.gravity[0] ** 2 + s.gravity[1] ** 2 + s.gravity[2] ** 2)
+    fast = 0.0
+    for k in range(len(s.geoms)):
+        move = r.work.moves[s.geoms[k].bone]
+        fast = max(fast, (move[0] ** 2 + move[1] ** 2 + move[2] ** 2) * s.geoms[k].reach)
+    for j in range(len(armed)):
+        armed[j] = 1.0 if r.gaps[j] > TOUCHING else 0.0
+    return time_free(s, r, q, v, r.gaps, armed, g + 2 * fast + 1e-3, path.ends) > WORTH * step
+
+
+@compiled
+def fly(s: System, r: Room, q: np.ndarray, v: np.ndarray, left: float, loads: np.ndarray,
+        path: Path, armed: np.ndarray) -> tuple[float, bool]:
+    """Go along the path by ``left`` s or to its end or its first touch; the time gone, and whether
+    something touches.
+    """
+    times = path.times
+    end = min(times[LENGTH], times[EVENT])
+    gone = min(left, end - times[ALONG])
+    if len(loads):
+        q2, v2 = r.states[1], r.vectors[0]
+        for place, weight in GAUSS:
+            along(s.tree, path, times[ALONG] + place * gone, q2, v2)
+            pose(s.tree, q2, v2, r.work)
+            for k in range(len(loads)):
+                r.sums[0] += weight * gone * power(s.tree, r.work, loads[k])
+    times[ALONG] += gone
+    along(s.tree, path, times[ALONG], q, v)
+    if times[ALONG] < end - 1e-15:
+        return gone, False
+    times[VALID] = 0.0
+    touched = times[EVENT] <= times[LENGTH]
+    times[KNOWN] = 0.0 if touched else 1.0
+    if touched:
+        times[TRY] = 0.0
+    else:
+        for j in range(path.ends.shape[1]):
+            path.ends[0, j] = path.ends[1, j]
+    return gone, touched
+
+
+@compiled
+def step_or_touch(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loads: np.ndarray,
+                  springs: np.ndarray, since: float, known: np.ndarray, step: float,
+                  seek: bool) -> tuple[float, bool]:
+    """Go on by h s, or to the first touch that is fast; the time gone, and whether one was met.
+
+    r.gaps are those at q, and again at the end. A step that makes energy is too long for what
+    turns: it is gone again, half as long.
+    """
+    end_q, end_v = r.states[2], r.vectors[4]
+    length, hit, m = min(h, r.sums[6]) if r.sums[6] > 0 else h, False, 0
+    r.sums[6] = 2 * length if 2 * length < step else 0.0
+    begin_step(s, r, q, v)
+    held, moving = energy(s, q, r)
+    done, handed, lifted = r.sums[0], r.sums[1], r.sums[2]
+    for turn in range(TRIES):
+        r.sums[0], r.sums[1], r.sums[2] = done, handed, lifted
+        m = contact_step(s, r, q, v, length, loads, springs, since, known, end_q, end_v)
+        settle_momentum(s, r, q, v, length, loads, springs, since, m, end_q, end_v)
+        look(s, r, end_q, end_v, r.gaps, length, r.later)
+        if turn == TRIES - 1:
+            break
+        now, speed = energy(s, end_q, r)
+        work = r.sums[0] - done + r.sums[1] - handed
+        gained = now - held - work - (r.sums[2] - lifted)
+        noise = NOISE * weight(s) + 10 * STEP_TOLERANCE * pressure(r, m)
+        if gained > 1e-14 * abs(now) and r.given[:, 6].min() == 0.0:
+            sum_dolls(s, end_q, end_v, r, r.after)
+            if keep_energy(s, r, gained, r.after, r.given, end_q, end_v):
+                gained = 0.0
+        if not gained <= GAIN * (max(moving, speed) + abs(work)) + noise:
+            if length > FINEST * step:
+                length, hit = length / 2, False
+                r.sums[6] = length
+                continue
+            r.counts[9] += 1
+        share, landed = first_touch(s, r, length)
+        hit = seek and (landed or share <= 1)
+        if share > 1 or not seek:
+            break
+        length = max(SHORTEST, length * share * (1 + 1e-9) + 2e-9)
+    if length > 0.1 * h:
+        for i in range(m):
+            known[i] = r.contacts[i]
+        r.counts[5], r.sums[4] = m, length
+    for j in range(len(q)):
+        q[j] = end_q[j]
+    for j in range(len(v)):
+        v[j] = end_v[j]
+    for j in range(len(r.gaps)):
+        r.gaps[j] = r.later[j]
+    return length, hit
+
+
+@compiled
+def pressure(r: Room, m: int) -> float:
+    """Sum of the sizes of all impulses of m contacts, N s or N m s: times the tolerance to which
+    they are solved, the energy that they may make.
+    """
+    total = 0.0
+    for i in range(m):
+        for e in range(r.contacts[i].kind):
+            total += abs(r.contacts[i].impulse[e])
+    return total
+
+
+@compiled
+def weight(s: System) -> float:
+    """Weight of all, N, times the largest reach of a geom, m."""
+    mass = reach = 0.0
+    for i in range(len(s.tree)):
+        mass += s.tree[i].mass
+    for k in range(len(s.geoms)):
+        reach = max(reach, s.geoms[k].reach)
+    return mass * reach * math.sqrt(s.gravity[0] ** 2 + s.gravity[1] ** 2 + s.gravity[2] ** 2)
+
+
+@compiled
+def begin_step(s: System, r: Room, q: np.ndarray, v: np.ndarray) -> None:
+    """Note what touches as a step begins, and how it moves; poses work and geoms at q and v.
+
+    On a curved way the rows at the step's middle see J v as h/2 dJ/dt v where it is zero at the
+    start: what they see of v' is to be its opposite, for it to be zero at the end.
+    """
+    pose(s.tree, q, v, r.work)
+    place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
+    m = find_contacts(s, q, r, r.gaps, TOUCHING)
+    for i in range(m):
+        contact_rates(s, r, q, v, r.contacts[i])
+        r.begun[i] = r.contacts[i]
+    r.counts[13] = m
+
+
+@compiled
+def settle_momentum(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loads: np.ndarray,
+                    springs: np.ndarray, since: float, m: int, end_q: np.ndarray,
+                    end_v: np.ndarray) -> None:
+    """Book the work of a step of h s, give depths back by r.vectors[3], and keep the momentum of
+    what the ground does not bear.
+    """
+    r.given[:] = 0.0
+    give_contacts(s, r, m, r.given)
+    if len(loads) or len(springs):
+        enter_work(s, r, v, end_v, h, loads, springs, since)
+    free = r.given[:, 6].min() == 0.0
+    if free:
+        sum_dolls(s, q, v, r, r.before)
+        sum_dolls(s, end_q, end_v, r, r.after)
+        for d in range(len(r.given)):
+            for k in range(3):
+                r.given[d, 7 + k] = r.after[d, 1 + k]
+    integrate(s.tree, end_q, r.vectors[3], 1.0, end_q)
+    if free:
+        sum_dolls(s, end_q, end_v, r, r.after)
+        keep_momentum(s, r, h, r.before, r.after, r.given, end_q, end_v)
+
+
+@compiled
+def first_touch(s: System, r: Room, h: float) -> tuple[float, bool]:
+    """Share of the step just gone at which something met that was apart, above 1: nothing; and
+    whether something touches at its end that came fast.
+    """
+    first, landed, bounds = 2.0, False, len(r.gaps) - len(s.pairs) - 2 * len(s.bounds)
+    for j in range(len(r.gaps)):
+        if r.gaps[j] > TOUCHING and r.later[j] <= TOUCHING:
+            fallen = r.gaps[j] - r.later[j]
+            slow = SLOW_TURN if bounds <= j < bounds + 2 * len(s.bounds) else SLOW
+            if fallen > slow * h:
+                landed = True
+                if r.later[j] < SUNK:
+                    first = min(first, r.gaps[j] / fallen)
+    return first, landed
+
+
+@compiled
+def observe(s: System, r: Room, q: np.ndarray, v: np.ndarray, rows: np.ndarray) -> None:
+    """Position, orientation, linear and angular velocity (n, 13) of all bones, world frame."""
+    pose(s.tree, q, v, r.work)
+    for i in range(len(s.tree)):
+        bone, turn, move, centre = s.tree[i], r.work.turns[i], r.work.moves[i], r.work.centres[i]
+        row, root, bind = rows[bone.bone], s.tree[s.root_of[i]].q, bone.bind
+        row[3], row[4], row[5], row[6] = times(turn[0], turn[1], turn[2], turn[3], bind[0],
+                                               bind[1], bind[2], bind[3])
+        x, y, z = cross(move[0], move[1], move[2], centre[0], centre[1], centre[2])
+        row[7], row[8], row[9] = move[3] + x, move[4] + y, move[5] + z
+        for k in range(3):
+            row[k] = q[root + k] + centre[k]
+            row[10 + k] = move[k]
+
+
+@entry(SYSTEM, ROOM, ROW, ROW, REAL, TABLE, TABLE, REAL, REAL, YES, REAL, PATH, TABLE, ROW, ROW,
+       CONTACTS, ROW, TABLE, COUNTS, TABLE, TABLE)
+def advance(s: System, r: Room, q: np.ndarray, v: np.ndarray, duration: float,
+            loads: np.ndarray, springs: np.ndarray, step: float, tolerance: float, flies: bool,
+            longest: float, path: Path, k: np.ndarray, y: np.ndarray, armed: np.ndarray,
+            known: np.ndarray, masses: np.ndarray, inertias: np.ndarray, doll_of: np.ndarray,
+            rows: np.ndarray, sums: np.ndarray) -> None:
+    """Go on by ``duration`` s: q and v, roots' angular velocities along their own axes, become
+    those at the end. ``step``: s of a step on the ground; ``tolerance``: m or rad by which a path's
+    end may err; ``flies``: whether damping and springs allow flights.
+    """
+    time, events = 0.0, 0
+    while time < duration - 1e-12:
+        left = duration - time
+        if path.times[VALID] == 0.0 and flies and events < MOST_EVENTS and may_fly(
+                s, r, q, v, loads, known, path, armed, step, y):
+            most = min(left if len(loads) else longest, LONGEST)
+            if begin_path(s, r, loads, q, v, tolerance, most, path, k, y):
+                find_event(s, r, path, armed, r.states[1], r.vectors[0])
+                r.counts[5] = 0
+        if path.times[VALID] > 0.0:
+            gone, touched = fly(s, r, q, v, left, loads, path, armed)
+            if touched:
+                look(s, r, q, v, r.gaps, math.inf, r.gaps)
+        else:
+            if not flies or events >= MOST_EVENTS:
+                look(s, r, q, v, r.gaps, math.inf, r.gaps)
+            h = left / math.ceil(left / step - 1e-9)
+            gone, touched = step_or_touch(s, r, q, v, h, loads, springs, time, known, step,
+                                          events < MOST_EVENTS)
+            path.times[KNOWN] = path.times[TRY] = 0.0
+        time += gone
+        r.counts[11] = 0 if touched else 1
+        if touched:
+            impact(s, r, q, v, events < MOST_BOUNCES)
+            events += 1
+    observe(s, r, q, v, rows)
+    motion(masses, inertias, doll_of, s.gravity, rows, sums)
+
+
+@entry(SYSTEM, ROOM, ROW, ROW, ROW)
+def gaps_at(s: System, r: Room, q: np.ndarray, v: np.ndarray, out: np.ndarray) -> None:
+    """All gaps at a pose; see contact.py."""
+    look(s, r, q, v, out, math.inf, out)

@@ -1,0 +1,383 @@
+"""The two ways to go on where something touches: the instant of an impact, and a step between.
+
+Both solve for impulses with the mass matrix at one pose; see response.py. The step is Moreau's,
+centred: forces, contacts and their rows at the middle of the way, so that it is of order 2 where
+no contact begins or ends (Moreau 1988; Studer, Numerics of Unilateral Contacts and Friction,
+2009). Joint damping and hands' springs are taken implicitly at the middle as well.
+"""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .contact import find_contacts, place_geoms
+from .dynamics import Work, pose
+from .machine import compiled
+from .mass import (
+    bias_forces,
+    crba,
+    factor,
+    integrate,
+    root_axes,
+    solve_lower,
+    solve_upper,
+    turn_inertias,
+    update_moves,
+)
+from .momentum import give
+from .quaternion import cross, times, turned
+from .response import respond
+from .system import Room, System
+
+STEP_TOLERANCE, IMPACT_TOLERANCE = 1e-8, 1e-10
+"""m/s to which contacts are solved."""
+
+SLOW = 0.02
+"""m/s, and SLOW_TURN rad/s: what meets more slowly where something touches already is taken on
+by the next step, without restitution, and not sought out."""
+
+SLOW_TURN = 0.1
+
+OPENING = 1e-3
+"""m/s: what comes apart faster as a step begins is not held sideways in it."""
+
+
+@compiled
+def impact(s: System, r: Room, q: np.ndarray, v: np.ndarray, bounces: bool) -> int:
+    """Change v by the impulses of all that touches at q by r.gaps; how many contacts there are.
+
+    Not ``bounces``: nothing is thrown back.
+    """
+    pose(s.tree, q, v, r.work)
+    place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
+    m = find_contacts(s, q, r, r.gaps, 1e-6)
+    if m == 0:
+        return 0
+    root_axes(s.tree, q, r.work.axes)
+    turn_inertias(s.tree, r.work, r.own)
+    crba(s.tree, s.up, s.bone_of, r.work, r.own, r.composite, r.H)
+    factor(r.H, s.up)
+    for i in range(m):
+        for e in range(5):
+            r.contacts[i].impulse[e] = 0.0
+        if not bounces:
+            r.contacts[i].restitution = 0.0
+    change, shift = r.vectors[0], r.vectors[1]
+    respond(s, r, q, v, v, m, 0.0, IMPACT_TOLERANCE, change, shift)
+    for j in range(len(v)):
+        v[j] += change[j]
+    r.counts[2] += 1
+    return m
+
+
+@compiled
+def contact_step(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loads: np.ndarray,
+                 springs: np.ndarray, since: float, known: np.ndarray, end_q: np.ndarray,
+                 end_v: np.ndarray) -> int:
+    """Go on by h s from q and v to ``end_q`` and ``end_v``; the number of contacts. What gives
+    depths back is still to come: r.vectors[3].
+
+    ``since``: s since the hands of ``springs`` were where these say. ``known``: contacts of the
+    step before, r.counts[5] of them, whose impulses over r.sums[4] s are where to begin.
+    """
+    middle = r.states[0]
+    free, smooth, change, shift = r.vectors[0], r.vectors[1], r.vectors[2], r.vectors[3]
+    integrate(s.tree, q, v, h / 2, middle)
+    pose(s.tree, middle, v, r.work)
+    root_axes(s.tree, middle, r.work.axes)
+    turn_inertias(s.tree, r.work, r.own)
+    for k in range(len(springs)):
+        springs[k, 14] = 1.0
+    for turn in range(2 if len(springs) else 1):
+        crba(s.tree, s.up, s.bone_of, r.work, r.own, r.composite, r.H)
+        for j in range(len(v)):
+            r.H[j, j] += h * lag(h * s.damping[j] / r.H[j, j]) * s.damping[j]
+        for k in range(len(springs)):
+            stiffen(s.tree, s.up, s.last, r.work, r.H, springs[k], h)
+        factor(r.H, s.up)
+        for stage in range(2):
+            if stage or turn:
+                for j in range(len(v)):
+                    smooth[j] = v[j] + (change[j] / 2 if stage else 0.0)
+                update_moves(s.tree, middle, smooth, r.work)
+            bias_forces(s.tree, s.gravity, loads, middle, smooth if stage else v, r.work, r.own,
+                        change)
+            for k in range(len(springs)):
+                pull(s.tree, s.up, s.last, r.work, middle, root_q(s, springs[k]), v, springs[k],
+                     since + h / 2, change)
+            for j in range(len(v)):
+                change[j] = h * (change[j] - s.damping[j] * v[j])
+            solve_upper(r.H, s.up, change)
+            solve_lower(r.H, s.up, change)
+        for j in range(len(v)):
+            free[j] = v[j] + change[j]
+        if turn or not weaken(s, r, middle, v, free, springs, since + h / 2, h):
+            break
+    place_geoms(s.tree, s.root_of, s.geoms, r.work, middle, r.at, r.turn)
+    m = find_contacts(s, middle, r, r.gaps, SLOW * h)
+    if m:
+        warm_start(r, m, known, h)
+        respond(s, r, middle, v, free, m, h, STEP_TOLERANCE, change, shift)
+        for j in range(len(v)):
+            end_v[j] = free[j] + change[j]
+    else:
+        for j in range(len(v)):
+            end_v[j], shift[j] = free[j], 0.0
+    integrate(s.tree, middle, end_v, h / 2, end_q)
+    if m:
+        r.sums[2] += lifted(s, r, shift)
+    r.counts[1] += 1
+    return m
+
+
+@compiled
+def lifted(s: System, r: Room, shift: np.ndarray) -> float:
+    """Energy of height, J, that a displacement (nv,) gives; axes, composites are those of now."""
+    total, g = 0.0, s.gravity
+    for j in range(len(shift)):
+        if shift[j] != 0.0:
+            a, c = r.work.axes[j], r.composite[s.bone_of[j]]
+            x, y, z = cross(a[0], a[1], a[2], c[1], c[2], c[3])
+            total -= shift[j] * (g[0] * (c[0] * a[3] + x) + g[1] * (c[0] * a[4] + y)
+                                 + g[2] * (c[0] * a[5] + z))
+    return total
+
+
+@compiled
+def energy(s: System, q: np.ndarray, r: Room) -> tuple[float, float]:
+    """Energy of all bones, J, and the kinetic part of it; work is posed."""
+    kinetic = height = 0.0
+    for i in range(len(s.tree)):
+        bone, move, c, t = s.tree[i], r.work.moves[i], r.work.centres[i], r.work.turns[i]
+        root, b = s.tree[s.root_of[i]].q, s.tree[i].bind
+        x, y, z = cross(move[0], move[1], move[2], c[0], c[1], c[2])
+        x, y, z = move[3] + x, move[4] + y, move[5] + z
+        ax, ay, az, aw = times(t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3])
+        wx, wy, wz = turned(ax, ay, az, -aw, move[0], move[1], move[2])
+        kinetic += 0.5 * (bone.mass * (x * x + y * y + z * z) + bone.inertia[0] * wx * wx
+                          + bone.inertia[1] * wy * wy + bone.inertia[2] * wz * wz)
+        height -= bone.mass * (s.gravity[0] * (q[root] + c[0]) + s.gravity[1] * (q[root + 1] + c[1])
+                               + s.gravity[2] * (q[root + 2] + c[2]))
+    return kinetic + height, kinetic
+
+
+@compiled
+def lag(fast: float) -> float:
+    """Share of a step's end at which damping is taken: the middle, later where it is stiff
+    (Liniger and Willoughby, SIAM J. Numer. Anal. 7, 1970).
+    """
+    return max(0.5, 1 - 1 / fast) if fast > 0 else 0.5
+
+
+@compiled
+def spring_point(bone: np.record, work: Work, i: int,
+                 point: np.ndarray) -> tuple[float, float, float]:
+    """Where a point of bone i, along its axes from its centre, is from its root, m."""
+    t, b, c = work.turns[i], bone.bind, work.centres[i]
+    x, y, z, w = times(t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3])
+    x, y, z = turned(x, y, z, w, point[0], point[1], point[2])
+    return c[0] + x, c[1] + y, c[2] + z
+
+
+@compiled
+def stiffen(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, H: np.ndarray,
+            spring: np.ndarray, h: float) -> None:
+    """Add to H what a spring's end resists: h (k h / 4 + c / 2) J^T J. A bone's velocities are of
+    one branch, so that H keeps its pattern.
+    """
+    i = int(spring[0])
+    x, y, z = spring_point(tree[i], work, i, spring[1:4])
+    share = h * (spring[11] * h / 4 + spring[12] / 2) if spring[14] > 0 else 0.0
+    a = last[i]
+    while a >= 0:
+        axis = work.axes[a]
+        ux, uy, uz = cross(axis[0], axis[1], axis[2], x, y, z)
+        ux, uy, uz = axis[3] + ux, axis[4] + uy, axis[5] + uz
+        b = a
+        while b >= 0:
+            axis = work.axes[b]
+            wx, wy, wz = cross(axis[0], axis[1], axis[2], x, y, z)
+            H[a, b] += share * (ux * (axis[3] + wx) + uy * (axis[4] + wy) + uz * (axis[5] + wz))
+            b = up[b]
+        a = up[a]
+
+
+@compiled
+def root_q(s: System, spring: np.ndarray) -> int:
+    """Where in q the root stands of the doll that a spring pulls."""
+    return s.tree[s.root_of[int(spring[0])]].q
+
+
+@compiled
+def spring_force(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, q: np.ndarray,
+                 root: int, v: np.ndarray, spring: np.ndarray, time: float,
+                 ) -> tuple[float, float, float, float, float, float]:
+    """Force, N, of a hand's spring on its point and the point's velocity, m/s, at q and v."""
+    i = int(spring[0])
+    x, y, z = spring_point(tree[i], work, i, spring[1:4])
+    ux = uy = uz = 0.0
+    j = last[i]
+    while j >= 0:
+        axis = work.axes[j]
+        a, b, c = cross(axis[0], axis[1], axis[2], x, y, z)
+        ux, uy, uz = ux + (axis[3] + a) * v[j], uy + (axis[4] + b) * v[j], uz + (axis[5] + c) * v[j]
+        j = up[j]
+    if spring[14] == 0.0:
+        return spring[15], spring[16], spring[17], ux, uy, uz
+    gone = min(time, spring[10])
+    moving = 1.0 if time < spring[10] else 0.0
+    k, d = spring[11], spring[12]
+    fx = -k * (q[root] + x - spring[4] - gone * spring[7]) - d * (ux - moving * spring[7])
+    fy = -k * (q[root + 1] + y - spring[5] - gone * spring[8]) - d * (uy - moving * spring[8])
+    fz = -k * (q[root + 2] + z - spring[6] - gone * spring[9]) - d * (uz - moving * spring[9])
+    return fx, fy, fz, ux, uy, uz
+
+
+@compiled
+def pull(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, q: np.ndarray,
+         root: int, v: np.ndarray, spring: np.ndarray, time: float, out: np.ndarray) -> None:
+    """Add a spring's generalised forces to ``out``."""
+    fx, fy, fz, _, _, _ = spring_force(tree, up, last, work, q, root, v, spring, time)
+    i = int(spring[0])
+    x, y, z = spring_point(tree[i], work, i, spring[1:4])
+    j = last[i]
+    while j >= 0:
+        axis = work.axes[j]
+        a, b, c = cross(axis[0], axis[1], axis[2], x, y, z)
+        out[j] += fx * (axis[3] + a) + fy * (axis[4] + b) + fz * (axis[5] + c)
+        j = up[j]
+
+
+@compiled
+def mean_force(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, q: np.ndarray,
+               root: int, v: np.ndarray, end_v: np.ndarray, spring: np.ndarray, time: float,
+               h: float) -> tuple[float, float, float, float, float, float]:
+    """Mean force, N, of a spring in a step of h s, and its point's mean velocity, m/s."""
+    fx, fy, fz, ux, uy, uz = spring_force(tree, up, last, work, q, root, v, spring, time)
+    _, _, _, wx, wy, wz = spring_force(tree, up, last, work, q, root, end_v, spring, time)
+    share = spring[11] * h / 4 + spring[12] / 2 if spring[14] > 0 else 0.0
+    return (fx - share * (wx - ux), fy - share * (wy - uy), fz - share * (wz - uz),
+            (ux + wx) / 2, (uy + wy) / 2, (uz + wz) / 2)
+
+
+@compiled
+def weaken(s: System, r: Room, q: np.ndarray, v: np.ndarray, free: np.ndarray,
+           springs: np.ndarray, time: float, h: float) -> bool:
+    """Let springs that would pull with more than they may pull with that; whether any does."""
+    some = False
+    for k in range(len(springs)):
+        spring = springs[k]
+        fx, fy, fz, _, _, _ = mean_force(s.tree, s.up, s.last, r.work, q, root_q(s, spring), v,
+                                            free, spring, time, h)
+        size = math.sqrt(fx * fx + fy * fy + fz * fz)
+        if size > spring[13]:
+            fx, fy, fz, _, _, _ = spring_force(s.tree, s.up, s.last, r.work, q,
+                                               root_q(s, spring), v, spring, time)
+            share = spring[13] / math.sqrt(fx * fx + fy * fy + fz * fz)
+            spring[14], spring[15], spring[16], spring[17] = 0.0, share * fx, share * fy, share * fz
+            some = True
+    return some
+
+
+@compiled
+def warm_start(r: Room, m: int, known: np.ndarray, h: float) -> None:
+    """Begin with the impulses of the step before, of the contacts that there were."""
+    scale = h / r.sums[4] if r.sums[4] > 0 else 0.0
+    for i in range(m):
+        c = r.contacts[i]
+        for e in range(5):
+            c.impulse[e] = 0.0
+        for j in range(r.counts[5]):
+            old = known[j]
+            if old.key == c.key:
+                for e in range(5):
+                    c.impulse[e] = scale * old.impulse[e]
+                break
+        c.begun = 0
+        for j in range(r.counts[13]):
+            old = r.begun[j]
+            if old.key == c.key:
+                c.begun, c.gap = 1, old.gap
+                for e in range(5):
+                    c.start[e] = old.start[e]
+                if c.kind > 1 and old.start[0] > OPENING:
+                    c.friction = c.rolling = 0.0
+                    for e in range(1, 5):
+                        c.impulse[e] = 0.0
+                break
+
+
+@compiled
+def enter_work(s: System, r: Room, v: np.ndarray, end_v: np.ndarray, h: float,
+               loads: np.ndarray, springs: np.ndarray, since: float) -> None:
+    """Book the work, J, of loads (r.sums[0]) and hands (r.sums[1]) in a step of h s, and their
+    impulses in r.given.
+    """
+    middle, mean = r.states[0], r.vectors[0]
+    for j in range(len(v)):
+        mean[j] = (v[j] + end_v[j]) / 2
+    pose(s.tree, middle, mean, r.work)
+    for k in range(len(loads)):
+        r.sums[0] += h * power(s.tree, r.work, loads[k])
+        give_load(s.tree, s.root_of, s.doll_of, r.work, r.given, middle, loads[k], h)
+    if len(springs):
+        root_axes(s.tree, middle, r.work.axes)
+    for k in range(len(springs)):
+        fx, fy, fz, ux, uy, uz = mean_force(
+            s.tree, s.up, s.last, r.work, middle, root_q(s, springs[k]), v, end_v, springs[k],
+            since + h / 2, h)
+        r.sums[1] += h * (fx * ux + fy * uy + fz * uz)
+        i = int(springs[k, 0])
+        x, y, z = spring_point(s.tree[i], r.work, i, springs[k, 1:4])
+        root = s.tree[s.root_of[i]].q
+        give(r.given, s.doll_of[i], h, middle[root] + x, middle[root + 1] + y,
+             middle[root + 2] + z, fx, fy, fz)
+
+
+@compiled
+def record_of(tree: np.ndarray, bone: int) -> int:
+    """Record of a bone of the scene."""
+    for i in range(len(tree)):
+        if tree[i].bone == bone:
+            return i
+    return 0
+
+
+@compiled
+def turned_load(bone: np.record, work: Work, i: int,
+                load: np.ndarray) -> tuple[float, float, float, float, float, float]:
+    """Force, N, and torque, N m, of a load on bone i along the world's axes."""
+    if load[10] == 0:
+        return load[1], load[2], load[3], load[4], load[5], load[6]
+    t, b = work.turns[i], bone.bind
+    x, y, z, w = times(t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3])
+    fx, fy, fz = turned(x, y, z, w, load[1], load[2], load[3])
+    nx, ny, nz = turned(x, y, z, w, load[4], load[5], load[6])
+    return fx, fy, fz, nx, ny, nz
+
+
+@compiled
+def give_load(tree: np.ndarray, root_of: np.ndarray, doll_of: np.ndarray, work: Work,
+              given: np.ndarray, q: np.ndarray, load: np.ndarray, h: float) -> None:
+    """Enter what a load gives in h s."""
+    i = record_of(tree, int(load[0]))
+    x, y, z = spring_point(tree[i], work, i, load[7:10])
+    fx, fy, fz, nx, ny, nz = turned_load(tree[i], work, i, load)
+    root, doll = tree[root_of[i]].q, doll_of[i]
+    give(given, doll, h, q[root] + x, q[root + 1] + y, q[root + 2] + z, fx, fy, fz)
+    given[doll, 3] += h * nx
+    given[doll, 4] += h * ny
+    given[doll, 5] += h * nz
+
+
+@compiled
+def power(tree: np.ndarray, work: Work, load: np.ndarray) -> float:
+    """Power, W, of a load on what moves as work says."""
+    i = record_of(tree, int(load[0]))
+    move = work.moves[i]
+    x, y, z = spring_point(tree[i], work, i, load[7:10])
+    fx, fy, fz, nx, ny, nz = turned_load(tree[i], work, i, load)
+    ux, uy, uz = cross(move[0], move[1], move[2], x, y, z)
+    return (fx * (move[3] + ux) + fy * (move[4] + uy) + fz * (move[5] + uz)
+            + nx * move[0] + ny * move[1] + nz * move[2])

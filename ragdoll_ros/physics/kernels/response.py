@@ -1,0 +1,251 @@
+"""What contacts and limits answer: impulses at an impact, and over a step, island by island.
+
+An island is what contacts join; islands do not feel each other and are solved one by one.
+"""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .contact import jacobian, through_factor
+from .machine import compiled
+from .mass import solve_lower
+from .solver import solve_impulses, solve_normals
+from .system import Room, System
+
+SWEEPS = 4
+"""Sweeps before Newton's method is asked for the first time."""
+
+GIVEN_BACK = 0.5
+"""Share of a depth that one step gives back, in position alone."""
+
+FASTEST_OUT = 1.0
+"""m/s or rad/s at which what began far inside is brought out at the most."""
+
+UNSOLVED = 1e-5
+"""m/s: what is left by more is counted, and its impulses are kept from making energy."""
+
+SLACK = 1e-9
+"""m or rad that nobody gives back."""
+
+
+@compiled
+def label_islands(s: System, r: Room, m: int) -> None:
+    """Give each of m contacts its island, the least of its dolls' numbers."""
+    label = r.label
+    for d in range(len(label)):
+        label[d] = d
+    for i in range(m):
+        c = r.contacts[i]
+        if c.b >= 0:
+            a, b = label[s.doll_of[c.a]], label[s.doll_of[c.b]]
+            if a != b:
+                low, high = min(a, b), max(a, b)
+                for d in range(len(label)):
+                    if label[d] == high:
+                        label[d] = low
+    for i in range(m):
+        c = r.contacts[i]
+        bone = s.bone_of[c.a] if c.kind == 1 else c.a
+        c.island = label[s.doll_of[bone]]
+
+
+@compiled
+def respond(s: System, r: Room, q: np.ndarray, v: np.ndarray, free: np.ndarray, m: int, h: float,
+            tolerance: float, change: np.ndarray, shift: np.ndarray) -> None:
+    """Change of velocity (nv,) by m contacts, where v becomes ``free`` without them in h s, and the
+    ``shift`` that gives depths back. h = 0: an impact. r.H holds the factor, work the axes, at q.
+    """
+    for j in range(len(change)):
+        change[j] = shift[j] = 0.0
+    label_islands(s, r, m)
+    for begin in range(m):
+        island = r.contacts[begin].island
+        if island < 0:
+            continue
+        count, rows = collect(r, begin, m, island)
+        for k in range(count):
+            i = r.need[1, k]
+            jacobian(s, q, r, r.contacts[int(i)], int(i), v, free, r.p[0],
+                     r.p[5])
+        factor_island(s, r, count, rows)
+        solve_island(s, r, count, rows, h, tolerance, change, shift)
+    solve_lower(r.H, s.up, change)
+    if h > 0:
+        solve_lower(r.H, s.up, shift)
+
+
+@compiled
+def collect(r: Room, begin: int, m: int, island: int) -> tuple[int, int]:
+    """Number the contacts of an island, r.need[1], and their rows; how many of each.
+
+    Those for which there is no room are counted and left out.
+    """
+    count = rows = 0
+    for i in range(begin, m):
+        c = r.contacts[i]
+        if c.island != island:
+            continue
+        c.island = -1 - island
+        if rows + c.kind > len(r.Y):
+            r.counts[7] += 1
+            continue
+        c.row = rows
+        r.kinds[count], r.rows[count] = c.kind, rows
+        r.mu[count], r.roll[count], r.need[1, count] = c.friction, c.rolling, i
+        rows += c.kind
+        count += 1
+    return count, rows
+
+
+@compiled
+def factor_island(s: System, r: Room, count: int, n: int) -> None:
+    """Rows through the factor, and W = Y Y^T, flat (n * n)."""
+    Y, W = r.Y, r.W
+    for k in range(count):
+        i = int(r.need[1, k])
+        c = r.contacts[i]
+        through_factor(s.up, r.H, Y, r.support[i], c)
+        for e in range(c.row, c.row + c.kind):
+            for g in range(e + 1):
+                total = 0.0
+                for x in range(c.support):
+                    j = r.support[i, x]
+                    total += Y[e, j] * Y[g, j]
+                W[e * n + g] = W[g * n + e] = total
+
+
+@compiled
+def solve_island(s: System, r: Room, count: int, n: int, h: float, tolerance: float,
+                 change: np.ndarray, shift: np.ndarray) -> None:
+    """Solve for the impulses of one island and add what they do to ``change`` and ``shift``, both
+    still to go through L; clears r.Y.
+    """
+    b, p, out, start, soft = r.p[0], r.p[1], r.p[2], r.p[3], r.p[4]
+    was, thrown, deep = r.p[5], False, False
+    for j in range(n):
+        start[j] = b[j]
+    for k in range(count):
+        c = r.contacts[int(r.need[1, k])]
+        r.need[0, k] = 0.0
+        c.before = was[c.row]
+        if h == 0.0:
+            if c.restitution > 0 and c.before < -s.bounce_speed[0]:
+                b[c.row] += c.restitution * c.before
+                thrown = True
+        elif c.begun:
+            for e in range(c.kind):
+                b[c.row + e] += was[c.row + e] - c.start[e]
+        elif c.gap > 0:
+            b[c.row] += c.gap / h
+        if h > 0 and c.gap < 0:
+            r.need[0, k] = min(GIVEN_BACK * max(0.0, -c.gap - SLACK), FASTEST_OUT * h)
+            deep |= r.need[0, k] > 0
+        for e in range(c.kind):
+            p[c.row + e] = c.impulse[e]
+    left, turns = solve_impulses(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, b, p, tolerance,
+                                 SWEEPS, r.solver, r.G)
+    if thrown and gained(r.W, start, p, n) > 0:
+        for j in range(n):
+            soft[j] = p[j]
+        solve_impulses(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, start, soft, tolerance, SWEEPS,
+                       r.solver, r.G)
+        hold_energy(r.W, start, soft, p, n)
+        r.counts[8] += 1
+    if not left <= UNSOLVED and h > 0:
+        left, more = solve_straight(r, count, n, h, tolerance)
+        turns += more
+    r.counts[4] += turns
+    if not left <= UNSOLVED:
+        r.counts[3] += 1
+        weaken_impulses(r.W, start, p, n)
+    r.sums[3] = max(r.sums[3], left)
+    if deep:
+        solve_normals(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, r.need[0], out, r.solver, r.G)
+    for k in range(count):
+        i = int(r.need[1, k])
+        c = r.contacts[i]
+        for e in range(c.kind):
+            row = c.row + e
+            c.impulse[e] = p[row]
+            for x in range(c.support):
+                j = r.support[i, x]
+                if p[row] != 0.0:
+                    change[j] += r.Y[row, j] * p[row]
+                if deep and e == 0:
+                    shift[j] += r.Y[row, j] * out[row]
+                r.Y[row, j] = 0.0
+
+
+@compiled
+def solve_straight(r: Room, count: int, n: int, h: float, tolerance: float) -> tuple[float, int]:
+    """Solve an island again as if its way were straight: more contacts than a body has freedoms
+    may see a curved way as no motion of the body at all.
+    """
+    b, p = r.p[0], r.p[1]
+    for j in range(n):
+        b[j], p[j] = r.p[3, j], 0.0
+    for k in range(count):
+        c = r.contacts[int(r.need[1, k])]
+        r.mu[k] = c.friction
+        if c.gap > 0 and not c.begun:
+            b[c.row] += c.gap / h
+    return solve_impulses(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, b, p, tolerance, SWEEPS,
+                          r.solver, r.G)
+
+
+@compiled
+def gained(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> float:
+    """Kinetic energy, J, that impulses p give to what moves at u: p (u + W p / 2); 0 if that is
+    rounding.
+    """
+    total = size = 0.0
+    for i in range(n):
+        w = 0.0
+        for j in range(n):
+            w += W[i * n + j] * p[j]
+        total += p[i] * (u[i] + w / 2)
+        size += abs(p[i] * u[i])
+    return total if total > 1e-12 * size else 0.0
+
+
+@compiled
+def weaken_impulses(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> None:
+    """Scale impulses that are no solution so that they make no energy; no number becomes none."""
+    work = spent = 0.0
+    for i in range(n):
+        w = 0.0
+        for j in range(n):
+            w += W[i * n + j] * p[j]
+        work += p[i] * u[i]
+        spent += p[i] * w
+    share = min(1.0, max(0.0, -2 * work / spent)) if spent > 0 else 0.0
+    if not math.isfinite(share) or not math.isfinite(work):
+        share = 0.0
+    for i in range(n):
+        p[i] = share * p[i] if share > 0 else 0.0
+
+
+@compiled
+def hold_energy(W: np.ndarray, u: np.ndarray, soft: np.ndarray, p: np.ndarray, n: int) -> None:
+    """Draw p towards the ``soft`` impulses, those of no restitution, until no energy is made.
+
+    Newton's law with friction can make some (Kane and Levinson 1985). Soft impulses never do:
+    p u+ <= 0 and so p (u + W p / 2) = p u+ - p W p / 2 < 0; between both, all are within their
+    cones and press nothing into anything, as cones and half-spaces are convex.
+    """
+    a = b = 0.0
+    for i in range(n):
+        w = ws = 0.0
+        for j in range(n):
+            w += W[i * n + j] * (p[j] - soft[j])
+            ws += W[i * n + j] * soft[j]
+        a += (p[i] - soft[i]) * w / 2
+        b += (p[i] - soft[i]) * (u[i] + ws)
+    c = min(0.0, gained(W, u, soft, n))
+    root = math.sqrt(max(0.0, b * b - 4 * a * c))
+    share = (-2 * c / (b + root) if b > 0 else (root - b) / (2 * a)) if a > 0 else 1.0
+    share = min(1.0, max(0.0, share))
+    for i in range(n):
+        p[i] = soft[i] + share * (p[i] - soft[i])

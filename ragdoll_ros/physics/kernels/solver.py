@@ -1,0 +1,375 @@
+"""Impulses of contacts and limits: Coulomb's law exactly, by Gauss-Seidel and Newton's method.
+
+Unknown are the impulses p of one island, rows of 1 (a limit), 3 (a contact: normal, two along the
+surface) or 5 (the same and two of rolling). The velocities after are u = W p + b. Wanted:
+u_n >= 0, p_n >= 0, u_n p_n = 0; |p_t| <= mu p_n, and where u_t is not zero p_t = -mu p_n u_t/|u_t|.
+
+Sweeps of non-smooth contact dynamics (Moreau 1988; Jean, CMAME 177, 1999) come near; where they
+stall, as with mass ratios of 1:1000, the semi-smooth Newton method of Alart and Curnier (CMAME 92,
+1991) on all rows at once ends it.
+"""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .machine import compiled
+from .system import STICKS
+
+LIMIT, TOUCH, ROLLING = 1, 3, 5
+"""Kinds of contact: how many rows each has."""
+
+ALTERNATIONS = 12
+"""Turns that a sliding contact takes between its normal and its friction in one sweep."""
+
+NEWTON_STEPS = 12
+"""At the most; from the sweeps' end some three are. All are taken in full: on the way the residual
+may grow, as contacts change sides. The best is kept."""
+
+SOFT = 1e-6
+"""Compliance of Newton's rows, as a share of their own W: where several contacts bear what one
+could, W is singular, and this keeps its steps short across what nothing decides."""
+
+OPENING = 1e-4
+"""m/s from which a contact without friction's limit is let go as open."""
+
+
+@compiled
+def one_contact(W: np.ndarray, n: int, a: int, c0: float, c1: float, c2: float, x: float,
+                y: float, z: float, mu: float) -> tuple[float, float, float]:
+    """Impulse of one contact by itself, whose velocity without it is c; near the last (x, y, z)."""
+    at = a * n + a
+    w00, w01, w02 = W[at], W[at + 1], W[at + 2]
+    w11, w12, w22 = W[at + n + 1], W[at + n + 2], W[at + 2 * n + 2]
+    if mu <= 0.0:
+        return max(0.0, -c0 / w00), 0.0, 0.0
+    d0, d1, d2 = w11 * w22 - w12 * w12, w02 * w12 - w01 * w22, w01 * w12 - w02 * w11
+    det = w00 * d0 + w01 * d1 + w02 * d2
+    if det > 1e-12 * w00 * w11 * w22:
+        e11, e12, e22 = w00 * w22 - w02 * w02, w01 * w02 - w00 * w12, w00 * w11 - w01 * w01
+        sx = -(d0 * c0 + d1 * c1 + d2 * c2) / det
+        sy = -(d1 * c0 + e11 * c1 + e12 * c2) / det
+        sz = -(d2 * c0 + e12 * c1 + e22 * c2) / det
+        if sx >= 0 and (mu >= STICKS or sy * sy + sz * sz <= mu * mu * sx * sx):
+            return sx, sy, sz
+    if mu >= STICKS:
+        det = w11 * w22 - w12 * w12
+        return 0.0, (w12 * c2 - w22 * c1) / det, (w12 * c1 - w11 * c2) / det
+    rho = 1 / (0.5 * (w11 + w22) + math.sqrt(0.25 * (w11 - w22) ** 2 + w12 * w12))
+    for _ in range(ALTERNATIONS):
+        before = x
+        x = max(0.0, -(c0 + w01 * y + w02 * z) / w00)
+        y0, z0 = y, z
+        y -= rho * (c1 + w01 * x + w11 * y0 + w12 * z0)
+        z -= rho * (c2 + w02 * x + w12 * y0 + w22 * z0)
+        y, z = on_disc(y, z, mu * x)
+        if abs(x - before) + abs(y - y0) + abs(z - z0) <= 1e-13 * abs(x):
+            break
+    return x, y, z
+
+
+@compiled
+def on_disc(y: float, z: float, radius: float) -> tuple[float, float]:
+    """The point of a disc nearest to (y, z)."""
+    size = math.sqrt(y * y + z * z)
+    if size > radius:
+        share = radius / size
+        return y * share, z * share
+    return y, z
+
+
+@compiled
+def sweep(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int, n: int,
+          W: np.ndarray, b: np.ndarray, p: np.ndarray) -> float:
+    """Go once through m contacts; the largest change of a velocity, m/s or rad/s."""
+    worst = 0.0
+    for c in range(m):
+        a = rows[c]
+        at = a * n
+        if kinds[c] == LIMIT:
+            u = b[a]
+            for j in range(n):
+                u += W[at + j] * p[j]
+            own = W[at + a]
+            x = max(0.0, p[a] - u / own)
+            worst = max(worst, abs(x - p[a]) * own)
+            p[a] = x
+            continue
+        c0, c1, c2 = b[a], b[a + 1], b[a + 2]
+        for j in range(n):
+            c0 += W[at + j] * p[j]
+            c1 += W[at + n + j] * p[j]
+            c2 += W[at + 2 * n + j] * p[j]
+        x, y, z = p[a], p[a + 1], p[a + 2]
+        sticks = mu[c] >= STICKS
+        if c0 >= 0 and x == 0.0 and y == 0.0 and z == 0.0 and not sticks:
+            continue
+        d = at + a
+        c0 -= W[d] * x + W[d + 1] * y + W[d + 2] * z
+        c1 -= W[d + 1] * x + W[d + n + 1] * y + W[d + n + 2] * z
+        c2 -= W[d + 2] * x + W[d + n + 2] * y + W[d + 2 * n + 2] * z
+        if c0 >= 0 and (x == 0.0 or mu[c] <= 0.0) and not sticks:
+            nx, ny, nz = 0.0, 0.0, 0.0
+        else:
+            nx, ny, nz = one_contact(W, n, a, c0, c1, c2, x, y, z, mu[c])
+        worst = max(worst, abs(nx - x) * W[d], abs(ny - y) * W[d + n + 1],
+                    abs(nz - z) * W[d + 2 * n + 2])
+        p[a], p[a + 1], p[a + 2] = nx, ny, nz
+        if kinds[c] == ROLLING:
+            worst = max(worst, roll_one(W, n, a + 3, b, p, roll[c] * nx))
+    return worst
+
+
+@compiled
+def roll_one(W: np.ndarray, n: int, a: int, b: np.ndarray, p: np.ndarray, most: float) -> float:
+    """Rolling impulse, rows a and a + 1, of at most ``most`` N m s; the largest change of rad/s."""
+    u, w = b[a], b[a + 1]
+    for j in range(n):
+        u += W[a * n + j] * p[j]
+        w += W[(a + 1) * n + j] * p[j]
+    w11, w12, w22 = W[a * n + a], W[a * n + a + 1], W[(a + 1) * n + a + 1]
+    rho = 1 / (0.5 * (w11 + w22) + math.sqrt(0.25 * (w11 - w22) ** 2 + w12 * w12))
+    x, y = p[a], p[a + 1]
+    for _ in range(4):
+        dx, dy = p[a] - x, p[a + 1] - y
+        nx, ny = on_disc(p[a] - rho * (u + w11 * dx + w12 * dy),
+                         p[a + 1] - rho * (w + w12 * dx + w22 * dy), most)
+        p[a], p[a + 1] = nx, ny
+    return max(abs(p[a] - x) * w11, abs(p[a + 1] - y) * w22)
+
+
+@compiled
+def residual(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
+             n: int, W: np.ndarray, b: np.ndarray, p: np.ndarray, u: np.ndarray,
+             phi: np.ndarray) -> float:
+    """Alart and Curnier's function, in velocities: zero where p is the solution; its largest."""
+    worst = 0.0
+    for i in range(n):
+        s = b[i]
+        for j in range(n):
+            s += W[i * n + j] * p[j]
+        u[i] = s
+    for c in range(m):
+        a = rows[c]
+        own = W[a * n + a]
+        push = max(0.0, p[a] - u[a] / own)
+        phi[a] = (p[a] - push) * own
+        worst = max(worst, abs(phi[a]))
+        for k in range(1, kinds[c], 2):
+            i = a + k
+            own = max(W[i * n + i], W[(i + 1) * n + i + 1])
+            if k == 1 and mu[c] >= STICKS:
+                phi[i], phi[i + 1] = u[i], u[i + 1]
+            else:
+                most = push * max(0.0, mu[c] if k == 1 else roll[c])
+                y, z = on_disc(p[i] - u[i] / own, p[i + 1] - u[i + 1] / own, most)
+                phi[i], phi[i + 1] = (p[i] - y) * own, (p[i + 1] - z) * own
+            worst = max(worst, abs(phi[i]), abs(phi[i + 1]))
+    return worst
+
+
+@compiled
+def newton_matrix(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
+                  n: int, W: np.ndarray, p: np.ndarray, u: np.ndarray, G: np.ndarray) -> None:
+    """Jacobian of residual(), flat (n * n)."""
+    for c in range(m):
+        a = rows[c]
+        own = W[a * n + a]
+        push = p[a] - u[a] / own
+        active = push > 0
+        for j in range(n):
+            G[a * n + j] = W[a * n + j] if active else 0.0
+        G[a * n + a] += SOFT * own if active else own
+        for k in range(1, kinds[c], 2):
+            i = a + k
+            own_t = max(W[i * n + i], W[(i + 1) * n + i + 1])
+            law = max(0.0, mu[c] if k == 1 else roll[c])
+            y, z = p[i] - u[i] / own_t, p[i + 1] - u[i + 1] / own_t
+            size, most = math.sqrt(y * y + z * z), law * max(0.0, push)
+            sticks = k == 1 and law >= STICKS
+            for e in range(2):
+                at = (i + e) * n
+                if not active and not sticks:
+                    for j in range(n):
+                        G[at + j] = 0.0
+                    G[at + i + e] = own_t
+                elif size <= most or sticks:
+                    for j in range(n):
+                        G[at + j] = W[at + j]
+                    G[at + i + e] += SOFT * own_t
+                else:
+                    y1, z1 = y / size, z / size
+                    d = y1 if e == 0 else z1
+                    share = most / size
+                    ky = share * ((1.0 if e == 0 else 0.0) - d * y1)
+                    kz = share * ((1.0 if e == 1 else 0.0) - d * z1)
+                    for j in range(n):
+                        G[at + j] = own_t * (law * d / own * W[a * n + j]) + (
+                            ky * W[i * n + j] + kz * W[(i + 1) * n + j])
+                    G[at + a] -= own_t * law * d
+                    G[at + i + e] += own_t
+                    G[at + i] -= own_t * ky
+                    G[at + i + 1] -= own_t * kz
+
+
+@compiled
+def gauss(G: np.ndarray, n: int, x: np.ndarray) -> bool:
+    """Solve G x = b in b's place, rows swapped by their largest; false if G is singular."""
+    for k in range(n):
+        best, most = k, abs(G[k * n + k])
+        for i in range(k + 1, n):
+            if abs(G[i * n + k]) > most:
+                best, most = i, abs(G[i * n + k])
+        if not most > 1e-300:
+            return False
+        if best != k:
+            for j in range(k, n):
+                G[k * n + j], G[best * n + j] = G[best * n + j], G[k * n + j]
+            x[k], x[best] = x[best], x[k]
+        inverse = 1 / G[k * n + k]
+        for i in range(k + 1, n):
+            f = G[i * n + k] * inverse
+            if f != 0.0:
+                for j in range(k + 1, n):
+                    G[i * n + j] -= f * G[k * n + j]
+                x[i] -= f * x[k]
+    for i in range(n - 1, -1, -1):
+        s = x[i]
+        for j in range(i + 1, n):
+            s -= G[i * n + j] * x[j]
+        x[i] = s / G[i * n + i]
+    return True
+
+
+@compiled
+def newton(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int, n: int,
+           W: np.ndarray, b: np.ndarray, p: np.ndarray, tolerance: float, room: np.ndarray,
+           G: np.ndarray) -> float:
+    """Newton's method from p on; p becomes the best found, the largest residual, m/s, is given."""
+    u, phi, way, keep = room[0], room[1], room[2], room[3]
+    worst = residual(kinds, rows, mu, roll, m, n, W, b, p, u, phi)
+    best = worst
+    for i in range(n):
+        keep[i] = p[i]
+    for _ in range(NEWTON_STEPS):
+        if worst <= tolerance:
+            break
+        newton_matrix(kinds, rows, mu, roll, m, n, W, p, u, G)
+        for i in range(n):
+            way[i] = -phi[i]
+        if not gauss(G, n, way):
+            break
+        total = 0.0
+        for i in range(n):
+            total += way[i]
+        if not math.isfinite(total):
+            break
+        for i in range(n):
+            p[i] += way[i]
+        worst = residual(kinds, rows, mu, roll, m, n, W, b, p, u, phi)
+        if worst < best:
+            best = worst
+            for i in range(n):
+                keep[i] = p[i]
+    for i in range(n):
+        p[i] = keep[i]
+    return best
+
+
+@compiled
+def admissible(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
+               p: np.ndarray) -> None:
+    """Bring all impulses into their cones: no contact ever pulls."""
+    for c in range(m):
+        a = rows[c]
+        p[a] = max(0.0, p[a])
+        for k in range(1, kinds[c], 2):
+            if k == 1 and mu[c] >= STICKS:
+                continue
+            most = p[a] * max(0.0, mu[c] if k == 1 else roll[c])
+            p[a + k], p[a + k + 1] = on_disc(p[a + k], p[a + k + 1], most)
+
+
+@compiled
+def solve_cones(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
+                n: int, W: np.ndarray, b: np.ndarray, p: np.ndarray, tolerance: float,
+                sweeps: int, room: np.ndarray, G: np.ndarray) -> tuple[float, int]:
+    """Solve for p (n,), from where it stands; the largest residual left, m/s, and the sweeps."""
+    done, worst = 0, math.inf
+    for _ in range(4):
+        for _ in range(min(sweeps, 100)):
+            done += 1
+            worst = sweep(kinds, rows, mu, roll, m, n, W, b, p)
+            if worst <= tolerance:
+                return worst, done
+        left = newton(kinds, rows, mu, roll, m, n, W, b, p, tolerance, room, G)
+        admissible(kinds, rows, mu, roll, m, p)
+        if left <= 10 * tolerance:
+            return left, done
+        worst = min(worst, left)
+        sweeps *= 4
+    return worst, done
+
+
+@compiled
+def opens(W: np.ndarray, n: int, a: int, b: np.ndarray, p: np.ndarray) -> bool:
+    """Whether a contact comes apart."""
+    u = b[a]
+    for j in range(n):
+        u += W[a * n + j] * p[j]
+    return u > OPENING
+
+
+@compiled
+def solve_impulses(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
+                   n: int, W: np.ndarray, b: np.ndarray, p: np.ndarray, tolerance: float,
+                   sweeps: int, room: np.ndarray, G: np.ndarray) -> tuple[float, int]:
+    """Solve for p (n,), from where it stands; the largest residual left, m/s, and the sweeps.
+
+    Friction without limit makes a convex problem of it, which holds a contact sideways even as it
+    opens; so what has come out as open is let go, and all is solved once more. What then closes
+    after all is held: between the two there is no answer (Painleve).
+    """
+    left, done = solve_cones(kinds, rows, mu, roll, m, n, W, b, p, tolerance, sweeps, room, G)
+    for turn in range(2):
+        some = False
+        for c in range(m):
+            a = rows[c]
+            if kinds[c] == LIMIT:
+                continue
+            if turn == 0 and mu[c] >= STICKS and p[a] <= 0.0 and (
+                    p[a + 1] != 0.0 or p[a + 2] != 0.0) and opens(W, n, a, b, p):
+                mu[c] = -1.0
+                p[a] = p[a + 1] = p[a + 2] = 0.0
+                some = True
+            elif turn == 1 and mu[c] < 0 and p[a] > 0:
+                mu[c] = STICKS
+                some = True
+        if not some:
+            break
+        left, more = solve_cones(kinds, rows, mu, roll, m, n, W, b, p, tolerance, sweeps, room, G)
+        done += more
+    return left, done
+
+
+@compiled
+def solve_normals(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
+                  n: int, W: np.ndarray, need: np.ndarray, p: np.ndarray, room: np.ndarray,
+                  G: np.ndarray) -> None:
+    """Least normal impulses p (n,) that give each contact its velocity ``need`` (m,) or more.
+
+    W, kinds and rows are lost: the normals' own W takes their place.
+    """
+    b, own = room[4], room[5]
+    for c in range(m):
+        for e in range(m):
+            W[c * m + e] = W[rows[c] * n + rows[e]]
+    for i in range(n):
+        p[i] = 0.0
+    for c in range(m):
+        b[c], own[c], room[6, c] = -need[c], 0.0, rows[c]
+        kinds[c], rows[c], mu[c], roll[c] = LIMIT, c, 0.0, 0.0
+    solve_cones(kinds, rows, mu, roll, m, m, W, b, own, 1e-9, 4, room, G)
+    for c in range(m):
+        p[int(room[6, c])] = max(0.0, own[c])

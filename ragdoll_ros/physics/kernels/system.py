@@ -1,0 +1,113 @@
+"""What the rigid core knows of a scene, and the room that it works in: two tuples of arrays."""
+from __future__ import annotations
+
+import collections
+
+import numba
+import numpy as np
+
+from .dynamics import Work
+from .record import RECORD
+
+GEOM = np.dtype([
+    ('bone', np.int64), ('kind', np.int64), ('size', float, 3), ('offset', float, 3),
+    ('turn', float, 4), ('radius', float), ('reach', float), ('friction', float),
+    ('rolling', float), ('restitution', float), ('first', np.int64), ('count', np.int64)],
+    align=True)
+"""A part of a bone's shape. ``bone``: its record in the tree; ``offset``, ``turn``: of the shape's
+centre and axes from the bone's centre of mass, along the doll's axes as bound; ``radius``: of the
+ball around it; ``reach``: from the bone's centre of mass to its farthest point, m. ``friction``,
+``rolling`` (m) and ``restitution``: against the ground. ``first``, ``count``: its own among all
+points that may touch the ground."""
+
+PAIR = np.dtype([('a', np.int64), ('b', np.int64), ('friction', float), ('rolling', float),
+                 ('restitution', float)], align=True)
+"""Two geoms that may meet, and the law of their contact."""
+
+BOUND = np.dtype([('q', np.int64), ('v', np.int64), ('lower', float), ('upper', float)],
+                 align=True)
+"""A limited coordinate: where it and its velocity stand, and its bounds."""
+
+CONTACT = np.dtype([
+    ('kind', np.int64), ('a', np.int64), ('b', np.int64), ('key', np.int64), ('group', np.int64),
+    ('island', np.int64), ('row', np.int64), ('support', np.int64), ('point', float, 3),
+    ('arm', float, 3), ('normal', float, 3), ('across', float, (2, 3)), ('gap', float),
+    ('friction', float), ('rolling', float), ('restitution', float), ('before', float),
+    ('impulse', float, 5), ('begun', np.int64), ('start', float, 5)], align=True)
+"""A contact of bone ``a`` (a record of the tree) with ``b`` (-1: the ground), or a joint at its
+limit: ``a`` its velocity, ``normal[0]`` the sign of the way out. ``point``, where the normal force
+acts, and ``arm``, where friction does, are in the world, m; ``normal`` is from b to a, ``across``
+two directions along the surface. ``key`` tells it from all others at all times, ``group`` those of
+one patch. ``before``: its normal velocity, m/s. ``begun``: whether it was there when the step
+began, with the velocities ``start`` along its rows."""
+
+System = collections.namedtuple(
+    'System', 'tree gravity up last bone_of root_of doll_of damping geoms pairs bounds normal '
+    'offset bounce_speed')
+"""A scene: ``tree`` of tree.py; ``up`` (nv,): of each velocity the next one towards the root;
+``last`` (n,): of each bone the last velocity that moves it; ``bone_of`` (nv,); ``root_of`` (n,):
+the record of its doll's root, ``doll_of`` (n,); ``damping`` (nv,) N m s; ``normal`` (3,) and
+``offset`` (1,) of the ground, offset -inf: none; ``bounce_speed`` (1,) m/s."""
+
+Room = collections.namedtuple(
+    'Room', 'work own composite H contacts table at turn gaps later Y support W G p solver '
+    'kinds rows mu roll need label vectors states counts sums given before after begun')
+"""Scratch of the rigid core."""
+
+STICKS = 1e5
+"""Coefficient from which friction has no limit."""
+
+VECTORS, STATES = 8, 6
+
+
+def make_room(system: System, contacts: int) -> Room:
+    """Room for a system with at most so many contacts at a time."""
+    bones, nv = len(system.tree), len(system.up)
+    nq = nv + int(system.tree['free'].sum())
+    geoms, dolls = len(system.geoms), int(system.doll_of.max()) + 1
+    rows = contacts * (5 if max(system.geoms['rolling'].max(initial=0.0),
+                                system.pairs['rolling'].max(initial=0.0)) > 0 else 3)
+    gaps = int(system.geoms['count'].sum()) + 2 * len(system.bounds) + len(system.pairs)
+    work = Work(np.zeros((bones, 4)), np.zeros((bones, 3)), np.zeros((bones, 6)),
+                np.zeros((nv, 6)), np.zeros((bones, 6, 6)), np.zeros((bones, 6)),
+                np.zeros((nv, 6)), np.zeros((nv, 8)), np.zeros((3, 3)))
+    return Room(
+        work=work, own=np.zeros((bones, 6)), composite=np.zeros((bones, 10)),
+        H=np.zeros((nv, nv)), contacts=np.zeros(contacts, CONTACT), table=np.zeros((16, 8)),
+        at=np.zeros((geoms, 3)), turn=np.zeros((geoms, 3, 3)), gaps=np.zeros(gaps),
+        later=np.zeros(gaps), Y=np.zeros((rows, nv)),
+        support=np.zeros((contacts, min(nv, 2 * depth(system)) + 1), np.int64),
+        W=np.zeros(rows * rows), G=np.zeros(rows * rows), p=np.zeros((6, rows)),
+        solver=np.zeros((7, max(rows, 8))), kinds=np.zeros(contacts, np.int64),
+        rows=np.zeros(contacts, np.int64), mu=np.zeros(contacts), roll=np.zeros(contacts),
+        need=np.zeros((2, contacts)), label=np.zeros(dolls, np.int64),
+        vectors=np.zeros((VECTORS, nv)), states=np.zeros((STATES, nq)),
+        counts=np.zeros(16, np.int64), sums=np.zeros(8), given=np.zeros((dolls, 10)),
+        before=np.zeros((dolls, 17)), after=np.zeros((dolls, 17)),
+        begun=np.zeros(contacts, CONTACT))
+
+
+def depth(system: System) -> int:
+    """Most velocities that move one bone."""
+    most = 0
+    for j in system.last:
+        size = 0
+        while j >= 0:
+            size, j = size + 1, system.up[j]
+        most = max(most, size)
+    return most
+
+
+def blank() -> System:
+    """A system of one bone and nothing else: what is compiled is compiled for its types."""
+    return System(
+        tree=np.zeros(1, RECORD), gravity=np.zeros(3), up=np.arange(6) - 1,
+        last=np.zeros(1, np.int64), bone_of=np.zeros(6, np.int64),
+        root_of=np.zeros(1, np.int64), doll_of=np.zeros(1, np.int64), damping=np.zeros(6),
+        geoms=np.zeros(1, GEOM), pairs=np.zeros(1, PAIR), bounds=np.zeros(1, BOUND),
+        normal=np.zeros(3), offset=np.zeros(1), bounce_speed=np.zeros(1))
+
+
+SYSTEM = numba.typeof(blank())
+ROOM = numba.typeof(make_room(blank(), 1))
+CONTACTS = numba.from_dtype(CONTACT)[::1]

@@ -1,0 +1,345 @@
+"""Shape against shape: distances as MuJoCo has them, patches as geometry has them."""
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+
+pytest.importorskip('numba')
+import numba
+
+from ragdoll_ros.physics.kernels.collision import (
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    POINT,
+    SPHERE,
+    collide,
+    separation,
+)
+
+KINDS = (SPHERE, CAPSULE, BOX, CYLINDER)
+PAIRS = list(itertools.combinations_with_replacement(KINDS, 2))
+NAMES = {SPHERE: 'sphere', CAPSULE: 'capsule', BOX: 'box', CYLINDER: 'cylinder'}
+TURNED = Rotation.from_rotvec([.3, -.5, .7])
+
+
+@numba.njit
+def _collide(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb, margin, out):
+    return collide(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb, margin, out)
+
+
+@numba.njit
+def _separation(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb):
+    return separation(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb)
+
+
+class Body:
+    def __init__(self, kind, size, centre=(0, 0, 0), turn=None):
+        self.kind, self.size = kind, np.array([*size, 0, 0][:3], float)
+        self.centre = np.array(centre, float)
+        self.turn = turn or Rotation.identity()
+
+    @property
+    def parts(self):
+        return self.kind, self.size, self.centre, np.ascontiguousarray(self.turn.as_matrix())
+
+    def moved(self, way, spin=(0, 0, 0)):
+        return Body(self.kind, self.size, self.centre + way,
+                    Rotation.from_rotvec(spin) * self.turn)
+
+    def seen(self, turn, way):
+        return Body(self.kind, self.size, turn.apply(self.centre) + way, turn * self.turn)
+
+    def velocity(self, velocity, spin, place):
+        return velocity + np.cross(spin, place - self.centre)
+
+
+def gap(a, b):
+    return _separation(*a.parts, *b.parts)
+
+
+def contacts(a, b, margin=1e-3):
+    out = np.full((8, POINT), np.nan)
+    found = out[:_collide(*a.parts, *b.parts, margin, out)]
+    assert np.isfinite(found).all()
+    assert np.linalg.norm(found[:, 3:6], axis=1) == pytest.approx(1, abs=1e-12)
+    assert len(set(found[:, 7])) == len(found) and (found[:, 7] >= 0).all()
+    return found
+
+
+def any_body(rng, kind, place=0.0):
+    size = rng.uniform(.05, .3, {SPHERE: 1, BOX: 3}.get(kind, 2))
+    return Body(kind, size, rng.normal(size=3) * place, Rotation.random(random_state=rng))
+
+
+def touching(rng, kind_a, kind_b, wanted=0.0):
+    """Two bodies in random poses whose gap is ``wanted``; their middles are not on one line."""
+    a, b = any_body(rng, kind_a, .03), any_body(rng, kind_b)
+    way = rng.normal(size=3)
+    way /= np.linalg.norm(way)
+    far = brentq(lambda t: gap(a.moved(way * t), b) - wanted, 0, 2, xtol=1e-15, rtol=1e-15)
+    return a.moved(way * far), b
+
+
+def places(found):
+    """Points in an order of their own."""
+    rows = np.round(found[:, :3], 7) + 0.0
+    return found[np.lexsort(rows.T)][:, :3]
+
+
+class Peer:
+    """MuJoCo's distance of two shapes."""
+
+    def __init__(self, kind_a, kind_b):
+        self.mujoco = pytest.importorskip('mujoco')
+        body = '<body><freejoint/><geom type="{}" size=".1 .1 .1"/></body>'
+        self.model = self.mujoco.MjModel.from_xml_string(
+            '<mujoco><option ccd_tolerance="1e-12" ccd_iterations="500"/><worldbody>'
+            + body.format(NAMES[kind_a]) + body.format(NAMES[kind_b]) + '</worldbody></mujoco>')
+        self.data = self.mujoco.MjData(self.model)
+
+    def distance(self, a, b):
+        for i, body in enumerate((a, b)):
+            self.model.geom_size[i] = body.size
+            self.data.qpos[7 * i:7 * i + 3] = body.centre
+            self.data.qpos[7 * i + 3:7 * i + 7] = body.turn.as_quat()[[3, 0, 1, 2]]
+        self.mujoco.mj_kinematics(self.model, self.data)
+        return self.mujoco.mj_geomDistance(self.model, self.data, 0, 1, 10.0, None)
+
+
+@pytest.mark.parametrize('pair', PAIRS)
+def test_apart_it_is_the_distance(pair):
+    # MuJoCo's own search ends within some 1e-10 m with cylinders, at rounding else
+    rng, peer = np.random.default_rng(1), Peer(*pair)
+    for _ in range(400):
+        a, b = any_body(rng, pair[0], .3), any_body(rng, pair[1], .3)
+        due, found = peer.distance(a, b), gap(a, b)
+        if pair == (BOX, BOX):
+            assert (due > 0) == (found > 0) and found <= due + 1e-12
+        elif found > 0:
+            assert found == pytest.approx(due, abs=2e-6 if pair == (CYLINDER, CYLINDER) else 1e-9)
+
+
+@pytest.mark.parametrize('pair', PAIRS)
+def test_at_touch_it_is_the_peers_signed_distance(pair):
+    rng, peer = np.random.default_rng(2), Peer(*pair)
+    for _ in range(200):
+        a, b = touching(rng, *pair, rng.uniform(-1e-4, 1e-4))
+        assert gap(a, b) == pytest.approx(peer.distance(a, b), abs=2e-9)
+
+
+@pytest.mark.parametrize('pair', PAIRS)
+def test_the_deepest_contact_is_as_deep_as_the_bodies(pair):
+    # but in where an axis of a face or its contact is taken instead of one better by 2 %
+    rng = np.random.default_rng(3)
+    off = []
+    for _ in range(300):
+        a, b = touching(rng, *pair, rng.uniform(-1e-4, 1e-4))
+        off.append(abs(contacts(a, b)[:, 6].min() - gap(a, b)))
+    assert np.quantile(off, .98) < 1e-9 and max(off) < 4.3e-6
+
+
+@pytest.mark.parametrize('pair', PAIRS)
+def test_swapped_bodies_have_the_same_contacts(pair):
+    rng = np.random.default_rng(4)
+    for _ in range(100):
+        a, b = touching(rng, *pair, -1e-5)
+        one, other = contacts(a, b), contacts(b, a)
+        assert gap(a, b) == pytest.approx(gap(b, a), abs=1e-9)
+        deep, same = one[one[:, 6].argmin()], other[other[:, 6].argmin()]
+        # a contact is found along a curved rim within some 1e-6 of its radius
+        assert same[:3] == pytest.approx(deep[:3], abs=1e-5)
+        assert same[3:6] == pytest.approx(-deep[3:6], abs=2e-5)
+
+
+@pytest.mark.parametrize('pair', PAIRS)
+def test_where_the_bodies_are_seen_from_changes_nothing(pair):
+    rng, way = np.random.default_rng(5), np.array([3, -2, 1.5])
+    for _ in range(100):
+        a, b = touching(rng, *pair, -1e-5)
+        c, d = a.seen(TURNED, way), b.seen(TURNED, way)
+        assert gap(c, d) == pytest.approx(gap(a, b), abs=1e-9)
+        one, other = contacts(a, b), contacts(c, d)
+        one, other = one[one[:, 6].argmin()], other[other[:, 6].argmin()]
+        assert other[:3] == pytest.approx(TURNED.apply(one[:3]) + way, abs=1e-5)
+        assert other[3:6] == pytest.approx(TURNED.apply(one[3:6]), abs=2e-5)
+
+
+@pytest.mark.parametrize('pair', PAIRS)
+def test_the_gap_changes_by_the_velocity_along_the_normal(pair):
+    rng, h = np.random.default_rng(6), 1e-6
+    off = []
+    for _ in range(150):
+        a, b = touching(rng, *pair, rng.uniform(-1e-5, 1e-5))
+        v, w = rng.normal(size=3), rng.normal(size=3)
+        rate = (gap(a.moved(v * h, w * h), b) - gap(a.moved(-v * h, -w * h), b)) / (2 * h)
+        found = contacts(a, b)
+        deep = found[found[:, 6].argmin()]
+        off.append(abs(rate - a.velocity(v, w, deep[:3]) @ deep[3:6]))
+    # where another feature is about to take over within 1e-6 s the rate has a corner
+    assert np.quantile(off, .95) < 1e-3, np.sort(off)[-10:]
+
+
+@pytest.mark.parametrize('pair', PAIRS)
+def test_the_gap_has_no_jumps_near_touch(pair):
+    # in 1e-5 s no point of a moves by more than 2e-5 m
+    rng, h = np.random.default_rng(7), 1e-5
+    for _ in range(20):
+        a, b = touching(rng, *pair, -1e-4)
+        v, w = rng.normal(size=3), rng.normal(size=3)
+        v, w = v / np.linalg.norm(v), w / np.linalg.norm(w)
+        course = [gap(a.moved(v * h * k, w * h * k), b) for k in range(-25, 25)]
+        assert np.abs(np.diff(course)).max() < 2e-5
+
+
+@pytest.mark.parametrize('pair', list(itertools.product(KINDS, KINDS)))
+def test_no_overlap_is_too_deep(pair):
+    rng = np.random.default_rng(8)
+    for k in range(1250):
+        a, b = any_body(rng, pair[0], .1 * (k % 3)), any_body(rng, pair[1])
+        if k % 5 == 0:
+            a.turn = b.turn
+        if k % 7 == 0:
+            tilt = rng.normal(size=3) * 10.0 ** -rng.integers(4, 17)
+            a.turn = b.turn * Rotation.from_rotvec(tilt)
+        if k % 11 == 0:
+            a.turn = b.turn * Rotation.from_rotvec([math.pi / 2, 0, 0])
+        assert math.isfinite(gap(a, b))
+        assert (len(contacts(a, b, 0)) > 0) == (gap(a, b) <= 0)
+
+
+@pytest.mark.parametrize('pair', PAIRS)
+def test_along_the_normal_overlapped_bodies_come_apart(pair):
+    rng = np.random.default_rng(9)
+    for _ in range(200):
+        a, b = any_body(rng, pair[0], .05), any_body(rng, pair[1])
+        for _ in range(60):
+            found = contacts(a, b, 0)
+            if not len(found):
+                break
+            deep = found[found[:, 6].argmin()]
+            a = a.moved(deep[3:6] * (1e-9 - deep[6]))
+        assert gap(a, b) > 0
+
+
+def square(half, height):
+    return [[-half, -half, height], [-half, half, height], [half, -half, height],
+            [half, half, height]]
+
+
+@pytest.mark.parametrize('depth', [1e-4, 0.0, -2e-4])
+def test_a_box_on_a_box_of_its_size_stands_on_four_corners(depth):
+    found = contacts(Body(BOX, [.1, .1, .1], [0, 0, .2 - depth]), Body(BOX, [.1, .1, .1]))
+    assert np.sort(places(found), axis=0) == pytest.approx(
+        np.sort(np.array(square(.1, .1 - depth / 2)), axis=0), abs=1e-12)
+    assert found[:, 3:6] == pytest.approx(np.tile([0, 0, 1], (4, 1)))
+    assert found[:, 6] == pytest.approx(-depth, abs=1e-12)
+
+
+def test_a_tilt_of_rounding_leaves_four_corners_and_their_names():
+    rng, names = np.random.default_rng(10), set()
+    for _ in range(200):
+        tilt = Rotation.from_rotvec(rng.normal(size=3) * 10.0 ** -rng.integers(6, 17))
+        found = contacts(Body(BOX, [.1, .1, .1], [.03, .02, .2], tilt), Body(BOX, [.1, .1, .1]))
+        assert len(found) == 4 and found[:, 5] == pytest.approx(1, abs=1e-9)
+        names.add(tuple(np.sort(found[:, 7])))
+    assert len(names) <= 2      # one for each of the faces that may be the reference
+
+
+def test_a_turned_box_on_a_box_stands_on_an_octagon():
+    a = Body(BOX, [.1, .1, .1], [0, 0, .2], Rotation.from_euler('z', math.pi / 4))
+    found = contacts(a, Body(BOX, [.1, .1, .1]))
+    assert len(found) == 8
+    # corners of the octagon within both squares are at .1 and .1 (sqrt 2 - 1)
+    near = .1 * (math.sqrt(2) - 1)
+    assert np.sort(np.abs(found[:, :2]), axis=1) == pytest.approx(np.tile([near, .1], (8, 1)))
+
+
+def test_a_box_on_its_edge_touches_at_two_points():
+    a = Body(BOX, [.1, .2, .1], [.05, 0, .1 + .1 * math.sqrt(2)],
+             Rotation.from_euler('y', math.pi / 4))
+    assert places(contacts(a, Body(BOX, [.5, .5, .1]))) == pytest.approx(
+        np.array([[.05, -.2, .1], [.05, .2, .1]]))
+    # and where the edge stands out over the face it ends with the face
+    assert np.sort(contacts(a, Body(BOX, [.5, .15, .1]))[:, 1]) == pytest.approx([-.15, .15])
+
+
+def test_edges_that_cross_touch_where_they_cross():
+    a = Body(BOX, [.1, .3, .1], [.02, .03, .2 * math.sqrt(2) - 1e-4],
+             Rotation.from_euler('y', math.pi / 4))
+    b = Body(BOX, [.3, .1, .1], [0, 0, 0], Rotation.from_euler('x', math.pi / 4))
+    found = contacts(a, b)
+    assert found[:, :7] == pytest.approx(np.array(
+        [[.02, 0, .1 * math.sqrt(2) - 5e-5, 0, 0, 1, -1e-4]]), abs=1e-12)
+
+
+@pytest.mark.parametrize('kind', [CAPSULE, CYLINDER])
+def test_what_lies_on_a_box_touches_at_two_points(kind):
+    lying = Rotation.from_euler('y', math.pi / 2)
+    a = Body(kind, [.05, .2], [.1, .03, .15 - 1e-5], lying)
+    found = contacts(a, Body(BOX, [.5, .5, .1]))
+    assert places(found) == pytest.approx(
+        np.array([[-.1, .03, .1 - 5e-6], [.3, .03, .1 - 5e-6]]), abs=1e-9)
+    # half of it is over the edge
+    assert places(contacts(a, Body(BOX, [.1, .5, .1])))[:, 0] == pytest.approx([-.1, .1])
+    # one end up by less than the margin: both are told, each with its gap
+    tilted = a.moved([0, 0, 0], [0, -1e-3, 0])
+    found = contacts(tilted, Body(BOX, [.5, .5, .1]))
+    assert np.sort(found[:, 6]) == pytest.approx([-1e-5 - 2e-4, -1e-5 + 2e-4], abs=1e-6)
+
+
+@pytest.mark.parametrize('kinds', list(itertools.product([CAPSULE, CYLINDER], repeat=2)))
+def test_side_by_side_they_touch_at_two_points(kinds):
+    a, b = Body(kinds[0], [.05, .2], [.09999, 0, .1]), Body(kinds[1], [.05, .3])
+    assert np.sort(contacts(a, b)[:, 2]) == pytest.approx([-.1, .3])
+    assert contacts(a, b)[:, 3] == pytest.approx(1)
+    across = Body(kinds[0], [.05, .2], [.1, .02, .1], Rotation.from_euler('x', math.pi / 2))
+    assert contacts(across, b)[:, :3] == pytest.approx(np.array([[.05, 0, .1]]), abs=1e-9)
+
+
+def test_a_cylinder_stands_on_its_rim():
+    a = Body(CYLINDER, [.1, .2], [.02, 0, .3])
+    found = contacts(a, Body(BOX, [.5, .5, .1]))
+    assert len(found) == 8 and np.ptp(found[:, 2]) < 1e-12
+    angles = np.sort(np.arctan2(found[:, 1], found[:, 0] - .02))
+    assert np.hypot(found[:, 0] - .02, found[:, 1]) == pytest.approx(.1)
+    assert np.diff(angles) == pytest.approx(math.pi / 4)
+    # on a smaller box: the box's corners, which all lie under the disc
+    assert len(contacts(a, Body(BOX, [.05, .05, .1]))) == 4
+    # on another cylinder: as much as the smaller has
+    found = contacts(a, Body(CYLINDER, [.3, .1]))
+    assert np.hypot(found[:, 0] - .02, found[:, 1]) == pytest.approx(.1) and len(found) == 8
+
+
+@pytest.mark.parametrize('degrees', [1e-5, .01, 1, 30, 80])
+def test_a_tilted_cylinder_stands_where_its_rim_is_lowest(degrees):
+    rng = np.random.default_rng(11)
+    for _ in range(20):
+        tilt, about = math.radians(degrees), rng.uniform(0, 2 * math.pi)
+        turn = Rotation.from_euler('zyz', [rng.uniform(0, 6), tilt, about])
+        high = .2 * math.cos(tilt) + .1 * math.sin(tilt)
+        a = Body(CYLINDER, [.1, .2], [0, 0, .1 + high], turn)
+        found = contacts(a, Body(BOX, [.9, .9, .1]), 1e-7)
+        deep = found[found[:, 6].argmin()]
+        down = turn.inv().apply([0, 0, -1])
+        rim = [.1 * down[0] / math.sin(tilt), .1 * down[1] / math.sin(tilt), -.2]
+        assert deep[:3] == pytest.approx(a.centre + turn.apply(rim), abs=1e-9)
+        assert abs(deep[6]) < 1e-12
+
+
+def test_contacts_keep_their_names_while_a_box_slides():
+    names = {tuple(np.sort(contacts(Body(BOX, [.1, .1, .1], [.01 * k, .05, .2], Rotation.from_euler(
+        'z', .3)), Body(BOX, [.5, .5, .1]))[:, 7])) for k in range(30)}
+    assert len(names) == 1
+
+
+def test_the_same_bodies_have_the_same_bits():
+    rng = np.random.default_rng(12)
+    for pair in PAIRS:
+        a, b = touching(rng, *pair, -1e-5)
+        assert contacts(a, b).tobytes() == contacts(a, b).tobytes()
