@@ -239,7 +239,7 @@ class RigidEngine:
 
     def _exclude_overlaps(self) -> None:
         """Let geoms of one doll that overlap by more than pressed() collide no more."""
-        kernels.gaps_at(self._system, self._room, self._q, self._v, self._room.gaps)
+        self._look()
         count = len(self._system.pairs)
         gaps = self._room.gaps[len(self._room.gaps) - count:]
         deep = self._system.pairs[gaps < -pressed(self.scene)]

@@ -317,6 +317,8 @@ def advance(s: System, r: Room, q: np.ndarray, v: np.ndarray, duration: float,
     end may err; ``flies``: whether damping and springs allow flights.
     """
     time, events = 0.0, 0
+    if duration == 0.0:
+        look(s, r, q, v, r.gaps, math.inf, r.gaps)
     while time < duration - 1e-12:
         left = duration - time
         if path.times[VALID] == 0.0 and flies and events < MOST_EVENTS and may_fly(
@@ -343,9 +345,3 @@ def advance(s: System, r: Room, q: np.ndarray, v: np.ndarray, duration: float,
             events += 1
     observe(s, r, q, v, rows)
     motion(masses, inertias, doll_of, s.gravity, rows, sums)
-
-
-@entry(SYSTEM, ROOM, ROW, ROW, ROW)
-def gaps_at(s: System, r: Room, q: np.ndarray, v: np.ndarray, out: np.ndarray) -> None:
-    """All gaps at a pose; see contact.py."""
-    look(s, r, q, v, out, math.inf, out)
