@@ -282,3 +282,15 @@ def test_dolls_that_collide_in_the_air_keep_their_momentum():
     before, after = (masses @ state.linear_velocities for state in (states[0], states[-1]))
     assert np.abs(states[-1].angular_velocities).max() > 0.5  # they did collide
     assert after == pytest.approx(before, abs=1e-12 * masses.sum() * 3)
+
+
+def test_a_start_and_a_sleeper_have_no_error_of_a_last_tick():
+    """It belongs to the motion that was: at the start and in sleep nothing was gone."""
+    with Simulation(body(Sphere(0.1), (0, 0, 0.3))) as simulation:
+        for _ in range(20):
+            simulation.advance()
+        simulation.reset()
+        assert simulation.measures()['error_estimate_m'] == 0
+        while not simulation.asleep and simulation.time < 5e9:
+            simulation.advance()
+        assert simulation.asleep and simulation.measures()['error_estimate_m'] == 0

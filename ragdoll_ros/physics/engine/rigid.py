@@ -38,7 +38,6 @@ FINER = 0.25
 CONTACTS_OF_GEOM = 12
 """Contacts for which there is room, for each part of a bone."""
 
-
 NO_HANDS = np.empty((0, 18))
 NO_LOADS = np.empty((0, 11))
 
@@ -124,6 +123,7 @@ class RigidEngine:
         """Bring all to rest where it is; the energy that is left is lost for good."""
         self._v[:] = 0.0
         self._path.times[:] = 0.0
+        self._departure = None
         self._look()
 
     def grounded(self) -> bool:
@@ -163,12 +163,12 @@ class RigidEngine:
         self._q, self._v = snapshot.q.copy(), snapshot.v.copy()
         self._path = Path(*(part.copy() for part in snapshot.path))
         self._excluded = snapshot.excluded
-        self._use(self._whole)
         self._drop_excluded()
         self._known[:] = snapshot.known
         self._room.counts[:] = snapshot.counts
         self._room.sums[:] = snapshot.sums
         self._start_energy = snapshot.start_energy
+        self._departure = None
         self._neighbours.forget()
         self._look()
 
