@@ -8,76 +8,85 @@ from ragdoll_ros.model import rotation
 from ragdoll_ros.model.coordinates import DofLayout, GeneralizedState
 from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.kernels.advance import observe
+from ragdoll_ros.physics.kernels.bundle import bind, bundle_at
 from ragdoll_ros.physics.kernels.dynamics import accelerations
-from ragdoll_ros.physics.kernels.flight import LENGTH, Path, along, path_step
+from ragdoll_ros.physics.kernels.flight import along, path_step
 from ragdoll_ros.physics.kernels.mass import integrate
-from ragdoll_ros.physics.kernels.system import make_room
+from ragdoll_ros.physics.kernels.system import COURSE, ROOM, SYSTEM, make_course, make_room
 from ragdoll_ros.physics.system import system_of
 
-
-@numba.njit
-def _observe(s, r, q, v, rows):
-    observe(s, r, q, v, rows)
+SYSTEM_AT, ROOM_AT, COURSE_AT = bundle_at(SYSTEM), bundle_at(ROOM), bundle_at(COURSE)
 
 
 @numba.njit
-def _accelerate(s, r, loads, q, v, out):
-    accelerations(s.tree, s.gravity, loads, q, v, r.work, out)
+def _observe(s, r, course, rows):
+    course = COURSE_AT(course)
+    observe(SYSTEM_AT(s), ROOM_AT(r), course.q, course.v, rows)
 
 
 @numba.njit
-def _integrate(s, q, v, h, out):
-    integrate(s.tree, q, v, h, out)
+def _accelerate(s, r, course, loads, out):
+    s, course = SYSTEM_AT(s), COURSE_AT(course)
+    accelerations(s.tree, s.gravity, loads, course.q, course.v, ROOM_AT(r).work, out)
 
 
 @numba.njit
-def _step(s, r, loads, q, v, h, path, k, y):
-    path_step(s.tree, s.gravity, r.work, loads, q, v, h, path, k, y)
+def _integrate(s, r, course, h, out):
+    course = COURSE_AT(course)
+    integrate(SYSTEM_AT(s).tree, course.q, course.v, h, out)
 
 
 @numba.njit
-def _along(s, path, time, q, v):
-    along(s.tree, path, time, q, v)
+def _step(s, r, course, loads, h):
+    path_step(SYSTEM_AT(s), ROOM_AT(r), loads, COURSE_AT(course), h)
+
+
+@numba.njit
+def _along(s, r, course, time, q, v):
+    along(SYSTEM_AT(s).tree, COURSE_AT(course), time, q, v)
 
 
 class KernelDynamics:
     """A scene's dynamics, without any choice of steps; coordinates are those of engines."""
 
     def __init__(self, scene):
-        self._system = system_of(scene)
-        self._room = make_room(self._system, 1)
+        system = system_of(scene)
+        self._course = make_course(system)
+        self._parts = system, make_room(system, 1, self._course.tally), self._course
+        self._rows = [bind(part) for part in self._parts]
+        self._addresses = [rows[0].ctypes.data for rows in self._rows]
         self._layout = DofLayout([placement.doll for placement in scene.dolls])
 
     def state(self, coordinates):
-        rows = np.empty((len(self._system.tree), 13))
-        _observe(self._system, self._room, *self._inwards(coordinates), rows)
+        rows = np.empty((len(self._parts[0].tree), 13))
+        self._put(coordinates)
+        _observe(*self._addresses, rows)
         return State.of(rows)
 
     def acceleration(self, coordinates, wrenches=()):
-        q, v = self._inwards(coordinates)
-        out = np.empty_like(v)
-        _accelerate(self._system, self._room, packed(wrenches), q, v, out)
-        return self._outwards(q, out).v
+        self._put(coordinates)
+        out = np.empty_like(self._course.v)
+        _accelerate(*self._addresses, packed(wrenches), out)
+        return self._outwards(self._course.q, out).v
 
     def moved(self, coordinates, duration):
         """The coordinates after a while at these velocities."""
-        q, v = self._inwards(coordinates)
-        out = np.empty_like(q)
-        _integrate(self._system, q, v, duration, out)
+        self._put(coordinates)
+        out = np.empty_like(self._course.q)
+        _integrate(*self._addresses, duration, out)
         return GeneralizedState(out, coordinates.v)
 
     def step(self, start, duration, wrenches=()):
         """Where one step leads, as a function of the share of it."""
-        q, v = self._inwards(start)
-        size = len(q) + len(v)
-        path = Path(np.zeros((8, size)), np.zeros((2, size)), np.zeros(8))
-        _step(self._system, self._room, packed(wrenches), q, v, duration, path,
-              np.empty((16, size)), np.empty(size))
-        path.times[LENGTH] = duration
+        self._put(start)
+        self._course.path[:] = 0
+        _step(*self._addresses, packed(wrenches), duration)
+        self._course.path['length'] = duration
 
         def at(share):
-            _along(self._system, path, share * duration, q, v)
-            return self._outwards(q.copy(), v.copy())
+            q, v = np.empty_like(self._course.q), np.empty_like(self._course.v)
+            _along(*self._addresses, share * duration, q, v)
+            return self._outwards(q, v)
         return at
 
     def fly(self, start, duration, steps, wrenches=()):
@@ -86,10 +95,10 @@ class KernelDynamics:
             start = self.step(start, duration / steps, wrenches)(1.0)
         return start
 
-    def _inwards(self, coordinates):
-        """Copies of q and v, roots' angular velocities along their own axes."""
-        q = coordinates.q.copy()
-        return q, self._turned(q, coordinates.v, rotation.inverse)
+    def _put(self, coordinates):
+        """Enter q and v, roots' angular velocities along their own axes."""
+        self._course.q[:] = coordinates.q
+        self._course.v[:] = self._turned(coordinates.q, coordinates.v, rotation.inverse)
 
     def _outwards(self, q, v):
         return GeneralizedState(q, self._turned(q, v, lambda turns: turns))

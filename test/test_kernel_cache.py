@@ -12,7 +12,7 @@ pytest.importorskip('numba')
 from ragdoll_ros.physics.kernels import cache, notices
 
 KERNELS = Path(cache.__file__).parent
-FRAME = ('cache.py', 'machine.py', 'notices.py')
+FRAME = ('cache.py', 'linking.py', 'machine.py', 'notices.py')
 INNER = """
 from .machine import compiled
 

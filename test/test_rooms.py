@@ -28,7 +28,7 @@ what a user would write without this package: it shares no code with it."""
 
 Edges = list[tuple[str, str]]
 
-MACHINE_CODE = {'numba', 'numpy', *sys.stdlib_module_names}
+MACHINE_CODE = {'numba', 'llvmlite', 'numpy', *sys.stdlib_module_names}
 
 REPORTS_OWN = {'accuracy/quickstart.py': {'pybullet'}, 'accuracy/depth.py': {'mujoco'}}
 

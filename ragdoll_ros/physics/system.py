@@ -35,7 +35,10 @@ def system_of(scene: Scene) -> System:
         geoms=geoms, pairs=pairs_between(scene, geoms, _within_dolls(scene, geoms)),
         bounds=bounds, normal=np.array(ground.normal if ground else (0.0, 0.0, 1.0)),
         offset=np.array([ground.offset if ground else -math.inf]),
-        bounce_speed=np.array([scene.material.restitution_speed]))
+        bounce_speed=np.array([scene.material.restitution_speed]),
+        masses=np.array([bone.mass for bone in scene.bones]),
+        inertias=np.array([bone.inertia for bone in scene.bones], float),
+        owners=np.ascontiguousarray(scene.doll_of_bone, np.int64))
 
 
 def pairs_between(scene: Scene, geoms: np.ndarray, couples: np.ndarray) -> np.ndarray:

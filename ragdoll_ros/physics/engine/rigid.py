@@ -16,9 +16,9 @@ from ...model.coordinates import DofLayout, GeneralizedState
 from ...model.scene import Scene
 from ...model.state import State
 from ..ground_heights import ground_heights
-from ..kernels.flight import Path
+from ..kernels.bundle import bind
 from ..kernels.loaded import advance as kernels
-from ..kernels.system import CONTACT, make_room
+from ..kernels.system import CONTACT, Course, make_course, make_room
 from ..motion import Motion, damping_rate
 from ..settings import Accuracy
 from ..system import pairs_between, system_of
@@ -46,12 +46,7 @@ NO_LOADS = np.empty((0, 11))
 class _Snapshot:
     """All that the next stretch depends on."""
 
-    q: np.ndarray
-    v: np.ndarray
-    path: Path
-    known: np.ndarray
-    counts: np.ndarray
-    sums: np.ndarray
+    course: Course
     excluded: frozenset
     start_energy: float
 
@@ -65,14 +60,10 @@ class RigidEngine:
         self._whole = self._system = system_of(scene)
         self._neighbours = Neighbours(scene, self._whole)
         self._flies = damping_rate(scene) < STIFFEST
-        self._masses = np.array([bone.mass for bone in scene.bones])
-        self._inertias = np.array([bone.inertia for bone in scene.bones], float)
-        self._doll_of = np.ascontiguousarray(scene.doll_of_bone, np.int64)
         self._spins = self.layout.root_spins
-        self._size = sum(self.layout.sizes)
         self._longest = math.inf
         """s that a path of flight may be long, as far as neighbours are known."""
-        self._stages, self._row = np.empty((16, self._size)), np.empty(self._size)
+        self._course = make_course(self._whole)
         self.place(self._placed())
 
     @property
@@ -83,10 +74,9 @@ class RigidEngine:
     @property
     def coordinates(self) -> GeneralizedState:
         """Generalised coordinates and velocities of all dolls now."""
-        v = self._v.copy()
-        turns = self._q[self.layout.root_orientations]
-        v[self._spins] = rotation.rotate(turns, v[self._spins])
-        return GeneralizedState(self._q.copy(), v)
+        q, v = self._course.q.copy(), self._course.v.copy()
+        v[self._spins] = rotation.rotate(q[self.layout.root_orientations], v[self._spins])
+        return GeneralizedState(q, v)
 
     @property
     def motion(self) -> Motion:
@@ -95,11 +85,12 @@ class RigidEngine:
 
     def place(self, coordinates: GeneralizedState) -> None:
         """Put all dolls there and begin; see Engine."""
-        self._q = np.array(coordinates.q, float)
-        self._v = np.array(coordinates.v, float)
-        turns = self._q[self.layout.root_orientations]
-        self._v[self._spins] = rotation.rotate(rotation.inverse(turns), self._v[self._spins])
-        self._path = Path(np.zeros((8, self._size)), np.zeros((2, self._size)), np.zeros(8))
+        q, v = self._course.q, self._course.v
+        q[:], v[:] = coordinates.q, coordinates.v
+        turns = rotation.inverse(q[self.layout.root_orientations])
+        v[self._spins] = rotation.rotate(turns, v[self._spins])
+        self._leave_path()
+        self._course.tally[:] = 0
         self._use(self._whole)
         self._look()
         self._lift_out()
@@ -111,18 +102,19 @@ class RigidEngine:
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = ()) -> None:
         """Go on by ``duration`` s; see Engine."""
-        self._departure = (self._q.copy(), self._v.copy(), duration, wrenches, springs)
+        self._departure = (self._course.q.copy(), self._course.v.copy(), duration, wrenches,
+                           springs)
         self._meet(duration)
         if wrenches or springs:
-            self._path.times[:] = 0.0
+            self._leave_path()
         self._go(duration, wrenches, springs, self.accuracy)
         if wrenches or springs:
-            self._path.times[:] = 0.0
+            self._leave_path()
 
     def stop(self) -> None:
         """Bring all to rest where it is; the energy that is left is lost for good."""
-        self._v[:] = 0.0
-        self._path.times[:] = 0.0
+        self._course.v[:] = 0.0
+        self._leave_path()
         self._departure = None
         self._look()
 
@@ -133,7 +125,7 @@ class RigidEngine:
 
     def contacts(self) -> list[Contact]:
         """What touches now."""
-        bones, lasted = self._system.tree['bone'], self._room.sums[4] or 1.0
+        bones, lasted = self._system.tree['bone'], self._course.tally['lasted'][0] or 1.0
         return [Contact(int(bones[c['a']]), int(bones[c['b']]) if c['b'] >= 0 else GROUND,
                         c['point'].copy(), c['normal'].copy(), -float(c['gap']),
                         float(c['impulse'][0]) / lasted)
@@ -141,32 +133,27 @@ class RigidEngine:
 
     def measures(self) -> dict[str, float]:
         """What went wrong since the start, and what was done: names end in their units."""
-        counts, room_sums = self._room.counts, self._room.sums
+        tally = self._course.tally[0]
+        pushed, handed = float(tally['pushed']), float(tally['handed'])
         energy = float(self.motion.energy.sum())
         return {
-            'energy_excess_J': energy - self._start_energy - float(room_sums[0] + room_sums[1]),
-            'energy_lifted_J': float(room_sums[2]),
-            'work_of_pushes_J': float(room_sums[0]), 'work_of_grabs_J': float(room_sums[1]),
+            'energy_excess_J': energy - self._start_energy - (pushed + handed),
+            'energy_lifted_J': float(tally['lifted']),
+            'work_of_pushes_J': pushed, 'work_of_grabs_J': handed,
             'error_estimate_m': self._estimate_error(), 'error_trusted': 1.0,
-            'flights': int(counts[0]), 'substeps': int(counts[1]), 'impacts': int(counts[2]),
-            'unsolved_total': int(counts[3])}
+            'flights': int(tally['flights']), 'substeps': int(tally['steps']),
+            'impacts': int(tally['impacts']), 'unsolved_total': int(tally['unsolved'])}
 
     def save(self) -> object:
         """A snapshot that restore brings back to the bit."""
-        return _Snapshot(
-            self._q.copy(), self._v.copy(), Path(*(part.copy() for part in self._path)),
-            self._known.copy(), self._room.counts.copy(), self._room.sums.copy(),
-            self._excluded, self._start_energy)
+        return _Snapshot(Course(*(part.copy() for part in self._course)), self._excluded,
+                         self._start_energy)
 
     def restore(self, snapshot: _Snapshot) -> None:
         """Go back to a snapshot."""
-        self._q, self._v = snapshot.q.copy(), snapshot.v.copy()
-        self._path = Path(*(part.copy() for part in snapshot.path))
         self._excluded = snapshot.excluded
         self._drop_excluded()
-        self._known[:] = snapshot.known
-        self._room.counts[:] = snapshot.counts
-        self._room.sums[:] = snapshot.sums
+        self._put(snapshot.course)
         self._start_energy = snapshot.start_energy
         self._departure = None
         self._neighbours.forget()
@@ -181,16 +168,26 @@ class RigidEngine:
     @property
     def _contacts(self) -> np.ndarray:
         """Contacts of the last step; none in flight."""
-        return self._known[:0 if self._path.times[0] else int(self._room.counts[5])]
+        course = self._course
+        return course.known[:0 if course.path['valid'][0] else int(course.tally['contacts'][0])]
+
+    def _leave_path(self) -> None:
+        """The next flight begins anew."""
+        self._course.path[:] = 0
+
+    def _put(self, course: Course) -> None:
+        """Go on from there; what is known of contacts may be of fewer of them."""
+        for own, other in zip(self._course[:-1], course[:-1], strict=True):
+            own[:] = other
+        count = min(len(course.known), len(self._course.known))
+        self._course.known[:count] = course.known[:count]
 
     def _go(self, duration: float, wrenches: Wrenches, springs: Springs,
             accuracy: Accuracy) -> None:
-        rows, sums = np.empty((len(self._masses), 13)), np.empty((len(self.scene.dolls), 20))
-        kernels.advance(self._system, self._room, self._q, self._v, duration, _loads(wrenches),
-                        self._hands(springs), accuracy.step, accuracy.flight_error,
-                        self._flies and not springs, self._longest, self._path, self._stages,
-                        self._row, self._armed, self._known, self._masses, self._inertias,
-                        self._doll_of, rows, sums)
+        rows, sums = np.empty((len(self.scene.bones), 13)), np.empty((len(self.scene.dolls), 20))
+        kernels.advance(*self._addresses, duration, _loads(wrenches), self._hands(springs),
+                        accuracy.step, accuracy.flight_error, self._flies and not springs,
+                        self._longest, rows, sums)
         self._state, self._motion = State.of(rows), Motion.of(sums)
 
     def _hands(self, springs: Springs) -> np.ndarray:
@@ -208,21 +205,19 @@ class RigidEngine:
             if couples is not None:
                 pairs = np.concatenate([self._own_pairs,
                                         pairs_between(self.scene, self._whole.geoms, couples)])
-                self._use(self._system._replace(pairs=pairs), keep=True)
-                self._path.times[:] = 0.0
+                self._use(self._system._replace(pairs=pairs))
+                self._leave_path()
             self._longest = duration
 
-    def _use(self, system: object, keep: bool = False) -> None:
-        """Work with these tables from now on; ``keep``: what is counted and known so far."""
+    def _use(self, system: object) -> None:
+        """Work with these tables from now on; contacts are found anew."""
         self._system = system
         contacts = min(MOST_CONTACTS, CONTACTS_OF_GEOM * len(system.geoms) + len(system.bounds))
-        counts, totals = (self._room.counts, self._room.sums) if keep else (None, None)
-        self._room = make_room(system, contacts)
-        if keep:
-            self._room.counts[:], self._room.sums[:] = counts, totals
-            self._room.counts[5] = 0
-        self._known = np.zeros(contacts, CONTACT)
-        self._armed = np.zeros(len(self._room.gaps))
+        self._course = self._course._replace(known=np.zeros(contacts, CONTACT))
+        self._course.tally['contacts'] = 0
+        self._room = make_room(system, contacts, self._course.tally)
+        self._rows = [bind(part) for part in (system, self._room, self._course)]
+        self._addresses = [rows[0].ctypes.data for rows in self._rows]
 
     def _look(self) -> None:
         """See where all is."""
@@ -235,7 +230,7 @@ class RigidEngine:
             depth = -heights[own].min()
             if depth > pressed(self.scene):
                 at = self.layout.root_positions[doll]
-                self._q[at] += depth * np.array(self.scene.ground.normal)
+                self._course.q[at] += depth * np.array(self.scene.ground.normal)
 
     def _exclude_overlaps(self) -> None:
         """Let geoms of one doll that overlap by more than pressed() collide no more."""
@@ -278,14 +273,12 @@ class RigidEngine:
         finer = dataclasses.replace(self.accuracy, step=FINER * self.accuracy.step,
                                     flight_error=self.accuracy.flight_error / 100)
         here, there = self.save(), self.state.positions
-        self._q, self._v = q.copy(), v.copy()
-        self._path.times[:] = 0.0
-        self._room.counts[5] = 0
+        self._course.q[:], self._course.v[:] = q, v
+        self._leave_path()
+        self._course.tally['contacts'] = 0
         self._go(duration, wrenches, springs, finer)
         missed = np.linalg.norm(self.state.positions - there, axis=1).max()
-        self._q, self._v, self._path = here.q, here.v, here.path
-        self._known[:] = here.known
-        self._room.counts[:], self._room.sums[:] = here.counts, here.sums
+        self._put(here.course)
         self._look()
         return float(missed / (1 - FINER ** 2))
 

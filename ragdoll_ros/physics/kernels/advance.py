@@ -5,23 +5,10 @@ import math
 
 import numpy as np
 
+from .bundle import bundle_at
 from .contact import TOUCHING, contact_rates, find_contacts, look, place_geoms
 from .dynamics import pose, rates
-from .flight import (
-    ALONG,
-    EVENT,
-    KNOWN,
-    LENGTH,
-    PATH,
-    TRY,
-    VALID,
-    Path,
-    along,
-    begin_path,
-    find_event,
-    point_velocity,
-    time_free,
-)
+from .flight import along, begin_path, find_event, point_velocity, time_free
 from .impact import (
     SLOW,
     SLOW_TURN,
@@ -32,12 +19,12 @@ from .impact import (
     impact,
     power,
 )
-from .machine import COUNTS, REAL, ROW, TABLE, YES, compiled, entry
+from .machine import ADDRESS, REAL, TABLE, YES, compiled, entry
 from .mass import integrate
 from .momentum import give_contacts, keep_energy, keep_momentum, sum_dolls
 from .quaternion import cross, times
 from .sums import motion
-from .system import CONTACTS, ROOM, SYSTEM, Room, System
+from .system import COURSE, ROOM, SYSTEM, Course, Room, System
 
 APART = 5e-3
 """m/s or rad/s at which what touches comes apart for a flight: to 1.3 um under gravity, which is
@@ -81,13 +68,15 @@ GAUSS = ((0.046910077030668, 0.118463442528095), (0.230765344947158, 0.239314335
 """Places and weights of Gauss and Legendre's rule of five points on (0, 1)."""
 
 
+system_at, room_at, course_at = bundle_at(SYSTEM), bundle_at(ROOM), bundle_at(COURSE)
+
+
 @compiled
-def may_fly(s: System, r: Room, q: np.ndarray, v: np.ndarray, loads: np.ndarray,
-            known: np.ndarray, path: Path, armed: np.ndarray, step: float,
-            rate: np.ndarray) -> bool:
-    """Whether all that touches comes apart, and for long enough; r.gaps are those at q."""
-    for i in range(r.counts[5]):
-        if r.counts[11] and known[i].impulse[0] > 0:
+def may_fly(s: System, r: Room, course: Course, loads: np.ndarray, step: float) -> bool:
+    """Whether all that touches comes apart, and for long enough; r.gaps are those of now."""
+    q, v, tally, armed = course.q, course.v, r.tally[0], r.armed
+    for i in range(tally.contacts):
+        if tally.settled and course.known[i].impulse[0] > 0:
             return False
     look(s, r, q, v, r.gaps, math.inf, r.gaps)
     m = find_contacts(s, q, r, r.gaps, TOUCHING)
@@ -105,11 +94,11 @@ def may_fly(s: System, r: Room, q: np.ndarray, v: np.ndarray, loads: np.ndarray,
         if apart < APART:
             return False
     if leaning:
-        rates(s.tree, s.gravity, loads, q, v, r.work, rate)
+        rates(s.tree, s.gravity, loads, q, v, r.work, r.row)
         for i in range(m):
             c = r.contacts[i]
             if c.kind == 1 and c.normal[0] * v[c.a] < APART and (
-                    c.normal[0] * rate[len(q) + c.a] < -STILL):
+                    c.normal[0] * r.row[len(q) + c.a] < -STILL):
                 return False
         pose(s.tree, q, v, r.work)
     if m == 0 or len(s.tree) == len(r.given):
@@ -121,65 +110,66 @@ def may_fly(s: System, r: Room, q: np.ndarray, v: np.ndarray, loads: np.ndarray,
         fast = max(fast, (move[0] ** 2 + move[1] ** 2 + move[2] ** 2) * s.geoms[k].reach)
     for j in range(len(armed)):
         armed[j] = 1.0 if r.gaps[j] > TOUCHING else 0.0
-    return time_free(s, r, q, v, r.gaps, armed, g + 2 * fast + 1e-3, path.ends) > WORTH * step
+    return time_free(s, r, q, v, r.gaps, armed, g + 2 * fast + 1e-3,
+                     course.ends) > WORTH * step
 
 
 @compiled
-def fly(s: System, r: Room, q: np.ndarray, v: np.ndarray, left: float, loads: np.ndarray,
-        path: Path, armed: np.ndarray) -> tuple[float, bool]:
+def fly(s: System, r: Room, course: Course, left: float, loads: np.ndarray) -> tuple[float, bool]:
     """Go along the path by ``left`` s or to its end or its first touch; the time gone, and whether
     something touches.
     """
-    times = path.times
-    end = min(times[LENGTH], times[EVENT])
-    gone = min(left, end - times[ALONG])
+    path = course.path[0]
+    end = min(path.length, path.event)
+    gone = min(left, end - path.along)
     if len(loads):
         q2, v2 = r.states[1], r.vectors[0]
         for place, weight in GAUSS:
-            along(s.tree, path, times[ALONG] + place * gone, q2, v2)
+            along(s.tree, course, path.along + place * gone, q2, v2)
             pose(s.tree, q2, v2, r.work)
             for k in range(len(loads)):
-                r.sums[0] += weight * gone * power(s.tree, r.work, loads[k])
-    times[ALONG] += gone
-    along(s.tree, path, times[ALONG], q, v)
-    if times[ALONG] < end - 1e-15:
+                r.tally[0].pushed += weight * gone * power(s.tree, r.work, loads[k])
+    path.along += gone
+    along(s.tree, course, path.along, course.q, course.v)
+    if path.along < end - 1e-15:
         return gone, False
-    times[VALID] = 0.0
-    touched = times[EVENT] <= times[LENGTH]
-    times[KNOWN] = 0.0 if touched else 1.0
+    path.valid = 0
+    touched = path.event <= path.length
+    path.begun = 0 if touched else 1
     if touched:
-        times[TRY] = 0.0
+        path.next = 0.0
     else:
-        for j in range(path.ends.shape[1]):
-            path.ends[0, j] = path.ends[1, j]
+        for j in range(course.ends.shape[1]):
+            course.ends[0, j] = course.ends[1, j]
     return gone, touched
 
 
 @compiled
-def step_or_touch(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loads: np.ndarray,
-                  springs: np.ndarray, since: float, known: np.ndarray, step: float,
+def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarray,
+                  springs: np.ndarray, since: float, step: float,
                   seek: bool) -> tuple[float, bool]:
     """Go on by h s, or to the first touch that is fast; the time gone, and whether one was met.
 
     r.gaps are those at q, and again at the end. A step that makes energy is too long for what
     turns: it is gone again, half as long.
     """
-    end_q, end_v = r.states[2], r.vectors[4]
-    length, hit, m = min(h, r.sums[6]) if r.sums[6] > 0 else h, False, 0
-    r.sums[6] = 2 * length if 2 * length < step else 0.0
+    q, v, end_q, end_v, tally = course.q, course.v, r.states[2], r.vectors[4], r.tally[0]
+    length, hit, m = min(h, tally.next) if tally.next > 0 else h, False, 0
+    tally.next = 2 * length if 2 * length < step else 0.0
     begin_step(s, r, q, v)
     held, moving = energy(s, q, r)
-    done, handed, lifted = r.sums[0], r.sums[1], r.sums[2]
+    done, lifted = tally.pushed + tally.handed, tally.lifted
+    pushed, handed = tally.pushed, tally.handed
     for turn in range(TRIES):
-        r.sums[0], r.sums[1], r.sums[2] = done, handed, lifted
-        m = contact_step(s, r, q, v, length, loads, springs, since, known, end_q, end_v)
+        tally.pushed, tally.handed, tally.lifted = pushed, handed, lifted
+        m = contact_step(s, r, course, length, loads, springs, since, end_q, end_v)
         settle_momentum(s, r, q, v, length, loads, springs, since, m, end_q, end_v)
         look(s, r, end_q, end_v, r.gaps, length, r.later)
         if turn == TRIES - 1:
             break
         now, speed = energy(s, end_q, r)
-        work = r.sums[0] - done + r.sums[1] - handed
-        gained = now - held - work - (r.sums[2] - lifted)
+        work = tally.pushed + tally.handed - done
+        gained = now - held - work - (tally.lifted - lifted)
         noise = NOISE * weight(s) + 10 * STEP_TOLERANCE * pressure(r, m)
         if gained > 1e-14 * abs(now) and r.given[:, 6].min() == 0.0:
             sum_dolls(s, end_q, end_v, r, r.after)
@@ -188,9 +178,9 @@ def step_or_touch(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, lo
         if not gained <= GAIN * (max(moving, speed) + abs(work)) + noise:
             if length > FINEST * step:
                 length, hit = length / 2, False
-                r.sums[6] = length
+                tally.next = length
                 continue
-            r.counts[9] += 1
+            tally.gains += 1
         share, landed = first_touch(s, r, length)
         hit = seek and (landed or share <= 1)
         if share > 1 or not seek:
@@ -198,8 +188,8 @@ def step_or_touch(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, lo
         length = max(SHORTEST, length * share * (1 + 1e-9) + 2e-9)
     if length > 0.1 * h:
         for i in range(m):
-            known[i] = r.contacts[i]
-        r.counts[5], r.sums[4] = m, length
+            course.known[i] = r.contacts[i]
+        tally.contacts, tally.lasted = m, length
     for j in range(len(q)):
         q[j] = end_q[j]
     for j in range(len(v)):
@@ -245,7 +235,7 @@ def begin_step(s: System, r: Room, q: np.ndarray, v: np.ndarray) -> None:
     for i in range(m):
         contact_rates(s, r, q, v, r.contacts[i])
         r.begun[i] = r.contacts[i]
-    r.counts[13] = m
+    r.count[0] = m
 
 
 @compiled
@@ -305,43 +295,43 @@ def observe(s: System, r: Room, q: np.ndarray, v: np.ndarray, rows: np.ndarray) 
             row[10 + k] = move[k]
 
 
-@entry(SYSTEM, ROOM, ROW, ROW, REAL, TABLE, TABLE, REAL, REAL, YES, REAL, PATH, TABLE, ROW, ROW,
-       CONTACTS, ROW, TABLE, COUNTS, TABLE, TABLE)
-def advance(s: System, r: Room, q: np.ndarray, v: np.ndarray, duration: float,
-            loads: np.ndarray, springs: np.ndarray, step: float, tolerance: float, flies: bool,
-            longest: float, path: Path, k: np.ndarray, y: np.ndarray, armed: np.ndarray,
-            known: np.ndarray, masses: np.ndarray, inertias: np.ndarray, doll_of: np.ndarray,
+@entry(ADDRESS, ADDRESS, ADDRESS, REAL, TABLE, TABLE, REAL, REAL, YES, REAL, TABLE, TABLE)
+def advance(system: int, room: int, moving: int, duration: float, loads: np.ndarray,
+            springs: np.ndarray, step: float, tolerance: float, flies: bool, longest: float,
             rows: np.ndarray, sums: np.ndarray) -> None:
-    """Go on by ``duration`` s: q and v, roots' angular velocities along their own axes, become
-    those at the end. ``step``: s of a step on the ground; ``tolerance``: m or rad by which a path's
-    end may err; ``flies``: whether damping and springs allow flights.
+    """Take the ``course`` on by ``duration`` s, and enter bones' ``rows`` (n, 13) and dolls'
+    ``sums`` (d, 20) at the end; the first three are addresses of bundles. ``step``: s of a step on
+    the ground; ``tolerance``: m or rad by which a path's end may err; ``flies``: whether damping
+    and springs allow flights; ``longest``: s that a path may be long.
     """
+    s, r, course = system_at(system), room_at(room), course_at(moving)
+    q, v, path, tally = course.q, course.v, course.path[0], r.tally[0]
     time, events = 0.0, 0
     if duration == 0.0:
         look(s, r, q, v, r.gaps, math.inf, r.gaps)
     while time < duration - 1e-12:
         left = duration - time
-        if path.times[VALID] == 0.0 and flies and events < MOST_EVENTS and may_fly(
-                s, r, q, v, loads, known, path, armed, step, y):
+        if not path.valid and flies and events < MOST_EVENTS and may_fly(
+                s, r, course, loads, step):
             most = min(left if len(loads) else longest, LONGEST)
-            if begin_path(s, r, loads, q, v, tolerance, most, path, k, y):
-                find_event(s, r, path, armed, r.states[1], r.vectors[0])
-                r.counts[5] = 0
-        if path.times[VALID] > 0.0:
-            gone, touched = fly(s, r, q, v, left, loads, path, armed)
+            if begin_path(s, r, course, loads, tolerance, most):
+                find_event(s, r, course)
+                tally.contacts = 0
+        if path.valid:
+            gone, touched = fly(s, r, course, left, loads)
             if touched:
                 look(s, r, q, v, r.gaps, math.inf, r.gaps)
         else:
             if not flies or events >= MOST_EVENTS:
                 look(s, r, q, v, r.gaps, math.inf, r.gaps)
             h = left / math.ceil(left / step - 1e-9)
-            gone, touched = step_or_touch(s, r, q, v, h, loads, springs, time, known, step,
+            gone, touched = step_or_touch(s, r, course, h, loads, springs, time, step,
                                           events < MOST_EVENTS)
-            path.times[KNOWN] = path.times[TRY] = 0.0
+            path.begun, path.next = 0, 0.0
         time += gone
-        r.counts[11] = 0 if touched else 1
+        tally.settled = 0 if touched else 1
         if touched:
             impact(s, r, q, v, events < MOST_BOUNCES)
             events += 1
     observe(s, r, q, v, rows)
-    motion(masses, inertias, doll_of, s.gravity, rows, sums)
+    motion(s.masses, s.inertias, s.owners, s.gravity, rows, sums)

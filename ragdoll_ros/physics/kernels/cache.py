@@ -7,6 +7,7 @@ all files of this folder; where they cannot be kept, all is compiled at every st
 from __future__ import annotations
 
 import contextlib
+import gc
 import hashlib
 import os
 import pickle
@@ -147,8 +148,13 @@ def keep(dispatcher: Dispatcher) -> None:
 
 @contextlib.contextmanager
 def alone() -> Iterator[None]:
-    """Let processes compile one after another: the next one finds what the first has kept."""
+    """Let processes compile one after another: the next one finds what the first has kept. No
+    garbage is looked for meanwhile, which takes a seventh of the time and finds little.
+    """
     with contextlib.ExitStack() as stack:
+        if gc.isenabled():
+            gc.disable()
+            stack.callback(gc.enable)
         if FOLDER is not None:
             with contextlib.suppress(OSError, ImportError):  # a system without such locks
                 lock = os.open(FOLDER / 'ragdoll_ros.lock', os.O_RDONLY | os.O_CREAT, 0o666)

@@ -5,10 +5,8 @@ once, when it is made, for the first instant at which a gap closes.
 """
 from __future__ import annotations
 
-import collections
 import math
 
-import numba
 import numpy as np
 
 from .collision import collide
@@ -17,18 +15,7 @@ from .dop853 import CONTINUED, STAGES, add_up, step_error
 from .dynamics import Work, normalize, pose, rates
 from .machine import compiled
 from .quaternion import cross
-from .system import Room, System
-
-Path = collections.namedtuple('Path', 'dense ends times')
-"""``dense`` (8, nq + nv): coefficients of the path, ``ends`` (2, nq + nv): rates of change at both
-ends, ``times`` (8,): see the indices below."""
-
-VALID, ALONG, LENGTH, TRY, KNOWN, EVENT, ERROR = range(7)
-"""Whether there is a path; how far along it all is, s; its length, s; the next one's, as its error
-tells; whether the rates at its start are known; the instant of its first touch, or infinity; its
-error as estimated, m or rad."""
-
-PATH = numba.typeof(Path(np.zeros((8, 1)), np.zeros((2, 1)), np.zeros(8)))
+from .system import Course, Room, System
 
 SAFETY, SHORTER, LONGER = 0.8, 0.2, 2.0
 """Share of the longest step that the tolerance allows, and bounds of a step over the last."""
@@ -53,19 +40,20 @@ STEADY = 1.5
 
 
 @compiled
-def path_step(tree: np.ndarray, gravity: np.ndarray, work: Work, loads: np.ndarray, q: np.ndarray,
-              v: np.ndarray, h: float, path: Path, k: np.ndarray, y: np.ndarray) -> float:
-    """Enter the step of h s from q and v into ``path``; its error. k (16, nq + nv), y: room."""
-    nq, size, dense = len(q), len(q) + len(v), path.dense
+def path_step(s: System, r: Room, loads: np.ndarray, course: Course, h: float) -> float:
+    """Enter the step of h s from where all is as the course's path; its error."""
+    tree, gravity, work, k, y = s.tree, s.gravity, r.work, r.stages, r.row
+    q, v, dense, ends = course.q, course.v, course.dense, course.ends
+    nq, size = len(q), len(q) + len(v)
     start = dense[0]
     for j in range(nq):
         start[j] = q[j]
     for j in range(nq, size):
         start[j] = v[j - nq]
     normalize(tree, start[:nq])
-    if path.times[KNOWN] > 0:
+    if course.path[0].begun:
         for j in range(size):
-            k[0, j] = path.ends[0, j]
+            k[0, j] = ends[0, j]
     else:
         rates(tree, gravity, loads, start[:nq], start[nq:], work, k[0])
     for stage in range(1, 16):
@@ -81,17 +69,17 @@ def path_step(tree: np.ndarray, gravity: np.ndarray, work: Work, loads: np.ndarr
         dense[1, j] -= start[j]
         dense[2, j] = h * k[0, j] - dense[1, j]
         dense[3, j] = 2 * dense[1, j] - h * (k[12, j] + k[0, j])
-        path.ends[0, j], path.ends[1, j] = k[0, j], k[12, j]
+        ends[0, j], ends[1, j] = k[0, j], k[12, j]
     for row in range(4):
         add_up(CONTINUED[row], 16, k, h, dense[4 + row])
     return step_error(k, h, nq, y)
 
 
 @compiled
-def along(tree: np.ndarray, path: Path, time: float, q: np.ndarray, v: np.ndarray) -> None:
+def along(tree: np.ndarray, course: Course, time: float, q: np.ndarray, v: np.ndarray) -> None:
     """Coordinates and velocities at an instant of the path, s from its start."""
-    nq, dense = len(q), path.dense
-    share = time / path.times[LENGTH]
+    nq, dense = len(q), course.dense
+    share = time / course.path[0].length
     for j in range(nq + len(v)):
         y = 0.0
         for row in range(7, 0, -1):
@@ -105,35 +93,34 @@ def along(tree: np.ndarray, path: Path, time: float, q: np.ndarray, v: np.ndarra
 
 
 @compiled
-def begin_path(s: System, r: Room, loads: np.ndarray, q: np.ndarray, v: np.ndarray,
-               tolerance: float, longest: float, path: Path, k: np.ndarray,
-               y: np.ndarray) -> bool:
-    """Make a path from q and v, as long as its error allows, at most ``longest`` s. False: none
-    was found that errs little enough.
+def begin_path(s: System, r: Room, course: Course, loads: np.ndarray, tolerance: float,
+               longest: float) -> bool:
+    """Make a path from where all is, as long as its error allows, at most ``longest`` s. False:
+    none was found that errs little enough.
     """
-    times = path.times
-    pose(s.tree, q, v, r.work)
-    if times[TRY] <= 0:
+    path = course.path[0]
+    pose(s.tree, course.q, course.v, r.work)
+    if path.next <= 0:
         fast = 1e-9
         for i in range(len(s.tree)):
             move = r.work.moves[i]
             fast = max(fast, move[0] ** 2 + move[1] ** 2 + move[2] ** 2)
-        times[TRY] = FIRST_TURN / math.sqrt(fast)
-    h, before = min(longest, times[TRY]), math.inf
+        path.next = FIRST_TURN / math.sqrt(fast)
+    h, before = min(longest, path.next), math.inf
     for _ in range(30):
-        error = path_step(s.tree, s.gravity, r.work, loads, q, v, h, path, k, y)
-        r.counts[0] += 1
+        error = path_step(s, r, loads, course, h)
+        r.tally[0].flights += 1
         ratio = error / tolerance
         factor = SAFETY * ratio ** -0.125 if ratio > 0 else LONGER
         good = ratio <= 1 or (HELPED * before < error < math.inf)
-        times[LENGTH], times[ERROR] = h, error
-        times[TRY] = h * min(LONGER, max(SHORTER, factor))
+        path.length, path.error = h, error
+        path.next = h * min(LONGER, max(SHORTER, factor))
         if good:
-            times[VALID], times[ALONG], times[EVENT] = 1.0, 0.0, math.inf
+            path.valid, path.along, path.event = 1, 0.0, math.inf
             return True
-        before, h = error, min(h * SHORTER if error == math.inf else times[TRY], longest)
-        path.times[KNOWN] = 1.0 if math.isfinite(path.ends[0, 0]) else 0.0
-    times[VALID] = 0.0
+        before, h = error, min(h * SHORTER if error == math.inf else path.next, longest)
+        path.begun = 1 if math.isfinite(course.ends[0, 0]) else 0
+    path.valid = 0
     return False
 
 
@@ -150,16 +137,16 @@ def point_velocity(work: Work, i: int, q: np.ndarray, root: int, point: np.ndarr
 
 
 @compiled
-def accelerations_of(s: System, r: Room, q: np.ndarray, v: np.ndarray, path: Path) -> float:
+def accelerations_of(s: System, r: Room, course: Course, q: np.ndarray, v: np.ndarray) -> float:
     """Acceleration, m/s^2, that no point exceeds on the path, as its ends tell; q, v: room."""
-    bones, h = len(s.tree), path.times[LENGTH]
-    along(s.tree, path, 0.0, q, v)
+    bones, h = len(s.tree), course.path[0].length
+    along(s.tree, course, 0.0, q, v)
     pose(s.tree, q, v, r.work)
     for i in range(bones):
         x, y, z, w = bone_velocity(r.work, i)
         r.own[i, 0], r.own[i, 1], r.own[i, 2], r.own[i, 3] = x, y, z, w
         r.own[i, 4] = 0.0
-    along(s.tree, path, h, q, v)
+    along(s.tree, course, h, q, v)
     pose(s.tree, q, v, r.work)
     for k in range(len(s.geoms)):
         i = s.geoms[k].bone
@@ -249,39 +236,39 @@ def pair_closing(s: System, r: Room, q: np.ndarray, k: int, gap: float) -> float
 
 
 @compiled
-def find_event(s: System, r: Room, path: Path, armed: np.ndarray, q: np.ndarray,
-               v: np.ndarray) -> None:
-    """Enter the instant of the path's first touch. q and v: room.
+def find_event(s: System, r: Room, course: Course) -> None:
+    """Enter the instant of the path's first touch.
 
     By conservative advancement (Mirtich 1996): no gap is gone before its speed and the largest
     acceleration allow, and near a touch these steps converge as Newton's. Where a gap is found
     closed all the same, regula falsi goes back (Illinois: Dowell and Jarratt, BIT 11, 1971). What
     touches at the start counts from when it has come apart.
     """
-    length, gaps = path.times[LENGTH], r.later
-    acceleration = accelerations_of(s, r, q, v, path)
+    q, v, path, gaps, armed = r.states[1], r.vectors[0], course.path[0], r.later, r.armed
+    length = path.length
+    acceleration = accelerations_of(s, r, course, q, v)
     for j in range(len(gaps)):
         armed[j] = 1.0 if r.gaps[j] > TOUCHING else 0.0
     time = before = 0.0
     for _ in range(SAMPLES):
-        along(s.tree, path, time, q, v)
+        along(s.tree, course, time, q, v)
         look(s, r, q, v, gaps, math.inf, gaps)
         least = closest(gaps, armed)
         if least < -MET:
-            path.times[EVENT] = go_back(s, r, path, armed, before, time, q, v)
+            path.event = go_back(s, r, course, before, time, q, v)
             return
         if least <= MET:
-            path.times[EVENT] = time
+            path.event = time
             return
-        step = time_free(s, r, q, v, gaps, armed, acceleration, path.ends)
+        step = time_free(s, r, q, v, gaps, armed, acceleration, course.ends)
         before = time
         time += max(step, 1e-9)
         if time >= length:
             if before >= length:
                 return
             time = length
-    path.times[EVENT] = before
-    r.counts[6] += 1
+    path.event = before
+    r.tally[0].stalls += 1
 
 
 @compiled
@@ -299,15 +286,15 @@ def closest(gaps: np.ndarray, armed: np.ndarray) -> float:
 
 
 @compiled
-def go_back(s: System, r: Room, path: Path, armed: np.ndarray, early: float, late: float,
-            q: np.ndarray, v: np.ndarray) -> float:
+def go_back(s: System, r: Room, course: Course, early: float, late: float, q: np.ndarray,
+            v: np.ndarray) -> float:
     """Instant, s, between two at which the least gap is gone."""
     above = below = 0.0
     time = early
     for turn in range(62):
-        along(s.tree, path, time, q, v)
+        along(s.tree, course, time, q, v)
         look(s, r, q, v, r.later, math.inf, r.later)
-        gap = closest(r.later, armed)
+        gap = closest(r.later, r.armed)
         if turn == 0:
             if gap <= 0:
                 break

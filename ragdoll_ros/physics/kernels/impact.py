@@ -28,7 +28,7 @@ from .mass import (
 from .momentum import give
 from .quaternion import cross, times, turned
 from .response import respond
-from .system import Room, System
+from .system import Course, Room, System
 
 STEP_TOLERANCE, IMPACT_TOLERANCE = 1e-8, 1e-10
 """m/s to which contacts are solved."""
@@ -67,21 +67,19 @@ def impact(s: System, r: Room, q: np.ndarray, v: np.ndarray, bounces: bool) -> i
     respond(s, r, q, v, v, m, 0.0, IMPACT_TOLERANCE, change, shift)
     for j in range(len(v)):
         v[j] += change[j]
-    r.counts[2] += 1
+    r.tally[0].impacts += 1
     return m
 
 
 @compiled
-def contact_step(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loads: np.ndarray,
-                 springs: np.ndarray, since: float, known: np.ndarray, end_q: np.ndarray,
-                 end_v: np.ndarray) -> int:
-    """Go on by h s from q and v to ``end_q`` and ``end_v``; the number of contacts. What gives
-    depths back is still to come: r.vectors[3].
+def contact_step(s: System, r: Room, course: Course, h: float, loads: np.ndarray,
+                 springs: np.ndarray, since: float, end_q: np.ndarray, end_v: np.ndarray) -> int:
+    """Go on by h s to ``end_q`` and ``end_v``; the number of contacts. What gives depths back is
+    still to come: r.vectors[3].
 
-    ``since``: s since the hands of ``springs`` were where these say. ``known``: contacts of the
-    step before, r.counts[5] of them, whose impulses over r.sums[4] s are where to begin.
+    ``since``: s since the hands of ``springs`` were where these say.
     """
-    middle = r.states[0]
+    q, v, middle = course.q, course.v, r.states[0]
     free, smooth, change, shift = r.vectors[0], r.vectors[1], r.vectors[2], r.vectors[3]
     integrate(s.tree, q, v, h / 2, middle)
     pose(s.tree, middle, v, r.work)
@@ -117,7 +115,7 @@ def contact_step(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loa
     place_geoms(s.tree, s.root_of, s.geoms, r.work, middle, r.at, r.turn)
     m = find_contacts(s, middle, r, r.gaps, SLOW * h)
     if m:
-        warm_start(r, m, known, h)
+        warm_start(r, m, course.known, h)
         respond(s, r, middle, v, free, m, h, STEP_TOLERANCE, change, shift)
         for j in range(len(v)):
             end_v[j] = free[j] + change[j]
@@ -126,8 +124,8 @@ def contact_step(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loa
             end_v[j], shift[j] = free[j], 0.0
     integrate(s.tree, middle, end_v, h / 2, end_q)
     if m:
-        r.sums[2] += lifted(s, r, shift)
-    r.counts[1] += 1
+        r.tally[0].lifted += lifted(s, r, shift)
+    r.tally[0].steps += 1
     return m
 
 
@@ -283,19 +281,20 @@ def weaken(s: System, r: Room, q: np.ndarray, v: np.ndarray, free: np.ndarray,
 @compiled
 def warm_start(r: Room, m: int, known: np.ndarray, h: float) -> None:
     """Begin with the impulses of the step before, of the contacts that there were."""
-    scale = h / r.sums[4] if r.sums[4] > 0 else 0.0
+    tally = r.tally[0]
+    scale = h / tally.lasted if tally.lasted > 0 else 0.0
     for i in range(m):
         c = r.contacts[i]
         for e in range(5):
             c.impulse[e] = 0.0
-        for j in range(r.counts[5]):
+        for j in range(tally.contacts):
             old = known[j]
             if old.key == c.key:
                 for e in range(5):
                     c.impulse[e] = scale * old.impulse[e]
                 break
         c.begun = 0
-        for j in range(r.counts[13]):
+        for j in range(r.count[0]):
             old = r.begun[j]
             if old.key == c.key:
                 c.begun, c.gap = 1, old.gap
@@ -311,15 +310,13 @@ def warm_start(r: Room, m: int, known: np.ndarray, h: float) -> None:
 @compiled
 def enter_work(s: System, r: Room, v: np.ndarray, end_v: np.ndarray, h: float,
                loads: np.ndarray, springs: np.ndarray, since: float) -> None:
-    """Book the work, J, of loads (r.sums[0]) and hands (r.sums[1]) in a step of h s, and their
-    impulses in r.given.
-    """
+    """Book the work, J, of loads and hands in a step of h s, and their impulses in r.given."""
     middle, mean = r.states[0], r.vectors[0]
     for j in range(len(v)):
         mean[j] = (v[j] + end_v[j]) / 2
     pose(s.tree, middle, mean, r.work)
     for k in range(len(loads)):
-        r.sums[0] += h * power(s.tree, r.work, loads[k])
+        r.tally[0].pushed += h * power(s.tree, r.work, loads[k])
         give_load(s.tree, s.root_of, s.doll_of, r.work, r.given, middle, loads[k], h)
     if len(springs):
         root_axes(s.tree, middle, r.work.axes)
@@ -327,7 +324,7 @@ def enter_work(s: System, r: Room, v: np.ndarray, end_v: np.ndarray, h: float,
         fx, fy, fz, ux, uy, uz = mean_force(
             s.tree, s.up, s.last, r.work, middle, root_q(s, springs[k]), v, end_v, springs[k],
             since + h / 2, h)
-        r.sums[1] += h * (fx * ux + fy * uy + fz * uz)
+        r.tally[0].handed += h * (fx * ux + fy * uy + fz * uz)
         i = int(springs[k, 0])
         x, y, z = spring_point(s.tree[i], r.work, i, springs[k, 1:4])
         root = s.tree[s.root_of[i]].q

@@ -6,18 +6,19 @@ from collections.abc import Callable
 import numba
 
 from .cache import keep
+from .linking import PartCompiler
 
 MATH = {'contract', 'nsz', 'arcp'}
 """Freedoms of rounding: a product and a sum may be rounded once. Sums stay in their order."""
 
 compiled = numba.njit(error_model='numpy', fastmath=MATH, no_cpython_wrapper=True,
-                      no_cfunc_wrapper=True)
+                      no_cfunc_wrapper=True, pipeline_class=PartCompiler)
 """Machine code, for what other compiled code calls."""
 
 inlined = numba.njit(inline='always', error_model='numpy', fastmath=MATH)
 """The same as a part of what calls it: twice as fast for what is called with many arrays."""
 
-REAL, YES = numba.float64, numba.boolean
+REAL, YES, ADDRESS = numba.float64, numba.boolean, numba.int64
 ROW, TABLE, COUNTS, FLAGS = REAL[::1], REAL[:, ::1], numba.int64[::1], YES[::1]
 
 

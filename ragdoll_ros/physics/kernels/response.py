@@ -89,7 +89,7 @@ def collect(r: Room, begin: int, m: int, island: int) -> tuple[int, int]:
             continue
         c.island = -1 - island
         if rows + c.kind > len(r.Y):
-            r.counts[7] += 1
+            r.tally[0].left_out += 1
             continue
         c.row = rows
         r.kinds[count], r.rows[count] = c.kind, rows
@@ -152,15 +152,14 @@ def solve_island(s: System, r: Room, count: int, n: int, h: float, tolerance: fl
         solve_impulses(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, start, soft, tolerance, SWEEPS,
                        r.solver, r.G)
         hold_energy(r.W, start, soft, p, n)
-        r.counts[8] += 1
+        r.tally[0].softened += 1
     if not left <= UNSOLVED and h > 0:
         left, more = solve_straight(r, count, n, h, tolerance)
         turns += more
-    r.counts[4] += turns
+    r.tally[0].sweeps += turns
     if not left <= UNSOLVED:
-        r.counts[3] += 1
+        r.tally[0].unsolved += 1
         weaken_impulses(r.W, start, p, n)
-    r.sums[3] = max(r.sums[3], left)
     if deep:
         solve_normals(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, r.need[0], out, r.solver, r.G)
     for k in range(count):

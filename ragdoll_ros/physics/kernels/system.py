@@ -1,11 +1,13 @@
-"""What the rigid core knows of a scene, and the room that it works in: two tuples of arrays."""
+"""What the rigid core knows of a scene, what of it moves, and the room that it works in: three
+tuples of arrays, bundles in compiled code.
+"""
 from __future__ import annotations
 
 import collections
 
-import numba
 import numpy as np
 
+from .bundle import bundle_type
 from .dynamics import Work
 from .record import RECORD
 
@@ -43,16 +45,42 @@ began, with the velocities ``start`` along its rows."""
 
 System = collections.namedtuple(
     'System', 'tree gravity up last bone_of root_of doll_of damping geoms pairs bounds normal '
-    'offset bounce_speed')
+    'offset bounce_speed masses inertias owners')
 """A scene: ``tree`` of tree.py; ``up`` (nv,): of each velocity the next one towards the root;
 ``last`` (n,): of each bone the last velocity that moves it; ``bone_of`` (nv,); ``root_of`` (n,):
 the record of its doll's root, ``doll_of`` (n,); ``damping`` (nv,) N m s; ``normal`` (3,) and
-``offset`` (1,) of the ground, offset -inf: none; ``bounce_speed`` (1,) m/s."""
+``offset`` (1,) of the ground, offset -inf: none; ``bounce_speed`` (1,) m/s; of the scene's bones
+in their order ``masses`` (n,), ``inertias`` (n, 3) and ``owners`` (n,), their dolls."""
+
+PATH = np.dtype([('valid', np.int64), ('begun', np.int64), ('along', float), ('length', float),
+                 ('next', float), ('event', float), ('error', float)], align=True)
+"""A path of flight: whether there is one, and whether the rates at its start are known; how far
+along it all is, s; its length, s; the next one's, as its error tells; the instant of its first
+touch, or infinity; its error as estimated, m or rad."""
+
+TALLY = np.dtype([
+    ('flights', np.int64), ('steps', np.int64), ('impacts', np.int64), ('sweeps', np.int64),
+    ('unsolved', np.int64), ('left_out', np.int64), ('stalls', np.int64), ('softened', np.int64),
+    ('gains', np.int64), ('contacts', np.int64), ('settled', np.int64), ('lasted', float),
+    ('next', float), ('pushed', float), ('handed', float), ('lifted', float)], align=True)
+"""What has been done since the start: paths of ``flights``, ``steps``, ``impacts``, ``sweeps``;
+islands that stayed ``unsolved``, contacts ``left_out`` for want of room, searches for a touch that
+came to none (``stalls``), impacts ``softened`` to make no energy, steps that made some all the
+same (``gains``). Of the last step: its ``contacts``, whether it ended without a touch
+(``settled``), how long it ``lasted`` and how long the ``next`` may be, s. Work of pushes and hands
+and what was spent on giving depths back, J."""
+
+Course = collections.namedtuple('Course', 'q v dense ends path tally known')
+"""What is carried on from stretch to stretch: coordinates (nq,) and velocities (nv,), those of
+roots' turning along their own axes; the path of flight, its coefficients ``dense`` (8, nq + nv) and
+rates of change at its ``ends`` (2, nq + nv); ``path`` and ``tally``, one record each; the contacts
+``known`` from the last step."""
 
 Room = collections.namedtuple(
     'Room', 'work own composite H contacts table at turn gaps later Y support W G p solver '
-    'kinds rows mu roll need label vectors states counts sums given before after begun')
-"""Scratch of the rigid core."""
+    'kinds rows mu roll need label vectors states given before after begun count tally armed '
+    'stages row')
+"""Scratch of the rigid core, but for its tally, which is the course's."""
 
 STICKS = 1e5
 """Coefficient from which friction has no limit."""
@@ -60,8 +88,17 @@ STICKS = 1e5
 VECTORS, STATES = 8, 6
 
 
-def make_room(system: System, contacts: int) -> Room:
-    """Room for a system with at most so many contacts at a time."""
+def make_course(system: System) -> Course:
+    """At the origin, at rest, with room for no contact."""
+    nv = len(system.up)
+    nq = nv + int(system.tree['free'].sum())
+    return Course(
+        q=np.zeros(nq), v=np.zeros(nv), dense=np.zeros((8, nq + nv)), ends=np.zeros((2, nq + nv)),
+        path=np.zeros(1, PATH), tally=np.zeros(1, TALLY), known=np.zeros(0, CONTACT))
+
+
+def make_room(system: System, contacts: int, tally: np.ndarray) -> Room:
+    """Room for a system with at most so many contacts at a time, counted in ``tally``."""
     bones, nv = len(system.tree), len(system.up)
     nq = nv + int(system.tree['free'].sum())
     geoms, dolls = len(system.geoms), int(system.doll_of.max()) + 1
@@ -82,9 +119,9 @@ def make_room(system: System, contacts: int) -> Room:
         rows=np.zeros(contacts, np.int64), mu=np.zeros(contacts), roll=np.zeros(contacts),
         need=np.zeros((2, contacts)), label=np.zeros(dolls, np.int64),
         vectors=np.zeros((VECTORS, nv)), states=np.zeros((STATES, nq)),
-        counts=np.zeros(16, np.int64), sums=np.zeros(8), given=np.zeros((dolls, 10)),
-        before=np.zeros((dolls, 17)), after=np.zeros((dolls, 17)),
-        begun=np.zeros(contacts, CONTACT))
+        given=np.zeros((dolls, 10)), before=np.zeros((dolls, 17)), after=np.zeros((dolls, 17)),
+        begun=np.zeros(contacts, CONTACT), count=np.zeros(1, np.int64), tally=tally,
+        armed=np.zeros(gaps), stages=np.zeros((16, nq + nv)), row=np.zeros(nq + nv))
 
 
 def depth(system: System) -> int:
@@ -105,9 +142,10 @@ def blank() -> System:
         last=np.zeros(1, np.int64), bone_of=np.zeros(6, np.int64),
         root_of=np.zeros(1, np.int64), doll_of=np.zeros(1, np.int64), damping=np.zeros(6),
         geoms=np.zeros(1, GEOM), pairs=np.zeros(1, PAIR), bounds=np.zeros(1, BOUND),
-        normal=np.zeros(3), offset=np.zeros(1), bounce_speed=np.zeros(1))
+        normal=np.zeros(3), offset=np.zeros(1), bounce_speed=np.zeros(1),
+        masses=np.zeros(1), inertias=np.zeros((1, 3)), owners=np.zeros(1, np.int64))
 
 
-SYSTEM = numba.typeof(blank())
-ROOM = numba.typeof(make_room(blank(), 1))
-CONTACTS = numba.from_dtype(CONTACT)[::1]
+SYSTEM = bundle_type(blank())
+COURSE = bundle_type(make_course(blank()))
+ROOM = bundle_type(make_room(blank(), 1, np.zeros(1, TALLY)))
