@@ -36,9 +36,8 @@ def system_of(scene: Scene) -> System:
         bounds=bounds, normal=np.array(ground.normal if ground else (0.0, 0.0, 1.0)),
         offset=np.array([ground.offset if ground else -math.inf]),
         bounce_speed=np.array([scene.material.restitution_speed]),
-        masses=np.array([bone.mass for bone in scene.bones]),
-        inertias=np.array([bone.inertia for bone in scene.bones], float),
-        owners=np.ascontiguousarray(scene.doll_of_bone, np.int64))
+        doll_masses=np.array([placement.doll.mass for placement in scene.dolls]),
+        heft=np.array([tree['mass'].sum() * geoms['reach'].max() * math.hypot(*scene.gravity)]))
 
 
 def pairs_between(scene: Scene, geoms: np.ndarray, couples: np.ndarray) -> np.ndarray:

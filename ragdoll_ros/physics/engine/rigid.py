@@ -18,7 +18,7 @@ from ...model.state import State
 from ..ground_heights import ground_heights
 from ..kernels.bundle import bind
 from ..kernels.loaded import advance as kernels
-from ..kernels.system import CONTACT, Course, make_course, make_room
+from ..kernels.system import CONTACT, DOLL, Course, make_course, make_room
 from ..motion import Motion, damping_rate
 from ..settings import Accuracy
 from ..system import pairs_between, system_of
@@ -184,11 +184,11 @@ class RigidEngine:
 
     def _go(self, duration: float, wrenches: Wrenches, springs: Springs,
             accuracy: Accuracy) -> None:
-        rows, sums = np.empty((len(self.scene.bones), 13)), np.empty((len(self.scene.dolls), 20))
+        rows, sums = np.empty((len(self.scene.bones), 13)), np.empty(len(self.scene.dolls), DOLL)
         kernels.advance(*self._addresses, duration, _loads(wrenches), self._hands(springs),
                         accuracy.step, accuracy.flight_error, self._flies and not springs,
                         self._longest, rows, sums)
-        self._state, self._motion = State.of(rows), Motion.of(sums)
+        self._state, self._motion = State.of(rows), Motion.of(sums.view(float).reshape(-1, 20))
 
     def _hands(self, springs: Springs) -> np.ndarray:
         """Springs as a table (m, 18) for compiled code, the last four its own."""

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import math
+import os
 
 import numpy as np
 
@@ -14,17 +15,15 @@ from .impact import (
     SLOW_TURN,
     STEP_TOLERANCE,
     contact_step,
-    energy,
     enter_work,
     impact,
     power,
 )
 from .machine import ADDRESS, REAL, TABLE, YES, compiled, entry
 from .mass import integrate
-from .momentum import give_contacts, keep_energy, keep_momentum, sum_dolls
+from .momentum import give_contacts, keep_momentum, sum_dolls, take_out, total_energy
 from .quaternion import cross, times
-from .sums import motion
-from .system import COURSE, ROOM, SYSTEM, Course, Room, System
+from .system import COURSE, DOLLS, ROOM, SYSTEM, Course, Room, System
 
 APART = 5e-3
 """m/s or rad/s at which what touches comes apart for a flight: to 1.3 um under gravity, which is
@@ -53,9 +52,9 @@ FINEST = 0.01
 same is counted."""
 
 NOISE = 1e-10
-"""Share of the weights times the largest reach that solving to a tolerance may give a step."""
+"""Share of the heft that solving to a tolerance may give a step."""
 
-GAIN = 2e-7
+GAIN = float(os.environ.get('GAIN','1e-5'))
 """Share of the kinetic energy that a step may gain."""
 
 MOST_BOUNCES, MOST_EVENTS = 60, 1000
@@ -150,50 +149,44 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
                   seek: bool) -> tuple[float, bool]:
     """Go on by h s, or to the first touch that is fast; the time gone, and whether one was met.
 
-    r.gaps are those at q, and again at the end. A step that makes energy is too long for what
-    turns: it is gone again, half as long.
+    r.gaps are those at q, and again at the end. A step that makes much energy is too long for what
+    turns: it is gone again, half as long. The little that others make is taken out of the motion.
     """
-    q, v, end_q, end_v, tally = course.q, course.v, r.states[2], r.vectors[4], r.tally[0]
+    end_q, end_v, tally = r.states[2], r.vectors[4], r.tally[0]
     length, hit, m = min(h, tally.next) if tally.next > 0 else h, False, 0
     tally.next = 2 * length if 2 * length < step else 0.0
-    begin_step(s, r, q, v)
-    held, moving = energy(s, q, r)
-    done, lifted = tally.pushed + tally.handed, tally.lifted
-    pushed, handed = tally.pushed, tally.handed
+    begin_step(s, r, course)
+    held, moving = total_energy(r.before)
+    pushed, handed, lifted = tally.pushed, tally.handed, tally.lifted
     for turn in range(TRIES):
         tally.pushed, tally.handed, tally.lifted = pushed, handed, lifted
         m = contact_step(s, r, course, length, loads, springs, since, end_q, end_v)
-        settle_momentum(s, r, q, v, length, loads, springs, since, m, end_q, end_v)
-        look(s, r, end_q, end_v, r.gaps, length, r.later)
-        if turn == TRIES - 1:
-            break
-        now, speed = energy(s, end_q, r)
-        work = tally.pushed + tally.handed - done
-        gained = now - held - work - (tally.lifted - lifted)
-        noise = NOISE * weight(s) + 10 * STEP_TOLERANCE * pressure(r, m)
-        if gained > 1e-14 * abs(now) and r.given[:, 6].min() == 0.0:
-            sum_dolls(s, end_q, end_v, r, r.after)
-            if keep_energy(s, r, gained, r.after, r.given, end_q, end_v):
-                gained = 0.0
-        if not gained <= GAIN * (max(moving, speed) + abs(work)) + noise:
-            if length > FINEST * step:
-                length, hit = length / 2, False
-                tally.next = length
-                continue
-            tally.gains += 1
+        settle(s, r, course, length, loads, springs, since, m, end_q, end_v)
+        now, speed = total_energy(r.after)
+        work = tally.pushed - pushed + tally.handed - handed
+        gained = now - held - work
+        much = GAIN * (max(moving, speed) + abs(work)) + NOISE * s.heft[0] + (
+            10 * STEP_TOLERANCE * pressure(r, m))
+        if not gained - (tally.lifted - lifted) <= much and turn < TRIES - 1 and (
+                length > FINEST * step):
+            length, hit = length / 2, False
+            tally.next = length
+            continue
         share, landed = first_touch(s, r, length)
         hit = seek and (landed or share <= 1)
-        if share > 1 or not seek:
+        if share > 1 or not seek or turn == TRIES - 1:
+            if gained > 0 and not take_out(s, r, gained, end_q, end_v) and gained > much:
+                tally.gains += 1
             break
         length = max(SHORTEST, length * share * (1 + 1e-9) + 2e-9)
     if length > 0.1 * h:
         for i in range(m):
             course.known[i] = r.contacts[i]
         tally.contacts, tally.lasted = m, length
-    for j in range(len(q)):
-        q[j] = end_q[j]
-    for j in range(len(v)):
-        v[j] = end_v[j]
+    for j in range(len(end_q)):
+        course.q[j] = end_q[j]
+    for j in range(len(end_v)):
+        course.v[j] = end_v[j]
     for j in range(len(r.gaps)):
         r.gaps[j] = r.later[j]
     return length, hit
@@ -212,24 +205,15 @@ def pressure(r: Room, m: int) -> float:
 
 
 @compiled
-def weight(s: System) -> float:
-    """Weight of all, N, times the largest reach of a geom, m."""
-    mass = reach = 0.0
-    for i in range(len(s.tree)):
-        mass += s.tree[i].mass
-    for k in range(len(s.geoms)):
-        reach = max(reach, s.geoms[k].reach)
-    return mass * reach * math.sqrt(s.gravity[0] ** 2 + s.gravity[1] ** 2 + s.gravity[2] ** 2)
-
-
-@compiled
-def begin_step(s: System, r: Room, q: np.ndarray, v: np.ndarray) -> None:
-    """Note what touches as a step begins, and how it moves; poses work and geoms at q and v.
+def begin_step(s: System, r: Room, course: Course) -> None:
+    """Note what touches as a step begins and how it moves, and the sums over the dolls.
 
     On a curved way the rows at the step's middle see J v as h/2 dJ/dt v where it is zero at the
     start: what they see of v' is to be its opposite, for it to be zero at the end.
     """
+    q, v = course.q, course.v
     pose(s.tree, q, v, r.work)
+    sum_dolls(s, q, r, r.before)
     place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
     m = find_contacts(s, q, r, r.gaps, TOUCHING)
     for i in range(m):
@@ -239,27 +223,35 @@ def begin_step(s: System, r: Room, q: np.ndarray, v: np.ndarray) -> None:
 
 
 @compiled
-def settle_momentum(s: System, r: Room, q: np.ndarray, v: np.ndarray, h: float, loads: np.ndarray,
-                    springs: np.ndarray, since: float, m: int, end_q: np.ndarray,
-                    end_v: np.ndarray) -> None:
-    """Book the work of a step of h s, give depths back by r.vectors[3], and keep the momentum of
-    what the ground does not bear.
+def settle(s: System, r: Room, course: Course, h: float, loads: np.ndarray, springs: np.ndarray,
+           since: float, m: int, end_q: np.ndarray, end_v: np.ndarray) -> None:
+    """Book the work of a step of h s, give depths back by r.vectors[3], keep the momentum of what
+    the ground does not bear; then the gaps and the sums at the end.
     """
-    r.given[:] = 0.0
+    free = False
+    for d in range(len(r.given)):
+        given = r.given[d]
+        given.borne = 0
+        for k in range(3):
+            given.impulse[k] = given.moment[k] = 0.0
     give_contacts(s, r, m, r.given)
     if len(loads) or len(springs):
-        enter_work(s, r, v, end_v, h, loads, springs, since)
-    free = r.given[:, 6].min() == 0.0
+        enter_work(s, r, course.v, end_v, h, loads, springs, since)
+    for d in range(len(r.given)):
+        free |= not r.given[d].borne
     if free:
-        sum_dolls(s, q, v, r, r.before)
-        sum_dolls(s, end_q, end_v, r, r.after)
+        pose(s.tree, end_q, end_v, r.work)
+        sum_dolls(s, end_q, r, r.after)
         for d in range(len(r.given)):
             for k in range(3):
-                r.given[d, 7 + k] = r.after[d, 1 + k]
+                r.given[d].centre[k] = r.after[d].centre[k]
     integrate(s.tree, end_q, r.vectors[3], 1.0, end_q)
     if free:
-        sum_dolls(s, end_q, end_v, r, r.after)
-        keep_momentum(s, r, h, r.before, r.after, r.given, end_q, end_v)
+        pose(s.tree, end_q, end_v, r.work)
+        sum_dolls(s, end_q, r, r.after)
+        keep_momentum(s, r, h, end_q, end_v)
+    look(s, r, end_q, end_v, r.gaps, h, r.later)
+    sum_dolls(s, end_q, r, r.after)
 
 
 @compiled
@@ -295,12 +287,12 @@ def observe(s: System, r: Room, q: np.ndarray, v: np.ndarray, rows: np.ndarray) 
             row[10 + k] = move[k]
 
 
-@entry(ADDRESS, ADDRESS, ADDRESS, REAL, TABLE, TABLE, REAL, REAL, YES, REAL, TABLE, TABLE)
+@entry(ADDRESS, ADDRESS, ADDRESS, REAL, TABLE, TABLE, REAL, REAL, YES, REAL, TABLE, DOLLS)
 def advance(system: int, room: int, moving: int, duration: float, loads: np.ndarray,
             springs: np.ndarray, step: float, tolerance: float, flies: bool, longest: float,
             rows: np.ndarray, sums: np.ndarray) -> None:
     """Take the ``course`` on by ``duration`` s, and enter bones' ``rows`` (n, 13) and dolls'
-    ``sums`` (d, 20) at the end; the first three are addresses of bundles. ``step``: s of a step on
+    ``sums`` (d,) at the end; the first three are addresses of bundles. ``step``: s of a step on
     the ground; ``tolerance``: m or rad by which a path's end may err; ``flies``: whether damping
     and springs allow flights; ``longest``: s that a path may be long.
     """
@@ -334,4 +326,4 @@ def advance(system: int, room: int, moving: int, duration: float, loads: np.ndar
             impact(s, r, q, v, events < MOST_BOUNCES)
             events += 1
     observe(s, r, q, v, rows)
-    motion(s.masses, s.inertias, s.owners, s.gravity, rows, sums)
+    sum_dolls(s, q, r, sums)

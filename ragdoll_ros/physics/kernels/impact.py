@@ -143,24 +143,6 @@ def lifted(s: System, r: Room, shift: np.ndarray) -> float:
 
 
 @compiled
-def energy(s: System, q: np.ndarray, r: Room) -> tuple[float, float]:
-    """Energy of all bones, J, and the kinetic part of it; work is posed."""
-    kinetic = height = 0.0
-    for i in range(len(s.tree)):
-        bone, move, c, t = s.tree[i], r.work.moves[i], r.work.centres[i], r.work.turns[i]
-        root, b = s.tree[s.root_of[i]].q, s.tree[i].bind
-        x, y, z = cross(move[0], move[1], move[2], c[0], c[1], c[2])
-        x, y, z = move[3] + x, move[4] + y, move[5] + z
-        ax, ay, az, aw = times(t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3])
-        wx, wy, wz = turned(ax, ay, az, -aw, move[0], move[1], move[2])
-        kinetic += 0.5 * (bone.mass * (x * x + y * y + z * z) + bone.inertia[0] * wx * wx
-                          + bone.inertia[1] * wy * wy + bone.inertia[2] * wz * wz)
-        height -= bone.mass * (s.gravity[0] * (q[root] + c[0]) + s.gravity[1] * (q[root + 1] + c[1])
-                               + s.gravity[2] * (q[root + 2] + c[2]))
-    return kinetic + height, kinetic
-
-
-@compiled
 def lag(fast: float) -> float:
     """Share of a step's end at which damping is taken: the middle, later where it is stiff
     (Liniger and Willoughby, SIAM J. Numer. Anal. 7, 1970).
@@ -317,7 +299,7 @@ def enter_work(s: System, r: Room, v: np.ndarray, end_v: np.ndarray, h: float,
     pose(s.tree, middle, mean, r.work)
     for k in range(len(loads)):
         r.tally[0].pushed += h * power(s.tree, r.work, loads[k])
-        give_load(s.tree, s.root_of, s.doll_of, r.work, r.given, middle, loads[k], h)
+        give_load(s, r, middle, loads[k], h)
     if len(springs):
         root_axes(s.tree, middle, r.work.axes)
     for k in range(len(springs)):
@@ -328,7 +310,7 @@ def enter_work(s: System, r: Room, v: np.ndarray, end_v: np.ndarray, h: float,
         i = int(springs[k, 0])
         x, y, z = spring_point(s.tree[i], r.work, i, springs[k, 1:4])
         root = s.tree[s.root_of[i]].q
-        give(r.given, s.doll_of[i], h, middle[root] + x, middle[root + 1] + y,
+        give(r.given[s.doll_of[i]], h, middle[root] + x, middle[root + 1] + y,
              middle[root + 2] + z, fx, fy, fz)
 
 
@@ -355,17 +337,16 @@ def turned_load(bone: np.record, work: Work, i: int,
 
 
 @compiled
-def give_load(tree: np.ndarray, root_of: np.ndarray, doll_of: np.ndarray, work: Work,
-              given: np.ndarray, q: np.ndarray, load: np.ndarray, h: float) -> None:
+def give_load(s: System, r: Room, q: np.ndarray, load: np.ndarray, h: float) -> None:
     """Enter what a load gives in h s."""
-    i = record_of(tree, int(load[0]))
-    x, y, z = spring_point(tree[i], work, i, load[7:10])
-    fx, fy, fz, nx, ny, nz = turned_load(tree[i], work, i, load)
-    root, doll = tree[root_of[i]].q, doll_of[i]
-    give(given, doll, h, q[root] + x, q[root + 1] + y, q[root + 2] + z, fx, fy, fz)
-    given[doll, 3] += h * nx
-    given[doll, 4] += h * ny
-    given[doll, 5] += h * nz
+    i = record_of(s.tree, int(load[0]))
+    x, y, z = spring_point(s.tree[i], r.work, i, load[7:10])
+    fx, fy, fz, nx, ny, nz = turned_load(s.tree[i], r.work, i, load)
+    root, given = s.tree[s.root_of[i]].q, r.given[s.doll_of[i]]
+    give(given, h, q[root] + x, q[root + 1] + y, q[root + 2] + z, fx, fy, fz)
+    given.moment[0] += h * nx
+    given.moment[1] += h * ny
+    given.moment[2] += h * nz
 
 
 @compiled

@@ -13,83 +13,96 @@ import math
 import numpy as np
 
 from .cholesky import solve
-from .dynamics import pose
 from .machine import compiled
 from .mass import turn_inertias
 from .quaternion import cross, turned
 from .system import Room, System
 
 SMALL = 0.01
-"""Share of the energy of the bones against each other that a step may be corrected by."""
-
-SUMS = 17
-"""Of a doll: mass, centre (3) m, momentum (3), angular momentum (3) about the centre, and the
-inertia (6) about it as if its joints were locked: xx, xy, xz, yy, yz, zz; the kinetic energy, J."""
-
+"""Share of a motion's energy that may be taken out of it."""
 
 @compiled
-def sum_dolls(s: System, q: np.ndarray, v: np.ndarray, r: Room, out: np.ndarray) -> None:
-    """Sums (d, SUMS) over each doll; poses work at q and v."""
-    pose(s.tree, q, v, r.work)
+def sum_dolls(s: System, q: np.ndarray, r: Room, out: np.ndarray) -> None:
+    """Sums (d,) over each doll; work is posed at q."""
     turn_inertias(s.tree, r.work, r.own)
     for d in range(len(out)):
-        for k in range(SUMS):
-            out[d, k] = 0.0
-    for i in range(len(s.tree)):
-        row, c, m = out[s.doll_of[i]], r.work.centres[i], s.tree[i].mass
-        root = s.tree[s.root_of[i]].q
-        move = r.work.moves[i]
-        x, y, z = cross(move[0], move[1], move[2], c[0], c[1], c[2])
-        row[0] += m
+        doll = out[d]
+        doll.kinetic = 0.0
         for k in range(3):
-            row[1 + k] += m * (q[root + k] + c[k])
-        row[4] += m * (move[3] + x)
-        row[5] += m * (move[4] + y)
-        row[6] += m * (move[5] + z)
+            doll.centre[k] = doll.momentum[k] = doll.angular[k] = 0.0
+            for j in range(3):
+                doll.inertia[j, k] = 0.0
+    for i in range(len(s.tree)):
+        d, m, c, root = s.doll_of[i], s.tree[i].mass, r.work.centres[i], s.tree[s.root_of[i]].q
+        for k in range(3):
+            out[d].centre[k] += m * (q[root + k] + c[k]) / s.doll_masses[d]
+    for i in range(len(s.tree)):
+        add_bone(out[s.doll_of[i]], s.tree[i].mass, r.work.centres[i], r.work.moves[i], r.own[i],
+                 q, s.tree[s.root_of[i]].q)
     for d in range(len(out)):
-        for k in range(3):
-            out[d, 1 + k] /= out[d, 0]
-    for i in range(len(s.tree)):
-        row, c, m = out[s.doll_of[i]], r.work.centres[i], s.tree[i].mass
-        root = s.tree[s.root_of[i]].q
-        move, I = r.work.moves[i], r.own[i]
-        x, y, z = cross(move[0], move[1], move[2], c[0], c[1], c[2])
-        a, b, e = q[root] + c[0] - row[1], q[root + 1] + c[1] - row[2], q[root + 2] + c[2] - row[3]
-        wx, wy, wz = move[0], move[1], move[2]
-        lx = I[0] * wx + I[1] * wy + I[2] * wz
-        ly = I[1] * wx + I[3] * wy + I[4] * wz
-        lz = I[2] * wx + I[4] * wy + I[5] * wz
-        x, y, z = move[3] + x, move[4] + y, move[5] + z
-        row[16] += (m * (x * x + y * y + z * z) + lx * wx + ly * wy + lz * wz) / 2
-        x, y, z = cross(a, b, e, m * x, m * y, m * z)
-        row[7] += x + lx
-        row[8] += y + ly
-        row[9] += z + lz
-        row[10] += I[0] + m * (b * b + e * e)
-        row[11] += I[1] - m * a * b
-        row[12] += I[2] - m * a * e
-        row[13] += I[3] + m * (a * a + e * e)
-        row[14] += I[4] - m * b * e
-        row[15] += I[5] + m * (a * a + b * b)
+        doll, g = out[d], s.gravity
+        doll.energy = doll.kinetic - s.doll_masses[d] * (
+            doll.centre[0] * g[0] + doll.centre[1] * g[1] + doll.centre[2] * g[2])
 
 
 @compiled
-def give(given: np.ndarray, doll: int, sign: float, x: float, y: float, z: float, jx: float,
-         jy: float, jz: float) -> None:
-    """Enter an impulse, N s, at a point of the world, m, into a doll's row of ``given`` (d, 10)."""
-    row = given[doll]
-    row[0] += sign * jx
-    row[1] += sign * jy
-    row[2] += sign * jz
+def add_bone(doll: np.record, m: float, c: np.ndarray, move: np.ndarray, I: np.ndarray,
+             q: np.ndarray, root: int) -> None:
+    """Add a bone of mass m, kg, ``c`` (3,) m from its doll's root, which stands in q at ``root``,
+    with the spatial velocity ``move`` and the inertia I (6,) about its own centre.
+    """
+    x, y, z = (q[root] + c[0] - doll.centre[0], q[root + 1] + c[1] - doll.centre[1],
+               q[root + 2] + c[2] - doll.centre[2])
+    wx, wy, wz = move[0], move[1], move[2]
+    vx, vy, vz = cross(wx, wy, wz, c[0], c[1], c[2])
+    vx, vy, vz = move[3] + vx, move[4] + vy, move[5] + vz
+    lx = I[0] * wx + I[1] * wy + I[2] * wz
+    ly = I[1] * wx + I[3] * wy + I[4] * wz
+    lz = I[2] * wx + I[4] * wy + I[5] * wz
+    doll.kinetic += (m * (vx * vx + vy * vy + vz * vz) + lx * wx + ly * wy + lz * wz) / 2
+    doll.momentum[0] += m * vx
+    doll.momentum[1] += m * vy
+    doll.momentum[2] += m * vz
+    vx, vy, vz = cross(x, y, z, m * vx, m * vy, m * vz)
+    doll.angular[0] += vx + lx
+    doll.angular[1] += vy + ly
+    doll.angular[2] += vz + lz
+    own = doll.inertia
+    own[0, 0] += I[0] + m * (y * y + z * z)
+    own[1, 1] += I[3] + m * (x * x + z * z)
+    own[2, 2] += I[5] + m * (x * x + y * y)
+    own[0, 1] += I[1] - m * x * y
+    own[0, 2] += I[2] - m * x * z
+    own[1, 2] += I[4] - m * y * z
+    own[1, 0], own[2, 0], own[2, 1] = own[0, 1], own[0, 2], own[1, 2]
+
+
+@compiled
+def total_energy(dolls: np.ndarray) -> tuple[float, float]:
+    """Energy of all dolls, J, and the kinetic part of it."""
+    energy = kinetic = 0.0
+    for d in range(len(dolls)):
+        energy += dolls[d].energy
+        kinetic += dolls[d].kinetic
+    return energy, kinetic
+
+
+@compiled
+def give(given: np.record, sign: float, x: float, y: float, z: float, jx: float, jy: float,
+         jz: float) -> None:
+    """Enter an impulse, N s, at a point of the world, m."""
+    given.impulse[0] += sign * jx
+    given.impulse[1] += sign * jy
+    given.impulse[2] += sign * jz
     a, b, c = cross(x, y, z, jx, jy, jz)
-    row[3] += sign * a
-    row[4] += sign * b
-    row[5] += sign * c
+    given.moment[0] += sign * a
+    given.moment[1] += sign * b
+    given.moment[2] += sign * c
 
 
 @compiled
 def give_contacts(s: System, r: Room, m: int, given: np.ndarray) -> None:
-    """Enter the impulses of m contacts; given[:, 6] becomes 1 for dolls that the ground bears."""
+    """Enter the impulses of m contacts, and which dolls the ground bears."""
     for n in range(m):
         c = r.contacts[n]
         if c.kind == 1:
@@ -98,54 +111,48 @@ def give_contacts(s: System, r: Room, m: int, given: np.ndarray) -> None:
         other = s.doll_of[c.b] if c.b >= 0 else -1
         if other < 0:
             if c.impulse[0] > 0:
-                given[one, 6] = 1.0
+                given[one].borne = 1
             continue
         if one == other:
             continue
         p, t, w = c.impulse, c.across[0], c.across[1]
         for doll, sign in ((one, 1.0), (other, -1.0)):
-            give(given, doll, sign, c.point[0], c.point[1], c.point[2], p[0] * c.normal[0],
+            give(given[doll], sign, c.point[0], c.point[1], c.point[2], p[0] * c.normal[0],
                  p[0] * c.normal[1], p[0] * c.normal[2])
-            give(given, doll, sign, c.arm[0], c.arm[1], c.arm[2], p[1] * t[0] + p[2] * w[0],
+            give(given[doll], sign, c.arm[0], c.arm[1], c.arm[2], p[1] * t[0] + p[2] * w[0],
                  p[1] * t[1] + p[2] * w[1], p[1] * t[2] + p[2] * w[2])
             if c.kind == 5:
                 for k in range(3):
-                    given[doll, 3 + k] += sign * (p[3] * t[k] + p[4] * w[k])
+                    given[doll].moment[k] += sign * (p[3] * t[k] + p[4] * w[k])
 
 
 @compiled
-def keep_momentum(s: System, r: Room, h: float, before: np.ndarray, after: np.ndarray,
-                  given: np.ndarray, q: np.ndarray, v: np.ndarray) -> None:
-    """Change q and v at a step's end, before which the centres were at given[:, 7:10], so that each
-    doll which the ground does not bear has the momentum and the place that are due; ``before``,
-    ``after``: sums (d, SUMS).
+def keep_momentum(s: System, r: Room, h: float, q: np.ndarray, v: np.ndarray) -> None:
+    """Change q and v at the end of a step of h s, before which the sums were r.before, so that each
+    doll which the ground does not bear has the momentum and the place that are due; r.after are
+    the sums at q and v.
     """
-    matrix, turn = r.work.matrix, r.table[14]
+    gained, mean, turn = r.table[12], r.table[13], r.table[14]
     for i in range(len(s.tree)):
-        bone = s.tree[i]
-        d = s.doll_of[i]
-        if bone.parent >= 0 or given[d, 6] > 0:
+        bone, d = s.tree[i], s.doll_of[i]
+        if bone.parent >= 0 or r.given[d].borne:
             continue
-        old, new, row, m = before[d], after[d], given[d], before[d, 0]
+        old, new, given, m = r.before[d], r.after[d], r.given[d], s.doll_masses[d]
         at, rate = bone.q, bone.v
-        gained, mean = r.table[12], r.table[13]
         for k in range(3):
-            due = old[4 + k] + row[k] + m * s.gravity[k] * h
-            place = old[1 + k] + h * (old[4 + k] + due) / (2 * m)
-            mean[k] = (old[1 + k] + place) / 2
-            mean[3 + k] = place - row[7 + k]
-            gained[k] = (due - new[4 + k]) / m
-        x, y, z = cross(mean[0], mean[1], mean[2], row[0], row[1], row[2])
-        turn[0] = old[7] + row[3] - x - new[7]
-        turn[1] = old[8] + row[4] - y - new[8]
-        turn[2] = old[9] + row[5] - z - new[9]
-        matrix[0, 0], matrix[1, 1], matrix[2, 2] = new[10], new[13], new[15]
-        matrix[0, 1] = matrix[1, 0] = new[11]
-        matrix[0, 2] = matrix[2, 0] = new[12]
-        matrix[1, 2] = matrix[2, 1] = new[14]
-        solve(matrix, turn[:3])
-        x, y, z = cross(turn[0], turn[1], turn[2], q[at] - new[1], q[at + 1] - new[2],
-                        q[at + 2] - new[3])
+            due = old.momentum[k] + given.impulse[k] + m * s.gravity[k] * h
+            place = old.centre[k] + h * (old.momentum[k] + due) / (2 * m)
+            mean[k] = (old.centre[k] + place) / 2
+            mean[3 + k] = place - given.centre[k]
+            gained[k] = (due - new.momentum[k]) / m
+        x, y, z = cross(mean[0], mean[1], mean[2], given.impulse[0], given.impulse[1],
+                        given.impulse[2])
+        turn[0] = old.angular[0] + given.moment[0] - x - new.angular[0]
+        turn[1] = old.angular[1] + given.moment[1] - y - new.angular[1]
+        turn[2] = old.angular[2] + given.moment[2] - z - new.angular[2]
+        lock(new, r.work.matrix, turn)
+        x, y, z = cross(turn[0], turn[1], turn[2], q[at] - new.centre[0], q[at + 1] - new.centre[1],
+                        q[at + 2] - new.centre[2])
         v[rate] += gained[0] + x
         v[rate + 1] += gained[1] + y
         v[rate + 2] += gained[2] + z
@@ -158,35 +165,39 @@ def keep_momentum(s: System, r: Room, h: float, before: np.ndarray, after: np.nd
 
 
 @compiled
-def keep_energy(s: System, r: Room, gained: float, after: np.ndarray, given: np.ndarray,
-                q: np.ndarray, v: np.ndarray) -> bool:
-    """Take energy that came from nothing out of how the bones of dolls that the ground does not
-    bear move against each other; momenta stay. Whether it was but a small part of that.
+def take_out(s: System, r: Room, gained: float, q: np.ndarray, v: np.ndarray) -> bool:
+    """Take energy, J, that came from nothing out of the motion v at q, the sums there being
+    r.after. Whether it was but a small part of that.
 
-    ``after``: sums (d, SUMS) at q and v. v becomes w + s (v - w), w the doll's motion as one rigid
-    body; the energy of v - w is what is left beside the rigid body's.
+    v becomes w + s (v - w). Of dolls that the ground bears w is zero, of others their motion as
+    one rigid body: their momenta stay. What is at rest against w stays so, and what slides or comes
+    apart does so in the same direction.
     """
     matrix, spin, inner = r.work.matrix, r.table[14], 0.0
-    for d in range(len(after)):
-        if given[d, 6] == 0.0:
-            lock(after[d], matrix, spin)
-            inner += after[d, 16] - rigid_energy(after[d], spin)
+    for d in range(len(r.after)):
+        inner += r.after[d].kinetic
+        if not r.given[d].borne:
+            for k in range(3):
+                spin[k] = r.after[d].angular[k]
+            lock(r.after[d], matrix, spin)
+            inner -= rigid_energy(r.after[d], s.doll_masses[d], spin)
     if not inner * SMALL > gained:
         return False
     share = math.sqrt(1 - gained / inner)
     for i in range(len(s.tree)):
-        bone, d = s.tree[i], s.doll_of[i]
-        if given[d, 6] > 0:
+        bone, new = s.tree[i], r.after[s.doll_of[i]]
+        at, rate = bone.q, bone.v
+        if bone.parent >= 0 or r.given[s.doll_of[i]].borne:
+            for k in range(bone.dof if bone.parent >= 0 else 6):
+                v[rate + k] *= share
             continue
-        if bone.parent >= 0:
-            for k in range(bone.dof):
-                v[bone.v + k] *= share
-            continue
-        new, at, rate = after[d], bone.q, bone.v
+        for k in range(3):
+            spin[k] = new.angular[k]
         lock(new, matrix, spin)
-        x, y, z = cross(spin[0], spin[1], spin[2], q[at] - new[1], q[at + 1] - new[2],
-                        q[at + 2] - new[3])
-        x, y, z = new[4] / new[0] + x, new[5] / new[0] + y, new[6] / new[0] + z
+        x, y, z = cross(spin[0], spin[1], spin[2], q[at] - new.centre[0], q[at + 1] - new.centre[1],
+                        q[at + 2] - new.centre[2])
+        mass = s.doll_masses[s.doll_of[i]]
+        x, y, z = new.momentum[0] / mass + x, new.momentum[1] / mass + y, new.momentum[2] / mass + z
         v[rate] = x + share * (v[rate] - x)
         v[rate + 1] = y + share * (v[rate + 1] - y)
         v[rate + 2] = z + share * (v[rate + 2] - z)
@@ -198,19 +209,19 @@ def keep_energy(s: System, r: Room, gained: float, after: np.ndarray, given: np.
 
 
 @compiled
-def lock(row: np.ndarray, matrix: np.ndarray, spin: np.ndarray) -> None:
-    """Angular velocity (3,) rad/s of a doll with its momentum as one rigid body."""
-    matrix[0, 0], matrix[1, 1], matrix[2, 2] = row[10], row[13], row[15]
-    matrix[0, 1] = matrix[1, 0] = row[11]
-    matrix[0, 2] = matrix[2, 0] = row[12]
-    matrix[1, 2] = matrix[2, 1] = row[14]
-    for k in range(3):
-        spin[k] = row[7 + k]
+def lock(doll: np.record, matrix: np.ndarray, spin: np.ndarray) -> None:
+    """Put in an angular momentum's place the angular velocity (3,) rad/s of a doll that has it as
+    one rigid body.
+    """
+    for j in range(3):
+        for k in range(3):
+            matrix[j, k] = doll.inertia[j, k]
     solve(matrix, spin[:3])
 
 
 @compiled
-def rigid_energy(row: np.ndarray, spin: np.ndarray) -> float:
+def rigid_energy(doll: np.record, mass: float, spin: np.ndarray) -> float:
     """Kinetic energy, J, of that body."""
-    return ((row[4] ** 2 + row[5] ** 2 + row[6] ** 2) / row[0] + spin[0] * row[7]
-            + spin[1] * row[8] + spin[2] * row[9]) / 2
+    p, l = doll.momentum, doll.angular
+    return ((p[0] ** 2 + p[1] ** 2 + p[2] ** 2) / mass + spin[0] * l[0] + spin[1] * l[1]
+            + spin[2] * l[2]) / 2

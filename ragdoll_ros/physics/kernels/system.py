@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import collections
 
+import numba
 import numpy as np
 
 from .bundle import bundle_type
@@ -45,12 +46,23 @@ began, with the velocities ``start`` along its rows."""
 
 System = collections.namedtuple(
     'System', 'tree gravity up last bone_of root_of doll_of damping geoms pairs bounds normal '
-    'offset bounce_speed masses inertias owners')
+    'offset bounce_speed doll_masses heft')
 """A scene: ``tree`` of tree.py; ``up`` (nv,): of each velocity the next one towards the root;
 ``last`` (n,): of each bone the last velocity that moves it; ``bone_of`` (nv,); ``root_of`` (n,):
 the record of its doll's root, ``doll_of`` (n,); ``damping`` (nv,) N m s; ``normal`` (3,) and
-``offset`` (1,) of the ground, offset -inf: none; ``bounce_speed`` (1,) m/s; of the scene's bones
-in their order ``masses`` (n,), ``inertias`` (n, 3) and ``owners`` (n,), their dolls."""
+``offset`` (1,) of the ground, offset -inf: none; ``bounce_speed`` (1,) m/s; ``doll_masses`` (d,);
+``heft`` (1,) J: the weight of all times the largest reach of a geom."""
+
+DOLL = np.dtype([('energy', float), ('kinetic', float), ('centre', float, 3),
+                 ('momentum', float, 3), ('angular', float, 3), ('inertia', float, (3, 3))])
+"""Sums over a doll, side by side as in Motion: energy with that of height, and its kinetic part, J;
+centre of mass, m; momentum; angular momentum about that centre, and the inertia about it as if all
+joints were locked."""
+
+GIVEN = np.dtype([('impulse', float, 3), ('moment', float, 3), ('centre', float, 3),
+                  ('borne', np.int64)], align=True)
+"""What a step gives a doll from outside: impulse and its moment about the world's origin; its
+``centre`` of mass before depths are given back, m; whether the ground bears it."""
 
 PATH = np.dtype([('valid', np.int64), ('begun', np.int64), ('along', float), ('length', float),
                  ('next', float), ('event', float), ('error', float)], align=True)
@@ -119,7 +131,7 @@ def make_room(system: System, contacts: int, tally: np.ndarray) -> Room:
         rows=np.zeros(contacts, np.int64), mu=np.zeros(contacts), roll=np.zeros(contacts),
         need=np.zeros((2, contacts)), label=np.zeros(dolls, np.int64),
         vectors=np.zeros((VECTORS, nv)), states=np.zeros((STATES, nq)),
-        given=np.zeros((dolls, 10)), before=np.zeros((dolls, 17)), after=np.zeros((dolls, 17)),
+        given=np.zeros(dolls, GIVEN), before=np.zeros(dolls, DOLL), after=np.zeros(dolls, DOLL),
         begun=np.zeros(contacts, CONTACT), count=np.zeros(1, np.int64), tally=tally,
         armed=np.zeros(gaps), stages=np.zeros((16, nq + nv)), row=np.zeros(nq + nv))
 
@@ -143,9 +155,10 @@ def blank() -> System:
         root_of=np.zeros(1, np.int64), doll_of=np.zeros(1, np.int64), damping=np.zeros(6),
         geoms=np.zeros(1, GEOM), pairs=np.zeros(1, PAIR), bounds=np.zeros(1, BOUND),
         normal=np.zeros(3), offset=np.zeros(1), bounce_speed=np.zeros(1),
-        masses=np.zeros(1), inertias=np.zeros((1, 3)), owners=np.zeros(1, np.int64))
+        doll_masses=np.zeros(1), heft=np.zeros(1))
 
 
 SYSTEM = bundle_type(blank())
 COURSE = bundle_type(make_course(blank()))
 ROOM = bundle_type(make_room(blank(), 1, np.zeros(1, TALLY)))
+DOLLS = numba.from_dtype(DOLL)[::1]
