@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 import math
-import os
 
 import numpy as np
 
@@ -54,7 +53,14 @@ same is counted."""
 NOISE = 1e-10
 """Share of the heft that solving to a tolerance may give a step."""
 
-GAIN = float(os.environ.get('GAIN','1e-5'))
+DEEP, DEEP_TURN = 5e-4, 2e-3
+"""m, and rad: what is deeper in the ground, a bone, or beyond a limit is brought out whatever it
+costs."""
+
+PAID = 0.005
+"""Share of the kinetic energy that giving depths back may cost in a step."""
+
+GAIN = 1e-4
 """Share of the kinetic energy that a step may gain."""
 
 MOST_BOUNCES, MOST_EVENTS = 60, 1000
@@ -167,7 +173,7 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
         gained = now - held - work
         much = GAIN * (max(moving, speed) + abs(work)) + NOISE * s.heft[0] + (
             10 * STEP_TOLERANCE * pressure(r, m))
-        if not gained - (tally.lifted - lifted) <= much and turn < TRIES - 1 and (
+        if not gained - r.lift[0] <= much and turn < TRIES - 1 and (
                 length > FINEST * step):
             length, hit = length / 2, False
             tally.next = length
@@ -175,6 +181,7 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
         share, landed = first_touch(s, r, length)
         hit = seek and (landed or share <= 1)
         if share > 1 or not seek or turn == TRIES - 1:
+            gained -= tally.lifted - lifted
             if gained > 0 and not take_out(s, r, gained, end_q, end_v) and gained > much:
                 tally.gains += 1
             break
@@ -231,20 +238,19 @@ def settle(s: System, r: Room, course: Course, h: float, loads: np.ndarray, spri
     free = False
     for d in range(len(r.given)):
         given = r.given[d]
-        given.borne = 0
+        given.borne = given.meets = 0
         for k in range(3):
             given.impulse[k] = given.moment[k] = 0.0
     give_contacts(s, r, m, r.given)
     if len(loads) or len(springs):
         enter_work(s, r, course.v, end_v, h, loads, springs, since)
+    pose(s.tree, end_q, end_v, r.work)
+    sum_dolls(s, end_q, r, r.after)
     for d in range(len(r.given)):
         free |= not r.given[d].borne
-    if free:
-        pose(s.tree, end_q, end_v, r.work)
-        sum_dolls(s, end_q, r, r.after)
-        for d in range(len(r.given)):
-            for k in range(3):
-                r.given[d].centre[k] = r.after[d].centre[k]
+        for k in range(3):
+            r.given[d].centre[k] = r.after[d].centre[k]
+    pay(r, m, r.vectors[3])
     integrate(s.tree, end_q, r.vectors[3], 1.0, end_q)
     if free:
         pose(s.tree, end_q, end_v, r.work)
@@ -252,6 +258,26 @@ def settle(s: System, r: Room, course: Course, h: float, loads: np.ndarray, spri
         keep_momentum(s, r, h, end_q, end_v)
     look(s, r, end_q, end_v, r.gaps, h, r.later)
     sum_dolls(s, end_q, r, r.after)
+
+
+@compiled
+def pay(r: Room, m: int, shift: np.ndarray) -> None:
+    """Let the motion pay for giving depths back, by a ``shift`` (nv,) that costs r.lift[0] J: where
+    it would be more than a part of its energy, they are given back by less. What is deep comes out
+    whatever it costs, which is booked.
+    """
+    deep = False
+    for i in range(m):
+        c = r.contacts[i]
+        deep |= c.gap < -(DEEP_TURN if c.kind == 1 else DEEP)
+    _, kinetic = total_energy(r.after)
+    if deep:
+        r.tally[0].lifted += r.lift[0]
+    elif r.lift[0] > PAID * kinetic:
+        share = PAID * kinetic / r.lift[0]
+        for j in range(len(shift)):
+            shift[j] *= share
+        r.lift[0] *= share
 
 
 @compiled

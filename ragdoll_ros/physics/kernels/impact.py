@@ -123,8 +123,7 @@ def contact_step(s: System, r: Room, course: Course, h: float, loads: np.ndarray
         for j in range(len(v)):
             end_v[j], shift[j] = free[j], 0.0
     integrate(s.tree, middle, end_v, h / 2, end_q)
-    if m:
-        r.tally[0].lifted += lifted(s, r, shift)
+    r.lift[0] = lifted(s, r, shift) if m else 0.0
     r.tally[0].steps += 1
     return m
 

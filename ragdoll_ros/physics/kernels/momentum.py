@@ -102,7 +102,7 @@ def give(given: np.record, sign: float, x: float, y: float, z: float, jx: float,
 
 @compiled
 def give_contacts(s: System, r: Room, m: int, given: np.ndarray) -> None:
-    """Enter the impulses of m contacts, and which dolls the ground bears."""
+    """Enter the impulses of m contacts, and who bears whom."""
     for n in range(m):
         c = r.contacts[n]
         if c.kind == 1:
@@ -110,11 +110,13 @@ def give_contacts(s: System, r: Room, m: int, given: np.ndarray) -> None:
         one = s.doll_of[c.a]
         other = s.doll_of[c.b] if c.b >= 0 else -1
         if other < 0:
-            if c.impulse[0] > 0:
+            p = c.impulse  # what sticks may be held sideways alone
+            if p[0] != 0.0 or p[1] != 0.0 or p[2] != 0.0:
                 given[one].borne = 1
             continue
         if one == other:
             continue
+        given[one].meets = given[other].meets = 1
         p, t, w = c.impulse, c.across[0], c.across[1]
         for doll, sign in ((one, 1.0), (other, -1.0)):
             give(given[doll], sign, c.point[0], c.point[1], c.point[2], p[0] * c.normal[0],
@@ -130,9 +132,10 @@ def give_contacts(s: System, r: Room, m: int, given: np.ndarray) -> None:
 def keep_momentum(s: System, r: Room, h: float, q: np.ndarray, v: np.ndarray) -> None:
     """Change q and v at the end of a step of h s, before which the sums were r.before, so that each
     doll which the ground does not bear has the momentum and the place that are due; r.after are
-    the sums at q and v.
+    the sums at q and v. Giving depths back may have moved dolls apart that touch each other: their
+    spins make up for what that changes of their angular momentum about the world's origin.
     """
-    gained, mean, turn = r.table[12], r.table[13], r.table[14]
+    gained, mean, turn, moved = r.table[12], r.table[13], r.table[14], r.table[15]
     for i in range(len(s.tree)):
         bone, d = s.tree[i], s.doll_of[i]
         if bone.parent >= 0 or r.given[d].borne:
@@ -143,13 +146,16 @@ def keep_momentum(s: System, r: Room, h: float, q: np.ndarray, v: np.ndarray) ->
             due = old.momentum[k] + given.impulse[k] + m * s.gravity[k] * h
             place = old.centre[k] + h * (old.momentum[k] + due) / (2 * m)
             mean[k] = (old.centre[k] + place) / 2
-            mean[3 + k] = place - given.centre[k]
+            mean[3 + k] = place - (given.centre[k] if given.meets else new.centre[k])
             gained[k] = (due - new.momentum[k]) / m
+            moved[k] = new.centre[k] + mean[3 + k] - place
+            turn[k] = due
         x, y, z = cross(mean[0], mean[1], mean[2], given.impulse[0], given.impulse[1],
                         given.impulse[2])
-        turn[0] = old.angular[0] + given.moment[0] - x - new.angular[0]
-        turn[1] = old.angular[1] + given.moment[1] - y - new.angular[1]
-        turn[2] = old.angular[2] + given.moment[2] - z - new.angular[2]
+        dx, dy, dz = cross(moved[0], moved[1], moved[2], turn[0], turn[1], turn[2])
+        turn[0] = old.angular[0] + given.moment[0] - x - dx - new.angular[0]
+        turn[1] = old.angular[1] + given.moment[1] - y - dy - new.angular[1]
+        turn[2] = old.angular[2] + given.moment[2] - z - dz - new.angular[2]
         lock(new, r.work.matrix, turn)
         x, y, z = cross(turn[0], turn[1], turn[2], q[at] - new.centre[0], q[at + 1] - new.centre[1],
                         q[at + 2] - new.centre[2])

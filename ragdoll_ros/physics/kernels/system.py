@@ -60,9 +60,10 @@ centre of mass, m; momentum; angular momentum about that centre, and the inertia
 joints were locked."""
 
 GIVEN = np.dtype([('impulse', float, 3), ('moment', float, 3), ('centre', float, 3),
-                  ('borne', np.int64)], align=True)
+                  ('borne', np.int64), ('meets', np.int64)], align=True)
 """What a step gives a doll from outside: impulse and its moment about the world's origin; its
-``centre`` of mass before depths are given back, m; whether the ground bears it."""
+``centre`` of mass before depths are given back, m; whether the ground has hold of it, and whether
+another doll touches it."""
 
 PATH = np.dtype([('valid', np.int64), ('begun', np.int64), ('along', float), ('length', float),
                  ('next', float), ('event', float), ('error', float)], align=True)
@@ -80,7 +81,8 @@ islands that stayed ``unsolved``, contacts ``left_out`` for want of room, search
 came to none (``stalls``), impacts ``softened`` to make no energy, steps that made some all the
 same (``gains``). Of the last step: its ``contacts``, whether it ended without a touch
 (``settled``), how long it ``lasted`` and how long the ``next`` may be, s. Work of pushes and hands
-and what was spent on giving depths back, J."""
+and what it cost to give deep
+ones back, J."""
 
 Course = collections.namedtuple('Course', 'q v dense ends path tally known')
 """What is carried on from stretch to stretch: coordinates (nq,) and velocities (nv,), those of
@@ -90,8 +92,8 @@ rates of change at its ``ends`` (2, nq + nv); ``path`` and ``tally``, one record
 
 Room = collections.namedtuple(
     'Room', 'work own composite H contacts table at turn gaps later Y support W G p solver '
-    'kinds rows mu roll need label vectors states given before after begun count tally armed '
-    'stages row')
+    'kinds rows mu roll need label vectors states given before after begun count lift tally '
+    'armed stages row')
 """Scratch of the rigid core, but for its tally, which is the course's."""
 
 STICKS = 1e5
@@ -132,8 +134,9 @@ def make_room(system: System, contacts: int, tally: np.ndarray) -> Room:
         need=np.zeros((2, contacts)), label=np.zeros(dolls, np.int64),
         vectors=np.zeros((VECTORS, nv)), states=np.zeros((STATES, nq)),
         given=np.zeros(dolls, GIVEN), before=np.zeros(dolls, DOLL), after=np.zeros(dolls, DOLL),
-        begun=np.zeros(contacts, CONTACT), count=np.zeros(1, np.int64), tally=tally,
-        armed=np.zeros(gaps), stages=np.zeros((16, nq + nv)), row=np.zeros(nq + nv))
+        begun=np.zeros(contacts, CONTACT), count=np.zeros(1, np.int64), lift=np.zeros(1),
+        tally=tally, armed=np.zeros(gaps), stages=np.zeros((16, nq + nv)),
+        row=np.zeros(nq + nv))
 
 
 def depth(system: System) -> int:
