@@ -35,7 +35,7 @@ def pytest_collection_modifyitems(items):
 
 
 def light():
-    """Environment of a process that is looked at, not measured: PyBullet plainly will do.
+    """Environment of a process that is looked at, not measured: PyBullet will do.
 
     To load machine code takes a second of a processor's time, more than the rest of its start.
     """

@@ -6,9 +6,6 @@ import math
 
 import numpy as np
 import pytest
-
-pytest.importorskip('numba', reason='numba is not installed: no account is kept')
-
 from conserved import conserved
 from oracles import PLAIN
 from samples import MANY, SCENES, each_tree, layout_of, random_coordinates, random_state
@@ -25,6 +22,7 @@ from ragdoll_ros.physics.engine.bullet import BulletEngine
 from ragdoll_ros.physics.engine.protocol import AppliedWrench
 from ragdoll_ros.physics.ground_heights import ground_heights
 from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.physics.sums import DollSums
 
 BALL = Ragdoll('ball', (Bone('ball', Sphere(0.1), 1.0, (0.0, 0.0, 0.0)),))
 
@@ -93,7 +91,7 @@ def test_surplus_energy_is_taken_from_the_joints_first(scene, joints, touched):
     projection, state = projection_of(scene), whole(scene, start)
     before, account = conserved(scene, state), Account.opened(np.zeros(1))
     after = conserved(scene, whole(scene, projection.without_surplus(
-        start, projection.motion(state), np.array([2.0]), np.array([touched]), account)))
+        start, DollSums(scene).motion(state), np.array([2.0]), np.array([touched]), account)))
     assert after.energy == pytest.approx(before.energy - 2.0, abs=1e-9)
     assert account.taken == pytest.approx(2.0, abs=1e-9)
     left = 1.0
@@ -111,11 +109,11 @@ def test_what_is_lost_is_lost_and_work_is_added():
     """The surplus is what is above the lowest energy so far and the work since, but 0.05 %."""
     scene, state = SCENES['doll'], random_state(SCENES['doll'], 1)
     projection = projection_of(scene)
-    motion, apart = projection.motion(state), projection.groups(set())
+    motion, apart = DollSums(scene).motion(state), projection.groups(set())
     account = Account.opened(motion.energy)
     begun = projection.surplus(account, motion, apart)
     assert -1e-3 * (motion.kinetic + 55 * 9.8) < begun < 0
-    lower = projection.motion(state)
+    lower = DollSums(scene).motion(state)
     lower.energy[:] -= 100.0
     projection.close_step(account, lower, apart)
     assert projection.surplus(account, motion, apart) == pytest.approx(begun + 100.0, abs=1e-9)
@@ -126,7 +124,7 @@ def test_what_is_lost_is_lost_and_work_is_added():
 def test_dolls_that_touch_share_what_is_too_much_by_their_energies():
     """A light one loses as large a share of its motion as a heavy one."""
     projection = projection_of(MANY)
-    motion = projection.motion(random_state(MANY, 1))
+    motion = DollSums(MANY).motion(random_state(MANY, 1))
     account = Account.opened(motion.energy - (50, 0, 0))
     pair = projection.surplus(account, motion, projection.groups({(0, 2)}))
     alone = projection.surplus(account, motion, projection.groups(set()))

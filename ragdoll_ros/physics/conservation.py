@@ -15,7 +15,6 @@ from ..model.scene import Scene
 from ..model.state import State
 from .account import Account
 from .engine.protocol import Wrenches
-from .kernels.loaded import sums as kernels
 from .motion import Motion, cross
 from .sums import DollSums
 from .work import mean_load
@@ -31,19 +30,10 @@ class ConservationProjection:
     def __init__(self, scene: Scene, layout: DofLayout) -> None:
         self._sums = DollSums(scene)
         self._layout = layout
-        self._roots = np.array([
-            own.start + placement.doll.bones.index(placement.doll.root)
-            for own, placement in zip(scene.bone_slices, scene.dolls, strict=True)])
         # Falling by a third of its size sets the scale of a doll's energy.
         heights = [placement.doll.extent / 3 for placement in scene.dolls]
         self._fall = self._sums.doll_masses * np.linalg.norm(scene.gravity) * heights
         self._own_groups = np.arange(len(scene.dolls))
-
-    def motion(self, state: State) -> Motion:
-        """Sums over each doll, in one go."""
-        sums, known = np.empty((len(self._own_groups), 20)), self._sums
-        kernels.motion(known.masses, known.inertias, known.doll_of, known.gravity, state.rows, sums)
-        return Motion.of(sums)
 
     def with_momentum(self, coordinates: GeneralizedState, states: tuple[State, State],
                       duration: float, wrenches: Wrenches,
@@ -55,22 +45,25 @@ class ConservationProjection:
         spin Ic^-1 dL, so that no joint notices. The moment of a force, whose point has moved, is
         not known well enough: then the angular momentum is left as it is.
         """
-        before, after = states
-        given = np.zeros((len(touched), 6))
+        first, last = (self._sums.motion(state) for state in states)
+        masses = self._sums.doll_masses[:, None]
+        momentum = first.momentum + duration * masses * self._sums.gravity
+        angular_momentum = first.angular_momentum.copy()
         for wrench in wrenches:
-            doll = self._sums.doll_of[wrench.bone]
-            given[doll] += duration * np.concatenate(mean_load(wrench, before, after))
-        spun = not any(wrench.force.any() for wrench in wrenches)
-        if not spun:
-            given[:, 3:] = 0.0
-        rows, sums = after.rows.copy(), self.motion(after).sums
-        kernels.keep_momentum(
-            self._sums.doll_masses, self._sums.doll_of, self._sums.gravity, duration, given, spun,
-            touched, self.motion(before).sums, sums, rows)
-        layout, roots = self._layout, rows[self._roots]
-        q, v = coordinates.q.copy(), coordinates.v.copy()
-        q[layout.root_positions] = roots[:, 0:3]
-        v[layout.root_velocities], v[layout.root_spins] = roots[:, 7:10], roots[:, 10:13]
+            doll, (force, torque) = self._sums.doll_of[wrench.bone], mean_load(wrench, *states)
+            momentum[doll] += duration * force
+            angular_momentum[doll] += duration * torque
+        if any(wrench.force.any() for wrench in wrenches):
+            angular_momentum = last.angular_momentum
+        centre = first.centre + duration * (first.momentum + momentum) / 2 / masses
+        spin = np.linalg.solve(
+            last.inertia, (angular_momentum - last.angular_momentum)[:, :, None])[:, :, 0]
+        q, v, layout, air = coordinates.q.copy(), coordinates.v.copy(), self._layout, ~touched
+        velocity = (momentum - last.momentum) / masses + cross(
+            spin, q[layout.root_positions] - last.centre)
+        q[layout.root_positions[air]] += (centre - last.centre)[air]
+        v[layout.root_velocities[air]] += velocity[air]
+        v[layout.root_spins[air]] += spin[air]
         return GeneralizedState(q, v)
 
     def groups(self, pairs: set[tuple[int, int]]) -> np.ndarray:

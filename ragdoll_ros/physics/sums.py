@@ -19,8 +19,8 @@ class DollSums:
         self.inertias = np.array([bone.inertia for bone in scene.bones], float)
         self.gravity = np.array(scene.gravity, float)
         self.doll_of = scene.doll_of_bone
-        self._members = (self.doll_of == np.arange(len(scene.dolls))[:, None]).astype(float)
-        self.doll_masses = self._members @ self.masses
+        self._starts = [own.start for own in scene.bone_slices]
+        self.doll_masses = self._sum(self.masses)
 
     def motion(self, state: State) -> Motion:
         """All sums at once: of each bone as a point at its centre of mass, plus its own turning."""
@@ -39,4 +39,4 @@ class DollSums:
 
     def _sum(self, values: np.ndarray) -> np.ndarray:
         """Sums (d, ...) over each doll's bones of values (n, ...)."""
-        return np.tensordot(self._members, values, 1)
+        return np.add.reduceat(values, self._starts)

@@ -20,8 +20,8 @@ from ...model.coordinates import GeneralizedState
 from ...model.ragdoll import Bone, Ragdoll
 from ...model.scene import Placement, Scene, grip
 from ...model.state import State
-from .. import kernels
-from ..motion import Motion, damping_rate
+from ..conservation import ConservationProjection
+from ..motion import damping_rate
 from ..settings import Accuracy
 from .protocol import GROUND, AppliedWrench, Contact, Wrenches, pressed
 from .substepped import SubsteppedEngine
@@ -167,9 +167,9 @@ class _World:
 
 
 class BulletEngine(SubsteppedEngine):
-    """A scene in PyBullet. Runs in a client of its own, so that many can live side by side.
+    """A scene in PyBullet, with an account of energy and momentum.
 
-    Where machine code can be made, it keeps an account of energy and momentum.
+    Runs in a client of its own, so that many can live side by side.
     """
 
     def __init__(self, scene: Scene, accuracy: Accuracy) -> None:
@@ -179,10 +179,7 @@ class BulletEngine(SubsteppedEngine):
         self._timing: tuple[float, int] | None = None
         self._gravity = math.hypot(*scene.gravity)
         self._damping_rate = damping_rate(scene)
-        self._projection = None
-        if kernels.ready():
-            from ..conservation import ConservationProjection
-            self._projection = ConservationProjection(scene, self.layout)
+        self._projection = ConservationProjection(scene, self.layout)
         try:
             self._take(_World(scene, self._client))
         except BaseException:
@@ -250,7 +247,7 @@ class BulletEngine(SubsteppedEngine):
     @property
     def _accounts(self) -> bool:
         """Whether energy and momentum are kept."""
-        return self.accuracy.energy and self._projection is not None
+        return self.accuracy.energy
 
     def _step(self, duration: float, substeps: int) -> None:
         timing = (duration, substeps)
@@ -269,14 +266,12 @@ class BulletEngine(SubsteppedEngine):
     def _least_substeps(self, duration: float) -> int:
         return math.ceil(self._damping_rate * duration / STIFFEST)
 
-    def _sum(self, state: State) -> Motion:
-        return self._projection.motion(state) if self._projection else super()._sum(state)
-
     def _conserve(self, before: State, duration: float, loads: Wrenches,
                   touched: set[tuple[int, int]]) -> None:
         """Keep the momentum of what was in the air, and take out energy from nothing."""
         projection, account = self._projection, self._account
-        outside = np.isin(np.arange(len(self._dolls)), [doll for pair in touched for doll in pair])
+        met = set().union(*touched)
+        outside = np.array([doll in met for doll in range(len(self._dolls))])
         if not outside.all():
             self._put(projection.with_momentum(self.coordinates, (before, self.state), duration,
                                                loads, outside))

@@ -62,7 +62,7 @@ class SubsteppedEngine(ABC):
     def motion(self) -> Motion:
         """Sums over each doll now."""
         if self._motion is None:
-            self._motion = self._sum(self.state)
+            self._motion = self._sums.motion(self.state)
         return self._motion
 
     def place(self, coordinates: GeneralizedState) -> None:
@@ -165,9 +165,6 @@ class SubsteppedEngine(ABC):
         self._state: State | None = None
         self._coordinates: GeneralizedState | None = None
         self._motion: Motion | None = None
-
-    def _sum(self, state: State) -> Motion:
-        return self._sums.motion(state)
 
     def _least_substeps(self, duration: float) -> int:
         """Substeps that a stretch must have, whatever the accuracy says."""
