@@ -52,7 +52,7 @@ class KernelDynamics:
     def __init__(self, scene):
         system = system_of(scene)
         self._course = make_course(system)
-        self._parts = system, make_room(system, 1, self._course.tally), self._course
+        self._parts = system, make_room(system, self._course), self._course
         self._rows = [bind(part) for part in self._parts]
         self._addresses = [rows[0].ctypes.data for rows in self._rows]
         self._layout = DofLayout([placement.doll for placement in scene.dolls])

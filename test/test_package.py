@@ -32,7 +32,8 @@ DISTRIBUTIONS = {'yaml': 'pyyaml', 'mpl_toolkits': 'matplotlib'}
 
 ROBOT = ('model', 'files', 'physics', 'ros')
 """Rooms that run on a robot, with OPTIONAL modules or without."""
-OPTIONAL = {'mujoco'}
+OPTIONAL = {'mujoco', 'llvmlite'}
+"""What is done without, and numba's own back end: who has numba has it."""
 EXTRAS = {'fit': 'fit', 'viewer': 'viewer', 'accuracy': 'report'}
 """The other rooms, and the extra that brings what each needs beyond that."""
 

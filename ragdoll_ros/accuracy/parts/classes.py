@@ -91,7 +91,7 @@ def restless(result: Result) -> bool:
 def worst(start: Trial, trajectory: Trajectory) -> dict[str, float]:
     """The worst of each figure; joints that start past their limits count from when they are back.
 
-    What brings them back is booked by the engine: energy counts from then on, too.
+    What brings them back is booked by the engine: energy and depths of bones count from then on.
     """
     if not trajectory.finite:
         return dict.fromkeys(WORST, math.inf) | {'settled_s': math.inf}
@@ -101,7 +101,7 @@ def worst(start: Trial, trajectory: Trajectory) -> dict[str, float]:
     inside = trajectory.part(slice(back, None))
     return {'excess': measure.energy_excess(start, inside),
             'overshoot_rad': float(past[back:].max()), 'sinking_m': measure.sinking(trajectory),
-            'depth_m': BoneDepth(start.scene).deepest(trajectory),
+            'depth_m': BoneDepth(start.scene).deepest(inside),
             'gap_m': measure.joint_gap(trajectory),
             'speed_m_s': float(np.linalg.norm(trajectory.linear_velocities, axis=-1).max()),
             'settled_s': measure.settling_time(trajectory)}

@@ -47,7 +47,6 @@ class _Snapshot:
     """All that the next stretch depends on."""
 
     course: Course
-    excluded: frozenset
     start_energy: float
 
 
@@ -94,7 +93,7 @@ class RigidEngine:
         self._use(self._whole)
         self._look()
         self._lift_out()
-        self._exclude_overlaps()
+        self._course.within[:] = 1
         self._look()
         self._neighbours.forget()
         self._start_energy = float(self.motion.energy.sum())
@@ -146,13 +145,11 @@ class RigidEngine:
 
     def save(self) -> object:
         """A snapshot that restore brings back to the bit."""
-        return _Snapshot(Course(*(part.copy() for part in self._course)), self._excluded,
-                         self._start_energy)
+        return _Snapshot(Course(*(part.copy() for part in self._course)), self._start_energy)
 
     def restore(self, snapshot: _Snapshot) -> None:
         """Go back to a snapshot."""
-        self._excluded = snapshot.excluded
-        self._drop_excluded()
+        self._use(self._whole)
         self._put(snapshot.course)
         self._start_energy = snapshot.start_energy
         self._departure = None
@@ -203,7 +200,7 @@ class RigidEngine:
         if len(self.scene.dolls) > 1:
             couples = self._neighbours.update(self.state, duration)
             if couples is not None:
-                pairs = np.concatenate([self._own_pairs,
+                pairs = np.concatenate([self._whole.pairs,
                                         pairs_between(self.scene, self._whole.geoms, couples)])
                 self._use(self._system._replace(pairs=pairs))
                 self._leave_path()
@@ -215,7 +212,7 @@ class RigidEngine:
         contacts = min(MOST_CONTACTS, CONTACTS_OF_GEOM * len(system.geoms) + len(system.bounds))
         self._course = self._course._replace(known=np.zeros(contacts, CONTACT))
         self._course.tally['contacts'] = 0
-        self._room = make_room(system, contacts, self._course.tally)
+        self._room = make_room(system, self._course)
         self._rows = [bind(part) for part in (system, self._room, self._course)]
         self._addresses = [rows[0].ctypes.data for rows in self._rows]
 
@@ -231,21 +228,6 @@ class RigidEngine:
             if depth > pressed(self.scene):
                 at = self.layout.root_positions[doll]
                 self._course.q[at] += depth * np.array(self.scene.ground.normal)
-
-    def _exclude_overlaps(self) -> None:
-        """Let geoms of one doll that overlap by more than pressed() collide no more."""
-        self._look()
-        count = len(self._system.pairs)
-        gaps = self._room.gaps[len(self._room.gaps) - count:]
-        deep = self._system.pairs[gaps < -pressed(self.scene)]
-        self._excluded = frozenset(zip(deep['a'].tolist(), deep['b'].tolist(), strict=True))
-        self._drop_excluded()
-
-    def _drop_excluded(self) -> None:
-        pairs = self._whole.pairs
-        self._own_pairs = pairs[[(a, b) not in self._excluded for a, b in
-                                 zip(pairs['a'].tolist(), pairs['b'].tolist(), strict=True)]]
-        self._use(self._whole._replace(pairs=self._own_pairs))
 
     def _placed(self) -> GeneralizedState:
         """Where the scene's placements stand."""

@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from .bundle import bundle_at
-from .contact import TOUCHING, contact_rates, find_contacts, look, place_geoms
+from .contact import TOUCHING, contact_rates, find_contacts, look, part_pairs, place_geoms
 from .dynamics import pose, rates
 from .flight import along, begin_path, find_event, point_velocity, time_free
 from .impact import (
@@ -325,6 +325,7 @@ def advance(system: int, room: int, moving: int, duration: float, loads: np.ndar
     s, r, course = system_at(system), room_at(room), course_at(moving)
     q, v, path, tally = course.q, course.v, course.path[0], r.tally[0]
     time, events = 0.0, 0
+    part_pairs(s, r, q, v)
     if duration == 0.0:
         look(s, r, q, v, r.gaps, math.inf, r.gaps)
     while time < duration - 1e-12:

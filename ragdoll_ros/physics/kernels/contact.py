@@ -24,6 +24,15 @@ FAR = 0.02
 NEAR = 5e-3
 """m: two bones that were apart by more, less twice what their speeds may have taken, are."""
 
+NEARLY = 1e-3
+"""m: two bones that began within each other collide from when they are no deeper than this."""
+
+BEYOND = 2e-3
+"""rad by which a joint is outside its limits."""
+
+NEVER = 1e6
+"""m: the gap of two bones that do not collide."""
+
 SEGMENT = 0.5
 """Mean distance of a segment's points from its middle over that of its ends."""
 
@@ -132,6 +141,9 @@ def all_gaps(s: System, q: np.ndarray, r: Room, before: np.ndarray, h: float,
             x, y, z, w = bone_velocity(r.work, i)
             r.own[i, 0], r.own[i, 1] = math.sqrt(x * x + y * y + z * z), w
     for k in range(len(s.pairs)):
+        if k < len(r.within) and r.within[k]:
+            out[n + k] = NEVER
+            continue
         a, b = s.geoms[s.pairs[k].a], s.geoms[s.pairs[k].b]
         least = before[n + k] - 2 * h * (
             r.own[a.bone, 0] + r.own[b.bone, 0] + r.own[a.bone, 1] * a.reach
@@ -139,6 +151,45 @@ def all_gaps(s: System, q: np.ndarray, r: Room, before: np.ndarray, h: float,
         out[n + k] = least if least > NEAR else pair_gap(
             a, b, r.at[s.pairs[k].a], r.turn[s.pairs[k].a], r.at[s.pairs[k].b],
             r.turn[s.pairs[k].b])
+
+
+@compiled
+def part_pairs(s: System, r: Room, q: np.ndarray, v: np.ndarray) -> None:
+    """Let those collide from now on that were within each other and have come apart, and whose
+    joints in between are back within their limits: nothing is to hold these back.
+    """
+    some = False
+    for k in range(len(r.within)):
+        some |= r.within[k] != 0
+    if not some:
+        return
+    pose(s.tree, q, v, r.work)
+    place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
+    for i in range(len(s.tree)):
+        r.own[i, 0] = 0.0
+    for k in range(len(s.bounds)):
+        bound = s.bounds[k]
+        if q[bound.q] < bound.lower - BEYOND or q[bound.q] > bound.upper + BEYOND:
+            r.own[s.bone_of[bound.v], 0] = 1.0
+    for k in range(len(r.within)):
+        a, b = s.pairs[k].a, s.pairs[k].b
+        if r.within[k] and not outside_between(s, r, s.geoms[a].bone, s.geoms[b].bone) and pair_gap(
+                s.geoms[a], s.geoms[b], r.at[a], r.turn[a], r.at[b], r.turn[b]) > -NEARLY:
+            r.within[k] = 0
+
+
+@compiled
+def outside_between(s: System, r: Room, i: int, j: int) -> bool:
+    """Whether a joint on the way from one bone to another is marked in r.own; parents stand before
+    their children.
+    """
+    while i != j:
+        if i < j:
+            i, j = j, i
+        if r.own[i, 0] > 0:
+            return True
+        i = s.tree[i].parent
+    return False
 
 
 @compiled

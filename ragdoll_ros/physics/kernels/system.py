@@ -84,17 +84,18 @@ same (``gains``). Of the last step: its ``contacts``, whether it ended without a
 and what it cost to give deep
 ones back, J."""
 
-Course = collections.namedtuple('Course', 'q v dense ends path tally known')
+Course = collections.namedtuple('Course', 'q v dense ends path tally within known')
 """What is carried on from stretch to stretch: coordinates (nq,) and velocities (nv,), those of
 roots' turning along their own axes; the path of flight, its coefficients ``dense`` (8, nq + nv) and
-rates of change at its ``ends`` (2, nq + nv); ``path`` and ``tally``, one record each; the contacts
-``known`` from the last step."""
+rates of change at its ``ends`` (2, nq + nv); ``path`` and ``tally``, one record each; of the first
+pairs whether they are still ``within`` each other as they were at the start, and do not collide;
+the contacts ``known`` from the last step."""
 
 Room = collections.namedtuple(
     'Room', 'work own composite H contacts table at turn gaps later Y support W G p solver '
     'kinds rows mu roll need label vectors states given before after begun count lift tally '
-    'armed stages row')
-"""Scratch of the rigid core, but for its tally, which is the course's."""
+    'within armed stages row')
+"""Scratch of the rigid core, but for ``tally`` and ``within``, which are the course's."""
 
 STICKS = 1e5
 """Coefficient from which friction has no limit."""
@@ -108,14 +109,16 @@ def make_course(system: System) -> Course:
     nq = nv + int(system.tree['free'].sum())
     return Course(
         q=np.zeros(nq), v=np.zeros(nv), dense=np.zeros((8, nq + nv)), ends=np.zeros((2, nq + nv)),
-        path=np.zeros(1, PATH), tally=np.zeros(1, TALLY), known=np.zeros(0, CONTACT))
+        path=np.zeros(1, PATH), tally=np.zeros(1, TALLY),
+        within=np.zeros(len(system.pairs), np.int64), known=np.zeros(0, CONTACT))
 
 
-def make_room(system: System, contacts: int, tally: np.ndarray) -> Room:
-    """Room for a system with at most so many contacts at a time, counted in ``tally``."""
+def make_room(system: System, course: Course) -> Room:
+    """Room for a course of a system, for as many contacts as the course knows at the most."""
     bones, nv = len(system.tree), len(system.up)
     nq = nv + int(system.tree['free'].sum())
     geoms, dolls = len(system.geoms), int(system.doll_of.max()) + 1
+    contacts = len(course.known)
     rows = contacts * (5 if max(system.geoms['rolling'].max(initial=0.0),
                                 system.pairs['rolling'].max(initial=0.0)) > 0 else 3)
     gaps = int(system.geoms['count'].sum()) + 2 * len(system.bounds) + len(system.pairs)
@@ -135,8 +138,8 @@ def make_room(system: System, contacts: int, tally: np.ndarray) -> Room:
         vectors=np.zeros((VECTORS, nv)), states=np.zeros((STATES, nq)),
         given=np.zeros(dolls, GIVEN), before=np.zeros(dolls, DOLL), after=np.zeros(dolls, DOLL),
         begun=np.zeros(contacts, CONTACT), count=np.zeros(1, np.int64), lift=np.zeros(1),
-        tally=tally, armed=np.zeros(gaps), stages=np.zeros((16, nq + nv)),
-        row=np.zeros(nq + nv))
+        tally=course.tally, within=course.within, armed=np.zeros(gaps),
+        stages=np.zeros((16, nq + nv)), row=np.zeros(nq + nv))
 
 
 def depth(system: System) -> int:
@@ -163,5 +166,5 @@ def blank() -> System:
 
 SYSTEM = bundle_type(blank())
 COURSE = bundle_type(make_course(blank()))
-ROOM = bundle_type(make_room(blank(), 1, np.zeros(1, TALLY)))
+ROOM = bundle_type(make_room(blank(), make_course(blank())))
 DOLLS = numba.from_dtype(DOLL)[::1]
