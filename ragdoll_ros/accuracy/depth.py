@@ -53,13 +53,19 @@ class BoneDepth:
 
     def deepest(self, trajectory: Trajectory) -> float:
         """Largest depth of any pair, m, each from when it first was apart."""
-        worst, counts = 0.0, np.zeros(len(self._pairs), bool)
-        for positions, orientations in zip(trajectory.positions, trajectory.orientations,
-                                           strict=True):
-            found = self.depths(positions, orientations)
-            counts |= found <= APART
-            worst = max(worst, float(found[counts].max(initial=0.0)))
-        return worst
+        found = self._course(trajectory)
+        counts = np.maximum.accumulate(found <= APART, axis=0)
+        return float(found[counts].max(initial=0.0))
+
+    def since_apart(self, trajectory: Trajectory) -> Trajectory:
+        """What comes after all pairs that begin in each other, and come apart, have done so."""
+        apart = self._course(trajectory) <= APART
+        return trajectory.part(slice(int(apart.argmax(axis=0).max(initial=0)), None))
+
+    def _course(self, trajectory: Trajectory) -> np.ndarray:
+        """Depths (t, pairs), m."""
+        return np.array([self.depths(positions, orientations) for positions, orientations
+                         in zip(trajectory.positions, trajectory.orientations, strict=True)])
 
     def _pose(self, positions: np.ndarray, orientations: np.ndarray) -> None:
         """Put every geom where its bone is; MuJoCo's quaternions are w, x, y, z."""

@@ -24,6 +24,10 @@ REST_SPEED = 0.01
 """m/s: slower than this, for good, counts as settled."""
 
 
+BACK = math.radians(0.2)
+"""rad past a limit from which a joint counts as back."""
+
+
 class Measure:
     """Yardsticks of one scene."""
 
@@ -157,6 +161,12 @@ class Measure:
         lower, upper = np.array(limits).T
         angles = self.joint_angles(trajectory)
         return np.maximum(angles - upper, lower - angles).max(axis=1).clip(min=0.0)
+
+    def since_back(self, trajectory: Trajectory) -> Trajectory:
+        """What comes after all joints that start past their limits are back; all, if never."""
+        past = self.overshoots(trajectory)
+        back = int(np.argmax(past <= BACK)) if past[0] > BACK and (past <= BACK).any() else 0
+        return trajectory.part(slice(back, None))
 
     def sinking(self, trajectory: Trajectory) -> float:
         """Deepest place in m of any bone's lowest point below the ground; 0 above it."""

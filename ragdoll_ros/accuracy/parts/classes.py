@@ -21,9 +21,6 @@ NAME = 'classes'
 RATIOS = 'ratios'
 WORST = ('excess', 'overshoot_rad', 'sinking_m', 'depth_m', 'gap_m', 'speed_m_s')
 
-BACK = math.radians(0.2)
-"""rad past a limit at which a joint that started further out is back."""
-
 RESTING, REST_SPEED = 15.0, 1e-3
 """s after a start's own time at which ours is to be asleep, all bones slower than so many m/s."""
 
@@ -89,19 +86,16 @@ def restless(result: Result) -> bool:
 
 
 def worst(start: Trial, trajectory: Trajectory) -> dict[str, float]:
-    """The worst of each figure; joints that start past their limits count from when they are back.
-
-    What brings them back is booked by the engine: energy and depths of bones count from then on.
+    """The worst of each figure; where joints start past their limits, or bones in each other, most
+    count from when all are back: what brings them back is booked by the engine.
     """
     if not trajectory.finite:
         return dict.fromkeys(WORST, math.inf) | {'settled_s': math.inf}
-    measure = Measure(start.scene)
-    past = measure.overshoots(trajectory)
-    back = int(np.argmax(past <= BACK)) if past[0] > BACK and (past <= BACK).any() else 0
-    inside = trajectory.part(slice(back, None))
+    measure, depths = Measure(start.scene), BoneDepth(start.scene)
+    inside = depths.since_apart(measure.since_back(trajectory))
     return {'excess': measure.energy_excess(start, inside),
-            'overshoot_rad': float(past[back:].max()), 'sinking_m': measure.sinking(trajectory),
-            'depth_m': BoneDepth(start.scene).deepest(inside),
+            'overshoot_rad': measure.overshoot(inside), 'sinking_m': measure.sinking(trajectory),
+            'depth_m': depths.deepest(inside),
             'gap_m': measure.joint_gap(trajectory),
             'speed_m_s': float(np.linalg.norm(trajectory.linear_velocities, axis=-1).max()),
             'settled_s': measure.settling_time(trajectory)}

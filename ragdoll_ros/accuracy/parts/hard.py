@@ -93,9 +93,11 @@ def figures(case: HardCase, trial: Trial, trajectory: Trajectory) -> Row:
     lift = (sum(bone.mass for bone in trial.scene.bones) * case.rule.lift_m
             * float(np.linalg.norm(trial.scene.gravity)))
     moved = np.linalg.norm(trajectory.positions[-1] - trajectory.positions[0], axis=-1)
-    depth = BoneDepth(trial.scene).deepest(trajectory) if case.rule.depth_m else None
-    return {'excess': measure.energy_excess(trial, trajectory, lift), 'depth_m': depth,
-            'gap_m': measure.joint_gap(trajectory), 'overshoot_rad': measure.overshoot(trajectory),
+    depths = BoneDepth(trial.scene)
+    inside = depths.since_apart(measure.since_back(trajectory))
+    return {'excess': measure.energy_excess(trial, inside, lift),
+            'depth_m': depths.deepest(inside) if case.rule.depth_m else None,
+            'gap_m': measure.joint_gap(trajectory), 'overshoot_rad': measure.overshoot(inside),
             'sinking_m': measure.sinking(trajectory),
             'end_sinking_m': measure.sinking(trajectory.part(slice(-1, None))),
             'momentum': max(measure.momentum_drift(trial, trajectory),

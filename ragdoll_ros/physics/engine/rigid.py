@@ -18,7 +18,7 @@ from ...model.state import State
 from ..ground_heights import ground_heights
 from ..kernels.bundle import bind
 from ..kernels.loaded import advance as kernels
-from ..kernels.system import CONTACT, DOLL, Course, make_course, make_room
+from ..kernels.system import CONTACT, DOLL, OUTSIDE, WITHIN, Course, make_course, make_room
 from ..motion import Motion, damping_rate
 from ..settings import Accuracy
 from ..system import pairs_between, system_of
@@ -63,7 +63,10 @@ class RigidEngine:
         self._longest = math.inf
         """s that a path of flight may be long, as far as neighbours are known."""
         self._course = make_course(self._whole)
+        self._designed = np.full(len(self._whole.pairs), WITHIN)
+        """Pairs that are within each other as bound: they are left so until they come apart."""
         self.place(self._placed())
+        self._designed = self._course.within & WITHIN
 
     @property
     def state(self) -> State:
@@ -93,7 +96,7 @@ class RigidEngine:
         self._use(self._whole)
         self._look()
         self._lift_out()
-        self._course.within[:] = 1
+        self._course.within[:] = self._designed | OUTSIDE
         self._look()
         self._neighbours.forget()
         self._start_energy = float(self.motion.energy.sum())

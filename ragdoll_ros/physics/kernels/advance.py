@@ -63,8 +63,8 @@ PAID = 0.005
 GAIN = 1e-4
 """Share of the kinetic energy that a step may gain."""
 
-MOST_BOUNCES, MOST_EVENTS = 60, 1000
-"""Impacts in one stretch: from the first number on nothing is thrown back, from the second on no
+MOST_EVENTS = 200
+"""Impacts in one stretch, over the number of dolls: from then on nothing is thrown back, and no
 instant of a touch is sought."""
 
 GAUSS = ((0.046910077030668, 0.118463442528095), (0.230765344947158, 0.239314335249683),
@@ -155,8 +155,9 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
                   seek: bool) -> tuple[float, bool]:
     """Go on by h s, or to the first touch that is fast; the time gone, and whether one was met.
 
-    r.gaps are those at q, and again at the end. A step that makes much energy is too long for what
-    turns: it is gone again, half as long. The little that others make is taken out of the motion.
+    r.gaps are those at q, and again at the end. A step that makes much energy, or presses one thing
+    deep into another, is too long for what turns: it is gone again, half as long. The little energy
+    that others make is taken out of the motion.
     """
     end_q, end_v, tally = r.states[2], r.vectors[4], r.tally[0]
     length, hit, m = min(h, tally.next) if tally.next > 0 else h, False, 0
@@ -173,8 +174,8 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
         gained = now - held - work
         much = GAIN * (max(moving, speed) + abs(work)) + NOISE * s.heft[0] + (
             10 * STEP_TOLERANCE * pressure(r, m))
-        if not gained - r.lift[0] <= much and turn < TRIES - 1 and (
-                length > FINEST * step):
+        if turn < TRIES - 1 and length > FINEST * step and (
+                not gained - r.lift[0] <= much or sinks(s, r)):
             length, hit = length / 2, False
             tally.next = length
             continue
@@ -251,6 +252,7 @@ def settle(s: System, r: Room, course: Course, h: float, loads: np.ndarray, spri
         for k in range(3):
             r.given[d].centre[k] = r.after[d].centre[k]
     pay(r, m, r.vectors[3])
+    keep_limits(s, end_q, r.vectors[3])
     integrate(s.tree, end_q, r.vectors[3], 1.0, end_q)
     if free:
         pose(s.tree, end_q, end_v, r.work)
@@ -278,6 +280,34 @@ def pay(r: Room, m: int, shift: np.ndarray) -> None:
         for j in range(len(shift)):
             shift[j] *= share
         r.lift[0] *= share
+
+
+@compiled
+def keep_limits(s: System, q: np.ndarray, shift: np.ndarray) -> None:
+    """Shorten a ``shift`` (nv,) that would take a joint past a limit that it does not touch."""
+    share = 1.0
+    for k in range(len(s.bounds)):
+        bound = s.bounds[k]
+        way = shift[bound.v]
+        room = q[bound.q] - bound.lower if way < 0 else bound.upper - q[bound.q]
+        if room > 0 and abs(way) > room + TOUCHING:
+            share = min(share, (room + TOUCHING) / abs(way))
+    if share < 1:
+        for j in range(len(shift)):
+            shift[j] *= share
+
+
+@compiled
+def sinks(s: System, r: Room) -> bool:
+    """Whether something that touched is deep at the step's end, and deeper by a tenth of that than
+    at its start.
+    """
+    bounds = len(r.gaps) - len(s.pairs) - 2 * len(s.bounds)
+    for j in range(len(r.gaps)):
+        most = DEEP_TURN if bounds <= j < bounds + 2 * len(s.bounds) else DEEP
+        if r.later[j] < -most and r.gaps[j] <= TOUCHING and r.later[j] < r.gaps[j] - most / 10:
+            return True
+    return False
 
 
 @compiled
@@ -324,13 +354,13 @@ def advance(system: int, room: int, moving: int, duration: float, loads: np.ndar
     """
     s, r, course = system_at(system), room_at(room), course_at(moving)
     q, v, path, tally = course.q, course.v, course.path[0], r.tally[0]
-    time, events = 0.0, 0
+    time, events, most_events = 0.0, 0, MOST_EVENTS // len(r.given)
     part_pairs(s, r, q, v)
     if duration == 0.0:
         look(s, r, q, v, r.gaps, math.inf, r.gaps)
     while time < duration - 1e-12:
         left = duration - time
-        if not path.valid and flies and events < MOST_EVENTS and may_fly(
+        if not path.valid and flies and events < most_events and may_fly(
                 s, r, course, loads, step):
             most = min(left if len(loads) else longest, LONGEST)
             if begin_path(s, r, course, loads, tolerance, most):
@@ -341,16 +371,16 @@ def advance(system: int, room: int, moving: int, duration: float, loads: np.ndar
             if touched:
                 look(s, r, q, v, r.gaps, math.inf, r.gaps)
         else:
-            if not flies or events >= MOST_EVENTS:
+            if not flies or events >= most_events:
                 look(s, r, q, v, r.gaps, math.inf, r.gaps)
             h = left / math.ceil(left / step - 1e-9)
             gone, touched = step_or_touch(s, r, course, h, loads, springs, time, step,
-                                          events < MOST_EVENTS)
+                                          events < most_events)
             path.begun, path.next = 0, 0.0
         time += gone
         tally.settled = 0 if touched else 1
         if touched:
-            impact(s, r, q, v, events < MOST_BOUNCES)
+            impact(s, r, q, v, events < most_events)
             events += 1
     observe(s, r, q, v, rows)
     sum_dolls(s, q, r, sums)

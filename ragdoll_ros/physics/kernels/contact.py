@@ -13,7 +13,7 @@ from .collision import collide, separation
 from .dynamics import Work, pose
 from .machine import compiled
 from .quaternion import cross, times, to_matrix, turned
-from .system import Room, System
+from .system import OUTSIDE, WITHIN, Room, System
 
 TOUCHING = 1e-6
 """m or rad: what is nearer touches."""
@@ -155,8 +155,8 @@ def all_gaps(s: System, q: np.ndarray, r: Room, before: np.ndarray, h: float,
 
 @compiled
 def part_pairs(s: System, r: Room, q: np.ndarray, v: np.ndarray) -> None:
-    """Let those collide from now on that were within each other and have come apart, and whose
-    joints in between are back within their limits: nothing is to hold these back.
+    """Let those collide from now on that were within each other and have come apart, and those with
+    a joint in between that was outside its limits and is back: nothing is to hold that back.
     """
     some = False
     for k in range(len(r.within)):
@@ -173,9 +173,11 @@ def part_pairs(s: System, r: Room, q: np.ndarray, v: np.ndarray) -> None:
             r.own[s.bone_of[bound.v], 0] = 1.0
     for k in range(len(r.within)):
         a, b = s.pairs[k].a, s.pairs[k].b
-        if r.within[k] and not outside_between(s, r, s.geoms[a].bone, s.geoms[b].bone) and pair_gap(
-                s.geoms[a], s.geoms[b], r.at[a], r.turn[a], r.at[b], r.turn[b]) > -NEARLY:
-            r.within[k] = 0
+        if r.within[k] & WITHIN and pair_gap(s.geoms[a], s.geoms[b], r.at[a], r.turn[a], r.at[b],
+                                             r.turn[b]) > -NEARLY:
+            r.within[k] &= ~WITHIN
+        if r.within[k] & OUTSIDE and not outside_between(s, r, s.geoms[a].bone, s.geoms[b].bone):
+            r.within[k] &= ~OUTSIDE
 
 
 @compiled

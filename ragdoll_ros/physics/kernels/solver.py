@@ -31,6 +31,9 @@ SOFT = 1e-6
 """Compliance of Newton's rows, as a share of their own W: where several contacts bear what one
 could, W is singular, and this keeps its steps short across what nothing decides."""
 
+ROUNDS = 4
+"""Of sweeps, four times as many as in the round before, and of Newton's method."""
+
 OPENING = 1e-4
 """m/s from which a contact without friction's limit is let go as open."""
 
@@ -295,17 +298,21 @@ def admissible(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.nda
 def solve_cones(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
                 n: int, W: np.ndarray, b: np.ndarray, p: np.ndarray, tolerance: float,
                 sweeps: int, room: np.ndarray, G: np.ndarray) -> tuple[float, int]:
-    """Solve for p (n,), from where it stands; the largest residual left, m/s, and the sweeps."""
+    """Solve for p (n,), from where it stands; the largest residual left, m/s, and the sweeps.
+
+    Each round that Newton's method ends without a solution makes do with ten times as much.
+    """
     done, worst = 0, math.inf
-    for _ in range(4):
+    for _ in range(ROUNDS):
+        tolerance *= 10
         for _ in range(min(sweeps, 100)):
             done += 1
             worst = sweep(kinds, rows, mu, roll, m, n, W, b, p)
-            if worst <= tolerance:
+            if worst <= tolerance / 10:
                 return worst, done
-        left = newton(kinds, rows, mu, roll, m, n, W, b, p, tolerance, room, G)
+        left = newton(kinds, rows, mu, roll, m, n, W, b, p, tolerance / 10, room, G)
         admissible(kinds, rows, mu, roll, m, p)
-        if left <= 10 * tolerance:
+        if left <= tolerance:
             return left, done
         worst = min(worst, left)
         sweeps *= 4

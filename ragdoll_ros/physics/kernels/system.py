@@ -88,14 +88,16 @@ Course = collections.namedtuple('Course', 'q v dense ends path tally within know
 """What is carried on from stretch to stretch: coordinates (nq,) and velocities (nv,), those of
 roots' turning along their own axes; the path of flight, its coefficients ``dense`` (8, nq + nv) and
 rates of change at its ``ends`` (2, nq + nv); ``path`` and ``tally``, one record each; of the first
-pairs whether they are still ``within`` each other as they were at the start, and do not collide;
-the contacts ``known`` from the last step."""
+pairs why they do not collide: they are WITHIN each other still, as they were at the start, or a
+joint in between is OUTSIDE its limits; the contacts ``known`` from the last step."""
 
 Room = collections.namedtuple(
     'Room', 'work own composite H contacts table at turn gaps later Y support W G p solver '
     'kinds rows mu roll need label vectors states given before after begun count lift tally '
     'within armed stages row')
 """Scratch of the rigid core, but for ``tally`` and ``within``, which are the course's."""
+
+WITHIN, OUTSIDE = 1, 2
 
 STICKS = 1e5
 """Coefficient from which friction has no limit."""
