@@ -50,6 +50,10 @@ FINEST = 0.01
 """Share of a step below which it is not made shorter to make no energy; what makes some all the
 same is counted."""
 
+SLIGHT = 1e-6
+"""Share of the heft that a step may gain where the motion can pay for it: of what hardly moves, the
+energy of a step says little about its error."""
+
 NOISE = 1e-10
 """Share of the heft that solving to a tolerance may give a step."""
 
@@ -64,8 +68,8 @@ GAIN = 1e-4
 """Share of the kinetic energy that a step may gain."""
 
 MOST_EVENTS = 200
-"""Impacts in one stretch, over the number of dolls: from then on nothing is thrown back, and no
-instant of a touch is sought."""
+"""Impacts in one stretch, over the number of dolls but at least 60: from then on nothing is thrown
+back, and no instant of a touch is sought."""
 
 GAUSS = ((0.046910077030668, 0.118463442528095), (0.230765344947158, 0.239314335249683),
          (0.5, 0.284444444444444), (0.769234655052842, 0.239314335249683),
@@ -172,8 +176,9 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
         now, speed = total_energy(r.after)
         work = tally.pushed - pushed + tally.handed - handed
         gained = now - held - work
-        much = GAIN * (max(moving, speed) + abs(work)) + NOISE * s.heft[0] + (
-            10 * STEP_TOLERANCE * pressure(r, m))
+        most = max(moving, speed)
+        much = max(GAIN * (most + abs(work)), min(PAID * most, SLIGHT * s.heft[0])) + (
+            NOISE * s.heft[0] + 10 * STEP_TOLERANCE * pressure(r, m))
         if turn < TRIES - 1 and length > FINEST * step and (
                 not gained - r.lift[0] <= much or sinks(s, r)):
             length, hit = length / 2, False
@@ -354,7 +359,7 @@ def advance(system: int, room: int, moving: int, duration: float, loads: np.ndar
     """
     s, r, course = system_at(system), room_at(room), course_at(moving)
     q, v, path, tally = course.q, course.v, course.path[0], r.tally[0]
-    time, events, most_events = 0.0, 0, MOST_EVENTS // len(r.given)
+    time, events, most_events = 0.0, 0, max(60, MOST_EVENTS // len(r.given))
     part_pairs(s, r, q, v)
     if duration == 0.0:
         look(s, r, q, v, r.gaps, math.inf, r.gaps)

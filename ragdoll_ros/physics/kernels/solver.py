@@ -31,7 +31,7 @@ SOFT = 1e-6
 """Compliance of Newton's rows, as a share of their own W: where several contacts bear what one
 could, W is singular, and this keeps its steps short across what nothing decides."""
 
-ROUNDS = 4
+ROUNDS = 3
 """Of sweeps, four times as many as in the round before, and of Newton's method."""
 
 OPENING = 1e-4
@@ -246,11 +246,50 @@ def gauss(G: np.ndarray, n: int, x: np.ndarray) -> bool:
 
 
 @compiled
+def solve_active(G: np.ndarray, n: int, x: np.ndarray, places: np.ndarray) -> bool:
+    """Solve G x = b, flat (n * n), in b's place; False if that fails. Rows of what is open have but
+    their diagonal: they are solved for first, the others by gauss(). places (2n,): room.
+    """
+    m = 0
+    for i in range(n):
+        alone = True
+        for j in range(n):
+            if j != i and G[i * n + j] != 0.0:
+                alone = False
+                break
+        if alone:
+            x[i] /= G[i * n + i]
+        else:
+            places[m] = i
+            m += 1
+    k = 0
+    for a in range(m):
+        i = int(places[a])
+        c = 0
+        for j in range(n):
+            if c < m and int(places[c]) == j:
+                c += 1
+            else:
+                x[i] -= G[i * n + j] * x[j]
+    for a in range(m):
+        i = int(places[a])
+        for c in range(m):
+            G[k] = G[i * n + int(places[c])]
+            k += 1
+        places[n + a] = x[i]
+    if not gauss(G, m, places[n:n + m]):
+        return False
+    for a in range(m):
+        x[int(places[a])] = places[n + a]
+    return True
+
+
+@compiled
 def newton(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int, n: int,
            W: np.ndarray, b: np.ndarray, p: np.ndarray, tolerance: float, room: np.ndarray,
            G: np.ndarray) -> float:
     """Newton's method from p on; p becomes the best found, the largest residual, m/s, is given."""
-    u, phi, way, keep = room[0], room[1], room[2], room[3]
+    u, phi, way, keep, places = room[0], room[1], room[2], room[3], room[7]
     worst = residual(kinds, rows, mu, roll, m, n, W, b, p, u, phi)
     best = worst
     for i in range(n):
@@ -261,7 +300,7 @@ def newton(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray
         newton_matrix(kinds, rows, mu, roll, m, n, W, p, u, G)
         for i in range(n):
             way[i] = -phi[i]
-        if not gauss(G, n, way):
+        if not solve_active(G, n, way, places):
             break
         total = 0.0
         for i in range(n):

@@ -134,7 +134,7 @@ def make_room(system: System, course: Course) -> Room:
         later=np.zeros(gaps), Y=np.zeros((rows, nv)),
         support=np.zeros((contacts, min(nv, 2 * depth(system)) + 1), np.int64),
         W=np.zeros(rows * rows), G=np.zeros(rows * rows), p=np.zeros((6, rows)),
-        solver=np.zeros((7, max(rows, 8))), kinds=np.zeros(contacts, np.int64),
+        solver=np.zeros((8, 2 * max(rows, 8))), kinds=np.zeros(contacts, np.int64),
         rows=np.zeros(contacts, np.int64), mu=np.zeros(contacts), roll=np.zeros(contacts),
         need=np.zeros((2, contacts)), label=np.zeros(dolls, np.int64),
         vectors=np.zeros((VECTORS, nv)), states=np.zeros((STATES, nq)),
