@@ -68,8 +68,7 @@ GAIN = 1e-4
 """Share of the kinetic energy that a step may gain."""
 
 MOST_EVENTS = 200
-"""Impacts in one stretch, over the number of dolls but at least 60: from then on nothing is thrown
-back, and no instant of a touch is sought."""
+"""Impacts in one stretch: from then on nothing is thrown back, and no instant of a touch sought."""
 
 GAUSS = ((0.046910077030668, 0.118463442528095), (0.230765344947158, 0.239314335249683),
          (0.5, 0.284444444444444), (0.769234655052842, 0.239314335249683),
@@ -359,13 +358,13 @@ def advance(system: int, room: int, moving: int, duration: float, loads: np.ndar
     """
     s, r, course = system_at(system), room_at(room), course_at(moving)
     q, v, path, tally = course.q, course.v, course.path[0], r.tally[0]
-    time, events, most_events = 0.0, 0, max(60, MOST_EVENTS // len(r.given))
+    time, events = 0.0, 0
     part_pairs(s, r, q, v)
     if duration == 0.0:
         look(s, r, q, v, r.gaps, math.inf, r.gaps)
     while time < duration - 1e-12:
         left = duration - time
-        if not path.valid and flies and events < most_events and may_fly(
+        if not path.valid and flies and events < MOST_EVENTS and may_fly(
                 s, r, course, loads, step):
             most = min(left if len(loads) else longest, LONGEST)
             if begin_path(s, r, course, loads, tolerance, most):
@@ -376,16 +375,16 @@ def advance(system: int, room: int, moving: int, duration: float, loads: np.ndar
             if touched:
                 look(s, r, q, v, r.gaps, math.inf, r.gaps)
         else:
-            if not flies or events >= most_events:
+            if not flies or events >= MOST_EVENTS:
                 look(s, r, q, v, r.gaps, math.inf, r.gaps)
             h = left / math.ceil(left / step - 1e-9)
             gone, touched = step_or_touch(s, r, course, h, loads, springs, time, step,
-                                          events < most_events)
+                                          events < MOST_EVENTS)
             path.begun, path.next = 0, 0.0
         time += gone
         tally.settled = 0 if touched else 1
         if touched:
-            impact(s, r, q, v, events < most_events)
+            impact(s, r, q, v, events < MOST_EVENTS)
             events += 1
     observe(s, r, q, v, rows)
     sum_dolls(s, q, r, sums)
