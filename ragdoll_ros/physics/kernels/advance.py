@@ -6,22 +6,25 @@ import math
 import numpy as np
 
 from .bundle import bundle_at
-from .contact import TOUCHING, contact_rates, find_contacts, look, part_pairs, place_geoms
+from .contact import TOUCHING, find_contacts, look, part_pairs
 from .dynamics import pose, rates
 from .flight import along, begin_path, find_event, point_velocity, time_free
-from .impact import (
+from .forces import power
+from .impact import impact
+from .machine import ADDRESS, REAL, TABLE, YES, compiled, entry
+from .momentum import sum_dolls, take_out, total_energy
+from .quaternion import cross, times
+from .step import (
+    DEEP,
+    DEEP_TURN,
+    PAID,
     SLOW,
     SLOW_TURN,
     STEP_TOLERANCE,
+    begin_step,
     contact_step,
-    enter_work,
-    impact,
-    power,
+    settle,
 )
-from .machine import ADDRESS, REAL, TABLE, YES, compiled, entry
-from .mass import integrate
-from .momentum import give_contacts, keep_momentum, sum_dolls, take_out, total_energy
-from .quaternion import cross, times
 from .system import COURSE, DOLLS, ROOM, SYSTEM, Course, Room, System
 
 APART = 5e-3
@@ -56,13 +59,6 @@ energy of a step says little about its error."""
 
 NOISE = 1e-10
 """Share of the heft that solving to a tolerance may give a step."""
-
-DEEP, DEEP_TURN = 5e-4, 2e-3
-"""m, and rad: what is deeper in the ground, a bone, or beyond a limit is brought out whatever it
-costs."""
-
-PAID = 0.005
-"""Share of the kinetic energy that giving depths back may cost in a step."""
 
 GAIN = 1e-4
 """Share of the kinetic energy that a step may gain."""
@@ -175,9 +171,7 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
         now, speed = total_energy(r.after)
         work = tally.pushed - pushed + tally.handed - handed
         gained = now - held - work
-        most = max(moving, speed)
-        much = max(GAIN * (most + abs(work)), min(PAID * most, SLIGHT * s.heft[0])) + (
-            NOISE * s.heft[0] + 10 * STEP_TOLERANCE * pressure(r, m))
+        much = tolerated(s, r, m, max(moving, speed), work)
         if turn < TRIES - 1 and length > FINEST * step and (
                 not gained - r.lift[0] <= much or sinks(s, r)):
             length, hit = length / 2, False
@@ -195,110 +189,31 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
         for i in range(m):
             course.known[i] = r.contacts[i]
         tally.contacts, tally.lasted = m, length
-    for j in range(len(end_q)):
-        course.q[j] = end_q[j]
-    for j in range(len(end_v)):
-        course.v[j] = end_v[j]
-    for j in range(len(r.gaps)):
-        r.gaps[j] = r.later[j]
+    take_over(course.q, end_q)
+    take_over(course.v, end_v)
+    take_over(r.gaps, r.later)
     return length, hit
 
 
 @compiled
-def pressure(r: Room, m: int) -> float:
-    """Sum of the sizes of all impulses of m contacts, N s or N m s: times the tolerance to which
-    they are solved, the energy that they may make.
+def take_over(to: np.ndarray, values: np.ndarray) -> None:
+    """Copy values (k,)."""
+    for j in range(len(to)):
+        to[j] = values[j]
+
+
+@compiled
+def tolerated(s: System, r: Room, m: int, kinetic: float, work: float) -> float:
+    """Energy, J, that a step of m contacts may make: a share of what moves, of what hardly moves a
+    share of the heft as far as the motion can pay for it, and what the tolerances of solving make:
+    that of contacts times the sum of all impulses.
     """
     total = 0.0
     for i in range(m):
         for e in range(r.contacts[i].kind):
             total += abs(r.contacts[i].impulse[e])
-    return total
-
-
-@compiled
-def begin_step(s: System, r: Room, course: Course) -> None:
-    """Note what touches as a step begins and how it moves, and the sums over the dolls.
-
-    On a curved way the rows at the step's middle see J v as h/2 dJ/dt v where it is zero at the
-    start: what they see of v' is to be its opposite, for it to be zero at the end.
-    """
-    q, v = course.q, course.v
-    pose(s.tree, q, v, r.work)
-    sum_dolls(s, q, r, r.before)
-    place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
-    m = find_contacts(s, q, r, r.gaps, TOUCHING)
-    for i in range(m):
-        contact_rates(s, r, q, v, r.contacts[i])
-        r.begun[i] = r.contacts[i]
-    r.count[0] = m
-
-
-@compiled
-def settle(s: System, r: Room, course: Course, h: float, loads: np.ndarray, springs: np.ndarray,
-           since: float, m: int, end_q: np.ndarray, end_v: np.ndarray) -> None:
-    """Book the work of a step of h s, give depths back by r.vectors[3], keep the momentum of what
-    the ground does not bear; then the gaps and the sums at the end.
-    """
-    free = False
-    for d in range(len(r.given)):
-        given = r.given[d]
-        given.borne = given.meets = 0
-        for k in range(3):
-            given.impulse[k] = given.moment[k] = 0.0
-    give_contacts(s, r, m, r.given)
-    if len(loads) or len(springs):
-        enter_work(s, r, course.v, end_v, h, loads, springs, since)
-    pose(s.tree, end_q, end_v, r.work)
-    sum_dolls(s, end_q, r, r.after)
-    for d in range(len(r.given)):
-        free |= not r.given[d].borne
-        for k in range(3):
-            r.given[d].centre[k] = r.after[d].centre[k]
-    pay(r, m, r.vectors[3])
-    keep_limits(s, end_q, r.vectors[3])
-    integrate(s.tree, end_q, r.vectors[3], 1.0, end_q)
-    if free:
-        pose(s.tree, end_q, end_v, r.work)
-        sum_dolls(s, end_q, r, r.after)
-        keep_momentum(s, r, h, end_q, end_v)
-    look(s, r, end_q, end_v, r.gaps, h, r.later)
-    sum_dolls(s, end_q, r, r.after)
-
-
-@compiled
-def pay(r: Room, m: int, shift: np.ndarray) -> None:
-    """Let the motion pay for giving depths back, by a ``shift`` (nv,) that costs r.lift[0] J: where
-    it would be more than a part of its energy, they are given back by less. What is deep comes out
-    whatever it costs, which is booked.
-    """
-    deep = False
-    for i in range(m):
-        c = r.contacts[i]
-        deep |= c.gap < -(DEEP_TURN if c.kind == 1 else DEEP)
-    _, kinetic = total_energy(r.after)
-    if deep:
-        r.tally[0].lifted += r.lift[0]
-    elif r.lift[0] > PAID * kinetic:
-        share = PAID * kinetic / r.lift[0]
-        for j in range(len(shift)):
-            shift[j] *= share
-        r.lift[0] *= share
-
-
-@compiled
-def keep_limits(s: System, q: np.ndarray, shift: np.ndarray) -> None:
-    """Shorten a ``shift`` (nv,) that would take a joint past a limit that it does not touch."""
-    share = 1.0
-    for k in range(len(s.bounds)):
-        bound = s.bounds[k]
-        way = shift[bound.v]
-        room = q[bound.q] - bound.lower if way < 0 else bound.upper - q[bound.q]
-        if room > 0 and abs(way) > room + TOUCHING:
-            share = min(share, (room + TOUCHING) / abs(way))
-    if share < 1:
-        for j in range(len(shift)):
-            shift[j] *= share
+    return max(GAIN * (kinetic + abs(work)), min(PAID * kinetic, SLIGHT * s.heft[0])) + (
+        NOISE * s.heft[0] + 10 * STEP_TOLERANCE * total)
 
 
 @compiled

@@ -1,0 +1,195 @@
+"""What pushes and hands do: their forces, the work of these, and how stiff springs make a step."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .dynamics import Work, pose
+from .machine import compiled
+from .mass import root_axes
+from .momentum import give
+from .quaternion import cross, times, turned
+from .system import Room, System
+
+
+@compiled
+def spring_point(bone: np.record, work: Work, i: int,
+                 point: np.ndarray) -> tuple[float, float, float]:
+    """Where a point of bone i, along its axes from its centre, is from its root, m."""
+    t, b, c = work.turns[i], bone.bind, work.centres[i]
+    x, y, z, w = times(t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3])
+    x, y, z = turned(x, y, z, w, point[0], point[1], point[2])
+    return c[0] + x, c[1] + y, c[2] + z
+
+
+@compiled
+def stiffen(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, H: np.ndarray,
+            spring: np.ndarray, h: float) -> None:
+    """Add to H what a spring's end resists: h (k h / 4 + c / 2) J^T J. A bone's velocities are of
+    one branch, so that H keeps its pattern.
+    """
+    i = int(spring[0])
+    x, y, z = spring_point(tree[i], work, i, spring[1:4])
+    share = h * (spring[11] * h / 4 + spring[12] / 2) if spring[14] > 0 else 0.0
+    a = last[i]
+    while a >= 0:
+        axis = work.axes[a]
+        ux, uy, uz = cross(axis[0], axis[1], axis[2], x, y, z)
+        ux, uy, uz = axis[3] + ux, axis[4] + uy, axis[5] + uz
+        b = a
+        while b >= 0:
+            axis = work.axes[b]
+            wx, wy, wz = cross(axis[0], axis[1], axis[2], x, y, z)
+            H[a, b] += share * (ux * (axis[3] + wx) + uy * (axis[4] + wy) + uz * (axis[5] + wz))
+            b = up[b]
+        a = up[a]
+
+
+@compiled
+def root_q(s: System, spring: np.ndarray) -> int:
+    """Where in q the root stands of the doll that a spring pulls."""
+    return s.tree[s.root_of[int(spring[0])]].q
+
+
+@compiled
+def spring_force(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, q: np.ndarray,
+                 root: int, v: np.ndarray, spring: np.ndarray, time: float,
+                 ) -> tuple[float, float, float, float, float, float]:
+    """Force, N, of a hand's spring on its point and the point's velocity, m/s, at q and v."""
+    i = int(spring[0])
+    x, y, z = spring_point(tree[i], work, i, spring[1:4])
+    ux = uy = uz = 0.0
+    j = last[i]
+    while j >= 0:
+        axis = work.axes[j]
+        a, b, c = cross(axis[0], axis[1], axis[2], x, y, z)
+        ux, uy, uz = ux + (axis[3] + a) * v[j], uy + (axis[4] + b) * v[j], uz + (axis[5] + c) * v[j]
+        j = up[j]
+    if spring[14] == 0.0:
+        return spring[15], spring[16], spring[17], ux, uy, uz
+    gone = min(time, spring[10])
+    moving = 1.0 if time < spring[10] else 0.0
+    k, d = spring[11], spring[12]
+    fx = -k * (q[root] + x - spring[4] - gone * spring[7]) - d * (ux - moving * spring[7])
+    fy = -k * (q[root + 1] + y - spring[5] - gone * spring[8]) - d * (uy - moving * spring[8])
+    fz = -k * (q[root + 2] + z - spring[6] - gone * spring[9]) - d * (uz - moving * spring[9])
+    return fx, fy, fz, ux, uy, uz
+
+
+@compiled
+def pull(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, q: np.ndarray,
+         root: int, v: np.ndarray, spring: np.ndarray, time: float, out: np.ndarray) -> None:
+    """Add a spring's generalised forces to ``out``."""
+    fx, fy, fz, _, _, _ = spring_force(tree, up, last, work, q, root, v, spring, time)
+    i = int(spring[0])
+    x, y, z = spring_point(tree[i], work, i, spring[1:4])
+    j = last[i]
+    while j >= 0:
+        axis = work.axes[j]
+        a, b, c = cross(axis[0], axis[1], axis[2], x, y, z)
+        out[j] += fx * (axis[3] + a) + fy * (axis[4] + b) + fz * (axis[5] + c)
+        j = up[j]
+
+
+@compiled
+def mean_force(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, q: np.ndarray,
+               root: int, v: np.ndarray, end_v: np.ndarray, spring: np.ndarray, time: float,
+               h: float) -> tuple[float, float, float, float, float, float]:
+    """Mean force, N, of a spring in a step of h s, and its point's mean velocity, m/s."""
+    fx, fy, fz, ux, uy, uz = spring_force(tree, up, last, work, q, root, v, spring, time)
+    _, _, _, wx, wy, wz = spring_force(tree, up, last, work, q, root, end_v, spring, time)
+    share = spring[11] * h / 4 + spring[12] / 2 if spring[14] > 0 else 0.0
+    return (fx - share * (wx - ux), fy - share * (wy - uy), fz - share * (wz - uz),
+            (ux + wx) / 2, (uy + wy) / 2, (uz + wz) / 2)
+
+
+@compiled
+def weaken(s: System, r: Room, q: np.ndarray, v: np.ndarray, free: np.ndarray,
+           springs: np.ndarray, time: float, h: float) -> bool:
+    """Let springs that would pull with more than they may pull with that; whether any does."""
+    some = False
+    for k in range(len(springs)):
+        spring = springs[k]
+        fx, fy, fz, _, _, _ = mean_force(s.tree, s.up, s.last, r.work, q, root_q(s, spring), v,
+                                            free, spring, time, h)
+        size = math.sqrt(fx * fx + fy * fy + fz * fz)
+        if size > spring[13]:
+            fx, fy, fz, _, _, _ = spring_force(s.tree, s.up, s.last, r.work, q,
+                                               root_q(s, spring), v, spring, time)
+            share = spring[13] / math.sqrt(fx * fx + fy * fy + fz * fz)
+            spring[14], spring[15], spring[16], spring[17] = 0.0, share * fx, share * fy, share * fz
+            some = True
+    return some
+
+
+@compiled
+def enter_work(s: System, r: Room, v: np.ndarray, end_v: np.ndarray, h: float,
+               loads: np.ndarray, springs: np.ndarray, since: float) -> None:
+    """Book the work, J, of loads and hands in a step of h s, and their impulses in r.given."""
+    middle, mean = r.states[0], r.vectors[0]
+    for j in range(len(v)):
+        mean[j] = (v[j] + end_v[j]) / 2
+    pose(s.tree, middle, mean, r.work)
+    for k in range(len(loads)):
+        r.tally[0].pushed += h * power(s.tree, r.work, loads[k])
+        give_load(s, r, middle, loads[k], h)
+    if len(springs):
+        root_axes(s.tree, middle, r.work.axes)
+    for k in range(len(springs)):
+        fx, fy, fz, ux, uy, uz = mean_force(
+            s.tree, s.up, s.last, r.work, middle, root_q(s, springs[k]), v, end_v, springs[k],
+            since + h / 2, h)
+        r.tally[0].handed += h * (fx * ux + fy * uy + fz * uz)
+        i = int(springs[k, 0])
+        x, y, z = spring_point(s.tree[i], r.work, i, springs[k, 1:4])
+        root = s.tree[s.root_of[i]].q
+        give(r.given[s.doll_of[i]], h, middle[root] + x, middle[root + 1] + y,
+             middle[root + 2] + z, fx, fy, fz)
+
+
+@compiled
+def record_of(tree: np.ndarray, bone: int) -> int:
+    """Record of a bone of the scene."""
+    for i in range(len(tree)):
+        if tree[i].bone == bone:
+            return i
+    return 0
+
+
+@compiled
+def turned_load(bone: np.record, work: Work, i: int,
+                load: np.ndarray) -> tuple[float, float, float, float, float, float]:
+    """Force, N, and torque, N m, of a load on bone i along the world's axes."""
+    if load[10] == 0:
+        return load[1], load[2], load[3], load[4], load[5], load[6]
+    t, b = work.turns[i], bone.bind
+    x, y, z, w = times(t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3])
+    fx, fy, fz = turned(x, y, z, w, load[1], load[2], load[3])
+    nx, ny, nz = turned(x, y, z, w, load[4], load[5], load[6])
+    return fx, fy, fz, nx, ny, nz
+
+
+@compiled
+def give_load(s: System, r: Room, q: np.ndarray, load: np.ndarray, h: float) -> None:
+    """Enter what a load gives in h s."""
+    i = record_of(s.tree, int(load[0]))
+    x, y, z = spring_point(s.tree[i], r.work, i, load[7:10])
+    fx, fy, fz, nx, ny, nz = turned_load(s.tree[i], r.work, i, load)
+    root, given = s.tree[s.root_of[i]].q, r.given[s.doll_of[i]]
+    give(given, h, q[root] + x, q[root + 1] + y, q[root + 2] + z, fx, fy, fz)
+    given.moment[0] += h * nx
+    given.moment[1] += h * ny
+    given.moment[2] += h * nz
+
+
+@compiled
+def power(tree: np.ndarray, work: Work, load: np.ndarray) -> float:
+    """Power, W, of a load on what moves as work says."""
+    i = record_of(tree, int(load[0]))
+    move = work.moves[i]
+    x, y, z = spring_point(tree[i], work, i, load[7:10])
+    fx, fy, fz, nx, ny, nz = turned_load(tree[i], work, i, load)
+    ux, uy, uz = cross(move[0], move[1], move[2], x, y, z)
+    return (fx * (move[3] + ux) + fy * (move[4] + uy) + fz * (move[5] + uz)
+            + nx * move[0] + ny * move[1] + nz * move[2])

@@ -1,0 +1,253 @@
+"""A step where something touches, by Moreau's centred scheme.
+
+Forces, contacts and their rows are those at the middle of the way, so that it is of order 2 where
+no contact begins or ends (Moreau 1988; Studer, Numerics of Unilateral Contacts and Friction,
+2009). Joint damping and hands' springs are taken implicitly at the middle as well. Then depths are
+given back in position alone, and momentum is kept where the ground bears nothing.
+"""
+from __future__ import annotations
+
+import numpy as np
+
+from .contact import TOUCHING, contact_rates, find_contacts, look, place_geoms
+from .dynamics import pose
+from .forces import enter_work, pull, root_q, stiffen, weaken
+from .machine import compiled
+from .mass import (
+    bias_forces,
+    crba,
+    factor,
+    integrate,
+    root_axes,
+    solve_lower,
+    solve_upper,
+    turn_inertias,
+    update_moves,
+)
+from .momentum import give_contacts, keep_momentum, sum_dolls, total_energy
+from .quaternion import cross
+from .response import respond
+from .system import Course, Room, System
+
+STEP_TOLERANCE = 1e-8
+"""m/s to which contacts are solved."""
+
+SLOW = 0.02
+"""m/s, and SLOW_TURN rad/s: what meets more slowly where something touches already is taken on
+by the next step, without restitution, and not sought out."""
+
+SLOW_TURN = 0.1
+
+OPENING = 1e-3
+"""m/s: what comes apart faster as a step begins is not held sideways in it."""
+
+DEEP, DEEP_TURN = 5e-4, 2e-3
+"""m, and rad: what is deeper in the ground, a bone, or beyond a limit is brought out whatever it
+costs."""
+
+PAID = 0.005
+"""Share of the kinetic energy that giving depths back may cost in a step."""
+
+
+@compiled
+def begin_step(s: System, r: Room, course: Course) -> None:
+    """Note what touches as a step begins and how it moves, and the sums over the dolls.
+
+    On a curved way the rows at the step's middle see J v as h/2 dJ/dt v where it is zero at the
+    start: what they see of v' is to be its opposite, for it to be zero at the end.
+    """
+    q, v = course.q, course.v
+    pose(s.tree, q, v, r.work)
+    sum_dolls(s, q, r, r.before)
+    place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
+    m = find_contacts(s, q, r, r.gaps, TOUCHING)
+    for i in range(m):
+        contact_rates(s, r, q, v, r.contacts[i])
+        r.begun[i] = r.contacts[i]
+    r.count[0] = m
+
+
+@compiled
+def contact_step(s: System, r: Room, course: Course, h: float, loads: np.ndarray,
+                 springs: np.ndarray, since: float, end_q: np.ndarray, end_v: np.ndarray) -> int:
+    """Go on by h s to ``end_q`` and ``end_v``; the number of contacts. What gives depths back is
+    still to come: r.vectors[3], at the cost of r.lift[0] J.
+
+    ``since``: s since the hands of ``springs`` were where these say.
+    """
+    q, v, middle = course.q, course.v, r.states[0]
+    free, change, shift = r.vectors[0], r.vectors[2], r.vectors[3]
+    integrate(s.tree, q, v, h / 2, middle)
+    pose(s.tree, middle, v, r.work)
+    move_freely(s, r, v, h, loads, springs, since + h / 2)
+    place_geoms(s.tree, s.root_of, s.geoms, r.work, middle, r.at, r.turn)
+    m = find_contacts(s, middle, r, r.gaps, SLOW * h)
+    if m:
+        warm_start(r, m, course.known, h)
+        respond(s, r, middle, v, free, m, h, STEP_TOLERANCE, change, shift)
+        for j in range(len(v)):
+            end_v[j] = free[j] + change[j]
+    else:
+        for j in range(len(v)):
+            end_v[j], shift[j] = free[j], 0.0
+    integrate(s.tree, middle, end_v, h / 2, end_q)
+    r.lift[0] = lifted(s, r, shift) if m else 0.0
+    r.tally[0].steps += 1
+    return m
+
+
+@compiled
+def move_freely(s: System, r: Room, v: np.ndarray, h: float, loads: np.ndarray,
+                springs: np.ndarray, time: float) -> None:
+    """Velocities r.vectors[0] into which those at the start, v, come in h s without contacts, and
+    the factor of the mass matrix, r.H; work is posed at the middle r.states[0].
+
+    ``time``: s since the hands were where ``springs`` say.
+    """
+    middle, free, smooth, change = r.states[0], r.vectors[0], r.vectors[1], r.vectors[2]
+    root_axes(s.tree, middle, r.work.axes)
+    turn_inertias(s.tree, r.work, r.own)
+    for k in range(len(springs)):
+        springs[k, 14] = 1.0
+    for turn in range(2 if len(springs) else 1):
+        crba(s.tree, s.up, s.bone_of, r.work, r.own, r.composite, r.H)
+        for j in range(len(v)):
+            r.H[j, j] += h * lag(h * s.damping[j] / r.H[j, j]) * s.damping[j]
+        for k in range(len(springs)):
+            stiffen(s.tree, s.up, s.last, r.work, r.H, springs[k], h)
+        factor(r.H, s.up)
+        for stage in range(2):
+            if stage or turn:
+                for j in range(len(v)):
+                    smooth[j] = v[j] + (change[j] / 2 if stage else 0.0)
+                update_moves(s.tree, middle, smooth, r.work)
+            bias_forces(s.tree, s.gravity, loads, middle, smooth if stage else v, r.work, r.own,
+                        change)
+            for k in range(len(springs)):
+                pull(s.tree, s.up, s.last, r.work, middle, root_q(s, springs[k]), v, springs[k],
+                     time, change)
+            for j in range(len(v)):
+                change[j] = h * (change[j] - s.damping[j] * v[j])
+            solve_upper(r.H, s.up, change)
+            solve_lower(r.H, s.up, change)
+        for j in range(len(v)):
+            free[j] = v[j] + change[j]
+        if turn or not weaken(s, r, middle, v, free, springs, time, h):
+            break
+
+
+@compiled
+def warm_start(r: Room, m: int, known: np.ndarray, h: float) -> None:
+    """Begin with the impulses of the step before, of the contacts that there were."""
+    tally = r.tally[0]
+    scale = h / tally.lasted if tally.lasted > 0 else 0.0
+    for i in range(m):
+        c = r.contacts[i]
+        for e in range(5):
+            c.impulse[e] = 0.0
+        for j in range(tally.contacts):
+            old = known[j]
+            if old.key == c.key:
+                for e in range(5):
+                    c.impulse[e] = scale * old.impulse[e]
+                break
+        c.begun = 0
+        for j in range(r.count[0]):
+            old = r.begun[j]
+            if old.key == c.key:
+                c.begun, c.gap = 1, old.gap
+                for e in range(5):
+                    c.start[e] = old.start[e]
+                if c.kind > 1 and old.start[0] > OPENING:
+                    c.friction = c.rolling = 0.0
+                    for e in range(1, 5):
+                        c.impulse[e] = 0.0
+                break
+
+
+@compiled
+def lag(fast: float) -> float:
+    """Share of a step's end at which damping is taken: the middle, later where it is stiff
+    (Liniger and Willoughby, SIAM J. Numer. Anal. 7, 1970).
+    """
+    return max(0.5, 1 - 1 / fast) if fast > 0 else 0.5
+
+
+@compiled
+def lifted(s: System, r: Room, shift: np.ndarray) -> float:
+    """Energy of height, J, that a displacement (nv,) gives; axes, composites are those of now."""
+    total, g = 0.0, s.gravity
+    for j in range(len(shift)):
+        if shift[j] != 0.0:
+            a, c = r.work.axes[j], r.composite[s.bone_of[j]]
+            x, y, z = cross(a[0], a[1], a[2], c[1], c[2], c[3])
+            total -= shift[j] * (g[0] * (c[0] * a[3] + x) + g[1] * (c[0] * a[4] + y)
+                                 + g[2] * (c[0] * a[5] + z))
+    return total
+
+
+@compiled
+def settle(s: System, r: Room, course: Course, h: float, loads: np.ndarray, springs: np.ndarray,
+           since: float, m: int, end_q: np.ndarray, end_v: np.ndarray) -> None:
+    """Book the work of a step of h s, give depths back by r.vectors[3], keep the momentum of what
+    the ground does not bear; then the gaps and the sums at the end.
+    """
+    free = False
+    for d in range(len(r.given)):
+        given = r.given[d]
+        given.borne = given.meets = 0
+        for k in range(3):
+            given.impulse[k] = given.moment[k] = 0.0
+    give_contacts(s, r, m, r.given)
+    if len(loads) or len(springs):
+        enter_work(s, r, course.v, end_v, h, loads, springs, since)
+    pose(s.tree, end_q, end_v, r.work)
+    sum_dolls(s, end_q, r, r.after)
+    for d in range(len(r.given)):
+        free |= not r.given[d].borne
+        for k in range(3):
+            r.given[d].centre[k] = r.after[d].centre[k]
+    pay(r, m, r.vectors[3])
+    keep_limits(s, end_q, r.vectors[3])
+    integrate(s.tree, end_q, r.vectors[3], 1.0, end_q)
+    if free:
+        pose(s.tree, end_q, end_v, r.work)
+        sum_dolls(s, end_q, r, r.after)
+        keep_momentum(s, r, h, end_q, end_v)
+    look(s, r, end_q, end_v, r.gaps, h, r.later)
+    sum_dolls(s, end_q, r, r.after)
+
+
+@compiled
+def pay(r: Room, m: int, shift: np.ndarray) -> None:
+    """Let the motion pay for giving depths back, by a ``shift`` (nv,) that costs r.lift[0] J: where
+    it would be more than a part of its energy, they are given back by less. What is deep comes out
+    whatever it costs, which is booked.
+    """
+    deep = False
+    for i in range(m):
+        c = r.contacts[i]
+        deep |= c.gap < -(DEEP_TURN if c.kind == 1 else DEEP)
+    _, kinetic = total_energy(r.after)
+    if deep:
+        r.tally[0].lifted += r.lift[0]
+    elif r.lift[0] > PAID * kinetic:
+        share = PAID * kinetic / r.lift[0]
+        for j in range(len(shift)):
+            shift[j] *= share
+        r.lift[0] *= share
+
+
+@compiled
+def keep_limits(s: System, q: np.ndarray, shift: np.ndarray) -> None:
+    """Shorten a ``shift`` (nv,) that would take a joint past a limit that it does not touch."""
+    share = 1.0
+    for k in range(len(s.bounds)):
+        bound = s.bounds[k]
+        way = shift[bound.v]
+        room = q[bound.q] - bound.lower if way < 0 else bound.upper - q[bound.q]
+        if room > 0 and abs(way) > room + TOUCHING:
+            share = min(share, (room + TOUCHING) / abs(way))
+    if share < 1:
+        for j in range(len(shift)):
+            shift[j] *= share
