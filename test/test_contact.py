@@ -9,7 +9,7 @@ from conserved import conserved
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.push import Push
-from ragdoll_ros.model.ragdoll import Bone, Ragdoll
+from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.scene import NO_SLIP, SECOND, Ground, Material, Placement, Scene, height
 from ragdoll_ros.model.shapes import Box, Capsule, Sphere
 from ragdoll_ros.physics.joint_gap import JointGap
@@ -223,3 +223,42 @@ def test_what_lies_goes_on_lying_where_it_is_put_down(accuracy):
             state, left = simulation.advance(), twin.advance()
     # It settles anew, as contact points begin anew too, within some tenths of a mm.
     assert np.linalg.norm(state.positions - left.positions, axis=1).max() < 0.0005
+
+
+def along_one_way(friction, bones, joints, angle=0.0, rate=0.0):
+    """Coordinates of a doll without gravity after 0.1 s, its last joint moved, and the energy that
+    it has won, J. Nothing is lost in a blow.
+    """
+    scene = Scene('s', (Placement(Ragdoll('d', bones, joints)),), None, gravity=(0, 0, 0),
+                  material=Material(friction=friction, restitution=1.0))
+    with Simulation(scene, engine='rigid') as simulation:
+        start = simulation.coordinates
+        start.q[-1], start.v[-1] = angle, rate
+        simulation.place(start)
+        for _ in range(10):
+            simulation.advance()
+        return simulation.coordinates, simulation.measures()['energy_excess_J']
+
+
+@pytest.mark.parametrize('friction', [0.0, 0.5, np.inf])
+def test_bones_that_no_joint_lets_slide_bounce_whatever_the_friction(friction):
+    """Both turn about one axis: along it nothing can move, and across it nothing slides, so that
+    friction has nothing to brake. A blow that loses nothing keeps the energy, here some joules.
+    """
+    bones = (Bone('hub', Sphere(0.05), 1.0, (0, 0, 0)), Bone('a', Sphere(0.025), 1.0, (0.3, 0, 0)),
+             Bone('b', Sphere(0.025), 1.0, (0, 0.3, 0)))
+    joints = (Joint('hub', 'a', 'fixed', (0, 0, 0)),
+              Joint('hub', 'b', 'hinge', (0, 0, 0), ((0, 0, 1),)))
+    met, won = along_one_way(friction, bones, joints, np.radians(-75), -8.0)
+    assert met.v[-1] > 1
+    assert abs(won) < 1e-9
+
+
+def test_what_no_joint_can_open_rests():
+    """Two bones that touch along the axis about which one of them turns."""
+    bones = (Bone('hub', Sphere(0.02), 1.0, (0, 0, 0)), Bone('a', Sphere(0.03), 1.0, (0, 0, 0.06)),
+             Bone('b', Sphere(0.03), 1.0, (0, 0, 0.1195)))
+    joints = (Joint('hub', 'a', 'fixed', (0, 0, 0)),
+              Joint('hub', 'b', 'hinge', (0, 0, 0), ((0, 0, 1),)))
+    rest, _ = along_one_way(np.inf, bones, joints)
+    assert np.abs(rest.v).max() < 1e-12

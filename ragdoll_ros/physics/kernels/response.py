@@ -26,6 +26,9 @@ FASTEST_OUT = 1.0
 UNSOLVED = 1e-5
 """m/s: what is left by more is counted, and its impulses are kept from making energy."""
 
+LOCKED = 1e-13
+"""Share of the largest ease, W, of an island's rows up to which one is locked."""
+
 SLACK = 1e-9
 """m or rad that nobody gives back."""
 
@@ -144,6 +147,7 @@ def solve_island(s: System, r: Room, count: int, n: int, h: float, tolerance: fl
             deep |= r.need[0, k] > 0
         for e in range(c.kind):
             p[c.row + e] = c.impulse[e]
+    rest_locked(r.W, n, b)
     left, turns = solve_impulses(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, b, p, tolerance,
                                  SWEEPS, r.solver, r.G)
     if thrown and gained(r.W, start, p, n) > 0:
@@ -175,6 +179,22 @@ def solve_island(s: System, r: Room, count: int, n: int, h: float, tolerance: fl
                 if deep and e == 0:
                     shift[j] += r.Y[row, j] * out[row]
                 r.Y[row, j] = 0.0
+
+
+@compiled
+def rest_locked(W: np.ndarray, n: int, b: np.ndarray) -> None:
+    """Let rows ask for nothing along which nothing can move, as no joint lets it: W is zero there,
+    and would be divided by.
+    """
+    most = 0.0
+    for i in range(n):
+        most = max(most, W[i * n + i])
+    for i in range(n):
+        if W[i * n + i] <= LOCKED * most:
+            for j in range(n):
+                W[i * n + j] = W[j * n + i] = 0.0
+            W[i * n + i] = most if most > 0 else 1.0
+            b[i] = 0.0
 
 
 @compiled
