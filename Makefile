@@ -56,7 +56,7 @@ bench: $(COMPILED) ## cost of a tick and of its parts, of swings and of the page
 	@$(BIN)/python -m ragdoll_ros.physics.swing.bench
 	@$(BIN)/python test/page_cost.py
 
-report: $(COMPILED) ## accuracy against independent references, into docs/, 20 min
+report: $(COMPILED) ## accuracy against independent references, into docs/, 40 min
 	@$(BIN)/python -m ragdoll_ros.accuracy.command --out docs
 
 hard: $(COMPILED) ## hard cases, each with its rule, as a table
