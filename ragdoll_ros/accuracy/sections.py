@@ -146,7 +146,7 @@ Written by `{about['command']}`{' (quick)' if about['quick'] else ''} on {about[
 {about['seconds']:.0f} s; every figure stands in `accuracy.json`.
 Machine: {about['machine']}, {about['cores']} cores, {about['system']}. Python {about['python']}; \
 {versions}.
-Our settings are those of the engine {'rigid' if about.get('compiled') else 'bullet'}.""",
+{f"Our settings are those of the engine {about['engine']}." if 'engine' in about else ''}""",
             """\
 CPU times are of the whole tick as Python sees it, reading all poses included, measured one after \
 another in one process. On motions whose truth is known each tick counts with the median of its \
