@@ -53,14 +53,15 @@ class BoneDepth:
 
     def deepest(self, trajectory: Trajectory) -> float:
         """Largest depth of any pair, m, each from when it first was apart."""
-        found = self._course(trajectory)
-        counts = np.maximum.accumulate(found <= APART, axis=0)
-        return float(found[counts].max(initial=0.0))
+        return _deepest(self._course(trajectory))
 
-    def since_apart(self, trajectory: Trajectory) -> Trajectory:
-        """What comes after all pairs that begin in each other, and come apart, have done so."""
-        apart = self._course(trajectory) <= APART
-        return trajectory.part(slice(int(apart.argmax(axis=0).max(initial=0)), None))
+    def since_apart(self, trajectory: Trajectory) -> tuple[Trajectory, float]:
+        """What comes after all pairs that begin in each other, and come apart, have done so; and
+        the deepest() of that.
+        """
+        found = self._course(trajectory)
+        begin = int((found <= APART).argmax(axis=0).max(initial=0))
+        return trajectory.part(slice(begin, None)), _deepest(found[begin:])
 
     def _course(self, trajectory: Trajectory) -> np.ndarray:
         """Depths (t, pairs), m."""
@@ -77,3 +78,9 @@ class BoneDepth:
 
     def _distance(self, one: int, other: int) -> float:
         return self._mujoco.mj_geomDistance(self._model, self._data, one, other, SEARCHED, None)
+
+
+def _deepest(found: np.ndarray) -> float:
+    """Largest of depths (t, pairs), m, each pair's from when it first was apart."""
+    counts = np.maximum.accumulate(found <= APART, axis=0)
+    return float(found[counts].max(initial=0.0))

@@ -91,11 +91,11 @@ def worst(start: Trial, trajectory: Trajectory) -> dict[str, float]:
     """
     if not trajectory.finite:
         return dict.fromkeys(WORST, math.inf) | {'settled_s': math.inf}
-    measure, depths = Measure(start.scene), BoneDepth(start.scene)
-    inside = depths.since_apart(measure.since_back(trajectory))
+    measure = Measure(start.scene)
+    inside, depth = BoneDepth(start.scene).since_apart(measure.since_back(trajectory))
     return {'excess': measure.energy_excess(start, inside),
             'overshoot_rad': measure.overshoot(inside), 'sinking_m': measure.sinking(trajectory),
-            'depth_m': depths.deepest(inside),
+            'depth_m': depth,
             'gap_m': measure.joint_gap(trajectory),
             'speed_m_s': float(np.linalg.norm(trajectory.linear_velocities, axis=-1).max()),
             'settled_s': measure.settling_time(trajectory)}

@@ -93,10 +93,9 @@ def figures(case: HardCase, trial: Trial, trajectory: Trajectory) -> Row:
     lift = (sum(bone.mass for bone in trial.scene.bones) * case.rule.lift_m
             * float(np.linalg.norm(trial.scene.gravity)))
     moved = np.linalg.norm(trajectory.positions[-1] - trajectory.positions[0], axis=-1)
-    depths = BoneDepth(trial.scene)
-    inside = depths.since_apart(measure.since_back(trajectory))
+    inside, depth = BoneDepth(trial.scene).since_apart(measure.since_back(trajectory))
     return {'excess': measure.energy_excess(trial, inside, lift),
-            'depth_m': depths.deepest(inside) if case.rule.depth_m else None,
+            'depth_m': depth if case.rule.depth_m else None,
             'gap_m': measure.joint_gap(trajectory), 'overshoot_rad': measure.overshoot(inside),
             'sinking_m': measure.sinking(trajectory),
             'end_sinking_m': measure.sinking(trajectory.part(slice(-1, None))),

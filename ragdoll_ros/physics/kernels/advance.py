@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from .bundle import bundle_at
-from .contact import TOUCHING, find_contacts, look, part_pairs
+from .contact import BEYOND, TOUCHING, find_contacts, look, part_pairs
 from .dynamics import pose, rates
 from .flight import along, begin_path, find_event, point_velocity, time_free
 from .forces import power
@@ -16,7 +16,6 @@ from .momentum import sum_dolls, take_out, total_energy
 from .quaternion import cross, times
 from .step import (
     DEEP,
-    DEEP_TURN,
     PAID,
     SLOW,
     SLOW_TURN,
@@ -223,7 +222,7 @@ def sinks(s: System, r: Room) -> bool:
     """
     bounds = len(r.gaps) - len(s.pairs) - 2 * len(s.bounds)
     for j in range(len(r.gaps)):
-        most = DEEP_TURN if bounds <= j < bounds + 2 * len(s.bounds) else DEEP
+        most = BEYOND if bounds <= j < bounds + 2 * len(s.bounds) else DEEP
         if r.later[j] < -most and r.gaps[j] <= TOUCHING and r.later[j] < r.gaps[j] - most / 10:
             return True
     return False

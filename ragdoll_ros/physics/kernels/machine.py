@@ -19,7 +19,7 @@ inlined = numba.njit(inline='always', error_model='numpy', fastmath=MATH)
 """The same as a part of what calls it: twice as fast for what is called with many arrays."""
 
 REAL, YES, ADDRESS = numba.float64, numba.boolean, numba.int64
-ROW, TABLE, COUNTS, FLAGS = REAL[::1], REAL[:, ::1], numba.int64[::1], YES[::1]
+TABLE = REAL[:, ::1]
 
 
 def entry(*types: numba.types.Type) -> Callable[[Callable], Callable]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .contact import TOUCHING, contact_rates, find_contacts, look, place_geoms
+from .contact import BEYOND, TOUCHING, contact_rates, find_contacts, look, place_geoms
 from .dynamics import pose
 from .forces import enter_work, pull, root_q, stiffen, weaken
 from .machine import compiled
@@ -41,9 +41,8 @@ SLOW_TURN = 0.1
 OPENING = 1e-3
 """m/s: what comes apart faster as a step begins is not held sideways in it."""
 
-DEEP, DEEP_TURN = 5e-4, 2e-3
-"""m, and rad: what is deeper in the ground, a bone, or beyond a limit is brought out whatever it
-costs."""
+DEEP = 5e-4
+"""m: what is deeper in the ground or a bone, or BEYOND a limit, comes out whatever it costs."""
 
 PAID = 0.005
 """Share of the kinetic energy that giving depths back may cost in a step."""
@@ -227,7 +226,7 @@ def pay(r: Room, m: int, shift: np.ndarray) -> None:
     deep = False
     for i in range(m):
         c = r.contacts[i]
-        deep |= c.gap < -(DEEP_TURN if c.kind == 1 else DEEP)
+        deep |= c.gap < -(BEYOND if c.kind == 1 else DEEP)
     _, kinetic = total_energy(r.after)
     if deep:
         r.tally[0].lifted += r.lift[0]
