@@ -12,7 +12,7 @@ from .flight import along, begin_path, find_event, point_velocity, time_free
 from .forces import power
 from .impact import impact
 from .machine import ADDRESS, REAL, TABLE, YES, compiled, entry
-from .momentum import sum_dolls, take_out, total_energy
+from .momentum import SMALL, inner_energy, sum_dolls, take_out, total_energy
 from .quaternion import cross, times
 from .step import (
     DEEP,
@@ -22,6 +22,7 @@ from .step import (
     STEP_TOLERANCE,
     begin_step,
     contact_step,
+    jammed,
     settle,
 )
 from .system import COURSE, DOLLS, ROOM, SYSTEM, Course, Room, System
@@ -170,7 +171,7 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
         now, speed = total_energy(r.after)
         work = tally.pushed - pushed + tally.handed - handed
         gained = now - held - work
-        much = tolerated(s, r, m, max(moving, speed), work)
+        much = tolerated(s, r, m, length, max(moving, speed), work)
         if turn < TRIES - 1 and length > FINEST * step and (
                 not gained - r.lift[0] <= much or sinks(s, r)):
             length, hit = length / 2, False
@@ -180,8 +181,10 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
         hit = seek and (landed or share <= 1)
         if share > 1 or not seek or turn == TRIES - 1:
             gained -= tally.lifted - lifted
-            if gained > 0 and not take_out(s, r, gained, end_q, end_v) and gained > much:
+            if not gained <= much:
                 tally.gains += 1
+            if gained > much or 0 < gained < SMALL * inner_energy(s, r):
+                take_out(s, r, gained, end_q, end_v)
             break
         length = max(SHORTEST, length * share * (1 + 1e-9) + 2e-9)
     if length > 0.1 * h:
@@ -202,17 +205,18 @@ def take_over(to: np.ndarray, values: np.ndarray) -> None:
 
 
 @compiled
-def tolerated(s: System, r: Room, m: int, kinetic: float, work: float) -> float:
-    """Energy, J, that a step of m contacts may make: a share of what moves, of what hardly moves a
-    share of the heft as far as the motion can pay for it, and what the tolerances of solving make:
-    that of contacts times the sum of all impulses.
+def tolerated(s: System, r: Room, m: int, h: float, kinetic: float, work: float) -> float:
+    """Energy, J, that a step of h s with m contacts may make: a share of what moves, of what hardly
+    moves a share of the heft, both as far as the motion can pay for it, and what the tolerances of
+    solving make: that of contacts times the sum of all impulses.
     """
     total = 0.0
     for i in range(m):
         for e in range(r.contacts[i].kind):
             total += abs(r.contacts[i].impulse[e])
-    return max(GAIN * (kinetic + abs(work)), min(PAID * kinetic, SLIGHT * s.heft[0])) + (
-        NOISE * s.heft[0] + 10 * STEP_TOLERANCE * total)
+    share = max(GAIN * (kinetic + abs(work)), min(PAID * kinetic, SLIGHT * s.heft[0]))
+    return min(share, (SMALL - PAID) * inner_energy(s, r)) + (
+        NOISE * s.heft[0] + 10 * STEP_TOLERANCE * min(total, jammed(s, r, h)))
 
 
 @compiled
@@ -273,8 +277,10 @@ def advance(system: int, room: int, moving: int, duration: float, loads: np.ndar
     s, r, course = system_at(system), room_at(room), course_at(moving)
     q, v, path, tally = course.q, course.v, course.path[0], r.tally[0]
     time, events = 0.0, 0
-    part_pairs(s, r, q, v)
-    if duration == 0.0:
+    parted = part_pairs(s, r, q, v)
+    if parted:
+        path.valid = path.begun = 0
+    if parted or duration == 0.0:
         look(s, r, q, v, r.gaps, math.inf, r.gaps)
     while time < duration - 1e-12:
         left = duration - time

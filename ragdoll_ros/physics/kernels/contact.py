@@ -30,6 +30,9 @@ NEARLY = 1e-3
 BEYOND = 2e-3
 """rad by which a joint is outside its limits."""
 
+BURIED = 1e-3
+"""m: what is deeper in the ground comes out whatever it costs; bones, as far as the motion pays."""
+
 NEVER = 1e6
 """m: the gap of two bones that do not collide."""
 
@@ -154,30 +157,34 @@ def all_gaps(s: System, q: np.ndarray, r: Room, before: np.ndarray, h: float,
 
 
 @compiled
-def part_pairs(s: System, r: Room, q: np.ndarray, v: np.ndarray) -> None:
+def part_pairs(s: System, r: Room, q: np.ndarray, v: np.ndarray) -> bool:
     """Let those collide from now on that were within each other and have come apart, and those with
     a joint in between that was outside its limits and is back: nothing is to hold that back.
+    Whether there are any, whose gaps are not known yet.
     """
     some = False
     for k in range(len(r.within)):
         some |= r.within[k] != 0
     if not some:
-        return
+        return False
+    some = False
     pose(s.tree, q, v, r.work)
     place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
     for i in range(len(s.tree)):
         r.own[i, 0] = 0.0
     for k in range(len(s.bounds)):
         bound = s.bounds[k]
-        if q[bound.q] < bound.lower - BEYOND or q[bound.q] > bound.upper + BEYOND:
+        if max(bound.lower - q[bound.q], q[bound.q] - bound.upper) > 2 * BEYOND:
             r.own[s.bone_of[bound.v], 0] = 1.0
     for k in range(len(r.within)):
-        a, b = s.pairs[k].a, s.pairs[k].b
+        a, b, before = s.pairs[k].a, s.pairs[k].b, r.within[k]
         if r.within[k] & WITHIN and pair_gap(s.geoms[a], s.geoms[b], r.at[a], r.turn[a], r.at[b],
                                              r.turn[b]) > -NEARLY:
             r.within[k] &= ~WITHIN
         if r.within[k] & OUTSIDE and not outside_between(s, r, s.geoms[a].bone, s.geoms[b].bone):
             r.within[k] &= ~OUTSIDE
+        some |= before != 0 and r.within[k] == 0
+    return some
 
 
 @compiled

@@ -19,7 +19,8 @@ from .quaternion import cross, turned
 from .system import Room, System
 
 SMALL = 0.01
-"""Share of a motion's energy that may be taken out of it."""
+"""Share of a motion's energy that may be taken out of it without a word."""
+
 
 @compiled
 def sum_dolls(s: System, q: np.ndarray, r: Room, out: np.ndarray) -> None:
@@ -171,25 +172,30 @@ def keep_momentum(s: System, r: Room, h: float, q: np.ndarray, v: np.ndarray) ->
 
 
 @compiled
-def take_out(s: System, r: Room, gained: float, q: np.ndarray, v: np.ndarray) -> bool:
-    """Take energy, J, that came from nothing out of the motion v at q, the sums there being
-    r.after. Whether it was but a small part of that.
-
-    v becomes w + s (v - w). Of dolls that the ground bears w is zero, of others their motion as
-    one rigid body: their momenta stay. What is at rest against w stays so, and what slides or comes
-    apart does so in the same direction.
-    """
-    matrix, spin, inner = r.work.matrix, r.table[14], 0.0
+def inner_energy(s: System, r: Room) -> float:
+    """Kinetic energy, J, of v - w in take_out, by the sums r.after."""
+    spin, inner = r.table[14], 0.0
     for d in range(len(r.after)):
         inner += r.after[d].kinetic
         if not r.given[d].borne:
             for k in range(3):
                 spin[k] = r.after[d].angular[k]
-            lock(r.after[d], matrix, spin)
+            lock(r.after[d], r.work.matrix, spin)
             inner -= rigid_energy(r.after[d], s.doll_masses[d], spin)
-    if not inner * SMALL > gained:
-        return False
-    share = math.sqrt(1 - gained / inner)
+    return inner
+
+
+@compiled
+def take_out(s: System, r: Room, gained: float, q: np.ndarray, v: np.ndarray) -> None:
+    """Take energy, J, that came from nothing out of the motion v at q, the sums there being
+    r.after, as far as there is any.
+
+    v becomes w + s (v - w). Of dolls that the ground bears w is zero, of others their motion as
+    one rigid body: their momenta stay. What is at rest against w stays so, and what slides or comes
+    apart does so in the same direction.
+    """
+    matrix, spin, inner = r.work.matrix, r.table[14], inner_energy(s, r)
+    share = math.sqrt(max(0.0, 1 - gained / inner)) if inner > 0 else 1.0
     for i in range(len(s.tree)):
         bone, new = s.tree[i], r.after[s.doll_of[i]]
         at, rate = bone.q, bone.v
@@ -211,7 +217,6 @@ def take_out(s: System, r: Room, gained: float, q: np.ndarray, v: np.ndarray) ->
         v[rate + 3] = x + share * (v[rate + 3] - x)
         v[rate + 4] = y + share * (v[rate + 4] - y)
         v[rate + 5] = z + share * (v[rate + 5] - z)
-    return True
 
 
 @compiled

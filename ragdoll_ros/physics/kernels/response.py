@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from .contact import jacobian, through_factor
+from .contact import BURIED, jacobian, through_factor
 from .machine import compiled
 from .mass import solve_lower
 from .solver import solve_impulses, solve_normals
@@ -20,8 +20,16 @@ SWEEPS = 4
 GIVEN_BACK = 0.5
 """Share of a depth that one step gives back, in position alone."""
 
-FASTEST_OUT = 1.0
-"""m/s or rad/s at which what began far inside is brought out at the most."""
+FASTEST_OUT = 0.3
+"""m/s at which what began far inside is brought out at the most: what is in its way has time to
+move on."""
+
+YIELDING = 0.01
+"""Compliance, as a share of their own W, at which bones BURIED in each other are brought apart: they
+may stand against a limit or the ground, which do not yield."""
+
+FASTEST_BACK = 1.0
+"""rad/s at which a joint that began far outside is brought back at the most."""
 
 UNSOLVED = 1e-5
 """m/s: what is left by more is counted, and its impulses are kept from making energy."""
@@ -131,7 +139,7 @@ def solve_island(s: System, r: Room, count: int, n: int, h: float, tolerance: fl
         start[j] = b[j]
     for k in range(count):
         c = r.contacts[int(r.need[1, k])]
-        r.need[0, k] = 0.0
+        r.need[0, k] = r.need[2, k] = 0.0
         c.before = was[c.row]
         if h == 0.0:
             if c.restitution > 0 and c.before < -s.bounce_speed[0]:
@@ -143,8 +151,11 @@ def solve_island(s: System, r: Room, count: int, n: int, h: float, tolerance: fl
         elif c.gap > 0:
             b[c.row] += c.gap / h
         if h > 0 and c.gap < 0:
-            r.need[0, k] = min(GIVEN_BACK * max(0.0, -c.gap - SLACK), FASTEST_OUT * h)
+            fastest = FASTEST_BACK if c.kind == 1 else FASTEST_OUT
+            r.need[0, k] = min(GIVEN_BACK * max(0.0, -c.gap - SLACK), fastest * h)
             deep |= r.need[0, k] > 0
+            if c.b >= 0 and c.kind > 1 and c.gap < -BURIED:
+                r.need[2, k] = YIELDING
         for e in range(c.kind):
             p[c.row + e] = c.impulse[e]
     rest_locked(r.W, n, b)
@@ -165,7 +176,7 @@ def solve_island(s: System, r: Room, count: int, n: int, h: float, tolerance: fl
         r.tally[0].unsolved += 1
         weaken_impulses(r.W, start, p, n)
     if deep:
-        solve_normals(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, r.need[0], out, r.solver, r.G)
+        solve_normals(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, r.need, out, r.solver, r.G)
     for k in range(count):
         i = int(r.need[1, k])
         c = r.contacts[i]

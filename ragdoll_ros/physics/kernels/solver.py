@@ -403,7 +403,8 @@ def solve_impulses(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np
 def solve_normals(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
                   n: int, W: np.ndarray, need: np.ndarray, p: np.ndarray, room: np.ndarray,
                   G: np.ndarray) -> None:
-    """Least normal impulses p (n,) that give each contact its velocity ``need`` (m,) or more.
+    """Least normal impulses p (n,) that give each contact its velocity need[0] (m,) or more, but for
+    a compliance of need[2], as a share of its W.
 
     W, kinds and rows are lost: the normals' own W takes their place.
     """
@@ -414,7 +415,8 @@ def solve_normals(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.
     for i in range(n):
         p[i] = 0.0
     for c in range(m):
-        b[c], own[c], room[6, c] = -need[c], 0.0, rows[c]
+        W[c * m + c] *= 1 + need[2, c]
+        b[c], own[c], room[6, c] = -need[0, c], 0.0, rows[c]
         kinds[c], rows[c], mu[c], roll[c] = LIMIT, c, 0.0, 0.0
     solve_cones(kinds, rows, mu, roll, m, m, W, b, own, 1e-9, 4, room, G)
     for c in range(m):

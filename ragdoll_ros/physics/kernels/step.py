@@ -7,9 +7,11 @@ given back in position alone, and momentum is kept where the ground bears nothin
 """
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from .contact import BEYOND, TOUCHING, contact_rates, find_contacts, look, place_geoms
+from .contact import BEYOND, BURIED, TOUCHING, contact_rates, find_contacts, look, place_geoms
 from .dynamics import pose
 from .forces import enter_work, pull, root_q, stiffen, weaken
 from .machine import compiled
@@ -24,7 +26,7 @@ from .mass import (
     turn_inertias,
     update_moves,
 )
-from .momentum import give_contacts, keep_momentum, sum_dolls, total_energy
+from .momentum import give_contacts, inner_energy, keep_momentum, sum_dolls
 from .quaternion import cross
 from .response import respond
 from .system import Course, Room, System
@@ -42,7 +44,10 @@ OPENING = 1e-3
 """m/s: what comes apart faster as a step begins is not held sideways in it."""
 
 DEEP = 5e-4
-"""m: what is deeper in the ground or a bone, or BEYOND a limit, comes out whatever it costs."""
+"""m into the ground or a bone to which a step may press."""
+
+JAMMED = 10.0
+"""Times all momenta and weights that impulses may be before they are those of a jam."""
 
 PAID = 0.005
 """Share of the kinetic energy that giving depths back may cost in a step."""
@@ -82,7 +87,7 @@ def contact_step(s: System, r: Room, course: Course, h: float, loads: np.ndarray
     place_geoms(s.tree, s.root_of, s.geoms, r.work, middle, r.at, r.turn)
     m = find_contacts(s, middle, r, r.gaps, SLOW * h)
     if m:
-        warm_start(r, m, course.known, h)
+        warm_start(s, r, m, course.known, h)
         respond(s, r, middle, v, free, m, h, STEP_TOLERANCE, change, shift)
         for j in range(len(v)):
             end_v[j] = free[j] + change[j]
@@ -136,10 +141,29 @@ def move_freely(s: System, r: Room, v: np.ndarray, h: float, loads: np.ndarray,
 
 
 @compiled
-def warm_start(r: Room, m: int, known: np.ndarray, h: float) -> None:
-    """Begin with the impulses of the step before, of the contacts that there were."""
-    tally = r.tally[0]
+def jammed(s: System, r: Room, h: float) -> float:
+    """Sum of impulses, N s, that only what jams exceeds in h s."""
+    momentum, g = 0.0, s.gravity
+    weight = math.sqrt(g[0] ** 2 + g[1] ** 2 + g[2] ** 2)
+    for d in range(len(r.before)):
+        mass = s.doll_masses[d]
+        momentum += math.sqrt(2 * r.before[d].kinetic * mass) + mass * weight * h
+    return JAMMED * momentum
+
+
+@compiled
+def warm_start(s: System, r: Room, m: int, known: np.ndarray, h: float) -> None:
+    """Begin with the impulses of the step before, of the contacts that there were.
+
+    Where contacts jam, what they press against each other is decided by nothing, and would grow
+    from step to step: from where it is beyond all measure, they begin with none.
+    """
+    tally, pressed = r.tally[0], 0.0
     scale = h / tally.lasted if tally.lasted > 0 else 0.0
+    for j in range(tally.contacts):
+        pressed += abs(known[j].impulse[0])
+    if scale * pressed > jammed(s, r, h):
+        scale = 0.0
     for i in range(m):
         c = r.contacts[i]
         for e in range(5):
@@ -206,7 +230,7 @@ def settle(s: System, r: Room, course: Course, h: float, loads: np.ndarray, spri
         free |= not r.given[d].borne
         for k in range(3):
             r.given[d].centre[k] = r.after[d].centre[k]
-    pay(r, m, r.vectors[3])
+    pay(s, r, m, r.vectors[3])
     keep_limits(s, end_q, r.vectors[3])
     integrate(s.tree, end_q, r.vectors[3], 1.0, end_q)
     if free:
@@ -218,20 +242,22 @@ def settle(s: System, r: Room, course: Course, h: float, loads: np.ndarray, spri
 
 
 @compiled
-def pay(r: Room, m: int, shift: np.ndarray) -> None:
+def pay(s: System, r: Room, m: int, shift: np.ndarray) -> None:
     """Let the motion pay for giving depths back, by a ``shift`` (nv,) that costs r.lift[0] J: where
-    it would be more than a part of its energy, they are given back by less. What is deep comes out
-    whatever it costs, which is booked.
+    it would be more than a part of its energy, they are given back by less. What is deep in the ground
+    or beyond a limit comes out whatever it costs: what the motion does not pay of it is booked.
     """
     deep = False
     for i in range(m):
         c = r.contacts[i]
-        deep |= c.gap < -(BEYOND if c.kind == 1 else DEEP)
-    _, kinetic = total_energy(r.after)
+        deep |= c.b < 0 and c.gap < -(BEYOND if c.kind == 1 else BURIED)
+    paid = PAID * max(0.0, inner_energy(s, r))
+    if r.lift[0] <= paid:
+        return
     if deep:
-        r.tally[0].lifted += r.lift[0]
-    elif r.lift[0] > PAID * kinetic:
-        share = PAID * kinetic / r.lift[0]
+        r.tally[0].lifted += r.lift[0] - paid
+    else:
+        share = paid / r.lift[0]
         for j in range(len(shift)):
             shift[j] *= share
         r.lift[0] *= share

@@ -136,7 +136,7 @@ def make_room(system: System, course: Course) -> Room:
         W=np.zeros(rows * rows), G=np.zeros(rows * rows), p=np.zeros((6, rows)),
         solver=np.zeros((8, 2 * max(rows, 8))), kinds=np.zeros(contacts, np.int64),
         rows=np.zeros(contacts, np.int64), mu=np.zeros(contacts), roll=np.zeros(contacts),
-        need=np.zeros((2, contacts)), label=np.zeros(dolls, np.int64),
+        need=np.zeros((3, contacts)), label=np.zeros(dolls, np.int64),
         vectors=np.zeros((VECTORS, nv)), states=np.zeros((STATES, nq)),
         given=np.zeros(dolls, GIVEN), before=np.zeros(dolls, DOLL), after=np.zeros(dolls, DOLL),
         begun=np.zeros(contacts, CONTACT), count=np.zeros(1, np.int64), lift=np.zeros(1),
