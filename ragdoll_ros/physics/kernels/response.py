@@ -25,8 +25,8 @@ FASTEST_OUT = 0.3
 move on."""
 
 YIELDING = 0.01
-"""Compliance, as a share of their own W, at which bones BURIED in each other are brought apart: they
-may stand against a limit or the ground, which do not yield."""
+"""Compliance, as a share of their own W, at which bones BURIED in each other are brought apart: a
+limit or the ground may be in the way, and do not yield."""
 
 FASTEST_BACK = 1.0
 """rad/s at which a joint that began far outside is brought back at the most."""

@@ -403,8 +403,8 @@ def solve_impulses(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np
 def solve_normals(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
                   n: int, W: np.ndarray, need: np.ndarray, p: np.ndarray, room: np.ndarray,
                   G: np.ndarray) -> None:
-    """Least normal impulses p (n,) that give each contact its velocity need[0] (m,) or more, but for
-    a compliance of need[2], as a share of its W.
+    """Least normal impulses p (n,) that give each contact its velocity need[0] (m,) or more, but
+    for a compliance of need[2], as a share of its W.
 
     W, kinds and rows are lost: the normals' own W takes their place.
     """

@@ -244,8 +244,8 @@ def settle(s: System, r: Room, course: Course, h: float, loads: np.ndarray, spri
 @compiled
 def pay(s: System, r: Room, m: int, shift: np.ndarray) -> None:
     """Let the motion pay for giving depths back, by a ``shift`` (nv,) that costs r.lift[0] J: where
-    it would be more than a part of its energy, they are given back by less. What is deep in the ground
-    or beyond a limit comes out whatever it costs: what the motion does not pay of it is booked.
+    it would be more than a part of its energy, they are given back by less. What is deep in the
+    ground or beyond a limit comes out whatever it costs: what the motion does not pay is booked.
     """
     deep = False
     for i in range(m):
