@@ -89,7 +89,7 @@ def test_a_ball_rests_on_a_tilted_ground_and_tells_of_it():
                   Material(restitution=0), gravity=-9.8 * normal)
     engine = MujocoEngine(scene, NORMAL)
     engine.advance(1.0)
-    assert engine.grounded()
+    assert engine.grounded().all()
     contact, = engine.contacts()
     assert (contact.a, contact.b) == (0, GROUND)
     assert contact.normal == pytest.approx(normal, abs=1e-9)

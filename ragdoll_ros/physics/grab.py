@@ -62,9 +62,6 @@ class Hands:
         self._scene = scene
         self._springs: dict[str, Spring] = {}
 
-    def __bool__(self) -> bool:
-        return bool(self._springs)
-
     @property
     def grabs(self) -> tuple[Grab, ...]:
         """What is held, the longest held first."""

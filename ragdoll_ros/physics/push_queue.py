@@ -28,14 +28,16 @@ class _Active:
 
 
 class PushQueue:
-    """Pushes of a scene in the order in which they came; false if there is none. Times in ns."""
+    """Pushes of a scene in the order in which they came. Times in ns."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._queue: list[_Active] = []
 
-    def __bool__(self) -> bool:
-        return bool(self._queue)
+    @property
+    def bones(self) -> list[int]:
+        """The bones that they push or will."""
+        return [active.bone for active in self._queue]
 
     def add(self, push: Push, channel: str | None, now: int) -> None:
         """Queue a push; on a ``channel`` it takes the place of the last. See Simulation.push."""

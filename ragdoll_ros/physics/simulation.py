@@ -1,6 +1,7 @@
 """A scene, an engine, pushes and time: what turns the first three into states."""
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 
 import numpy as np
@@ -21,25 +22,32 @@ from .sleeping import SleepDetector
 from .swing.pose import SwingState
 from .swing.simulation import SwingSimulation
 
+MOST_WORKERS = 64
+"""Threads: each has its own scratch."""
+
 
 class Simulation:
     """A scene that moves: push() it, advance() it by a tick, read its state.
 
     ``step`` is the tick in s (None: the scene's), ``accuracy`` a name of ACCURACIES or an
-    Accuracy, ``engine`` a name of ENGINES or an Engine. ``workers`` is the number of threads, 1 as
-    yet. The same pushes at the same ticks give the same states to the bit.
+    Accuracy, ``engine`` a name of ENGINES or an Engine. ``workers`` is the number of threads over
+    which dolls are spread that do not touch, 'auto': as many as there are cores. The same pushes at
+    the same ticks give the same states to the bit, for any number of them.
     """
 
     def __init__(self, scene: Scene, step: float | None = None,
                  accuracy: str | Accuracy = 'normal', engine: str | type[Engine] = 'auto',
-                 workers: int = 1) -> None:
-        errors.check_range('workers', workers, 1, 1)
+                 workers: int | str = 1) -> None:
+        if workers == 'auto':
+            workers = len(os.sched_getaffinity(0))
+        errors.check_range('workers', workers, 1, MOST_WORKERS)
         self.scene = scene
         self.step = scene.step if step is None else step
         choice = resolve_engine(engine)
         self.engine_name, self.engine_reason = choice.name, choice.reason
         """The engine that is taken; why it is not the one that 'auto' takes first."""
-        self._engine: Engine = choice.make(scene, resolve_accuracy(accuracy))
+        self._engine: Engine = choice.make(scene, resolve_accuracy(accuracy),
+                                           workers=int(workers))
         self._start = self._engine.save()
         self._gap = JointGap(scene)
         self._sleep_detector = SleepDetector(scene)
@@ -202,26 +210,36 @@ class Simulation:
 
     def _advance_until(self, end: int) -> None:
         """Go on to an instant, ns, before which no push begins or ends."""
-        wrenches = self._pushes.wrenches(self.time, self.state)
-        if wrenches or self._hands:
+        wrenches, springs = self._pushes.wrenches(self.time, self.state), self._hands.springs
+        if wrenches or springs:
             self.asleep = False
-            self._sleep_detector.disturb()
         if not self.asleep:
             duration = (end - self.time) / SECOND
-            self._engine.advance(duration, wrenches, self._hands.springs)
+            self._engine.advance(duration, wrenches, springs)
             self._hands.move(duration)
         self.time = end
 
     def _fall_asleep(self) -> None:
-        """Sleep when all has been still for a while with something to rest on."""
+        """Dolls sleep that have been still for a while, with all that they touch, where something
+        of them rests on the ground.
+        """
+        engine = self._engine
         if self.asleep or not self.accuracy.sleep:
             return
-        if self._pushes or self._hands:
-            self._sleep_detector.disturb()
-        elif (self._sleep_detector.update(self.state, self._engine.motion.kinetic, self.tick)
-                and self._engine.grounded()):
-            self._engine.stop()
-            self.asleep = True
+        ready = self._sleep_detector.update(self.state, engine.motion.kinetic, self.tick)
+        for bone in (*self._pushes.bones, *(spring.bone for spring in self._hands.springs)):
+            doll = self.scene.doll_of_bone[bone]
+            self._sleep_detector.disturb(doll)
+            ready[doll] = False
+        if not ready.any():
+            return
+        ready |= engine.resting
+        awake = np.bincount(engine.groups, ~ready) > 0
+        borne = np.bincount(engine.groups, engine.grounded()) > 0
+        dolls = (borne & ~awake)[engine.groups] & ~engine.resting
+        if dolls.any():
+            engine.stop(dolls)
+            self.asleep = bool(engine.resting.all())
 
 
 class _ClosedEngine:

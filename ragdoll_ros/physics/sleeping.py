@@ -1,4 +1,4 @@
-"""SleepDetector: when a scene may sleep, because nothing has moved for a while."""
+"""SleepDetector: which dolls may sleep, because they have not moved for a while."""
 from __future__ import annotations
 
 import math
@@ -22,7 +22,7 @@ REST_DISPLACEMENT = 0.0012
 their joints' damping slower than 4 mm/s are stopped. For other dolls it goes with their size."""
 
 REST_TIME = 3 * SECOND // 10
-"""ns that all bones must be still before the scene sleeps; longer in weak gravity, under which all
+"""ns that all bones must be still before a doll sleeps; longer in weak gravity, under which all
 goes slower as its root. In 44 starts of the report bones that were not put to sleep then moved 2 mm
 more within 3 s in the median, as they do after 0.5 s, at the most 15 mm; 60 mm after 0.2 s."""
 
@@ -35,6 +35,8 @@ class SleepDetector:
 
     def __init__(self, scene: Scene) -> None:
         self._sizes = np.array([max(bone.shape.half_extents) for bone in scene.bones])
+        self._first = np.array([own.start for own in scene.bone_slices])
+        self._doll = scene.doll_of_bone
         size = min(placement.doll.extent for placement in scene.dolls) / HUMAN
         gravity = math.hypot(*scene.gravity)
         self._pulled = gravity > 0
@@ -46,34 +48,37 @@ class SleepDetector:
         # its spin, as no radius of gyration is longer than its largest half extent.
         masses = np.array([placement.doll.mass for placement in scene.dolls])
         self._most = 2 * masses * (2 * self._speed) ** 2
-        self.disturb()
+        self._still = np.zeros(len(scene.dolls), np.int64)
+        """ns for which each doll has been still."""
+        self._since = np.zeros((len(scene.bones), 7))
+        """Where its bones were as that began."""
 
-    def disturb(self) -> None:
-        """Begin anew to wait."""
-        self._still = 0
-        """ns for which all have been still."""
+    def disturb(self, dolls: np.ndarray | slice = slice(None)) -> None:
+        """Begin anew to wait, for these dolls (d,) or for all."""
+        self._still[dolls] = 0
 
-    def update(self, state: State, kinetic: np.ndarray, tick: int) -> bool:
-        """Whether all have been still for long enough, after one more tick (ns).
+    def update(self, state: State, kinetic: np.ndarray, tick: int) -> np.ndarray:
+        """Which dolls (d,) have been still for long enough, after one more tick (ns).
 
         ``kinetic`` (d,) J are the dolls' energies of motion.
         """
-        if not self._pulled or self._moves(state, kinetic):
+        slow = kinetic <= self._most
+        if not self._pulled or not slow.any():
             self.disturb()
-            return False
-        if not self._still:
-            self._since = state
-        self._still += tick
-        if self._still < self._time:
-            return False
-        self.disturb()
-        displacement = np.abs(state.positions - self._since.positions).max()
-        turn = rotation.angle_between(state.orientations, self._since.orientations)
-        return bool(max(displacement, (turn * self._sizes).max()) < self._displacement)
-
-    def _moves(self, state: State, kinetic: np.ndarray) -> bool:
-        """Whether any bone is faster than still; in most ticks the energies say so."""
-        return bool((kinetic > self._most).any()
-                    or np.abs(state.linear_velocities).max() > self._speed
-                    or (np.abs(state.angular_velocities).max(axis=1)
-                        * self._sizes).max() > self._speed)
+            return np.zeros(len(slow), bool)
+        speeds = np.maximum(
+            np.abs(state.linear_velocities).max(axis=1),
+            np.abs(state.angular_velocities).max(axis=1) * self._sizes)
+        slow &= np.maximum.reduceat(speeds, self._first) <= self._speed
+        begun = (slow & (self._still == 0))[self._doll]
+        self._since[begun] = state.rows[begun, :7]
+        self._still = np.where(slow, self._still + tick, 0)
+        ready = self._still >= self._time
+        if not ready.any():
+            return ready
+        moved = np.maximum(
+            np.abs(state.positions - self._since[:, :3]).max(axis=1),
+            rotation.angle_between(state.orientations, self._since[:, 3:]) * self._sizes)
+        crept = np.maximum.reduceat(moved, self._first) >= self._displacement
+        self.disturb(crept)
+        return ready & ~crept

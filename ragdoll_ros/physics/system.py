@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -9,10 +10,15 @@ from ..model import rotation
 from ..model.coordinates import DofLayout
 from ..model.scene import Scene
 from .kernels.system import BOUND, GEOM, PAIR, STICKS, System
+from .motion import damping_rate
 from .tree import table
 
 KINDS = {'sphere': 0, 'capsule': 1, 'box': 2, 'cylinder': 3}
 """Numbers of the kinds of shapes, as in kernels/collision_shapes.py."""
+
+STIFFEST = 1000.0
+"""1/s at which joint damping may end a motion for it to be flown; above, steps take it
+implicitly."""
 
 GROUND_POINTS = {'sphere': 1, 'capsule': 2, 'box': 8, 'cylinder': 10}
 """Points of each kind that may touch the ground, see kernels/contact.py."""
@@ -37,7 +43,47 @@ def system_of(scene: Scene) -> System:
         offset=np.array([ground.offset if ground else -math.inf]),
         bounce_speed=np.array([scene.material.restitution_speed]),
         doll_masses=np.array([placement.doll.mass for placement in scene.dolls]),
-        heft=np.array([tree['mass'].sum() * geoms['reach'].max() * math.hypot(*scene.gravity)]))
+        heft=np.array([tree['mass'].sum() * geoms['reach'].max() * math.hypot(*scene.gravity)]),
+        flies=np.array([float(damping_rate(scene) < STIFFEST)]))
+
+
+def joined(systems: Sequence[System], pairs: np.ndarray) -> System:
+    """The tables of several systems as one, and ``pairs`` between their geoms."""
+    q = v = bones = geoms = points = 0
+    parts = []
+    for one in systems:
+        tree, shapes, own, bounds = (part.copy() for part in (
+            one.tree, one.geoms, one.pairs, one.bounds))
+        tree['parent'] += np.where(tree['parent'] >= 0, bones, 0)
+        tree['bone'] += bones
+        shapes['bone'] += bones
+        shapes['first'] += points
+        for rows in (tree, bounds):
+            rows['q'] += q
+            rows['v'] += v
+        own['a'] += geoms
+        own['b'] += geoms
+        parts.append(one._replace(
+            tree=tree, geoms=shapes, pairs=own, bounds=bounds,
+            up=np.where(one.up >= 0, one.up + v, -1), last=one.last + v,
+            bone_of=one.bone_of + bones, root_of=one.root_of + bones,
+            doll_of=one.doll_of + sum(len(part.doll_masses) for part in parts)))
+        q, v, bones = q + coordinates(one), v + len(one.up), bones + len(tree)
+        geoms, points = geoms + len(shapes), points + int(shapes['count'].sum())
+    whole = {name: np.concatenate([getattr(part, name) for part in parts]) for name in (
+        'tree', 'up', 'last', 'bone_of', 'root_of', 'doll_of', 'damping', 'geoms', 'bounds',
+        'doll_masses')}
+    tree, shapes = whole['tree'], whole['geoms']
+    return parts[0]._replace(
+        **whole, pairs=np.concatenate([*(part.pairs for part in parts), pairs]),
+        heft=np.array([tree['mass'].sum() * shapes['reach'].max()
+                       * math.hypot(*parts[0].gravity)]),
+        flies=np.array([min(part.flies[0] for part in parts)]))
+
+
+def coordinates(system: System) -> int:
+    """How many coordinates a system has."""
+    return len(system.up) + int(system.tree['free'].sum())
 
 
 def pairs_between(scene: Scene, geoms: np.ndarray, couples: np.ndarray) -> np.ndarray:

@@ -172,8 +172,8 @@ class BulletEngine(SubsteppedEngine):
     Runs in a client of its own, so that many can live side by side.
     """
 
-    def __init__(self, scene: Scene, accuracy: Accuracy) -> None:
-        super().__init__(scene, accuracy)
+    def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
+        super().__init__(scene, accuracy, workers=workers)
         self._check_sizes()
         self._client = pybullet.connect(pybullet.DIRECT)
         self._timing: tuple[float, int] | None = None

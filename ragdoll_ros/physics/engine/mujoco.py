@@ -32,14 +32,15 @@ XYZW, WXYZ = [1, 2, 3, 0], [3, 0, 1, 2]
 class MujocoEngine(SubsteppedEngine):
     """A scene in MuJoCo."""
 
-    def __init__(self, scene: Scene, accuracy: Accuracy, integrator: str = 'implicitfast') -> None:
+    def __init__(self, scene: Scene, accuracy: Accuracy, integrator: str = 'implicitfast', *,
+                 workers: int = 1) -> None:
         if integrator not in INTEGRATORS:
             raise errors.OutOfRange('integrator', integrator, 'one of ' + ', '.join(INTEGRATORS))
         try:
             import mujoco
         except ImportError as error:
             raise MissingEngine('MuJoCo is missing: pip install "ragdoll_ros[report]"') from error
-        super().__init__(scene, accuracy)
+        super().__init__(scene, accuracy, workers=workers)
         self.lags = integrator != 'rk4'
         self._mujoco = mujoco
         self._integrator = getattr(mujoco.mjtIntegrator, 'mjINT_' + integrator.upper())

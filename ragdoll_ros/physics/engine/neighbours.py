@@ -1,54 +1,43 @@
-"""Which dolls may meet soon: a list that is made anew only when they have moved far enough."""
+"""Which dolls may meet soon: those whose surrounding balls do."""
 from __future__ import annotations
 
 import numpy as np
 
 from ...model.scene import Scene
-from ...model.state import State
-from ..kernels.system import System
-
-AHEAD = 0.05
-"""s that the list looks ahead."""
 
 SPARE = 0.05
-"""m that it looks farther."""
+"""m that balls are wider than what moves within a tick."""
 
 
 class Neighbours:
-    """Pairs of geoms of dolls whose surrounding balls are near each other (Verlet's list)."""
+    """Balls about the dolls of a scene, and a sweep along x over them."""
 
-    def __init__(self, scene: Scene, system: System) -> None:
-        self._own = scene.bone_slices
-        owner = np.repeat(scene.doll_of_bone, [len(bone.shape.parts) for bone in scene.bones])
-        self._geoms = [np.flatnonzero(owner == doll) for doll in range(len(scene.dolls))]
-        reach = np.zeros(len(scene.bones))
-        np.maximum.at(reach, system.tree['bone'][system.geoms['bone']], system.geoms['reach'])
+    def __init__(self, scene: Scene, reach: np.ndarray) -> None:
+        self._first = np.array([own.start for own in scene.bone_slices])
+        self._counts = np.diff([*self._first, len(scene.bones)])
         self._reach = reach
-        self.forget()
 
-    def forget(self) -> None:
-        """Make the list anew next time."""
-        self._spare = -1.0
-
-    def update(self, state: State, duration: float) -> np.ndarray | None:
-        """Pairs (p, 2) of geoms of different dolls that may meet within ``duration`` s; None: those
-        that were given last.
+    def couples(self, rows: np.ndarray, ahead: float, moving: np.ndarray) -> np.ndarray:
+        """Pairs (k, 2) of dolls that may touch within ``ahead`` s, in order, one of each at least
+        ``moving`` (d,); ``rows`` (n, 13) of all bones.
         """
-        centres = np.array([state.positions[own].mean(axis=0) for own in self._own])
-        speeds = np.linalg.norm(state.linear_velocities, axis=1) + self._reach * np.linalg.norm(
-            state.angular_velocities, axis=1)
-        radii = np.array([
-            (np.linalg.norm(state.positions[own] - centre, axis=1) + self._reach[own]).max()
-            for own, centre in zip(self._own, centres, strict=True)])
-        fastest = np.array([speeds[own].max() for own in self._own])
-        if self._spare >= 0:
-            moved = np.linalg.norm(centres - self._centres, axis=1) + radii - self._radii
-            if (moved + fastest * duration < self._margins).all():
-                return None
-        margins = fastest * max(AHEAD, 2 * duration) + SPARE
-        self._spare, self._centres, self._radii, self._margins = 1.0, centres, radii, margins
-        wide = radii + margins
-        apart = np.linalg.norm(centres[:, None] - centres[None], axis=2)
-        near = np.argwhere(np.triu(apart < wide[:, None] + wide[None], 1))
-        return np.array([(a, b) for one, other in near for a in self._geoms[one]
-                         for b in self._geoms[other]], np.int64).reshape(-1, 2)
+        centres = np.add.reduceat(rows[:, :3], self._first) / self._counts[:, None]
+        away = rows[:, :3] - np.repeat(centres, self._counts, axis=0)
+        radii = np.maximum.reduceat(_length(away) + self._reach, self._first)
+        speeds = np.maximum.reduceat(
+            _length(rows[:, 7:10]) + self._reach * _length(rows[:, 10:13]), self._first)
+        wide = radii + 2 * speeds * ahead + SPARE / 2
+        order = np.argsort(centres[:, 0], kind='stable')
+        x, size = centres[order, 0], wide[order]
+        ends = np.searchsorted(x, x + size + size.max(), side='right')
+        counts = ends - np.arange(len(x)) - 1
+        one = np.repeat(np.arange(len(x)), counts)
+        other = one + 1 + np.arange(len(one)) - np.repeat(np.cumsum(counts) - counts, counts)
+        a, b = order[one], order[other]
+        near = (_length(centres[a] - centres[b]) < wide[a] + wide[b]) & (moving[a] | moving[b])
+        found = np.sort(np.stack([a[near], b[near]], axis=1), axis=1)
+        return found[np.lexsort((found[:, 1], found[:, 0]))]
+
+
+def _length(vectors: np.ndarray) -> np.ndarray:
+    return np.sqrt((vectors * vectors).sum(axis=-1))

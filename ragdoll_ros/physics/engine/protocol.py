@@ -104,8 +104,11 @@ class Engine(Protocol):
     layout: DofLayout
     accuracy: Accuracy
     """May be changed between ticks."""
+    resting: np.ndarray
+    """(d,) dolls that stand until something pushes, grabs or comes near them."""
 
-    def __init__(self, scene: Scene, accuracy: Accuracy) -> None: ...
+    def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
+        """``workers``: threads that it may use; what comes of it is the same to the bit."""
 
     @property
     def state(self) -> State:
@@ -119,6 +122,10 @@ class Engine(Protocol):
     def motion(self) -> Motion:
         """Sums over each doll now."""
 
+    @property
+    def groups(self) -> np.ndarray:
+        """Number (d,) of what each doll goes on with: dolls of one number fall asleep together."""
+
     def place(self, coordinates: GeneralizedState) -> None:
         """Put all dolls there and begin: nothing has been gained or lost yet.
 
@@ -131,11 +138,13 @@ class Engine(Protocol):
         of hands.
         """
 
-    def stop(self) -> None:
-        """Bring all to rest where it is; the energy that is left is lost for good."""
+    def stop(self, dolls: np.ndarray) -> None:
+        """Bring dolls (d,), whole groups, to rest where they are; the energy that is left is lost
+        for good.
+        """
 
-    def grounded(self) -> bool:
-        """Whether anything rests on the ground."""
+    def grounded(self) -> np.ndarray:
+        """Which dolls (d,) rest on the ground."""
 
     def contacts(self) -> list[Contact]:
         """What touches now."""

@@ -6,8 +6,6 @@ and what is told of it.
 from __future__ import annotations
 
 import dataclasses
-import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,57 +14,37 @@ from ...model.coordinates import DofLayout, GeneralizedState
 from ...model.scene import Scene
 from ...model.state import State
 from ..ground_heights import ground_heights
-from ..kernels.bundle import bind
-from ..kernels.loaded import advance as kernels
-from ..kernels.system import CONTACT, DOLL, OUTSIDE, WITHIN, Course, make_course, make_room
-from ..motion import Motion, damping_rate
+from ..kernels.system import OUTSIDE, WITHIN
+from ..motion import Motion
 from ..settings import Accuracy
-from ..system import pairs_between, system_of
+from .clusters import NO_HANDS, NO_LOADS, Cluster, Clusters
 from .neighbours import Neighbours
 from .protocol import GROUND, Contact, Spring, Springs, Wrenches, pressed
-
-STIFFEST = 1000.0
-"""1/s at which joint damping may end a motion for it to be flown; above, steps take it
-implicitly."""
-
-MOST_CONTACTS = 400
-"""Contacts at a time; those beyond are counted and left out."""
 
 FINER = 0.25
 """Share of the step by which the last stretch is gone again to tell its error."""
 
-CONTACTS_OF_GEOM = 12
-"""Contacts for which there is room, for each part of a bone."""
+AHEAD = 0.05
+"""s that clusters are made for: those that may touch so soon go on together."""
 
-NO_HANDS = np.empty((0, 18))
-NO_LOADS = np.empty((0, 11))
-
-
-@dataclass
-class _Snapshot:
-    """All that the next stretch depends on."""
-
-    course: Course
-    start_energy: float
+KEPT = 10
+"""Stretches for which clusters are kept, unless others come near."""
 
 
 class RigidEngine:
     """An Engine by the rigid core; see Engine."""
 
-    def __init__(self, scene: Scene, accuracy: Accuracy) -> None:
+    def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
         self.scene, self.accuracy = scene, accuracy
         self.layout = DofLayout([placement.doll for placement in scene.dolls])
-        self._whole = self._system = system_of(scene)
-        self._neighbours = Neighbours(scene, self._whole)
-        self._flies = damping_rate(scene) < STIFFEST
+        self._clusters = Clusters(scene, self.layout, workers)
+        self._neighbours = Neighbours(scene, self._clusters.reach())
         self._spins = self.layout.root_spins
-        self._longest = math.inf
-        """s that a path of flight may be long, as far as neighbours are known."""
-        self._course = make_course(self._whole)
-        self._designed = np.full(len(self._whole.pairs), WITHIN)
+        self.resting = np.zeros(len(scene.dolls), bool)
+        self._designed = [np.full(len(own), WITHIN) for own in self._clusters.flags(WITHIN)]
         """Pairs that are within each other as bound: they are left so until they come apart."""
         self.place(self._placed())
-        self._designed = self._course.within & WITHIN
+        self._designed = self._clusters.flags(WITHIN)
 
     @property
     def state(self) -> State:
@@ -76,7 +54,7 @@ class RigidEngine:
     @property
     def coordinates(self) -> GeneralizedState:
         """Generalised coordinates and velocities of all dolls now."""
-        q, v = self._course.q.copy(), self._course.v.copy()
+        q, v = self._clusters.q.copy(), self._clusters.v.copy()
         v[self._spins] = rotation.rotate(q[self.layout.root_orientations], v[self._spins])
         return GeneralizedState(q, v)
 
@@ -85,57 +63,70 @@ class RigidEngine:
         """Sums over each doll now."""
         return self._motion
 
+    @property
+    def groups(self) -> np.ndarray:
+        """Number (d,) of what each doll goes on with: dolls of one number fall asleep together."""
+        return self._clusters.of_doll
+
     def place(self, coordinates: GeneralizedState) -> None:
         """Put all dolls there and begin; see Engine."""
-        q, v = self._course.q, self._course.v
+        clusters, q, v = self._clusters, self._clusters.q, self._clusters.v
         q[:], v[:] = coordinates.q, coordinates.v
         turns = rotation.inverse(q[self.layout.root_orientations])
         v[self._spins] = rotation.rotate(turns, v[self._spins])
-        self._leave_path()
-        self._course.tally[:] = 0
-        self._use(self._whole)
+        clusters.tally[:] = 0
+        clusters.begin()
+        self.resting[:] = False
         self._look()
         self._lift_out()
-        self._course.within[:] = self._designed | OUTSIDE
+        clusters.within([own | OUTSIDE for own in self._designed])
         self._look()
-        self._neighbours.forget()
+        self._age = KEPT
         self._start_energy = float(self.motion.energy.sum())
         self._departure = None
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = ()) -> None:
         """Go on by ``duration`` s; see Engine."""
-        self._departure = (self._course.q.copy(), self._course.v.copy(), duration, wrenches,
-                           springs)
+        clusters = self._clusters
+        self._departure = clusters.q.copy(), clusters.v.copy(), duration, wrenches, springs
+        for acts in (*wrenches, *springs):
+            self.resting[self.scene.doll_of_bone[acts.bone]] = False
         self._meet(duration)
-        if wrenches or springs:
-            self._leave_path()
         self._go(duration, wrenches, springs, self.accuracy)
-        if wrenches or springs:
-            self._leave_path()
 
-    def stop(self) -> None:
-        """Bring all to rest where it is; the energy that is left is lost for good."""
-        self._course.v[:] = 0.0
-        self._leave_path()
+    def stop(self, dolls: np.ndarray) -> None:
+        """Bring dolls (d,) to rest where they are; the energy that is left is lost for good."""
+        for cluster in self._clusters:
+            if dolls[cluster.dolls].any():
+                self._clusters.v[cluster.v] = 0.0
+                cluster.course.v[:] = 0.0
+                cluster.course.path[:] = 0
+                self.resting[cluster.dolls] = True
         self._departure = None
         self._look()
 
-    def grounded(self) -> bool:
-        """Whether anything rests on the ground."""
-        now = self._contacts
-        return bool(((now['kind'] > 1) & (now['b'] < 0) & (now['impulse'][:, 0] > 0)).any())
+    def grounded(self) -> np.ndarray:
+        """Which dolls (d,) rest on the ground."""
+        found = np.zeros(len(self.scene.dolls), bool)
+        for cluster, now in self._touching():
+            on = now[(now['kind'] > 1) & (now['b'] < 0) & (now['impulse'][:, 0] > 0)]
+            found[cluster.dolls[cluster.system.doll_of[on['a']]]] = True
+        return found
 
     def contacts(self) -> list[Contact]:
         """What touches now."""
-        bones, lasted = self._system.tree['bone'], self._course.tally['lasted'][0] or 1.0
-        return [Contact(int(bones[c['a']]), int(bones[c['b']]) if c['b'] >= 0 else GROUND,
-                        c['point'].copy(), c['normal'].copy(), -float(c['gap']),
-                        float(c['impulse'][0]) / lasted)
-                for c in self._contacts if c['kind'] > 1]
+        made = []
+        for cluster, now in self._touching():
+            bones = cluster.bones[cluster.system.tree['bone']]
+            lasted = cluster.course.tally['lasted'][0] or 1.0
+            made += [Contact(int(bones[c['a']]), int(bones[c['b']]) if c['b'] >= 0 else GROUND,
+                             c['point'].copy(), c['normal'].copy(), -float(c['gap']),
+                             float(c['impulse'][0]) / lasted) for c in now if c['kind'] > 1]
+        return made
 
     def measures(self) -> dict[str, float]:
         """What went wrong since the start, and what was done: names end in their units."""
-        tally = self._course.tally[0]
+        tally = self._clusters.totals()
         pushed, handed = float(tally['pushed']), float(tally['handed'])
         energy = float(self.motion.energy.sum())
         return {
@@ -148,16 +139,14 @@ class RigidEngine:
 
     def save(self) -> object:
         """A snapshot that restore brings back to the bit."""
-        return _Snapshot(Course(*(part.copy() for part in self._course)), self._start_energy)
+        return self._clusters.save(), self.resting.copy(), self._age, self._start_energy
 
-    def restore(self, snapshot: _Snapshot) -> None:
+    def restore(self, snapshot: tuple) -> None:
         """Go back to a snapshot."""
-        self._use(self._whole)
-        self._put(snapshot.course)
-        self._start_energy = snapshot.start_energy
+        kept, self.resting[:], self._age, self._start_energy = snapshot
+        self._clusters.restore(kept)
         self._departure = None
-        self._neighbours.forget()
-        self._look()
+        self._show()
 
     def forget(self, snapshot: object) -> None:
         """Nothing to release: the memory goes with the object."""
@@ -165,79 +154,87 @@ class RigidEngine:
     def close(self) -> None:
         """Nothing to release: the memory goes with the object."""
 
-    @property
-    def _contacts(self) -> np.ndarray:
-        """Contacts of the last step; none in flight."""
-        course = self._course
-        return course.known[:0 if course.path['valid'][0] else int(course.tally['contacts'][0])]
+    def _touching(self) -> list[tuple[Cluster, np.ndarray]]:
+        """Contacts of each cluster's last step; none in flight."""
+        found = []
+        for cluster in self._clusters:
+            count = int(cluster.course.tally['contacts'][0])
+            if count and not cluster.course.path['valid'][0]:
+                found.append((cluster, cluster.course.known[:count]))
+        return found
 
-    def _leave_path(self) -> None:
-        """The next flight begins anew."""
-        self._course.path[:] = 0
-
-    def _put(self, course: Course) -> None:
-        """Go on from there; what is known of contacts may be of fewer of them."""
-        for own, other in zip(self._course[:-1], course[:-1], strict=True):
-            own[:] = other
-        count = min(len(course.known), len(self._course.known))
-        self._course.known[:count] = course.known[:count]
+    def _meet(self, duration: float) -> None:
+        """See that those go on together who may touch within ``duration`` s; they wake."""
+        if len(self.scene.dolls) == 1:
+            return
+        rows, groups = self._clusters.rows, self._clusters.of_doll
+        near = self._neighbours.couples(rows, duration, ~self.resting)
+        self._age += 1
+        if self._age <= KEPT and (groups[near[:, 0]] == groups[near[:, 1]]).all():
+            return
+        while True:
+            near = self._neighbours.couples(rows, max(duration, AHEAD), ~self.resting)
+            if not self.resting[near].any():
+                break
+            self.resting[near] = False
+        self._clusters.group(near)
+        self._age = 0
 
     def _go(self, duration: float, wrenches: Wrenches, springs: Springs,
             accuracy: Accuracy) -> None:
-        rows, sums = np.empty((len(self.scene.bones), 13)), np.empty(len(self.scene.dolls), DOLL)
-        kernels.advance(*self._addresses, duration, _loads(wrenches), self._hands(springs),
-                        accuracy.step, accuracy.flight_error, self._flies and not springs,
-                        self._longest, rows, sums)
-        self._state, self._motion = State.of(rows), Motion.of(sums.view(float).reshape(-1, 20))
+        """Take all clusters on that do not rest."""
+        acted = self._act(wrenches, springs) if wrenches or springs else ()
+        self._clusters.advance(duration, accuracy, self.resting)
+        for cluster in acted:
+            cluster.use(NO_LOADS, NO_HANDS)
+            cluster.course.path[:] = 0
+        self._show()
 
-    def _hands(self, springs: Springs) -> np.ndarray:
-        """Springs as a table (m, 18) for compiled code, the last four its own."""
-        if not springs:
-            return NO_HANDS
-        bones = self._system.tree['bone'].tolist()
-        return np.array([_hand(bones.index(spring.bone), spring) for spring in springs])
+    def _show(self) -> None:
+        """The state and the sums that all have come to."""
+        self._state = State.of(self._clusters.rows.copy())
+        self._motion = Motion.of(self._clusters.sums.view(float).reshape(-1, 20).copy())
 
-    def _meet(self, duration: float) -> None:
-        """See that all geoms of two dolls that may meet within ``duration`` s are paired."""
-        self._longest = math.inf
-        if len(self.scene.dolls) > 1:
-            couples = self._neighbours.update(self.state, duration)
-            if couples is not None:
-                pairs = np.concatenate([self._whole.pairs,
-                                        pairs_between(self.scene, self._whole.geoms, couples)])
-                self._use(self._system._replace(pairs=pairs))
-                self._leave_path()
-            self._longest = duration
-
-    def _use(self, system: object) -> None:
-        """Work with these tables from now on; contacts are found anew."""
-        self._system = system
-        contacts = min(MOST_CONTACTS, CONTACTS_OF_GEOM * len(system.geoms) + len(system.bounds))
-        self._course = self._course._replace(known=np.zeros(contacts, CONTACT))
-        self._course.tally['contacts'] = 0
-        self._room = make_room(system, self._course)
-        self._rows = [bind(part) for part in (system, self._room, self._course)]
-        self._addresses = [rows[0].ctypes.data for rows in self._rows]
+    def _act(self, wrenches: Wrenches, springs: Springs) -> list[Cluster]:
+        """Enter what acts where it acts; the clusters concerned, whose flights begin anew."""
+        acts: dict[int, tuple[list, list]] = {}
+        for kind, given in enumerate((wrenches, springs)):
+            for one in given:
+                place = int(self._clusters.of_doll[self.scene.doll_of_bone[one.bone]])
+                acts.setdefault(place, ([], []))[kind].append(one)
+        acted = []
+        for place, (loads, hands) in acts.items():
+            cluster = self._clusters.members[place]
+            bones = cluster.bones.tolist()
+            records = cluster.system.tree['bone'].tolist()
+            cluster.use(_loads(loads, bones), np.array([
+                _hand(records.index(bones.index(spring.bone)), spring) for spring in hands])
+                if hands else NO_HANDS)
+            cluster.course.path[:] = 0
+            acted.append(cluster)
+        return acted
 
     def _look(self) -> None:
         """See where all is."""
-        self._go(0.0, (), (), self.accuracy)
+        self._clusters.advance(0.0, self.accuracy, np.zeros(len(self.resting), bool))
+        self._show()
 
     def _lift_out(self) -> None:
         """Set dolls that are in the ground onto it."""
-        heights = ground_heights(self.scene, self.state)
-        for doll, own in enumerate(self.scene.bone_slices):
-            depth = -heights[own].min()
-            if depth > pressed(self.scene):
-                at = self.layout.root_positions[doll]
-                self._course.q[at] += depth * np.array(self.scene.ground.normal)
+        if self.scene.ground is None:
+            return
+        depths = -np.minimum.reduceat(ground_heights(self.scene, self.state),
+                                      [own.start for own in self.scene.bone_slices])
+        for doll in np.flatnonzero(depths > pressed(self.scene)):
+            at = self.layout.root_positions[doll]
+            self._clusters.q[at] += depths[doll] * np.array(self.scene.ground.normal)
 
     def _placed(self) -> GeneralizedState:
         """Where the scene's placements stand."""
         q, v = np.zeros(self.layout.sizes[0]), np.zeros(self.layout.sizes[1])
-        for bone in self._whole.tree:
-            if bone['free'] and bone['parent'] >= 0:
-                q[bone['q'] + 3] = 1.0
+        for cluster in self._clusters:
+            balls = cluster.system.tree[cluster.system.tree['free'] > 0]
+            q[cluster.q[balls['q'][balls['parent'] >= 0] + 3]] = 1.0
         for doll, placement in enumerate(self.scene.dolls):
             pose = placement.bone_pose(placement.doll.root)
             q[self.layout.root_positions[doll]] = pose.position
@@ -258,24 +255,24 @@ class RigidEngine:
         finer = dataclasses.replace(self.accuracy, step=FINER * self.accuracy.step,
                                     flight_error=self.accuracy.flight_error / 100)
         here, there = self.save(), self.state.positions
-        self._course.q[:], self._course.v[:] = q, v
-        self._leave_path()
-        self._course.tally['contacts'] = 0
+        clusters = self._clusters
+        clusters.q[:], clusters.v[:] = q, v
+        clusters.gather()
+        clusters.forget()
         self._go(duration, wrenches, springs, finer)
         missed = np.linalg.norm(self.state.positions - there, axis=1).max()
-        self._put(here.course)
-        self._look()
+        departure = self._departure
+        self.restore(here)
+        self._departure = departure
         return float(missed / (1 - FINER ** 2))
 
 
-def _loads(wrenches: Wrenches) -> np.ndarray:
-    """Wrenches as a table (m, 11) for compiled code."""
-    if not wrenches:
-        return NO_LOADS
-    rows = np.empty((len(wrenches), 11))
+def _loads(wrenches: Wrenches, bones: list[int]) -> np.ndarray:
+    """Wrenches as a table (m, 11) for compiled code, on bones of a cluster."""
+    rows = np.zeros((len(wrenches), 11))
     for row, load in zip(rows, wrenches, strict=True):
         row[0], row[1:4], row[4:7], row[7:10], row[10] = (
-            load.bone, load.force, load.torque, load.point, load.local)
+            bones.index(load.bone), load.force, load.torque, load.point, load.local)
     return rows
 
 

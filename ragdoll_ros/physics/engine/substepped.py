@@ -30,16 +30,18 @@ LEAST_SHARE = 0.01
 class SubsteppedEngine(ABC):
     """An Engine but for its library: how that steps, reads, places and tells what touches.
 
-    A stretch is some substeps under loads that are taken to be steady.
+    A stretch is some substeps under loads that are taken to be steady. One thread takes all of
+    them, however many ``workers`` there may be.
     """
 
     lags = True
     """Whether a substep moves all by the velocity at its end (semi-implicit Euler)."""
 
-    def __init__(self, scene: Scene, accuracy: Accuracy) -> None:
+    def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
         self.scene, self.accuracy = scene, accuracy
         self.layout = DofLayout([placement.doll for placement in scene.dolls])
         self._sums = DollSums(scene)
+        self.resting = np.zeros(len(scene.dolls), bool)
         self._taken = 0
         """Substeps that the last advance took."""
         self._changed()
@@ -65,8 +67,14 @@ class SubsteppedEngine(ABC):
             self._motion = self._sums.motion(self.state)
         return self._motion
 
+    @property
+    def groups(self) -> np.ndarray:
+        """Zeros (d,): all dolls go on together."""
+        return np.zeros(len(self.resting), np.int64)
+
     def place(self, coordinates: GeneralizedState) -> None:
         """Put all dolls there and begin; see Engine."""
+        self.resting[:] = False
         self._put(coordinates)
         self._lift_out()
         self._exclude_overlaps()
@@ -76,6 +84,7 @@ class SubsteppedEngine(ABC):
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = ()) -> None:
         """Go on by ``duration`` s; see Engine."""
+        self.resting[:] = False
         self._taken, least, left = 0, LEAST_SHARE * duration, duration
         while left > 1e-12 * duration:
             longest = max(least, min(left, *self._steady(wrenches, springs)))
@@ -84,16 +93,17 @@ class SubsteppedEngine(ABC):
             springs = [spring.after(length) for spring in springs]
             left -= length
 
-    def stop(self) -> None:
+    def stop(self, dolls: np.ndarray) -> None:
         """Bring all to rest where it is; the energy that is left is lost for good."""
+        self.resting[:] = True
         here = self.coordinates
         self._put(GeneralizedState(here.q, np.zeros_like(here.v)))
         self._account.lower(self.motion.energy)
         self._taken = 0
 
-    def grounded(self) -> bool:
-        """Whether anything touches the ground."""
-        return any(GROUND in pair for pair in self._touched())
+    def grounded(self) -> np.ndarray:
+        """Whether anything touches the ground, for all dolls (d,) the same."""
+        return np.full(len(self.resting), any(GROUND in pair for pair in self._touched()))
 
     def measures(self) -> dict[str, float]:
         """What the account says, and the substeps that the last advance took."""
@@ -106,6 +116,7 @@ class SubsteppedEngine(ABC):
     def restore(self, snapshot: object) -> None:
         """Go back to a snapshot."""
         held, account = snapshot
+        self.resting[:] = False
         self._restore(held)
         self._account, self._taken = account.copy(), 0
         self._changed()

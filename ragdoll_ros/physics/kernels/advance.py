@@ -11,7 +11,7 @@ from .dynamics import pose, rates
 from .flight import along, begin_path, find_event, point_velocity, time_free
 from .forces import power
 from .impact import impact
-from .machine import ADDRESS, REAL, TABLE, YES, compiled, entry
+from .machine import JOBS, REAL, compiled, entry
 from .momentum import SMALL, inner_energy, sum_dolls, take_out, total_energy
 from .quaternion import cross, times
 from .step import (
@@ -25,7 +25,7 @@ from .step import (
     jammed,
     settle,
 )
-from .system import COURSE, DOLLS, ROOM, SYSTEM, Course, Room, System
+from .system import COURSE, ROOM, SYSTEM, Course, Room, System
 
 APART = 5e-3
 """m/s or rad/s at which what touches comes apart for a flight: to 1.3 um under gravity, which is
@@ -265,31 +265,27 @@ def observe(s: System, r: Room, q: np.ndarray, v: np.ndarray, rows: np.ndarray) 
             row[10 + k] = move[k]
 
 
-@entry(ADDRESS, ADDRESS, ADDRESS, REAL, TABLE, TABLE, REAL, REAL, YES, REAL, TABLE, DOLLS)
-def advance(system: int, room: int, moving: int, duration: float, loads: np.ndarray,
-            springs: np.ndarray, step: float, tolerance: float, flies: bool, longest: float,
-            rows: np.ndarray, sums: np.ndarray) -> None:
-    """Take the ``course`` on by ``duration`` s, and enter bones' ``rows`` (n, 13) and dolls'
-    ``sums`` (d,) at the end; the first three are addresses of bundles. ``step``: s of a step on
-    the ground; ``tolerance``: m or rad by which a path's end may err; ``flies``: whether damping
-    and springs allow flights; ``longest``: s that a path may be long.
-    """
-    s, r, course = system_at(system), room_at(room), course_at(moving)
+@compiled
+def go_on(s: System, r: Room, course: Course, duration: float, step: float,
+          tolerance: float) -> None:
+    """Take the course of one cluster on by ``duration`` s; see advance()."""
     q, v, path, tally = course.q, course.v, course.path[0], r.tally[0]
-    time, events = 0.0, 0
+    loads, springs, time, events = course.loads, course.springs, 0.0, 0
+    flies = s.flies[0] > 0 and len(springs) == 0
     parted = part_pairs(s, r, q, v)
     if parted:
         path.valid = path.begun = 0
-    if parted or duration == 0.0:
+    if parted or not tally.seen or duration == 0.0:
         look(s, r, q, v, r.gaps, math.inf, r.gaps)
+        tally.seen = 1
     while time < duration - 1e-12:
         left = duration - time
-        if not path.valid and flies and events < MOST_EVENTS and may_fly(
-                s, r, course, loads, step):
-            most = min(left if len(loads) else longest, LONGEST)
-            if begin_path(s, r, course, loads, tolerance, most):
-                find_event(s, r, course)
-                tally.contacts = 0
+        if (not path.valid and flies and events < MOST_EVENTS
+                and may_fly(s, r, course, loads, step)
+                and begin_path(s, r, course, loads, tolerance,
+                               min(left, LONGEST) if len(loads) else LONGEST)):
+            find_event(s, r, course)
+            tally.contacts = 0
         if path.valid:
             gone, touched = fly(s, r, course, left, loads)
             if touched:
@@ -306,5 +302,16 @@ def advance(system: int, room: int, moving: int, duration: float, loads: np.ndar
         if touched:
             impact(s, r, q, v, events < MOST_EVENTS)
             events += 1
-    observe(s, r, q, v, rows)
-    sum_dolls(s, q, r, sums)
+    observe(s, r, q, v, course.rows)
+    sum_dolls(s, q, r, course.sums)
+
+
+@entry(JOBS, REAL, REAL, REAL)
+def advance(jobs: np.ndarray, duration: float, step: float, tolerance: float) -> None:
+    """Take clusters on by ``duration`` s, each by itself, and enter in their courses the rows and
+    sums at the end. ``jobs`` (k, 3): addresses of their bundles, system, room and course. ``step``:
+    s of a step on the ground; ``tolerance``: m or rad by which a path's end may err.
+    """
+    for k in range(len(jobs)):
+        go_on(system_at(jobs[k, 0]), room_at(jobs[k, 1]), course_at(jobs[k, 2]), duration, step,
+              tolerance)

@@ -18,8 +18,8 @@ compiled = numba.njit(error_model='numpy', fastmath=MATH, no_cpython_wrapper=Tru
 inlined = numba.njit(inline='always', error_model='numpy', fastmath=MATH)
 """The same as a part of what calls it: twice as fast for what is called with many arrays."""
 
-REAL, YES, ADDRESS = numba.float64, numba.boolean, numba.int64
-TABLE = REAL[:, ::1]
+REAL, ADDRESS = numba.float64, numba.int64
+JOBS = ADDRESS[:, ::1]
 
 
 def entry(*types: numba.types.Type) -> Callable[[Callable], Callable]:

@@ -46,12 +46,13 @@ began, with the velocities ``start`` along its rows."""
 
 System = collections.namedtuple(
     'System', 'tree gravity up last bone_of root_of doll_of damping geoms pairs bounds normal '
-    'offset bounce_speed doll_masses heft')
+    'offset bounce_speed doll_masses heft flies')
 """A scene: ``tree`` of tree.py; ``up`` (nv,): of each velocity the next one towards the root;
 ``last`` (n,): of each bone the last velocity that moves it; ``bone_of`` (nv,); ``root_of`` (n,):
 the record of its doll's root, ``doll_of`` (n,); ``damping`` (nv,) N m s; ``normal`` (3,) and
 ``offset`` (1,) of the ground, offset -inf: none; ``bounce_speed`` (1,) m/s; ``doll_masses`` (d,);
-``heft`` (1,) J: the weight of all times the largest reach of a geom."""
+``heft`` (1,) J: the weight of all times the largest reach of a geom; ``flies`` (1,): whether
+damping allows flights."""
 
 DOLL = np.dtype([('energy', float), ('kinetic', float), ('centre', float, 3),
                  ('momentum', float, 3), ('angular', float, 3), ('inertia', float, (3, 3))])
@@ -75,27 +76,32 @@ TALLY = np.dtype([
     ('flights', np.int64), ('steps', np.int64), ('impacts', np.int64), ('sweeps', np.int64),
     ('unsolved', np.int64), ('left_out', np.int64), ('stalls', np.int64), ('softened', np.int64),
     ('gains', np.int64), ('contacts', np.int64), ('settled', np.int64), ('lasted', float),
-    ('next', float), ('pushed', float), ('handed', float), ('lifted', float)], align=True)
+    ('next', float), ('pushed', float), ('handed', float), ('lifted', float), ('seen', np.int64)],
+    align=True)
 """What has been done since the start: paths of ``flights``, ``steps``, ``impacts``, ``sweeps``;
 islands that stayed ``unsolved``, contacts ``left_out`` for want of room, searches for a touch that
 came to none (``stalls``), impacts ``softened`` to make no energy, steps that made some all the
 same (``gains``). Of the last step: its ``contacts``, whether it ended without a touch
 (``settled``), how long it ``lasted`` and how long the ``next`` may be, s. Work of pushes and hands
 and what it cost to give deep
-ones back, J."""
+ones back, J. ``seen``: whether the gaps are those of now."""
 
-Course = collections.namedtuple('Course', 'q v dense ends path tally within known')
+Course = collections.namedtuple(
+    'Course', 'q v dense ends path tally within known gaps rows sums loads springs')
 """What is carried on from stretch to stretch: coordinates (nq,) and velocities (nv,), those of
 roots' turning along their own axes; the path of flight, its coefficients ``dense`` (8, nq + nv) and
 rates of change at its ``ends`` (2, nq + nv); ``path`` and ``tally``, one record each; of the first
 pairs why they do not collide: they are WITHIN each other still, as they were at the start, or a
-joint in between is OUTSIDE its limits; the contacts ``known`` from the last step."""
+joint in between is OUTSIDE its
+limits; the contacts ``known`` from the last step; all ``gaps``, m or rad. What comes of a stretch:
+bones' ``rows`` (n, 13) and the dolls' ``sums`` (d,). What acts in it: ``loads`` (m, 11), and
+``springs`` (k, 18) of hands."""
 
 Room = collections.namedtuple(
     'Room', 'work own composite H contacts table at turn gaps later Y support W G p solver '
     'kinds rows mu roll need label vectors states given before after begun count lift tally '
     'within armed stages row')
-"""Scratch of the rigid core, but for ``tally`` and ``within``, which are the course's."""
+"""Scratch of the rigid core, but for ``tally``, ``within`` and ``gaps``, which are the course's."""
 
 WITHIN, OUTSIDE = 1, 2
 
@@ -105,32 +111,40 @@ STICKS = 1e5
 VECTORS, STATES = 8, 6
 
 
-def make_course(system: System) -> Course:
-    """At the origin, at rest, with room for no contact."""
+def make_course(system: System, contacts: int = 0) -> Course:
+    """At the origin, at rest, with room for so many contacts."""
     nv = len(system.up)
     nq = nv + int(system.tree['free'].sum())
     return Course(
         q=np.zeros(nq), v=np.zeros(nv), dense=np.zeros((8, nq + nv)), ends=np.zeros((2, nq + nv)),
         path=np.zeros(1, PATH), tally=np.zeros(1, TALLY),
-        within=np.zeros(len(system.pairs), np.int64), known=np.zeros(0, CONTACT))
+        within=np.zeros(len(system.pairs), np.int64), known=np.zeros(contacts, CONTACT),
+        gaps=np.zeros(count_gaps(system)), rows=np.zeros((len(system.tree), 13)),
+        sums=np.zeros(len(system.doll_masses), DOLL), loads=np.zeros((0, 11)),
+        springs=np.zeros((0, 18)))
+
+
+def count_gaps(system: System) -> int:
+    """Of points above the ground, of joints to both of their limits, and of pairs."""
+    return int(system.geoms['count'].sum()) + 2 * len(system.bounds) + len(system.pairs)
 
 
 def make_room(system: System, course: Course) -> Room:
     """Room for a course of a system, for as many contacts as the course knows at the most."""
     bones, nv = len(system.tree), len(system.up)
     nq = nv + int(system.tree['free'].sum())
-    geoms, dolls = len(system.geoms), int(system.doll_of.max()) + 1
+    geoms, dolls = len(system.geoms), len(system.doll_masses)
     contacts = len(course.known)
     rows = contacts * (5 if max(system.geoms['rolling'].max(initial=0.0),
                                 system.pairs['rolling'].max(initial=0.0)) > 0 else 3)
-    gaps = int(system.geoms['count'].sum()) + 2 * len(system.bounds) + len(system.pairs)
+    gaps = len(course.gaps)
     work = Work(np.zeros((bones, 4)), np.zeros((bones, 3)), np.zeros((bones, 6)),
                 np.zeros((nv, 6)), np.zeros((bones, 6, 6)), np.zeros((bones, 6)),
                 np.zeros((nv, 6)), np.zeros((nv, 8)), np.zeros((3, 3)))
     return Room(
         work=work, own=np.zeros((bones, 6)), composite=np.zeros((bones, 10)),
         H=np.zeros((nv, nv)), contacts=np.zeros(contacts, CONTACT), table=np.zeros((16, 8)),
-        at=np.zeros((geoms, 3)), turn=np.zeros((geoms, 3, 3)), gaps=np.zeros(gaps),
+        at=np.zeros((geoms, 3)), turn=np.zeros((geoms, 3, 3)), gaps=course.gaps,
         later=np.zeros(gaps), Y=np.zeros((rows, nv)),
         support=np.zeros((contacts, min(nv, 2 * depth(system)) + 1), np.int64),
         W=np.zeros(rows * rows), G=np.zeros(rows * rows), p=np.zeros((6, rows)),
@@ -163,7 +177,7 @@ def blank() -> System:
         root_of=np.zeros(1, np.int64), doll_of=np.zeros(1, np.int64), damping=np.zeros(6),
         geoms=np.zeros(1, GEOM), pairs=np.zeros(1, PAIR), bounds=np.zeros(1, BOUND),
         normal=np.zeros(3), offset=np.zeros(1), bounce_speed=np.zeros(1),
-        doll_masses=np.zeros(1), heft=np.zeros(1))
+        doll_masses=np.zeros(1), heft=np.zeros(1), flies=np.zeros(1))
 
 
 SYSTEM = bundle_type(blank())

@@ -1,0 +1,286 @@
+"""Dolls that may touch go on together, each other doll goes its own way."""
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model.coordinates import DofLayout
+from ...model.scene import Scene
+from ..kernels.bundle import bind
+from ..kernels.loaded import advance as kernels
+from ..kernels.system import (
+    DOLL,
+    TALLY,
+    Course,
+    Room,
+    System,
+    make_course,
+    make_room,
+)
+from ..settings import Accuracy
+from ..system import joined, pairs_between, system_of
+
+MOST_CONTACTS = 400
+"""Contacts of a cluster at a time; those beyond are counted and left out."""
+
+CONTACTS_OF_GEOM = 12
+"""Contacts for which there is room, for each part of a bone."""
+
+COUNTS = ('flights', 'steps', 'impacts', 'sweeps', 'unsolved', 'left_out', 'stalls', 'softened',
+          'gains', 'pushed', 'handed', 'lifted')
+"""What of a tally is summed over clusters."""
+
+SHARES = 4
+"""Parts of the work for each thread: who is done early takes one more."""
+
+NO_COUPLES = np.zeros((0, 2), np.int64)
+NO_LOADS = np.zeros((0, 11))
+NO_HANDS = np.zeros((0, 18))
+
+
+@dataclass
+class Cluster:
+    """Some dolls, in the scene's order, and which of them may touch each other: (k, 2)."""
+
+    dolls: np.ndarray
+    couples: np.ndarray
+    bones: np.ndarray
+    """Their places in the scene."""
+    q: np.ndarray
+    v: np.ndarray
+    """Where their coordinates and velocities stand among the scene's."""
+    system: System
+    course: Course
+    rooms: list[Room]
+    bundles: list[list[np.ndarray]]
+    """The rows that bind system, course, and a room for each worker; see bundle.py."""
+
+    def addresses(self, worker: int) -> list[int]:
+        """Of its bundles, for compiled code."""
+        system, course, *rooms = (rows[0].ctypes.data for rows in self.bundles)
+        return [system, rooms[worker % len(rooms)], course]
+
+    def use(self, loads: np.ndarray, springs: np.ndarray) -> None:
+        """What acts on it from now on, as tables for compiled code."""
+        self.course = self.course._replace(loads=loads, springs=springs)
+        self.bundles[1][0][:] = bind(self.course)[0]
+
+
+class Clusters:
+    """All dolls of a scene, in clusters; states and sums of the whole scene."""
+
+    def __init__(self, scene: Scene, layout: DofLayout, workers: int) -> None:
+        self._scene = scene
+        self._systems = _systems(scene)
+        self._q = [np.arange(own.start, own.stop) for own in layout.own_q]
+        self._v = [np.arange(own.start, own.stop) for own in layout.own_v]
+        self._bones = [np.arange(own.start, own.stop) for own in scene.bone_slices]
+        self._rooms: dict[int, list[Room]] = {}
+        self._workers, self._threads = workers, None
+        self.q, self.v = np.zeros(layout.sizes[0]), np.zeros(layout.sizes[1])
+        self.rows, self.sums = np.zeros((len(scene.bones), 13)), np.zeros(len(scene.dolls), DOLL)
+        self.tally = np.zeros(len(scene.dolls), TALLY)
+        """A joined cluster counts where its first doll does."""
+        self._effort = np.zeros(len(scene.dolls), np.int64)
+        self._alone = [self._single(doll) for doll in range(len(scene.dolls))]
+        self.members = list(self._alone)
+        self.of_doll = np.arange(len(scene.dolls))
+        """Which of ``members`` each doll is in."""
+        self._set(self.members)
+
+    def __iter__(self) -> object:
+        return iter(self.members)
+
+    def reach(self) -> np.ndarray:
+        """Reach (n,) m of each bone from its centre of mass."""
+        reach = np.zeros(len(self._scene.bones))
+        for system, bones in zip(self._systems, self._bones, strict=True):
+            np.maximum.at(reach, bones[system.tree['bone'][system.geoms['bone']]],
+                          system.geoms['reach'])
+        return reach
+
+    def group(self, couples: np.ndarray) -> None:
+        """Let those dolls go on together that ``couples`` (k, 2) join, others by themselves."""
+        label = np.arange(len(self._alone))
+        for one, other in couples:
+            low, high = sorted((label[one], label[other]))
+            label[label == high] = low
+        old = {self._key(cluster.dolls, cluster.couples): cluster for cluster in self.members}
+        made = []
+        for first in np.unique(label):
+            dolls = np.flatnonzero(label == first)
+            own = couples[label[couples[:, 0]] == first] if len(couples) else NO_COUPLES
+            cluster = old.pop(self._key(dolls, own), None)
+            made.append(cluster or (self._join(dolls, own) if len(dolls) > 1
+                                    else self._alone[dolls[0]]))
+            if cluster is None:
+                self._begin(made[-1])
+        self._set(made)
+
+    def advance(self, duration: float, accuracy: Accuracy, resting: np.ndarray) -> None:
+        """Take all clusters on by ``duration`` s, but for those of ``resting`` dolls (d,)."""
+        jobs = self._jobs[:, ~resting[self._firsts]] if resting.any() else self._jobs
+        if self._workers == 1 or jobs.shape[1] < 2:
+            kernels.advance(jobs[0], duration, accuracy.step, accuracy.flight_error)
+        else:
+            self._spread_out(jobs, duration, accuracy, resting)
+        for cluster in self._joined:
+            if not resting[cluster.dolls[0]]:
+                self._spread(cluster)
+
+    def gather(self) -> None:
+        """Let joined clusters go on from where the scene's q and v are."""
+        for cluster in self._joined:
+            cluster.course.q[:], cluster.course.v[:] = self.q[cluster.q], self.v[cluster.v]
+
+    def within(self, flags: list[np.ndarray]) -> None:
+        """Enter why pairs of each doll do not collide."""
+        for cluster, own in zip(self._alone, flags, strict=True):
+            cluster.course.within[:] = own
+
+    def flags(self, kind: int) -> list[np.ndarray]:
+        """Those of a kind, WITHIN or OUTSIDE, of each doll's pairs."""
+        return [cluster.course.within & kind for cluster in self._alone]
+
+    def begin(self) -> None:
+        """Let all go on by themselves, nothing known of what is to come."""
+        self._set(list(self._alone))
+        self.forget()
+
+    def forget(self) -> None:
+        """What is known of contacts, gaps and flights is no more true."""
+        for cluster in self.members:
+            self._begin(cluster)
+
+    def totals(self) -> dict[str, float]:
+        """What has been counted since the start."""
+        return {name: self.tally[name].sum() for name in COUNTS}
+
+    def save(self) -> object:
+        """A snapshot that restore() brings back to the bit."""
+        return (self.q.copy(), self.v.copy(), self.rows.copy(), self.sums.copy(),
+                self.tally.copy(), [cluster.course.within.copy() for cluster in self._alone],
+                [(cluster, _copied(cluster.course)) for cluster in self.members])
+
+    def restore(self, snapshot: tuple) -> None:
+        """Go back to a snapshot."""
+        self.q[:], self.v[:], self.rows[:], self.sums[:], self.tally[:] = snapshot[:5]
+        self.within(snapshot[5])
+        self._set([cluster for cluster, _ in snapshot[6]])
+        for cluster, course in snapshot[6]:
+            for name in ('q', 'v', 'dense', 'ends', 'path', 'within', 'gaps', 'rows', 'sums'):
+                getattr(cluster.course, name)[:] = getattr(course, name)
+            cluster.course.known[:len(course.known)] = course.known
+
+    def _key(self, dolls: np.ndarray, couples: np.ndarray) -> tuple:
+        return dolls.tobytes(), couples.tobytes()
+
+    def _set(self, clusters: list[Cluster]) -> None:
+        self.members = clusters
+        for place, cluster in enumerate(clusters):
+            self.of_doll[cluster.dolls] = place
+        self._joined = [cluster for cluster in clusters if len(cluster.dolls) > 1]
+        self._firsts = np.array([cluster.dolls[0] for cluster in clusters])
+        self._jobs = np.array([[cluster.addresses(worker) for cluster in clusters]
+                               for worker in range(self._workers)], np.int64)
+        """(workers, k, 3)"""
+
+    def _spread_out(self, jobs: np.ndarray, duration: float, accuracy: Accuracy,
+                    resting: np.ndarray) -> None:
+        """Let several threads take clusters on: the dearest of the last time first, in turns."""
+        self._threads = self._threads or ThreadPoolExecutor(self._workers - 1, 'clusters')
+        effort = self.tally['steps'] + self.tally['impacts'] + 6 * self.tally['flights']
+        spent, self._effort = effort - self._effort, effort
+        order = np.argsort(-spent[self._firsts[~resting[self._firsts]]], kind='stable')
+        shares = min(len(order), SHARES * self._workers)
+        parts = itertools.count()
+
+        def work(worker: int) -> None:
+            while (part := next(parts)) < shares:
+                kernels.advance(jobs[worker, order[part::shares]], duration, accuracy.step,
+                                accuracy.flight_error)
+
+        others = [self._threads.submit(work, worker) for worker in range(1, self._workers)]
+        work(0)
+        for other in others:
+            other.result()
+
+    def _spread(self, cluster: Cluster) -> None:
+        """Enter what a joined cluster has come to among the scene's."""
+        self.q[cluster.q], self.v[cluster.v] = cluster.course.q, cluster.course.v
+        self.rows[cluster.bones] = cluster.course.rows
+        self.sums[cluster.dolls] = cluster.course.sums
+        at = 0
+        for doll in cluster.dolls:
+            within = self._alone[doll].course.within
+            within[:] = cluster.course.within[at:at + len(within)]
+            at += len(within)
+
+    def _begin(self, cluster: Cluster) -> None:
+        """Nothing is known of its contacts, its gaps and its next flight."""
+        cluster.course.path[:] = 0
+        for name in ('contacts', 'settled', 'lasted', 'next', 'seen'):
+            cluster.course.tally[name] = 0
+
+    def _single(self, doll: int) -> Cluster:
+        """A doll by itself; its state is a part of the scene's, its scratch that of its equals."""
+        system = self._systems[doll]
+        bones, q, v = self._bones[doll], self._q[doll], self._v[doll]
+        course = make_course(system, _contacts(system))._replace(
+            q=self.q[q[0]:q[-1] + 1], v=self.v[v[0]:v[-1] + 1],
+            rows=self.rows[bones[0]:bones[-1] + 1], sums=self.sums[doll:doll + 1],
+            tally=self.tally[doll:doll + 1])
+        if id(system) not in self._rooms:
+            self._rooms[id(system)] = [make_room(system, course) for _ in range(self._workers)]
+        rooms = [room._replace(tally=course.tally, within=course.within, gaps=course.gaps)
+                 for room in self._rooms[id(system)]]
+        return _bound(np.array([doll]), NO_COUPLES, bones, q, v, system, course, rooms)
+
+    def _join(self, dolls: np.ndarray, couples: np.ndarray) -> Cluster:
+        """Several dolls that go on from where they are."""
+        systems = [self._systems[doll] for doll in dolls]
+        bones, q, v = (np.concatenate([parts[doll] for doll in dolls])
+                       for parts in (self._bones, self._q, self._v))
+        firsts = np.cumsum([0, *(len(system.geoms) for system in systems)])
+        place = {int(doll): k for k, doll in enumerate(dolls)}
+        geoms = np.concatenate([
+            np.stack(np.meshgrid(np.arange(firsts[a], firsts[a + 1]),
+                                 np.arange(firsts[b], firsts[b + 1]), indexing='ij'), -1)
+            .reshape(-1, 2) for one, other in couples
+            for a, b in [(place[int(one)], place[int(other)])]])
+        scene = dataclasses.replace(
+            self._scene, dolls=tuple(self._scene.dolls[doll] for doll in dolls))
+        system = joined(systems, pairs_between(scene, None, geoms))
+        alone = [self._alone[doll].course for doll in dolls]
+        course = make_course(system, _contacts(system))._replace(
+            q=self.q[q], v=self.v[v], tally=self.tally[dolls[0]:dolls[0] + 1],
+            within=np.concatenate([course.within for course in alone]))
+        return _bound(dolls, couples, bones, q, v, system, course, [make_room(system, course)])
+
+
+def _bound(*parts: object) -> Cluster:
+    """A cluster of these, its system, course and rooms bound; they live as long as it."""
+    system, course, rooms = parts[-3:]
+    return Cluster(*parts, [bind(part) for part in (system, course, *rooms)])
+
+
+def _systems(scene: Scene) -> list[System]:
+    """The tables of each doll by itself; equal dolls share them."""
+    made: dict[int, System] = {}
+    for placement in scene.dolls:
+        if id(placement.doll) not in made:
+            made[id(placement.doll)] = system_of(dataclasses.replace(scene, dolls=(placement,)))
+    return [made[id(placement.doll)] for placement in scene.dolls]
+
+
+def _contacts(system: System) -> int:
+    return min(MOST_CONTACTS, CONTACTS_OF_GEOM * len(system.geoms) + len(system.bounds))
+
+
+def _copied(course: Course) -> Course:
+    known = course.known[:int(course.tally['contacts'][0])]
+    return Course(*(part.copy() for part in course._replace(known=known)))

@@ -1,0 +1,148 @@
+"""Dolls that may touch go on together, others by themselves; none feels how work is split."""
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+
+import numpy as np
+import pytest
+
+pytest.importorskip('numba', reason='numba is not installed: there is no rigid engine')
+
+from conserved import conserved
+
+from ragdoll_ros import Push, Simulation, load_scene
+from ragdoll_ros.model.scene import Placement
+
+APART = 2.5
+"""m between dolls that never touch."""
+
+
+def field(count, apart=APART, heights=(0.0,), **changed):
+    """The default doll so many times in a row along x."""
+    drop = load_scene('drop')
+    doll = drop.dolls[0].doll
+    return dataclasses.replace(drop, name='field', dolls=tuple(
+        Placement(doll, f'doll_{k}', (apart * k, 0.0, heights[k % len(heights)]))
+        for k in range(count)), **changed)
+
+
+def rows(scene, ticks, workers=1, pushes=()):
+    """States (t, n, 13) of a scene, tick by tick."""
+    with Simulation(scene, engine='rigid', workers=workers) as simulation:
+        for push in pushes:
+            simulation.push(push)
+        return np.array([simulation.advance().rows for _ in range(ticks)])
+
+
+def own(scene, states, doll):
+    """Those of a doll, as if it stood at the origin; x is rounded otherwise there."""
+    part = states[:, scene.bone_slices[doll]].copy()
+    part[..., 0] -= scene.dolls[doll].position[0]
+    return part
+
+
+def test_a_doll_in_a_crowd_that_it_does_not_touch_moves_to_the_bit_as_by_itself():
+    crowd = field(5)
+    lone = dataclasses.replace(crowd, dolls=crowd.dolls[:1])
+    push = Push('doll_3/torso', (0.0, 300.0, 0.0), start=0.3, duration=0.1)
+    many = rows(crowd, 150, pushes=[push])
+    assert (many[:, crowd.bone_slices[0]] == rows(lone, 150)).all()
+    assert own(crowd, many, 2)[:60] == pytest.approx(own(crowd, many, 0)[:60], abs=1e-9)
+    assert np.abs(own(crowd, many, 3) - own(crowd, many, 0)).max() > 0.1, 'the pushed one'
+
+
+def test_states_are_the_same_to_the_bit_for_any_number_of_workers():
+    """Some collide, one is pushed; heights differ, so that they land at different times."""
+    crowd = field(9, 1.3, (0.0, 0.4, 0.1))
+    pushes = [Push('doll_4/torso', (400.0, 0.0, 0.0), start=0.2, duration=0.2)]
+    digests = {hashlib.sha256(rows(crowd, 200, workers, pushes).tobytes()).hexdigest()
+               for workers in (1, 2, 3, 1)}
+    assert len(digests) == 1
+
+
+def test_a_reset_repeats_a_crowd_to_the_bit():
+    crowd = field(4, 1.0, (0.0, 0.5))
+    with Simulation(crowd, engine='rigid') as simulation:
+        runs = []
+        for _ in range(2):
+            runs.append([simulation.advance().rows.tobytes() for _ in range(150)])
+            simulation.reset()
+    assert runs[0] == runs[1]
+
+
+def test_dolls_that_meet_in_the_air_keep_momentum_as_they_meet_and_part():
+    """Two fly at each other at 4 m/s and a third passes by; sums from their definitions."""
+    crowd = field(3, 3.0, gravity=(0.0, 0.0, 0.0), ground=None)
+    thrown = [dataclasses.replace(crowd.dolls[0], velocity=(4.0, 0.1, 0.0)),
+              dataclasses.replace(crowd.dolls[1], velocity=(-4.0, 0.0, 0.1)),
+              dataclasses.replace(crowd.dolls[2], velocity=(0.0, 0.0, 3.0))]
+    crowd = dataclasses.replace(crowd, dolls=tuple(thrown))
+    with Simulation(crowd, engine='rigid') as simulation:
+        def sums():
+            return [conserved(crowd, simulation.state, doll) for doll in range(3)]
+        first, groups = sums(), set()
+        for _ in range(120):
+            simulation.advance()
+            groups.add(tuple(simulation._engine.groups.tolist()))
+        last = sums()
+    total = sum(one.momentum for one in first)
+    assert sum(one.momentum for one in last) == pytest.approx(total, abs=1e-9)
+    assert abs(last[0].momentum[0] - first[0].momentum[0]) > 10, 'they did meet'
+    assert last[2].momentum == pytest.approx(first[2].momentum, abs=1e-9)
+    assert sum(one.energy for one in last) <= sum(one.energy for one in first) * (1 + 1e-9)
+    assert {len(set(labels)) for labels in groups} == {2, 3}, 'together, and by themselves'
+
+
+def test_each_doll_sleeps_and_wakes_by_itself():
+    """A push wakes the pushed one alone, one that is dropped onto a sleeper wakes that alone."""
+    crowd = field(4)
+    high = dataclasses.replace(crowd.dolls[3], position=(APART, 0.0, 3.0))
+    crowd = dataclasses.replace(crowd, dolls=(*crowd.dolls[:3], high))
+    first, second, third, above = crowd.bone_slices
+    with Simulation(crowd, engine='rigid') as simulation:
+        resting = simulation._engine.resting
+
+        def advance_until(met):
+            end = simulation.time + 20e9
+            while not met():
+                simulation.advance()
+                assert simulation.time < end
+
+        simulation.grab('hand', 'doll_3/torso')
+        advance_until(lambda: resting[:3].all())
+        assert not simulation.asleep and not resting[3]
+        here = simulation.state.rows.copy()
+        simulation.push(Push('doll_0/torso', (0.0, 0.0, 900.0), duration=0.05))
+        simulation.advance()
+        assert resting.tolist() == [False, True, True, False]
+        advance_until(lambda: resting[0])
+        assert np.abs(simulation.state.rows[first] - here[first]).max() > 0.01
+        simulation.let_go('hand')
+        advance_until(lambda: not resting[1])
+        now = simulation.state
+        assert now.positions[above, 2].min() - now.positions[second, 2].max() < 1.0
+        advance_until(lambda: simulation.asleep)
+        assert (simulation.state.rows[third] == here[third]).all()
+        assert np.abs(simulation.state.rows[second] - here[second]).max() > 0.01
+
+
+def test_dolls_that_pile_up_do_not_go_through_each_other():
+    """Four dropped onto each other lie higher than one, and no bone is deep in another's."""
+    pytest.importorskip('mujoco')
+    from ragdoll_ros.accuracy.depth import BoneDepth
+    crowd = field(4, 0.0, (0.0, 1.6, 3.2, 4.8))
+    with Simulation(crowd, engine='rigid') as simulation:
+        scales, deepest = BoneDepth(crowd), 0.0
+        for tick in range(500):
+            simulation.advance()
+            if tick % 20 == 0:
+                deepest = max(deepest, scales.depths(
+                    simulation.state.positions, simulation.state.orientations).max())
+        assert simulation.measures()['sinking_m'] < 1e-3
+    assert deepest < 2e-3
+
+
+def test_workers_out_of_range_are_refused():
+    with pytest.raises(ValueError, match='workers'):
+        Simulation(field(1), workers=0)
