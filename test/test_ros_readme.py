@@ -90,7 +90,8 @@ def test_table_has_all_parameters_with_their_defaults(make_node):
 def test_table_has_the_ranges_of_the_parameters(make_node):
     node = make_node()
     for name, _, told, *_ in table('Parameters'):
-        for span in node.describe_parameter(name.strip('`')).floating_point_range:
+        told_by = node.describe_parameter(name.strip('`'))
+        for span in (*told_by.floating_point_range, *told_by.integer_range):
             lower, upper = map(float, told.split(' to '))
             assert (span.from_value, span.to_value) == (lower, upper), name
 

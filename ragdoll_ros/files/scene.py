@@ -8,13 +8,16 @@ import functools
 import re
 from pathlib import Path
 
-from ..model.errors import ModelError
+from ..model.errors import ModelError, OutOfRange
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Ground, Material, Placement, Scene, above_ground
 from . import config, yaml_text
 from .building import any_under, attempt, raise_or_give, read_named
 from .doll import build_doll, doll_data
+from .repeat import repeated
 from .schema import schema_errors
+
+MOST_DOLLS = 1000
 
 
 def load_scene(name: str) -> Scene:
@@ -57,8 +60,11 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
             found += [error.at(where) for error in more]
         if doll is not None and not any_under(found, where):
             fields = {'position', 'orientation', 'velocity', 'spin', 'name'} & set(entry)
-            placements.append(attempt(found, where, Placement, doll,
-                                       **{key: entry[key] for key in fields}))
+            first = attempt(found, where, Placement, doll, **{key: entry[key] for key in fields})
+            placements += repeated(first, entry['repeat']) if first and 'repeat' in entry else [
+                first]
+    if len(placements) > MOST_DOLLS:
+        found.append(OutOfRange('dolls', len(placements), f'at most {MOST_DOLLS} in all'))
     parts = {}
     for key, part in (('ground', Ground), ('material', Material)):
         if isinstance(data.get(key), dict) and not any_under(found, key):

@@ -193,7 +193,7 @@ class RagdollNode(Node):
         if self._prepared is not None:
             self._prepared.close()
         self._prepared = (make_simulation(scene, settings)
-                          if changed & {'scene', 'engine'} else None)
+                          if changed & {'scene', 'engine', 'workers'} else None)
 
     def _apply(self, changed: set[str]) -> None:
         """Carry a change of the settings out."""
@@ -253,7 +253,8 @@ def step_of(settings: Settings) -> float:
 
 def make_simulation(scene: Scene, settings: Settings) -> Simulation:
     """Build the simulation that the settings ask for."""
-    return Simulation(scene, step_of(settings), settings.accuracy, settings.engine)
+    return Simulation(scene, step_of(settings), settings.accuracy, settings.engine,
+                      settings.workers or 'auto')
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -5,7 +5,12 @@ import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -17,6 +22,7 @@ from ..model.ragdoll import WORLD
 from ..model.scene import STEP_RANGE, Scene
 from ..physics.engine.registry import ENGINES, check_engine
 from ..physics.settings import ACCURACIES
+from ..physics.simulation import MOST_WORKERS
 
 
 def _setting(default: object, description: str, span: tuple[float, float] | None = None,
@@ -61,6 +67,9 @@ class Settings:
                              constraints='one of ' + ', '.join(ACCURACIES))
     engine: str = _setting('auto', 'What simulates; another one starts anew',
                            constraints='one of ' + ', '.join(ENGINES))
+    workers: int = _setting(
+        1, 'Threads over which dolls are spread that do not touch, 0: as many as there are cores; '
+        'another number starts anew', (0, MOST_WORKERS))
 
 
 SPECS = {field.name: field for field in fields(Settings)}
@@ -192,6 +201,10 @@ def _descriptor(spec: dataclasses.Field) -> ParameterDescriptor:
     descriptor = ParameterDescriptor(description=spec.metadata['description'],
                                      additional_constraints=spec.metadata['constraints'])
     if spec.metadata['span']:
-        lower, upper = map(float, spec.metadata['span'])
-        descriptor.floating_point_range = [FloatingPointRange(from_value=lower, to_value=upper)]
+        lower, upper = spec.metadata['span']
+        if isinstance(spec.default, int):
+            descriptor.integer_range = [IntegerRange(from_value=lower, to_value=upper, step=1)]
+        else:
+            descriptor.floating_point_range = [
+                FloatingPointRange(from_value=float(lower), to_value=float(upper))]
     return descriptor

@@ -1,0 +1,85 @@
+"""What crowds cost: dolls that fall, lie and sleep, for any number of them and of threads.
+
+Dolls stand 2.5 m apart and do not touch. Take the ratios; the microseconds are this machine's.
+"""
+from __future__ import annotations
+
+import dataclasses
+import math
+import resource
+import time
+
+from ..files.scene import load_scene
+from ..model.push import Push
+from ..model.scene import Placement, Scene
+from .settings import ACCURACIES
+from .simulation import Simulation
+
+NUMBERS = (1, 10, 100, 1000)
+APART = 2.5
+FALL = 2.0
+"""s from the start, in which dolls fall 0.4 m and lie down."""
+
+
+def field(count: int) -> Scene:
+    """The default scene with so many dolls, each turned a little otherwise."""
+    drop, side = load_scene('drop'), math.ceil(math.sqrt(count))
+    doll = drop.dolls[0].doll
+    return dataclasses.replace(drop, name='field', dolls=tuple(
+        Placement(doll, f'doll_{k}', (APART * (k % side), APART * (k // side), 0.0),
+                  spin=(0.1 * math.sin(k), 0.1 * math.cos(k), 0.0)) for k in range(count)))
+
+
+def falling(count: int, accuracy: str, workers: int) -> tuple[float, float]:
+    """CPU and wall in us a doll and tick while so many fall and lie down."""
+    with Simulation(field(count), accuracy=dataclasses.replace(
+            ACCURACIES[accuracy], sleep=False), workers=workers) as simulation:
+        ticks = round(FALL / simulation.step)
+        cpu, wall = time.process_time(), time.perf_counter()
+        for _ in range(ticks):
+            simulation.advance()
+        each = 1e6 / ticks / count
+        return (time.process_time() - cpu) * each, (time.perf_counter() - wall) * each
+
+
+def falls() -> None:
+    """Print what a doll of a crowd costs."""
+    print(f'us a doll and tick of 10 ms over {FALL:g} s of a fall; "real time": dolls whose ticks '
+          'take 10 ms')
+    print(f'{"":22}{"CPU":>10}{"of one":>10}{"2 workers":>12}{"wall ratio":>12}{"real time":>12}')
+    for accuracy in ACCURACIES:
+        alone = falling(1, accuracy, 1)[0]
+        for count in NUMBERS:
+            cpu, wall = falling(count, accuracy, 1)
+            shared = falling(count, accuracy, 2)[1]
+            print(f'{accuracy + f", {count}":22}{cpu:10.1f}{cpu / alone:10.2f}{shared:12.1f}'
+                  f'{wall / shared:12.2f}{1e4 / shared:12.0f}', flush=True)
+
+
+def sleepers() -> None:
+    """Print what those cost that lie still, and what waking one wakes."""
+    print('\nasleep: us a tick of all; set-up in s; memory of the process at the most, MB')
+    for count in NUMBERS:
+        begin = time.perf_counter()
+        with Simulation(field(count)) as simulation:
+            made = time.perf_counter() - begin
+            while not simulation.asleep and simulation.time < 30e9:
+                simulation.advance()
+            begin = time.process_time()
+            for _ in range(1000):
+                simulation.advance()
+            tick = (time.process_time() - begin) * 1e3
+            before = simulation.state.rows
+            simulation.push(Push(simulation.scene.bone_names[0], (0.0, 0.0, 800.0), duration=0.1))
+            for _ in range(10):
+                simulation.advance()
+            moved = (simulation.state.rows != before).any(axis=1)
+            print(f'{count:6} dolls:{tick:8.1f} us,'
+                  f' set up in {made:.2f} s, a push moves '
+                  f'{len(set(simulation.scene.doll_of_bone[moved].tolist()))} doll(s); '
+                  f'{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB', flush=True)
+
+
+if __name__ == '__main__':
+    falls()
+    sleepers()
