@@ -53,7 +53,7 @@ slow: $(COMPILED) ## the tests that take minutes
 
 bench: $(COMPILED) ## cost of a tick and of its parts, of swings and of the page, 2 min
 	@$(BIN)/python -m ragdoll_ros.ros.bench
-	@$(BIN)/python -m ragdoll_ros.physics.bench
+	@$(BIN)/python -m ragdoll_ros.accuracy.crowds
 	@$(BIN)/python -m ragdoll_ros.physics.swing.bench
 	@$(BIN)/python test/page_cost.py
 

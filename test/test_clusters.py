@@ -146,3 +146,28 @@ def test_dolls_that_pile_up_do_not_go_through_each_other():
 def test_workers_out_of_range_are_refused():
     with pytest.raises(ValueError, match='workers'):
         Simulation(field(1), workers=0)
+
+
+def test_dolls_at_the_ends_of_a_row_that_closes_touch_each_other_too():
+    """Three in one cluster, of which the outer two were far apart: the middle one is pulled out
+    from between them, and they meet; momentum is kept, and none goes through the other.
+    """
+    pytest.importorskip('mujoco')
+    from ragdoll_ros.accuracy.depth import BoneDepth
+    crowd = field(3, 1.0, gravity=(0.0, 0.0, 0.0), ground=None)
+    speeds = (1.5, 0.0, 0.0), (0.0, 6.0, 0.0), (-1.5, 0.0, 0.0)
+    crowd = dataclasses.replace(crowd, dolls=tuple(
+        dataclasses.replace(placement, velocity=speed)
+        for placement, speed in zip(crowd.dolls, speeds, strict=True)))
+    scales = BoneDepth(crowd)
+    with Simulation(crowd, engine='rigid') as simulation:
+        first = sum(conserved(crowd, simulation.state, doll).momentum for doll in range(3))
+        start, deepest = conserved(crowd, simulation.state, 0).momentum[0], 0.0
+        for _ in range(120):
+            simulation.advance()
+            deepest = max(deepest, scales.depths(
+                simulation.state.positions, simulation.state.orientations).max())
+        last = [conserved(crowd, simulation.state, doll).momentum for doll in range(3)]
+    assert sum(last) == pytest.approx(first, abs=1e-9)
+    assert last[0][0] < start - 10 and last[1][1] > 100
+    assert deepest < 1e-3

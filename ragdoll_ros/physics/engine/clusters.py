@@ -38,8 +38,6 @@ SHARES = 4
 """Parts of the work for each thread: who is done early takes one more."""
 
 NO_COUPLES = np.zeros((0, 2), np.int64)
-NO_LOADS = np.zeros((0, 11))
-NO_HANDS = np.zeros((0, 18))
 
 
 @dataclass
@@ -64,10 +62,10 @@ class Cluster:
         system, course, *rooms = (rows[0].ctypes.data for rows in self.bundles)
         return [system, rooms[worker % len(rooms)], course]
 
-    def use(self, loads: np.ndarray, springs: np.ndarray) -> None:
-        """What acts on it from now on, as tables for compiled code."""
-        self.course = self.course._replace(loads=loads, springs=springs)
-        self.bundles[1][0][:] = bind(self.course)[0]
+    def use(self, course: Course) -> None:
+        """Go on with this course, of which other arrays act than before."""
+        self.course = course
+        self.bundles[1][0][:] = bind(course)[0]
 
 
 class Clusters:
@@ -102,6 +100,16 @@ class Clusters:
             np.maximum.at(reach, bones[system.tree['bone'][system.geoms['bone']]],
                           system.geoms['reach'])
         return reach
+
+    @property
+    def all_alone(self) -> bool:
+        """Whether each doll goes on by itself."""
+        return not self._joined
+
+    def know(self, couples: np.ndarray) -> bool:
+        """Whether all these (k, 2) are in the couples of the clusters."""
+        return not len(couples) or bool(np.isin(
+            self._numbers(couples), self._known_numbers).all())
 
     def group(self, couples: np.ndarray) -> None:
         """Let those dolls go on together that ``couples`` (k, 2) join, others by themselves."""
@@ -176,6 +184,10 @@ class Clusters:
                 getattr(cluster.course, name)[:] = getattr(course, name)
             cluster.course.known[:len(course.known)] = course.known
 
+    def _numbers(self, couples: np.ndarray) -> np.ndarray:
+        """A number for each couple (k, 2)."""
+        return couples[:, 0] * len(self._alone) + couples[:, 1]
+
     def _key(self, dolls: np.ndarray, couples: np.ndarray) -> tuple:
         return dolls.tobytes(), couples.tobytes()
 
@@ -185,6 +197,8 @@ class Clusters:
             self.of_doll[cluster.dolls] = place
         self._joined = [cluster for cluster in clusters if len(cluster.dolls) > 1]
         self._firsts = np.array([cluster.dolls[0] for cluster in clusters])
+        self._known_numbers = self._numbers(np.concatenate(
+            [NO_COUPLES, *(cluster.couples for cluster in self._joined)]))
         self._jobs = np.array([[cluster.addresses(worker) for cluster in clusters]
                                for worker in range(self._workers)], np.int64)
         """(workers, k, 3)"""

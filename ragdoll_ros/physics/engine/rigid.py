@@ -17,7 +17,7 @@ from ..ground_heights import ground_heights
 from ..kernels.system import OUTSIDE, WITHIN
 from ..motion import Motion
 from ..settings import Accuracy
-from .clusters import NO_HANDS, NO_LOADS, Cluster, Clusters
+from .clusters import Cluster, Clusters
 from .neighbours import Neighbours
 from .protocol import GROUND, Contact, Spring, Springs, Wrenches, pressed
 
@@ -29,6 +29,9 @@ AHEAD = 0.05
 
 KEPT = 10
 """Stretches for which clusters are kept, unless others come near."""
+
+NO_LOADS = np.zeros((0, 11))
+NO_HANDS = np.zeros((0, 18))
 
 
 class RigidEngine:
@@ -167,10 +170,10 @@ class RigidEngine:
         """See that those go on together who may touch within ``duration`` s; they wake."""
         if len(self.scene.dolls) == 1:
             return
-        rows, groups = self._clusters.rows, self._clusters.of_doll
+        rows = self._clusters.rows
         near = self._neighbours.couples(rows, duration, ~self.resting)
         self._age += 1
-        if self._age <= KEPT and (groups[near[:, 0]] == groups[near[:, 1]]).all():
+        if self._clusters.know(near) and (self._age <= KEPT or self._clusters.all_alone):
             return
         while True:
             near = self._neighbours.couples(rows, max(duration, AHEAD), ~self.resting)
@@ -186,7 +189,7 @@ class RigidEngine:
         acted = self._act(wrenches, springs) if wrenches or springs else ()
         self._clusters.advance(duration, accuracy, self.resting)
         for cluster in acted:
-            cluster.use(NO_LOADS, NO_HANDS)
+            cluster.use(cluster.course._replace(loads=NO_LOADS, springs=NO_HANDS))
             cluster.course.path[:] = 0
         self._show()
 
@@ -207,9 +210,9 @@ class RigidEngine:
             cluster = self._clusters.members[place]
             bones = cluster.bones.tolist()
             records = cluster.system.tree['bone'].tolist()
-            cluster.use(_loads(loads, bones), np.array([
+            cluster.use(cluster.course._replace(loads=_loads(loads, bones), springs=np.array([
                 _hand(records.index(bones.index(spring.bone)), spring) for spring in hands])
-                if hands else NO_HANDS)
+                if hands else NO_HANDS))
             cluster.course.path[:] = 0
             acted.append(cluster)
         return acted

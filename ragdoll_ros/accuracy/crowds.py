@@ -1,9 +1,10 @@
-"""What crowds cost: dolls that fall, lie and sleep, for any number of them and of threads.
+"""`python -m ragdoll_ros.accuracy.crowds`: what crowds cost: dolls that fall, lie and sleep, for any number of them and of threads.
 
 Dolls stand 2.5 m apart and do not touch. Take the ratios; the microseconds are this machine's.
 """
 from __future__ import annotations
 
+import argparse
 import dataclasses
 import math
 import resource
@@ -12,8 +13,8 @@ import time
 from ..files.scene import load_scene
 from ..model.push import Push
 from ..model.scene import Placement, Scene
-from .settings import ACCURACIES
-from .simulation import Simulation
+from ..physics.settings import ACCURACIES
+from ..physics.simulation import Simulation
 
 NUMBERS = (1, 10, 100, 1000)
 APART = 2.5
@@ -80,6 +81,14 @@ def sleepers() -> None:
                   f'{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB', flush=True)
 
 
-if __name__ == '__main__':
+def main() -> None:
+    """Print both tables."""
+    argparse.ArgumentParser(
+        prog='python -m ragdoll_ros.accuracy.crowds', description='Print what crowds cost, 3 min.',
+        epilog='example: python -m ragdoll_ros.accuracy.crowds').parse_args()
     falls()
     sleepers()
+
+
+if __name__ == '__main__':
+    main()
