@@ -1,4 +1,4 @@
-"""`python -m ragdoll_ros.accuracy.crowds`: what crowds cost: dolls that fall, lie and sleep, for any number of them and of threads.
+"""`python -m ragdoll_ros.accuracy.crowds`: what dolls cost that fall, lie and sleep, in crowds.
 
 Dolls stand 2.5 m apart and do not touch. Take the ratios; the microseconds are this machine's.
 """
@@ -8,6 +8,7 @@ import argparse
 import dataclasses
 import math
 import resource
+import statistics
 import time
 
 from ..files.scene import load_scene
@@ -22,18 +23,20 @@ FALL = 2.0
 """s from the start, in which dolls fall 0.4 m and lie down."""
 
 
-def field(count: int) -> Scene:
-    """The default scene with so many dolls, each turned a little otherwise."""
+def field(count: int, first: int = 0) -> Scene:
+    """The default scene with so many dolls, each turning a little otherwise, from one on."""
     drop, side = load_scene('drop'), math.ceil(math.sqrt(count))
     doll = drop.dolls[0].doll
     return dataclasses.replace(drop, name='field', dolls=tuple(
         Placement(doll, f'doll_{k}', (APART * (k % side), APART * (k // side), 0.0),
-                  spin=(0.1 * math.sin(k), 0.1 * math.cos(k), 0.0)) for k in range(count)))
+                  spin=(0.1 * math.sin(first + k), 0.1 * math.cos(first + k), 0.0))
+        for k in range(count)))
 
 
-def falling(count: int, accuracy: str, workers: int) -> tuple[float, float]:
-    """CPU and wall in us a doll and tick while so many fall and lie down."""
-    with Simulation(field(count), accuracy=dataclasses.replace(
+def falling(scene: Scene, accuracy: str, workers: int = 1) -> tuple[float, float]:
+    """CPU and wall in us a doll and tick while they fall and lie down."""
+    count = len(scene.dolls)
+    with Simulation(scene, accuracy=dataclasses.replace(
             ACCURACIES[accuracy], sleep=False), workers=workers) as simulation:
         ticks = round(FALL / simulation.step)
         cpu, wall = time.process_time(), time.perf_counter()
@@ -47,12 +50,12 @@ def falls() -> None:
     """Print what a doll of a crowd costs."""
     print(f'us a doll and tick of 10 ms over {FALL:g} s of a fall; "real time": dolls whose ticks '
           'take 10 ms')
-    print(f'{"":22}{"CPU":>10}{"of one":>10}{"2 workers":>12}{"wall ratio":>12}{"real time":>12}')
+    print(f'{"":22}{"CPU":>10}{"of alone":>10}{"2 workers":>12}{"wall ratio":>12}{"real time":>12}')
     for accuracy in ACCURACIES:
-        alone = falling(1, accuracy, 1)[0]
+        alone = statistics.mean(falling(field(1, k), accuracy)[0] for k in range(NUMBERS[1]))
         for count in NUMBERS:
-            cpu, wall = falling(count, accuracy, 1)
-            shared = falling(count, accuracy, 2)[1]
+            cpu, wall = falling(field(count), accuracy)
+            shared = falling(field(count), accuracy, 2)[1]
             print(f'{accuracy + f", {count}":22}{cpu:10.1f}{cpu / alone:10.2f}{shared:12.1f}'
                   f'{wall / shared:12.2f}{1e4 / shared:12.0f}', flush=True)
 

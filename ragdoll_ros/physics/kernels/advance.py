@@ -132,7 +132,7 @@ def fly(s: System, r: Room, course: Course, left: float, loads: np.ndarray) -> t
             along(s.tree, course, path.along + place * gone, q2, v2)
             pose(s.tree, q2, v2, r.work)
             for k in range(len(loads)):
-                r.tally[0].pushed += weight * gone * power(s.tree, r.work, loads[k])
+                r.tally[0].pushed += weight * gone * power(s.tree, r.work, loads[k], False)
     path.along += gone
     along(s.tree, course, path.along, course.q, course.v)
     if path.along < end - 1e-15:
@@ -161,7 +161,7 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
     end_q, end_v, tally = r.states[2], r.vectors[4], r.tally[0]
     length, hit, m = min(h, tally.next) if tally.next > 0 else h, False, 0
     tally.next = 2 * length if 2 * length < step else 0.0
-    begin_step(s, r, course)
+    begin_step(s, r, course, loads)
     held, moving = total_energy(r.before)
     pushed, handed, lifted = tally.pushed, tally.handed, tally.lifted
     for turn in range(TRIES):

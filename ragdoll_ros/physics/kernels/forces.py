@@ -126,13 +126,15 @@ def weaken(s: System, r: Room, q: np.ndarray, v: np.ndarray, free: np.ndarray,
 @compiled
 def enter_work(s: System, r: Room, v: np.ndarray, end_v: np.ndarray, h: float,
                loads: np.ndarray, springs: np.ndarray, since: float) -> None:
-    """Book the work, J, of loads and hands in a step of h s, and their impulses in r.given."""
+    """Book the work, J, of loads and hands in a step of h s, and their impulses in r.given; that of
+    forces along the world's axes is that of reached() alone.
+    """
     middle, mean = r.states[0], r.vectors[0]
     for j in range(len(v)):
         mean[j] = (v[j] + end_v[j]) / 2
     pose(s.tree, middle, mean, r.work)
     for k in range(len(loads)):
-        r.tally[0].pushed += h * power(s.tree, r.work, loads[k])
+        r.tally[0].pushed += h * power(s.tree, r.work, loads[k], loads[k, 10] == 0)
         give_load(s, r, middle, loads[k], h)
     if len(springs):
         root_axes(s.tree, middle, r.work.axes)
@@ -184,12 +186,31 @@ def give_load(s: System, r: Room, q: np.ndarray, load: np.ndarray, h: float) -> 
 
 
 @compiled
-def power(tree: np.ndarray, work: Work, load: np.ndarray) -> float:
-    """Power, W, of a load on what moves as work says."""
+def reached(s: System, r: Room, q: np.ndarray, loads: np.ndarray) -> float:
+    """Sum of F x, J, over forces along the world's axes, x where they act at q: what it grows by is
+    the work of a steady force, whatever the way. Work is posed at q.
+    """
+    total = 0.0
+    for k in range(len(loads)):
+        load = loads[k]
+        if load[10] == 0:
+            i = record_of(s.tree, int(load[0]))
+            x, y, z = spring_point(s.tree[i], r.work, i, load[7:10])
+            root = s.tree[s.root_of[i]].q
+            total += (load[1] * (q[root] + x) + load[2] * (q[root + 1] + y)
+                      + load[3] * (q[root + 2] + z))
+    return total
+
+
+@compiled
+def power(tree: np.ndarray, work: Work, load: np.ndarray, turning: bool) -> float:
+    """Power, W, of a load on what moves as work says; ``turning``: of its torque alone."""
     i = record_of(tree, int(load[0]))
     move = work.moves[i]
     x, y, z = spring_point(tree[i], work, i, load[7:10])
     fx, fy, fz, nx, ny, nz = turned_load(tree[i], work, i, load)
     ux, uy, uz = cross(move[0], move[1], move[2], x, y, z)
+    if turning:
+        fx = fy = fz = 0.0
     return (fx * (move[3] + ux) + fy * (move[4] + uy) + fz * (move[5] + uz)
             + nx * move[0] + ny * move[1] + nz * move[2])

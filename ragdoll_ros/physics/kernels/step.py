@@ -13,7 +13,7 @@ import numpy as np
 
 from .contact import BEYOND, BURIED, TOUCHING, contact_rates, find_contacts, look, place_geoms
 from .dynamics import pose
-from .forces import enter_work, pull, root_q, stiffen, weaken
+from .forces import enter_work, pull, reached, root_q, stiffen, weaken
 from .machine import compiled
 from .mass import (
     bias_forces,
@@ -54,7 +54,7 @@ PAID = 0.005
 
 
 @compiled
-def begin_step(s: System, r: Room, course: Course) -> None:
+def begin_step(s: System, r: Room, course: Course, loads: np.ndarray) -> None:
     """Note what touches as a step begins and how it moves, and the sums over the dolls.
 
     On a curved way the rows at the step's middle see J v as h/2 dJ/dt v where it is zero at the
@@ -63,6 +63,7 @@ def begin_step(s: System, r: Room, course: Course) -> None:
     q, v = course.q, course.v
     pose(s.tree, q, v, r.work)
     sum_dolls(s, q, r, r.before)
+    r.lift[1] = reached(s, r, q, loads)
     place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
     m = find_contacts(s, q, r, r.gaps, TOUCHING)
     for i in range(m):
@@ -239,6 +240,7 @@ def settle(s: System, r: Room, course: Course, h: float, loads: np.ndarray, spri
         keep_momentum(s, r, h, end_q, end_v)
     look(s, r, end_q, end_v, r.gaps, h, r.later)
     sum_dolls(s, end_q, r, r.after)
+    r.tally[0].pushed += reached(s, r, end_q, loads) - r.lift[1]
 
 
 @compiled

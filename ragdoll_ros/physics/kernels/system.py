@@ -153,7 +153,7 @@ def make_room(system: System, course: Course) -> Room:
         need=np.zeros((3, contacts)), label=np.zeros(dolls, np.int64),
         vectors=np.zeros((VECTORS, nv)), states=np.zeros((STATES, nq)),
         given=np.zeros(dolls, GIVEN), before=np.zeros(dolls, DOLL), after=np.zeros(dolls, DOLL),
-        begun=np.zeros(contacts, CONTACT), count=np.zeros(1, np.int64), lift=np.zeros(1),
+        begun=np.zeros(contacts, CONTACT), count=np.zeros(1, np.int64), lift=np.zeros(2),
         tally=course.tally, within=course.within, armed=np.zeros(gaps),
         stages=np.zeros((16, nq + nv)), row=np.zeros(nq + nv))
 
