@@ -16,7 +16,8 @@ from ragdoll_ros.physics.settings import EXACT
 from ragdoll_ros.ros.outputs import LATCHED
 from ragdoll_ros.ros.parameters import SPECS, Settings
 
-RANGES = {name: spec.metadata['span'] for name, spec in SPECS.items() if spec.metadata['span']}
+RANGES = {name: spec.metadata['span'] for name, spec in SPECS.items()
+          if spec.metadata['span'] and isinstance(spec.default, float)}
 
 
 def put(node, **values):
@@ -57,10 +58,23 @@ def test_a_number_may_be_at_its_ends_and_not_beyond(node, name):
     assert node.tally.refused['parameters'] == len(bad)
 
 
+def test_workers_are_a_number_of_threads_or_all_cores(node):
+    for good in (0, 2, 64, 1):
+        assert put(node, workers=good).successful
+        assert node.settings.workers == value(node, 'workers') == good
+        node.tick()
+    for count, bad in enumerate((-1, 65), start=1):
+        result = put(node, workers=bad)
+        assert not result.successful and 'workers' in result.reason
+        assert node.tally.refused['parameters'] == count
+    assert node.settings.workers == 1
+
+
 @pytest.mark.parametrize('name', [*SPECS, 'bone_names'])
 def test_a_wrong_type_is_refused_and_counted(node, name):
     before = value(node, name)
-    wrong = [7, [1.0], [b'x']] + ([1.5] if isinstance(before, str) else ['text'])
+    wrong = [[1.0], [b'x'], *([1.5] if isinstance(before, str | int) else ['text'])]
+    wrong += ['text' if isinstance(before, int) else 7]
     for count, other in enumerate(wrong, start=1):
         result = put(node, **{name: other})
         assert not result.successful and result.reason
