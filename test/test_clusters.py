@@ -171,3 +171,19 @@ def test_dolls_at_the_ends_of_a_row_that_closes_touch_each_other_too():
     assert sum(last) == pytest.approx(first, abs=1e-9)
     assert last[0][0] < start - 10 and last[1][1] > 100
     assert deepest < 1e-3
+
+
+@pytest.mark.parametrize('wait', [1, 6])
+def test_a_push_on_one_of_two_that_sleep_on_each_other_acts_at_once(wait):
+    """On the second in the scene's order, however long ago their cluster was made."""
+    crowd = field(2, 0.0, (0.0, 1.6))
+    with Simulation(crowd, engine='rigid') as simulation:
+        engine, mass = simulation._engine, crowd.dolls[1].doll.mass
+        while not simulation.asleep:
+            simulation.advance()
+            assert simulation.time < 60e9
+        assert len(set(engine.groups.tolist())) == 1, 'they lie on each other'
+        engine._age = wait
+        simulation.push(Push('doll_1/torso', (0.0, 0.0, 30.0 * mass), duration=0.05))
+        simulation.advance()
+        assert conserved(crowd, simulation.state, 1).momentum[2] > 0.1 * mass

@@ -164,6 +164,12 @@ class Clusters:
         for cluster in self.members:
             self._begin(cluster)
 
+    def close(self) -> None:
+        """End the threads."""
+        if self._threads:
+            self._threads.shutdown()
+            self._threads = None
+
     def totals(self) -> dict[str, float]:
         """What has been counted since the start."""
         return {name: self.tally[name].sum() for name in COUNTS}

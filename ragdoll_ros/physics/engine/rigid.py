@@ -93,7 +93,7 @@ class RigidEngine:
         clusters = self._clusters
         self._departure = clusters.q.copy(), clusters.v.copy(), duration, wrenches, springs
         for acts in (*wrenches, *springs):
-            self.resting[self.scene.doll_of_bone[acts.bone]] = False
+            self.resting[self.groups == self.groups[self.scene.doll_of_bone[acts.bone]]] = False
         self._meet(duration)
         self._go(duration, wrenches, springs, self.accuracy)
 
@@ -155,7 +155,8 @@ class RigidEngine:
         """Nothing to release: the memory goes with the object."""
 
     def close(self) -> None:
-        """Nothing to release: the memory goes with the object."""
+        """End the threads."""
+        self._clusters.close()
 
     def _touching(self) -> list[tuple[Cluster, np.ndarray]]:
         """Contacts of each cluster's last step; none in flight."""
@@ -173,7 +174,8 @@ class RigidEngine:
         rows = self._clusters.rows
         near = self._neighbours.couples(rows, duration, ~self.resting)
         self._age += 1
-        if self._clusters.know(near) and (self._age <= KEPT or self._clusters.all_alone):
+        if (self._clusters.know(near) and not self.resting[near].any()
+                and (self._age <= KEPT or self._clusters.all_alone)):
             return
         while True:
             near = self._neighbours.couples(rows, max(duration, AHEAD), ~self.resting)
