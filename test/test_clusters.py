@@ -95,10 +95,14 @@ def test_dolls_that_meet_in_the_air_keep_momentum_as_they_meet_and_part():
 
 
 def test_each_doll_sleeps_and_wakes_by_itself():
-    """A push wakes the pushed one alone, one that is dropped onto a sleeper wakes that alone."""
+    """A push wakes the pushed one alone, one that is dropped onto a sleeper wakes that alone.
+
+    They begin with a spin: even ones come to stand, and stay so.
+    """
     crowd = field(4)
-    high = dataclasses.replace(crowd.dolls[3], position=(APART, 0.0, 3.0))
-    crowd = dataclasses.replace(crowd, dolls=(*crowd.dolls[:3], high))
+    falling = [dataclasses.replace(doll, spin=(0.4, 0.3, 0.0)) for doll in crowd.dolls]
+    high = dataclasses.replace(falling[3], position=(APART, 0.0, 3.0))
+    crowd = dataclasses.replace(crowd, dolls=(*falling[:3], high))
     first, second, third, above = crowd.bone_slices
     with Simulation(crowd, engine='rigid') as simulation:
         resting = simulation._engine.resting

@@ -216,19 +216,21 @@ def test_three_balls_strike_one_after_the_other():
     scene = Scene('row', balls, None, Material(0.0, 0.0, 1.0), gravity=(0, 0, 0))
     places = impacts.balls_in_a_row(0.1, (1, 1, 1), (0, 0.25, 0.5), (2, 0, 0), 1.0,
                                     np.array([0.0, 0.5]))[-1]
-    assert run(scene, 0.5)[-1].positions[:, 0] == pytest.approx(places, abs=1e-10)
+    assert run(scene, 0.5)[-1].positions[:, 0] == pytest.approx(places, abs=1e-9), (
+        'but for the compliance of two impacts, 1e-10 of W, on a way of 1.4 m')
 
 
 @pytest.mark.parametrize('accuracy', ['draft', 'normal', 'exact'])
 def test_a_block_rocks_as_housner_says(accuracy):
     """Nine peaks, seen at ticks, which is good to 1e-3; the first step after each of nine impacts
-    may be off by as much as what touches comes apart at, 5 mm/s of some 0.3 m/s, and draft by more.
+    may be off by as much as what touches comes apart at, 5 mm/s of some 0.3 m/s, and draft by more:
+    1 % is what the report promises.
     """
     size, lean = (0.2, 0.4, 0.8), math.radians(5)
     times = np.arange(0, 3.001, 0.01)
     truth = impacts.peaks(impacts.edge_angle(0.1, 0.4, lean, G, times))
     found = impacts.peaks(pitches(run(on_edge(size, lean), 3.0, accuracy)))
-    assert found[:9] == pytest.approx(truth[:9], rel=0.005)
+    assert found[:9] == pytest.approx(truth[:9], rel=0.01 if accuracy == 'draft' else 0.005)
 
 
 def test_a_disc_that_spins_on_its_face_brakes_evenly():

@@ -24,9 +24,6 @@ from ..kernels.system import (
 from ..settings import Accuracy
 from ..system import joined, pairs_between, system_of
 
-MOST_CONTACTS = 400
-"""Contacts of a cluster at a time; those beyond are counted and left out."""
-
 CONTACTS_OF_GEOM = 12
 """Contacts for which there is room, for each part of a bone."""
 
@@ -298,7 +295,7 @@ def _systems(scene: Scene) -> list[System]:
 
 
 def _contacts(system: System) -> int:
-    return min(MOST_CONTACTS, CONTACTS_OF_GEOM * len(system.geoms) + len(system.bounds))
+    return CONTACTS_OF_GEOM * len(system.geoms) + len(system.bounds)
 
 
 def _copied(course: Course) -> Course:

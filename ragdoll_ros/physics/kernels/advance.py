@@ -34,6 +34,10 @@ what TOUCHING can tell."""
 STILL = 1e-6
 """rad/s, or rad/s^2, at which a joint that leans on its limit does not press on it."""
 
+NOTHING = 1e-9
+"""Share of a doll's weight below which nothing presses on anything: what falls with all its joints
+at their limits presses on them by rounding alone."""
+
 WORTH = 6
 """Steps on the ground that cost as much as one of flight."""
 
@@ -63,6 +67,12 @@ NOISE = 1e-10
 GAIN = 1e-4
 """Share of the kinetic energy that a step may gain."""
 
+MET, MET_TURN = 5e-3, 0.05
+"""m and rad: where touches are not sought, steps are halved, down to the share COARSEST, to keep
+what meets from ending deeper."""
+
+COARSEST = 0.13
+
 MOST_EVENTS = 200
 """Impacts in one stretch: from then on nothing is thrown back, and no instant of a touch sought."""
 
@@ -79,8 +89,10 @@ system_at, room_at, course_at = bundle_at(SYSTEM), bundle_at(ROOM), bundle_at(CO
 def may_fly(s: System, r: Room, course: Course, loads: np.ndarray, step: float) -> bool:
     """Whether all that touches comes apart, and for long enough; r.gaps are those of now."""
     q, v, tally, armed = course.q, course.v, r.tally[0], r.armed
+    g = math.sqrt(s.gravity[0] ** 2 + s.gravity[1] ** 2 + s.gravity[2] ** 2)
+    least = NOTHING * g * s.doll_masses[0] * tally.lasted
     for i in range(tally.contacts):
-        if tally.settled and course.known[i].impulse[0] > 0:
+        if tally.settled and course.known[i].impulse[0] > least:
             return False
     look(s, r, q, v, r.gaps, math.inf, r.gaps)
     m = find_contacts(s, q, r, r.gaps, TOUCHING)
@@ -107,7 +119,6 @@ def may_fly(s: System, r: Room, course: Course, loads: np.ndarray, step: float) 
         pose(s.tree, q, v, r.work)
     if m == 0 or len(s.tree) == len(r.given):
         return True
-    g = math.sqrt(s.gravity[0] ** 2 + s.gravity[1] ** 2 + s.gravity[2] ** 2)
     fast = 0.0
     for k in range(len(s.geoms)):
         move = r.work.moves[s.geoms[k].bone]
@@ -156,12 +167,15 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
 
     r.gaps are those at q, and again at the end. A step that makes much energy, or presses one thing
     deep into another, is too long for what turns: it is gone again, half as long. The little energy
-    that others make is taken out of the motion.
+    that others make is taken out of the motion. Where touches are not to be sought, what meets in
+    the step is held in it, without restitution: it is gone again with that.
     """
     end_q, end_v, tally = r.states[2], r.vectors[4], r.tally[0]
     length, hit, m = min(h, tally.next) if tally.next > 0 else h, False, 0
     tally.next = 2 * length if 2 * length < step else 0.0
     begin_step(s, r, course, loads)
+    take_over(r.met, r.gaps)
+    r.unsought[0] = 0.0 if seek else 1.0
     held, moving = total_energy(r.before)
     pushed, handed, lifted = tally.pushed, tally.handed, tally.lifted
     for turn in range(TRIES):
@@ -173,9 +187,13 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
         gained = now - held - work
         much = tolerated(s, r, m, length, max(moving, speed), work)
         if turn < TRIES - 1 and length > FINEST * step and (
-                not gained - r.lift[0] <= much or sinks(s, r)):
+                not gained - r.lift[0] <= much or sinks(s, r)
+                or not seek and length > COARSEST * step and meets_deep(s, r)):
             length, hit = length / 2, False
             tally.next = length
+            take_over(r.met, r.gaps)
+            continue
+        if not seek and turn < TRIES - 1 and meet(r):
             continue
         share, landed = first_touch(s, r, length)
         hit = seek and (landed or share <= 1)
@@ -195,6 +213,28 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
     take_over(course.v, end_v)
     take_over(r.gaps, r.later)
     return length, hit
+
+
+@compiled
+def meets_deep(s: System, r: Room) -> bool:
+    """Whether something met in the step just gone that would end deep within the other."""
+    bounds = len(r.gaps) - len(s.pairs) - 2 * len(s.bounds)
+    for j in range(len(r.gaps)):
+        most = MET_TURN if bounds <= j < bounds + 2 * len(s.bounds) else MET
+        if r.met[j] > TOUCHING and r.later[j] < -most:
+            return True
+    return False
+
+
+@compiled
+def meet(r: Room) -> bool:
+    """Let what met in the step just gone be of those that touch in it; whether there is any."""
+    some = False
+    for j in range(len(r.met)):
+        if r.met[j] > TOUCHING and r.later[j] < SUNK:
+            r.met[j] = r.later[j]
+            some = True
+    return some
 
 
 @compiled
@@ -271,6 +311,7 @@ def go_on(s: System, r: Room, course: Course, duration: float, step: float,
     """Take the course of one cluster on by ``duration`` s; see advance()."""
     q, v, path, tally = course.q, course.v, course.path[0], r.tally[0]
     loads, springs, time, events = course.loads, course.springs, 0.0, 0
+    most = MOST_EVENTS // len(r.given) ** 3
     flies = s.flies[0] > 0 and len(springs) == 0
     parted = part_pairs(s, r, q, v)
     if parted:
@@ -280,7 +321,7 @@ def go_on(s: System, r: Room, course: Course, duration: float, step: float,
         tally.seen = 1
     while time < duration - 1e-12:
         left = duration - time
-        if (not path.valid and flies and events < MOST_EVENTS
+        if (not path.valid and flies and events < most
                 and may_fly(s, r, course, loads, step)
                 and begin_path(s, r, course, loads, tolerance,
                                min(left, LONGEST) if len(loads) else LONGEST)):
@@ -291,16 +332,17 @@ def go_on(s: System, r: Room, course: Course, duration: float, step: float,
             if touched:
                 look(s, r, q, v, r.gaps, math.inf, r.gaps)
         else:
-            if not flies or events >= MOST_EVENTS:
+            if not flies or events >= most:
                 look(s, r, q, v, r.gaps, math.inf, r.gaps)
             h = left / math.ceil(left / step - 1e-9)
             gone, touched = step_or_touch(s, r, course, h, loads, springs, time, step,
-                                          events < MOST_EVENTS)
+                                          events < most)
             path.begun, path.next = 0, 0.0
         time += gone
         tally.settled = 0 if touched else 1
         if touched:
-            impact(s, r, q, v, events < MOST_EVENTS)
+            r.unsought[0] = 0.0
+            impact(s, r, q, v, events < most)
             events += 1
     observe(s, r, q, v, course.rows)
     sum_dolls(s, q, r, course.sums)

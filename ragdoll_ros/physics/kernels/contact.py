@@ -400,20 +400,19 @@ def sector(tangent: float) -> float:
 @compiled
 def jacobian(s: System, q: np.ndarray, r: Room, c: np.record, index: int, v: np.ndarray,
              free: np.ndarray, b: np.ndarray, was: np.ndarray) -> None:
-    """Rows of a contact into r.Y from c.row on, the velocities that they see, descending, into
-    r.support; its velocities under ``free`` into b, those under v into ``was``.
+    """The velocities that a contact's rows see, descending, into r.support, and the rows' entries
+    for these into r.Y from c.row on; its velocities under ``free`` into b, under v into ``was``.
     """
     row, Y, list_ = c.row, r.Y, r.support[index]
     for k in range(c.kind):
         b[row + k] = was[row + k] = 0.0
     if c.kind == 1:
         j, n = c.a, 0
-        Y[row, j] = c.normal[0]
         b[row], was[row] = c.normal[0] * free[j], c.normal[0] * v[j]
         while j >= 0:
-            list_[n] = j
+            list_[n], Y[row, n] = j, 0.0
             n, j = n + 1, s.up[j]
-        c.support = n
+        Y[row, 0], c.support = c.normal[0], n
         return
     i, k = s.last[c.a], -1
     if c.b >= 0:
@@ -422,23 +421,27 @@ def jacobian(s: System, q: np.ndarray, r: Room, c: np.record, index: int, v: np.
     while i >= 0 or k >= 0:
         j = max(i, k)
         list_[n] = j
-        n += 1
+        for e in range(c.kind):
+            Y[row + e, n] = 0.0
         if i == j:
-            add_column(r.work.axes[j], q, s.tree[s.root_of[c.a]].q, c, 1.0, Y, j)
+            add_column(r.work.axes[j], q, s.tree[s.root_of[c.a]].q, c, 1.0, Y, n)
             i = s.up[i]
         if k == j:
-            add_column(r.work.axes[j], q, s.tree[s.root_of[c.b]].q, c, -1.0, Y, j)
+            add_column(r.work.axes[j], q, s.tree[s.root_of[c.b]].q, c, -1.0, Y, n)
             k = s.up[k]
         for e in range(c.kind):
-            b[row + e] += Y[row + e, j] * free[j]
-            was[row + e] += Y[row + e, j] * v[j]
+            b[row + e] += Y[row + e, n] * free[j]
+            was[row + e] += Y[row + e, n] * v[j]
+        n += 1
     c.support = n
 
 
 @compiled
 def add_column(axis: np.ndarray, q: np.ndarray, at: int, c: np.record, sign: float,
                Y: np.ndarray, j: int) -> None:
-    """Add what a velocity of a bone, whose root stands in q at ``at``, does to a contact's rows."""
+    """Add what a velocity of a bone, whose root stands in q at ``at``, does to column j of a
+    contact's rows.
+    """
     row = c.row
     n, t, w = c.normal, c.across[0], c.across[1]
     x, y, z = cross(axis[0], axis[1], axis[2], c.point[0] - q[at], c.point[1] - q[at + 1],
@@ -455,16 +458,20 @@ def add_column(axis: np.ndarray, q: np.ndarray, at: int, c: np.record, sign: flo
 
 
 @compiled
-def through_factor(up: np.ndarray, H: np.ndarray, Y: np.ndarray, seen: np.ndarray,
-                   c: np.record) -> None:
-    """Put L^-T J^T in place of a contact's rows; ``seen``: the velocities that they see."""
+def through_factor(up: np.ndarray, H: np.ndarray, Y: np.ndarray, seen: np.ndarray, c: np.record,
+                   place: np.ndarray) -> None:
+    """Put L^-T J^T in place of a contact's rows; ``seen``: the velocities that they see; ``place``
+    (nv,): room for where these stand in the rows.
+    """
+    for n in range(c.support):
+        place[seen[n]] = n
     for e in range(c.row, c.row + c.kind):
         for n in range(c.support):
             i = seen[n]
-            Y[e, i] /= H[i, i]
-            f, j = Y[e, i], up[i]
+            Y[e, n] /= H[i, i]
+            f, j = Y[e, n], up[i]
             while j >= 0:
-                Y[e, j] -= H[i, j] * f
+                Y[e, place[j]] -= H[i, j] * f
                 j = up[j]
 
 

@@ -23,13 +23,12 @@ LIMIT, TOUCH, ROLLING = 1, 3, 5
 ALTERNATIONS = 12
 """Turns that a sliding contact takes between its normal and its friction in one sweep."""
 
-NEWTON_STEPS = 12
+NEWTON_STEPS = 40
 """At the most; from the sweeps' end some three are. All are taken in full: on the way the residual
 may grow, as contacts change sides. The best is kept."""
 
-SOFT = 1e-6
-"""Compliance of Newton's rows, as a share of their own W: where several contacts bear what one
-could, W is singular, and this keeps its steps short across what nothing decides."""
+PATIENCE = 3
+"""Steps in which all rows change sides that are on the wrong one, though no fewer come to be."""
 
 ROUNDS = 3
 """Of sweeps, four times as many as in the round before, and of Newton's method."""
@@ -174,16 +173,18 @@ def residual(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarr
 
 @compiled
 def newton_matrix(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
-                  n: int, W: np.ndarray, p: np.ndarray, u: np.ndarray, G: np.ndarray) -> None:
-    """Jacobian of residual(), flat (n * n)."""
+                  n: int, W: np.ndarray, p: np.ndarray, u: np.ndarray, sides: np.ndarray,
+                  G: np.ndarray) -> None:
+    """Jacobian of residual(), flat (n * n), where the rows stand on their ``sides`` (n,)."""
     for c in range(m):
         a = rows[c]
         own = W[a * n + a]
         push = p[a] - u[a] / own
-        active = push > 0
+        active = sides[a] > 0
         for j in range(n):
             G[a * n + j] = W[a * n + j] if active else 0.0
-        G[a * n + a] += SOFT * own if active else own
+        if not active:
+            G[a * n + a] = own
         for k in range(1, kinds[c], 2):
             i = a + k
             own_t = max(W[i * n + i], W[(i + 1) * n + i + 1])
@@ -200,7 +201,6 @@ def newton_matrix(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.
                 elif size <= most or sticks:
                     for j in range(n):
                         G[at + j] = W[at + j]
-                    G[at + i + e] += SOFT * own_t
                 else:
                     y1, z1 = y / size, z / size
                     d = y1 if e == 0 else z1
@@ -285,21 +285,47 @@ def solve_active(G: np.ndarray, n: int, x: np.ndarray, places: np.ndarray) -> bo
 
 
 @compiled
+def change_sides(rows: np.ndarray, m: int, n: int, W: np.ndarray, p: np.ndarray, u: np.ndarray,
+                 sides: np.ndarray, all_: bool) -> int:
+    """Let each normal row that is on the wrong side, pressing (1) or open (0), change it, or only
+    the last of them; how many are.
+    """
+    wrong, last = 0, -1
+    for c in range(m):
+        a = rows[c]
+        if (p[a] - u[a] / W[a * n + a] > 0) != (sides[a] > 0):
+            wrong, last = wrong + 1, a
+            if all_:
+                sides[a] = 1 - sides[a]
+    if wrong and not all_:
+        sides[last] = 1 - sides[last]
+    return wrong
+
+
+@compiled
 def newton(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int, n: int,
            W: np.ndarray, b: np.ndarray, p: np.ndarray, tolerance: float, room: np.ndarray,
            G: np.ndarray) -> float:
-    """Newton's method from p on; p becomes the best found, the largest residual, m/s, is given."""
-    u, phi, way, keep, places = room[0], room[1], room[2], room[3], room[7]
+    """Newton's method from p on; p becomes the best found, the largest residual, m/s, is given.
+
+    Where it turns in circles, one row at a time changes sides until fewer stand wrong, which ends
+    (block principal pivoting: Judice and Pires, Computers and Operations Research 21, 1994).
+    """
+    u, phi, way, keep, sides, places = room[0], room[1], room[2], room[3], room[8], room[7]
     worst = residual(kinds, rows, mu, roll, m, n, W, b, p, u, phi)
-    best = worst
+    best, least, patience = worst, m + 1, PATIENCE
     for i in range(n):
-        keep[i] = p[i]
+        keep[i], sides[i] = p[i], 0.0
+    change_sides(rows, m, n, W, p, u, sides, True)
     for _ in range(NEWTON_STEPS):
         if worst <= tolerance:
             break
-        newton_matrix(kinds, rows, mu, roll, m, n, W, p, u, G)
+        newton_matrix(kinds, rows, mu, roll, m, n, W, p, u, sides, G)
         for i in range(n):
             way[i] = -phi[i]
+        for c in range(m):
+            a = rows[c]
+            way[a] = -u[a] if sides[a] > 0 else -p[a] * W[a * n + a]
         if not solve_active(G, n, way, places):
             break
         total = 0.0
@@ -309,11 +335,19 @@ def newton(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray
             break
         for i in range(n):
             p[i] += way[i]
+        for c in range(m):
+            if sides[rows[c]] == 0.0:
+                p[rows[c]] = 0.0
         worst = residual(kinds, rows, mu, roll, m, n, W, b, p, u, phi)
         if worst < best:
             best = worst
             for i in range(n):
                 keep[i] = p[i]
+        wrong = change_sides(rows, m, n, W, p, u, sides, patience > 0)
+        if wrong < least:
+            least, patience = wrong, PATIENCE
+        else:
+            patience -= 1
     for i in range(n):
         p[i] = keep[i]
     return best

@@ -28,7 +28,7 @@ from .mass import (
 )
 from .momentum import give_contacts, inner_energy, keep_momentum, sum_dolls
 from .quaternion import cross
-from .response import respond
+from .response import OPENING, respond
 from .system import Course, Room, System
 
 STEP_TOLERANCE = 1e-8
@@ -39,9 +39,6 @@ SLOW = 0.02
 by the next step, without restitution, and not sought out."""
 
 SLOW_TURN = 0.1
-
-OPENING = 1e-3
-"""m/s: what comes apart faster as a step begins is not held sideways in it."""
 
 DEEP = 5e-4
 """m into the ground or a bone to which a step may press."""
@@ -86,7 +83,7 @@ def contact_step(s: System, r: Room, course: Course, h: float, loads: np.ndarray
     pose(s.tree, middle, v, r.work)
     move_freely(s, r, v, h, loads, springs, since + h / 2)
     place_geoms(s.tree, s.root_of, s.geoms, r.work, middle, r.at, r.turn)
-    m = find_contacts(s, middle, r, r.gaps, SLOW * h)
+    m = find_contacts(s, middle, r, r.met, SLOW * h)
     if m:
         warm_start(s, r, m, course.known, h)
         respond(s, r, middle, v, free, m, h, STEP_TOLERANCE, change, shift)
@@ -165,28 +162,40 @@ def warm_start(s: System, r: Room, m: int, known: np.ndarray, h: float) -> None:
         pressed += abs(known[j].impulse[0])
     if scale * pressed > jammed(s, r, h):
         scale = 0.0
+    j = k = 0
     for i in range(m):
         c = r.contacts[i]
         for e in range(5):
             c.impulse[e] = 0.0
-        for j in range(tally.contacts):
-            old = known[j]
-            if old.key == c.key:
-                for e in range(5):
-                    c.impulse[e] = scale * old.impulse[e]
-                break
-        c.begun = 0
-        for j in range(r.count[0]):
-            old = r.begun[j]
-            if old.key == c.key:
-                c.begun, c.gap = 1, old.gap
-                for e in range(5):
-                    c.start[e] = old.start[e]
-                if c.kind > 1 and old.start[0] > OPENING:
-                    c.friction = c.rolling = 0.0
-                    for e in range(1, 5):
-                        c.impulse[e] = 0.0
-                break
+        j = find_key(known, tally.contacts, c.key, j)
+        if j < tally.contacts:
+            for e in range(5):
+                c.impulse[e] = scale * known[j].impulse[e]
+        k = find_key(r.begun, r.count[0], c.key, k)
+        c.begun = 1 if k < r.count[0] else 0
+        if c.begun:
+            old = r.begun[k]
+            c.gap = old.gap
+            for e in range(5):
+                c.start[e] = old.start[e]
+            if c.kind > 1 and old.start[0] > OPENING:
+                c.friction = c.rolling = 0.0
+                for e in range(1, 5):
+                    c.impulse[e] = 0.0
+
+
+@compiled
+def find_key(contacts: np.ndarray, count: int, key: int, near: int) -> int:
+    """Where among so many contacts that with the key stands, sought from ``near`` on, as most stand
+    in the same order; ``count``: nowhere.
+    """
+    for n in range(count):
+        j = near + n
+        if j >= count:
+            j -= count
+        if contacts[j].key == key:
+            return j
+    return count
 
 
 @compiled
@@ -267,14 +276,26 @@ def pay(s: System, r: Room, m: int, shift: np.ndarray) -> None:
 
 @compiled
 def keep_limits(s: System, q: np.ndarray, shift: np.ndarray) -> None:
-    """Shorten a ``shift`` (nv,) that would take a joint past a limit that it does not touch."""
-    share = 1.0
+    """Shorten a ``shift`` (nv,) of a doll that would take a joint past a limit that it does not
+    touch.
+    """
+    share, doll = 1.0, -1
     for k in range(len(s.bounds)):
         bound = s.bounds[k]
+        if s.doll_of[s.bone_of[bound.v]] != doll:
+            shorten(s, doll, share, shift)
+            share, doll = 1.0, s.doll_of[s.bone_of[bound.v]]
         way = shift[bound.v]
         room = q[bound.q] - bound.lower if way < 0 else bound.upper - q[bound.q]
         if room > 0 and abs(way) > room + TOUCHING:
             share = min(share, (room + TOUCHING) / abs(way))
+    shorten(s, doll, share, shift)
+
+
+@compiled
+def shorten(s: System, doll: int, share: float, shift: np.ndarray) -> None:
+    """Scale what of a ``shift`` (nv,) is a doll's."""
     if share < 1:
         for j in range(len(shift)):
-            shift[j] *= share
+            if s.doll_of[s.bone_of[j]] == doll:
+                shift[j] *= share

@@ -100,10 +100,13 @@ bones' ``rows`` (n, 13) and the dolls' ``sums`` (d,). What acts in it: ``loads``
 Room = collections.namedtuple(
     'Room', 'work own composite H contacts table at turn gaps later Y support W G p solver '
     'kinds rows mu roll need label vectors states given before after begun count lift tally '
-    'within armed stages row')
+    'within armed met stages row place blocks unsought')
 """Scratch of the rigid core, but for ``tally``, ``within`` and ``gaps``, which are the course's."""
 
 WITHIN, OUTSIDE = 1, 2
+
+LARGE = 96
+"""Rows of an island from which on it is solved without W; see large_island.py."""
 
 STICKS = 1e5
 """Coefficient from which friction has no limit."""
@@ -137,7 +140,7 @@ def make_room(system: System, course: Course) -> Room:
     contacts = len(course.known)
     rows = contacts * (5 if max(system.geoms['rolling'].max(initial=0.0),
                                 system.pairs['rolling'].max(initial=0.0)) > 0 else 3)
-    gaps = len(course.gaps)
+    gaps, wide, few = len(course.gaps), min(nv, 2 * depth(system)) + 1, min(rows, LARGE)
     work = Work(np.zeros((bones, 4)), np.zeros((bones, 3)), np.zeros((bones, 6)),
                 np.zeros((nv, 6)), np.zeros((bones, 6, 6)), np.zeros((bones, 6)),
                 np.zeros((nv, 6)), np.zeros((nv, 8)), np.zeros((3, 3)))
@@ -145,17 +148,17 @@ def make_room(system: System, course: Course) -> Room:
         work=work, own=np.zeros((bones, 6)), composite=np.zeros((bones, 10)),
         H=np.zeros((nv, nv)), contacts=np.zeros(contacts, CONTACT), table=np.zeros((16, 8)),
         at=np.zeros((geoms, 3)), turn=np.zeros((geoms, 3, 3)), gaps=course.gaps,
-        later=np.zeros(gaps), Y=np.zeros((rows, nv)),
-        support=np.zeros((contacts, min(nv, 2 * depth(system)) + 1), np.int64),
-        W=np.zeros(rows * rows), G=np.zeros(rows * rows), p=np.zeros((6, rows)),
-        solver=np.zeros((8, 2 * max(rows, 8))), kinds=np.zeros(contacts, np.int64),
+        later=np.zeros(gaps), Y=np.zeros((rows, wide)),
+        support=np.zeros((contacts, wide), np.int64), W=np.zeros(few * few), G=np.zeros(few * few), p=np.zeros((6, rows)),
+        solver=np.zeros((9, 2 * max(rows, 8))), kinds=np.zeros(contacts, np.int64),
         rows=np.zeros(contacts, np.int64), mu=np.zeros(contacts), roll=np.zeros(contacts),
-        need=np.zeros((3, contacts)), label=np.zeros(dolls, np.int64),
+        need=np.zeros((4, contacts)), label=np.zeros(dolls, np.int64),
         vectors=np.zeros((VECTORS, nv)), states=np.zeros((STATES, nq)),
         given=np.zeros(dolls, GIVEN), before=np.zeros(dolls, DOLL), after=np.zeros(dolls, DOLL),
         begun=np.zeros(contacts, CONTACT), count=np.zeros(1, np.int64), lift=np.zeros(2),
-        tally=course.tally, within=course.within, armed=np.zeros(gaps),
-        stages=np.zeros((16, nq + nv)), row=np.zeros(nq + nv))
+        tally=course.tally, within=course.within, armed=np.zeros(gaps), met=np.zeros(gaps),
+        stages=np.zeros((16, nq + nv)), row=np.zeros(nq + nv), place=np.zeros(nv, np.int64), blocks=np.zeros((contacts, 25)),
+        unsought=np.zeros(1))
 
 
 def depth(system: System) -> int:
