@@ -18,11 +18,12 @@ from ragdoll_ros.physics import kernels
 from ragdoll_ros.physics.simulation import Simulation
 
 DROP, FLIGHT = load_scene('drop'), load_scene('flight')
+EVEN = dataclasses.replace(DROP, dolls=(dataclasses.replace(DROP.dolls[0], spin=(0, 0, 0)),))
 
 
 @pytest.mark.parametrize('accuracy', ['draft', 'normal', 'exact'])
 def test_free_fall_is_exact(accuracy):
-    with Simulation(DROP, accuracy=accuracy) as simulation:
+    with Simulation(EVEN, accuracy=accuracy) as simulation:
         start = simulation.state.positions.copy()
         for tick in range(1, 28):
             fallen = simulation.advance().positions - start
@@ -183,7 +184,7 @@ def test_every_engine_starts_where_the_scene_says_and_falls(engine):
     """Freely, by g t^2 / 2; PyBullet and MuJoCo to one of their substeps of 1 ms."""
     if engine == 'mujoco':
         pytest.importorskip('mujoco')
-    with Simulation(DROP, engine=engine) as simulation:
+    with Simulation(EVEN, engine=engine) as simulation:
         start = simulation.state.positions
         for bone, place in zip(DROP.dolls[0].doll.bones, start, strict=True):
             assert DROP.dolls[0].bone_pose(bone).position == pytest.approx(place, abs=1e-12)
