@@ -65,7 +65,7 @@ def test_what_is_drawn_of_a_bone_reaches_as_far_as_its_shape(shape):
                   *np.zeros((2, 1, 3)))
     points = []
     for batch in Bodies(server, scene, state).batches:
-        vertices = MESHES[batch.handle.name.split('/')[-1]][0]
+        vertices = MESHES[batch.kind][0]
         for place, wxyz, scale in zip(batch.handle.batched_positions, batch.handle.batched_wxyzs,
                                       batch.handle.batched_scales, strict=True):
             points.append(place + rotation.rotate(wxyz[[1, 2, 3, 0]], vertices * scale))
