@@ -5,6 +5,8 @@ costs as much as the batches it is in.
 """
 from __future__ import annotations
 
+import itertools
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +34,8 @@ class Batch:
     """Parts of one kind: which bone each is of, and its pose (p,) in that one's frame."""
 
     kind: str
+    clad: bool
+    """Whether they are of dolls that show their skin."""
     handle: viser.BatchedMeshHandle
     bones: np.ndarray
     within: Pose | None
@@ -39,33 +43,36 @@ class Batch:
 
 
 class Bodies:
-    """Every bone of a scene in its own shape and colour."""
+    """Every bone of a scene in its own shape and colour; those in ``clad`` are under a skin."""
 
-    def __init__(self, server: viser.ViserServer, scene: Scene, state: State) -> None:
+    def __init__(self, server: viser.ViserServer, scene: Scene, state: State,
+                 clad: Collection[int] = ()) -> None:
         self._server = server
         self.batches: list[Batch] = []
         parts = [(index, part) for index, bone in enumerate(scene.bones)
                  for part in bone.shape.primitives]
         colors = np.array([(bone.color or DEFAULT_COLOR)[:3] for bone in scene.bones])
-        for kind in MESHES:
-            mine = [(index, part) for index, part in parts if part.kind == kind]
-            for number, first in enumerate(range(0, len(mine), MOST)):
-                self._add(f'{kind}_{number}', mine[first:first + MOST], colors, state)
+        for kind, under in itertools.product(MESHES, (False, True)):
+            mine = [(index, part) for index, part in parts
+                    if part.kind == kind and (index in clad) == under]
+            for first in range(0, len(mine), MOST):
+                self._add(mine[first:first + MOST], under, colors, state)
 
-    def _add(self, name: str, some: list[tuple[int, Part]], colors: np.ndarray,
+    def _add(self, some: list[tuple[int, Part]], clad: bool, colors: np.ndarray,
              state: State) -> None:
         """Add parts of one kind, each with the bone that it is of."""
         bones = np.array([index for index, _ in some])
         parts = [part for _, part in some]
+        kind = parts[0].kind
         within = None if all(part.is_centred for part in parts) else Pose(
             np.array([part.position for part in parts]),
             np.array([part.orientation for part in parts]))
         positions, wxyzs = _placed(state, bones, within)
         handle = self._server.scene.add_batched_meshes_simple(
-            f'/scene/bodies/{name}', *MESHES[parts[0].kind], wxyzs, positions,
+            f'/scene/bodies/{kind}_{len(self.batches)}', *MESHES[kind], wxyzs, positions,
             batched_scales=np.array([part.size for part in parts]),
             batched_colors=np.round(colors[bones] * 255).astype(np.uint8), lod='off')
-        self.batches.append(Batch(parts[0].kind, handle, bones, within))
+        self.batches.append(Batch(kind, clad, handle, bones, within))
 
     def show(self, state: State) -> None:
         """Draw all where they are now."""
@@ -75,10 +82,11 @@ class Bodies:
             batch.handle.batched_wxyzs = wxyzs
 
     def be_visible(self, wanted: bool, glass: bool) -> None:
-        """Show the bones, as of glass if so wished, or hide them."""
+        """Show the bones under skins, as of glass if so wished, or hide them; others stay."""
         for batch in self.batches:
-            batch.handle.visible = wanted
-            batch.handle.opacity = GLASS if glass else None
+            if batch.clad:
+                batch.handle.visible = wanted
+                batch.handle.opacity = GLASS if glass else None
 
 
 def _placed(state: State, bones: np.ndarray,
