@@ -3,8 +3,9 @@
 python test/page_crowds.py [DOLLS ...]
 
 The dolls of `field` turn where they stand, as a recording, so that nothing is simulated and every
-bone is elsewhere in every picture. Without a GPU the browser's pictures a second are those of
-software rendering; the script's time, which a GPU does not shorten, is told beside them.
+bone is elsewhere in every picture. Without a GPU the browser draws in software; beside the pictures
+a second that it makes so stand those that it makes where nothing is left to do but the drawing
+itself, which a GPU would take.
 """
 from __future__ import annotations
 
@@ -35,21 +36,24 @@ from ragdoll_ros.model.scene import Scene  # noqa: E402
 from ragdoll_ros.viewer.sources.playback import Playback  # noqa: E402
 from ragdoll_ros.viewer.sources.recording import Recording  # noqa: E402
 
-SECONDS = 8.0
+SECONDS = 5.0
 """That a measurement lasts."""
 
-RUNS = 1
+RUNS = 3
 """Measurements, of which the median is told."""
 
 LAST = 600.0
 """s of the recording: longer than anything here takes."""
 
-COUNT = """() => {
-  const node = Object.values(window.__viserMutable.nodeRefFromName).flatMap(node => {
-    const found = [];
-    node?.traverse(mesh => { if (mesh.isInstancedMesh2) found.push(mesh); });
-    return found;
-  })[0];
+MESHES = """() => {
+  const found = new Set();
+  window.__viserMutable.scene.traverse(mesh => { if (mesh.isInstancedMesh2) found.add(mesh); });
+  return [...found];
+}"""
+
+INSTANCES = f'({MESHES})().reduce((sum, mesh) => sum + mesh.instancesCount, 0)'
+
+COUNT = f'() => {{ const [node] = ({MESHES})(); ' + """
   window.pictures = 0;
   let last = '';
   const look = () => {
@@ -62,6 +66,12 @@ COUNT = """() => {
 }"""
 """Counts pictures in which the first bone is elsewhere than in the one before."""
 
+LEAVE_OUT = """() => {
+  for (const name of ['drawArrays', 'drawElements', 'drawArraysInstanced', 'drawElementsInstanced'])
+    WebGL2RenderingContext.prototype[name] = () => {};
+}"""
+"""Has the page do all but the drawing itself."""
+
 
 class Cost(NamedTuple):
     """What one page costs; a picture is one state of all bones."""
@@ -72,10 +82,10 @@ class Cost(NamedTuple):
     """ms of a processor for each picture that is sent."""
     size: float
     """kB of each."""
-    pictures: float
-    """Each second in the browser."""
-    script: float
-    """ms of the page's own thread for each picture there."""
+    drawn: float
+    """Pictures each second in the browser, drawn by its processor."""
+    undrawn: float
+    """And without the drawing itself."""
 
 
 def field(dolls: int) -> Scene:
@@ -132,25 +142,27 @@ def sent(process: subprocess.Popen, port: int) -> tuple[float, float]:
 
 
 def seen(context: object, port: int, scene: Scene) -> tuple[float, float, float]:
-    """Seconds to open the page; pictures a second, and ms of its thread for each."""
+    """Seconds to open the page; pictures a second, drawn and undrawn."""
     since = time.monotonic()
-    with browser.opened(context, f'http://127.0.0.1:{port}', scene) as view:
-        opening = time.monotonic() - since
-        meter = context.new_cdp_session(view.page)
-        meter.send('Performance.enable')
-        view.page.evaluate(COUNT)
-        view.page.wait_for_timeout(3000)
-        before = _metrics(view, meter)
-        view.page.wait_for_timeout(1e3 * SECONDS)
-        spent, busy, pictures = (b - a for a, b in zip(before, _metrics(view, meter), strict=True))
-    return opening, pictures / spent, 1e3 * busy / pictures
+    view = browser.View(context, f'http://127.0.0.1:{port}')
+    parts = sum(len(bone.shape.primitives) for bone in scene.bones)
+    view.wait(lambda: view.page.evaluate(INSTANCES) == parts)
+    view.page.evaluate(COUNT)
+    view.wait(lambda: view.page.evaluate('window.pictures') > 1)
+    opening = time.monotonic() - since
+    drawn = pictures(view)
+    view.page.evaluate(LEAVE_OUT)
+    undrawn = pictures(view)
+    view.close()
+    return opening, drawn, undrawn
 
 
-def _metrics(view: browser.View, meter: object) -> tuple[float, float, int]:
-    """Instant and s that the page's thread has been busy, and the pictures so far."""
-    metrics = meter.send('Performance.getMetrics')['metrics']
-    values = {each['name']: each['value'] for each in metrics}
-    return values['Timestamp'], values['TaskDuration'], view.page.evaluate('window.pictures')
+def pictures(view: browser.View) -> float:
+    """Each second, after as long a time to come to a steady pace."""
+    view.page.wait_for_timeout(1e3 * SECONDS)
+    count, since = view.page.evaluate('window.pictures'), time.monotonic()
+    view.page.wait_for_timeout(1e3 * SECONDS)
+    return (view.page.evaluate('window.pictures') - count) / (time.monotonic() - since)
 
 
 def measure(context: object, dolls: int) -> Cost:
@@ -160,21 +172,21 @@ def measure(context: object, dolls: int) -> Cost:
     for _ in range(RUNS):
         with server(dolls) as (process, port):
             server_ms, size = sent(process, port)
-            opening, pictures, script = seen(context, port, scene)
-            runs.append(Cost(opening, server_ms, size, pictures, script))
+            opening, drawn, undrawn = seen(context, port, scene)
+            runs.append(Cost(opening, server_ms, size, drawn, undrawn))
     return Cost(*(statistics.median(column) for column in zip(*runs, strict=True)))
 
 
 def main(counts: list[int]) -> None:
     """Print the table."""
-    print(f'{"dolls":>6}{"opens, s":>10}{"server, ms":>12}{"kB":>8}{"pictures/s":>12}'
-          f'{"page, ms":>10}')
+    print(f'{"dolls":>6}{"opens, s":>10}{"server, ms":>12}{"kB":>8}{"drawn/s":>10}'
+          f'{"undrawn/s":>11}')
     browser.SHARPNESS, browser.PLAIN = 1, '() => {}'
     with browser.chromium() as context:
         for dolls in counts:
             cost = measure(context, dolls)
             print(f'{dolls:6}{cost.opening:10.1f}{cost.server:12.2f}{cost.size:8.1f}'
-                  f'{cost.pictures:12.1f}{cost.script:10.1f}', flush=True)
+                  f'{cost.drawn:10.1f}{cost.undrawn:11.1f}', flush=True)
 
 
 if __name__ == '__main__':

@@ -17,13 +17,16 @@ from ...model.ragdoll import DEFAULT_COLOR
 from ...model.scene import Scene
 from ...model.shapes import Part
 from ...model.state import State
-from .meshes import MESHES
+from .meshes import COARSE, MESHES
 
 GLASS = 0.45
 """Opacity of bones through which their skin is to be seen."""
 
 MOST = 1000
 """Parts in a batch: 28 kB when it moves. Each batch costs the page some 0.3 ms by itself."""
+
+CROWD = 1000
+"""Parts from which on round ones are drawn coarsely."""
 
 WXYZ = [3, 0, 1, 2]
 """Viser's order of a quaternion, from ours."""
@@ -51,6 +54,7 @@ class Bodies:
         self.batches: list[Batch] = []
         parts = [(index, part) for index, bone in enumerate(scene.bones)
                  for part in bone.shape.primitives]
+        self._meshes = MESHES if len(parts) <= CROWD else COARSE
         colors = np.array([(bone.color or DEFAULT_COLOR)[:3] for bone in scene.bones])
         for kind, under in itertools.product(MESHES, (False, True)):
             mine = [(index, part) for index, part in parts
@@ -69,7 +73,7 @@ class Bodies:
             np.array([part.orientation for part in parts]))
         positions, wxyzs = _placed(state, bones, within)
         handle = self._server.scene.add_batched_meshes_simple(
-            f'/scene/bodies/{kind}_{len(self.batches)}', *MESHES[kind], wxyzs, positions,
+            f'/scene/bodies/{kind}_{len(self.batches)}', *self._meshes[kind], wxyzs, positions,
             batched_scales=np.array([part.size for part in parts]),
             batched_colors=np.round(colors[bones] * 255).astype(np.uint8), lod='off')
         self.batches.append(Batch(kind, clad, handle, bones, within))
