@@ -47,7 +47,7 @@ class Simulated(Source):
         self._wanted = Wanted()
         self._frame: Frame | None = None
         self._report = Report(pace=_pace_of(scene), engine=engine)
-        self._simulation = Simulation(scene, engine=engine)
+        self._simulation = Simulation(scene, engine=engine, workers='auto')
         self._pacer = Pacer(1.0, 0)
         self._next_measure = 0.0
         self._show()
@@ -166,7 +166,7 @@ class Simulated(Source):
         self._simulation.push(Push(bone, force, duration=HOLD), 'page')
 
     def _replace(self, scene: Scene, engine: str) -> None:
-        simulation = Simulation(scene, engine=engine)
+        simulation = Simulation(scene, engine=engine, workers='auto')
         pace = self._report.pace if scene is self._simulation.scene else _pace_of(scene)
         self._simulation.close()
         self._simulation = simulation
