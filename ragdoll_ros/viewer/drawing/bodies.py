@@ -23,7 +23,7 @@ GLASS = 0.45
 """Opacity of bones through which their skin is to be seen."""
 
 MOST = 1000
-"""Parts in a batch: 28 kB when it moves. Each batch costs the page some 0.3 ms by itself."""
+"""Parts in a batch: 28 kB when it moves. Each batch costs the page some 0.4 ms by itself."""
 
 CROWD = 1000
 """Parts from which on round ones are drawn coarsely."""
