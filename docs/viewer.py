@@ -22,6 +22,8 @@ from ragdoll_ros.fit import command as fit  # noqa: E402
 
 SIZE = {'width': 1000, 'height': 600}
 
+BESIDE_PANEL = {'x': 0, 'y': 80, 'width': 660, 'height': 400}
+
 ASIDE = 0.31
 """m to the doll's left for each m away at which the camera looks: the doll is beside the panel."""
 
@@ -124,6 +126,14 @@ def skin(context: browser.BrowserContext, folder: Path) -> None:
             (folder / 'viewer_skin.png').write_bytes(shot(view))
 
 
+def field(context: browser.BrowserContext, folder: Path) -> None:
+    """A thousand dolls, without the panel."""
+    with page(context, 'field', camera(11.0, 5.0, 1.0)) as view:
+        step(view, 60)
+        shot(view)
+        (folder / 'viewer_field.png').write_bytes(view.page.screenshot(clip=BESIDE_PANEL))
+
+
 def main(folder: Path) -> None:
     """Take all pictures."""
     browser.SIZE.update(SIZE)
@@ -131,7 +141,7 @@ def main(folder: Path) -> None:
     browser.SHARPNESS, browser.PLAIN = 1, '() => {}'
     browser.PATIENCE = 100.0
     with browser.chromium() as context:
-        for picture in (fall, grab, edit, skin):
+        for picture in (fall, grab, edit, skin, field):
             picture(context, folder)
 
 

@@ -53,14 +53,14 @@ BODIES = """() => {
   const toWorld = nodes[''].matrixWorld.clone().invert();
   const bodies = {};
   for (const [name, node] of Object.entries(nodes)) node?.traverse(mesh => {
-    const kind = name.split('/scene/bodies/')[1];
-    if (!kind || !mesh.isInstancedMesh2) return;
-    bodies[kind] = Array.from({length: mesh.instancesCount}, (_, index) =>
+    const batch = name.split('/scene/bodies/')[1];
+    if (!batch || !mesh.isInstancedMesh2) return;
+    bodies[batch] = Array.from({length: mesh.instancesCount}, (_, index) =>
       toWorld.clone().multiply(mesh.matrixWorld).multiply(mesh.getMatrixAt(index)).elements);
   });
   return bodies;
 }"""
-"""Matrices that the graphics card gets of each instance, by kind, column by column; z up."""
+"""Matrices that the graphics card gets of each instance, by batch, column by column; z up."""
 
 TO_PIXELS = """points => {
   const {camera, canvas, nodeRefFromName: nodes} = window.__viserMutable;
@@ -122,9 +122,12 @@ class View:
     def bodies(self, scene):
         """Place of each bone as it is drawn, (n, 3) m, z up; NaN while not all are there.
 
-        Read from three.js' instances; the page keeps parts of one kind in the scene's order.
+        Read from three.js' instances; the page keeps parts of one kind in the scene's order, in
+        batches that it counts: box_0, box_1.
         """
-        drawn = self.page.evaluate(BODIES)
+        batches, drawn = self.page.evaluate(BODIES), {}
+        for name in sorted(batches, key=lambda name: int(name.split('_')[1])):
+            drawn.setdefault(name.split('_')[0], []).extend(batches[name])
         kinds = [part.kind for bone in scene.bones for part in bone.shape.primitives]
         assert len(kinds) == len(scene.bones), 'bones of one part each'
         if {kind: len(matrices) for kind, matrices in drawn.items()} != Counter(kinds):

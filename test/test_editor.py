@@ -40,13 +40,13 @@ def server():
 class Desk:
     """An editor and what it asked of its page."""
 
-    def __init__(self, server, path):
+    def __init__(self, server, path, scene=DROP):
         server.gui.reset()
         server.scene.reset()
         self.asked = []
         self.reason = ''
         self.path = path
-        self.editor = Editor(server, DROP, lambda scene: self.use(scene), self.asked.append, path)
+        self.editor = Editor(server, scene, lambda scene: self.use(scene), self.asked.append, path)
         self.panel, self.files = self.editor.panel, self.editor.files
 
     def use(self, scene):
@@ -182,6 +182,20 @@ def test_the_root_has_no_joint_fields(desk):
 def test_the_dropdown_chooses(desk):
     desk.panel.bone.value = 'head'
     assert desk.editor.bone == 'head' and desk.panel.body['radius'].value == 0.1
+
+
+def test_the_list_is_of_one_doll_in_a_crowd(server, tmp_path):
+    """Ten thousand bones are no list: a doll is chosen first, which chooses its root."""
+    scene = load_scene('field')
+    desk = Desk(server, tmp_path, scene)
+    panel, (first, *_, last) = desk.panel, scene.dolls
+    assert panel.doll.visible and len(panel.doll.options) == 1000
+    assert panel.bone.options == ('(no bone)', *scene.bone_names[:10])
+    panel.doll.value = last.name
+    assert desk.editor.bone == f'{last.name}/torso' == panel.bone.value
+    assert panel.bone.options == ('(no bone)', *scene.bone_names[-10:])
+    desk.editor.select(f'{first.name}/head')
+    assert panel.doll.value == first.name and panel.bone.value == f'{first.name}/head'
 
 
 def drag(handle, position=None, turn=None):

@@ -68,7 +68,7 @@ def test_a_capsule_is_a_cylinder_between_two_balls():
     with served(Simulated(scene)) as page:
         page.open()
         wait(lambda: page.stage)
-        batches = {batch.handle.name.split('/')[-1]: batch.handle
+        batches = {batch.kind: batch.handle
                    for batch in page.stage.bodies.batches}
         assert set(batches) == {'cylinder', 'sphere'}
         along = rotation.rotate(turn, np.array([0, 0, 0.3]))

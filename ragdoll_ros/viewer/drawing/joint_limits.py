@@ -12,6 +12,9 @@ from ...model.state import State
 PIECES = 12
 """Lines that make up an arc."""
 
+MOST = 25
+"""Dolls that have dials at once: those of one are some 130 lines, 4 kB with each picture."""
+
 DEPTH = 3
 """Most angles of a joint."""
 
@@ -24,19 +27,62 @@ SIZES = (0.04, 0.15)
 
 
 class Limits:
-    """Dials of all limited angles of a scene.
+    """Dials of the limited angles of a scene's dolls: in a crowd, of those that are looked at."""
+
+    def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
+        self._server, self._scene = server, scene
+        self._handle: viser.LineSegmentsHandle | None = None
+        self._roots = np.array([part.start for part in scene.bone_slices])
+        self._starts = np.cumsum([0, *(sum(joint.dof for joint in placement.doll.joints)
+                                       for placement in scene.dolls)])
+        self._dials: _Dials | None = None
+
+    def show(self, state: State, angles: np.ndarray | None) -> None:
+        """Draw the dials for all joint angles (k,) rad; None hides them."""
+        if angles is None or len(angles) != self._starts[-1]:
+            self._hide()
+            return
+        dolls = self._looked_at(state)
+        if self._dials is None or self._dials.dolls != dolls:
+            self._dials = _Dials(self._scene, dolls, self._starts)
+        if not self._dials.some:
+            self._hide()
+            return
+        points, colors = self._dials.lines(state, angles), self._dials.colors(angles)
+        if self._handle is None:
+            self._handle = self._server.scene.add_line_segments(
+                '/scene/limits', points, colors, thickness=2.5, thickness_units='screen')
+            return
+        self._handle.points, self._handle.colors = points, colors
+        self._handle.visible = True
+
+    def _hide(self) -> None:
+        if self._handle is not None:
+            self._handle.visible = False
+
+    def _looked_at(self, state: State) -> list[int]:
+        """All dolls, or the MOST that are nearest to what the pages look at."""
+        if len(self._roots) <= MOST:
+            return list(range(len(self._roots)))
+        points = [client.camera.look_at for client in self._server.get_clients().values()]
+        offsets = state.positions[self._roots, None] - np.array(points).reshape(-1, 3)
+        away = np.linalg.norm(offsets, axis=2).min(axis=1, initial=np.inf)
+        return sorted(np.argpartition(away, MOST)[:MOST].tolist())
+
+
+class _Dials:
+    """Dials of some of a scene's dolls; ``starts`` is where each doll's joint angles begin.
 
     A joint's angles are rotations one after the other, each about an axis that the ones before
     have rotated; all is kept along the axes of the parent bone.
     """
 
-    def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
-        self._server = server
-        self._handle: viser.LineSegmentsHandle | None = None
+    def __init__(self, scene: Scene, dolls: list[int], starts: np.ndarray) -> None:
+        self.dolls = dolls
         parents, anchors, axes, numbers, dials = [], [], [], [], []
-        angle = 0
-        for placement, part in zip(scene.dolls, scene.bone_slices, strict=True):
-            doll = placement.doll
+        for index in dolls:
+            doll, first = scene.dolls[index].doll, scene.bone_slices[index].start
+            angle = starts[index]
             for joint in doll.joints:
                 parent = doll.bone(joint.parent)
                 into_parent = rotation.inverse(parent.orientation)
@@ -46,7 +92,7 @@ class Limits:
                         needle = rotation.rotate(into_parent, _needle(doll, joint, depth))
                         dials.append((len(parents), depth, angle + depth, pair,
                                       _arc(local_axes[depth], needle, pair), needle))
-                parents.append(part.start + doll.bones.index(parent))
+                parents.append(first + doll.bones.index(parent))
                 anchors.append(rotation.rotate(into_parent,
                                                np.subtract(joint.anchor, parent.position)))
                 axes.append(local_axes)
@@ -54,26 +100,12 @@ class Limits:
                 angle += joint.dof
         self._parents, self._anchors = np.array(parents, int), np.array(anchors)
         self._axes, self._numbers = np.array(axes), np.array(numbers, int)
-        self._some = bool(dials)
+        self.some = bool(dials)
         if dials:
             self._joints, self._depths, self._angles, self._pairs, self._arcs, self._needles = (
                 np.array(column) for column in zip(*dials, strict=True))
 
-    def show(self, state: State, angles: np.ndarray | None) -> None:
-        """Draw the dials for all joint angles (k,) rad; None hides them."""
-        if angles is None or not self._some or len(angles) != self._numbers.max() + 1:
-            if self._handle is not None:
-                self._handle.visible = False
-            return
-        points, colors = self._lines(state, angles), self._colors(angles)
-        if self._handle is None:
-            self._handle = self._server.scene.add_line_segments(
-                '/scene/limits', points, colors, thickness=2.5, thickness_units='screen')
-            return
-        self._handle.points, self._handle.colors = points, colors
-        self._handle.visible = True
-
-    def _lines(self, state: State, angles: np.ndarray) -> np.ndarray:
+    def lines(self, state: State, angles: np.ndarray) -> np.ndarray:
         """Both ends (l, 2, 3) m of all lines, needles last, world frame."""
         frames = [state.orientations[self._parents]]
         centres = state.positions[self._parents] + rotation.rotate(frames[0], self._anchors)
@@ -88,7 +120,8 @@ class Limits:
         lines = np.stack([arcs[:, :-1], arcs[:, 1:]], axis=2).reshape(-1, 2, 3)
         return np.concatenate([lines, np.stack([centres, tips], axis=1)]).astype(np.float32)
 
-    def _colors(self, angles: np.ndarray) -> np.ndarray:
+    def colors(self, angles: np.ndarray) -> np.ndarray:
+        """Of both ends (l, 2, 3) of all lines, for joint angles (k,) rad."""
         values = angles[self._angles]
         red = (values < self._pairs[:, 0] + NEAR) | (values > self._pairs[:, 1] - NEAR)
         arcs = np.tile(np.array(GRAY, np.uint8), (len(red) * PIECES, 2, 1))

@@ -26,30 +26,30 @@ def box() -> Mesh:
     return np.array(corners), np.array(faces)
 
 
-def cylinder() -> Mesh:
+def cylinder(corners: int = ROUND) -> Mesh:
     """1 m across and 1 m long."""
-    angle = np.arange(ROUND) * 2 * np.pi / ROUND
-    ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(ROUND)], axis=1) / 2
+    angle = np.arange(corners) * 2 * np.pi / corners
+    ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(corners)], axis=1) / 2
     up = np.array([0, 0, 0.5])
     low, high = ring - up, ring + up
-    at, after = np.arange(ROUND), (np.arange(ROUND) + 1) % ROUND
-    side = [np.stack([at, after, after + ROUND], axis=1),
-            np.stack([at, after + ROUND, at + ROUND], axis=1)]
-    fan = np.stack([np.zeros(ROUND - 2, int), at[1:-1], at[2:]], axis=1)
-    caps = [fan[:, ::-1] + 2 * ROUND, fan + 3 * ROUND]
+    at, after = np.arange(corners), (np.arange(corners) + 1) % corners
+    side = [np.stack([at, after, after + corners], axis=1),
+            np.stack([at, after + corners, at + corners], axis=1)]
+    fan = np.stack([np.zeros(corners - 2, int), at[1:-1], at[2:]], axis=1)
+    caps = [fan[:, ::-1] + 2 * corners, fan + 3 * corners]
     return np.concatenate([low, high, low, high]), np.concatenate(side + caps)
 
 
-def ball() -> Mesh:
+def ball(corners: int = ROUND) -> Mesh:
     """1 m across."""
-    rows = ROUND // 2
+    rows = corners // 2
     tilt = np.arange(rows + 1)[:, None] * np.pi / rows
-    angle = np.arange(ROUND)[None] * 2 * np.pi / ROUND
+    angle = np.arange(corners)[None] * 2 * np.pi / corners
     points = np.stack(np.broadcast_arrays(
         np.sin(tilt) * np.cos(angle), np.sin(tilt) * np.sin(angle), np.cos(tilt)), axis=-1) / 2
-    row, at = (index.ravel() for index in np.mgrid[:rows, :ROUND])
-    after = (at + 1) % ROUND
-    a, b, c, d = (r * ROUND + p for r, p in ((row, at), (row + 1, at), (row + 1, after),
+    row, at = (index.ravel() for index in np.mgrid[:rows, :corners])
+    after = (at + 1) % corners
+    a, b, c, d = (r * corners + p for r, p in ((row, at), (row + 1, at), (row + 1, after),
                                              (row, after)))
     faces = np.concatenate([np.stack([a, b, c], axis=1)[row < rows - 1],
                             np.stack([a, c, d], axis=1)[row > 0]])
@@ -58,3 +58,6 @@ def ball() -> Mesh:
 
 MESHES = {'box': box(), 'cylinder': cylinder(), 'sphere': ball()}
 """By the kinds of the primitives of model.shapes."""
+
+COARSE = {**MESHES, 'cylinder': cylinder(ROUND // 2), 'sphere': ball(ROUND // 2)}
+"""For crowds, whose heads are most of what there is to draw: a quarter of their triangles."""

@@ -23,6 +23,9 @@ from .bodies import WXYZ
 
 COLOR = (205, 190, 175)
 
+MOST = 30
+"""Skins at once: each has a message for every bone in each picture."""
+
 SCALE = 1e-3
 """Share by which a skin's size may miss the doll's before it is read again in the doll's."""
 
@@ -131,11 +134,16 @@ def _size(doll: Ragdoll, character: Character) -> float:
 
 
 class Skins:
-    """The skins of all dolls of a scene that have one; ``notes`` tells of those that failed."""
+    """The skins of a scene's dolls, of the first MOST that have one.
+
+    ``notes`` tells of those that failed, or are too many; ``clad`` are the indices of all bones of
+    dolls that show their skin.
+    """
 
     def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
         self.notes: list[str] = []
         self.handles: list[viser.MeshSkinnedHandle] = []
+        self.clad: set[int] = set()
         self._bones: list[np.ndarray] = []
         for number, (placement, part) in enumerate(
                 zip(scene.dolls, scene.bone_slices, strict=True)):
@@ -144,9 +152,14 @@ class Skins:
             except errors.RagdollError as error:
                 self.notes.append(f'no skin for {placement.name}: {error}')
                 skin = None
-            if skin is not None:
-                self._add(server, f'/scene/skins/{number}', skin)
-                self._bones.append(part.start + skin.bones)
+            if skin is None:
+                continue
+            if len(self.handles) == MOST:
+                self.notes.append(f'skins of {MOST} dolls: the others show their bones')
+                break
+            self._add(server, f'/scene/skins/{number}', skin)
+            self._bones.append(part.start + skin.bones)
+            self.clad.update(range(part.start, part.stop))
 
     def show(self, state: State) -> None:
         """Draw all skins where their bones are now."""

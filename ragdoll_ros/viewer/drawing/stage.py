@@ -18,8 +18,8 @@ class Stage:
         self.scene = frame.scene
         server.scene.remove_by_name('/scene')
         show_ground(server, self.scene)
-        self.bodies = Bodies(server, self.scene, frame.state)
         self.skins = Skins(server, self.scene)
+        self.bodies = Bodies(server, self.scene, frame.state, self.skins.clad)
         self._marks = Marks(server)
         self._limits = Limits(server, self.scene)
 
@@ -32,6 +32,5 @@ class Stage:
 
     def be_visible(self, bones: bool, skins: bool) -> None:
         """Show bones and skins; bones at least where there is no skin."""
-        clad = bool(skins and self.skins.handles)
-        self.bodies.be_visible(bones or not clad, glass=clad)
+        self.bodies.be_visible(bones or not skins, glass=skins)
         self.skins.be_visible(skins)

@@ -230,7 +230,7 @@ class Editor:
 
     def _chosen(self) -> str:
         if self.bone is None:
-            raise errors.UnknownBone('bone', None, 'one of ' + ', '.join(self.scene.bone_names))
+            raise errors.UnknownBone('bone', None, 'a bone of the list, or a click on one')
         return self.bone
 
     def _refresh(self) -> None:
@@ -238,7 +238,7 @@ class Editor:
         scene = self.scene
         if self.bone not in scene.bone_names:
             self.bone = None
-        self.panel.show_bones(scene.bone_names, self.bone)
+        self.panel.show_bones(scene, self.bone)
         self.panel.show_history(self._history)
         joint = None if self.bone is None else changes.joint_of(scene, self.bone)
         self.panel.show_sheet(None if self.bone is None else sheet.read(scene, self.bone),

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 import viser
 
 from ...model import errors
+from ...model.scene import Scene
 from .form import RED, ROOMY, Form, Quiet, colored
 from .history import History
 from .sheet import BODY, JOINT, Sheet
@@ -26,6 +27,7 @@ class Panel:
         self.edit = gui.add_button('Edit', icon='pencil', hint='E: pause in the bind pose')
         self.undo = gui.add_button('Undo', icon='arrow-back-up', hint='Ctrl+Z')
         self.redo = gui.add_button('Redo', icon='arrow-forward-up', hint='Ctrl+Shift+Z')
+        self.doll = gui.add_dropdown('doll', (NONE,), visible=False, hint='chooses its root')
         self.bone = gui.add_dropdown('bone', (NONE,), hint='or click on it')
         self.limb = gui.add_checkbox('whole limb', False, hint='what hangs from the bone moves '
                                      'and turns with it; else the body alone, and pivots stay')
@@ -46,16 +48,21 @@ class Panel:
             self.name = gui.add_text('name', 'new bone')
             self.add = gui.add_button('Add a bone here', icon='plus')
             self.remove = gui.add_button('Remove this limb', icon='trash')
+        self._roots: dict[str, str] = {}
+        self.doll.on_update(lambda _: self._filling.now or select(
+            self._roots.get(self.doll.value)))
         self.bone.on_update(lambda _: self._filling.now or select(
             None if self.bone.value == NONE else self.bone.value))
 
-    def show_bones(self, names: tuple[str, ...], chosen: str | None) -> None:
-        """Offer these bones."""
-        options = (NONE, *names)
+    def show_bones(self, scene: Scene, chosen: str | None) -> None:
+        """Offer the bones of one doll, the chosen bone's or the first; and the other dolls."""
+        index = 0 if chosen is None else int(scene.doll_of_bone[scene.bone_index(chosen)])
+        self._roots = {placement.name: scene.qualified(placement, placement.doll.root.name)
+                       for placement in scene.dolls}
+        self.doll.visible = len(scene.dolls) > 1
         with self._filling:
-            if self.bone.options != options:
-                self.bone.options = options
-            self.bone.value = chosen or NONE
+            _offer(self.doll, tuple(self._roots), scene.dolls[index].name)
+            _offer(self.bone, (NONE, *scene.bone_names[scene.bone_slices[index]]), chosen or NONE)
 
     def show_sheet(self, sheet: Sheet | None, parent: str | None) -> None:
         """Show a bone's numbers, or none."""
@@ -94,3 +101,9 @@ class Panel:
         """Label the button with what it would do."""
         self.edit.label = 'Drop it' if editing else 'Edit'
         self.edit.icon = 'arrow-big-down-lines' if editing else 'pencil'
+
+
+def _offer(dropdown: viser.GuiDropdownHandle, options: tuple[str, ...], chosen: str) -> None:
+    if dropdown.options != options:
+        dropdown.options = options
+    dropdown.value = chosen

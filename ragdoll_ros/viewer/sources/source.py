@@ -62,7 +62,7 @@ class Report:
     engine: str = ''
     """The engine that was asked for, by its name; empty where there is none."""
     measures: dict[str, float] = field(default_factory=dict)
-    """As Simulation.measures() has them, no older than a second."""
+    """As Simulation.measures() has them, no older than a second, or some more in a crowd."""
 
 
 @dataclass(frozen=True)
