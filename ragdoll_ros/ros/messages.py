@@ -29,6 +29,8 @@ def count_masses(scene: Scene) -> int:
 
 def poses_of(state: State | SwingState) -> np.ndarray:
     """Poses (n, 7) of bones or of swings' masses: position m, orientation x, y, z, w."""
+    if isinstance(state, State):
+        return state.rows[:, :7]
     return np.concatenate([state.positions, state.orientations], axis=1)
 
 
@@ -45,7 +47,7 @@ def contact_poses(contacts: Sequence[Contact]) -> np.ndarray:
 
 def twists_of(state: State) -> np.ndarray:
     """Twists (n, 6) in the world frame: linear m/s, angular rad/s."""
-    return np.concatenate([state.linear_velocities, state.angular_velocities], axis=1)
+    return state.rows[:, 7:]
 
 
 def to_time(nanoseconds: int) -> Time:

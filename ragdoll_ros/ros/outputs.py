@@ -1,4 +1,4 @@
-"""All that is published of the doll: poses each tick, the rest only while somebody listens."""
+"""All that is published of the dolls, while somebody listens or the time stands."""
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
@@ -50,19 +50,23 @@ class Outputs:
         self._layouts, self._frame = Layouts(scene, frame), frame
         self._offer_swings(count_masses(scene) > 0)
         self._next_markers = 0
+        self._untold = False
         self._description.publish(String(data=scene_to_urdf(scene, frame)))
 
     def publish(self, simulation: Simulation, stamp: int, now: int, still: bool = False) -> None:
         """Publish where the simulation is; ``stamp`` and the steady clock's ``now`` in ns.
 
-        ``still``: nothing may follow, so that markers can not wait.
+        ``still``: nothing may follow, so that poses can not stay away, nor markers wait.
         """
-        state = simulation.state
-        poses = poses_of(state)
-        self._poses.publish(self._layouts.poses.message(stamp, poses))
         self.publish_clock(stamp)
+        if still or self._poses.get_subscription_count():
+            self._publish_poses(simulation, stamp)
+        else:
+            self._untold = True
         if self._state.get_subscription_count():
-            self._state.publish(self._layouts.state.message(stamp, poses, twists_of(state)))
+            state = simulation.state
+            self._state.publish(self._layouts.state.message(stamp, poses_of(state),
+                                                            twists_of(state)))
         if self._joints.get_subscription_count():
             angles = np.asarray(simulation.joint_angles)
             self._joints.publish(self._layouts.joints.message(stamp, angles))
@@ -73,10 +77,22 @@ class Outputs:
                                                 contact_poses(simulation.contacts)))
         if still or (now >= self._next_markers and self._markers.get_subscription_count()):
             self._next_markers = now + MARKER_PERIOD
-            self.publish_markers(simulation, stamp)
+            self._publish_markers(simulation, stamp)
 
-    def publish_markers(self, simulation: Simulation, stamp: int) -> None:
-        """Publish the markers, heard or not: who comes while the time stands asks for them."""
+    def stand(self, simulation: Simulation, stamp: int) -> None:
+        """Publish what the last tick has not, heard or not, as the time stands from now on.
+
+        Who comes then asks for the past.
+        """
+        if self._untold:
+            self._publish_poses(simulation, stamp)
+        self._publish_markers(simulation, stamp)
+
+    def _publish_poses(self, simulation: Simulation, stamp: int) -> None:
+        self._untold = False
+        self._poses.publish(self._layouts.poses.message(stamp, poses_of(simulation.state)))
+
+    def _publish_markers(self, simulation: Simulation, stamp: int) -> None:
         self._markers.publish(self._layouts.markers.message(
             stamp, simulation.state, simulation.pushes, simulation.swings))
 

@@ -38,7 +38,10 @@ class Form:
         """Serialized message with this stamp, ns, and these numbers."""
         self._words[self._stamps] = divmod(stamp, SECOND)
         for places, value in zip(self._places, values, strict=True):
-            self._numbers[places] = value.ravel()
+            if isinstance(places, slice):
+                self._numbers[places].reshape(value.shape)[...] = value
+            else:
+                self._numbers[places] = value.ravel()
         return bytes(self._data)
 
 

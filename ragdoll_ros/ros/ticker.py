@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 
 from rclpy.clock import Clock
@@ -23,8 +24,9 @@ class Ticker:
     """A timer of the ``steady`` clock that calls ``tick`` each period, from start() to stop()."""
 
     def __init__(self, node: Node, steady: Clock, tick: Callable[[], None]) -> None:
-        self._steady, self._tick = steady, tick
+        self._tick = tick
         self._pacer = Pacer(1.0, 0)
+        self._wakes = 0
         self._timer = node.create_timer(1.0, self._catch_up, clock=steady)
 
     @property
@@ -32,10 +34,19 @@ class Ticker:
         """Time that was given up in long stalls, ns."""
         return self._pacer.lost
 
+    def looks(self, patience: int) -> bool:
+        """Whether what may wait for ``patience``, ns, is to be looked at before the next tick.
+
+        Where ticks follow each other more closely, that is before each so many of them.
+        """
+        if self._timer.is_canceled():
+            return True
+        return self._wakes % max(1, patience // self._timer.timer_period_ns) == 0
+
     def start(self, period: float) -> None:
         """Begin anew: the first tick comes one ``period``, ns, from now."""
         self._pacer.period = period
-        self._pacer.start(self._steady.now().nanoseconds)
+        self._pacer.start(time.monotonic_ns())
         self._timer.timer_period_ns = max(SHORTEST_PERIOD, round(period))
         self._most_ticks = math.ceil(CATCH_UP * self._timer.timer_period_ns / period)
         self._timer.reset()
@@ -46,9 +57,10 @@ class Ticker:
 
     def _catch_up(self) -> None:
         """Make the ticks that are due, as far as there is time."""
-        end = self._steady.now().nanoseconds + LONGEST_BURST
+        self._wakes += 1
+        end = time.monotonic_ns() + LONGEST_BURST
         for _ in range(self._most_ticks):
-            now = self._steady.now().nanoseconds
+            now = time.monotonic_ns()
             if now > end or not self._pacer.due(now):
                 break
             self._tick()
