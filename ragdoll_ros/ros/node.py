@@ -17,30 +17,25 @@ from rclpy.parameter import Parameter
 from rclpy.service import Service
 from rclpy.utilities import remove_ros_args
 from rclpy.waitable import Waitable
-from std_srvs.srv import SetBool, Trigger
 
 from ..model import errors
-from ..model.scene import SECOND, STEP_RANGE, Scene
+from ..model.scene import Scene
 from ..physics.simulation import Simulation
 from .diagnostics import Diagnostics
 from .inputs import Inputs
 from .interactive import Interactive
 from .outputs import Outputs
-from .parameters import Parameters, Settings
+from .parameters import Parameters, Settings, make_simulation, step_of
+from .services import Services
 from .session import ros_session
 from .stamps import Stamps
 from .tally import Tally
-from .ticker import Ticker
+from .ticker import CALLS, MISFITS, Ticker
 
 InvalidROSArguments = rclpy_implementation.RCLInvalidROSArgsError
 
 STANDING_CLOCK = 0.5
 """s on the wall between two messages on /clock while the doll is paused."""
-
-CALLS, MISFITS = 50_000_000, 1_000_000_000
-"""ns on the wall for which the call of a service may wait at the most, and the warning that
-another's topic does not fit. rclpy goes through all that a node has at each wake: 37 services and
-misfits of topics, looked for before each tick, cost more than all else of a doll that sleeps."""
 
 EXAMPLE = """examples:
   ragdoll_node
@@ -75,9 +70,7 @@ class RagdollNode(Node):
         self.interactive = Interactive(self, self.tally, time.monotonic_ns)
         self._diagnostics = Diagnostics(self, self._steady, self.tally, self._facts,
                                         self._wanted_pace, self._time_of_report)
-        self.create_service(Trigger, '~/reset', self._serve_reset)
-        self.create_service(Trigger, '~/step', self._serve_step)
-        self.create_service(SetBool, '~/pause', self._serve_pause)
+        Services(self, self)
         self.paused = False
         self._use(self.simulation)
         self._tell_engine()
@@ -231,25 +224,6 @@ class RagdollNode(Node):
             self.simulation.step = step_of(settings)
             self._go_on()
 
-    def _serve_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Go back to the start; what is paused stays paused."""
-        self.reset()
-        return _answer(response, True, 'back at the start')
-
-    def _serve_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """One tick; refused unless paused, as the timer makes them otherwise."""
-        if not self.paused:
-            self.tally.refuse('~/step', 'not paused')
-            return _answer(response, False, 'not paused: call ~/pause with data: true first')
-        self.tick()
-        return _answer(response, True, f'at {self.simulation.time / SECOND:.9g} s')
-
-    def _serve_pause(self, request: SetBool.Request, response: SetBool.Response
-                     ) -> SetBool.Response:
-        self.pause(request.data)
-        word = 'paused' if request.data else 'running'
-        return _answer(response, True, f'{word} at {self.simulation.time / SECOND:.9g} s')
-
     def _wanted_pace(self) -> float:
         return 0.0 if self.paused else self.settings.real_time_factor
 
@@ -257,22 +231,6 @@ class RagdollNode(Node):
         return {'paused': self.paused, 'real_time_factor': self.settings.real_time_factor,
                 'lost_time': self._ticker.lost / 1e9,
                 'stamp_of_zero': self._stamps.at(0, self.settings.publish_clock)}
-
-
-def _answer(response: object, success: bool, message: str) -> object:
-    response.success, response.message = success, message
-    return response
-
-
-def step_of(settings: Settings) -> float:
-    """Tick in s; a rate that is at its range's end but for rounding gives the step's end."""
-    return min(max(1 / settings.rate, STEP_RANGE[0]), STEP_RANGE[1])
-
-
-def make_simulation(scene: Scene, settings: Settings) -> Simulation:
-    """Build the simulation that the settings ask for."""
-    return Simulation(scene, step_of(settings), settings.accuracy, settings.engine,
-                      settings.workers or 'auto')
 
 
 def main(arguments: list[str] | None = None) -> int:
