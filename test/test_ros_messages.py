@@ -3,8 +3,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import rclpy
-from rclpy.clock import Clock, ClockType
 from rclpy.serialization import deserialize_message
 from specimens import SPECIMENS
 from visualization_msgs.msg import Marker, MarkerArray
@@ -15,10 +13,10 @@ from ragdoll_ros.model.push import ARROW, Push
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.ros.glance import Glance
 from ragdoll_ros.ros.handles import GROWTH, Handles
 from ragdoll_ros.ros.markers import Markers
 from ragdoll_ros.ros.stamps import Stamps
-from ragdoll_ros.ros.ticker import Ticker
 
 
 class RosTime:
@@ -193,6 +191,8 @@ def test_another_scene_leaves_nothing_of_the_last_one():
 
 
 def test_the_benchmark_times_all_parts(ros, monkeypatch):
+    import rclpy
+
     from ragdoll_ros.ros import bench
     monkeypatch.setattr(bench, 'ROUNDS', 1)
     node = rclpy.create_node('bench')
@@ -202,16 +202,19 @@ def test_the_benchmark_times_all_parts(ros, monkeypatch):
     assert min(costs.values()) > 0
 
 
-@pytest.mark.parametrize('speed, looks', [(100.0, 5), (10.0, 1)])
-def test_a_ticker_lets_others_look_as_often_as_they_have_patience_for(ros, speed, looks):
-    node = rclpy.create_node('ticker')
-    ticker = Ticker(node, Clock(clock_type=ClockType.STEADY_TIME), lambda: None)
-    ticker.stop()
-    assert ticker.looks(50_000_000)
-    ticker.start(1e9 / speed)
+def looks_of(glance, period, wakes):
+    """Whether a glance is open before each wake of a timer and, after it, still is."""
     found = []
-    for _ in range(3 * looks):
-        found.append(ticker.looks(50_000_000))
-        ticker._catch_up()
-    assert sum(found) == 3
-    node.destroy_node()
+    for wake in range(1, wakes + 1):
+        before = glance.is_open
+        glance.wake(wake * period)
+        found.append((before, glance.is_open))
+    return found
+
+
+def test_a_glance_is_open_now_and_then_and_always_where_wakes_are_rare():
+    """What is gathered in time is also gone through, though the timer comes first."""
+    often = looks_of(Glance(50), 10, 40)
+    assert 2 * 40 // 5 <= sum(before for before, _ in often) <= 2 * 40 // 4
+    assert sum(before and after for before, after in often) >= 40 // 6
+    assert all(before and after for before, after in looks_of(Glance(50), 60, 40))

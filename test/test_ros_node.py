@@ -394,3 +394,10 @@ def test_calls_are_answered_while_ticks_follow_each_other_closely(make_node, pee
     for wanted in (True, False, True):
         assert peer.call(SetBool, 'ragdoll/pause', SetBool.Request(data=wanted)).success
     assert peer.call(Trigger, 'ragdoll/step', Trigger.Request()).success
+
+
+def test_calls_are_answered_by_a_node_that_falls_behind(make_node, peer):
+    """Its timer is ready whenever the executor looks, and comes first."""
+    node = make_node(rate=5000.0, real_time_factor=100.0)
+    peer.executor_.add_node(node)
+    assert peer.call(SetBool, 'ragdoll/pause', SetBool.Request(data=True)).success

@@ -9,6 +9,7 @@ from rclpy.clock import Clock
 from rclpy.node import Node
 
 from ..physics.pacing import Pacer
+from .glance import Glance
 
 SHORTEST_PERIOD = 1_000_000
 """ns between two calls of the timer at the least; at a faster pace, it makes several ticks."""
@@ -20,9 +21,8 @@ CATCH_UP = 2
 """Times the wanted pace at which a stall is caught up: listeners' queues are ten messages long."""
 
 CALLS, MISFITS = 50_000_000, 1_000_000_000
-"""ns on the wall for which the call of a service may wait at the most, and the warning that
-another's topic does not fit. rclpy goes through all that a node has at each wake: 37 services and
-misfits of topics, looked for before each tick, cost more than all else of a doll that sleeps."""
+"""ns for which the call of a service may wait while ticks follow each other closely, and the
+warning that another's topic does not fit."""
 
 
 class Ticker:
@@ -31,7 +31,7 @@ class Ticker:
     def __init__(self, node: Node, steady: Clock, tick: Callable[[], None]) -> None:
         self._tick = tick
         self._pacer = Pacer(1.0, 0)
-        self._wakes = 0
+        self._glances = {patience: Glance(patience) for patience in (CALLS, MISFITS)}
         self._timer = node.create_timer(1.0, self._catch_up, clock=steady)
 
     @property
@@ -40,13 +40,8 @@ class Ticker:
         return self._pacer.lost
 
     def looks(self, patience: int) -> bool:
-        """Whether what may wait for ``patience``, ns, is to be looked at before the next tick.
-
-        Where ticks follow each other more closely, that is before each so many of them.
-        """
-        if self._timer.is_canceled():
-            return True
-        return self._wakes % max(1, patience // self._timer.timer_period_ns) == 0
+        """Whether what may wait for ``patience``, CALLS or MISFITS, is to be looked at now."""
+        return self._timer.is_canceled() or self._glances[patience].is_open
 
     def start(self, period: float) -> None:
         """Begin anew: the first tick comes one ``period``, ns, from now."""
@@ -62,8 +57,10 @@ class Ticker:
 
     def _catch_up(self) -> None:
         """Make the ticks that are due, as far as there is time."""
-        self._wakes += 1
-        end = time.monotonic_ns() + LONGEST_BURST
+        woken = time.monotonic_ns()
+        for glance in self._glances.values():
+            glance.wake(woken)
+        end = woken + LONGEST_BURST
         for _ in range(self._most_ticks):
             now = time.monotonic_ns()
             if now > end or not self._pacer.due(now):
