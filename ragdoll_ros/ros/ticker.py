@@ -20,7 +20,7 @@ LONGEST_BURST = 20_000_000
 CATCH_UP = 2
 """Times the wanted pace at which a stall is caught up: listeners' queues are ten messages long."""
 
-CALLS, MISFITS = 50_000_000, 1_000_000_000
+CALLS, MISFITS = 100_000_000, 1_000_000_000
 """ns for which the call of a service may wait while ticks follow each other closely, and the
 warning that another's topic does not fit."""
 
