@@ -1,14 +1,11 @@
-"""Packed messages against rclpy's own serialization; markers against the bones."""
+"""Stamps; markers and handles against the bones."""
 from __future__ import annotations
-
-import functools
-import timeit
 
 import numpy as np
 import pytest
-from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.serialization import deserialize_message
 from specimens import SPECIMENS
-from visualization_msgs.msg import Marker
+from visualization_msgs.msg import Marker, MarkerArray
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import rotation
@@ -16,49 +13,10 @@ from ragdoll_ros.model.push import ARROW, Push
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.ros.glance import Glance
 from ragdoll_ros.ros.handles import GROWTH, Handles
 from ragdoll_ros.ros.markers import Markers
-from ragdoll_ros.ros.messages import to_joint_state, to_multi_dof, to_pose_array
-from ragdoll_ros.ros.packed import Packed
 from ragdoll_ros.ros.stamps import Stamps
-
-STAMPS = (0, 1, 999_999_999, 1_795_257_907_785_147_064)
-
-
-@pytest.mark.parametrize('frame', ['', 'w', 'wo', 'wor', 'world', 'a/longer/frame'])
-@pytest.mark.parametrize('count', [1, 10, 100])
-def test_packed_messages_are_what_rclpy_serializes(frame, count):
-    random = np.random.default_rng(count)
-    names = tuple(f'bone_{"x" * (k % 5)}{k}' for k in range(count))
-    poses, twists = random.normal(size=(count, 7)), random.normal(size=(count, 6))
-    angles = random.normal(size=count)
-    for make, values in ((functools.partial(to_pose_array, frame), (poses,)),
-                         (functools.partial(to_multi_dof, frame, names), (poses, twists)),
-                         (functools.partial(to_joint_state, frame, names), (angles,))):
-        packed = Packed(make, *(value.shape for value in values))
-        for stamp in STAMPS:
-            assert_same(packed.message(stamp, *values), make(stamp, *values))
-
-
-def assert_same(data, message):
-    """Serialized as rclpy does it, but for the bytes between, which rclpy leaves to chance."""
-    assert len(data) == len(serialize_message(message))
-    assert deserialize_message(data, type(message)) == message
-
-
-def test_a_doll_without_joints_has_an_empty_joint_state():
-    make = functools.partial(to_joint_state, 'world', ())
-    packed = Packed(make, (0,))
-    assert_same(packed.message(5, np.zeros(0)), make(5, np.zeros(0)))
-
-
-def test_packing_is_worth_it():
-    poses = np.random.default_rng(0).normal(size=(1000, 7))
-    make = functools.partial(to_pose_array, 'world')
-    packed = Packed(make, poses.shape)
-    plain = min(timeit.repeat(lambda: serialize_message(make(1, poses)), number=1, repeat=5))
-    quick = min(timeit.repeat(lambda: packed.message(1, poses), number=1, repeat=5))
-    assert quick < plain / 20, 'measured: a hundredth'
 
 
 class RosTime:
@@ -127,9 +85,14 @@ def lone(request):
         yield simulation
 
 
+def heard(data):
+    """The MarkerArray of serialized markers."""
+    return deserialize_message(data, MarkerArray)
+
+
 def test_markers_fill_the_shape_of_a_bone(lone):
     """The markers' farthest points along any direction are those of the bone's own shape."""
-    array = Markers(lone.scene, 'map').message(7, lone.state, ())
+    array = heard(Markers(lone.scene, 'map').message(7, lone.state, ()))
     assert {marker.header.frame_id for marker in array.markers} == {'map'}
     directions = rotation.normalized(np.random.default_rng(3).normal(size=(50, 3)))
     reach = np.max([_support(marker, directions) for marker in array.markers
@@ -142,9 +105,9 @@ def test_markers_fill_the_shape_of_a_bone(lone):
 
 def test_ghosts_to_drag_fill_the_shape_of_a_bone_too(lone):
     """In the bone's own frame, each part larger by GROWTH about its own middle."""
-    handles = Handles(lone.scene, 'map')
+    handles = Handles(lone.scene, 'map', '/ragdoll')
     directions = rotation.normalized(np.random.default_rng(4).normal(size=(50, 3)))
-    ghosts = handles.markers[0].controls[0].markers
+    ghosts = handles.markers(lone.state)[0].controls[0].markers
     for ghost in ghosts:
         scale = ghost.scale
         scale.x, scale.y, scale.z = scale.x / GROWTH, scale.y / GROWTH, scale.z / GROWTH
@@ -173,7 +136,7 @@ def test_the_tip_of_a_push_s_arrow_is_where_it_attacks(local):
         bone = simulation.scene.bone_index(name)
         push = Push(name, (300.0, -400.0, 0.0), point=(0.01, 0.02, 0.1), local=local)
         markers = Markers(simulation.scene, 'world')
-        arrow = markers.message(0, state, [push]).markers[-1]
+        arrow = heard(markers.message(0, state, [push])).markers[-1]
         assert (arrow.type, arrow.action) == (Marker.ARROW, Marker.ADD)
         turn = np.array([arrow.pose.orientation.x, arrow.pose.orientation.y,
                          arrow.pose.orientation.z, arrow.pose.orientation.w])
@@ -184,15 +147,15 @@ def test_the_tip_of_a_push_s_arrow_is_where_it_attacks(local):
             point = rotation.rotate(state.orientations[bone], point)
         np.testing.assert_allclose(tip, state.positions[bone] + point, atol=1e-12)
         assert arrow.scale.x == pytest.approx(ARROW * 0.5 ** 0.5)
-        gone = markers.message(1, state, []).markers[-1]
+        gone = heard(markers.message(1, state, [])).markers[-1]
         assert (gone.ns, gone.id, gone.action) == (arrow.ns, arrow.id, Marker.DELETE)
         assert all(marker.action == Marker.ADD
-                   for marker in markers.message(2, state, []).markers)
+                   for marker in heard(markers.message(2, state, [])).markers)
 
 
 def test_each_marker_is_its_own():
     with Simulation(load_scene('crowd')) as simulation:
-        array = Markers(simulation.scene, 'world').message(0, simulation.state, ())
+        array = heard(Markers(simulation.scene, 'world').message(0, simulation.state, ()))
         keys = [(marker.ns, marker.id) for marker in array.markers
                 if marker.action == Marker.ADD]
         assert len(set(keys)) == len(keys) == len(simulation.scene.bone_names)
@@ -219,7 +182,7 @@ def test_another_scene_leaves_nothing_of_the_last_one():
             push = Push(simulation.scene.bone_names[0], (100.0, 0.0, 0.0))
             swings = simulation.swings if name == 'ponytail' else None
             for pushes in ([], [push]):
-                array = markers.message(0, simulation.state, pushes, swings)
+                array = heard(markers.message(0, simulation.state, pushes, swings))
                 shown(screen, array)
             assert {name for name, _ in screen} - {'push', 'swings'} == set(
                 simulation.scene.bone_names)
@@ -237,3 +200,21 @@ def test_the_benchmark_times_all_parts(ros, monkeypatch):
     node.destroy_node()
     assert set(costs) == {'simulation', 'conversion', 'messages', 'bare engine', 'bare publish'}
     assert min(costs.values()) > 0
+
+
+def looks_of(glance, period, wakes):
+    """Whether a glance is open before each wake of a timer and, after it, still is."""
+    found = []
+    for wake in range(1, wakes + 1):
+        before = glance.is_open
+        glance.wake(wake * period)
+        found.append((before, glance.is_open))
+    return found
+
+
+def test_a_glance_is_open_now_and_then_and_always_where_wakes_are_rare():
+    """What is gathered in time is also gone through, though the timer comes first."""
+    often = looks_of(Glance(50), 10, 40)
+    assert 2 * 40 // 5 <= sum(before for before, _ in often) <= 2 * 40 // 4
+    assert sum(before and after for before, after in often) >= 40 // 6
+    assert all(before and after for before, after in looks_of(Glance(50), 60, 40))

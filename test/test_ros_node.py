@@ -369,3 +369,35 @@ def test_nodes_leave_nothing_behind(ros, count):
     after = left_behind()
     assert after[:2] == (threads, files)
     assert after[2] - memory < 0.5 * count + 5, 'MB; a node with its engines takes some 50'
+
+
+def test_what_nobody_hears_is_not_made_and_who_comes_later_hears_it(make_node, peer):
+    """No layout of a message before its first listener; while paused, the last poses are kept."""
+    node = make_node(scene='crowd')
+    for _ in range(3):
+        node.tick()
+    assert not set(vars(node._outputs._layouts)) & {'poses', 'state', 'joints', 'markers'}
+    node.pause(True)
+    late = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    poses = peer.collect(PoseArray, 'ragdoll/poses', late)
+    peer.wait(lambda: stamps_of(poses) == [node.stamp])
+    state = peer.collect(MultiDOFJointState, 'ragdoll/state')
+    peer.wait_heard(node, '/ragdoll/state')
+    node.tick()
+    peer.wait(lambda: stamps_of(state) == stamps_of(poses)[1:] == [node.stamp])
+
+
+def test_calls_are_answered_while_ticks_follow_each_other_closely(make_node, peer):
+    """Services are looked at before some ticks only, and before each where these are rare."""
+    node = make_node(rate=5000.0)
+    peer.executor_.add_node(node)
+    for wanted in (True, False, True):
+        assert peer.call(SetBool, 'ragdoll/pause', SetBool.Request(data=wanted)).success
+    assert peer.call(Trigger, 'ragdoll/step', Trigger.Request()).success
+
+
+def test_calls_are_answered_by_a_node_that_falls_behind(make_node, peer):
+    """Its timer is ready whenever the executor looks, and comes first."""
+    node = make_node(rate=5000.0, real_time_factor=100.0)
+    peer.executor_.add_node(node)
+    assert peer.call(SetBool, 'ragdoll/pause', SetBool.Request(data=True)).success

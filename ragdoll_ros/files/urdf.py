@@ -12,7 +12,6 @@ link of no mass with the joint's frame takes it, and the child is fixed to that.
 """
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -24,6 +23,9 @@ from ..model.scene import Scene
 from ..model.shapes import Shape
 
 UNLIMITED = 'continuous'
+
+OWNER = '\0'
+"""Stands for a doll's own name in the tree that equal dolls share: XML allows no such character."""
 
 ESCAPES = str.maketrans({'&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;',
                          '\t': '&#9;', '\n': '&#10;', '\r': '&#13;'})
@@ -42,15 +44,19 @@ def scene_to_urdf(scene: Scene, frame: str = WORLD) -> str:
     """
     if len(scene.dolls) == 1:
         return to_urdf(scene.dolls[0].doll)
-    lines = [f'  <link name={_quoted(frame)}/>']
+    lines, trees = [f'  <link name={_quoted(frame)}/>'], {}
     for placement in scene.dolls:
-        doll = placement.doll.renamed(functools.partial(scene.qualified, placement))
-        position, _ = placement.bone_pose(doll.root)
-        lines += [f'  <joint name={_quoted(doll.root.name)} type="floating">',
+        doll = placement.doll
+        if id(doll) not in trees:
+            trees[id(doll)] = doll.root, '\n'.join(_tree(doll.renamed(OWNER.__add__), 'ros'))
+        root, tree = trees[id(doll)]
+        name = _quoted(scene.qualified(placement, root.name))
+        position, _ = placement.bone_pose(root)
+        lines += [f'  <joint name={name} type="floating">',
                   f'    <parent link={_quoted(frame)}/>',
-                  f'    <child link={_quoted(doll.root.name)}/>',
+                  f'    <child link={name}/>',
                   f'    {_origin(position, np.array(placement.orientation))}', '  </joint>',
-                  *_tree(doll, 'ros')]
+                  tree.replace(OWNER, scene.qualified(placement, '').translate(ESCAPES))]
     return _document(scene.name, lines)
 
 

@@ -37,8 +37,9 @@ class DofLayout:
         plain_v: list[int] = []
         roots: list[tuple[int, int]] = []
         balls: list[tuple[int, int]] = []
-        self._angles: list[slice] = []
-        """Where in q each joint stands, in the order of Scene.angle_names."""
+        angles: list[int] = []
+        self._free_angles: list[tuple[slice, slice]] = []
+        """Where among the joint angles and in q each free ball joint stands."""
         v = 0
         self.own_q: list[slice] = []
         self.own_v: list[slice] = []
@@ -60,12 +61,18 @@ class DofLayout:
                     plain_v += range(v, v + joint.dof)
                     bounds += [pair or UNLIMITED for pair in joint.angle_limits]
                 v += joint.dof
-            self._angles += [slice(at[joint.child], at[joint.child] + (
-                4 if joint.is_free_ball else joint.dof)) for joint in doll.joints]
+            for joint in doll.joints:
+                begin = at[joint.child]
+                if joint.is_free_ball:
+                    self._free_angles.append((slice(len(angles), len(angles) + 3),
+                                              slice(begin, begin + 4)))
+                angles += range(begin, begin + joint.dof)
             self.own_q.append(slice(q, len(bounds)))
             self.own_v.append(slice(first_v, v))
         self.sizes = (len(bounds), v)
         """Numbers in q and in v."""
+        self._angles = np.array(angles, int)
+        """(k,) where in q each joint angle stands, in the order of Scene.angle_names."""
         self._plain = (np.array(plain_q), np.array(plain_v))
         self._turning = self._indices(roots + balls)
         self.root_orientations, self.root_spins = self._indices(roots)
@@ -94,8 +101,10 @@ class DofLayout:
         """All joint angles, rad, in the order of Scene.angle_names; of a free ball joint those
         about x, then y, then z.
         """
-        return np.array([angle for at in self._angles for angle in (
-            rotation.to_xyz(q[at]) if at.stop - at.start == 4 else q[at])])
+        angles = q[self._angles]
+        for own, at in self._free_angles:
+            angles[own] = rotation.to_xyz(q[at])
+        return angles
 
     def past_limits(self, q: np.ndarray) -> np.ndarray:
         """Angles (k,) rad by which the limited joints are past their limits; negative inside."""

@@ -50,8 +50,8 @@ class Diagnostics:
         self._simulated += simulated
 
     def report(self) -> None:
-        """Publish how it is now; pace and cost are those of the last whole period."""
-        if self._last is None:
+        """Tell who listens how it is now; pace and cost are those of the last whole period."""
+        if self._last is None or not self._publisher.get_subscription_count():
             return
         level, message = self._judge()
         status = DiagnosticStatus(

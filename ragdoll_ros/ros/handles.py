@@ -1,10 +1,16 @@
 """Bones as interactive markers: a ghost of each bone's shape that a mouse can drag."""
 from __future__ import annotations
 
+import copy
+from functools import cached_property
+
+import numpy as np
+from std_msgs.msg import Header
 from visualization_msgs.msg import (
     InteractiveMarker,
     InteractiveMarkerControl,
     InteractiveMarkerPose,
+    InteractiveMarkerUpdate,
     Marker,
 )
 
@@ -12,8 +18,9 @@ from ..model.ragdoll import DEFAULT_COLOR, Bone
 from ..model.scene import Scene
 from ..model.shapes import Part
 from ..model.state import State
-from .markers import KINDS, paint, place
-from .messages import to_vector
+from .markers import KINDS, paint
+from .messages import poses_of, to_pose, to_vector
+from .packed import Packed
 
 OPACITY = 0.15
 """Of a ghost: seen when it is left behind, out of the way where the bone itself is shown."""
@@ -26,40 +33,67 @@ AXES = 0.2
 
 
 class Handles:
-    """Interactive markers of all bones of a scene, named as the bones; made once, moved after.
+    """Interactive markers of all bones of a scene, named as the bones, which ``server`` tells of.
 
-    Stamps are zero: RViz then answers in the marker's own frame, not in its fixed one.
+    Nothing is made of them before it is asked for. Stamps are zero: RViz then answers in the
+    marker's own frame, not in its fixed one.
     """
 
-    def __init__(self, scene: Scene, frame: str) -> None:
-        self.names = scene.bone_names
-        self.markers = [_marker(name, bone, frame)
-                        for name, bone in zip(scene.bone_names, scene.bones, strict=True)]
-        self.poses = [InteractiveMarkerPose(header=marker.header, name=marker.name,
-                                            pose=marker.pose) for marker in self.markers]
+    def __init__(self, scene: Scene, frame: str, server: str) -> None:
+        self._scene, self._server = scene, server
+        self._header = Header(frame_id=frame)
+        self.names = frozenset(scene.bone_names)
 
-    def move(self, state: State) -> None:
-        """Put all where the bones are; markers and poses are the same objects."""
-        for marker, position, orientation in zip(self.markers, state.positions.tolist(),
-                                          state.orientations.tolist(), strict=True):
-            place(marker.pose, position, orientation)
+    def markers(self, state: State) -> list[InteractiveMarker]:
+        """A marker where each bone is; in those of equal bones, what is equal is one object."""
+        models, markers = {}, []
+        for name, bone, row in zip(self._scene.bone_names, self._scene.bones,
+                                   poses_of(state).tolist(), strict=True):
+            if id(bone) not in models:
+                models[id(bone)] = _marker(bone, self._header)
+            marker = copy.copy(models[id(bone)])
+            marker.name, marker.pose = name, to_pose(row)
+            markers.append(marker)
+        return markers
+
+    def update(self, sequence: int, state: State) -> bytes:
+        """Serialized update that bears this number: where all markers are."""
+        return self._packed.message(0, _as_float(sequence), poses_of(state))
+
+    def to_update(self, sequence: int, **content: list) -> InteractiveMarkerUpdate:
+        """An update that bears this number, in the plain way."""
+        return InteractiveMarkerUpdate(server_id=self._server, seq_num=sequence,
+                                       type=InteractiveMarkerUpdate.UPDATE, **content)
+
+    @cached_property
+    def _packed(self) -> Packed:
+        return Packed(self._to_poses, (1,), (len(self._scene.bones), 7))
+
+    def _to_poses(self, _: int, sequence: np.ndarray, poses: np.ndarray) -> InteractiveMarkerUpdate:
+        """An update of poses (n, 7); its number comes as a float64 of the same bytes."""
+        return self.to_update(int(sequence.view(np.uint64)[0]), poses=[
+            InteractiveMarkerPose(header=self._header, name=name, pose=to_pose(row))
+            for name, row in zip(self._scene.bone_names, poses.tolist(), strict=True)])
 
 
-def _marker(name: str, bone: Bone, frame: str) -> InteractiveMarker:
+def _as_float(number: int) -> np.ndarray:
+    """(1,) float64 of the same bytes as a number of 64 bits."""
+    return np.array([number], np.uint64).view(float)
+
+
+def _marker(bone: Bone, header: Header) -> InteractiveMarker:
     control = InteractiveMarkerControl(
         name='drag', interaction_mode=InteractiveMarkerControl.MOVE_3D,
         orientation_mode=InteractiveMarkerControl.INHERIT, always_visible=False,
         markers=[_ghost(bone, part) for part in bone.shape.primitives])
     control.orientation.w = 1.0
-    marker = InteractiveMarker(name=name, scale=AXES, controls=[control])
-    marker.header.frame_id = frame
-    return marker
+    return InteractiveMarker(header=header, scale=AXES, controls=[control])
 
 
 def _ghost(bone: Bone, part: Part) -> Marker:
     """A part of a bone, relative to it: a frame of its own would be looked up."""
     ghost = Marker(type=KINDS[part.kind], action=Marker.ADD)
     ghost.scale = to_vector([GROWTH * side for side in part.size])
-    place(ghost.pose, list(part.position), list(part.orientation))
+    ghost.pose = to_pose((*part.position, *part.orientation))
     paint(ghost, (*(bone.color or DEFAULT_COLOR)[:3], OPACITY))
     return ghost

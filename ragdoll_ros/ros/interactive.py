@@ -83,16 +83,16 @@ class Interactive:
 
     def use(self, simulation: Simulation, settings: Settings) -> None:
         """Show the markers of this simulation's scene, and erase those of the last one's."""
-        last = () if self._handles is None else self._handles.names
+        last = frozenset() if self._handles is None else self._handles.names
         if simulation is not self._simulation:
             self._drags.clear()
         self._simulation, self.settings = simulation, settings
-        handles = self._handles = Handles(simulation.scene, settings.frame_id)
-        handles.move(simulation.state)
-        gone = sorted(set(last) - set(handles.names))
+        handles = self._handles = Handles(simulation.scene, settings.frame_id, self._server)
         self._sequence += 1
         if self._updates.get_subscription_count():
-            self._updates.publish(self._update(markers=handles.markers, erases=gone))
+            self._updates.publish(handles.to_update(
+                self._sequence, markers=handles.markers(simulation.state),
+                erases=sorted(last - handles.names)))
 
     def publish(self, now: int, still: bool = False) -> None:
         """Publish where the markers are at ``now``, and let go for clients that are gone.
@@ -109,9 +109,8 @@ class Interactive:
     def publish_poses(self) -> None:
         """Publish where the markers are, now, if somebody listens."""
         if self._updates.get_subscription_count():
-            self._handles.move(self._simulation.state)
             self._sequence += 1
-            self._updates.publish(self._update(poses=self._handles.poses))
+            self._updates.publish(self._handles.update(self._sequence, self._simulation.state))
 
     def take(self, message: InteractiveMarkerFeedback) -> None:
         """Move a hand as a client wants it; see the table above."""
@@ -137,8 +136,9 @@ class Interactive:
 
     def _check(self, message: InteractiveMarkerFeedback) -> None:
         """Refuse what is for no bone, in another frame or of another kind."""
-        names, frame = self._handles.names, message.header.frame_id
-        if message.marker_name not in names:
+        frame = message.header.frame_id
+        if message.marker_name not in self._handles.names:
+            names = self._simulation.scene.bone_names
             raise errors.UnknownBone('marker_name', message.marker_name,
                                      f'one of {", ".join(names)}')
         if frame not in (WORLD, self.settings.frame_id):
@@ -169,14 +169,10 @@ class Interactive:
         self._simulation.let_go(hand)
         self._drags.pop(hand, None)
 
-    def _update(self, **content: list) -> InteractiveMarkerUpdate:
-        return InteractiveMarkerUpdate(server_id=self._server, seq_num=self._sequence,
-                                       type=InteractiveMarkerUpdate.UPDATE, **content)
-
     def _answer(self, _: GetInteractiveMarkers.Request,
                 response: GetInteractiveMarkers.Response) -> GetInteractiveMarkers.Response:
-        self._handles.move(self._simulation.state)
-        response.sequence_number, response.markers = self._sequence, self._handles.markers
+        response.sequence_number = self._sequence
+        response.markers = self._handles.markers(self._simulation.state)
         return response
 
 

@@ -14,6 +14,7 @@ from sensor_msgs.msg import JointState, MultiDOFJointState
 from std_msgs.msg import Header
 
 from ..model import rotation
+from ..model.scene import Scene
 from ..model.state import State
 from ..physics.swing.pose import SwingState
 
@@ -21,21 +22,32 @@ if TYPE_CHECKING:  # else the page, which reads this file, would load an engine
     from ..physics.engine.protocol import Contact
 
 
+def count_masses(scene: Scene) -> int:
+    """How many point masses all swings of a scene have."""
+    return sum(len(swing.links) for placement in scene.dolls for swing in placement.doll.swings)
+
+
 def poses_of(state: State | SwingState) -> np.ndarray:
     """Poses (n, 7) of bones or of swings' masses: position m, orientation x, y, z, w."""
+    if isinstance(state, State):
+        return state.rows[:, :7]
     return np.concatenate([state.positions, state.orientations], axis=1)
 
 
 def contact_poses(contacts: Sequence[Contact]) -> np.ndarray:
-    """Poses (c, 7) of contacts: position m, and a rotation of x to the normal."""
-    x = np.array([1.0, 0, 0])
-    return np.array([(*contact.position, *rotation.shortest_arc(x, contact.normal))
-                     for contact in contacts]).reshape(-1, 7)
+    """Poses (c, 7) of contacts: position m, and the smallest rotation of x to the normal."""
+    if not contacts:
+        return np.zeros((0, 7))
+    positions = np.array([contact.position for contact in contacts])
+    x, y, z = rotation.normalized([contact.normal for contact in contacts]).T
+    turns = np.stack([np.zeros_like(x), -z, y, 1 + x], axis=1)
+    turns[1 + x < 1e-15] = (0, 0, 1, 0)
+    return np.concatenate([positions, rotation.normalized(turns)], axis=1)
 
 
 def twists_of(state: State) -> np.ndarray:
     """Twists (n, 6) in the world frame: linear m/s, angular rad/s."""
-    return np.concatenate([state.linear_velocities, state.angular_velocities], axis=1)
+    return state.rows[:, 7:]
 
 
 def to_time(nanoseconds: int) -> Time:
@@ -67,10 +79,33 @@ def to_quaternion(values: np.ndarray) -> Quaternion:
     return Quaternion(x=x, y=y, z=z, w=w)
 
 
+def to_pose(row: Sequence[float]) -> Pose:
+    """A pose from 7 numbers: position m, orientation x, y, z, w."""
+    pose = Pose()
+    p, q = pose.position, pose.orientation
+    p.x, p.y, p.z, q.x, q.y, q.z, q.w = row
+    return pose
+
+
+def to_transform(row: Sequence[float]) -> Transform:
+    """A transform from 7 numbers: translation m, rotation x, y, z, w."""
+    transform = Transform()
+    t, q = transform.translation, transform.rotation
+    t.x, t.y, t.z, q.x, q.y, q.z, q.w = row
+    return transform
+
+
+def to_twist(row: Sequence[float]) -> Twist:
+    """A twist from 6 numbers: linear m/s, angular rad/s."""
+    twist = Twist()
+    v, w = twist.linear, twist.angular
+    v.x, v.y, v.z, w.x, w.y, w.z = row
+    return twist
+
+
 def to_pose_array(frame: str, stamp: int, poses: np.ndarray) -> PoseArray:
     """Poses (n, 7)."""
-    return PoseArray(header=to_header(stamp, frame), poses=[
-        Pose(position=to_point(row[:3]), orientation=to_quaternion(row[3:])) for row in poses])
+    return PoseArray(header=to_header(stamp, frame), poses=[to_pose(row) for row in poses.tolist()])
 
 
 def to_multi_dof(frame: str, names: tuple[str, ...], stamp: int, poses: np.ndarray,
@@ -78,9 +113,8 @@ def to_multi_dof(frame: str, names: tuple[str, ...], stamp: int, poses: np.ndarr
     """Poses (n, 7) and twists (n, 6) with the bones' names."""
     return MultiDOFJointState(
         header=to_header(stamp, frame), joint_names=list(names),
-        transforms=[Transform(translation=to_vector(row[:3]), rotation=to_quaternion(row[3:]))
-                    for row in poses],
-        twist=[Twist(linear=to_vector(row[:3]), angular=to_vector(row[3:])) for row in twists])
+        transforms=[to_transform(row) for row in poses.tolist()],
+        twist=[to_twist(row) for row in twists.tolist()])
 
 
 def to_joint_state(frame: str, names: tuple[str, ...], stamp: int,

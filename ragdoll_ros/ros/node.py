@@ -4,6 +4,8 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+import time
+from collections.abc import Iterator
 
 import rclpy
 from rcl_interfaces.msg import SetParametersResult
@@ -12,21 +14,23 @@ from rclpy.exceptions import ParameterException
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.service import Service
 from rclpy.utilities import remove_ros_args
-from std_srvs.srv import SetBool, Trigger
+from rclpy.waitable import Waitable
 
 from ..model import errors
-from ..model.scene import SECOND, STEP_RANGE, Scene
+from ..model.scene import Scene
 from ..physics.simulation import Simulation
 from .diagnostics import Diagnostics
 from .inputs import Inputs
 from .interactive import Interactive
 from .outputs import Outputs
-from .parameters import Parameters, Settings
+from .parameters import Parameters, Settings, make_simulation, step_of
+from .services import Services
 from .session import ros_session
 from .stamps import Stamps
 from .tally import Tally
-from .ticker import Ticker
+from .ticker import CALLS, MISFITS, Ticker
 
 InvalidROSArguments = rclpy_implementation.RCLInvalidROSArgsError
 
@@ -63,12 +67,10 @@ class RagdollNode(Node):
         self._stamps = Stamps(self._ros_time)
         self._outputs = Outputs(self)
         self.inputs = Inputs(self, self.tally)
-        self.interactive = Interactive(self, self.tally, self._now)
+        self.interactive = Interactive(self, self.tally, time.monotonic_ns)
         self._diagnostics = Diagnostics(self, self._steady, self.tally, self._facts,
                                         self._wanted_pace, self._time_of_report)
-        self.create_service(Trigger, '~/reset', self._serve_reset)
-        self.create_service(Trigger, '~/step', self._serve_step)
-        self.create_service(SetBool, '~/pause', self._serve_pause)
+        Services(self, self)
         self.paused = False
         self._use(self.simulation)
         self._tell_engine()
@@ -88,14 +90,24 @@ class RagdollNode(Node):
         """Stamp of the state as it stands, ns."""
         return self._stamps.at(self.simulation.time, self.settings.publish_clock)
 
+    @property
+    def services(self) -> Iterator[Service]:
+        """Services that an executor is to look at now."""
+        return super().services if self._ticker.looks(CALLS) else iter(())
+
+    @property
+    def waitables(self) -> Iterator[Waitable]:
+        """Misfits of topics that an executor is to look at now."""
+        return super().waitables if self._ticker.looks(MISFITS) else iter(())
+
     def tick(self) -> None:
         """Go on by one tick and publish; a state that is not finite is never shown."""
-        start = self._now()
+        start = time.monotonic_ns()
         if not self._advance():
             self.tally.refuse('state', 'not finite; the simulation was built anew')
             self._replace(make_simulation(self._tuning.scene, self.settings))
         self._publish()
-        self._diagnostics.count(self._now() - start, self.simulation.tick)
+        self._diagnostics.count(time.monotonic_ns() - start, self.simulation.tick)
 
     def reset(self) -> None:
         """Go back to the start, to the bit, and publish it."""
@@ -112,7 +124,7 @@ class RagdollNode(Node):
         self._go_on()
         if wanted:
             # What is not published with every tick.
-            self._outputs.publish_markers(self.simulation, self.stamp)
+            self._outputs.stand(self.simulation, self.stamp)
             self.interactive.publish_poses()
         self._diagnostics.report()
 
@@ -136,13 +148,12 @@ class RagdollNode(Node):
             state = self.simulation.advance()
         except (ArithmeticError, ValueError):
             return False
-        return math.isfinite(float(state.rows.sum()))
-
-    def _now(self) -> int:
-        return self._steady.now().nanoseconds
+        return self.simulation.asleep or math.isfinite(float(state.rows.sum()))
 
     def _ros_time(self) -> int:
-        return self.get_clock().now().nanoseconds
+        """Of the node's clock, ns; of the computer's where that is the same, which is quicker."""
+        clock = self.get_clock()
+        return clock.now().nanoseconds if clock.ros_time_is_active else time.time_ns()
 
     def _time_of_report(self) -> int:
         """ROS time, ns; where this node is the clock, what it says, heard or not."""
@@ -156,7 +167,7 @@ class RagdollNode(Node):
             self._ticker.start(self.simulation.tick / self.settings.real_time_factor)
 
     def _publish(self) -> None:
-        simulation, now = self.simulation, self._now()
+        simulation, now = self.simulation, time.monotonic_ns()
         self._stamps.follow(simulation.time)
         self._outputs.publish(simulation, self.stamp, now, self.paused)
         self.interactive.publish(now, self.paused)
@@ -213,25 +224,6 @@ class RagdollNode(Node):
             self.simulation.step = step_of(settings)
             self._go_on()
 
-    def _serve_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Go back to the start; what is paused stays paused."""
-        self.reset()
-        return _answer(response, True, 'back at the start')
-
-    def _serve_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """One tick; refused unless paused, as the timer makes them otherwise."""
-        if not self.paused:
-            self.tally.refuse('~/step', 'not paused')
-            return _answer(response, False, 'not paused: call ~/pause with data: true first')
-        self.tick()
-        return _answer(response, True, f'at {self.simulation.time / SECOND:.9g} s')
-
-    def _serve_pause(self, request: SetBool.Request, response: SetBool.Response
-                     ) -> SetBool.Response:
-        self.pause(request.data)
-        word = 'paused' if request.data else 'running'
-        return _answer(response, True, f'{word} at {self.simulation.time / SECOND:.9g} s')
-
     def _wanted_pace(self) -> float:
         return 0.0 if self.paused else self.settings.real_time_factor
 
@@ -239,22 +231,6 @@ class RagdollNode(Node):
         return {'paused': self.paused, 'real_time_factor': self.settings.real_time_factor,
                 'lost_time': self._ticker.lost / 1e9,
                 'stamp_of_zero': self._stamps.at(0, self.settings.publish_clock)}
-
-
-def _answer(response: object, success: bool, message: str) -> object:
-    response.success, response.message = success, message
-    return response
-
-
-def step_of(settings: Settings) -> float:
-    """Tick in s; a rate that is at its range's end but for rounding gives the step's end."""
-    return min(max(1 / settings.rate, STEP_RANGE[0]), STEP_RANGE[1])
-
-
-def make_simulation(scene: Scene, settings: Settings) -> Simulation:
-    """Build the simulation that the settings ask for."""
-    return Simulation(scene, step_of(settings), settings.accuracy, settings.engine,
-                      settings.workers or 'auto')
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -1,7 +1,6 @@
-"""All that is published of the doll: poses each tick, the rest only while somebody listens."""
+"""All that is published of the dolls, while somebody listens or the time stands."""
 from __future__ import annotations
 
-import functools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,18 +15,9 @@ from visualization_msgs.msg import MarkerArray
 
 from ..files.urdf import scene_to_urdf
 from ..model.scene import Scene
-from ..physics.swing.mount import mounts
-from .markers import Markers
-from .messages import (
-    contact_poses,
-    poses_of,
-    to_joint_state,
-    to_multi_dof,
-    to_pose_array,
-    to_time,
-    twists_of,
-)
-from .packed import Packed
+from .layouts import Layouts
+from .messages import contact_poses, count_masses, poses_of, to_time, twists_of
+from .packed import packed_poses
 
 if TYPE_CHECKING:  # else the page, which reads this file, would load an engine
     from ..physics.simulation import Simulation
@@ -57,61 +47,67 @@ class Outputs:
 
     def describe(self, scene: Scene, frame: str) -> None:
         """Make ready for a scene, and publish its URDF."""
-        bones, angles = len(scene.bone_names), len(scene.angle_names)
-        self._packed_poses = Packed(functools.partial(to_pose_array, frame), (bones, 7))
-        self._packed_state = Packed(functools.partial(to_multi_dof, frame, scene.bone_names),
-                                    (bones, 7), (bones, 6))
-        self._packed_joints = Packed(functools.partial(to_joint_state, frame, scene.angle_names),
-                                     (angles,))
-        self._marker_array = Markers(scene, frame)
-        self._frame = frame
-        self._describe_swings(scene, frame)
+        self._layouts, self._frame = Layouts(scene, frame), frame
+        self._offer_swings(count_masses(scene) > 0)
         self._next_markers = 0
+        self._untold = False
         self._description.publish(String(data=scene_to_urdf(scene, frame)))
 
     def publish(self, simulation: Simulation, stamp: int, now: int, still: bool = False) -> None:
         """Publish where the simulation is; ``stamp`` and the steady clock's ``now`` in ns.
 
-        ``still``: nothing may follow, so that markers can not wait.
+        ``still``: nothing may follow, so that poses can not stay away, nor markers wait.
         """
-        state = simulation.state
-        poses = poses_of(state)
-        self._poses.publish(self._packed_poses.message(stamp, poses))
         self.publish_clock(stamp)
+        if still or self._poses.get_subscription_count():
+            self._publish_poses(simulation, stamp)
+        else:
+            self._untold = True
         if self._state.get_subscription_count():
-            self._state.publish(self._packed_state.message(stamp, poses, twists_of(state)))
+            state = simulation.state
+            self._state.publish(self._layouts.state.message(stamp, poses_of(state),
+                                                            twists_of(state)))
         if self._joints.get_subscription_count():
             angles = np.asarray(simulation.joint_angles)
-            self._joints.publish(self._packed_joints.message(stamp, angles))
+            self._joints.publish(self._layouts.joints.message(stamp, angles))
         if self._swings is not None and self._swings.get_subscription_count():
-            self._swings.publish(self._packed_swings.message(stamp, poses_of(simulation.swings)))
+            self._swings.publish(self._layouts.swings.message(stamp, poses_of(simulation.swings)))
         if self._contacts.get_subscription_count():
-            self._contacts.publish(to_pose_array(self._frame, stamp,
-                                                 contact_poses(simulation.contacts)))
+            self._contacts.publish(packed_poses(self._frame, stamp,
+                                                contact_poses(simulation.contacts)))
         if still or (now >= self._next_markers and self._markers.get_subscription_count()):
             self._next_markers = now + MARKER_PERIOD
-            self.publish_markers(simulation, stamp)
+            self._publish_markers(simulation, stamp)
 
-    def publish_markers(self, simulation: Simulation, stamp: int) -> None:
-        """Publish the markers, heard or not: who comes while the time stands asks for them."""
-        self._markers.publish(self._marker_array.message(stamp, simulation.state,
-                                                         simulation.pushes, simulation.swings))
+    def stand(self, simulation: Simulation, stamp: int) -> None:
+        """Publish what the last tick has not, heard or not, as the time stands from now on.
+
+        Who comes then asks for the past.
+        """
+        if self._untold:
+            self._publish_poses(simulation, stamp)
+        self._publish_markers(simulation, stamp)
+
+    def _publish_poses(self, simulation: Simulation, stamp: int) -> None:
+        self._untold = False
+        self._poses.publish(self._layouts.poses.message(stamp, poses_of(simulation.state)))
+
+    def _publish_markers(self, simulation: Simulation, stamp: int) -> None:
+        self._markers.publish(self._layouts.markers.message(
+            stamp, simulation.state, simulation.pushes, simulation.swings))
 
     def publish_clock(self, stamp: int) -> None:
         """Publish the time, ns, if this node is the clock."""
         if self._clock is not None:
             self._clock.publish(Clock(clock=to_time(stamp)))
 
-    def _describe_swings(self, scene: Scene, frame: str) -> None:
-        """Make ready for the masses of a scene's swings; a scene without any has no topic."""
-        masses = sum(len(mount.names) for mount in mounts(scene))
-        if masses and self._swings is None:
+    def _offer_swings(self, wanted: bool) -> None:
+        """Begin or end to publish swings: a scene without any has no such topic."""
+        if wanted and self._swings is None:
             self._swings = self._node.create_publisher(PoseArray, '~/swings', 10)
-        elif not masses and self._swings is not None:
+        elif not wanted and self._swings is not None:
             self._node.destroy_publisher(self._swings)
             self._swings = None
-        if masses:
-            self._packed_swings = Packed(functools.partial(to_pose_array, frame), (masses, 7))
 
     def be_clock(self, wanted: bool) -> None:
         """Begin or end to publish /clock."""

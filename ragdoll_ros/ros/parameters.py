@@ -22,7 +22,7 @@ from ..model.ragdoll import WORLD
 from ..model.scene import STEP_RANGE, Scene
 from ..physics.engine.registry import ENGINES, check_engine
 from ..physics.settings import ACCURACIES
-from ..physics.simulation import MOST_WORKERS
+from ..physics.simulation import MOST_WORKERS, Simulation
 
 
 def _setting(default: object, description: str, span: tuple[float, float] | None = None,
@@ -190,6 +190,17 @@ def check(settings: Settings, scene: Scene) -> None:
         raise errors.OutOfRange('frame_id', frame, 'a name without a slash at its beginning')
     if frame in names:
         raise errors.DuplicateName('frame_id', frame, 'a name that no bone bears')
+
+
+def step_of(settings: Settings) -> float:
+    """Tick in s; a rate that is at its range's end but for rounding gives the step's end."""
+    return min(max(1 / settings.rate, STEP_RANGE[0]), STEP_RANGE[1])
+
+
+def make_simulation(scene: Scene, settings: Settings) -> Simulation:
+    """Build the simulation that the settings ask for."""
+    return Simulation(scene, step_of(settings), settings.accuracy, settings.engine,
+                      settings.workers or 'auto')
 
 
 def _given(parameters: list[Parameter]) -> dict:

@@ -2,12 +2,14 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 
 from rclpy.clock import Clock
 from rclpy.node import Node
 
 from ..physics.pacing import Pacer
+from .glance import Glance
 
 SHORTEST_PERIOD = 1_000_000
 """ns between two calls of the timer at the least; at a faster pace, it makes several ticks."""
@@ -18,13 +20,18 @@ LONGEST_BURST = 20_000_000
 CATCH_UP = 2
 """Times the wanted pace at which a stall is caught up: listeners' queues are ten messages long."""
 
+CALLS, MISFITS = 100_000_000, 1_000_000_000
+"""ns for which the call of a service may wait while ticks follow each other closely, and the
+warning that another's topic does not fit."""
+
 
 class Ticker:
     """A timer of the ``steady`` clock that calls ``tick`` each period, from start() to stop()."""
 
     def __init__(self, node: Node, steady: Clock, tick: Callable[[], None]) -> None:
-        self._steady, self._tick = steady, tick
+        self._tick = tick
         self._pacer = Pacer(1.0, 0)
+        self._glances = {patience: Glance(patience) for patience in (CALLS, MISFITS)}
         self._timer = node.create_timer(1.0, self._catch_up, clock=steady)
 
     @property
@@ -32,10 +39,14 @@ class Ticker:
         """Time that was given up in long stalls, ns."""
         return self._pacer.lost
 
+    def looks(self, patience: int) -> bool:
+        """Whether what may wait for ``patience``, CALLS or MISFITS, is to be looked at now."""
+        return self._timer.is_canceled() or self._glances[patience].is_open
+
     def start(self, period: float) -> None:
         """Begin anew: the first tick comes one ``period``, ns, from now."""
         self._pacer.period = period
-        self._pacer.start(self._steady.now().nanoseconds)
+        self._pacer.start(time.monotonic_ns())
         self._timer.timer_period_ns = max(SHORTEST_PERIOD, round(period))
         self._most_ticks = math.ceil(CATCH_UP * self._timer.timer_period_ns / period)
         self._timer.reset()
@@ -46,9 +57,12 @@ class Ticker:
 
     def _catch_up(self) -> None:
         """Make the ticks that are due, as far as there is time."""
-        end = self._steady.now().nanoseconds + LONGEST_BURST
+        woken = time.monotonic_ns()
+        for glance in self._glances.values():
+            glance.wake(woken)
+        end = woken + LONGEST_BURST
         for _ in range(self._most_ticks):
-            now = self._steady.now().nanoseconds
+            now = time.monotonic_ns()
             if now > end or not self._pacer.due(now):
                 break
             self._tick()
