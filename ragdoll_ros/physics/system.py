@@ -38,7 +38,7 @@ def system_of(scene: Scene) -> System:
     geoms = _geoms(scene, tree)
     return System(
         tree=tree, gravity=np.array(scene.gravity, float), **_dofs(tree, layout.sizes[1]),
-        geoms=geoms, pairs=pairs_between(scene, geoms, _within_dolls(scene, geoms)),
+        geoms=geoms, pairs=pairs_between(scene, _within_dolls(scene)),
         bounds=bounds, normal=np.array(ground.normal if ground else (0.0, 0.0, 1.0)),
         offset=np.array([ground.offset if ground else -math.inf]),
         bounce_speed=np.array([scene.material.restitution_speed]),
@@ -86,7 +86,7 @@ def coordinates(system: System) -> int:
     return len(system.up) + int(system.tree['free'].sum())
 
 
-def pairs_between(scene: Scene, geoms: np.ndarray, couples: np.ndarray) -> np.ndarray:
+def pairs_between(scene: Scene, couples: np.ndarray) -> np.ndarray:
     """Pairs of geoms (p, 2) with the law of their contact."""
     laws = np.array([scene.material.on(bone) for bone in scene.bones
                      for _ in bone.shape.parts]).reshape(-1, 3)
@@ -168,7 +168,7 @@ def _radius(shape: object) -> float:
                         else shape.half_extents))
 
 
-def _within_dolls(scene: Scene, geoms: np.ndarray) -> np.ndarray:
+def _within_dolls(scene: Scene) -> np.ndarray:
     """Pairs (p, 2) of geoms of one doll whose bones are not one, nor jointed to each other."""
     if not scene.self_collision:
         return np.zeros((0, 2), np.int64)

@@ -271,7 +271,7 @@ class Clusters:
             for a, b in [(place[int(one)], place[int(other)])]])
         scene = dataclasses.replace(
             self._scene, dolls=tuple(self._scene.dolls[doll] for doll in dolls))
-        system = joined(systems, pairs_between(scene, None, geoms))
+        system = joined(systems, pairs_between(scene, geoms))
         alone = [self._alone[doll].course for doll in dolls]
         course = make_course(system, _contacts(system))._replace(
             q=self.q[q], v=self.v[v], tally=self.tally[dolls[0]:dolls[0] + 1],

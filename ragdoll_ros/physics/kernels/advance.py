@@ -74,7 +74,8 @@ what meets from ending deeper."""
 COARSEST = 0.13
 
 MOST_EVENTS = 200
-"""Impacts in one stretch: from then on nothing is thrown back, and no instant of a touch sought."""
+"""Impacts in one stretch of a doll by itself, by the cube of their number of several that go on
+together: from then on no instant of a touch is sought, so that a tick of many costs what they do."""
 
 GAUSS = ((0.046910077030668, 0.118463442528095), (0.230765344947158, 0.239314335249683),
          (0.5, 0.284444444444444), (0.769234655052842, 0.239314335249683),
@@ -188,7 +189,7 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
         much = tolerated(s, r, m, length, max(moving, speed), work)
         if turn < TRIES - 1 and length > FINEST * step and (
                 not gained - r.lift[0] <= much or sinks(s, r)
-                or not seek and length > COARSEST * step and meets_deep(s, r)):
+                or (not seek and length > COARSEST * step and meets_deep(s, r))):
             length, hit = length / 2, False
             tally.next = length
             take_over(r.met, r.gaps)
@@ -256,7 +257,7 @@ def tolerated(s: System, r: Room, m: int, h: float, kinetic: float, work: float)
             total += abs(r.contacts[i].impulse[e])
     share = max(GAIN * (kinetic + abs(work)), min(PAID * kinetic, SLIGHT * s.heft[0]))
     return min(share, (SMALL - PAID) * inner_energy(s, r)) + (
-        NOISE * s.heft[0] + 10 * STEP_TOLERANCE * min(total, jammed(s, r, h)))
+        NOISE * s.heft[0] + max(10 * STEP_TOLERANCE, r.left[0]) * min(total, jammed(s, r, h)))
 
 
 @compiled

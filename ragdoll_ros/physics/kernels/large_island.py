@@ -7,17 +7,59 @@ Erleben, The Visual Computer 26, 2010).
 """
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from .machine import compiled
 from .solver import LIMIT, OPENING, ROLLING, on_disc, one_contact
-from .system import STICKS, Room
+from .system import COMPLIANCE, STICKS, Room
 
 MOST_SWEEPS = 100
 """Of a large island."""
 
 GOOD = 1e-6
 """m/s to which a large island is solved, if that many sweeps bring it there."""
+
+LOCKED = 1e30
+"""Of a row along which nothing can move, instead of its W."""
+
+ROUGHLY = 1e-2
+"""m/s: what is left by more is counted, and its impulses are kept from making energy."""
+
+
+@compiled
+def solve_large(r: Room, count: int, n: int, h: float, thrown: bool, deep: bool) -> None:
+    """Solve an island as solve_small() does, but that what is thrown back so that it would make
+    energy is not thrown, and that curved ways are taken as straight.
+    """
+    b, p, out, start = r.p[0], r.p[1], r.p[2], r.p[3]
+    own_blocks(r, count, COMPLIANCE)
+    left, turns = sweep_island(r, count, n, b, p)
+    if let_go(r, count, b, p):
+        left, more = sweep_island(r, count, n, b, p)
+        turns += more
+    work, spent = work_and_spent(r, n, start, p)
+    if thrown and work + spent / 2 > 0:
+        left, more = sweep_island(r, count, n, start, p)
+        turns += more
+        r.tally[0].softened += 1
+        work, spent = work_and_spent(r, n, start, p)
+    r.tally[0].sweeps += turns
+    if not left <= ROUGHLY:
+        r.tally[0].unsolved += 1
+        if not work + spent / 2 <= 0:
+            share = max(0.0, -2 * work / spent) if spent > 0 else 0.0
+            for i in range(n):
+                p[i] = share * p[i] if math.isfinite(p[i]) and math.isfinite(share) else 0.0
+    r.left[0] = max(r.left[0], left)
+    if deep:
+        normals_alone(r, count)
+        for i in range(n):
+            b[i] = out[i] = 0.0
+        for k in range(count):
+            b[r.rows[k]] = -r.need[0, k]
+        sweep_island(r, count, n, b, out)
 
 
 @compiled
@@ -33,7 +75,8 @@ def own_blocks(r: Room, count: int, compliance: float) -> None:
                 for x in range(c.support):
                     total += r.Y[c.row + e, x] * r.Y[c.row + g, x]
                 r.blocks[k, 5 * e + g] = r.blocks[k, 5 * g + e] = total
-            r.blocks[k, 6 * e] *= 1 + compliance
+            own = r.blocks[k, 6 * e]
+            r.blocks[k, 6 * e] = (1 + compliance) * own if own > 0 else LOCKED
 
 
 @compiled

@@ -84,6 +84,7 @@ def contact_step(s: System, r: Room, course: Course, h: float, loads: np.ndarray
     move_freely(s, r, v, h, loads, springs, since + h / 2)
     place_geoms(s.tree, s.root_of, s.geoms, r.work, middle, r.at, r.turn)
     m = find_contacts(s, middle, r, r.met, SLOW * h)
+    r.left[0] = 0.0
     if m:
         warm_start(s, r, m, course.known, h)
         respond(s, r, middle, v, free, m, h, STEP_TOLERANCE, change, shift)

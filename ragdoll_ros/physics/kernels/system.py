@@ -100,10 +100,20 @@ bones' ``rows`` (n, 13) and the dolls' ``sums`` (d,). What acts in it: ``loads``
 Room = collections.namedtuple(
     'Room', 'work own composite H contacts table at turn gaps later Y support W G p solver '
     'kinds rows mu roll need label vectors states given before after begun count lift tally '
-    'within armed met stages row place blocks unsought')
-"""Scratch of the rigid core, but for ``tally``, ``within`` and ``gaps``, which are the course's."""
+    'within armed met stages row place blocks unsought left')
+"""Scratch of the rigid core, but for ``tally``, ``within`` and ``gaps``, which are the course's.
+
+The rows ``Y`` of contacts have entries for the velocities that they see, ``support``, alone; ``W``
+and ``G`` have room for a small island, ``blocks`` for W of each contact by itself. Of a step:
+``met``, the gaps that tell what touches in it; ``unsought`` (1,), whether touches in it are not
+sought; ``left`` (1,), m/s by which contacts of large islands may err."""
 
 WITHIN, OUTSIDE = 1, 2
+
+COMPLIANCE, OF_IMPACTS = 1e-8, 1e-10
+"""Of contacts and limits, as a share of their own W, in steps and at impacts: what several of them
+bear together is then decided, and their impulses stay small where they jam. What rests on a slope
+creeps by some 1e-10 m/s for it, and what strikes misses as large a share of its velocity."""
 
 LARGE = 96
 """Rows of an island from which on it is solved without W; see large_island.py."""
@@ -149,7 +159,8 @@ def make_room(system: System, course: Course) -> Room:
         H=np.zeros((nv, nv)), contacts=np.zeros(contacts, CONTACT), table=np.zeros((16, 8)),
         at=np.zeros((geoms, 3)), turn=np.zeros((geoms, 3, 3)), gaps=course.gaps,
         later=np.zeros(gaps), Y=np.zeros((rows, wide)),
-        support=np.zeros((contacts, wide), np.int64), W=np.zeros(few * few), G=np.zeros(few * few), p=np.zeros((6, rows)),
+        support=np.zeros((contacts, wide), np.int64), W=np.zeros(few * few),
+        G=np.zeros(few * few), p=np.zeros((6, rows)),
         solver=np.zeros((9, 2 * max(rows, 8))), kinds=np.zeros(contacts, np.int64),
         rows=np.zeros(contacts, np.int64), mu=np.zeros(contacts), roll=np.zeros(contacts),
         need=np.zeros((4, contacts)), label=np.zeros(dolls, np.int64),
@@ -157,8 +168,9 @@ def make_room(system: System, course: Course) -> Room:
         given=np.zeros(dolls, GIVEN), before=np.zeros(dolls, DOLL), after=np.zeros(dolls, DOLL),
         begun=np.zeros(contacts, CONTACT), count=np.zeros(1, np.int64), lift=np.zeros(2),
         tally=course.tally, within=course.within, armed=np.zeros(gaps), met=np.zeros(gaps),
-        stages=np.zeros((16, nq + nv)), row=np.zeros(nq + nv), place=np.zeros(nv, np.int64), blocks=np.zeros((contacts, 25)),
-        unsought=np.zeros(1))
+        stages=np.zeros((16, nq + nv)), row=np.zeros(nq + nv),
+        place=np.zeros(nv, np.int64), blocks=np.zeros((contacts, 25)),
+        unsought=np.zeros(1), left=np.zeros(1))
 
 
 def depth(system: System) -> int:
