@@ -74,8 +74,8 @@ what meets from ending deeper."""
 COARSEST = 0.13
 
 MOST_EVENTS = 200
-"""Impacts in one stretch of a doll by itself, by the cube of their number of several that go on
-together: from then on no instant of a touch is sought, so that a tick of many costs what they do."""
+"""Impacts in one stretch of a doll by itself, over the cube of their number of several that go on
+together: from then on no instant of a touch is sought, so that many do not cost their square."""
 
 GAUSS = ((0.046910077030668, 0.118463442528095), (0.230765344947158, 0.239314335249683),
          (0.5, 0.284444444444444), (0.769234655052842, 0.239314335249683),
