@@ -375,9 +375,10 @@ def test_plots_tell_energy_gap_and_pace(page):
     client.press(page, 'Push up')
     wait(lambda: min(len(plot.handle.data[0]) for plot in (
         page.plots.pace, page.plots.energy)) > 3)
+    wait(lambda: page.plots.energy.handle.data[2].max() > 10)
     _, energy, put_in = page.plots.energy.handle.data
     # The doll never has more than was put in: a thousandth for rounding.
-    assert put_in.max() > 10 and (energy <= put_in * 1.001 + 1e-6).all()
+    assert (energy <= put_in * 1.001 + 1e-6).all()
     _, gap = page.plots.gap.handle.data
     assert 0 <= gap.max() < 50
     _, pace, wanted = page.plots.pace.handle.data
