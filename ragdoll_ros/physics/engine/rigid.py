@@ -13,7 +13,7 @@ from ...model import rotation
 from ...model.coordinates import DofLayout, GeneralizedState
 from ...model.scene import Scene
 from ...model.state import State
-from ..ground_heights import ground_heights
+from ..ground_heights import GroundHeights
 from ..kernels.system import OUTSIDE, WITHIN
 from ..motion import Motion
 from ..settings import Accuracy
@@ -42,6 +42,7 @@ class RigidEngine:
         self.layout = DofLayout([placement.doll for placement in scene.dolls])
         self._clusters = Clusters(scene, self.layout, workers)
         self._neighbours = Neighbours(scene, self._clusters.reach())
+        self._heights = GroundHeights(scene)
         self._spins = self.layout.root_spins
         self.resting = np.zeros(len(scene.dolls), bool)
         self._designed = [np.full(len(own), WITHIN) for own in self._clusters.flags(WITHIN)]
@@ -228,7 +229,7 @@ class RigidEngine:
         """Set dolls that are in the ground onto it."""
         if self.scene.ground is None:
             return
-        depths = -np.minimum.reduceat(ground_heights(self.scene, self.state),
+        depths = -np.minimum.reduceat(self._heights(self.state),
                                       [own.start for own in self.scene.bone_slices])
         for doll in np.flatnonzero(depths > pressed(self.scene)):
             at = self.layout.root_positions[doll]
