@@ -1,4 +1,4 @@
-"""Heights of all bones at once: as model.scene.height tells of each, and as corners of meshes do."""
+"""Heights of all bones at once: as model.scene.height tells of each, and corners of meshes do."""
 import dataclasses
 
 import numpy as np

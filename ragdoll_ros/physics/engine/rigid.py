@@ -173,13 +173,14 @@ class RigidEngine:
         if len(self.scene.dolls) == 1:
             return
         rows = self._clusters.rows
-        near = self._neighbours.couples(rows, duration, ~self.resting)
+        near = self._neighbours.couples(rows, duration, ~self.resting, self.groups)
         self._age += 1
         if (self._clusters.know(near) and not self.resting[near].any()
                 and (self._age <= KEPT or self._clusters.all_alone)):
             return
         while True:
-            near = self._neighbours.couples(rows, max(duration, AHEAD), ~self.resting)
+            near = self._neighbours.couples(rows, max(duration, AHEAD), ~self.resting,
+                                            self.groups)
             if not self.resting[near].any():
                 break
             self.resting[near] = False
