@@ -34,22 +34,22 @@ class Neighbours:
         """
         ahead *= SUDDEN
         centres, drifts = (self._mean(rows[:, own]) for own in (slice(0, 3), slice(7, 10)))
-        away, apart = (rows[:, own] - np.repeat(means, self._counts, axis=0) for own, means in (
-            (slice(0, 3), centres), (slice(7, 10), drifts)))
-        turning = self._reach * _length(rows[:, 10:13])
-        balls = self._reach + SPARE / 2 + ahead * (_length(apart) + turning)
-        wide = np.maximum.reduceat(_length(away) + balls, self._first)
-        bound = self._near_ground(rows, balls, ahead * _length(drifts), groups)
-        a, b = _sweep(centres, wide + ahead * _spread(drifts, bound))
+        balls = self._balls(rows, drifts, ahead)
+        away = _length(rows[:, :3] - np.repeat(centres, self._counts, axis=0))
+        wide = np.maximum.reduceat(away + balls, self._first, axis=1)
+        thrown = self._near_ground(rows, balls[1], groups)
+        a, b = _sweep(centres, _enough(wide, ahead * drifts, thrown))
         near = moving[a] | moving[b]
         a, b = a[near], b[near]
-        closing = ahead * _closing(drifts, bound, a, b)
-        near = _length(centres[a] - centres[b]) < wide[a] + wide[b] + closing
-        a, b, closing = a[near], b[near], closing[near]
+        seen = (thrown[a] | thrown[b]).astype(int)
+        """(k,) against what the speeds of two dolls count: 0 each other, 1 the ground."""
+        closing = np.where(seen, 0.0, ahead * _length(drifts[a] - drifts[b]))
+        near = _length(centres[a] - centres[b]) < wide[seen, a] + wide[seen, b] + closing
+        a, b, seen, closing = a[near], b[near], seen[near, None], closing[near]
         if len(a):
             one, other = self._bones[a], self._bones[b]
             gaps = (_length(rows[one, :3][:, :, None] - rows[other, :3][:, None])
-                    - balls[one][:, :, None] - balls[other][:, None, :])
+                    - balls[seen, one][:, :, None] - balls[seen, other][:, None, :])
             near = gaps.min(axis=(1, 2)) < closing
             a, b = a[near], b[near]
         found = np.sort(np.stack([a, b], axis=1), axis=1)
@@ -59,32 +59,35 @@ class Neighbours:
         """Means (d, 3) over the bones of each doll."""
         return np.add.reduceat(values, self._first) / self._counts[:, None]
 
-    def _near_ground(self, rows: np.ndarray, balls: np.ndarray, ways: np.ndarray,
-                     groups: np.ndarray) -> np.ndarray:
-        """Which dolls (d,) may be at the ground when they have moved by ``ways`` (d,) m, they or
-        one of their group, which may hand on how the ground throws it.
+    def _balls(self, rows: np.ndarray, drifts: np.ndarray, ahead: float) -> np.ndarray:
+        """Radii (2, n) m about bones: of where they get to against their dolls' drift (d, 3) m/s,
+        and against the ground.
+        """
+        own = rows[:, 7:10] - np.repeat(drifts, self._counts, axis=0)
+        turning = self._reach * _length(rows[:, 10:13])
+        return np.array([self._reach + ahead * (_length(velocities) + turning) + SPARE / 2
+                         for velocities in (own, rows[:, 7:10])])
+
+    def _near_ground(self, rows: np.ndarray, balls: np.ndarray, groups: np.ndarray) -> np.ndarray:
+        """Which dolls (d,) the ground may throw: whose ``balls`` (n,) m reach it, and those that
+        go on with such a one, which may hand it on.
         """
         if self._ground is None:
-            return np.zeros(len(ways), bool)
+            return np.zeros(len(groups), bool)
         heights = rows[:, :3] @ np.array(self._ground.normal) - self._ground.offset
-        near = np.minimum.reduceat(heights - balls, self._first) < ways
+        near = np.minimum.reduceat(heights - balls, self._first) < 0
         return (np.bincount(groups, near) > 0)[groups]
 
 
-def _closing(drifts: np.ndarray, bound: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """How fast (k,) m/s dolls that drift (d, 3) may come nearer, where the ground binds (d,)."""
-    speeds = _length(drifts)
-    return np.where(bound[a] | bound[b], speeds[a] + speeds[b], _length(drifts[a] - drifts[b]))
+def _enough(wide: np.ndarray, ways: np.ndarray, thrown: np.ndarray) -> np.ndarray:
+    """Radii (d,) m of balls about dolls that meet wherever those of radii ``wide`` (2, d) do.
 
-
-def _spread(drifts: np.ndarray, bound: np.ndarray) -> np.ndarray:
-    """Speeds (d,) m/s of which two dolls' together are no less than they may come nearer by.
-
-    They are those against a common velocity w: |v - u| <= |v - w| + |u - w|, and where the ground
-    binds u, |v| + |u| <= |v - w| + (|u| + |w|).
+    For dolls that go ways (d, 3) m of u and v, and a common way w: |u - v| <= |u - w| + |v - w|.
+    Where the ground counts for a pair, as one of it may be ``thrown``, the other one's ball may be
+    wider by |u|; but |u| <= |u - w| + |w|, and |w| is added to the thrown one.
     """
-    common = np.where(bound[:, None], 0.0, drifts).mean(axis=0)
-    return np.where(bound, _length(drifts) + _length(common), _length(drifts - common))
+    common = np.where(thrown[:, None], 0.0, ways).mean(axis=0)
+    return np.where(thrown, wide[1] + _length(common), wide[0] + _length(ways - common))
 
 
 def _sweep(centres: np.ndarray, wide: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
