@@ -11,7 +11,7 @@ from ..model.coordinates import GeneralizedState
 from ..model.push import Push
 from ..model.scene import SECOND, STEP_RANGE, Scene
 from ..model.state import State
-from .engine.protocol import Contact, Engine
+from .engine.protocol import Contacts, Engine
 from .engine.registry import resolve_engine
 from .grab import EVENLY, Grab, Hands
 from .ground_heights import GroundHeights
@@ -102,7 +102,7 @@ class Simulation:
         return self._hands.grabs
 
     @property
-    def contacts(self) -> list[Contact]:
+    def contacts(self) -> Contacts:
         """What touches now."""
         return self._engine.contacts()
 

@@ -14,12 +14,12 @@ from ...model.coordinates import DofLayout, GeneralizedState
 from ...model.scene import Scene
 from ...model.state import State
 from ..ground_heights import GroundHeights
-from ..kernels.system import OUTSIDE, WITHIN
+from ..kernels.system import CONTACT, OUTSIDE, WITHIN
 from ..motion import Motion
 from ..settings import Accuracy
 from .clusters import Cluster, Clusters
 from .neighbours import Neighbours
-from .protocol import GROUND, Contact, Spring, Springs, Wrenches, pressed
+from .protocol import GROUND, Contacts, Spring, Springs, Wrenches, pressed
 
 FINER = 0.25
 """Share of the step by which the last stretch is gone again to tell its error."""
@@ -32,6 +32,7 @@ KEPT = 10
 
 NO_LOADS = np.zeros((0, 11))
 NO_HANDS = np.zeros((0, 18))
+NO_CONTACTS = np.zeros(0, CONTACT)
 
 
 class RigidEngine:
@@ -111,22 +112,17 @@ class RigidEngine:
 
     def grounded(self) -> np.ndarray:
         """Which dolls (d,) rest on the ground."""
+        known, bones, _ = self._touching()
         found = np.zeros(len(self.scene.dolls), bool)
-        for cluster, now in self._touching():
-            on = now[(now['kind'] > 1) & (now['b'] < 0) & (now['impulse'][:, 0] > 0)]
-            found[cluster.dolls[cluster.system.doll_of[on['a']]]] = True
+        on = (bones[:, 1] == GROUND) & (known['impulse'][:, 0] > 0)
+        found[self.scene.doll_of_bone[bones[on, 0]]] = True
         return found
 
-    def contacts(self) -> list[Contact]:
+    def contacts(self) -> Contacts:
         """What touches now."""
-        made = []
-        for cluster, now in self._touching():
-            bones = cluster.bones[cluster.system.tree['bone']]
-            lasted = cluster.course.tally['lasted'][0] or 1.0
-            made += [Contact(int(bones[c['a']]), int(bones[c['b']]) if c['b'] >= 0 else GROUND,
-                             c['point'].copy(), c['normal'].copy(), -float(c['gap']),
-                             float(c['impulse'][0]) / lasted) for c in now if c['kind'] > 1]
-        return made
+        known, bones, lasted = self._touching()
+        return Contacts(bones[:, 0], bones[:, 1], known['point'], known['normal'], -known['gap'],
+                        known['impulse'][:, 0] / lasted)
 
     def measures(self) -> dict[str, float]:
         """What went wrong since the start, and what was done: names end in their units."""
@@ -159,14 +155,22 @@ class RigidEngine:
         """End the threads."""
         self._clusters.close()
 
-    def _touching(self) -> list[tuple[Cluster, np.ndarray]]:
-        """Contacts of each cluster's last step; none in flight."""
-        found = []
+    def _touching(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Contacts (c,) of each cluster's last step, none in flight; which bones (c, 2) of the
+        scene touch, or GROUND; how long (c,) s the step lasted.
+        """
+        tables, bones, lasted = [NO_CONTACTS], [np.zeros((0, 2), np.int64)], [np.zeros(0)]
         for cluster in self._clusters:
-            count = int(cluster.course.tally['contacts'][0])
-            if count and not cluster.course.path['valid'][0]:
-                found.append((cluster, cluster.course.known[:count]))
-        return found
+            tally = cluster.course.tally[0]
+            if not tally['contacts'] or cluster.course.path['valid'][0]:
+                continue
+            known = cluster.course.known[:tally['contacts']]
+            known = known[known['kind'] > 1]
+            place = np.append(cluster.bones[cluster.system.tree['bone']], GROUND)
+            tables.append(known)
+            bones.append(place[np.stack([known['a'], known['b']], axis=1)])
+            lasted.append(np.full(len(known), tally['lasted'] or 1.0))
+        return tuple(map(np.concatenate, (tables, bones, lasted)))
 
     def _meet(self, duration: float) -> None:
         """See that those go on together who may touch within ``duration`` s; they wake."""
