@@ -17,7 +17,7 @@ def test_a_stack_and_a_ball_beside_it_bear_their_weights(engine):
     """A block on a block, 2 m from a ball that lies and one that flies: m g between the blocks,
     2 m g under the lower one, m g under the ball, nothing of the fourth.
     """
-    pytest.importorskip({'rigid': 'numba'}.get(engine, engine))
+    pytest.importorskip({'rigid': 'numba', 'bullet': 'pybullet'}.get(engine, engine))
     half = EDGE / 2
     places = [(BLOCK, (0, 0, half)), (BALL, (2, 0, 50)), (BLOCK, (0, 0, 3 * half)),
               (BALL, (2, 0, half))]

@@ -14,7 +14,7 @@ from ...model.coordinates import DofLayout, GeneralizedState
 from ...model.scene import Scene
 from ...model.state import State
 from ..ground_heights import GroundHeights
-from ..kernels.system import CONTACT, OUTSIDE, WITHIN
+from ..kernels.system import OUTSIDE, WITHIN
 from ..motion import Motion
 from ..settings import Accuracy
 from .clusters import Cluster, Clusters
@@ -32,7 +32,6 @@ KEPT = 10
 
 NO_LOADS = np.zeros((0, 11))
 NO_HANDS = np.zeros((0, 18))
-NO_CONTACTS = np.zeros(0, CONTACT)
 
 
 class RigidEngine:
@@ -112,7 +111,7 @@ class RigidEngine:
 
     def grounded(self) -> np.ndarray:
         """Which dolls (d,) rest on the ground."""
-        known, bones, _ = self._touching()
+        known, bones, _ = self._clusters.touching()
         found = np.zeros(len(self.scene.dolls), bool)
         on = (bones[:, 1] == GROUND) & (known['impulse'][:, 0] > 0)
         found[self.scene.doll_of_bone[bones[on, 0]]] = True
@@ -120,7 +119,7 @@ class RigidEngine:
 
     def contacts(self) -> Contacts:
         """What touches now."""
-        known, bones, lasted = self._touching()
+        known, bones, lasted = self._clusters.touching()
         return Contacts(bones[:, 0], bones[:, 1], known['point'], known['normal'], -known['gap'],
                         known['impulse'][:, 0] / lasted)
 
@@ -154,23 +153,6 @@ class RigidEngine:
     def close(self) -> None:
         """End the threads."""
         self._clusters.close()
-
-    def _touching(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Contacts (c,) of each cluster's last step, none in flight; which bones (c, 2) of the
-        scene touch, or GROUND; how long (c,) s the step lasted.
-        """
-        tables, bones, lasted = [NO_CONTACTS], [np.zeros((0, 2), np.int64)], [np.zeros(0)]
-        for cluster in self._clusters:
-            tally = cluster.course.tally[0]
-            if not tally['contacts'] or cluster.course.path['valid'][0]:
-                continue
-            known = cluster.course.known[:tally['contacts']]
-            known = known[known['kind'] > 1]
-            place = np.append(cluster.bones[cluster.system.tree['bone']], GROUND)
-            tables.append(known)
-            bones.append(place[np.stack([known['a'], known['b']], axis=1)])
-            lasted.append(np.full(len(known), tally['lasted'] or 1.0))
-        return tuple(map(np.concatenate, (tables, bones, lasted)))
 
     def _meet(self, duration: float) -> None:
         """See that those go on together who may touch within ``duration`` s; they wake."""
