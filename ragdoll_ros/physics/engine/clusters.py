@@ -70,6 +70,7 @@ class Clusters:
         self._systems = _systems(scene)
         self._q = [np.arange(own.start, own.stop) for own in layout.own_q]
         self._v = [np.arange(own.start, own.stop) for own in layout.own_v]
+        self._doll_of_v = np.repeat(np.arange(len(self._v)), list(map(len, self._v)))
         self._bones = [np.arange(own.start, own.stop) for own in scene.bone_slices]
         self._rooms: dict[int, list[Room]] = {}
         self._workers, self._threads = workers, None
@@ -139,6 +140,15 @@ class Clusters:
         for cluster in self._joined:
             if not resting[cluster.dolls[0]]:
                 self._spread(cluster)
+
+    def stop(self, dolls: np.ndarray) -> None:
+        """Take all speed from ``dolls`` (d,), whole clusters."""
+        self.v[dolls[self._doll_of_v]] = 0.0
+        self._courses.whole['path'][dolls] = 0
+        for cluster in self._joined:
+            if dolls[cluster.dolls[0]]:
+                cluster.course.v[:] = 0.0
+                cluster.course.path[:] = 0
 
     def gather(self) -> None:
         """Let joined clusters go on from where the scene's q and v are."""

@@ -100,12 +100,8 @@ class RigidEngine:
 
     def stop(self, dolls: np.ndarray) -> None:
         """Bring dolls (d,) to rest where they are; the energy that is left is lost for good."""
-        for cluster in self._clusters:
-            if dolls[cluster.dolls].any():
-                self._clusters.v[cluster.v] = 0.0
-                cluster.course.v[:] = 0.0
-                cluster.course.path[:] = 0
-                self.resting[cluster.dolls] = True
+        self._clusters.stop(dolls)
+        self.resting[dolls] = True
         self._departure = None
         self._look()
 
