@@ -90,11 +90,11 @@ def test_a_ball_rests_on_a_tilted_ground_and_tells_of_it():
     engine = MujocoEngine(scene, NORMAL)
     engine.advance(1.0)
     assert engine.grounded().all()
-    contact, = engine.contacts()
-    assert (contact.a, contact.b) == (0, GROUND)
-    assert contact.normal == pytest.approx(normal, abs=1e-9)
-    assert contact.force == pytest.approx(2 * 9.8, rel=1e-3)
-    assert contact.position == pytest.approx(normal * (1.1 - .1), abs=1e-3)
+    found = engine.contacts()
+    assert (found.a, found.b) == ([0], [GROUND])
+    assert found.normals == pytest.approx(normal[None], abs=1e-9)
+    assert found.forces == pytest.approx([2 * 9.8], rel=1e-3)
+    assert found.positions[0] == pytest.approx(normal * (1.1 - .1), abs=1e-3)
 
 
 @pytest.mark.parametrize('engine', ENGINES)
@@ -103,11 +103,11 @@ def test_a_contact_lies_on_its_first_bone_however_deep(engine, shape, beside):
     """Under a ball's middle and a box's corners."""
     doll = Ragdoll('doll', (Bone('bone', shape, 2.0, (0, 0, 0)),))
     deep = engine(Scene('deep', (Placement(doll, position=(0, 0, .098)),), Ground()), PLAIN)
-    assert deep.contacts()
-    for contact in deep.contacts():
-        assert np.abs(contact.position[:2]) == pytest.approx([beside, beside], abs=1e-6)
-        assert contact.position[2] == pytest.approx(-.002, abs=1e-6)
-        assert contact.depth == pytest.approx(.002, abs=1e-6)
+    found = deep.contacts()
+    assert len(found)
+    assert np.abs(found.positions[:, :2]) == pytest.approx(beside, abs=1e-6)
+    assert found.positions[:, 2] == pytest.approx(-.002, abs=1e-6)
+    assert found.depths == pytest.approx(.002, abs=1e-6)
 
 
 def test_jointed_and_overlapping_pairs_do_not_collide():

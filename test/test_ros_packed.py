@@ -21,6 +21,7 @@ from ragdoll_ros.files.urdf import scene_to_urdf, to_urdf
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.ragdoll import DEFAULT_COLOR
+from ragdoll_ros.physics.engine.protocol import GROUND, Contacts
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.ros.handles import Handles
 from ragdoll_ros.ros.markers import BROWN, KINDS, RED, ROD, Markers, paint
@@ -152,13 +153,10 @@ def test_updates_of_handles_are_what_rclpy_serializes(frame, name):
 
 
 def test_a_contact_s_pose_has_x_along_its_normal():
-    class Contact:
-        def __init__(self, normal):
-            self.position, self.normal = np.arange(3.0), np.array(normal)
-
-    assert contact_poses([]).shape == (0, 7)
-    normals = np.array([(0, 0, 1), (1, 0, 0), (-1, 0, 0), (0.6, 0, -0.8), (0, -2.0, 0)])
-    poses = contact_poses([Contact(normal) for normal in normals])
+    assert contact_poses(Contacts.of([])).shape == (0, 7)
+    normals = np.array([(0, 0, 1), (1, 0, 0), (-1, 0, 0), (0.6, 0, -0.8), (0, -1.0, 0)])
+    poses = contact_poses(Contacts.of([[0, GROUND, *range(3), *normal, 0, 0]
+                                       for normal in normals]))
     np.testing.assert_array_equal(poses[:, :3], np.arange(3.0)[None].repeat(5, 0))
     np.testing.assert_allclose(rotation.rotate(poses[:, 3:], np.array([1.0, 0, 0])),
                                rotation.normalized(normals), atol=1e-15)

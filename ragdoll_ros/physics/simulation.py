@@ -11,10 +11,10 @@ from ..model.coordinates import GeneralizedState
 from ..model.push import Push
 from ..model.scene import SECOND, STEP_RANGE, Scene
 from ..model.state import State
-from .engine.protocol import Contact, Engine
+from .engine.protocol import Contacts, Engine
 from .engine.registry import resolve_engine
 from .grab import EVENLY, Grab, Hands
-from .ground_heights import ground_heights
+from .ground_heights import GroundHeights
 from .joint_gap import JointGap
 from .push_queue import PushQueue
 from .settings import Accuracy, resolve_accuracy
@@ -49,7 +49,7 @@ class Simulation:
         self._engine: Engine = choice.make(scene, resolve_accuracy(accuracy),
                                            workers=int(workers))
         self._start = self._engine.save()
-        self._gap = JointGap(scene)
+        self._gap, self._heights = JointGap(scene), GroundHeights(scene)
         self._sleep_detector = SleepDetector(scene)
         self._swings = SwingSimulation(scene) if any(
             placement.doll.swings for placement in scene.dolls) else None
@@ -102,7 +102,7 @@ class Simulation:
         return self._hands.grabs
 
     @property
-    def contacts(self) -> list[Contact]:
+    def contacts(self) -> Contacts:
         """What touches now."""
         return self._engine.contacts()
 
@@ -200,7 +200,7 @@ class Simulation:
             'joint_gap_m': float(self._gap.gaps(self.state).max(initial=0.0)),
             'limit_overshoot_rad': max(0.0, float(
                 engine.layout.past_limits(self.coordinates.q).max(initial=0.0))),
-            'sinking_m': max(0.0, -float(ground_heights(self.scene, self.state).min())),
+            'sinking_m': max(0.0, -float(self._heights(self.state).min())),
             'asleep': float(self.asleep)}
 
     def close(self) -> None:

@@ -19,7 +19,7 @@ from ..model.state import State
 from ..physics.swing.pose import SwingState
 
 if TYPE_CHECKING:  # else the page, which reads this file, would load an engine
-    from ..physics.engine.protocol import Contact
+    from ..physics.engine.protocol import Contacts
 
 
 def count_masses(scene: Scene) -> int:
@@ -34,15 +34,12 @@ def poses_of(state: State | SwingState) -> np.ndarray:
     return np.concatenate([state.positions, state.orientations], axis=1)
 
 
-def contact_poses(contacts: Sequence[Contact]) -> np.ndarray:
+def contact_poses(contacts: Contacts) -> np.ndarray:
     """Poses (c, 7) of contacts: position m, and the smallest rotation of x to the normal."""
-    if not contacts:
-        return np.zeros((0, 7))
-    positions = np.array([contact.position for contact in contacts])
-    x, y, z = rotation.normalized([contact.normal for contact in contacts]).T
+    x, y, z = contacts.normals.T
     turns = np.stack([np.zeros_like(x), -z, y, 1 + x], axis=1)
     turns[1 + x < 1e-15] = (0, 0, 1, 0)
-    return np.concatenate([positions, rotation.normalized(turns)], axis=1)
+    return np.concatenate([contacts.positions, rotation.normalized(turns)], axis=1)
 
 
 def twists_of(state: State) -> np.ndarray:

@@ -23,7 +23,7 @@ from ...model.state import State
 from ..conservation import ConservationProjection
 from ..motion import damping_rate
 from ..settings import Accuracy
-from .protocol import GROUND, AppliedWrench, Contact, Wrenches, pressed
+from .protocol import GROUND, AppliedWrench, Contacts, Wrenches, pressed
 from .substepped import SubsteppedEngine
 
 BREAKING_DISTANCE = 2e-3
@@ -186,19 +186,19 @@ class BulletEngine(SubsteppedEngine):
             self.close()
             raise
 
-    def contacts(self) -> list[Contact]:
+    def contacts(self) -> Contacts:
         """What touched in the last substep."""
         found = []
         # PyBullet divides a substep's impulse by the time of all.
         substeps = self._timing[1] if self._timing else 1
         for point in pybullet.getContactPoints(physicsClientId=self._client):
             a, b = self._bone_of.get(point[1:4:2]), self._bone_of.get(point[2:5:2])
-            position, normal = np.array(point[5]), np.array(point[7])
+            position, normal = point[5], np.array(point[7])
             if a is None:
-                a, b, position, normal = b, GROUND, np.array(point[6]), -normal
-            found.append(Contact(a, GROUND if b is None else b, position, normal,
-                                 -point[8], point[9] * substeps))
-        return found
+                a, b, position, normal = b, GROUND, point[6], -normal
+            found.append([a, GROUND if b is None else b, *position, *normal, -point[8],
+                          point[9] * substeps])
+        return Contacts.of(found)
 
     def close(self) -> None:
         """Release the client; a second time does nothing."""

@@ -13,8 +13,6 @@ from ...model.scene import Scene
 from ..kernels.bundle import bind
 from ..kernels.loaded import advance as kernels
 from ..kernels.system import (
-    DOLL,
-    TALLY,
     Course,
     Room,
     System,
@@ -23,9 +21,8 @@ from ..kernels.system import (
 )
 from ..settings import Accuracy
 from ..system import joined, pairs_between, system_of
-
-CONTACTS_OF_GEOM = 12
-"""Contacts for which there is room, for each part of a bone."""
+from .courses import Courses, room_for_contacts
+from .protocol import GROUND
 
 COUNTS = ('flights', 'steps', 'impacts', 'sweeps', 'unsolved', 'left_out', 'stalls', 'softened',
           'gains', 'pushed', 'handed', 'lifted')
@@ -73,13 +70,20 @@ class Clusters:
         self._systems = _systems(scene)
         self._q = [np.arange(own.start, own.stop) for own in layout.own_q]
         self._v = [np.arange(own.start, own.stop) for own in layout.own_v]
+        self._doll_of_v = np.repeat(np.arange(len(self._v)), list(map(len, self._v)))
         self._bones = [np.arange(own.start, own.stop) for own in scene.bone_slices]
         self._rooms: dict[int, list[Room]] = {}
         self._workers, self._threads = workers, None
-        self.q, self.v = np.zeros(layout.sizes[0]), np.zeros(layout.sizes[1])
-        self.rows, self.sums = np.zeros((len(scene.bones), 13)), np.zeros(len(scene.dolls), DOLL)
-        self.tally = np.zeros(len(scene.dolls), TALLY)
+        self._courses = Courses(self._systems)
+        whole = self._courses.whole
+        self.q, self.v, self.rows = whole['q'], whole['v'], whole['rows'].reshape(-1, 13)
+        self.sums, self.tally = whole['sums'], whole['tally']
         """A joined cluster counts where its first doll does."""
+        trees = {id(system): system.tree['bone'] for system in self._systems}
+        self._records = np.concatenate([bones[trees[id(system)]] for system, bones in zip(
+            self._systems, self._bones, strict=True)])
+        """(n,) bones in the order of the dolls' trees."""
+        self._first = np.array([own.start for own in scene.bone_slices])
         self._effort = np.zeros(len(scene.dolls), np.int64)
         self._alone = [self._single(doll) for doll in range(len(scene.dolls))]
         self.members = list(self._alone)
@@ -137,6 +141,15 @@ class Clusters:
             if not resting[cluster.dolls[0]]:
                 self._spread(cluster)
 
+    def stop(self, dolls: np.ndarray) -> None:
+        """Take all speed from ``dolls`` (d,), whole clusters."""
+        self.v[dolls[self._doll_of_v]] = 0.0
+        self._courses.whole['path'][dolls] = 0
+        for cluster in self._joined:
+            if dolls[cluster.dolls[0]]:
+                cluster.course.v[:] = 0.0
+                cluster.course.path[:] = 0
+
     def gather(self) -> None:
         """Let joined clusters go on from where the scene's q and v are."""
         for cluster in self._joined:
@@ -171,18 +184,35 @@ class Clusters:
         """What has been counted since the start."""
         return {name: self.tally[name].sum() for name in COUNTS}
 
+    def touching(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Contacts (c,) of all last steps, none in flight; which bones (c, 2) of the scene touch,
+        or GROUND; how long (c,) s the step lasted.
+        """
+        courses, lone = self._courses, np.bincount(self.of_doll)[self.of_doll] == 1
+        known, dolls = courses.contacts_of(lone & (courses.whole['path']['valid'] == 0))
+        found = [_touching(courses.whole['known'][known], self._records, self._first[dolls],
+                           self.tally['lasted'][dolls])]
+        for cluster in self._joined:
+            tally = cluster.course.tally[0]
+            if not cluster.course.path['valid'][0]:
+                known = cluster.course.known[:tally['contacts']]
+                found.append(_touching(known, cluster.bones[cluster.system.tree['bone']],
+                                       np.zeros(len(known), np.int64),
+                                       np.full(len(known), tally['lasted'])))
+        return tuple(map(np.concatenate, zip(*found, strict=True)))
+
     def save(self) -> object:
         """A snapshot that restore() brings back to the bit."""
-        return (self.q.copy(), self.v.copy(), self.rows.copy(), self.sums.copy(),
-                self.tally.copy(), [cluster.course.within.copy() for cluster in self._alone],
-                [(cluster, _copied(cluster.course)) for cluster in self.members])
+        return (self._courses.save(), self.members,
+                [(cluster, _copied(cluster.course)) for cluster in self._joined])
 
     def restore(self, snapshot: tuple) -> None:
         """Go back to a snapshot."""
-        self.q[:], self.v[:], self.rows[:], self.sums[:], self.tally[:] = snapshot[:5]
-        self.within(snapshot[5])
-        self._set([cluster for cluster, _ in snapshot[6]])
-        for cluster, course in snapshot[6]:
+        courses, members, joint = snapshot
+        self._courses.restore(courses)
+        if members is not self.members:
+            self._set(members)
+        for cluster, course in joint:
             for name in ('q', 'v', 'dense', 'ends', 'path', 'within', 'gaps', 'rows', 'sums'):
                 getattr(cluster.course, name)[:] = getattr(course, name)
             cluster.course.known[:len(course.known)] = course.known
@@ -247,10 +277,7 @@ class Clusters:
         """A doll by itself; its state is a part of the scene's, its scratch that of its equals."""
         system = self._systems[doll]
         bones, q, v = self._bones[doll], self._q[doll], self._v[doll]
-        course = make_course(system, _contacts(system))._replace(
-            q=self.q[q[0]:q[-1] + 1], v=self.v[v[0]:v[-1] + 1],
-            rows=self.rows[bones[0]:bones[-1] + 1], sums=self.sums[doll:doll + 1],
-            tally=self.tally[doll:doll + 1])
+        course = self._courses[doll]
         if id(system) not in self._rooms:
             self._rooms[id(system)] = [make_room(system, course) for _ in range(self._workers)]
         rooms = [room._replace(tally=course.tally, within=course.within, gaps=course.gaps)
@@ -273,7 +300,7 @@ class Clusters:
             self._scene, dolls=tuple(self._scene.dolls[doll] for doll in dolls))
         system = joined(systems, pairs_between(scene, geoms))
         alone = [self._alone[doll].course for doll in dolls]
-        course = make_course(system, _contacts(system))._replace(
+        course = make_course(system, room_for_contacts(system))._replace(
             q=self.q[q], v=self.v[v], tally=self.tally[dolls[0]:dolls[0] + 1],
             within=np.concatenate([course.within for course in alone]))
         return _bound(dolls, couples, bones, q, v, system, course, [make_room(system, course)])
@@ -294,8 +321,17 @@ def _systems(scene: Scene) -> list[System]:
     return [made[id(placement.doll)] for placement in scene.dolls]
 
 
-def _contacts(system: System) -> int:
-    return CONTACTS_OF_GEOM * len(system.geoms) + len(system.bounds)
+def _touching(known: np.ndarray, records: np.ndarray, first: np.ndarray,
+              lasted: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of ``known`` ones the contacts, their bones and times, as Clusters.touching() tells them.
+
+    Their records count from the ``first`` (c,) of ``records``, which hold the scene's bones.
+    """
+    touch = known['kind'] > 1
+    known, first, lasted = known[touch], first[touch], lasted[touch]
+    bones = np.stack([records[first + known['a']], np.where(
+        known['b'] < 0, GROUND, records[first + known['b']])], axis=1)
+    return known, bones, np.where(lasted > 0, lasted, 1.0)
 
 
 def _copied(course: Course) -> Course:

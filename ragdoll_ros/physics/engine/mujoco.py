@@ -15,7 +15,7 @@ from ...model.ragdoll import Joint, joint_frame
 from ...model.scene import Placement, Scene
 from ...model.state import State
 from ..settings import Accuracy
-from .protocol import GROUND, Contact, MissingEngine, Wrenches, pressed
+from .protocol import GROUND, Contacts, MissingEngine, Wrenches, pressed
 from .substepped import SubsteppedEngine
 
 INTEGRATORS = ('euler', 'implicitfast', 'rk4')
@@ -48,7 +48,7 @@ class MujocoEngine(SubsteppedEngine):
         self._build()
         self.place(self._moving())
 
-    def contacts(self) -> list[Contact]:
+    def contacts(self) -> Contacts:
         """What touches now."""
         self._mujoco.mj_forward(self._model, self._data)
         self._stale = False
@@ -62,8 +62,8 @@ class MujocoEngine(SubsteppedEngine):
             if a == GROUND:
                 a, b, normal = b, GROUND, -normal
             position += normal * contact.dist / 2
-            found.append(Contact(a, b, position, normal, -contact.dist, float(force[0])))
-        return found
+            found.append([a, b, *position, *normal, -contact.dist, force[0]])
+        return Contacts.of(found)
 
     def close(self) -> None:
         """Nothing to give back: the memory goes with the object."""

@@ -28,19 +28,31 @@ class MissingEngine(errors.RagdollError):
 
 
 @dataclass(frozen=True)
-class Contact:
-    """Two things that touch: bone ``a`` with bone ``b``, or with the GROUND.
+class Contacts:
+    """All c points at which two things touch: bone ``a`` with bone ``b``, or with the GROUND."""
 
-    ``position`` (3,) m on a's surface, ``normal`` (3,) from b to a, ``depth`` m (negative: a gap),
-    ``force`` N along the normal in the last substep.
-    """
+    a: np.ndarray
+    """(c,) indices of bones."""
+    b: np.ndarray
+    """(c,) those of others, or GROUND."""
+    positions: np.ndarray
+    """(c, 3) m on a's surface."""
+    normals: np.ndarray
+    """(c, 3) of length one, from b to a."""
+    depths: np.ndarray
+    """(c,) m; negative: a gap."""
+    forces: np.ndarray
+    """(c,) N along the normal in the last substep."""
 
-    a: int
-    b: int
-    position: np.ndarray
-    normal: np.ndarray
-    depth: float
-    force: float
+    def __len__(self) -> int:
+        return len(self.a)
+
+    @classmethod
+    def of(cls, rows: Sequence[Sequence[float]]) -> Contacts:
+        """From rows (c, 10) of all these side by side."""
+        table = np.array(rows, float).reshape(-1, 10)
+        a, b = table[:, :2].T.astype(np.int64)
+        return cls(a, b, table[:, 2:5], table[:, 5:8], table[:, 8], table[:, 9])
 
 
 @dataclass(frozen=True)
@@ -146,7 +158,7 @@ class Engine(Protocol):
     def grounded(self) -> np.ndarray:
         """Which dolls (d,) rest on the ground."""
 
-    def contacts(self) -> list[Contact]:
+    def contacts(self) -> Contacts:
         """What touches now."""
 
     def measures(self) -> dict[str, float]:

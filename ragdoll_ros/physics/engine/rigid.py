@@ -13,13 +13,13 @@ from ...model import rotation
 from ...model.coordinates import DofLayout, GeneralizedState
 from ...model.scene import Scene
 from ...model.state import State
-from ..ground_heights import ground_heights
+from ..ground_heights import GroundHeights
 from ..kernels.system import OUTSIDE, WITHIN
 from ..motion import Motion
 from ..settings import Accuracy
 from .clusters import Cluster, Clusters
 from .neighbours import Neighbours
-from .protocol import GROUND, Contact, Spring, Springs, Wrenches, pressed
+from .protocol import GROUND, Contacts, Spring, Springs, Wrenches, pressed
 
 FINER = 0.25
 """Share of the step by which the last stretch is gone again to tell its error."""
@@ -42,6 +42,7 @@ class RigidEngine:
         self.layout = DofLayout([placement.doll for placement in scene.dolls])
         self._clusters = Clusters(scene, self.layout, workers)
         self._neighbours = Neighbours(scene, self._clusters.reach())
+        self._heights = GroundHeights(scene)
         self._spins = self.layout.root_spins
         self.resting = np.zeros(len(scene.dolls), bool)
         self._designed = [np.full(len(own), WITHIN) for own in self._clusters.flags(WITHIN)]
@@ -99,33 +100,24 @@ class RigidEngine:
 
     def stop(self, dolls: np.ndarray) -> None:
         """Bring dolls (d,) to rest where they are; the energy that is left is lost for good."""
-        for cluster in self._clusters:
-            if dolls[cluster.dolls].any():
-                self._clusters.v[cluster.v] = 0.0
-                cluster.course.v[:] = 0.0
-                cluster.course.path[:] = 0
-                self.resting[cluster.dolls] = True
+        self._clusters.stop(dolls)
+        self.resting[dolls] = True
         self._departure = None
         self._look()
 
     def grounded(self) -> np.ndarray:
         """Which dolls (d,) rest on the ground."""
+        known, bones, _ = self._clusters.touching()
         found = np.zeros(len(self.scene.dolls), bool)
-        for cluster, now in self._touching():
-            on = now[(now['kind'] > 1) & (now['b'] < 0) & (now['impulse'][:, 0] > 0)]
-            found[cluster.dolls[cluster.system.doll_of[on['a']]]] = True
+        on = (bones[:, 1] == GROUND) & (known['impulse'][:, 0] > 0)
+        found[self.scene.doll_of_bone[bones[on, 0]]] = True
         return found
 
-    def contacts(self) -> list[Contact]:
+    def contacts(self) -> Contacts:
         """What touches now."""
-        made = []
-        for cluster, now in self._touching():
-            bones = cluster.bones[cluster.system.tree['bone']]
-            lasted = cluster.course.tally['lasted'][0] or 1.0
-            made += [Contact(int(bones[c['a']]), int(bones[c['b']]) if c['b'] >= 0 else GROUND,
-                             c['point'].copy(), c['normal'].copy(), -float(c['gap']),
-                             float(c['impulse'][0]) / lasted) for c in now if c['kind'] > 1]
-        return made
+        known, bones, lasted = self._clusters.touching()
+        return Contacts(bones[:, 0], bones[:, 1], known['point'], known['normal'], -known['gap'],
+                        known['impulse'][:, 0] / lasted)
 
     def measures(self) -> dict[str, float]:
         """What went wrong since the start, and what was done: names end in their units."""
@@ -158,27 +150,19 @@ class RigidEngine:
         """End the threads."""
         self._clusters.close()
 
-    def _touching(self) -> list[tuple[Cluster, np.ndarray]]:
-        """Contacts of each cluster's last step; none in flight."""
-        found = []
-        for cluster in self._clusters:
-            count = int(cluster.course.tally['contacts'][0])
-            if count and not cluster.course.path['valid'][0]:
-                found.append((cluster, cluster.course.known[:count]))
-        return found
-
     def _meet(self, duration: float) -> None:
         """See that those go on together who may touch within ``duration`` s; they wake."""
         if len(self.scene.dolls) == 1:
             return
         rows = self._clusters.rows
-        near = self._neighbours.couples(rows, duration, ~self.resting)
+        near = self._neighbours.couples(rows, duration, ~self.resting, self.groups)
         self._age += 1
         if (self._clusters.know(near) and not self.resting[near].any()
                 and (self._age <= KEPT or self._clusters.all_alone)):
             return
         while True:
-            near = self._neighbours.couples(rows, max(duration, AHEAD), ~self.resting)
+            near = self._neighbours.couples(rows, max(duration, AHEAD), ~self.resting,
+                                            self.groups)
             if not self.resting[near].any():
                 break
             self.resting[near] = False
@@ -228,7 +212,7 @@ class RigidEngine:
         """Set dolls that are in the ground onto it."""
         if self.scene.ground is None:
             return
-        depths = -np.minimum.reduceat(ground_heights(self.scene, self.state),
+        depths = -np.minimum.reduceat(self._heights(self.state),
                                       [own.start for own in self.scene.bone_slices])
         for doll in np.flatnonzero(depths > pressed(self.scene)):
             at = self.layout.root_positions[doll]

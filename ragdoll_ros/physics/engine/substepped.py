@@ -11,7 +11,7 @@ from ...model.coordinates import DofLayout, GeneralizedState
 from ...model.scene import Scene
 from ...model.state import State
 from ..account import Account
-from ..ground_heights import ground_heights
+from ..ground_heights import GroundHeights
 from ..motion import Motion
 from ..settings import Accuracy
 from ..sums import DollSums
@@ -40,7 +40,7 @@ class SubsteppedEngine(ABC):
     def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
         self.scene, self.accuracy = scene, accuracy
         self.layout = DofLayout([placement.doll for placement in scene.dolls])
-        self._sums = DollSums(scene)
+        self._sums, self._heights = DollSums(scene), GroundHeights(scene)
         self.resting = np.zeros(len(scene.dolls), bool)
         self._taken = 0
         """Substeps that the last advance took."""
@@ -158,7 +158,7 @@ class SubsteppedEngine(ABC):
 
     def _lift_out(self) -> None:
         """Set dolls that are in the ground onto it: else they stay, or are thrown out."""
-        heights = ground_heights(self.scene, self.state)
+        heights = self._heights(self.state)
         depths = -np.array([heights[own].min() for own in self.scene.bone_slices])
         sunk = depths > pressed(self.scene)
         if sunk.any():

@@ -192,7 +192,7 @@ class Simulated(Source):
             simulation.scene, simulation.time / SECOND, simulation.state, simulation.pushes,
             held=tuple(self._held()),
             rods=None if swings is None else np.stack([swings.roots, swings.positions], axis=1),
-            contacts=self._contacts() if wanted.contacts else None,
+            contacts=simulation.contacts.positions if wanted.contacts else None,
             angles=simulation.joint_angles if wanted.angles else None)
         if time.monotonic() >= self._next_measure:
             self._measure()
@@ -209,10 +209,6 @@ class Simulated(Source):
             bone = self._simulation.scene.bone_index(grab.bone)
             point = rotation.rotate(state.orientations[bone], np.array(grab.point))
             yield Held(grab.bone, state.positions[bone] + point, np.array(grab.target))
-
-    def _contacts(self) -> np.ndarray:
-        contacts = self._simulation.contacts
-        return np.array([contact.position for contact in contacts]).reshape(-1, 3)
 
 
 def _pace_of(scene: Scene) -> float:

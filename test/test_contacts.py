@@ -1,0 +1,50 @@
+"""What touches, told of a whole scene at once: indices, directions and forces, by any engine."""
+import numpy as np
+import pytest
+
+from ragdoll_ros import Bone, Ground, Placement, Ragdoll, Scene, Simulation
+from ragdoll_ros.model.scene import Material
+from ragdoll_ros.model.shapes import Box, Sphere
+from ragdoll_ros.physics.engine.protocol import GROUND
+
+EDGE, MASS, G = 0.2, 2.0, 9.8
+BLOCK = Ragdoll('block', (Bone('block', Box((EDGE,) * 3), MASS, (0, 0, 0)),))
+BALL = Ragdoll('ball', (Bone('ball', Sphere(EDGE / 2), MASS, (0, 0, 0)),))
+
+
+@pytest.mark.parametrize('engine', ['rigid', 'bullet', 'mujoco'])
+def test_a_stack_and_a_ball_beside_it_bear_their_weights(engine):
+    """A block on a block, 2 m from a ball that lies and one that flies: m g between the blocks,
+    2 m g under the lower one, m g under the ball, nothing of the fourth.
+    """
+    pytest.importorskip({'rigid': 'numba', 'bullet': 'pybullet'}.get(engine, engine))
+    half = EDGE / 2
+    places = [(BLOCK, (0, 0, half)), (BALL, (2, 0, 50)), (BLOCK, (0, 0, 3 * half)),
+              (BALL, (2, 0, half))]
+    scene = Scene('stack', tuple(Placement(doll, f'doll_{k}', place)
+                                 for k, (doll, place) in enumerate(places)), Ground(),
+                  Material(restitution=0))
+    with Simulation(scene, engine=engine, accuracy='exact') as simulation:
+        for _ in range(28):  # and before they sleep
+            simulation.advance()
+        found = simulation.contacts
+    borne = {}
+    for pair in {*zip(found.a.tolist(), found.b.tolist(), strict=True)}:
+        own = (found.a == pair[0]) & (found.b == pair[1])
+        up = found.normals[own, 2]
+        assert np.abs(up) == pytest.approx(1, abs=1e-3)
+        upper = pair if up.mean() > 0 else pair[::-1]
+        borne[upper] = found.forces[own].sum()
+        level = {(0, GROUND): 0, (2, 0): EDGE, (3, GROUND): 0}[upper]
+        assert found.positions[own, 2] == pytest.approx(level, abs=2e-3)
+    assert borne == pytest.approx({(0, GROUND): 2 * MASS * G, (2, 0): MASS * G,
+                                   (3, GROUND): MASS * G}, rel=0.02)
+    assert np.abs(found.depths).max() < 2e-3
+
+
+def test_without_a_touch_all_arrays_are_empty():
+    with Simulation(Scene('one', (Placement(BALL),))) as simulation:
+        simulation.advance()
+        found = simulation.contacts
+    assert len(found) == 0
+    assert (found.a.shape, found.positions.shape, found.forces.shape) == ((0,), (0, 3), (0,))
