@@ -42,6 +42,26 @@ def test_a_stack_and_a_ball_beside_it_bear_their_weights(engine):
     assert np.abs(found.depths).max() < 2e-3
 
 
+def test_what_sleeps_on_each_other_goes_on_touching_while_others_move():
+    """A stack beside a ball that is thrown onto another: clusters are made anew, not theirs."""
+    pytest.importorskip('numba')
+    half = EDGE / 2
+    scene = Scene('stack', (
+        Placement(BLOCK, 'lower', (0, 0, half)), Placement(BLOCK, 'upper', (0, 0, 3 * half)),
+        Placement(BALL, 'lies', (3, 0, half)), Placement(BALL, 'falls', (3, 0, 8))), Ground(),
+        Material(restitution=0))
+    with Simulation(scene, engine='rigid') as simulation:
+        engine = simulation._engine
+        for _ in range(100):
+            simulation.advance()
+            if engine.resting[:2].all():
+                assert engine.groups[0] == engine.groups[1]
+                found = simulation.contacts
+                pairs = set(zip(found.a.tolist(), found.b.tolist(), strict=True))
+                assert (1, 0) in pairs or (0, 1) in pairs
+        assert engine.resting[:2].all() and not engine.resting[3]
+
+
 def test_without_a_touch_all_arrays_are_empty():
     with Simulation(Scene('one', (Placement(BALL),))) as simulation:
         simulation.advance()

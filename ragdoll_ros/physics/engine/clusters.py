@@ -230,8 +230,10 @@ class Clusters:
             self.of_doll[cluster.dolls] = place
         self._joined = [cluster for cluster in clusters if len(cluster.dolls) > 1]
         self._firsts = np.array([cluster.dolls[0] for cluster in clusters])
-        self._known_numbers = self._numbers(np.concatenate(
-            [NO_COUPLES, *(cluster.couples for cluster in self._joined)]))
+        self.couples = np.concatenate(
+            [NO_COUPLES, *(cluster.couples for cluster in self._joined)])
+        """(k, 2), of all clusters: who may touch whom."""
+        self._known_numbers = self._numbers(self.couples)
         self._jobs = np.array([[cluster.addresses(worker) for cluster in clusters]
                                for worker in range(self._workers)], np.int64)
         """(workers, k, 3)"""

@@ -151,7 +151,9 @@ class RigidEngine:
         self._clusters.close()
 
     def _meet(self, duration: float) -> None:
-        """See that those go on together who may touch within ``duration`` s; they wake."""
+        """See that those go on together who may touch within ``duration`` s; they wake. What sleeps
+        on each other stays together.
+        """
         if len(self.scene.dolls) == 1:
             return
         rows = self._clusters.rows
@@ -166,7 +168,9 @@ class RigidEngine:
             if not self.resting[near].any():
                 break
             self.resting[near] = False
-        self._clusters.group(near)
+        asleep = self._clusters.couples
+        asleep = asleep[self.resting[asleep].all(axis=1)]
+        self._clusters.group(np.unique(np.concatenate([near, asleep]), axis=0))
         self._age = 0
 
     def _go(self, duration: float, wrenches: Wrenches, springs: Springs,
