@@ -23,7 +23,7 @@ class PageClient:
 
     def __init__(self, port, position=(4.2, -1.2, 1.5), look_at=(0.0, 0.0, 0.8)):
         self.bytes = self.windows = 0
-        self.arrivals = []
+        self.arrivals, self.sizes = [], []
         self._socket = None
         self._ready = threading.Event()
         self._loop = asyncio.new_event_loop()
@@ -87,6 +87,7 @@ class PageClient:
                     self.bytes += len(data)
                     self.windows += 1
                     self.arrivals.append(time.monotonic())
+                    self.sizes.append(len(data))
             except websockets.ConnectionClosed:
                 pass
 

@@ -58,13 +58,15 @@ def page(recording):
         yield page
 
 
-def sent(page, least):
-    """Go to the next instant; give the bytes that come by when that many have."""
+def sent(page, bones):
+    """Go to the next instant, and wait for its picture, a message of 28 bytes for each of so many
+    bones and some more.
+    """
     client, time = page.clients[0], page.frame.time
-    before = client.bytes
+    before = len(client.sizes)
     page.source.step()
-    wait(lambda: page.frame.time == time + 1 and client.bytes >= before + least)
-    return client.bytes - before
+    wait(lambda: page.frame.time == time + 1 and any(
+        28 * bones <= size < 29 * bones + 2000 for size in client.sizes[before:]))
 
 
 def drawn(page):
@@ -85,13 +87,13 @@ def test_ten_thousand_bones_are_drawn_in_ten_batches_where_they_are(page, record
         assert np.abs(places - recording.positions[instant]).max() < 4e-6
         assert np.abs(orientations - recording.orientations[instant]).max() < 1e-7
         if instant < 2:
-            sent(page, 28 * 2000)
+            sent(page, (2000, BONES)[instant])
 
 
 def test_only_what_moves_is_sent(page):
     """28 bytes a bone where all move; where one doll does, those of the batches it is in."""
-    assert sent(page, 28 * 2000) < 60_000
-    assert sent(page, 28 * BONES) < 29 * BONES
+    sent(page, 2000)
+    sent(page, BONES)
 
 
 @pytest.mark.parametrize('doll', [1, MOVED, 1000])
