@@ -59,7 +59,7 @@ def test_yaw_turns_about_the_vertical_through_the_centre_of_mass():
                        for placement in pile.dolls])
     assert np.abs(spines[:, 2]).max() < 1e-12, 'they lie'
     angles = np.arctan2(spines[:, 1], spines[:, 0])
-    assert 0 <= angles.min() and angles.max() <= np.pi
+    assert ((angles >= 0) & (angles <= np.pi)).all()
     assert angles.std() == pytest.approx(np.pi / 12 ** 0.5, rel=0.1)
 
 
