@@ -56,6 +56,8 @@ class Course:
 
     costs: list[float] = field(default_factory=list)
     """Of each tick, s on the wall."""
+    cpu: float = 0.0
+    """Of all ticks together, s of processors."""
     between: float = 0.0
     """Deepest of bones in each other, m."""
     sunk: float = 0.0
@@ -72,14 +74,14 @@ class Course:
         ms = 1e3 * np.array(self.costs)
         halves = [part.mean() for part in np.split(ms, range(HALF_SECOND, len(ms), HALF_SECOND))]
         still = f'{self.asleep:.1f}' if self.asleep < math.inf else 'no'
-        return (f'{ms.mean():9.1f}{max(halves):9.1f}{np.percentile(ms, 99):9.1f}'
+        return (f'{1e3 * self.cpu / len(ms):9.1f}{ms.mean():9.1f}{max(halves):9.1f}{np.percentile(ms, 99):9.1f}'
                 f'{1e3 * self.between:10.2f}{1e3 * self.sunk:10.2f}{math.degrees(self.past):9.2f}'
                 f'{still:>8}  {self.ended}')
 
 
-HEAD = (f'{"ms a tick, depths in mm":30}{"mean":>9}{"worst":>9}{"p99":>9}{"bones":>10}{"ground":>10}'
-        f'{"past, °":>9}{"asleep":>8}')
-"""Of a tick the mean, the worst half second, the 99th percentile."""
+HEAD = (f'{"ms a tick, depths in mm":30}{"CPU":>9}{"mean":>9}{"worst":>9}{"p99":>9}{"bones":>10}'
+        f'{"ground":>10}{"past, °":>9}{"asleep":>8}')
+"""Of a tick the CPU; on the wall the mean, the worst half second, the 99th percentile."""
 
 
 def watched(scene: Scene, scale: BoneDepth, advance: Callable[[], State],
@@ -88,9 +90,10 @@ def watched(scene: Scene, scale: BoneDepth, advance: Callable[[], State],
     course = Course()
     try:
         for tick in range(round(DURATION / scene.step)):
-            begin = time.perf_counter()
+            used, begin = time.process_time(), time.perf_counter()
             state = advance()
             course.costs.append(time.perf_counter() - begin)
+            course.cpu += time.process_time() - used
             _look(course, scene, scale, state, tick)
             course.past = max(course.past, past())
             if sum(course.costs) > PATIENCE:
@@ -110,9 +113,14 @@ def _look(course: Course, scene: Scene, scale: BoneDepth, state: State, tick: in
     elif course.asleep == math.inf:
         course.asleep = (tick + 1) * scene.step
     if tick % LOOKS == 0:
-        depths = scale.depths(state.positions, state.orientations)
-        course.between = max(course.between, float(depths.max(initial=0.0)))
-        course.sunk = max(course.sunk, -float(ground_heights(scene, state).min()))
+        enter_depths(course, scene, scale, state)
+
+
+def enter_depths(course: Course, scene: Scene, scale: BoneDepth, state: State) -> None:
+    """Enter how deep bones are in each other and below the ground."""
+    depths = scale.depths(state.positions, state.orientations)
+    course.between = max(course.between, float(depths.max(initial=0.0)))
+    course.sunk = max(course.sunk, -float(ground_heights(scene, state).min()))
 
 
 def simulated(scene: Scene, scale: BoneDepth, **how: object) -> Course:
