@@ -107,8 +107,8 @@ def main() -> None:
         prog='python -m ragdoll_ros.accuracy.crowds', description='Print what crowds cost.',
         epilog='example: python -m ragdoll_ros.accuracy.crowds --part pile --part digests')
     parser.add_argument('--part', action='append', choices=PARTS,
-                        help='a part alone, more than once for several: falls (4 min), sleepers '
-                             '(1 min), pile (10 min), digests (2 min); all by default')
+                        help='a part alone, more than once for several: falls (5 min), sleepers '
+                             '(1 min), pile (at most 14 min), digests (1 min); all by default')
     for name in parser.parse_args().part or PARTS:
         PARTS[name]()
 

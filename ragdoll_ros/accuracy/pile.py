@@ -74,13 +74,14 @@ class Course:
         ms = 1e3 * np.array(self.costs)
         halves = [part.mean() for part in np.split(ms, range(HALF_SECOND, len(ms), HALF_SECOND))]
         still = f'{self.asleep:.1f}' if self.asleep < math.inf else 'no'
-        return (f'{1e3 * self.cpu / len(ms):9.1f}{ms.mean():9.1f}{max(halves):9.1f}{np.percentile(ms, 99):9.1f}'
+        return (f'{1e3 * self.cpu / len(ms):9.1f}{ms.mean():9.1f}{max(halves):9.1f}'
+                f'{np.percentile(ms, 99):9.1f}'
                 f'{1e3 * self.between:10.2f}{1e3 * self.sunk:10.2f}{math.degrees(self.past):9.2f}'
                 f'{still:>8}  {self.ended}')
 
 
-HEAD = (f'{"ms a tick, depths in mm":30}{"CPU":>9}{"mean":>9}{"worst":>9}{"p99":>9}{"bones":>10}'
-        f'{"ground":>10}{"past, °":>9}{"asleep":>8}')
+HEAD = (f'{"ms a tick, depths in mm":30}{"CPU":>9}{"mean":>9}{"worst":>9}{"p99":>9}'
+        f'{"bones":>10}{"ground":>10}{"past, °":>9}{"asleep":>8}')
 """Of a tick the CPU; on the wall the mean, the worst half second, the 99th percentile."""
 
 
