@@ -51,7 +51,7 @@ lint: $(READY) ## ruff
 slow: $(COMPILED) ## the tests that take minutes
 	@$(BIN)/python -m pytest -m slow
 
-bench: $(COMPILED) ## cost of a tick and of its parts, of crowds, swings and the page, 10 min
+bench: $(COMPILED) ## cost of a tick and of its parts, of crowds, swings and the page, 30 min
 	@$(BIN)/python -m ragdoll_ros.ros.bench
 	@$(BIN)/python -m ragdoll_ros.ros.crowd_bench
 	@$(BIN)/python -m ragdoll_ros.accuracy.crowds

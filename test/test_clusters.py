@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ pytest.importorskip('numba', reason='numba is not installed: there is no rigid e
 from conserved import conserved
 
 from ragdoll_ros import Push, Simulation, load_scene
+from ragdoll_ros.accuracy import crowd_digests
 from ragdoll_ros.model.scene import Placement
 
 APART = 2.5
@@ -59,6 +61,18 @@ def test_states_are_the_same_to_the_bit_for_any_number_of_workers():
     digests = {hashlib.sha256(rows(crowd, 200, workers, pushes).tobytes()).hexdigest()
                for workers in (1, 2, 3, 1)}
     assert len(digests) == 1
+
+
+@pytest.mark.slow
+def test_sixty_dolls_have_the_same_bits_for_any_workers_after_a_reset_and_alone():
+    """As `python -m ragdoll_ros.accuracy.crowds --part digests`, over fewer ticks."""
+    ticks, seen = 200, Counter()
+    (crowd, lone), again = crowd_digests.of_workers(1, ticks, 2, seen)
+    assert again == (crowd, lone)
+    assert {run for workers in (2, 3) for run in crowd_digests.of_workers(workers, ticks)} == {
+        (crowd, lone)}
+    assert crowd_digests.of_the_lone(ticks) == lone
+    assert seen['joined'] and seen['slept'] and seen['woke']
 
 
 def test_a_reset_repeats_a_crowd_to_the_bit():

@@ -31,7 +31,8 @@ dolls:
 
 
 def test_the_shipped_scenes_load():
-    assert {'drop', 'article', 'flight', 'crowd', 'doll', 'article_doll'} <= set(scene_names())
+    assert {'drop', 'article', 'flight', 'crowd', 'field', 'pile', 'doll', 'article_doll'} <= set(
+        scene_names())
     for name in scene_names():
         load_scene(name)
     assert load_scene('article').pace == 0.6

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from ragdoll_ros import load_scene
+from ragdoll_ros.model import rotation
 from ragdoll_ros.model.errors import ModelErrors
 
 BONE = '{name: ball, shape: {sphere: {radius: 0.1}}, mass: 1, position: [0, 0, 0]}'
@@ -45,6 +46,23 @@ def test_a_seed_strews_and_turns_the_same_way_for_ever(tmp_path):
     assert np.abs(turns.mean(axis=0)).max() < 0.2, 'any way up'
 
 
+def test_yaw_turns_about_the_vertical_through_the_centre_of_mass():
+    """Of the 160 dolls of `pile`, which stay lying in 4 x 4 columns of ten, clear of the ground."""
+    pile = load_scene('pile')
+    centres = np.array([np.array(placement.position) + rotation.rotate(
+        placement.orientation, placement.doll.mass_centre) for placement in pile.dolls])
+    assert len(pile.dolls) == 160
+    assert np.ptp(centres[::16], axis=0) == pytest.approx((0, 0, 5.4)), 'ten above each other'
+    assert centres[:16].max(axis=0) == pytest.approx((6, 6, 0.5), abs=0.01)
+    assert centres[:16].min(axis=0) == pytest.approx((-6, -6, 0.5), abs=0.01)
+    spines = np.array([rotation.rotate(placement.orientation, (0.0, 0.0, 1.0))
+                       for placement in pile.dolls])
+    assert np.abs(spines[:, 2]).max() < 1e-12, 'they lie'
+    angles = np.arctan2(spines[:, 1], spines[:, 0])
+    assert ((angles >= 0) & (angles <= np.pi)).all()
+    assert angles.std() == pytest.approx(np.pi / 12 ** 0.5, rel=0.1)
+
+
 def test_the_field_is_a_thousand_dolls_that_do_not_touch():
     field = load_scene('field')
     where = places(field)
@@ -57,7 +75,8 @@ def test_the_field_is_a_thousand_dolls_that_do_not_touch():
     ('{grid: [1, 1, 1]}', r'repeat'), ('{count: 0}', r'repeat\.count'),
     ('{count: 1001}', r'repeat\.count'), ('{count: 2.5}', r'repeat\.count'),
     ('{count: 2, grid: [1, 1]}', r'repeat\.grid'), ('{count: 2, sped: 1}', r'repeat'),
-    ('{count: 2, columns: [0, 1]}', r'repeat\.columns')])
+    ('{count: 2, columns: [0, 1]}', r'repeat\.columns'),
+    ('{count: 2, turned: pitch}', r'repeat\.turned')])
 def test_what_is_wrong_is_told_in_its_place(tmp_path, repeat, path):
     with pytest.raises(ModelErrors, match=r'dolls\[0\]\.' + path):
         scene(tmp_path, repeat)

@@ -1,6 +1,7 @@
-"""`python -m ragdoll_ros.accuracy.crowds`: what dolls cost that fall, lie and sleep, in crowds.
+"""`python -m ragdoll_ros.accuracy.crowds`: what dolls cost that fall, lie, sleep and pile up.
 
-Dolls stand 2.5 m apart and do not touch. Take the ratios; the microseconds are this machine's.
+But for those of the pile and the digests, dolls are 2.5 m apart and do not touch. Take the ratios;
+the microseconds are this machine's.
 """
 from __future__ import annotations
 
@@ -11,11 +12,13 @@ import resource
 import statistics
 import time
 
+from ..files.repeat import repeated
 from ..files.scene import load_scene
 from ..model.push import Push
 from ..model.scene import Placement, Scene
 from ..physics.settings import ACCURACIES
 from ..physics.simulation import Simulation
+from . import crowd_digests, pile
 
 NUMBERS = (1, 10, 100, 1000)
 APART = 2.5
@@ -23,14 +26,25 @@ FALL = 2.0
 """s from the start, in which dolls fall 0.4 m and lie down."""
 
 
-def field(count: int, first: int = 0) -> Scene:
-    """The default scene with so many dolls, each turning a little otherwise, from one on."""
-    drop, side = load_scene('drop'), math.ceil(math.sqrt(count))
-    doll = drop.dolls[0].doll
-    return dataclasses.replace(drop, name='field', dolls=tuple(
-        Placement(doll, f'doll_{k}', (APART * (k % side), APART * (k // side), 0.0),
-                  spin=(0.1 * math.sin(first + k), 0.1 * math.cos(first + k), 0.0))
-        for k in range(count)))
+def grid(count: int, **placed: object) -> Scene:
+    """The default scene with so many of its dolls, APART m apart; ``placed`` as of a Placement."""
+    drop = load_scene('drop')
+    first = Placement(drop.dolls[0].doll, **placed)
+    return dataclasses.replace(drop, name='grid', dolls=tuple(
+        repeated(first, {'count': count, 'grid': (APART, APART, 0.0)})))
+
+
+def turning(count: int, first: int = 0) -> Scene:
+    """So many dolls, each of which turns a little otherwise as it falls, from one on."""
+    level = grid(count)
+    return dataclasses.replace(level, dolls=tuple(
+        dataclasses.replace(doll, spin=(0.1 * math.sin(first + k), 0.1 * math.cos(first + k), 0.0))
+        for k, doll in enumerate(level.dolls)))
+
+
+def lying(count: int) -> Scene:
+    """So many dolls on their faces, soon asleep."""
+    return grid(count, position=(0.0, 0.0, 0.12), orientation=(0.0, 1.0, 0.0, 1.0))
 
 
 def falling(scene: Scene, accuracy: str, workers: int = 1) -> tuple[float, float]:
@@ -52,10 +66,10 @@ def falls() -> None:
           'take 10 ms')
     print(f'{"":22}{"CPU":>10}{"of alone":>10}{"2 workers":>12}{"wall ratio":>12}{"real time":>12}')
     for accuracy in ACCURACIES:
-        alone = statistics.mean(falling(field(1, k), accuracy)[0] for k in range(NUMBERS[1]))
+        alone = statistics.mean(falling(turning(1, k), accuracy)[0] for k in range(NUMBERS[1]))
         for count in NUMBERS:
-            cpu, wall = falling(field(count), accuracy)
-            shared = falling(field(count), accuracy, 2)[1]
+            cpu, wall = falling(turning(count), accuracy)
+            shared = falling(turning(count), accuracy, 2)[1]
             print(f'{accuracy + f", {count}":22}{cpu:10.1f}{cpu / alone:10.2f}{shared:12.1f}'
                   f'{wall / shared:12.2f}{1e4 / shared:12.0f}', flush=True)
 
@@ -65,7 +79,7 @@ def sleepers() -> None:
     print('\nasleep: us a tick of all; set-up in s; memory of the process at the most, MB')
     for count in NUMBERS:
         begin = time.perf_counter()
-        with Simulation(field(count)) as simulation:
+        with Simulation(lying(count)) as simulation:
             made = time.perf_counter() - begin
             while not simulation.asleep and simulation.time < 30e9:
                 simulation.advance()
@@ -84,13 +98,19 @@ def sleepers() -> None:
                   f'{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB', flush=True)
 
 
+PARTS = {'falls': falls, 'sleepers': sleepers, 'pile': pile.pile, 'digests': crowd_digests.digests}
+
+
 def main() -> None:
-    """Print both tables."""
-    argparse.ArgumentParser(
-        prog='python -m ragdoll_ros.accuracy.crowds', description='Print what crowds cost, 3 min.',
-        epilog='example: python -m ragdoll_ros.accuracy.crowds').parse_args()
-    falls()
-    sleepers()
+    """Print the parts that are asked for."""
+    parser = argparse.ArgumentParser(
+        prog='python -m ragdoll_ros.accuracy.crowds', description='Print what crowds cost.',
+        epilog='example: python -m ragdoll_ros.accuracy.crowds --part pile --part digests')
+    parser.add_argument('--part', action='append', choices=PARTS,
+                        help='a part alone, more than once for several: falls (5 min), sleepers '
+                             '(1 min), pile (at most 14 min), digests (1 min); all by default')
+    for name in parser.parse_args().part or PARTS:
+        PARTS[name]()
 
 
 if __name__ == '__main__':

@@ -15,6 +15,9 @@ def repeated(first: Placement, repeat: dict) -> list[Placement]:
 
     The grid grows from the first's place along x, then y, then z; each copy is then moved by up to
     half of ``spread`` along each axis. The same seed gives the same copies.
+
+    What is turned by any turn turns about its frame's origin; by ``yaw``, about the vertical
+    through its centre of mass, by up to half a turn.
     """
     count, rng = int(repeat['count']), np.random.default_rng(int(repeat.get('seed', 0)))
     columns = repeat.get('columns') or [math.ceil(math.sqrt(count))] * 2
@@ -26,8 +29,21 @@ def repeated(first: Placement, repeat: dict) -> list[Placement]:
         cell = np.array([k % wide, k // wide % deep, k // (wide * deep)])
         place = np.array(first.position) + cell * grid + spread * rng.uniform(-0.5, 0.5, 3)
         turn = first.orientation
-        if repeat.get('turned'):
+        if repeat.get('turned') == 'yaw':
+            place, turn = _turned_about_the_vertical(first, place, rng.uniform(0, math.pi))
+        elif repeat.get('turned'):
             turn = tuple(rotation.normalized(rng.normal(size=4)))
         copies.append(dataclasses.replace(first, name=f'{first.name}_{k + 1}',
                                           position=tuple(place.tolist()), orientation=turn))
     return copies
+
+
+def _turned_about_the_vertical(first: Placement, place: np.ndarray,
+                               angle: float) -> tuple[np.ndarray, tuple[float, ...]]:
+    """Where a copy's frame stands, (3,) m, and its orientation: turned by ``angle`` rad about z
+    through its centre of mass, which stays where it is with the frame at ``place``.
+    """
+    turn = rotation.from_axis_angle((0.0, 0.0, 1.0), angle)
+    arm = rotation.rotate(first.orientation, first.doll.mass_centre)
+    orientation = rotation.normalized(rotation.multiply(turn, np.array(first.orientation)))
+    return place + arm - rotation.rotate(turn, arm), tuple(orientation.tolist())

@@ -260,6 +260,11 @@ class Ragdoll:
         """Total mass, kg."""
         return sum(bone.mass for bone in self.bones)
 
+    @property
+    def mass_centre(self) -> np.ndarray:
+        """Centre of mass (3,) m, doll's frame, bind pose."""
+        return sum(bone.mass * np.array(bone.position) for bone in self.bones) / self.mass
+
     def __repr__(self) -> str:
         return (f'Ragdoll {self.name!r}: {len(self.bones)} bones, {len(self.joints)} joints, '
                 f'{sum(joint.dof for joint in self.joints)} degrees of freedom, {self.mass:.4g} kg')

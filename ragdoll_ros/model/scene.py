@@ -105,9 +105,7 @@ class Placement:
 
     def root_velocity(self) -> np.ndarray:
         """Velocity (3,) m/s of the root's centre of mass at the start, world frame."""
-        bones = self.doll.bones
-        centre = sum(bone.mass * np.array(bone.position) for bone in bones) / self.doll.mass
-        arm = rotation.rotate(self.orientation, self.doll.root.position - centre)
+        arm = rotation.rotate(self.orientation, self.doll.root.position - self.doll.mass_centre)
         return self.velocity + np.cross(self.spin, arm)
 
 

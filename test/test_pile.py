@@ -1,0 +1,37 @@
+"""What the bench tells of a pile: costs, the deepest, when all lie still, why a run ended."""
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import pytest
+
+pytest.importorskip('mujoco')
+pytest.importorskip('numba', reason='numba is not installed: there is no rigid engine')
+
+from ragdoll_ros import load_scene
+from ragdoll_ros.accuracy import pile
+from ragdoll_ros.accuracy.depth import BoneDepth
+
+
+def course(**placed):
+    drop = load_scene('drop')
+    scene = dataclasses.replace(drop, dolls=(dataclasses.replace(drop.dolls[0], **placed),))
+    return pile.simulated(scene, BoneDepth(scene), engine='rigid', accuracy='draft')
+
+
+def test_a_doll_that_lies_down_is_asleep_from_when_it_is():
+    made = course(position=(0, 0, 0.12), orientation=(0, 1, 0, 1))
+    assert len(made.costs) == 1000 and not made.ended
+    assert 0.3 < made.asleep < 5 and made.cpu > 0
+    assert max(made.between, made.sunk) < 2e-3 and made.past < math.radians(1)
+
+
+def test_a_run_that_is_too_fast_is_ended():
+    made = course(position=(0, 0, 5), velocity=(2 * pile.RUNAWAY, 0, 0))
+    assert made.ended == 'exploded, at 0.01 s' and made.asleep == math.inf
+
+
+def test_a_run_that_takes_too_long_is_ended(monkeypatch):
+    monkeypatch.setattr(pile, 'PATIENCE', 0.0)
+    assert course().ended == 'ended after 0 s, at 0.01 s'
