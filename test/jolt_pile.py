@@ -24,6 +24,7 @@ from ragdoll_ros.model.ragdoll import joint_axes
 from ragdoll_ros.model.scene import Scene
 from ragdoll_ros.model.shapes import Sphere
 from ragdoll_ros.model.state import State
+from ragdoll_ros.physics.ground_heights import GroundHeights
 
 SCRIPT = Path(__file__).with_name('jolt_pile.mjs')
 
@@ -75,7 +76,8 @@ def main() -> None:
     parser.add_argument('--steps', type=int, default=1, help='steps of Jolt in a tick')
     given = parser.parse_args()
     scene = load_scene('pile')
-    scale, course = BoneDepth(scene), Course(past=np.nan, cpu=np.nan)
+    scale, heights = BoneDepth(scene), GroundHeights(scene)
+    course = Course(past=np.nan, cpu=np.nan)
     done = subprocess.run(['node', SCRIPT, given.module.resolve()], input=told(scene, given.steps),
                           capture_output=True, text=True, check=True)
     for tick, line in enumerate(done.stdout.splitlines()):
@@ -86,7 +88,8 @@ def main() -> None:
         if 'poses' in one:
             poses = np.array(one['poses'])
             still = np.zeros((len(poses), 3))
-            enter_depths(course, scene, scale, State(poses[:, :3], poses[:, 3:], still, still))
+            enter_depths(course, heights, scale,
+                         State(poses[:, :3], poses[:, 3:], still, still))
     print(f'{HEAD}\n{f"Jolt, steps {given.steps}":30}{course.row()}')
 
 

@@ -18,7 +18,7 @@ from ..model.scene import Scene
 from ..model.state import State
 from ..physics.engine.bullet import BulletEngine
 from ..physics.engine.mujoco import MujocoEngine
-from ..physics.ground_heights import ground_heights
+from ..physics.ground_heights import GroundHeights
 from ..physics.settings import Accuracy
 from ..physics.simulation import Simulation
 from .depth import BoneDepth
@@ -88,14 +88,14 @@ HEAD = (f'{"ms a tick, depths in mm":30}{"CPU":>9}{"mean":>9}{"worst":>9}{"p99":
 def watched(scene: Scene, scale: BoneDepth, advance: Callable[[], State],
             past: Callable[[], float]) -> Course:
     """Take a scene on for DURATION; ``advance`` goes a tick, ``past`` tells of limits, rad."""
-    course = Course()
+    course, heights = Course(), GroundHeights(scene)
     try:
         for tick in range(round(DURATION / scene.step)):
             used, begin = time.process_time(), time.perf_counter()
             state = advance()
             course.costs.append(time.perf_counter() - begin)
             course.cpu += time.process_time() - used
-            _look(course, scene, scale, state, tick)
+            _look(course, heights, scale, state, tick, scene.step)
             course.past = max(course.past, past())
             if sum(course.costs) > PATIENCE:
                 raise Ended(f'ended after {PATIENCE:g} s')
@@ -104,24 +104,25 @@ def watched(scene: Scene, scale: BoneDepth, advance: Callable[[], State],
     return course
 
 
-def _look(course: Course, scene: Scene, scale: BoneDepth, state: State, tick: int) -> None:
-    """Enter what the state after a tick shows."""
+def _look(course: Course, heights: GroundHeights, scale: BoneDepth, state: State, tick: int,
+          step: float) -> None:
+    """Enter what the state after a tick of ``step`` s shows."""
     speeds = np.abs(state.linear_velocities).max()
     if not speeds < RUNAWAY:
         raise Ended('exploded')
     if speeds > 0:
         course.asleep = math.inf
     elif course.asleep == math.inf:
-        course.asleep = (tick + 1) * scene.step
+        course.asleep = (tick + 1) * step
     if tick % LOOKS == 0:
-        enter_depths(course, scene, scale, state)
+        enter_depths(course, heights, scale, state)
 
 
-def enter_depths(course: Course, scene: Scene, scale: BoneDepth, state: State) -> None:
+def enter_depths(course: Course, heights: GroundHeights, scale: BoneDepth, state: State) -> None:
     """Enter how deep bones are in each other and below the ground."""
     depths = scale.depths(state.positions, state.orientations)
     course.between = max(course.between, float(depths.max(initial=0.0)))
-    course.sunk = max(course.sunk, -float(ground_heights(scene, state).min()))
+    course.sunk = max(course.sunk, -float(heights(state).min()))
 
 
 def simulated(scene: Scene, scale: BoneDepth, **how: object) -> Course:
