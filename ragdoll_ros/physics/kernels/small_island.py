@@ -45,6 +45,8 @@ def solve_small(r: Room, count: int, n: int, h: float, tolerance: float, thrown:
             soft[j] = p[j]
         solve_impulses(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, start, soft, tolerance, SWEEPS,
                        r.solver, r.G)
+        if gained(r.W, start, soft, n) > 0:
+            weaken_impulses(r.W, start, soft, n)
         hold_energy(r.W, start, soft, p, n)
         r.tally[0].softened += 1
     r.tally[0].sweeps += turns
