@@ -169,7 +169,7 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
     r.gaps are those at q, and again at the end. A step that makes much energy, or presses one thing
     deep into another, is too long for what turns: it is gone again, half as long. The little energy
     that others make is taken out of the motion. Where touches are not to be sought, what meets in
-    the step is held in it, without restitution: it is gone again with that.
+    the step is held or thrown back in it, as restitution says: it is gone again with that.
     """
     end_q, end_v, tally = r.states[2], r.vectors[4], r.tally[0]
     length, hit, m = min(h, tally.next) if tally.next > 0 else h, False, 0
@@ -342,7 +342,6 @@ def go_on(s: System, r: Room, course: Course, duration: float, step: float,
         time += gone
         tally.settled = 0 if touched else 1
         if touched:
-            r.unsought[0] = 0.0
             impact(s, r, q, v, events < most)
             events += 1
     observe(s, r, q, v, course.rows)
