@@ -85,11 +85,11 @@ def digests() -> None:
           f'{seen["joined"]} on others, {seen["slept"]} times one slept, {seen["woke"]} one woke')
     other = subprocess.run([sys.executable, '-m', __name__], capture_output=True, text=True,
                            check=True).stdout.strip()
-    print(f'{"1 worker":24}{crowd}')
+    print(f'{"1 worker":24}{crowd}\n{"first doll in the crowd":24}{first}')
     for name, found, wanted in (
             ('1 worker, after a reset', again[0], crowd), ('2 workers', of_workers(2)[0][0], crowd),
             ('3 workers', of_workers(3)[0][0], crowd), ('another process', other, crowd),
-            ('one doll in the crowd', first, first), ('that doll alone', of_the_lone(), first)):
+            ('first doll, alone', of_the_lone(), first)):
         print(f'{name:24}{found} {"equal" if found == wanted else "UNEQUAL"}', flush=True)
 
 
