@@ -23,9 +23,9 @@ class Accuracy:
     engine does not do so by itself: PyBullet."""
 
 
-DRAFT = Accuracy(step=5e-3, flight_error=1e-10, substeps=4)
+DRAFT = Accuracy(step=4e-3, flight_error=1e-10, substeps=4)
 NORMAL = Accuracy(step=2.5e-3, flight_error=1e-11, substeps=10)
-EXACT = Accuracy(step=1e-3, flight_error=1e-13, substeps=40)
+EXACT = Accuracy(step=5e-4, flight_error=1e-13, substeps=40)
 ACCURACIES = {'draft': DRAFT, 'normal': NORMAL, 'exact': EXACT}
 
 

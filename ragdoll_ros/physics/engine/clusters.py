@@ -21,7 +21,7 @@ from ..kernels.system import (
 )
 from ..settings import Accuracy
 from ..system import joined, pairs_between, system_of
-from .courses import Courses, room_for_contacts
+from .courses import KEPT, Courses, room_for_contacts
 from .protocol import GROUND
 
 COUNTS = ('flights', 'steps', 'impacts', 'sweeps', 'unsolved', 'left_out', 'stalls', 'softened',
@@ -213,7 +213,7 @@ class Clusters:
         if members is not self.members:
             self._set(members)
         for cluster, course in joint:
-            for name in ('q', 'v', 'dense', 'ends', 'path', 'within', 'gaps', 'rows', 'sums'):
+            for name in KEPT:
                 getattr(cluster.course, name)[:] = getattr(course, name)
             cluster.course.known[:len(course.known)] = course.known
 
@@ -271,7 +271,7 @@ class Clusters:
 
     def _begin(self, cluster: Cluster) -> None:
         """Nothing is known of its contacts, its gaps and its next flight."""
-        cluster.course.path[:] = 0
+        cluster.course.path[:] = cluster.course.reaction[:] = 0
         for name in ('contacts', 'settled', 'lasted', 'next', 'seen'):
             cluster.course.tally[name] = 0
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..kernels.system import Course, System, make_course
 
-KEPT = ('dense', 'ends', 'path', 'within', 'gaps', 'q', 'v', 'rows', 'sums', 'tally')
+KEPT = ('dense', 'ends', 'path', 'within', 'gaps', 'reaction', 'q', 'v', 'rows', 'sums', 'tally')
 """What a snapshot holds beside the contacts that are known."""
 
 CONTACTS_OF_GEOM = 12

@@ -17,8 +17,6 @@ from .quaternion import cross, times
 from .step import (
     DEEP,
     PAID,
-    SLOW,
-    SLOW_TURN,
     STEP_TOLERANCE,
     begin_step,
     contact_step,
@@ -26,6 +24,7 @@ from .step import (
     settle,
 )
 from .system import COURSE, ROOM, SYSTEM, Course, Room, System
+from .touch import SUNK, between, narrow, open_bracket, touched
 
 APART = 5e-3
 """m/s or rad/s at which what touches comes apart for a flight: to 1.3 um under gravity, which is
@@ -44,14 +43,8 @@ WORTH = 6
 LONGEST = 0.05
 """s of a path."""
 
-SUNK = -1e-7
-"""m or rad: what is found deeper than this at a step's end has met on the way."""
-
 TRIES = 16
 """At a step that is to end at a touch, and is to make no energy."""
-
-SHORTEST = 1e-9
-"""s: no step is made shorter to find a touch."""
 
 FINEST = 0.01
 """Share of a step below which it is not made shorter to make no energy; what makes some all the
@@ -146,6 +139,8 @@ def fly(s: System, r: Room, course: Course, left: float, loads: np.ndarray) -> t
             for k in range(len(loads)):
                 r.tally[0].pushed += weight * gone * power(s.tree, r.work, loads[k], False)
     path.along += gone
+    for j in range(len(course.reaction)):
+        course.reaction[j] = 0.0
     along(s.tree, course, path.along, course.q, course.v)
     if path.along < end - 1e-15:
         return gone, False
@@ -176,6 +171,7 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
     tally.next = 2 * length if 2 * length < step else 0.0
     begin_step(s, r, course, loads)
     take_over(r.met, r.gaps)
+    open_bracket(r)
     r.unsought[0] = 0.0 if seek else 1.0
     held, moving = total_energy(r.before)
     pushed, handed, lifted = tally.pushed, tally.handed, tally.lifted
@@ -193,19 +189,21 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
             length, hit = length / 2, False
             tally.next = length
             take_over(r.met, r.gaps)
+            open_bracket(r)
             continue
         if not seek and turn < TRIES - 1 and meet(r):
             continue
-        share, landed = first_touch(s, r, length)
-        hit = seek and (landed or share <= 1)
-        if share > 1 or not seek or turn == TRIES - 1:
-            gained -= tally.lifted - lifted
-            if not gained <= much:
-                tally.gains += 1
-            if gained > much or 0 < gained < SMALL * inner_energy(s, r):
-                take_out(s, r, gained, end_q, end_v)
-            break
-        length = max(SHORTEST, length * share * (1 + 1e-9) + 2e-9)
+        sunk, landed, fast = touched(s, r, length)
+        hit = seek and fast
+        if seek and turn < TRIES - 1 and narrow(s, r, length, sunk, landed):
+            length = between(r)
+            continue
+        gained -= tally.lifted - lifted
+        if not gained <= much:
+            tally.gains += 1
+        if gained > much or 0 < gained < SMALL * inner_energy(s, r):
+            take_out(s, r, gained, end_q, end_v)
+        break
     if length > 0.1 * h:
         for i in range(m):
             course.known[i] = r.contacts[i]
@@ -271,23 +269,6 @@ def sinks(s: System, r: Room) -> bool:
         if r.later[j] < -most and r.gaps[j] <= TOUCHING and r.later[j] < r.gaps[j] - most / 10:
             return True
     return False
-
-
-@compiled
-def first_touch(s: System, r: Room, h: float) -> tuple[float, bool]:
-    """Share of the step just gone at which something met that was apart, above 1: nothing; and
-    whether something touches at its end that came fast.
-    """
-    first, landed, bounds = 2.0, False, len(r.gaps) - len(s.pairs) - 2 * len(s.bounds)
-    for j in range(len(r.gaps)):
-        if r.gaps[j] > TOUCHING and r.later[j] <= TOUCHING:
-            fallen = r.gaps[j] - r.later[j]
-            slow = SLOW_TURN if bounds <= j < bounds + 2 * len(s.bounds) else SLOW
-            if fallen > slow * h:
-                landed = True
-                if r.later[j] < SUNK:
-                    first = min(first, r.gaps[j] / fallen)
-    return first, landed
 
 
 @compiled

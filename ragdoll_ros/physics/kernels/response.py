@@ -124,6 +124,8 @@ def ask(s: System, r: Room, count: int, n: int, h: float) -> tuple[bool, bool]:
             r.need[3, k] = 1.0 if c.start[0] > OPENING else 0.0
             for e in range(c.kind):
                 curve[c.row + e] = was[c.row + e] - c.start[e]
+            if c.gap > 0:
+                b[c.row] += c.gap / h
         elif r.unsought[0] and c.restitution > 0 and c.before < -s.bounce_speed[0]:
             b[c.row] += c.restitution * c.before
         elif c.gap > 0:

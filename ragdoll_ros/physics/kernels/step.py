@@ -2,8 +2,10 @@
 
 Forces, contacts and their rows are those at the middle of the way, so that it is of order 2 where
 no contact begins or ends (Moreau 1988; Studer, Numerics of Unilateral Contacts and Friction,
-2009). Joint damping and hands' springs are taken implicitly at the middle as well. Then depths are
-given back in position alone, and momentum is kept where the ground bears nothing.
+2009). Of the velocities there, half of what contacts change is a part: what they changed in the
+step before stands in for it. Joint damping and hands' springs are taken implicitly at the middle as
+well. Then depths are given back in position alone, and momentum is kept where the ground bears
+nothing.
 """
 from __future__ import annotations
 
@@ -29,7 +31,7 @@ from .mass import (
 from .momentum import give_contacts, inner_energy, keep_momentum, sum_dolls
 from .quaternion import cross
 from .response import OPENING, respond
-from .system import Course, Room, System
+from .system import STICKS, Course, Room, System
 
 STEP_TOLERANCE = 1e-8
 """m/s to which contacts are solved."""
@@ -45,6 +47,9 @@ DEEP = 5e-4
 
 JAMMED = 10.0
 """Times all momenta and weights that impulses may be before they are those of a jam."""
+
+STEADY = 1.0
+"""m/s^2 or rad/s^2, over a step: what contacts stop that is faster, they do not stop again."""
 
 PAID = 0.005
 """Share of the kinetic energy that giving depths back may cost in a step."""
@@ -81,7 +86,7 @@ def contact_step(s: System, r: Room, course: Course, h: float, loads: np.ndarray
     free, change, shift = r.vectors[0], r.vectors[2], r.vectors[3]
     integrate(s.tree, q, v, h / 2, middle)
     pose(s.tree, middle, v, r.work)
-    move_freely(s, r, v, h, loads, springs, since + h / 2)
+    move_freely(s, r, v, h, loads, springs, since + h / 2, course.reaction)
     place_geoms(s.tree, s.root_of, s.geoms, r.work, middle, r.at, r.turn)
     m = find_contacts(s, middle, r, r.met, SLOW * h)
     r.left[0] = 0.0
@@ -93,6 +98,9 @@ def contact_step(s: System, r: Room, course: Course, h: float, loads: np.ndarray
     else:
         for j in range(len(v)):
             end_v[j], shift[j] = free[j], 0.0
+    lasts = m > 0 and all_last(r, m, h)
+    for j in range(len(v)):
+        course.reaction[j] = change[j] / h if lasts else 0.0
     integrate(s.tree, middle, end_v, h / 2, end_q)
     r.lift[0] = lifted(s, r, shift) if m else 0.0
     r.tally[0].steps += 1
@@ -100,12 +108,26 @@ def contact_step(s: System, r: Room, course: Course, h: float, loads: np.ndarray
 
 
 @compiled
+def all_last(r: Room, m: int, h: float) -> bool:
+    """Whether all contacts of a step of h s were there before, and neither closed nor opened."""
+    for i in range(m):
+        c = r.contacts[i]
+        if not c.begun or abs(c.start[0]) > STEADY * h:
+            return False
+        if c.kind > 1 and c.friction >= STICKS and (
+                max(abs(c.start[1]), abs(c.start[2])) > STEADY * h):
+            return False
+    return True
+
+
+@compiled
 def move_freely(s: System, r: Room, v: np.ndarray, h: float, loads: np.ndarray,
-                springs: np.ndarray, time: float) -> None:
+                springs: np.ndarray, time: float, reaction: np.ndarray) -> None:
     """Velocities r.vectors[0] into which those at the start, v, come in h s without contacts, and
     the factor of the mass matrix, r.H; work is posed at the middle r.states[0].
 
-    ``time``: s since the hands were where ``springs`` say.
+    ``reaction`` (nv,): what contacts are taken to accelerate. ``time``: s since the hands were
+    where ``springs`` say.
     """
     middle, free, smooth, change = r.states[0], r.vectors[0], r.vectors[1], r.vectors[2]
     root_axes(s.tree, middle, r.work.axes)
@@ -122,7 +144,7 @@ def move_freely(s: System, r: Room, v: np.ndarray, h: float, loads: np.ndarray,
         for stage in range(2):
             if stage or turn:
                 for j in range(len(v)):
-                    smooth[j] = v[j] + (change[j] / 2 if stage else 0.0)
+                    smooth[j] = v[j] + ((change[j] + h * reaction[j]) / 2 if stage else 0.0)
                 update_moves(s.tree, middle, smooth, r.work)
             bias_forces(s.tree, s.gravity, loads, middle, smooth if stage else v, r.work, r.own,
                         change)

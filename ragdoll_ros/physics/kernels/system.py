@@ -87,25 +87,27 @@ and what it cost to give deep
 ones back, J. ``seen``: whether the gaps are those of now."""
 
 Course = collections.namedtuple(
-    'Course', 'q v dense ends path tally within known gaps rows sums loads springs')
+    'Course', 'q v dense ends path tally within known gaps reaction rows sums loads springs')
 """What is carried on from stretch to stretch: coordinates (nq,) and velocities (nv,), those of
 roots' turning along their own axes; the path of flight, its coefficients ``dense`` (8, nq + nv) and
 rates of change at its ``ends`` (2, nq + nv); ``path`` and ``tally``, one record each; of the first
 pairs why they do not collide: they are WITHIN each other still, as they were at the start, or a
 joint in between is OUTSIDE its
-limits; the contacts ``known`` from the last step; all ``gaps``, m or rad. What comes of a stretch:
-bones' ``rows`` (n, 13) and the dolls' ``sums`` (d,). What acts in it: ``loads`` (m, 11), and
-``springs`` (k, 18) of hands."""
+limits; the contacts ``known`` from the last step; all ``gaps``, m or rad; the ``reaction`` (nv,),
+accelerations that contacts gave in the last step, zero unless all of them lasted on. What comes of
+a stretch: bones' ``rows`` (n, 13) and the dolls' ``sums`` (d,). What acts in it: ``loads`` (m, 11),
+and ``springs`` (k, 18) of hands."""
 
 Room = collections.namedtuple(
     'Room', 'work own composite H contacts table at turn gaps later Y support W G p solver '
     'kinds rows mu roll need label vectors states given before after begun count lift tally '
-    'within armed met stages row place blocks unsought left')
+    'within armed met above below bracket stages row place blocks unsought left')
 """Scratch of the rigid core, but for ``tally``, ``within`` and ``gaps``, which are the course's.
 
 The rows ``Y`` of contacts have entries for the velocities that they see, ``support``, alone; ``W``
 and ``G`` have room for a small island, ``blocks`` for W of each contact by itself. Of a step:
-``met``, the gaps that tell what touches in it; ``unsought`` (1,), whether touches in it are not
+``met``, the gaps that tell what touches in it; ``bracket``, ``above`` and ``below`` of touch.py;
+``unsought`` (1,), whether touches in it are not
 sought; ``left`` (1,), m/s by which contacts of large islands may err."""
 
 WITHIN, OUTSIDE = 1, 2
@@ -132,9 +134,9 @@ def make_course(system: System, contacts: int = 0) -> Course:
         q=np.zeros(nq), v=np.zeros(nv), dense=np.zeros((8, nq + nv)), ends=np.zeros((2, nq + nv)),
         path=np.zeros(1, PATH), tally=np.zeros(1, TALLY),
         within=np.zeros(len(system.pairs), np.int64), known=np.zeros(contacts, CONTACT),
-        gaps=np.zeros(count_gaps(system)), rows=np.zeros((len(system.tree), 13)),
-        sums=np.zeros(len(system.doll_masses), DOLL), loads=np.zeros((0, 11)),
-        springs=np.zeros((0, 18)))
+        gaps=np.zeros(count_gaps(system)), reaction=np.zeros(nv),
+        rows=np.zeros((len(system.tree), 13)), sums=np.zeros(len(system.doll_masses), DOLL),
+        loads=np.zeros((0, 11)), springs=np.zeros((0, 18)))
 
 
 def count_gaps(system: System) -> int:
@@ -168,6 +170,7 @@ def make_room(system: System, course: Course) -> Room:
         given=np.zeros(dolls, GIVEN), before=np.zeros(dolls, DOLL), after=np.zeros(dolls, DOLL),
         begun=np.zeros(contacts, CONTACT), count=np.zeros(1, np.int64), lift=np.zeros(2),
         tally=course.tally, within=course.within, armed=np.zeros(gaps), met=np.zeros(gaps),
+        above=np.zeros(gaps), below=np.zeros(gaps), bracket=np.zeros(3),
         stages=np.zeros((16, nq + nv)), row=np.zeros(nq + nv),
         place=np.zeros(nv, np.int64), blocks=np.zeros((contacts, 25)),
         unsought=np.zeros(1), left=np.zeros(1))
