@@ -30,6 +30,10 @@ class BoneDepth:
         self._data = mujoco.MjData(self._model)
         bodies = [self._model.body(name).id for name in scene.bone_names]
         self._geoms = [np.flatnonzero(self._model.geom_bodyid == body) for body in bodies]
+        self._bones = np.repeat(np.arange(len(bodies)), [len(own) for own in self._geoms])
+        own = np.concatenate(self._geoms)
+        self._own, self._places = own, self._model.geom_pos[own]
+        self._turns = self._model.geom_quat[own][:, [1, 2, 3, 0]]
         self._radii = np.array([np.linalg.norm(bone.shape.half_extents) for bone in scene.bones])
         jointed = {frozenset(scene.bone_index(scene.qualified(placement, name))
                              for name in (joint.parent, joint.child))
@@ -70,11 +74,11 @@ class BoneDepth:
 
     def _pose(self, positions: np.ndarray, orientations: np.ndarray) -> None:
         """Put every geom where its bone is; MuJoCo's quaternions are w, x, y, z."""
-        for own, position, orientation in zip(self._geoms, positions, orientations, strict=True):
-            self._data.geom_xpos[own] = position + rotation.rotate(
-                orientation, self._model.geom_pos[own])
-            self._data.geom_xmat[own] = rotation.matrix(rotation.multiply(
-                orientation, self._model.geom_quat[own][:, [1, 2, 3, 0]])).reshape(-1, 9)
+        turns = orientations[self._bones]
+        self._data.geom_xpos[self._own] = positions[self._bones] + rotation.rotate(
+            turns, self._places)
+        self._data.geom_xmat[self._own] = rotation.matrix(
+            rotation.multiply(turns, self._turns)).reshape(-1, 9)
 
     def _distance(self, one: int, other: int) -> float:
         return self._mujoco.mj_geomDistance(self._model, self._data, one, other, SEARCHED, None)

@@ -6,12 +6,12 @@ joint ranges, so that no bone starts inside another; lowest points are placed ex
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable
 
 import numpy as np
 
-from ..files.doll import load_doll
 from ..files.scene import load_scene
 from ..model import rotation
 from ..model.coordinates import GeneralizedState
@@ -24,6 +24,12 @@ SETTLING = 2.0
 """s simulated after the first touch."""
 
 
+@functools.cache
+def drop() -> Scene:
+    """The default scene, read once."""
+    return load_scene('drop')
+
+
 def trial(class_name: str, number: int) -> Trial:
     """Start ``number`` of a class."""
     rng = np.random.default_rng([list(CLASSES).index(class_name), number])
@@ -32,7 +38,7 @@ def trial(class_name: str, number: int) -> Trial:
 
 def _push(rng: np.random.Generator) -> Trial:
     """2000 N along the ground on the torso, as the arrow keys do, for 0.1 to 3 s."""
-    scene = load_scene('drop')
+    scene = drop()
     heading = rng.uniform(0, 2 * math.pi)
     force = (2000 * math.cos(heading), 2000 * math.sin(heading), 1.0)
     start, duration = round(rng.uniform(0, 1), 2), round(rng.uniform(0.1, 3.0), 2)
@@ -44,27 +50,27 @@ def _spin(speed: float) -> Callable[[np.random.Generator], Trial]:
     """A rigid spin about any axis, 2 m above the ground."""
     def make(rng: np.random.Generator) -> Trial:
         axis = rotation.normalized(rng.normal(size=3))
-        return _let_go(rng, 2.0, inner_angles(load_doll('doll'), rng), spin=tuple(speed * axis))
+        return _let_go(rng, 2.0, inner_angles(drop().dolls[0].doll, rng), spin=tuple(speed * axis))
     return make
 
 
 def _drop(fall: float) -> Callable[[np.random.Generator], Trial]:
     """A fall from rest, at any orientation."""
     def make(rng: np.random.Generator) -> Trial:
-        return _let_go(rng, fall, inner_angles(load_doll('doll'), rng))
+        return _let_go(rng, fall, inner_angles(drop().dolls[0].doll, rng))
     return make
 
 
 def _slam(rng: np.random.Generator) -> Trial:
     """Every joint flung toward one of its limits at 10 to 20 rad/s."""
-    doll = load_doll('doll')
+    doll = drop().dolls[0].doll
     rates = {name: rng.choice((-1, 1)) * rng.uniform(10, 20) for name in angle_places(doll)}
     return _let_go(rng, 0.4, inner_angles(doll, rng), rates)
 
 
 def _outside(rng: np.random.Generator) -> Trial:
     """Half of all joint angles 5 to 30 degrees past a limit."""
-    doll = load_doll('doll')
+    doll = drop().dolls[0].doll
     angles = inner_angles(doll, rng)
     for name, (lower, upper) in angle_limits(doll).items():
         if rng.random() < 0.5:
@@ -82,7 +88,7 @@ CLASSES: dict[str, Callable[[np.random.Generator], Trial]] = {
 def _let_go(rng: np.random.Generator, fall: float, angles: dict[str, float],
             rates: dict[str, float] | None = None, **moving: object) -> Trial:
     """The doll at any orientation, with its lowest point ``fall`` m above the ground."""
-    scene = load_scene('drop')
+    scene = drop()
     orientation = tuple(rotation.normalized(rng.normal(size=4)))
     placement = Placement(scene.dolls[0].doll, orientation=orientation, **moving)
     start = lifted(scene, posed(placement, angles, rates), fall)
