@@ -48,6 +48,21 @@ def test_what_falls_slowly_is_not_at_rest():
         assert not simulation.asleep
 
 
+def test_a_push_that_waits_keeps_nobody_awake_and_wakes_in_time():
+    """It begins at tick 800 and takes the weight off what lies on the ground."""
+    with Simulation(DROP) as simulation:
+        simulation.push(Push('torso', (0.0, 0.0, 1500.0), start=8.0, duration=0.1))
+        while not simulation.asleep:
+            simulation.advance()
+        assert simulation.tick < 800
+        while simulation.tick < 800:
+            still = simulation.advance()
+        for _ in range(10):
+            moved = simulation.advance()
+        assert not simulation.asleep
+        assert moved.positions[0, 2] > still.positions[0, 2] + 0.01
+
+
 def test_a_doll_at_rest_sleeps_and_a_push_wakes_it():
     with Simulation(DROP) as simulation:
         while not simulation.asleep:

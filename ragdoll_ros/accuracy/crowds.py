@@ -9,8 +9,9 @@ import argparse
 import dataclasses
 import math
 import resource
-import statistics
 import time
+
+import numpy as np
 
 from ..files.repeat import repeated
 from ..files.scene import load_scene
@@ -22,6 +23,9 @@ from . import crowd_digests, pile
 
 NUMBERS = (1, 10, 100, 1000)
 APART = 2.5
+SAME = 100
+"""Dolls of which all smaller crowds are made, as no two fall alike."""
+
 FALL = 2.0
 """s from the start, in which dolls fall 0.4 m and lie down."""
 
@@ -61,15 +65,17 @@ def falling(scene: Scene, accuracy: str, workers: int = 1) -> tuple[float, float
 
 
 def falls() -> None:
-    """Print what a doll of a crowd costs."""
+    """Print what a doll of a crowd costs; the smaller crowds are parts of the hundred."""
     print(f'us a doll and tick of 10 ms over {FALL:g} s of a fall; "real time": dolls whose ticks '
           'take 10 ms')
     print(f'{"":22}{"CPU":>10}{"of alone":>10}{"2 workers":>12}{"wall ratio":>12}{"real time":>12}')
     for accuracy in ACCURACIES:
-        alone = statistics.mean(falling(turning(1, k), accuracy)[0] for k in range(NUMBERS[1]))
+        alone = 0.0
         for count in NUMBERS:
-            cpu, wall = falling(turning(count), accuracy)
-            shared = falling(turning(count), accuracy, 2)[1]
+            crowds = [turning(count, first) for first in range(0, max(SAME, count), count)]
+            cpu, wall, shared = np.mean([(*falling(crowd, accuracy), falling(crowd, accuracy, 2)[1])
+                                         for crowd in crowds], axis=0)
+            alone = alone or cpu
             print(f'{accuracy + f", {count}":22}{cpu:10.1f}{cpu / alone:10.2f}{shared:12.1f}'
                   f'{wall / shared:12.2f}{1e4 / shared:12.0f}', flush=True)
 

@@ -34,10 +34,9 @@ class PushQueue:
         self._scene = scene
         self._queue: list[_Active] = []
 
-    @property
-    def bones(self) -> list[int]:
-        """The bones that they push or will."""
-        return [active.bone for active in self._queue]
+    def bones(self, now: int) -> list[int]:
+        """The bones that are being pushed."""
+        return [active.bone for active in self._acting(now)]
 
     def add(self, push: Push, channel: str | None, now: int) -> None:
         """Queue a push; on a ``channel`` it takes the place of the last. See Simulation.push."""

@@ -227,7 +227,8 @@ class Simulation:
         if self.asleep or not self.accuracy.sleep:
             return
         ready = self._sleep_detector.update(self.state, engine.motion.kinetic, self.tick)
-        for bone in (*self._pushes.bones, *(spring.bone for spring in self._hands.springs)):
+        pushed = self._pushes.bones(self.time)
+        for bone in (*pushed, *(spring.bone for spring in self._hands.springs)):
             doll = self.scene.doll_of_bone[bone]
             self._sleep_detector.disturb(doll)
             ready[doll] = False
