@@ -1,8 +1,22 @@
 """What can be wrong with a model: one root, and a named error for each kind."""
 from __future__ import annotations
 
+import bisect
 import dataclasses
 import math
+from collections.abc import Sequence
+
+LISTED = 40
+"""Names that an error lists; of more, those beside which the wrong one would stand."""
+
+
+def one_of(names: Sequence[str], wrong: str) -> str:
+    """What is expected instead of a wrong name."""
+    if len(names) <= LISTED:
+        return 'one of ' + ', '.join(names)
+    ordered = sorted(names)
+    place = max(0, min(bisect.bisect(ordered, wrong) - 2, len(ordered) - 5))
+    return f'one of {len(names)} names, such as {", ".join(ordered[place:place + 5])}'
 
 
 class RagdollError(ValueError):

@@ -181,8 +181,7 @@ class Scene:
         try:
             return self.bone_names.index(name)
         except ValueError:
-            expected = 'one of ' + ', '.join(self.bone_names)
-            raise errors.UnknownBone('', name, expected) from None
+            raise errors.UnknownBone('', name, errors.one_of(self.bone_names, name)) from None
 
 
 def height(bone: Bone, position: np.ndarray, orientation: np.ndarray, ground: Ground) -> float:

@@ -184,7 +184,8 @@ def check(settings: Settings, scene: Scene) -> None:
     check_engine(settings.engine)
     names = scene.bone_names
     if settings.pushed_bone not in names:
-        raise errors.UnknownBone('pushed_bone', settings.pushed_bone, 'one of ' + ', '.join(names))
+        raise errors.UnknownBone('pushed_bone', settings.pushed_bone,
+                                 errors.one_of(names, settings.pushed_bone))
     frame = settings.frame_id
     if not frame or frame.startswith('/'):
         raise errors.OutOfRange('frame_id', frame, 'a name without a slash at its beginning')
