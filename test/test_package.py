@@ -35,6 +35,8 @@ ROBOT = ('model', 'files', 'physics', 'ros')
 OPTIONAL = {'mujoco'}
 NUMBAS = {'llvmlite'}
 """What numba is made of: who has numba has it."""
+LAUNCHED = {'launch', 'launch_ros', 'launch_xml'}
+"""What the files in launch/ are read by."""
 EXTRAS = {'fit': 'fit', 'viewer': 'viewer', 'accuracy': 'report'}
 """The other rooms, and the extra that brings what each needs beyond that."""
 
@@ -163,7 +165,7 @@ def test_manifest_names_what_a_robot_needs_and_nothing_else():
     manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
     assert manifest.findtext('export/build_type') == 'ament_python'
     declared = [tag.text for tag in manifest.iter() if tag.tag == 'exec_depend']
-    used = imported(*ROBOT) - OPTIONAL - NUMBAS
+    used = imported(*ROBOT) - OPTIONAL - NUMBAS | LAUNCHED
     assert sorted(ROSDEP_KEYS.get(module, module) for module in used) == sorted(declared)
     assert {tag.tag for tag in manifest.iter() if 'depend' in tag.tag} == {
         'exec_depend', 'test_depend'}
@@ -240,6 +242,8 @@ def test_wheel_holds_config_twice_and_nothing_foreign(wheel):
 def test_pip_install_has_the_layout_of_a_ros_prefix(prefix):
     assert (prefix / 'share/ament_index/resource_index/packages/ragdoll_ros').is_file()
     assert (prefix / 'share/ragdoll_ros/package.xml').is_file()
+    assert {path.name for path in prefix.glob('share/ragdoll_ros/launch/*.*')} == {
+        path.name for path in (ROOT / 'launch').glob('*.*')}
     for folder in ('lib/ragdoll_ros', 'bin'):
         assert {path.name for path in prefix.glob(f'{folder}/*')} == set(EXECUTABLES), folder
     assert all(os.access(prefix / 'lib/ragdoll_ros' / name, os.X_OK) for name in EXECUTABLES)
@@ -322,8 +326,9 @@ def test_colcon_build_runs_the_node(ros, environment, tmp_path, option):
         run('colcon', 'build', *option, cwd=tmp_path, PATH=path)
     prefix = tmp_path / 'install/ragdoll_ros'
     assert (prefix / 'share/ament_index/resource_index/packages/ragdoll_ros').is_file()
-    shipped = {file.name for file in (ROOT / 'config').iterdir()}
-    assert {file.name for file in (prefix / 'share/ragdoll_ros/config').iterdir()} == shipped
+    for folder in ('config', 'launch'):
+        shipped = {file.name for file in (ROOT / folder).glob('*.*')}
+        assert {file.name for file in prefix.glob(f'share/ragdoll_ros/{folder}/*.*')} == shipped
     assert {file.name for file in (prefix / 'lib/ragdoll_ros').iterdir()} == set(EXECUTABLES)
     assert not (prefix / 'bin').exists()
     sourced = f'. {tmp_path}/install/setup.sh && exec {prefix}/lib/ragdoll_ros/ragdoll_node "$@"'
