@@ -160,3 +160,12 @@ def test_a_node_without_tf2_msgs_runs_and_says_once_what_is_missing(make_node, c
     assert told.count('/tf is not published') == 1 - lines
     assert lines or "No module named 'tf2_msgs'" in told
     assert '/tf' not in {publisher.topic_name for publisher in node.publishers}
+
+
+@pytest.mark.skipif(transforms.TFMessage is None, reason='tf2_msgs is not installed')
+def test_the_topic_is_there_while_it_is_wanted(make_node):
+    node = make_node()
+    for tree, offered in (('none', False), ('root', True), ('all', True), ('none', False)):
+        assert node.set_parameters([Parameter('publish_tf', value=tree)])[0].successful
+        node.tick()
+        assert ('/tf' in {publisher.topic_name for publisher in node.publishers}) == offered

@@ -74,7 +74,8 @@ class Transforms:
         """Publish once more what stands, if somebody has come: /tf keeps nothing for who is late,
         and who has it already would complain of the same stamp.
         """
-        if self._count() > self._listeners:
+        before, self._listeners = self._listeners, self._count()
+        if self._listeners > before:
             self.publish(simulation, stamp)
 
     def _count(self) -> int:
