@@ -171,6 +171,37 @@ def test_manifest_names_what_a_robot_needs_and_nothing_else():
         'exec_depend', 'test_depend'}
 
 
+def test_manifest_leads_to_the_project_and_to_its_documentation():
+    """REP 149; rosdoc2 wants two YAML documents, the first of which says what they are."""
+    manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
+    urls = {tag.get('type'): tag.text for tag in manifest.iter('url')}
+    assert set(urls) == {'website', 'bugtracker', 'repository'}
+    assert all(url.startswith(urls['repository']) for url in urls.values())
+    head, config = yaml.safe_load_all((ROOT / manifest.findtext('export/rosdoc2')).read_text())
+    assert head == {'type': 'rosdoc2 config', 'version': 1}
+    assert (ROOT / config['settings']['python_source'] / '__init__.py').is_file()
+    assert [list(builder) for builder in config['builders']] == [['sphinx']]
+
+
+def test_the_node_needs_no_pybullet_for_its_own_engine():
+    """What docs/ros.md leaves out where pip may not be used."""
+    text = ('import sys; sys.modules["pybullet"] = None; import ragdoll_ros.ros.node; '
+            'from ragdoll_ros import Simulation, load_scene; '
+            'simulation = Simulation(load_scene("drop"), engine="rigid"); '
+            'print(simulation.advance().positions.shape)')
+    assert run(sys.executable, '-c', text, PYTHONPATH=with_ros(ROOT)).strip() == '(10, 3)'
+
+
+def test_a_node_with_neither_numba_nor_pybullet_says_so_in_a_line(ros):
+    text = ('import sys; sys.modules["pybullet"] = None; from ragdoll_ros.ros.node import main; '
+            'sys.exit(main(["ragdoll_node"]))')
+    done = subprocess.run([sys.executable, '-c', text], capture_output=True, text=True, timeout=60,
+                          env={**os.environ, 'NUMBA_DISABLE_JIT': '1'})
+    said = done.stderr.splitlines()[-1]
+    assert done.returncode == 2 and 'Traceback' not in done.stderr
+    assert 'engine bullet: ' in said and 'engine rigid: ' in said and 'numba 0.59' in said
+
+
 def test_pip_brings_what_the_core_imports_and_extras_what_their_rooms_do(wheel):
     """ROS is an extra too."""
     core = imported('model', 'files', 'physics') - OPTIONAL - NUMBAS
