@@ -15,7 +15,8 @@ EXECUTABLES = {
     'ragdoll_fit': 'ragdoll_ros.fit.command:main',
     'ragdoll_report': 'ragdoll_ros.accuracy.command:main',
 }
-CONFIG = sorted(str(path) for path in Path('config').iterdir() if path.is_file())
+CONFIG, LAUNCH = (sorted(str(path) for path in Path(folder).iterdir() if path.is_file())
+                  for folder in ('config', 'launch'))
 LAUNCHER = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'
 """What `ros2 run` finds in a wheel's lib/ragdoll_ros: the way to the script that pip put in bin."""
 
@@ -70,6 +71,7 @@ setup(
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
         (f'share/{NAME}/config', CONFIG),
+        (f'share/{NAME}/launch', LAUNCH),
     ],
     cmdclass={'build_py': BuildWithConfig, 'install_data': InstallDataWithLaunchers},
     entry_points={'console_scripts': [f'{name} = {place}' for name, place in EXECUTABLES.items()]},

@@ -35,6 +35,8 @@ ROBOT = ('model', 'files', 'physics', 'ros')
 OPTIONAL = {'mujoco'}
 NUMBAS = {'llvmlite'}
 """What numba is made of: who has numba has it."""
+LAUNCHED = {'launch', 'launch_ros', 'launch_xml'}
+"""What the files in launch/ are read by."""
 EXTRAS = {'fit': 'fit', 'viewer': 'viewer', 'accuracy': 'report'}
 """The other rooms, and the extra that brings what each needs beyond that."""
 
@@ -163,10 +165,41 @@ def test_manifest_names_what_a_robot_needs_and_nothing_else():
     manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
     assert manifest.findtext('export/build_type') == 'ament_python'
     declared = [tag.text for tag in manifest.iter() if tag.tag == 'exec_depend']
-    used = imported(*ROBOT) - OPTIONAL - NUMBAS
+    used = imported(*ROBOT) - OPTIONAL - NUMBAS | LAUNCHED
     assert sorted(ROSDEP_KEYS.get(module, module) for module in used) == sorted(declared)
     assert {tag.tag for tag in manifest.iter() if 'depend' in tag.tag} == {
         'exec_depend', 'test_depend'}
+
+
+def test_manifest_leads_to_the_project_and_to_its_documentation():
+    """REP 149; rosdoc2 wants two YAML documents, the first of which says what they are."""
+    manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
+    urls = {tag.get('type'): tag.text for tag in manifest.iter('url')}
+    assert set(urls) == {'website', 'bugtracker', 'repository'}
+    assert all(url.startswith(urls['repository']) for url in urls.values())
+    head, config = yaml.safe_load_all((ROOT / manifest.findtext('export/rosdoc2')).read_text())
+    assert head == {'type': 'rosdoc2 config', 'version': 1}
+    assert (ROOT / config['settings']['python_source'] / '__init__.py').is_file()
+    assert [list(builder) for builder in config['builders']] == [['sphinx']]
+
+
+def test_the_node_needs_no_pybullet_for_its_own_engine():
+    """What docs/ros.md leaves out where pip may not be used."""
+    text = ('import sys; sys.modules["pybullet"] = None; import ragdoll_ros.ros.node; '
+            'from ragdoll_ros import Simulation, load_scene; '
+            'simulation = Simulation(load_scene("drop"), engine="rigid"); '
+            'print(simulation.advance().positions.shape)')
+    assert run(sys.executable, '-c', text, PYTHONPATH=with_ros(ROOT)).strip() == '(10, 3)'
+
+
+def test_a_node_with_neither_numba_nor_pybullet_says_so_in_a_line(ros):
+    text = ('import sys; sys.modules["pybullet"] = None; from ragdoll_ros.ros.node import main; '
+            'sys.exit(main(["ragdoll_node"]))')
+    done = subprocess.run([sys.executable, '-c', text], capture_output=True, text=True, timeout=60,
+                          env={**os.environ, 'NUMBA_DISABLE_JIT': '1'})
+    said = done.stderr.splitlines()[-1]
+    assert done.returncode == 2 and 'Traceback' not in done.stderr
+    assert 'engine bullet: ' in said and 'engine rigid: ' in said and 'numba 0.59' in said
 
 
 def test_pip_brings_what_the_core_imports_and_extras_what_their_rooms_do(wheel):
@@ -240,6 +273,8 @@ def test_wheel_holds_config_twice_and_nothing_foreign(wheel):
 def test_pip_install_has_the_layout_of_a_ros_prefix(prefix):
     assert (prefix / 'share/ament_index/resource_index/packages/ragdoll_ros').is_file()
     assert (prefix / 'share/ragdoll_ros/package.xml').is_file()
+    assert {path.name for path in prefix.glob('share/ragdoll_ros/launch/*.*')} == {
+        path.name for path in (ROOT / 'launch').glob('*.*')}
     for folder in ('lib/ragdoll_ros', 'bin'):
         assert {path.name for path in prefix.glob(f'{folder}/*')} == set(EXECUTABLES), folder
     assert all(os.access(prefix / 'lib/ragdoll_ros' / name, os.X_OK) for name in EXECUTABLES)
@@ -322,8 +357,9 @@ def test_colcon_build_runs_the_node(ros, environment, tmp_path, option):
         run('colcon', 'build', *option, cwd=tmp_path, PATH=path)
     prefix = tmp_path / 'install/ragdoll_ros'
     assert (prefix / 'share/ament_index/resource_index/packages/ragdoll_ros').is_file()
-    shipped = {file.name for file in (ROOT / 'config').iterdir()}
-    assert {file.name for file in (prefix / 'share/ragdoll_ros/config').iterdir()} == shipped
+    for folder in ('config', 'launch'):
+        shipped = {file.name for file in (ROOT / folder).glob('*.*')}
+        assert {file.name for file in prefix.glob(f'share/ragdoll_ros/{folder}/*.*')} == shipped
     assert {file.name for file in (prefix / 'lib/ragdoll_ros').iterdir()} == set(EXECUTABLES)
     assert not (prefix / 'bin').exists()
     sourced = f'. {tmp_path}/install/setup.sh && exec {prefix}/lib/ragdoll_ros/ragdoll_node "$@"'

@@ -17,7 +17,8 @@ import ragdoll_ros
 ROOT = Path(__file__).resolve().parent.parent
 WRITTEN_BY_PROGRAMS = {'docs/accuracy.md', 'docs/starts/accuracy.md'}
 PAGES = {name: path.read_text() for path in [
-    ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *sorted(ROOT.glob('docs/**/*.md'))]
+    *(ROOT / f'{name}.md' for name in ('README', 'CONTRIBUTING', 'QUALITY_DECLARATION')),
+    *sorted(ROOT.glob('docs/**/*.md'))]
     if (name := path.relative_to(ROOT).as_posix()) not in WRITTEN_BY_PROGRAMS}
 
 SETUP = (ROOT / 'setup.py').read_text()
@@ -29,7 +30,7 @@ TARGETS = set(re.findall(r'^([a-z-]+):.*## ', MAKEFILE, re.M))
 OURS = ('make', 'pip', 'python', 'python3', 'ros2', *EXECUTABLES)
 """Programs whose calls are looked at."""
 
-FOREIGN = {'apt', 'colcon', 'git', 'pre-commit', 'rosdep', 'rviz2', 'source', 'ssh'}
+FOREIGN = {'apt', 'colcon', 'export', 'git', 'pre-commit', 'rosdep', 'rviz2', 'source', 'ssh'}
 """Programs that are neither ours nor called with anything of ours."""
 
 

@@ -46,10 +46,10 @@ def test_packed_messages_are_what_rclpy_serializes(frame, count):
     random = np.random.default_rng(count)
     names = tuple(f'bone_{"x" * (k % 5)}{k}' for k in range(count))
     poses, twists = random.normal(size=(count, 7)), random.normal(size=(count, 6))
-    angles = random.normal(size=count)
+    angles, rates = random.normal(size=(2, count))
     for make, values in ((functools.partial(to_pose_array, frame), (poses,)),
                          (functools.partial(to_multi_dof, frame, names), (poses, twists)),
-                         (functools.partial(to_joint_state, frame, names), (angles,))):
+                         (functools.partial(to_joint_state, frame, names), (angles, rates))):
         packed = Packed(make, *(value.shape for value in values))
         for stamp in STAMPS:
             assert_same(packed.message(stamp, *values), make(stamp, *values))
@@ -63,8 +63,8 @@ def assert_same(data, message):
 
 def test_a_doll_without_joints_has_an_empty_joint_state():
     make = functools.partial(to_joint_state, 'world', ())
-    packed = Packed(make, (0,))
-    assert_same(packed.message(5, np.zeros(0)), make(5, np.zeros(0)))
+    packed = Packed(make, (0,), (0,))
+    assert_same(packed.message(5, np.zeros(0), np.zeros(0)), make(5, np.zeros(0), np.zeros(0)))
 
 
 @pytest.mark.parametrize('frame', ['', 'w', 'wo', 'wor', 'world', 'Wörld'])

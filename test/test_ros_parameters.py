@@ -85,7 +85,8 @@ def test_a_wrong_type_is_refused_and_counted(node, name):
 @pytest.mark.parametrize('name, bad, reason', [
     ('accuracy', 'perfect', 'draft, normal, exact'), ('engine', 'steam', 'rigid, bullet, mujoco'),
     ('pushed_bone', 'tail', 'torso, head'),
-    ('pushed_bone', '', 'torso'), ('frame_id', '', 'a name'), ('frame_id', '/world', 'slash'),
+    ('pushed_bone', '', 'torso'), ('publish_tf', 'some', 'all, root, none'),
+    ('frame_id', '', 'a name'), ('frame_id', '/world', 'slash'),
     ('frame_id', 'left_shin', 'no bone'), ('scene', 'nowhere', 'crowd'), ('scene', '', 'crowd'),
     ('scene', 'x' * 5000, 'Unreadable'), ('scene', '~nobody/x', 'Unreadable'),
     ('scene', '/', 'Unreadable')])

@@ -119,7 +119,7 @@ def test_all_topics_tell_of_the_same_doll(heard, peer):
     scene = load_scene('drop')
     joints = peer.hear_once(JointState, 'joint_states')
     assert tuple(joints.name) == scene.angle_names
-    assert len(joints.position) == 14
+    assert len(joints.position) == len(joints.velocity) == 14
     _, description = heard['description'][-1]
     assert all(f'<link name="{name}">' in description.data for name in scene.bone_names)
     _, markers = heard['markers'][-1]

@@ -8,7 +8,8 @@ are named child/1, child/2. A joint bears the name of the angle it measures.
 Two dialects: 'ros' is what urdfdom reads; 'bullet' has capsules, links of no mass, and for a
 ball joint without limits its spherical joint (whose own limits hardly hold: measured, it passes
 0.5 rad by 2 rad). PyBullet counts that joint's turn in the frame of the child's inertia, so a
-link of no mass with the joint's frame takes it, and the child is fixed to that.
+link of no mass with the joint's frame takes it, and the child is fixed to that. Limits of effort
+and of velocity are zero there, where no motor is meant.
 """
 from __future__ import annotations
 
@@ -23,6 +24,10 @@ from ..model.scene import Scene
 from ..model.shapes import Shape
 
 UNLIMITED = 'continuous'
+
+STRENGTH = 'effort="1000.0" velocity="100.0"'
+"""N m and rad/s that URDF wants with limits, and that joints of dolls do not reach: nothing in the
+doll keeps them, and planners and drivers of joints take zeros for joints that can not move."""
 
 OWNER = '\0'
 """Stands for a doll's own name in the tree that equal dolls share: XML allows no such character."""
@@ -60,16 +65,33 @@ def scene_to_urdf(scene: Scene, frame: str = WORLD) -> str:
     return _document(scene.name, lines)
 
 
+def link_frames(doll: Ragdoll) -> dict[str, Pose]:
+    """Frame of each bone's link, in the doll's frame in the bind pose."""
+    frames = {doll.root.name: Pose(np.array(doll.root.position))}
+    for joint in doll.joints:
+        frames[joint.child] = Pose(np.array(joint.anchor), joint_frame(joint))
+    return frames
+
+
+def link_axes(joint: Joint) -> np.ndarray:
+    """Axes (dof, 3) of a joint's angles, in the frame of its child's link."""
+    return np.eye(3) if joint.kind == 'ball' else np.array(joint.axes).reshape(-1, 3)
+
+
+def link_names(child: str, count: int) -> list[str]:
+    """Links of a joint that is ``count`` joints in a row: those between, then the child's."""
+    return [*(f'{child}/{index}' for index in range(1, count)), child]
+
+
 def _document(name: str, lines: list[str]) -> str:
     return '\n'.join(['<?xml version="1.0"?>', f'<robot name={_quoted(name)}>', *lines,
                       '</robot>', ''])
 
 
 def _tree(doll: Ragdoll, dialect: str) -> list[str]:
-    frames = {doll.root.name: Pose(np.array(doll.root.position))}
+    frames = link_frames(doll)
     lines = _link(doll.root, frames[doll.root.name], dialect)
     for joint in doll.joints_from_root():
-        frames[joint.child] = Pose(np.array(joint.anchor), joint_frame(joint))
         lines += _joint(joint, frames, dialect)
         lines += _link(doll.bone(joint.child), frames[joint.child], dialect)
     return lines
@@ -129,10 +151,11 @@ def _joint(joint: Joint, frames: dict[str, Pose], dialect: str) -> list[str]:
         row = [(joint.child, 'spherical', (0, 0, 1), None),
                (f'{joint.child}/fixed', 'fixed', None, None)]
         return _row(joint, row, place, dialect)
-    axes = np.eye(3) if joint.kind == 'ball' else joint.axes
+    strength = STRENGTH if dialect == 'ros' else 'effort="0" velocity="0"'
     row = []
-    for name, axis, pair in zip(joint.angle_names, axes, joint.angle_limits, strict=True):
-        limit = pair and f'<limit lower="{pair[0]!r}" upper="{pair[1]!r}" effort="0" velocity="0"/>'
+    for name, axis, pair in zip(joint.angle_names, link_axes(joint), joint.angle_limits,
+                                strict=True):
+        limit = pair and f'<limit lower="{pair[0]!r}" upper="{pair[1]!r}" {strength}/>'
         row.append((name, 'revolute' if pair else UNLIMITED, axis, limit))
     return _row(joint, row, place, dialect)
 
@@ -140,13 +163,13 @@ def _joint(joint: Joint, frames: dict[str, Pose], dialect: str) -> list[str]:
 def _row(joint: Joint, row: list, place: Pose, dialect: str) -> list[str]:
     """Write joints one behind the other; only the first one is displaced."""
     lines, parent = [], joint.parent
-    for index, (name, kind, axis, limit) in enumerate(row, start=1):
-        last = index == len(row)
-        child = joint.child if last else f'{joint.child}/{index}'
+    links = link_names(joint.child, len(row))
+    for index, (child, (name, kind, axis, limit)) in enumerate(zip(links, row, strict=True)):
+        last = child == joint.child
         lines += [f'  <joint name={_quoted(name)} type="{kind}">',
                   f'    <parent link={_quoted(parent)}/>',
                   f'    <child link={_quoted(child)}/>',
-                  f'    {_origin(*place) if index == 1 else "<origin/>"}']
+                  f'    {_origin(*place) if index == 0 else "<origin/>"}']
         if axis is not None:
             lines.append(f'    <axis xyz={_numbers(axis)}/>')
         if limit:

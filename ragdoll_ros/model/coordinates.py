@@ -38,8 +38,9 @@ class DofLayout:
         roots: list[tuple[int, int]] = []
         balls: list[tuple[int, int]] = []
         angles: list[int] = []
-        self._free_angles: list[tuple[slice, slice]] = []
-        """Where among the joint angles and in q each free ball joint stands."""
+        rates: list[int] = []
+        self._free_angles: list[tuple[slice, slice, slice]] = []
+        """Where among the joint angles, in q and in v each free ball joint stands."""
         v = 0
         self.own_q: list[slice] = []
         self.own_v: list[slice] = []
@@ -52,7 +53,7 @@ class DofLayout:
             bounds += [UNLIMITED] * 7
             v += 6
             for joint in doll.joints_depth_first():
-                at[joint.child] = len(bounds)
+                at[joint.child] = len(bounds), v
                 if joint.is_free_ball:
                     balls.append((len(bounds), v))
                     bounds += [UNLIMITED] * 4
@@ -62,17 +63,19 @@ class DofLayout:
                     bounds += [pair or UNLIMITED for pair in joint.angle_limits]
                 v += joint.dof
             for joint in doll.joints:
-                begin = at[joint.child]
+                begin, first = at[joint.child]
                 if joint.is_free_ball:
                     self._free_angles.append((slice(len(angles), len(angles) + 3),
-                                              slice(begin, begin + 4)))
+                                              slice(begin, begin + 4), slice(first, first + 3)))
                 angles += range(begin, begin + joint.dof)
+                rates += range(first, first + joint.dof)
             self.own_q.append(slice(q, len(bounds)))
             self.own_v.append(slice(first_v, v))
         self.sizes = (len(bounds), v)
         """Numbers in q and in v."""
-        self._angles = np.array(angles, int)
-        """(k,) where in q each joint angle stands, in the order of Scene.angle_names."""
+        self._angles, self._rates = np.array(angles, int), np.array(rates, int)
+        """(k,) where in q each joint angle stands, and in v its rate, in the order of
+        Scene.angle_names."""
         self._plain = (np.array(plain_q), np.array(plain_v))
         self._turning = self._indices(roots + balls)
         self.root_orientations, self.root_spins = self._indices(roots)
@@ -102,9 +105,17 @@ class DofLayout:
         about x, then y, then z.
         """
         angles = q[self._angles]
-        for own, at in self._free_angles:
+        for own, at, _ in self._free_angles:
             angles[own] = rotation.to_xyz(q[at])
         return angles
+
+    def joint_rates(self, coordinates: GeneralizedState) -> np.ndarray:
+        """What joint_angles() changes by, rad/s."""
+        rates = coordinates.v[self._rates]
+        for own, at, spin in self._free_angles:
+            rates[own] = rotation.xyz_rates(rotation.to_xyz(coordinates.q[at]),
+                                            coordinates.v[spin])
+        return rates
 
     def past_limits(self, q: np.ndarray) -> np.ndarray:
         """Angles (k,) rad by which the limited joints are past their limits; negative inside."""

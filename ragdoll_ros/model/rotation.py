@@ -160,6 +160,17 @@ def to_xyz(q: np.ndarray) -> tuple[float, float, float]:
             math.atan2(-r[0, 1], r[0, 0]))
 
 
+def xyz_rates(angles: np.ndarray, spin: np.ndarray) -> np.ndarray:
+    """Rates (3,) rad/s of the angles of to_xyz while what they turn spins with ``spin`` (3,)
+    rad/s along its own axes; without bound as the second angle comes near a quarter turn.
+    """
+    _, second, third = angles
+    sin, cos = math.sin(third), math.cos(third)
+    first_rate = (spin[0] * cos - spin[1] * sin) / math.cos(second)
+    return np.array([first_rate, spin[0] * sin + spin[1] * cos,
+                     spin[2] - first_rate * math.sin(second)])
+
+
 def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Geodesic distance of unit quaternions in rad, 0 to pi; q and -q are the same turn."""
     difference = multiply(inverse(a), b)

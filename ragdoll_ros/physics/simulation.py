@@ -116,6 +116,11 @@ class Simulation:
         """All joint angles, rad, in the order of Scene.angle_names."""
         return self._engine.layout.joint_angles(self.coordinates.q)
 
+    @property
+    def joint_rates(self) -> np.ndarray:
+        """What the joint angles change by, rad/s."""
+        return self._engine.layout.joint_rates(self.coordinates)
+
     def push(self, push: Push, channel: str | None = None) -> None:
         """Let a push act from its start on; on a ``channel`` it takes the place of the last.
 

@@ -43,7 +43,7 @@ def row(node: Node, scene: Scene, accuracy: str, ticks_before: int) -> dict[str,
     for _ in range(ticks_before):
         simulation.advance()
     outputs = Outputs(node)
-    outputs.describe(scene, 'world')
+    outputs.describe(scene, 'world', 'none')
     ready = to_pose_array('world', 0, poses_of(simulation.state))
     publisher = node.create_publisher(PoseArray, '~/bare', 10)
     bare = BulletEngine(scene, BARE)

@@ -29,9 +29,9 @@ class Layouts:
 
     @cached_property
     def joints(self) -> Packed:
-        """JointState of all joint angles (k,) rad."""
+        """JointState of all joint angles (k,) rad and their rates (k,) rad/s."""
         names = self._scene.angle_names
-        return Packed(partial(to_joint_state, self._frame, names), (len(names),))
+        return Packed(partial(to_joint_state, self._frame, names), (len(names),), (len(names),))
 
     @cached_property
     def swings(self) -> Packed:

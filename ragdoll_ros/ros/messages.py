@@ -114,7 +114,8 @@ def to_multi_dof(frame: str, names: tuple[str, ...], stamp: int, poses: np.ndarr
         twist=[to_twist(row) for row in twists.tolist()])
 
 
-def to_joint_state(frame: str, names: tuple[str, ...], stamp: int,
-                   angles: np.ndarray) -> JointState:
-    """Joint angles (k,) rad with their names."""
-    return JointState(header=to_header(stamp, frame), name=list(names), position=angles.tolist())
+def to_joint_state(frame: str, names: tuple[str, ...], stamp: int, angles: np.ndarray,
+                   rates: np.ndarray) -> JointState:
+    """Joint angles (k,) rad and their rates (k,) rad/s, with their names."""
+    return JointState(header=to_header(stamp, frame), name=list(names), position=angles.tolist(),
+                      velocity=rates.tolist())

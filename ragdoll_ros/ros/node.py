@@ -76,7 +76,7 @@ class RagdollNode(Node):
         self._tell_engine()
         self._outputs.be_clock(self.settings.publish_clock)
         self._ticker = Ticker(self, self._steady, self.tick)
-        self.create_timer(STANDING_CLOCK, self._repeat_clock, clock=self._steady)
+        self.create_timer(STANDING_CLOCK, self._repeat, clock=self._steady)
         self._go_on()
         self._tuning.watch(self._prepare, self._apply)
 
@@ -177,16 +177,17 @@ class RagdollNode(Node):
         self._diagnostics.report()
         self._publish()
 
-    def _repeat_clock(self) -> None:
-        """Publish the standing time for who has come since: who goes by /clock asks for no past."""
+    def _repeat(self) -> None:
+        """Publish what stands for who has come: on /clock and /tf nobody asks for the past."""
         if self.paused:
-            self._outputs.publish_clock(self.stamp)
+            self._outputs.repeat(self.simulation, self.stamp)
 
     def _use(self, simulation: Simulation) -> None:
         """Let all parts work with this simulation and the settings as they are."""
         self.simulation = self.inputs.simulation = self._diagnostics.simulation = simulation
         self.inputs.settings = self.settings
-        self._outputs.describe(simulation.scene, self.settings.frame_id)
+        self._outputs.describe(simulation.scene, self.settings.frame_id,
+                               self.settings.publish_tf)
         self.interactive.use(simulation, self.settings)
 
     def _tell_engine(self) -> None:
@@ -215,7 +216,7 @@ class RagdollNode(Node):
             self._replace(simulation)
             self._tell_engine()
             self._begin()
-        elif 'frame_id' in changed:
+        elif changed & {'frame_id', 'publish_tf'}:
             self._use(self.simulation)
             if self.paused:
                 self._publish()

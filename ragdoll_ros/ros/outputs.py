@@ -3,7 +3,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 from geometry_msgs.msg import PoseArray
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -18,6 +17,7 @@ from ..model.scene import Scene
 from .layouts import Layouts
 from .messages import contact_poses, count_masses, poses_of, to_time, twists_of
 from .packed import packed_poses
+from .transforms import Transforms
 
 if TYPE_CHECKING:  # else the page, which reads this file, would load an engine
     from ..physics.simulation import Simulation
@@ -43,14 +43,16 @@ class Outputs:
         self._contacts = node.create_publisher(PoseArray, '~/contacts', 10)
         self._markers = node.create_publisher(MarkerArray, '~/markers', KEPT)
         self._description = node.create_publisher(String, 'robot_description', LATCHED)
+        self._transforms = Transforms(node)
         self._clock: Publisher | None = None
 
-    def describe(self, scene: Scene, frame: str) -> None:
-        """Make ready for a scene, and publish its URDF."""
+    def describe(self, scene: Scene, frame: str, tree: str) -> None:
+        """Make ready for a scene, and publish its URDF; ``tree`` is what of it is on /tf."""
         self._layouts, self._frame = Layouts(scene, frame), frame
         self._offer_swings(count_masses(scene) > 0)
         self._next_markers = 0
         self._untold = False
+        self._transforms.describe(scene, frame, tree)
         self._description.publish(String(data=scene_to_urdf(scene, frame)))
 
     def publish(self, simulation: Simulation, stamp: int, now: int, still: bool = False) -> None:
@@ -59,6 +61,7 @@ class Outputs:
         ``still``: nothing may follow, so that poses can not stay away, nor markers wait.
         """
         self.publish_clock(stamp)
+        self._transforms.publish(simulation, stamp)
         if still or self._poses.get_subscription_count():
             self._publish_poses(simulation, stamp)
         else:
@@ -68,8 +71,8 @@ class Outputs:
             self._state.publish(self._layouts.state.message(stamp, poses_of(state),
                                                             twists_of(state)))
         if self._joints.get_subscription_count():
-            angles = np.asarray(simulation.joint_angles)
-            self._joints.publish(self._layouts.joints.message(stamp, angles))
+            self._joints.publish(self._layouts.joints.message(
+                stamp, simulation.joint_angles, simulation.joint_rates))
         if self._swings is not None and self._swings.get_subscription_count():
             self._swings.publish(self._layouts.swings.message(stamp, poses_of(simulation.swings)))
         if self._contacts.get_subscription_count():
@@ -95,6 +98,11 @@ class Outputs:
     def _publish_markers(self, simulation: Simulation, stamp: int) -> None:
         self._markers.publish(self._layouts.markers.message(
             stamp, simulation.state, simulation.pushes, simulation.swings))
+
+    def repeat(self, simulation: Simulation, stamp: int) -> None:
+        """Publish the standing time, and for who has come since, the standing frames."""
+        self.publish_clock(stamp)
+        self._transforms.repeat(simulation, stamp)
 
     def publish_clock(self, stamp: int) -> None:
         """Publish the time, ns, if this node is the clock."""

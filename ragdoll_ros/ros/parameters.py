@@ -23,6 +23,7 @@ from ..model.scene import STEP_RANGE, Scene
 from ..physics.engine.registry import ENGINES, check_engine
 from ..physics.settings import ACCURACIES
 from ..physics.simulation import MOST_WORKERS, Simulation
+from .transforms import TREES
 
 
 def _setting(default: object, description: str, span: tuple[float, float] | None = None,
@@ -63,6 +64,8 @@ class Settings:
     frame_id: str = _setting(WORLD, 'Name of the world frame in all messages',
                              constraints='no bone of bone_names, no slash at its beginning')
     publish_clock: bool = _setting(False, 'Publish simulated time on /clock and stamp by it')
+    publish_tf: str = _setting('all', 'Frames on /tf: of all links, of the roots alone, or none',
+                               constraints='one of ' + ', '.join(TREES))
     accuracy: str = _setting('normal', 'How finely to simulate',
                              constraints='one of ' + ', '.join(ACCURACIES))
     engine: str = _setting('auto', 'What simulates; another one starts anew',
@@ -181,6 +184,8 @@ def check(settings: Settings, scene: Scene) -> None:
     """Raise a RagdollError for what no range can tell."""
     if settings.accuracy not in ACCURACIES:
         raise errors.OutOfRange('accuracy', settings.accuracy, 'one of ' + ', '.join(ACCURACIES))
+    if settings.publish_tf not in TREES:
+        raise errors.OutOfRange('publish_tf', settings.publish_tf, 'one of ' + ', '.join(TREES))
     check_engine(settings.engine)
     names = scene.bone_names
     if settings.pushed_bone not in names:

@@ -23,7 +23,7 @@ class EngineChoice:
 def resolve_engine(engine: str | type[Engine]) -> EngineChoice:
     """The engine for a name, or a class as it is; OutOfRange for a name that is none.
 
-    Raises MissingEngine for the rigid engine where numba is missing or does not work.
+    Raises MissingEngine for an engine whose library is missing or does not work.
     """
     if not isinstance(engine, str):
         return EngineChoice(engine.__name__, engine)
@@ -36,10 +36,20 @@ def resolve_engine(engine: str | type[Engine]) -> EngineChoice:
         from .mujoco import MujocoEngine
         return EngineChoice('mujoco', MujocoEngine)
     if engine == 'bullet' or problem:
-        from .bullet import BulletEngine
-        return EngineChoice('bullet', BulletEngine, problem)
+        return EngineChoice('bullet', _bullet_engine(problem), problem)
     from .rigid import RigidEngine
     return EngineChoice('rigid', RigidEngine)
+
+
+def _bullet_engine(problem: str) -> type[Engine]:
+    """PyBullet's; ``problem`` is what the rigid engine lacks, if that was asked for first."""
+    try:
+        from .bullet import BulletEngine
+    except ImportError as error:
+        reasons = [f'engine bullet: {error}', *([f'engine rigid: {problem}'] if problem else [])]
+        raise MissingEngine('; '.join([*reasons, 'expected PyBullet, or numba 0.59 or newer for '
+                                       'engine rigid'])) from error
+    return BulletEngine
 
 
 def check_engine(name: str) -> None:

@@ -1,0 +1,84 @@
+"""tf2_msgs built from its one message by the generators of ROS's wheels, as PyPI has no tf2_msgs.
+
+python test/tf2_msgs_build.py FOLDER
+"""
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+GENERATORS = [f'ros-jazzy-{name}' for name in (
+    'ament-cmake', 'ament-cmake-gmock', 'ament-cmake-gtest', 'ament-cmake-include-directories',
+    'ament-cmake-pytest', 'ament-cmake-ros', 'ament-package', 'common-interfaces',
+    'fastrtps-cmake-module', 'python-cmake-module', 'rmw-fastrtps-cpp',
+    'rosidl-core-generators', 'rosidl-default-generators', 'rosidl-generator-py')]
+TOOLS = ['catkin_pkg', 'cmake', 'empy<4', 'lark', 'ninja', 'numpy', 'setuptools<80']
+
+FILES = {
+    'msg/TFMessage.msg': 'geometry_msgs/TransformStamped[] transforms\n',
+    'package.xml': """<package format="3">
+  <name>tf2_msgs</name> <version>0.36.0</version> <description>TFMessage</description>
+  <maintainer email="tf2@example.org">nobody</maintainer> <license>BSD</license>
+  <buildtool_depend>ament_cmake</buildtool_depend>
+  <buildtool_depend>rosidl_default_generators</buildtool_depend>
+  <depend>geometry_msgs</depend>
+  <member_of_group>rosidl_interface_packages</member_of_group>
+  <export><build_type>ament_cmake</build_type></export>
+</package>
+""",
+    'CMakeLists.txt': """cmake_minimum_required(VERSION 3.20)
+project(tf2_msgs)
+find_package(ament_cmake REQUIRED)
+find_package(geometry_msgs REQUIRED)
+find_package(rosidl_default_generators REQUIRED)
+rosidl_generate_interfaces(tf2_msgs msg/TFMessage.msg DEPENDENCIES geometry_msgs)
+ament_package()
+"""}
+
+
+def build(folder: Path) -> dict[str, str]:
+    """Build in a folder, with an environment of its own; what a process needs to import it."""
+    tools, prefix = folder / 'environment', folder / 'prefix'
+    _run(sys.executable, '-m', 'venv', tools)
+    _run(tools / 'bin/pip', 'install', '--quiet', *TOOLS, *GENERATORS)
+    site = next(tools.glob('lib/python3*/site-packages'))
+    _mend(tools / 'share', site)
+    for name, text in FILES.items():
+        path = folder / 'source' / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    places = {'PATH': f'{tools}/bin:{os.environ["PATH"]}', 'LD_LIBRARY_PATH': f'{tools}/lib',
+              'AMENT_PREFIX_PATH': str(tools), 'CMAKE_PREFIX_PATH': f'{tools}:{site}',
+              'PYTHONPATH': ''}
+    python = tools / 'bin/python'
+    _run(tools / 'bin/cmake', '-S', folder / 'source', '-B', folder / 'build', '-G', 'Ninja',
+         f'-DCMAKE_INSTALL_PREFIX={prefix}', '-DBUILD_TESTING=OFF',
+         f'-DPython3_EXECUTABLE={python}', f'-DPYTHON_EXECUTABLE={python}', **places)
+    _run(tools / 'bin/cmake', '--build', folder / 'build', '--target', 'install', **places)
+    return {'LD_LIBRARY_PATH': str(prefix / 'lib'),
+            'PYTHONPATH': str(next(prefix.glob('lib/python3*/site-packages')))}
+
+
+def _mend(share: Path, site: Path) -> None:
+    """Point the wheels' CMake files to this Python, not to that of who has built them."""
+    for path in share.rglob('*.cmake'):
+        text = path.read_text()
+        here = re.sub(r'/opt/python/[^/;"]*/include/python3[^/;"]*',
+                      sysconfig.get_path('include'), text)
+        here = re.sub(r'/opt/python/[^/;"]*/lib/python3[^/;"]*/site-packages', str(site), here)
+        if here != text:
+            path.write_text(here)
+
+
+def _run(*command: object, **variables: str) -> None:
+    done = subprocess.run([str(part) for part in command], env={**os.environ, **variables},
+                          capture_output=True, text=True, timeout=900)
+    assert done.returncode == 0, f'{command}\n{done.stdout}\n{done.stderr}'
+
+
+if __name__ == '__main__':
+    print(build(Path(sys.argv[1])))
