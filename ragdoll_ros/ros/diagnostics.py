@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock
@@ -24,6 +24,17 @@ BEHIND = 0.95
 """Share of the wanted pace below which a report warns that the doll falls behind."""
 
 
+class TickCost(NamedTuple):
+    """What a tick took, all in ns."""
+
+    wall: int
+    cpu: int
+    """Of all threads of the process."""
+    simulated: int
+    late: float
+    """Between the time at which it was due and its begin."""
+
+
 class Diagnostics:
     """Collects what each tick cost; reports pace, cost, errors and counts.
 
@@ -36,18 +47,17 @@ class Diagnostics:
         self._node, self._steady, self._tally = node, steady, tally
         self._facts, self._wanted_pace, self._stamp = facts, wanted_pace, stamp
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self._reported = 0
+        self._counted = self._dropped = 0
         self._last: dict[str, float] | None = None
         self.simulation: Simulation
         self._begin()
         node.create_timer(PERIOD, self._close, clock=steady)
 
-    def count(self, cost: int, simulated: int) -> None:
-        """Enter a tick: the ns that it took, and those that it simulated."""
+    def count(self, tick: TickCost) -> None:
+        """Enter a tick."""
         self._ticks += 1
-        self._cost += cost
-        self._dearest = max(self._dearest, cost)
-        self._simulated += simulated
+        self._sums = TickCost(*map(sum, zip(self._sums, tick, strict=True)))
+        self._most = TickCost(*map(max, zip(self._most, tick, strict=True)))
 
     def report(self) -> None:
         """Tell who listens how it is now; pace and cost are those of the last whole period."""
@@ -65,26 +75,42 @@ class Diagnostics:
     def _close(self) -> None:
         """Close a period: report it, and begin to count anew."""
         elapsed = max(1, self._steady.now().nanoseconds - self._since)
-        self._last = {'pace': self._simulated / elapsed,
-                      'tick_cost_ms': self._cost / max(1, self._ticks) / 1e6,
-                      'tick_cost_max_ms': self._dearest / 1e6}
+        mean = TickCost(*(total / max(1, self._ticks) / 1e6 for total in self._sums))
+        self._last = {'pace': self._sums.simulated / elapsed,
+                      'tick_cost_ms': mean.wall, 'tick_cost_max_ms': self._most.wall / 1e6,
+                      'tick_cpu_ms': mean.cpu,
+                      'stamp_lag_ms': mean.late, 'stamp_lag_max_ms': self._most.late / 1e6}
         self.report()
         self._begin()
 
     def _begin(self) -> None:
         self._since = self._steady.now().nanoseconds
-        self._ticks = self._cost = self._dearest = self._simulated = 0
+        self._ticks, self._sums, self._most = 0, TickCost(0, 0, 0, 0), TickCost(0, 0, 0, 0)
 
     def _judge(self) -> tuple[bytes, str]:
-        """Level and message: what was refused since the last report, else how the pace is."""
-        tally, wanted, pace = self._tally, self._wanted_pace(), self._last['pace']
+        """Level and message: what was refused since the last report, what stalled, else OK."""
+        tally, wanted = self._tally, self._wanted_pace()
         counted = tally.refused.total() + tally.clamped.total()
-        news, self._reported = counted > self._reported, counted
-        if news:
-            return DiagnosticStatus.WARN, tally.reason
-        if wanted and self._ticks and pace < BEHIND * wanted:
-            return DiagnosticStatus.WARN, f'pace {pace:.3g} falls behind {wanted:.3g}'
+        refused, self._counted = counted > self._counted, counted
+        warnings = [tally.reason] if refused else []
+        warnings += self._stalls(wanted)
+        if warnings:
+            return DiagnosticStatus.WARN, '; '.join(warnings)
         return DiagnosticStatus.OK, 'running' if wanted else 'paused'
+
+    def _stalls(self, wanted: float) -> list[str]:
+        """What fell behind the clock on the wall; late by more than a tick on the average counts,
+        as a busy machine lets one tick or another wait.
+        """
+        last, facts, found = self._last, self._facts(), []
+        if wanted and self._ticks and last['pace'] < BEHIND * wanted:
+            found.append(f'pace {last["pace"]:.3g} falls behind {wanted:.3g}')
+        dropped, self._dropped = facts['dropped_ticks'] - self._dropped, facts['dropped_ticks']
+        if dropped:
+            found.append(f'{dropped} ticks were dropped')
+        if wanted and last['stamp_lag_ms'] > self.simulation.tick / wanted / 1e6:
+            found.append(f'stamps were {last["stamp_lag_ms"]:.3g} ms late')
+        return found
 
     def _values(self) -> dict[str, object]:
         simulation, tally = self.simulation, self._tally
@@ -120,6 +146,8 @@ def _push_text(push: Push) -> str:
 
 
 def _text(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
     if isinstance(value, float):
         return f'{value:.6g}' if math.isfinite(value) else 'unknown'
     return str(value)

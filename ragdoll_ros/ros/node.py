@@ -21,7 +21,7 @@ from rclpy.waitable import Waitable
 from ..model import errors
 from ..model.scene import Scene
 from ..physics.simulation import Simulation
-from .diagnostics import Diagnostics
+from .diagnostics import Diagnostics, TickCost
 from .inputs import Inputs
 from .interactive import Interactive
 from .outputs import Outputs
@@ -88,7 +88,7 @@ class RagdollNode(Node):
     @property
     def stamp(self) -> int:
         """Stamp of the state as it stands, ns."""
-        return self._stamps.at(self.simulation.time, self.settings.publish_clock)
+        return self.simulation.time if self.settings.publish_clock else self._stamps.newest
 
     @property
     def services(self) -> Iterator[Service]:
@@ -100,26 +100,28 @@ class RagdollNode(Node):
         """Misfits of topics that an executor is to look at now."""
         return super().waitables if self._ticker.looks(MISFITS) else iter(())
 
-    def tick(self) -> None:
-        """Go on by one tick and publish; a state that is not finite is never shown."""
-        start = time.monotonic_ns()
+    def tick(self, due: float | None = None) -> None:
+        """Go on by one tick and publish; a state that is not finite is never shown.
+
+        ``due``: when, ns of the steady clock; now, if it is not said.
+        """
+        start, cpu = time.monotonic_ns(), time.process_time_ns()
         if not self._advance():
             self.tally.refuse('state', 'not finite; the simulation was built anew')
             self._replace(make_simulation(self._tuning.scene, self.settings))
+        self._stamps.take(due)
         self._publish()
-        self._diagnostics.count(time.monotonic_ns() - start, self.simulation.tick)
+        self._diagnostics.count(TickCost(
+            time.monotonic_ns() - start, time.process_time_ns() - cpu, self.simulation.tick,
+            0 if due is None else max(0.0, start - due)))
 
     def reset(self) -> None:
         """Go back to the start, to the bit, and publish it."""
-        self._stamps.begin_again(self.simulation.time, self.simulation.tick)
-        self._stamps.catch_up(0)
         self.simulation.reset()
         self._begin()
 
     def pause(self, wanted: bool) -> None:
         """Hold the time, or let it go on from where it is."""
-        if self.paused and not wanted:
-            self._stamps.catch_up(self.simulation.time)
         self.paused = wanted
         self._go_on()
         if wanted:
@@ -168,14 +170,15 @@ class RagdollNode(Node):
 
     def _publish(self) -> None:
         simulation, now = self.simulation, time.monotonic_ns()
-        self._stamps.follow(simulation.time)
         self._outputs.publish(simulation, self.stamp, now, self.paused)
         self.interactive.publish(now, self.paused)
 
     def _begin(self) -> None:
         """Publish a start: first which stamp it has, so that listeners know the next one's time."""
+        self._stamps.take()
         self._diagnostics.report()
         self._publish()
+        self._go_on()
 
     def _repeat_clock(self) -> None:
         """Publish the standing time for who has come since: who goes by /clock asks for no past."""
@@ -195,7 +198,6 @@ class RagdollNode(Node):
         self.get_logger().info(f'engine {name}' + (f', as {reason}' if reason else ''))
 
     def _replace(self, simulation: Simulation) -> None:
-        self._stamps.begin_again(self.simulation.time, self.simulation.tick)
         self.simulation.close()
         self._use(simulation)
 
@@ -228,9 +230,10 @@ class RagdollNode(Node):
         return 0.0 if self.paused else self.settings.real_time_factor
 
     def _facts(self) -> dict:
+        pace = 1.0 if self.settings.publish_clock else self.settings.real_time_factor
         return {'paused': self.paused, 'real_time_factor': self.settings.real_time_factor,
-                'lost_time': self._ticker.lost / 1e9,
-                'stamp_of_zero': self._stamps.at(0, self.settings.publish_clock)}
+                'lost_time': self._ticker.lost / 1e9, 'dropped_ticks': self._ticker.dropped,
+                'stamp_pace': pace, 'stamp_of_zero': self.stamp - round(self.simulation.time / pace)}
 
 
 def main(arguments: list[str] | None = None) -> int:
