@@ -230,10 +230,12 @@ class RagdollNode(Node):
         return 0.0 if self.paused else self.settings.real_time_factor
 
     def _facts(self) -> dict:
-        pace = 1.0 if self.settings.publish_clock else self.settings.real_time_factor
-        return {'paused': self.paused, 'real_time_factor': self.settings.real_time_factor,
-                'lost_time': self._ticker.lost / 1e9, 'dropped_ticks': self._ticker.dropped,
-                'stamp_pace': pace, 'stamp_of_zero': self.stamp - round(self.simulation.time / pace)}
+        settings, ticker = self.settings, self._ticker
+        pace = 1.0 if settings.publish_clock else settings.real_time_factor
+        return {'paused': self.paused, 'real_time_factor': settings.real_time_factor,
+                'lost_time': ticker.lost / 1e9, 'dropped_ticks': ticker.dropped,
+                'stamp_pace': pace,
+                'stamp_of_zero': self.stamp - round(self.simulation.time / pace)}
 
 
 def main(arguments: list[str] | None = None) -> int:
