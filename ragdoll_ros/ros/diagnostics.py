@@ -93,16 +93,19 @@ class Diagnostics:
         counted = tally.refused.total() + tally.clamped.total()
         refused, self._counted = counted > self._counted, counted
         warnings = [tally.reason] if refused else []
-        warnings += self._stalls(wanted)
+        facts = self._facts()
+        if facts['namesakes']:
+            warnings.append(f'{facts["namesakes"] + 1} nodes have this name')
+        warnings += self._stalls(wanted, facts)
         if warnings:
             return DiagnosticStatus.WARN, '; '.join(warnings)
         return DiagnosticStatus.OK, 'running' if wanted else 'paused'
 
-    def _stalls(self, wanted: float) -> list[str]:
+    def _stalls(self, wanted: float, facts: dict) -> list[str]:
         """What fell behind the clock on the wall; late by more than a tick on the average counts,
         as a busy machine lets one tick or another wait.
         """
-        last, facts, found = self._last, self._facts(), []
+        last, found = self._last, []
         if wanted and self._ticks and last['pace'] < BEHIND * wanted:
             found.append(f'pace {last["pace"]:.3g} falls behind {wanted:.3g}')
         dropped, self._dropped = facts['dropped_ticks'] - self._dropped, facts['dropped_ticks']

@@ -24,13 +24,16 @@ from ..physics.simulation import Simulation
 from .diagnostics import Diagnostics, TickCost
 from .inputs import Inputs
 from .interactive import Interactive
+from .namesakes import Namesakes
 from .outputs import Outputs
 from .parameters import Parameters, Settings, make_simulation, step_of
 from .services import Services
 from .session import ros_session
+from .signals import ended_by_signals
 from .stamps import Stamps
 from .tally import Tally
 from .ticker import CALLS, MISFITS, Ticker
+from .told import end_line, start_line
 
 InvalidROSArguments = rclpy_implementation.RCLInvalidROSArgsError
 
@@ -60,7 +63,7 @@ class RagdollNode(Node):
 
     def _set_up(self) -> None:
         self.tally = Tally(self.get_logger())
-        self._tuning = Parameters(self)
+        self._tuning = Parameters(self, self._parameter_overrides)
         self.simulation = make_simulation(self._tuning.scene, self.settings)
         self._prepared: Simulation | None = None
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -71,9 +74,10 @@ class RagdollNode(Node):
         self._diagnostics = Diagnostics(self, self._steady, self.tally, self._facts,
                                         self._wanted_pace, self._time_of_report)
         Services(self, self)
+        self._namesakes = Namesakes(self, self._steady)
         self.paused = False
         self._use(self.simulation)
-        self._tell_engine()
+        self._tell_start()
         self._outputs.be_clock(self.settings.publish_clock)
         self._ticker = Ticker(self, self._steady, self.tick)
         self.create_timer(STANDING_CLOCK, self._repeat_clock, clock=self._steady)
@@ -132,10 +136,19 @@ class RagdollNode(Node):
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Set parameters; a refusal is counted, also one by a range that rclpy checks."""
-        result = super().set_parameters_atomically(parameter_list)
+        wanted = [each for each in parameter_list if not self._tuning.stands(each)]
+        if parameter_list and not wanted:
+            return SetParametersResult(successful=True)
+        result = super().set_parameters_atomically(wanted)
         if not result.successful:
             self.tally.refuse('parameters', result.reason)
         return result
+
+    def end(self) -> None:
+        """Give all back and say how far it came: ROS may be gone already, the log is not."""
+        line = end_line(self.simulation, self.tally.refused.total(), self._ticker.dropped)
+        self.destroy_node()
+        self.get_logger().info(line)
 
     def destroy_node(self) -> None:
         """Give the engine back as well."""
@@ -192,10 +205,9 @@ class RagdollNode(Node):
         self._outputs.describe(simulation.scene, self.settings.frame_id)
         self.interactive.use(simulation, self.settings)
 
-    def _tell_engine(self) -> None:
-        """Say which engine simulates, and why it is not the rigid one where that was wanted."""
-        name, reason = self.simulation.engine_name, self.simulation.engine_reason
-        self.get_logger().info(f'engine {name}' + (f', as {reason}' if reason else ''))
+    def _tell_start(self) -> None:
+        """Say what is simulated, by what and how finely, and where to look."""
+        self.get_logger().info(start_line(self.simulation, self.settings, self))
 
     def _replace(self, simulation: Simulation) -> None:
         self.simulation.close()
@@ -215,7 +227,7 @@ class RagdollNode(Node):
         if self._prepared is not None:
             simulation, self._prepared = self._prepared, None
             self._replace(simulation)
-            self._tell_engine()
+            self._tell_start()
             self._begin()
         elif 'frame_id' in changed:
             self._use(self.simulation)
@@ -234,7 +246,7 @@ class RagdollNode(Node):
         pace = 1.0 if settings.publish_clock else settings.real_time_factor
         return {'paused': self.paused, 'real_time_factor': settings.real_time_factor,
                 'lost_time': ticker.lost / 1e9, 'dropped_ticks': ticker.dropped,
-                'stamp_pace': pace,
+                'stamp_pace': pace, 'namesakes': self._namesakes.count,
                 'stamp_of_zero': self.stamp - round(self.simulation.time / pace)}
 
 
@@ -246,11 +258,19 @@ def main(arguments: list[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter)
     try:
         parser.parse_args(remove_ros_args(arguments)[1:])
-        with ros_session(arguments):
-            rclpy.spin(RagdollNode())
+        return ended_by_signals(lambda: _spin(arguments))
     except (errors.RagdollError, ParameterException, InvalidROSArguments) as error:
         print(error, file=sys.stderr)
         return 2
+
+
+def _spin(arguments: list[str]) -> int:
+    with ros_session(arguments):
+        node = RagdollNode()
+        try:
+            rclpy.spin(node)
+        finally:
+            node.end()
     return 0
 
 
