@@ -9,6 +9,9 @@ from rclpy.parameter import Parameter
 OF_ROS = 'qos_overrides.'
 """Begins the names of what rclpy declares for a topic, if it does at all."""
 
+LIKE = 0.7
+"""How much two names must have in common, of 1, for one to be a slip for the other."""
+
 
 def as_numbers(parameters: Iterable[Parameter], real: Collection[str]) -> list[Parameter]:
     """The parameters, whole numbers being as good as others where a ``real`` one is wanted."""
@@ -20,5 +23,5 @@ def as_numbers(parameters: Iterable[Parameter], real: Collection[str]) -> list[P
 def unknown(names: Iterable[str], known: Collection[str]) -> list[str]:
     """A sentence for each name that is not known, with the known one that is most like it."""
     return [f'no parameter {name}: it is ignored' + ''.join(
-                f'; did you mean {like}?' for like in difflib.get_close_matches(name, known, 1))
+                f'; did you mean {like}?' for like in difflib.get_close_matches(name, known, 1, LIKE))
             for name in names if name not in known and not name.startswith(OF_ROS)]
