@@ -22,6 +22,10 @@ def as_numbers(parameters: Iterable[Parameter], real: Collection[str]) -> list[P
 
 def unknown(names: Iterable[str], known: Collection[str]) -> list[str]:
     """A sentence for each name that is not known, with the known one that is most like it."""
-    return [f'no parameter {name}: it is ignored' + ''.join(
-                f'; did you mean {like}?' for like in difflib.get_close_matches(name, known, 1, LIKE))
-            for name in names if name not in known and not name.startswith(OF_ROS)]
+    told = []
+    for name in names:
+        if name not in known and not name.startswith(OF_ROS):
+            like = difflib.get_close_matches(name, known, 1, LIKE)
+            told.append(f'no parameter {name}: it is ignored'
+                        + (f'; did you mean {like[0]}?' if like else ''))
+    return told
