@@ -199,6 +199,20 @@ def test_stamps_are_ros_time_over_stalls_paces_pauses_and_resets(heard, peer):
     assert min(np.diff(heard.stamps)) > 0
 
 
+def test_a_change_of_the_pace_is_no_stall(make_node, peer):
+    """No report compares a mean over the time before with what is wanted now."""
+    node = make_node(scene='flight', rate=20.0)
+    reports = peer.collect(DiagnosticArray, '/diagnostics')
+    peer.executor_.add_node(node)
+    for change in (lambda: node.set_parameters([Parameter('real_time_factor', value=4)]),
+                   lambda: node.pause(True), lambda: node.pause(False)):
+        peer.wait(lambda: reports)
+        change()
+        reports.clear()
+        peer.wait(lambda: len(reports) > 2)
+        assert not any('falls behind 4' in report.status[0].message for _, report in reports[:2])
+
+
 def test_overload_lowers_the_pace_and_stamps_stay_ros_time(make_node, peer):
     """A hundred times as fast as life in ticks of 0.2 ms, which no machine here can do."""
     node = make_node(rate=5000.0, real_time_factor=100.0)

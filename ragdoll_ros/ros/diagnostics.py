@@ -2,8 +2,9 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock
@@ -24,17 +25,6 @@ BEHIND = 0.95
 """Share of the wanted pace below which a report warns that the doll falls behind."""
 
 
-class TickCost(NamedTuple):
-    """What a tick took, all in ns."""
-
-    wall: int
-    cpu: int
-    """Of all threads of the process."""
-    simulated: int
-    late: float
-    """Between the time at which it was due and its begin."""
-
-
 class Diagnostics:
     """Collects what each tick cost; reports pace, cost, errors and counts.
 
@@ -50,14 +40,19 @@ class Diagnostics:
         self._counted = self._dropped = 0
         self._last: dict[str, float] | None = None
         self.simulation: Simulation
-        self._begin()
+        self.begin()
         node.create_timer(PERIOD, self._close, clock=steady)
 
-    def count(self, tick: TickCost) -> None:
-        """Enter a tick."""
+    def count(self, cost: int, late: float, simulated: int) -> None:
+        """Enter a tick, all in ns: what it took on the wall, how long after it was due it began,
+        and what it simulated.
+        """
         self._ticks += 1
-        self._sums = TickCost(*map(sum, zip(self._sums, tick, strict=True)))
-        self._most = TickCost(*map(max, zip(self._most, tick, strict=True)))
+        self._cost += cost
+        self._dearest = max(self._dearest, cost)
+        self._late += late
+        self._latest = max(self._latest, late)
+        self._simulated += simulated
 
     def report(self) -> None:
         """Tell who listens how it is now; pace and cost are those of the last whole period."""
@@ -75,17 +70,21 @@ class Diagnostics:
     def _close(self) -> None:
         """Close a period: report it, and begin to count anew."""
         elapsed = max(1, self._steady.now().nanoseconds - self._since)
-        mean = TickCost(*(total / max(1, self._ticks) / 1e6 for total in self._sums))
-        self._last = {'pace': self._sums.simulated / elapsed,
-                      'tick_cost_ms': mean.wall, 'tick_cost_max_ms': self._most.wall / 1e6,
-                      'tick_cpu_ms': mean.cpu,
-                      'stamp_lag_ms': mean.late, 'stamp_lag_max_ms': self._most.late / 1e6}
+        # In ms; what the process takes besides ticks is little, and to ask at each tick is not.
+        spent, ticks = time.process_time_ns() - self._spent, 1e6 * max(1, self._ticks)
+        self._last = {'pace': self._simulated / elapsed,
+                      'tick_cost_ms': self._cost / ticks, 'tick_cost_max_ms': self._dearest / 1e6,
+                      'tick_cpu_ms': spent / ticks,
+                      'stamp_lag_ms': self._late / ticks, 'stamp_lag_max_ms': self._latest / 1e6}
         self.report()
-        self._begin()
+        self.begin()
 
-    def _begin(self) -> None:
+    def begin(self) -> None:
+        """Begin to count anew, as after a change of the pace: a mean over both tells nothing."""
         self._since = self._steady.now().nanoseconds
-        self._ticks, self._sums, self._most = 0, TickCost(0, 0, 0, 0), TickCost(0, 0, 0, 0)
+        self._spent = time.process_time_ns()
+        self._ticks = self._cost = self._dearest = self._simulated = 0
+        self._late = self._latest = 0.0
 
     def _judge(self) -> tuple[bytes, str]:
         """Level and message: what was refused since the last report, what stalled, else OK."""

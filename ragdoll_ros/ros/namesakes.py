@@ -1,22 +1,18 @@
 """Other nodes of the same name: their messages mix with this one's, and ROS says no word."""
 from __future__ import annotations
 
-from rclpy.clock import Clock
 from rclpy.node import Node
-
-PERIOD = 2.0
-"""s of the steady clock between two looks at the graph."""
 
 
 class Namesakes:
     """Counts other nodes with the name and namespace of ``node``; the log tells when more come."""
 
-    def __init__(self, node: Node, steady: Clock) -> None:
+    def __init__(self, node: Node) -> None:
         self._node = node
         self.count = 0
-        node.create_timer(PERIOD, self._look, clock=steady)
 
-    def _look(self) -> None:
+    def look(self) -> None:
+        """Look at the graph; now and then, by a timer that is there anyway."""
         node = self._node
         own = node.get_name(), node.get_namespace()
         before, self.count = self.count, max(

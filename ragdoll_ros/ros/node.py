@@ -21,7 +21,7 @@ from rclpy.waitable import Waitable
 from ..model import errors
 from ..model.scene import Scene
 from ..physics.simulation import Simulation
-from .diagnostics import Diagnostics, TickCost
+from .diagnostics import Diagnostics
 from .inputs import Inputs
 from .interactive import Interactive
 from .namesakes import Namesakes
@@ -37,8 +37,8 @@ from .told import end_line, start_line
 
 InvalidROSArguments = rclpy_implementation.RCLInvalidROSArgsError
 
-STANDING_CLOCK = 0.5
-"""s on the wall between two messages on /clock while the doll is paused."""
+LOOK_AROUND = 0.5
+"""s on the wall between two looks at who is there, and two messages on /clock while paused."""
 
 EXAMPLE = """examples:
   ragdoll_node
@@ -74,13 +74,13 @@ class RagdollNode(Node):
         self._diagnostics = Diagnostics(self, self._steady, self.tally, self._facts,
                                         self._wanted_pace, self._time_of_report)
         Services(self, self)
-        self._namesakes = Namesakes(self, self._steady)
+        self._namesakes = Namesakes(self)
         self.paused = False
         self._use(self.simulation)
         self._tell_start()
         self._outputs.be_clock(self.settings.publish_clock)
         self._ticker = Ticker(self, self._steady, self.tick)
-        self.create_timer(STANDING_CLOCK, self._repeat_clock, clock=self._steady)
+        self.create_timer(LOOK_AROUND, self._look_around, clock=self._steady)
         self._go_on()
         self._tuning.watch(self._prepare, self._apply)
 
@@ -109,15 +109,14 @@ class RagdollNode(Node):
 
         ``due``: when, ns of the steady clock; now, if it is not said.
         """
-        start, cpu = time.monotonic_ns(), time.process_time_ns()
+        start = time.monotonic_ns()
         if not self._advance():
             self.tally.refuse('state', 'not finite; the simulation was built anew')
             self._replace(make_simulation(self._tuning.scene, self.settings))
         self._stamps.take(due)
         self._publish()
-        self._diagnostics.count(TickCost(
-            time.monotonic_ns() - start, time.process_time_ns() - cpu, self.simulation.tick,
-            0 if due is None else max(0.0, start - due)))
+        late = 0.0 if due is None else max(0.0, start - due)
+        self._diagnostics.count(time.monotonic_ns() - start, late, self.simulation.tick)
 
     def reset(self) -> None:
         """Go back to the start, to the bit, and publish it."""
@@ -176,6 +175,7 @@ class RagdollNode(Node):
 
     def _go_on(self) -> None:
         """Tick from now on at the wanted pace, or not while the doll is paused."""
+        self._diagnostics.begin()
         if self.paused:
             self._ticker.stop()
         else:
@@ -193,8 +193,9 @@ class RagdollNode(Node):
         self._publish()
         self._go_on()
 
-    def _repeat_clock(self) -> None:
-        """Publish the standing time for who has come since: who goes by /clock asks for no past."""
+    def _look_around(self) -> None:
+        """Look who has come, and tell them standing time: who goes by /clock asks for no past."""
+        self._namesakes.look()
         if self.paused:
             self._outputs.publish_clock(self.stamp)
 
