@@ -6,6 +6,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check
 BRIEF = $$(test -t 2 || echo --quiet)
+# pip's warnings are nothing to act on; what it says is shown where it fails.
+UNWARNED = 2>$(VENV)/pip.log || { cat $(VENV)/pip.log >&2; exit 1; }
 
 # 3.12, or old-3.8, or nothing; and the sourced ROS, or wheels.
 VERSION := $(shell $(PYTHON) -c 'import sys; v = sys.version_info; \
@@ -101,11 +103,12 @@ $(READY): setup.py pyproject.toml
 	  "$(if $(VENV_FLAGS),the sourced $(ROS),PyPI's Jazzy wheels); once, a few minutes at most"
 	@test -e $@ || $(PYTHON) -m venv --clear $(VENV_FLAGS) $(VENV)
 	@# The pip of Python 3.10 (22 to 23.0) can search for versions that agree for an hour.
-	@$(PIP) install --quiet --upgrade pip
+	@$(PIP) install --quiet --upgrade pip $(UNWARNED)
 	@# A sourced rclpy is built against the numpy beside it: that one stays.
 	@$(if $(VENV_FLAGS),$(PIP) freeze,true) | grep '^numpy==' > $(VENV)/keep.txt || true
 	@$(PIP) install --quiet --only-binary :all: pybullet 2>/dev/null || $(MAKE) pybullet-from-source
-	@$(PIP) install $(BRIEF) --constraint $(VENV)/keep.txt --editable '.[$(EXTRAS)$(ROS_EXTRA)]'
+	@$(PIP) install $(BRIEF) --constraint $(VENV)/keep.txt --editable '.[$(EXTRAS)$(ROS_EXTRA)]' \
+	  $(UNWARNED)
 	@touch $@
 
 # Once, and after a change, with a word on it: else the first programs that need it would.
@@ -120,8 +123,8 @@ pybullet-from-source:
 	  echo 'which needs a C++ compiler: apt install g++ python3-dev' >&2; exit 1; }
 	@$(PYTHON) -c 'import os, sysconfig as s; open(os.path.join(s.get_path("include"), "Python.h"))' \
 	  2>/dev/null || { echo "which needs Python's headers: apt install python3-dev" >&2; exit 1; }
-	@$(PIP) install pybullet
+	@$(PIP) install pybullet $(UNWARNED)
 
 $(VENV)/colcon: $(READY)
-	@$(PIP) install $(BRIEF) --constraint $(VENV)/keep.txt --editable '.[colcon]'
+	@$(PIP) install $(BRIEF) --constraint $(VENV)/keep.txt --editable '.[colcon]' $(UNWARNED)
 	@touch $@

@@ -1,5 +1,7 @@
 """PyBullet behind the protocol: contacts, loads, and what it would cut off without a word."""
 import dataclasses
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -108,3 +110,11 @@ def test_more_joints_than_pybullet_tells_of_are_refused():
     scene = Scene('chain', (Placement(Ragdoll('chain', balls, joints)),), ground=None)
     with pytest.raises(errors.OutOfRange, match='at most 128'):
         BulletEngine(scene, PLAIN)
+
+
+def test_pybullet_is_imported_without_a_word():
+    """It prints when it was built; what a program says before and after is not lost."""
+    done = subprocess.run(
+        [sys.executable, '-c', 'print("before"); import ragdoll_ros.physics.engine.bullet\n'
+         'print("after")'], capture_output=True, text=True, timeout=60, check=True)
+    assert (done.stdout, done.stderr) == ('before\nafter\n', '')

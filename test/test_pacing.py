@@ -63,3 +63,30 @@ def test_a_pause_owes_nothing():
     pacer = Pacer(PERIOD, 0)
     pacer.start(500 * PERIOD)
     assert ticks(pacer, [500 * PERIOD, 501 * PERIOD]) == [0, 1]
+
+
+def test_ticks_that_are_too_dear_are_due_when_their_turn_comes():
+    """Late for a second, then each at its own time, and on time as soon as they are cheap again."""
+    pacer, now = Pacer(PERIOD, 0), PERIOD
+    lags, owed = [], 0.0
+    while now < 10_000_000_000:
+        assert pacer.due(now)
+        lags.append(now - pacer.at)
+        now += 12 * PERIOD // 10
+    assert max(lags) < 200_000_000 and max(lags[len(lags) // 2:]) == 0
+    assert pacer.dropped == pytest.approx(len(lags) * 0.2, rel=0.05)
+    lost = pacer.lost
+    for _ in range(1000):
+        while not pacer.due(now):
+            now += PERIOD // 10
+        now += PERIOD // 2
+        owed = max(owed, now - pacer.at)
+    assert pacer.lost == pytest.approx(lost, abs=PERIOD) and owed < 2 * PERIOD
+
+
+def test_a_waiter_that_always_wakes_a_little_late_is_on_time():
+    pacer, now, made = Pacer(PERIOD, 0), 0, 0
+    while now < 100_000_000_000:
+        now += int(pacer.wait(now)) + 100_000
+        made += pacer.due(now)
+    assert made == pytest.approx(10_000, abs=1) and pacer.lost == 0

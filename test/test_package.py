@@ -311,7 +311,7 @@ def test_uninstall_would_leave_nothing(prefix):
 def test_parameter_file_holds_the_defaults():
     """All of them but those that the scene brings along."""
     from ragdoll_ros.ros.parameters import Settings
-    given = yaml.safe_load((ROOT / 'config/node.yaml').read_text())['/ragdoll']['ros__parameters']
+    given = yaml.safe_load((ROOT / 'config/node.yaml').read_text())['/**']['ros__parameters']
     defaults = {key: value for key, value in vars(Settings()).items()
                 if key not in DEFAULTS_OF_A_SCENE}
     assert given == defaults

@@ -1,4 +1,4 @@
-"""Stamps; markers and handles against the bones."""
+"""Markers and handles against the bones."""
 from __future__ import annotations
 
 import numpy as np
@@ -16,64 +16,6 @@ from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.ros.glance import Glance
 from ragdoll_ros.ros.handles import GROWTH, Handles
 from ragdoll_ros.ros.markers import Markers
-from ragdoll_ros.ros.stamps import Stamps
-
-
-class RosTime:
-    """ROS time as a test sets it, ns, and stamps that go by it."""
-
-    def __init__(self, now):
-        self.now = now
-        self.stamps = Stamps(lambda: self.now)
-
-    def stamp(self, time):
-        self.stamps.follow(time)
-        return self.stamps.at(time, is_clock=False)
-
-
-def test_stamps_rise_by_one_tick_over_a_new_start():
-    ros = RosTime(100)
-    before = [ros.stamp(time) for time in (0, 10, 20)]
-    ros.stamps.begin_again(20, 10)
-    after = [ros.stamp(time) for time in (0, 10)]
-    assert before + after == [100, 110, 120, 130, 140]
-    assert ros.stamps.at(0, is_clock=True) == 0
-
-
-def test_stamps_are_set_to_ros_time_at_a_reset_and_after_a_pause_and_never_back():
-    """And at no other time, as the steps between are to be ticks."""
-    ros = RosTime(100)
-    assert [ros.stamp(time) for time in (10, 20)] == [110, 120]
-    ros.now = 500
-    assert ros.stamp(30) == 130
-    ros.stamps.catch_up(30)
-    assert [ros.stamp(time) for time in (40, 50)] == [510, 520]
-    ros.now = 900
-    ros.stamps.begin_again(50, 10)
-    ros.stamps.catch_up(0)
-    assert [ros.stamp(time) for time in (0, 10)] == [900, 910]
-    ros.now = 300
-    ros.stamps.catch_up(10)
-    assert ros.stamp(20) == 920
-
-
-@pytest.mark.parametrize('first', [50, 504_770_000_000], ids=['behind', 'ahead'])
-def test_stamps_begin_with_ros_time_also_where_it_begins_later(first):
-    """A /clock that comes after the node; one that begins anew, as a recording's in a loop."""
-    ros = RosTime(0)
-    assert [ros.stamp(time) for time in (10, 20, 1000)] == [10, 20, 1000]
-    ros.now = first
-    assert [ros.stamp(time) for time in (1010, 1020)] == [first, first + 10]
-    ros.now = first + 5_000_000_000
-    assert ros.stamp(1030) == first + 20
-    ros.now = 7
-    assert [ros.stamp(time) for time in (1040, 1050)] == [7, 17]
-
-
-def test_a_computer_s_clock_that_is_set_back_a_little_moves_no_stamp():
-    ros = RosTime(5_000_000_000)
-    ros.now -= 500_000_000
-    assert ros.stamp(10) == 5_000_000_010
 
 
 @pytest.fixture(params=SPECIMENS)

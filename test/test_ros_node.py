@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray, Twist, Vector3, Wrench, WrenchStamped
 from rclpy.parameter import Parameter
@@ -181,61 +180,6 @@ def stamp_of(message):
 
 def stamps_of(got):
     return [stamp_of(message) for _, message in got]
-
-
-def test_stamps_rise_by_ticks_and_are_ros_time_after_a_reset_and_a_pause(paused, peer):
-    """Each ``act`` publishes once; what the last stamps lag behind is more than ten ticks then."""
-    got = peer.collect(PoseArray, 'ragdoll/poses')
-    peer.wait_heard(paused, POSES)
-
-    def go_on():
-        paused.pause(False)
-        paused.tick()
-
-    def ros_time():
-        return paused.get_clock().now().nanoseconds
-
-    for act in (go_on, paused.reset):
-        paused.pause(True)
-        for _ in range(3):
-            paused.tick()
-        late = paused.stamp + 10 * paused.simulation.tick
-        peer.wait(lambda late=late: ros_time() > late and stamps_of(got)[-1:] == [paused.stamp])
-        before, count = ros_time(), len(got)
-        act()
-        peer.wait(lambda count=count: len(got) > count)
-        # The computer's clock may be set back meanwhile, by parts of a second.
-        assert before <= stamps_of(got)[-1] <= ros_time() + SECOND
-        paused.tick()
-        paused.tick()
-        paused.set_parameters([Parameter('scene', value='drop')])
-        peer.wait(lambda count=count: len(got) == count + 4)
-        assert set(np.diff(stamps_of(got)[-4:])) == {paused.simulation.tick}
-    assert min(np.diff(stamps_of(got))) > 0
-
-
-def test_stamps_are_those_of_a_clock_that_another_tells(make_node, peer):
-    """A /clock is heard after the node has begun, as it can not be before."""
-    node = make_node(use_sim_time=True)
-    got = peer.collect(PoseArray, 'ragdoll/poses')
-    clock = peer.sender(Clock, '/clock')
-    peer.wait_heard(node, POSES)
-    peer.executor_.add_node(node)
-
-    def told():
-        clock.publish(Clock(clock=Time(sec=504, nanosec=770_000_000)))
-        return node.get_clock().now().nanoseconds
-
-    peer.wait(told)
-    peer.wait(lambda: max(stamps_of(got), default=0) > 504 * SECOND)
-    count = len(got)
-    peer.wait(lambda: len(got) > count + 9)
-    later = [stamp for stamp in stamps_of(got) if stamp > 504 * SECOND]
-    assert later[0] == 504_770_000_000
-    assert set(np.diff(later)) == {node.simulation.tick}
-    reports = peer.collect(DiagnosticArray, '/diagnostics')
-    peer.wait(lambda: reports)
-    assert stamps_of(reports)[0] == 504_770_000_000
 
 
 def test_reports_bear_the_time_that_the_node_itself_tells(make_node, peer):

@@ -5,16 +5,28 @@ import dataclasses
 import math
 
 import pytest
-from rcl_interfaces.msg import ParameterType
-from rclpy.parameter import Parameter
+import yaml
+from conftest import ROOT
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import Log, ParameterType
+from rcl_interfaces.srv import GetParameters, ListParameters
+from rclpy.parameter import (
+    Parameter,
+    parameter_value_to_python,
+)
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
 from ragdoll_ros.files.scene import load_scene, save_scene
 from ragdoll_ros.files.urdf_tree import parse_urdf
 from ragdoll_ros.model.errors import ModelErrors, RagdollError
 from ragdoll_ros.physics.settings import EXACT
+from ragdoll_ros.ros.node import RagdollNode
 from ragdoll_ros.ros.outputs import LATCHED
 from ragdoll_ros.ros.parameters import SPECS, Settings
+
+LATCHED_LOG = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 RANGES = {name: spec.metadata['span'] for name, spec in SPECS.items()
           if spec.metadata['span'] and isinstance(spec.default, float)}
@@ -58,6 +70,87 @@ def test_a_number_may_be_at_its_ends_and_not_beyond(node, name):
     assert node.tally.refused['parameters'] == len(bad)
 
 
+def test_whole_numbers_are_numbers(make_node):
+    node = make_node(rate=50, real_time_factor=2)
+    assert (node.settings.rate, node.settings.real_time_factor) == (50.0, 2.0)
+    assert put(node, max_force=300).successful and put(node, push_timeout=1).successful
+    assert (node.settings.max_force, value(node, 'push_timeout')) == (300.0, 1.0)
+    assert not put(node, rate=True).successful
+    result, = node.set_parameters([Parameter('rate', value=6000)])
+    assert not result.successful and '5000' in result.reason
+
+
+def rosout(peer, node):
+    """What the log of a node gets to say to everybody."""
+    got = peer.collect(Log, '/rosout', LATCHED_LOG)
+    peer.executor_.add_node(node)
+    return lambda: [message.msg for _, message in got]
+
+
+def test_a_parameter_that_does_not_exist_is_warned_of(make_node, peer):
+    said = rosout(peer, make_node(rat=50.0, speed=1.0))
+    peer.wait(lambda: {'no parameter rat: it is ignored; did you mean rate?',
+                       'no parameter speed: it is ignored'} <= set(said()))
+
+
+def test_two_nodes_of_one_name_are_told_of(make_node, peer):
+    nodes = make_node(), make_node()
+    said = rosout(peer, nodes[0])
+    reports = peer.collect(DiagnosticArray, '/diagnostics')
+    peer.executor_.add_node(nodes[1])
+    peer.wait(lambda: any('2 nodes are called /ragdoll' in line for line in said()))
+    peer.wait(lambda: any('2 nodes have this name' in report.status[0].message
+                          for _, report in reports))
+    peer.executor_.remove_node(nodes[1])
+    nodes[1].destroy_node()
+    count = len(reports)
+    peer.wait(lambda: any({pair.key: pair.value for pair in report.status[0].values}['namesakes']
+                          == '0' for _, report in reports[count:]))
+
+
+def test_the_start_is_told_in_one_line(make_node, peer):
+    said = rosout(peer, make_node(scene='crowd', accuracy='draft', engine='bullet'))
+    peer.wait(lambda: ('scene crowd: 10 dolls of 100 bones, engine bullet, accuracy draft; poses '
+                       'are on /ragdoll/poses, how it goes on /diagnostics') in said())
+
+
+def dump(peer, path):
+    """Write all parameters of the node as `ros2 param dump` does."""
+    names = peer.call(ListParameters, 'ragdoll/list_parameters', ListParameters.Request())
+    request = GetParameters.Request(names=names.result.names)
+    values = peer.call(GetParameters, 'ragdoll/get_parameters', request).values
+    found = {name: parameter_value_to_python(value)
+             for name, value in zip(request.names, values, strict=True)}
+    path.write_text(yaml.safe_dump({'/ragdoll': {'ros__parameters': found}}))
+
+
+def test_a_dump_can_be_loaded(make_node, peer, tmp_path):
+    """By what `ros2 param load` uses; all of it is accepted, also what is read-only."""
+    path = tmp_path / 'dump.yaml'
+    node = make_node(rate=50, scene='flight', pushed_bone='head')
+    peer.executor_.add_node(node)
+    dump(peer, path)
+    before = node.settings
+    assert put(node, rate=200.0, pushed_bone='torso', scene='drop').successful
+    client = AsyncParameterClient(peer, 'ragdoll')
+    peer.wait(client.services_are_ready)
+    future = client.load_parameter_file(str(path))
+    peer.wait(future.done)
+    assert [result.reason for result in future.result().results if not result.successful] == []
+    assert node.settings == before
+
+
+@pytest.mark.parametrize('names', [[], ['-r', '__node:=other', '-r', '__ns:=/stage']])
+def test_the_parameter_file_reaches_a_node_of_any_name(ros, tmp_path, names):
+    path, text = tmp_path / 'node.yaml', (ROOT / 'config/node.yaml').read_text()
+    path.write_text(text.replace('max_force: 10000.0', 'max_force: 300'))
+    node = RagdollNode(cli_args=['--ros-args', *names, '--params-file', str(path)])
+    try:
+        assert node.settings.max_force == 300.0
+    finally:
+        node.destroy_node()
+
+
 def test_workers_are_a_number_of_threads_or_all_cores(node):
     for good in (0, 2, 64, 1):
         assert put(node, workers=good).successful
@@ -74,7 +167,7 @@ def test_workers_are_a_number_of_threads_or_all_cores(node):
 def test_a_wrong_type_is_refused_and_counted(node, name):
     before = value(node, name)
     wrong = [[1.0], [b'x'], *([1.5] if isinstance(before, str | int) else ['text'])]
-    wrong += ['text' if isinstance(before, int) else 7]
+    wrong += ['text' if isinstance(before, int | float) else 7]
     for count, other in enumerate(wrong, start=1):
         result = put(node, **{name: other})
         assert not result.successful and result.reason
@@ -203,7 +296,8 @@ def test_the_world_s_name_and_the_clock_change_live(node):
 @pytest.mark.parametrize('values, words', [
     ({'rate': -1.0, 'real_time_factor': math.nan, 'pushed_bone': 'tail'},
      ['rate', 'real_time_factor', 'tail']),
-    ({'rate': 50, 'accuracy': 'foo'}, ['rate', 'DOUBLE', 'foo']),
+    ({'rate': 'fast', 'accuracy': 'foo'}, ['rate', 'DOUBLE', 'foo']),
+    ({'rate': 6000}, ['rate', '5000']),
     ({'frame_id': 'left_shin'}, ['frame_id', 'left_shin'])])
 def test_a_wrong_start_is_refused_with_all_that_is_wrong(make_node, values, words):
     with pytest.raises(RagdollError) as caught:

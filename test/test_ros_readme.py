@@ -13,6 +13,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGES = [(ROOT / 'README.md').read_text(), *(path.read_text() for path in ROOT.glob('docs/*.md'))]
 TEXT = re.sub(r' *\\\n *', ' ', '\n'.join(PAGES))
 REFERENCE = (ROOT / 'docs/reference.md').read_text()
+DIAGNOSTICS = (ROOT / 'docs/diagnostics.md').read_text()
 SENT = sorted(set(re.findall(r'^ros2 (?:topic pub --once|service call) (\S+) (\w+)/(msg|srv)/(\w+)'
                              r"(?: '(.*)')?$", TEXT, re.M)))
 
@@ -50,9 +51,9 @@ def fill(message, values):
             setattr(message, key, value)  # rclpy asserts name, type and range
 
 
-def table(title):
-    """Cells of each row of the table below a title of docs/reference.md."""
-    section = REFERENCE.split(f'## {title}\n')[1].split('\n## ')[0]
+def table(title, page=REFERENCE):
+    """Cells of each row of the tables below a title of a page, of docs/reference.md if not said."""
+    section = page.split(f'## {title}\n')[1].split('\n## ')[0]
     return [[cell.strip() for cell in line.strip('|').split(' | ')]
             for line in re.findall(r'^\| `.*\|$', section, re.M)]
 
@@ -108,8 +109,10 @@ def test_parameters_that_lines_to_copy_set_exist(make_node):
     assert named and named <= set(parameters(make_node()))
 
 
-def test_table_has_all_values_of_the_diagnostics(make_node, peer):
-    node = make_node()
+@pytest.mark.parametrize('engine', ['rigid', 'bullet'])
+def test_table_has_all_values_of_the_diagnostics(make_node, peer, engine):
+    """With units, as the keys of measures end in them; and none that no engine has."""
+    node = make_node(engine=engine)
     got = peer.collect(DiagnosticArray, '/diagnostics')
     peer.executor_.add_node(node)
     try:
@@ -117,10 +120,18 @@ def test_table_has_all_values_of_the_diagnostics(make_node, peer):
     finally:
         peer.executor_.remove_node(node)
     status = got[0][1].status[0]
-    told = {key for keys, *_ in table('Diagnostics') for key in re.findall('`(.*?)`', keys)}
-    measures = set(node.simulation.measures())
-    assert status.name in REFERENCE
-    assert told == {pair.key for pair in status.values} - measures
+    rows = {key: (unit, meaning) for keys, unit, meaning, *_ in table('Values', DIAGNOSTICS)
+            for key in re.findall('`(.*?)`', keys)}
+    values = {pair.key: pair.value for pair in status.values}
+    assert status.name in DIAGNOSTICS
+    assert set(values) <= set(rows)
+    others = [meaning for key, (_, meaning) in rows.items() if key not in values]
+    assert all('`rigid`' in meaning or '`bullet`' in meaning for meaning in others)
+    assert {key for key, (unit, _) in rows.items() if unit == 'boolean' and key in values} == {
+        key for key, value in values.items() if value in ('true', 'false')}
+    for key, (unit, _) in rows.items():
+        ending = key.rpartition('_')[2]
+        assert ending not in ('J', 'm', 'rad', 'ms') or unit == ending, key
 
 
 def test_files_that_lines_to_copy_name_exist():

@@ -206,7 +206,7 @@ class Simulation:
             'limit_overshoot_rad': max(0.0, float(
                 engine.layout.past_limits(self.coordinates.q).max(initial=0.0))),
             'sinking_m': max(0.0, -float(self._heights(self.state).min())),
-            'asleep': float(self.asleep)}
+            'asleep': self.asleep}
 
     def close(self) -> None:
         """Release the engine; a second time does nothing."""

@@ -69,7 +69,7 @@ def wait_asleep(node: Node, names: list[str]) -> None:
     def take(message: DiagnosticArray) -> None:
         awake.difference_update(
             status.name.partition(':')[0] for status in message.status
-            if {pair.key: pair.value for pair in status.values}['asleep'] == '1')
+            if {pair.key: pair.value for pair in status.values}['asleep'] == 'true')
 
     subscription = node.create_subscription(DiagnosticArray, '/diagnostics', take, 10)
     while awake:

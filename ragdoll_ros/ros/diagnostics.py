@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
@@ -36,17 +37,21 @@ class Diagnostics:
         self._node, self._steady, self._tally = node, steady, tally
         self._facts, self._wanted_pace, self._stamp = facts, wanted_pace, stamp
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self._reported = 0
+        self._counted = self._dropped = 0
         self._last: dict[str, float] | None = None
         self.simulation: Simulation
-        self._begin()
+        self.begin()
         node.create_timer(PERIOD, self._close, clock=steady)
 
-    def count(self, cost: int, simulated: int) -> None:
-        """Enter a tick: the ns that it took, and those that it simulated."""
+    def count(self, cost: int, late: float, simulated: int) -> None:
+        """Enter a tick, all in ns: what it took on the wall, how long after it was due it began,
+        and what it simulated.
+        """
         self._ticks += 1
         self._cost += cost
         self._dearest = max(self._dearest, cost)
+        self._late += late
+        self._latest = max(self._latest, late)
         self._simulated += simulated
 
     def report(self) -> None:
@@ -65,26 +70,49 @@ class Diagnostics:
     def _close(self) -> None:
         """Close a period: report it, and begin to count anew."""
         elapsed = max(1, self._steady.now().nanoseconds - self._since)
+        # In ms; what the process takes besides ticks is little, and to ask at each tick is not.
+        spent, ticks = time.process_time_ns() - self._spent, 1e6 * max(1, self._ticks)
         self._last = {'pace': self._simulated / elapsed,
-                      'tick_cost_ms': self._cost / max(1, self._ticks) / 1e6,
-                      'tick_cost_max_ms': self._dearest / 1e6}
+                      'tick_cost_ms': self._cost / ticks, 'tick_cost_max_ms': self._dearest / 1e6,
+                      'tick_cpu_ms': spent / ticks,
+                      'stamp_lag_ms': self._late / ticks, 'stamp_lag_max_ms': self._latest / 1e6}
         self.report()
-        self._begin()
+        self.begin()
 
-    def _begin(self) -> None:
+    def begin(self) -> None:
+        """Begin to count anew, as after a change of the pace: a mean over both tells nothing."""
         self._since = self._steady.now().nanoseconds
+        self._spent = time.process_time_ns()
         self._ticks = self._cost = self._dearest = self._simulated = 0
+        self._late = self._latest = 0.0
 
     def _judge(self) -> tuple[bytes, str]:
-        """Level and message: what was refused since the last report, else how the pace is."""
-        tally, wanted, pace = self._tally, self._wanted_pace(), self._last['pace']
+        """Level and message: what was refused since the last report, what stalled, else OK."""
+        tally, wanted = self._tally, self._wanted_pace()
         counted = tally.refused.total() + tally.clamped.total()
-        news, self._reported = counted > self._reported, counted
-        if news:
-            return DiagnosticStatus.WARN, tally.reason
-        if wanted and self._ticks and pace < BEHIND * wanted:
-            return DiagnosticStatus.WARN, f'pace {pace:.3g} falls behind {wanted:.3g}'
+        refused, self._counted = counted > self._counted, counted
+        warnings = [tally.reason] if refused else []
+        facts = self._facts()
+        if facts['namesakes']:
+            warnings.append(f'{facts["namesakes"] + 1} nodes have this name')
+        warnings += self._stalls(wanted, facts)
+        if warnings:
+            return DiagnosticStatus.WARN, '; '.join(warnings)
         return DiagnosticStatus.OK, 'running' if wanted else 'paused'
+
+    def _stalls(self, wanted: float, facts: dict) -> list[str]:
+        """What fell behind the clock on the wall; late by more than a tick on the average counts,
+        as a busy machine lets one tick or another wait.
+        """
+        last, found = self._last, []
+        if wanted and self._ticks and last['pace'] < BEHIND * wanted:
+            found.append(f'pace {last["pace"]:.3g} falls behind {wanted:.3g}')
+        dropped, self._dropped = facts['dropped_ticks'] - self._dropped, facts['dropped_ticks']
+        if dropped:
+            found.append(f'{dropped} ticks were dropped')
+        if wanted and last['stamp_lag_ms'] > self.simulation.tick / wanted / 1e6:
+            found.append(f'stamps were {last["stamp_lag_ms"]:.3g} ms late')
+        return found
 
     def _values(self) -> dict[str, object]:
         simulation, tally = self.simulation, self._tally
@@ -120,6 +148,8 @@ def _push_text(push: Push) -> str:
 
 
 def _text(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
     if isinstance(value, float):
         return f'{value:.6g}' if math.isfinite(value) else 'unknown'
     return str(value)

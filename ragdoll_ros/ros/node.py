@@ -24,18 +24,21 @@ from ..physics.simulation import Simulation
 from .diagnostics import Diagnostics
 from .inputs import Inputs
 from .interactive import Interactive
+from .namesakes import Namesakes
 from .outputs import Outputs
 from .parameters import Parameters, Settings, make_simulation, step_of
 from .services import Services
 from .session import ros_session
+from .signals import ended_by_signals
 from .stamps import Stamps
 from .tally import Tally
 from .ticker import CALLS, MISFITS, Ticker
+from .told import end_line, start_line
 
 InvalidROSArguments = rclpy_implementation.RCLInvalidROSArgsError
 
-STANDING_CLOCK = 0.5
-"""s on the wall between two messages on /clock while the doll is paused."""
+LOOK_AROUND = 0.5
+"""s on the wall between two looks at who is there, and two messages on /clock while paused."""
 
 EXAMPLE = """examples:
   ragdoll_node
@@ -60,7 +63,7 @@ class RagdollNode(Node):
 
     def _set_up(self) -> None:
         self.tally = Tally(self.get_logger())
-        self._tuning = Parameters(self)
+        self._tuning = Parameters(self, self._parameter_overrides)
         self.simulation = make_simulation(self._tuning.scene, self.settings)
         self._prepared: Simulation | None = None
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -71,12 +74,13 @@ class RagdollNode(Node):
         self._diagnostics = Diagnostics(self, self._steady, self.tally, self._facts,
                                         self._wanted_pace, self._time_of_report)
         Services(self, self)
+        self._namesakes = Namesakes(self)
         self.paused = False
         self._use(self.simulation)
-        self._tell_engine()
+        self._tell_start()
         self._outputs.be_clock(self.settings.publish_clock)
         self._ticker = Ticker(self, self._steady, self.tick)
-        self.create_timer(STANDING_CLOCK, self._repeat, clock=self._steady)
+        self.create_timer(LOOK_AROUND, self._look_around, clock=self._steady)
         self._go_on()
         self._tuning.watch(self._prepare, self._apply)
 
@@ -88,7 +92,7 @@ class RagdollNode(Node):
     @property
     def stamp(self) -> int:
         """Stamp of the state as it stands, ns."""
-        return self._stamps.at(self.simulation.time, self.settings.publish_clock)
+        return self.simulation.time if self.settings.publish_clock else self._stamps.newest
 
     @property
     def services(self) -> Iterator[Service]:
@@ -100,26 +104,27 @@ class RagdollNode(Node):
         """Misfits of topics that an executor is to look at now."""
         return super().waitables if self._ticker.looks(MISFITS) else iter(())
 
-    def tick(self) -> None:
-        """Go on by one tick and publish; a state that is not finite is never shown."""
+    def tick(self, due: float | None = None) -> None:
+        """Go on by one tick and publish; a state that is not finite is never shown.
+
+        ``due``: when, ns of the steady clock; now, if it is not said.
+        """
         start = time.monotonic_ns()
         if not self._advance():
             self.tally.refuse('state', 'not finite; the simulation was built anew')
             self._replace(make_simulation(self._tuning.scene, self.settings))
+        self._stamps.take(due)
         self._publish()
-        self._diagnostics.count(time.monotonic_ns() - start, self.simulation.tick)
+        late = 0.0 if due is None else max(0.0, start - due)
+        self._diagnostics.count(time.monotonic_ns() - start, late, self.simulation.tick)
 
     def reset(self) -> None:
         """Go back to the start, to the bit, and publish it."""
-        self._stamps.begin_again(self.simulation.time, self.simulation.tick)
-        self._stamps.catch_up(0)
         self.simulation.reset()
         self._begin()
 
     def pause(self, wanted: bool) -> None:
         """Hold the time, or let it go on from where it is."""
-        if self.paused and not wanted:
-            self._stamps.catch_up(self.simulation.time)
         self.paused = wanted
         self._go_on()
         if wanted:
@@ -130,10 +135,19 @@ class RagdollNode(Node):
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Set parameters; a refusal is counted, also one by a range that rclpy checks."""
-        result = super().set_parameters_atomically(parameter_list)
+        wanted = [each for each in parameter_list if not self._tuning.stands(each)]
+        if parameter_list and not wanted:
+            return SetParametersResult(successful=True)
+        result = super().set_parameters_atomically(wanted)
         if not result.successful:
             self.tally.refuse('parameters', result.reason)
         return result
+
+    def end(self) -> None:
+        """Give all back and say how far it came: ROS may be gone already, the log is not."""
+        line = end_line(self.simulation, self.tally.refused.total(), self._ticker.dropped)
+        self.destroy_node()
+        self.get_logger().info(line)
 
     def destroy_node(self) -> None:
         """Give the engine back as well."""
@@ -161,6 +175,7 @@ class RagdollNode(Node):
 
     def _go_on(self) -> None:
         """Tick from now on at the wanted pace, or not while the doll is paused."""
+        self._diagnostics.begin()
         if self.paused:
             self._ticker.stop()
         else:
@@ -168,17 +183,19 @@ class RagdollNode(Node):
 
     def _publish(self) -> None:
         simulation, now = self.simulation, time.monotonic_ns()
-        self._stamps.follow(simulation.time)
         self._outputs.publish(simulation, self.stamp, now, self.paused)
         self.interactive.publish(now, self.paused)
 
     def _begin(self) -> None:
         """Publish a start: first which stamp it has, so that listeners know the next one's time."""
+        self._stamps.take()
         self._diagnostics.report()
         self._publish()
+        self._go_on()
 
-    def _repeat(self) -> None:
-        """Publish what stands for who has come: on /clock and /tf nobody asks for the past."""
+    def _look_around(self) -> None:
+        """Look who has come, and tell them what stands: on /clock and /tf nobody asks for the past."""
+        self._namesakes.look()
         if self.paused:
             self._outputs.repeat(self.simulation, self.stamp)
 
@@ -190,13 +207,11 @@ class RagdollNode(Node):
                                self.settings.publish_tf)
         self.interactive.use(simulation, self.settings)
 
-    def _tell_engine(self) -> None:
-        """Say which engine simulates, and why it is not the rigid one where that was wanted."""
-        name, reason = self.simulation.engine_name, self.simulation.engine_reason
-        self.get_logger().info(f'engine {name}' + (f', as {reason}' if reason else ''))
+    def _tell_start(self) -> None:
+        """Say what is simulated, by what and how finely, and where to look."""
+        self.get_logger().info(start_line(self.simulation, self.settings, self))
 
     def _replace(self, simulation: Simulation) -> None:
-        self._stamps.begin_again(self.simulation.time, self.simulation.tick)
         self.simulation.close()
         self._use(simulation)
 
@@ -214,7 +229,7 @@ class RagdollNode(Node):
         if self._prepared is not None:
             simulation, self._prepared = self._prepared, None
             self._replace(simulation)
-            self._tell_engine()
+            self._tell_start()
             self._begin()
         elif changed & {'frame_id', 'publish_tf'}:
             self._use(self.simulation)
@@ -229,9 +244,12 @@ class RagdollNode(Node):
         return 0.0 if self.paused else self.settings.real_time_factor
 
     def _facts(self) -> dict:
-        return {'paused': self.paused, 'real_time_factor': self.settings.real_time_factor,
-                'lost_time': self._ticker.lost / 1e9,
-                'stamp_of_zero': self._stamps.at(0, self.settings.publish_clock)}
+        settings, ticker = self.settings, self._ticker
+        pace = 1.0 if settings.publish_clock else settings.real_time_factor
+        return {'paused': self.paused, 'real_time_factor': settings.real_time_factor,
+                'lost_time': ticker.lost / 1e9, 'dropped_ticks': ticker.dropped,
+                'stamp_pace': pace, 'namesakes': self._namesakes.count,
+                'stamp_of_zero': self.stamp - round(self.simulation.time / pace)}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -242,11 +260,19 @@ def main(arguments: list[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter)
     try:
         parser.parse_args(remove_ros_args(arguments)[1:])
-        with ros_session(arguments):
-            rclpy.spin(RagdollNode())
+        return ended_by_signals(lambda: _spin(arguments))
     except (errors.RagdollError, ParameterException, InvalidROSArguments) as error:
         print(error, file=sys.stderr)
         return 2
+
+
+def _spin(arguments: list[str]) -> int:
+    with ros_session(arguments):
+        node = RagdollNode()
+        try:
+            rclpy.spin(node)
+        finally:
+            node.end()
     return 0
 
 

@@ -24,6 +24,7 @@ from ..physics.engine.registry import ENGINES, check_engine
 from ..physics.settings import ACCURACIES
 from ..physics.simulation import MOST_WORKERS, Simulation
 from .transforms import TREES
+from .written import as_numbers, unknown
 
 
 def _setting(default: object, description: str, span: tuple[float, float] | None = None,
@@ -76,6 +77,7 @@ class Settings:
 
 
 SPECS = {field.name: field for field in fields(Settings)}
+REAL = {name for name, field in SPECS.items() if isinstance(field.default, float)}
 BONE_NAMES = 'bone_names'
 
 
@@ -86,14 +88,17 @@ class WrongParameters(RagdollError):
 class Parameters:
     """Declares the parameters and keeps ``settings`` equal to them.
 
+    ``overrides``: the start values that the node was given, by name.
+
     A change is first prepared by ``prepare(changed, settings, scene)``, which may raise a
     RagdollError with the reason to refuse it, and then carried out by ``apply(changed)``. A new
     scene brings its own rate, pace and pushed bone, except for those that were set otherwise.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, overrides: dict[str, Parameter]) -> None:
         self._node = node
         self.settings = Settings()
+        overrides.update((given.name, given) for given in as_numbers(overrides.values(), REAL))
         found: list[str] = []
         self._declare('scene', found)
         self.scene = load_scene(self.settings.scene)
@@ -113,13 +118,23 @@ class Parameters:
         # What a dump of another scene's parameters brings along would not be true.
         node.declare_parameter(BONE_NAMES, list(self.scene.bone_names), self._bone_names,
                                ignore_override=True)
+        declared = [name for name in overrides if node.has_parameter(name)]
+        for sentence in unknown(overrides, {*SPECS, *declared}):
+            node.get_logger().warning(sentence)
 
     def watch(self, prepare: Callable[[set[str], Settings, Scene], None],
               apply: Callable[[set[str]], None]) -> None:
         """From now on let changes through."""
         self._prepare, self._apply = prepare, apply
+        self._node.add_pre_set_parameters_callback(lambda given: as_numbers(given, REAL))
         self._node.add_on_set_parameters_callback(self._on_set)
         self._node.add_post_set_parameters_callback(self._after_set)
+
+    def stands(self, parameter: Parameter) -> bool:
+        """Whether it is read-only and has this value: a dump holds all, and is set as a whole."""
+        node, name = self._node, parameter.name
+        return (node.has_parameter(name) and node.describe_parameter(name).read_only
+                and node.get_parameter(name).value == parameter.value)
 
     def _declare(self, name: str, found: list[str]) -> None:
         """Declare a parameter and take its start value; a wrong one is noted in ``found``."""

@@ -20,6 +20,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.utilities import remove_ros_args
 
 from .session import ros_session
+from .signals import ended_by_signals
 from .teleop import HELP, Teleop, show, steer
 
 LOG_PERIOD = 1.0
@@ -49,12 +50,13 @@ def main(arguments: list[str] | None = None) -> int:
     if scene:
         own.remove(scene)
         own += ['--ros-args', '-p', f'scene:={scene}']
-    terminal = sys.stdin.isatty() and sys.stdout.isatty()
-    code = 0
+    return ended_by_signals(lambda: _run(arguments, own))
+
+
+def _run(arguments: list[str], own: list[str]) -> int:
+    terminal, code = sys.stdin.isatty() and sys.stdout.isatty(), 0
     with ros_session(arguments):
-        # On the node's standard output PyBullet greets, and nothing else is said there.
-        with (started('ros.node', own, stdout=subprocess.DEVNULL,
-                      stderr=subprocess.PIPE if terminal else None) as node,
+        with (started('ros.node', own, stderr=subprocess.PIPE if terminal else None) as node,
               page_process(own, terminal) as page):
             (_steer if terminal else _log)(Teleop(), node, page)
         code = node.returncode

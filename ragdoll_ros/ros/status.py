@@ -24,7 +24,7 @@ class Status:
     @property
     def paused(self) -> bool:
         """Whether the node said last that it is paused."""
-        return self._values.get('paused') == 'True'
+        return self._values.get('paused') == 'true'
 
     def line(self, push: str = '') -> str:
         """Pace, simulated time, the push that acts, tick cost, the root's place and speed.
@@ -39,9 +39,10 @@ class Status:
                           f'tick {float(values["tick_cost_ms"]):.2f} ms', self._root()))
 
     def _time(self) -> float:
-        """Simulated time, s: stamps count from that of time zero."""
-        stamp = self._state.header.stamp
-        return (stamp.sec * SECOND + stamp.nanosec - int(self._values['stamp_of_zero'])) / SECOND
+        """Simulated time, s: stamps count from that of time zero, at their own pace."""
+        stamp, values = self._state.header.stamp, self._values
+        since = stamp.sec * SECOND + stamp.nanosec - int(values['stamp_of_zero'])
+        return since / SECOND * float(values['stamp_pace'])
 
     def _root(self) -> str:
         name, place, motion = (self._state.joint_names[0], self._state.transforms[0].translation,

@@ -26,9 +26,12 @@ warning that another's topic does not fit."""
 
 
 class Ticker:
-    """A timer of the ``steady`` clock that calls ``tick`` each period, from start() to stop()."""
+    """A timer of the ``steady`` clock that calls ``tick`` each period, from start() to stop().
 
-    def __init__(self, node: Node, steady: Clock, tick: Callable[[], None]) -> None:
+    ``tick`` gets the steady time, ns, at which it is due.
+    """
+
+    def __init__(self, node: Node, steady: Clock, tick: Callable[[float], None]) -> None:
         self._tick = tick
         self._pacer = Pacer(1.0, 0)
         self._glances = {patience: Glance(patience) for patience in (CALLS, MISFITS)}
@@ -38,6 +41,11 @@ class Ticker:
     def lost(self) -> float:
         """Time that was given up in long stalls, ns."""
         return self._pacer.lost
+
+    @property
+    def dropped(self) -> int:
+        """Ticks that were given up with it."""
+        return round(self._pacer.dropped)
 
     def looks(self, patience: int) -> bool:
         """Whether what may wait for ``patience``, CALLS or MISFITS, is to be looked at now."""
@@ -65,4 +73,4 @@ class Ticker:
             now = time.monotonic_ns()
             if now > end or not self._pacer.due(now):
                 break
-            self._tick()
+            self._tick(self._pacer.at)

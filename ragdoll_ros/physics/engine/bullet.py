@@ -12,7 +12,6 @@ import tempfile
 from dataclasses import dataclass
 
 import numpy as np
-import pybullet
 
 from ...files.urdf import to_urdf
 from ...model import errors, rotation
@@ -23,8 +22,12 @@ from ...model.state import State
 from ..conservation import ConservationProjection
 from ..motion import damping_rate
 from ..settings import Accuracy
+from .hush import hushed
 from .protocol import GROUND, AppliedWrench, Contacts, Wrenches, pressed
 from .substepped import SubsteppedEngine
+
+with hushed():  # PyBullet prints when it was built
+    import pybullet
 
 BREAKING_DISTANCE = 2e-3
 """m at which a contact point is let go. A gap is room to move in within a substep, so that it eats

@@ -128,7 +128,7 @@ class RigidEngine:
             'energy_excess_J': energy - self._start_energy - (pushed + handed),
             'energy_lifted_J': float(tally['lifted']),
             'work_of_pushes_J': pushed, 'work_of_grabs_J': handed,
-            'error_estimate_m': self._estimate_error(), 'error_trusted': 1.0,
+            'error_estimate_m': self._estimate_error(), 'error_trusted': True,
             'flights': int(tally['flights']), 'substeps': int(tally['steps']),
             'impacts': int(tally['impacts']), 'unsolved_total': int(tally['unsolved'])}
 

@@ -221,11 +221,12 @@ class Remote(Source):
                 # What cannot be read stays as it was.
                 with contextlib.suppress(KeyError, ValueError):
                     self._told = dataclasses.replace(
-                        self._told, paused=values['paused'] == 'True',
+                        self._told, paused=values['paused'] == 'true',
                         pace=float(values['real_time_factor']),
                         measures={key: float(values[key]) for key in KEYS if key in values})
                 with contextlib.suppress(KeyError, ValueError):
-                    zero, simulated = int(values['stamp_of_zero']), float(values['simulated_time'])
+                    zero = int(values['stamp_of_zero']), float(values['stamp_pace'])
+                    simulated = float(values['simulated_time'])
                     if simulated < self._simulated:
                         self._hands.forget()
                     self._frames.zero, self._simulated = zero, simulated

@@ -66,9 +66,9 @@ class RemoteFrames:
         """How often a message or a scene came, or a topic went, so far."""
         self._framed = (0, 0)
         """That, and how often a hand was moved, as the frame was made."""
-        self._zero_of_poses: int | None = None
-        self.zero: int | None = None
-        """Stamp of time zero, ns, that the node has reported last."""
+        self._zero_of_poses: tuple[int, float] | None = None
+        self.zero: tuple[int, float] | None = None
+        """Stamp of time zero, ns, and the pace of stamps that the node has reported last."""
         self.heard = 0.0
         """Instant of the last poses, s of the steady clock."""
 
@@ -126,9 +126,9 @@ class RemoteFrames:
         unknown = np.full((len(poses), 3), np.nan)
         state = State(poses[:, :3], poses[:, 3:], unknown, unknown)
         # Before the first report the node's time zero is not known.
-        self.zero = stamp if self.zero is None else self.zero
-        zero = self.zero if self._zero_of_poses is None else self._zero_of_poses
-        self._pushes.time = (stamp - zero) / SECOND
+        self.zero = (stamp, 1.0) if self.zero is None else self.zero
+        zero, pace = self.zero if self._zero_of_poses is None else self._zero_of_poses
+        self._pushes.time = (stamp - zero) / SECOND * pace
         masses, rods = self._values.get('swings'), None
         if masses is not None and len(masses) == self._rods.count:
             rods = self._rods.between(masses, state)

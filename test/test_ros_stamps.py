@@ -1,0 +1,229 @@
+"""Stamps against ROS time: on a made-up clock, in a node, and over stalls of a whole process."""
+from __future__ import annotations
+
+import signal
+import time
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import PoseArray
+from peer import end, kill, start
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import SetBool, Trigger
+
+from ragdoll_ros.ros.messages import to_time
+from ragdoll_ros.ros.stamps import DOUBT, SLACK, Stamps
+
+SECOND = 1_000_000_000
+TICK = 10_000_000
+
+
+class Clocks:
+    """ROS time and a steady clock as a test sets them, ns, and stamps that go by them."""
+
+    def __init__(self, ros, steady=0):
+        self.ros, self.steady = ros, steady
+        self.stamps = Stamps(lambda: self.ros, lambda: self.steady)
+
+    def go(self, span):
+        self.ros += span
+        self.steady += span
+
+    def stamp(self, due=None):
+        self.stamps.take(due)
+        return self.stamps.newest
+
+
+def test_a_stamp_is_the_ros_time_at_which_the_state_was_due():
+    clocks = Clocks(5 * SECOND)
+    found = []
+    for tick in range(1, 100):
+        clocks.go(TICK)
+        clocks.ros += (-1) ** tick * SLACK // 4  # a clock is never read at the very instant
+        found.append(clocks.stamp(tick * TICK))
+    assert found == [5 * SECOND + tick * TICK for tick in range(1, 100)]
+    clocks.go(3 * SECOND)
+    assert clocks.stamp() == pytest.approx(clocks.ros, abs=SLACK)
+
+
+def test_a_reading_between_which_others_had_the_processor_moves_nothing():
+    clocks = Clocks(5 * SECOND)
+    looks = iter([TICK, TICK + 10 * DOUBT + 2 * SLACK])
+    clocks.ros += TICK
+    clocks.stamps._steady = lambda: next(looks)
+    assert clocks.stamp(TICK) == 5 * SECOND + TICK
+
+
+@pytest.mark.parametrize('step, stays', [(2 * TICK, False), (-SECOND // 2, True)])
+def test_a_clock_that_is_set_is_followed_and_stamps_never_go_back(step, stays):
+    clocks = Clocks(5 * SECOND)
+    before = clocks.stamp()
+    clocks.ros += step
+    clocks.go(TICK)
+    assert clocks.stamp() == (before + 1 if stays else clocks.ros)
+    clocks.go(SECOND)
+    assert clocks.stamp() == clocks.ros
+
+
+@pytest.mark.parametrize('first', [50, 504_770_000_000], ids=['behind', 'ahead'])
+def test_stamps_begin_with_ros_time_also_where_it_begins_later(first):
+    """A /clock that comes after the node; one that begins anew, as a recording's in a loop."""
+    clocks = Clocks(0)
+    assert [clocks.stamp(due) for due in (TICK, 2 * TICK, 9 * SECOND)] == [
+        TICK, 2 * TICK, 9 * SECOND]
+    clocks.ros, clocks.steady = first, 10 * SECOND
+    assert clocks.stamp() == first
+    clocks.go(5 * SECOND)
+    assert clocks.stamp() == first + 5 * SECOND
+    clocks.ros = 7
+    assert clocks.stamp() == 7
+
+
+def stamp_of(message):
+    return message.header.stamp.sec * SECOND + message.header.stamp.nanosec
+
+
+def test_stamps_are_those_of_a_clock_that_another_tells(make_node, peer):
+    """A /clock is heard after the node has begun, as it can not be before."""
+    node = make_node(use_sim_time=True)
+    got = peer.collect(PoseArray, 'ragdoll/poses')
+    clock = peer.sender(Clock, '/clock')
+    peer.wait_heard(node, '/ragdoll/poses')
+    peer.executor_.add_node(node)
+    begun = time.monotonic_ns()
+
+    def told():
+        return 504 * SECOND + time.monotonic_ns() - begun
+
+    peer.create_timer(0.01, lambda: clock.publish(Clock(clock=to_time(told()))))
+    peer.wait(lambda: sum(stamp_of(message) >= 504 * SECOND for _, message in got) > 100)
+    stamps = [stamp_of(message) for _, message in got if stamp_of(message) >= 504 * SECOND]
+    assert min(np.diff(stamps)) > 0
+    arrivals = 504 * SECOND + np.array([int(arrival * 1e9) for arrival, _ in got]) - begun
+    late = arrivals[-len(stamps):] - stamps
+    assert abs(np.median(late)) < 3 * TICK
+    reports = peer.collect(DiagnosticArray, '/diagnostics')
+    peer.wait(lambda: reports)
+    assert 504 * SECOND <= stamp_of(reports[0][1]) <= told()
+
+
+class Heard:
+    """The stamps of a node's poses, and how late each came, ns; WARN messages of /diagnostics."""
+
+    def __init__(self, peer):
+        self.peer, self.stamps, self.late, self.warnings = peer, [], [], []
+        peer.create_subscription(PoseArray, 'ragdoll/poses', self._take, 1000)
+        peer.create_subscription(DiagnosticArray, '/diagnostics', self._judge, 10)
+
+    def _take(self, message):
+        self.stamps.append(stamp_of(message))
+        self.late.append(time.time_ns() - self.stamps[-1])
+
+    def _judge(self, message):
+        self.warnings += [status.message for status in message.status
+                          if status.level == DiagnosticStatus.WARN]
+
+    def next(self, count):
+        """Give the stamps that come from now on, and how late they are."""
+        begin = len(self.stamps)
+        self.peer.wait(lambda: len(self.stamps) >= begin + count)
+        return np.array(self.stamps[begin:]), np.array(self.late[begin:])
+
+    def are_on_time(self, spacing, count=100):
+        """Whether stamps come that are equally spaced and due within a tick, in one of ten tries.
+
+        Others may take the machine's time away.
+        """
+        for _ in range(10):
+            stamps, late = self.next(count)
+            if (np.mean(np.diff(stamps) == spacing) > 0.95
+                    and np.mean(np.abs(late) < spacing) > 0.8):
+                return True
+        return False
+
+
+@pytest.fixture
+def heard(ros, peer):
+    process = start('node', compiled=True)
+    heard = Heard(peer)
+    heard.process = process
+    peer.wait(lambda: len(heard.stamps) > 50)
+    yield heard
+    try:
+        end(process, signal.SIGINT)
+    finally:
+        kill(process)
+
+
+def test_stamps_are_ros_time_over_stalls_paces_pauses_and_resets(heard, peer):
+    assert heard.are_on_time(TICK)
+
+    heard.process.send_signal(signal.SIGSTOP)
+    stopped = time.monotonic()
+    peer.wait(lambda: time.monotonic() > stopped + 3)
+    heard.warnings.clear()
+    count = len(heard.stamps)
+    heard.process.send_signal(signal.SIGCONT)
+    peer.wait(lambda: heard.warnings)
+    assert 'falls behind' in heard.warnings[0] or 'dropped' in heard.warnings[0]
+    peer.wait(lambda: len(heard.stamps) > count + 200)
+    # From a second after the stall on; what the process had sent before it is not counted.
+    first = np.argmax(np.diff(heard.stamps[count - 10:])) + count - 9
+    caught_up = np.array(heard.late[first:])[
+        np.array(heard.stamps[first:]) > heard.stamps[first] + SECOND]
+    assert np.median(caught_up) < TICK
+    assert heard.are_on_time(TICK)
+
+    for pace in (0.5, 2.0):
+        request = SetParameters.Request(parameters=[
+            Parameter('real_time_factor', value=pace).to_parameter_msg()])
+        assert peer.call(SetParameters, 'ragdoll/set_parameters', request).results[0].successful
+        heard.next(10)
+        assert heard.are_on_time(round(TICK / pace))
+
+    assert peer.call(SetBool, 'ragdoll/pause', SetBool.Request(data=True)).success
+    paused = time.monotonic()
+    peer.wait(lambda: time.monotonic() > paused + 1)
+    count = len(heard.stamps)
+    assert peer.call(SetBool, 'ragdoll/pause', SetBool.Request(data=False)).success
+    peer.wait(lambda: len(heard.stamps) > count)
+    assert heard.stamps[count] - heard.stamps[count - 1] > SECOND // 2
+    assert heard.are_on_time(TICK // 2)
+
+    assert peer.call(Trigger, 'ragdoll/reset', Trigger.Request()).success
+    heard.next(10)
+    assert heard.are_on_time(TICK // 2)
+    assert min(np.diff(heard.stamps)) > 0
+
+
+def test_a_change_of_the_pace_is_no_stall(make_node, peer):
+    """No report compares a mean over the time before with what is wanted now."""
+    node = make_node(scene='flight', rate=20.0)
+    reports = peer.collect(DiagnosticArray, '/diagnostics')
+    peer.executor_.add_node(node)
+    for change in (lambda: node.set_parameters([Parameter('real_time_factor', value=4)]),
+                   lambda: node.pause(True), lambda: node.pause(False)):
+        peer.wait(lambda: reports)
+        change()
+        reports.clear()
+        peer.wait(lambda: len(reports) > 2)
+        assert not any('falls behind 4' in report.status[0].message for _, report in reports[:2])
+
+
+def test_overload_lowers_the_pace_and_stamps_stay_ros_time(make_node, peer):
+    """A hundred times as fast as life in ticks of 0.2 ms, which no machine here can do."""
+    node = make_node(rate=5000.0, real_time_factor=100.0)
+    heard, reports = Heard(peer), peer.collect(DiagnosticArray, '/diagnostics')
+    peer.executor_.add_node(node)
+    peer.wait(lambda: len(reports) > 3)
+    stamps, _ = heard.next(200)
+    lag = time.time_ns() - node.stamp
+    assert min(np.diff(stamps)) > 0 and lag < SECOND
+    values = {pair.key: pair.value for pair in reports[-1][1].status[0].values}
+    assert float(values['pace']) < 100 and int(values['dropped_ticks']) > 0
+    assert float(values['lost_time']) > 0 and float(values['stamp_lag_ms']) < 1000
+    assert 'falls behind' in reports[-1][1].status[0].message
+    assert 'dropped' in reports[-1][1].status[0].message
