@@ -194,7 +194,7 @@ class RagdollNode(Node):
         self._go_on()
 
     def _look_around(self) -> None:
-        """Look who has come, and tell them what stands: on /clock and /tf nobody asks for the past."""
+        """Look who has come, and tell them what stands: of /clock and /tf nobody asks the past."""
         self._namesakes.look()
         if self.paused:
             self._outputs.repeat(self.simulation, self.stamp)
