@@ -33,7 +33,7 @@ class Ticker:
 
     def __init__(self, node: Node, steady: Clock, tick: Callable[[float], None]) -> None:
         self._tick = tick
-        self._pacer = Pacer(1.0, 0)
+        self._pacer, self._runs = Pacer(1.0, 0), False
         self._glances = {patience: Glance(patience) for patience in (CALLS, MISFITS)}
         self._timer = node.create_timer(1.0, self._catch_up, clock=steady)
 
@@ -49,7 +49,7 @@ class Ticker:
 
     def looks(self, patience: int) -> bool:
         """Whether what may wait for ``patience``, CALLS or MISFITS, is to be looked at now."""
-        return self._timer.is_canceled() or self._glances[patience].is_open
+        return not self._runs or self._glances[patience].is_open
 
     def start(self, period: float) -> None:
         """Begin anew: the first tick comes one ``period``, ns, from now."""
@@ -58,10 +58,12 @@ class Ticker:
         self._timer.timer_period_ns = max(SHORTEST_PERIOD, round(period))
         self._most_ticks = math.ceil(CATCH_UP * self._timer.timer_period_ns / period)
         self._timer.reset()
+        self._runs = True
 
     def stop(self) -> None:
         """No tick from now on."""
         self._timer.cancel()
+        self._runs = False
 
     def _catch_up(self) -> None:
         """Make the ticks that are due, as far as there is time."""
