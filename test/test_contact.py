@@ -264,3 +264,13 @@ def test_what_no_joint_can_open_rests():
               Joint('hub', 'b', 'hinge', (0, 0, 0), ((0, 0, 1),)))
     rest, _ = along_one_way(np.inf, bones, joints)
     assert np.abs(rest.v).max() < 1e-12
+
+
+def test_a_stretch_of_two_picoseconds_is_one_step():
+    """What is left of a tick after a touch may be any length. To 1e-8 m/s contacts are solved."""
+    with Simulation(DROP, engine='rigid') as simulation:
+        for _ in range(60):
+            simulation.advance()
+        before = simulation.state.rows
+        simulation._engine.advance(2e-12, [], [])
+        assert simulation._engine.state.rows == pytest.approx(before, abs=1e-7)

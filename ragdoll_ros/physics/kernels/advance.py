@@ -139,8 +139,7 @@ def fly(s: System, r: Room, course: Course, left: float, loads: np.ndarray) -> t
             for k in range(len(loads)):
                 r.tally[0].pushed += weight * gone * power(s.tree, r.work, loads[k], False)
     path.along += gone
-    for j in range(len(course.reaction)):
-        course.reaction[j] = 0.0
+    forget_reaction(course)
     along(s.tree, course, path.along, course.q, course.v)
     if path.along < end - 1e-15:
         return gone, False
@@ -190,6 +189,7 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
             tally.next = length
             take_over(r.met, r.gaps)
             open_bracket(r)
+            forget_reaction(course)
             continue
         if not seek and turn < TRIES - 1 and meet(r):
             continue
@@ -212,6 +212,13 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
     take_over(course.v, end_v)
     take_over(r.gaps, r.later)
     return length, hit
+
+
+@compiled
+def forget_reaction(course: Course) -> None:
+    """Nothing is known of what contacts will do."""
+    for j in range(len(course.reaction)):
+        course.reaction[j] = 0.0
 
 
 @compiled
@@ -316,7 +323,7 @@ def go_on(s: System, r: Room, course: Course, duration: float, step: float,
         else:
             if not flies or events >= most:
                 look(s, r, q, v, r.gaps, math.inf, r.gaps)
-            h = left / math.ceil(left / step - 1e-9)
+            h = left / max(1, math.ceil(left / step - 1e-9))
             gone, touched = step_or_touch(s, r, course, h, loads, springs, time, step,
                                           events < most)
             path.begun, path.next = 0, 0.0
