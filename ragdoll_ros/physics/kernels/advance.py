@@ -60,11 +60,11 @@ NOISE = 1e-10
 GAIN = 1e-4
 """Share of the kinetic energy that a step may gain."""
 
-MET, MET_TURN = 5e-3, 0.05
-"""m and rad: where touches are not sought, steps are halved, down to the share COARSEST, to keep
-what meets from ending deeper."""
+MET, MET_EACH, MET_TURN = 5e-3, 5e-5, 0.05
+"""m, at the most and for each doll of those that go on together, and rad: where touches are not
+sought, steps are halved, down to the share COARSEST, to keep what meets from ending deeper."""
 
-COARSEST = 0.13
+COARSEST = 0.03
 
 MOST_EVENTS = 200
 """Impacts in one stretch of a doll by itself, over the cube of their number of several that go on
@@ -225,8 +225,9 @@ def forget_reaction(course: Course) -> None:
 def meets_deep(s: System, r: Room) -> bool:
     """Whether something met in the step just gone that would end deep within the other."""
     bounds = len(r.gaps) - len(s.pairs) - 2 * len(s.bounds)
+    deep = min(MET, MET_EACH * len(r.given))
     for j in range(len(r.gaps)):
-        most = MET_TURN if bounds <= j < bounds + 2 * len(s.bounds) else MET
+        most = MET_TURN if bounds <= j < bounds + 2 * len(s.bounds) else deep
         if r.met[j] > TOUCHING and r.later[j] < -most:
             return True
     return False
