@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from .bundle import bundle_at
-from .contact import BEYOND, TOUCHING, find_contacts, look, part_pairs
+from .contact import BEYOND, TOUCHING, find_contacts, look, of_limit, part_pairs
 from .dynamics import pose, rates
 from .flight import along, begin_path, find_event, point_velocity, time_free
 from .forces import power
@@ -224,10 +224,9 @@ def forget_reaction(course: Course) -> None:
 @compiled
 def meets_deep(s: System, r: Room) -> bool:
     """Whether something met in the step just gone that would end deep within the other."""
-    bounds = len(r.gaps) - len(s.pairs) - 2 * len(s.bounds)
     deep = min(MET, MET_EACH * len(r.given))
     for j in range(len(r.gaps)):
-        most = MET_TURN if bounds <= j < bounds + 2 * len(s.bounds) else deep
+        most = MET_TURN if of_limit(s, r.gaps, j) else deep
         if r.met[j] > TOUCHING and r.later[j] < -most:
             return True
     return False
@@ -271,9 +270,8 @@ def sinks(s: System, r: Room) -> bool:
     """Whether something that touched is deep at the step's end, and deeper by a tenth of that than
     at its start.
     """
-    bounds = len(r.gaps) - len(s.pairs) - 2 * len(s.bounds)
     for j in range(len(r.gaps)):
-        most = BEYOND if bounds <= j < bounds + 2 * len(s.bounds) else DEEP
+        most = BEYOND if of_limit(s, r.gaps, j) else DEEP
         if r.later[j] < -most and r.gaps[j] <= TOUCHING and r.later[j] < r.gaps[j] - most / 10:
             return True
     return False

@@ -221,6 +221,13 @@ def pair_gap(a: np.record, b: np.record, pa: np.ndarray, ra: np.ndarray, pb: np.
 
 
 @compiled
+def of_limit(s: System, gaps: np.ndarray, j: int) -> bool:
+    """Whether gap j of all is a joint's from a limit, in rad."""
+    first = len(gaps) - len(s.pairs) - 2 * len(s.bounds)
+    return first <= j < first + 2 * len(s.bounds)
+
+
+@compiled
 def find_contacts(s: System, q: np.ndarray, r: Room, gaps: np.ndarray, margin: float) -> int:
     """Enter all contacts whose gap in ``gaps`` says that they touch, as they are at q, into
     r.contacts; of a pair those points that are nearer than ``margin``. Their number.

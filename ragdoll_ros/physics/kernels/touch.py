@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from .contact import NEVER, TOUCHING
+from .contact import NEVER, TOUCHING, of_limit
 from .machine import compiled
 from .step import SLOW, SLOW_TURN
 from .system import Room, System
@@ -22,8 +22,7 @@ SHORTEST = 1e-9
 @compiled
 def met_fast(s: System, r: Room, j: int, h: float) -> bool:
     """Whether what gap j parts met in the step of h s just gone, too fast for the next one."""
-    bounds = len(r.gaps) - len(s.pairs) - 2 * len(s.bounds)
-    slow = SLOW_TURN if bounds <= j < bounds + 2 * len(s.bounds) else SLOW
+    slow = SLOW_TURN if of_limit(s, r.gaps, j) else SLOW
     return (r.gaps[j] > TOUCHING and r.later[j] <= TOUCHING
             and r.gaps[j] - r.later[j] > slow * h)
 
