@@ -68,6 +68,16 @@ def peer(ros):
 
 
 @pytest.fixture
+def nothing_runs_on(ros):
+    """Kill what a test that failed has left running."""
+    from peer import STARTED, kill
+    before = len(STARTED)
+    yield
+    for process in STARTED[before:]:
+        kill(process)
+
+
+@pytest.fixture
 def make_node(ros):
     """Make ragdoll nodes in this process, with parameters as keywords; destroyed at the end."""
     from rclpy.parameter import Parameter

@@ -136,7 +136,7 @@ def test_diagnostics_come_each_second_and_add_up(heard, peer):
     peer.wait(lambda: len(heard['diagnostics']) > 3)
     values, status = last_report(heard)
     times = [arrival for arrival, _ in heard['diagnostics']][-6:]
-    assert np.median(np.diff(times)) == pytest.approx(1.0, abs=0.5), 'late on a busy machine'
+    assert np.median(np.diff(times)) == pytest.approx(1.0, abs=0.1)
     assert status.name == 'ragdoll: simulation'
     # A busy machine may hold the node up: then it says so.
     behind = float(values['pace']) < BEHIND * PACE

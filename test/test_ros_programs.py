@@ -9,9 +9,11 @@ import time
 
 import pytest
 from geometry_msgs.msg import PoseArray, Wrench
-from peer import PATIENCE, STARTED, Peer, end, kill, start, start_on_terminal
+from peer import PATIENCE, Peer, end, start, start_on_terminal
 
 from ragdoll_ros.ros import node, run, teleop
+
+pytestmark = pytest.mark.usefixtures('nothing_runs_on')
 
 
 @pytest.fixture(scope='module')
@@ -19,15 +21,6 @@ def peer(ros):
     peer = Peer()
     yield peer
     peer.destroy_node()
-
-
-@pytest.fixture(autouse=True)
-def nothing_runs_on():
-    """Kill what a test that failed has left running."""
-    before = len(STARTED)
-    yield
-    for process in STARTED[before:]:
-        kill(process)
 
 
 def test_a_signal_ends_the_node_with_0_within_2_s(peer):
