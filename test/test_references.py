@@ -8,6 +8,7 @@ pytest.importorskip('scipy')
 
 from scipy.special import ellipk
 
+from ragdoll_ros.accuracy.motions import flight
 from ragdoll_ros.accuracy.motions.motion import without_damping
 from ragdoll_ros.accuracy.references import closed_forms
 from ragdoll_ros.accuracy.references.articulated import Articulated
@@ -98,6 +99,20 @@ def test_a_doll_in_flight_keeps_momentum_and_energy(seed):
     assert np.ptp(energy) / energy[0] < 1e-9
     assert np.ptp(angular, axis=0).max() / np.linalg.norm(angular[0]) < 1e-9
     assert np.ptp(linear.sum(axis=1), axis=0).max() < 1e-9 * np.abs(linear).sum()
+
+
+@pytest.mark.parametrize('make', [flight.free_fall, flight.projectile, flight.first_touch])
+def test_falls_that_are_formulas_are_those_of_their_scenes(make):
+    """As the articulated reference has them: a scene that turns at its start is no such fall."""
+    motion = make()
+    placement, = motion.trial.scene.dolls
+    tree = Articulated(placement.doll, motion.trial.scene.gravity)
+    times = np.array([0.0, 0.1])
+    q = tree.bind(placement.position, placement.orientation)
+    v = np.zeros(tree.nv)
+    v[:3], v[3:6] = placement.velocity, placement.spin
+    found, truth = tree.trajectory(q, v, times), motion.truth(times)
+    assert found.positions == pytest.approx(truth.positions, abs=1e-9)
 
 
 def test_velocities_are_the_derivatives_of_the_poses():

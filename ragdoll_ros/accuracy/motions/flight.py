@@ -1,6 +1,7 @@
 """Motions in the air: falls, throws, a tumbling box, chains, the doll itself."""
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -42,9 +43,11 @@ def projectile() -> Motion:
 
 
 def first_touch() -> Motion:
-    """The default scene up to just before the feet touch, at 0.2857 s."""
-    return _rigid_fall('drop_to_touch', 'The default drop up to the first touch, 0.28 s',
-                       load_scene('drop'), 0.28, 'x0 + g t²/2')
+    """The default scene, its doll not turning, up to just before the feet touch, at 0.2857 s."""
+    scene = load_scene('drop')
+    even = dataclasses.replace(scene.dolls[0], spin=(0.0, 0.0, 0.0))
+    return _rigid_fall('drop_to_touch', 'The default drop, even, up to the first touch, 0.28 s',
+                       dataclasses.replace(scene, dolls=(even,)), 0.28, 'x0 + g t²/2')
 
 
 def _thrown(velocity: tuple[float, float, float]) -> Scene:
