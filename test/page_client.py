@@ -67,15 +67,20 @@ class PageClient:
         self._thread.join(PATIENCE)
 
     def close(self):
-        """Close the page; a second time does nothing."""
-        if not self._thread.is_alive():
+        """Close the page; a second time does nothing.
+
+        The loop is closed here, after its thread: a line that is cut ends the thread at any
+        instant, between the two lines below too.
+        """
+        if self._loop.is_closed():
             return
-        asyncio.run_coroutine_threadsafe(self._socket.close(), self._loop)
+        self._loop.call_soon_threadsafe(
+            lambda: self._loop.create_task(self._socket.close()))
         self._thread.join(PATIENCE)
+        self._loop.close()
 
     def _run(self, port):
         self._loop.run_until_complete(self._listen(port))
-        self._loop.close()
 
     async def _listen(self, port):
         async with websockets.connect(
@@ -118,11 +123,11 @@ def served(source, folder='.'):
         try:
             yield page
         finally:
-            for each in page.clients:
-                each.close()
             stop.set()
             thread.join()
             source.close()
+            for each in page.clients:
+                each.close()
 
 
 def batch_of(page, bone):
