@@ -102,6 +102,7 @@ def contact_step(s: System, r: Room, course: Course, h: float, loads: np.ndarray
     for j in range(len(v)):
         course.reaction[j] = change[j] / h if lasts else 0.0
     integrate(s.tree, middle, end_v, h / 2, end_q)
+    keep_limits(s, end_q, shift)
     r.lift[0] = lifted(s, r, shift) if m else 0.0
     r.tally[0].steps += 1
     return m
@@ -264,7 +265,6 @@ def settle(s: System, r: Room, course: Course, h: float, loads: np.ndarray, spri
         for k in range(3):
             r.given[d].centre[k] = r.after[d].centre[k]
     pay(s, r, m, r.vectors[3])
-    keep_limits(s, end_q, r.vectors[3])
     integrate(s.tree, end_q, r.vectors[3], 1.0, end_q)
     if free:
         pose(s.tree, end_q, end_v, r.work)
@@ -300,7 +300,8 @@ def pay(s: System, r: Room, m: int, shift: np.ndarray) -> None:
 @compiled
 def keep_limits(s: System, q: np.ndarray, shift: np.ndarray) -> None:
     """Shorten a ``shift`` (nv,) of a doll that would take a joint past a limit that it does not
-    touch.
+    touch, or farther past one that it has passed: bones that are put or come back within each
+    other do not come apart at the price of a joint.
     """
     share, doll = 1.0, -1
     for k in range(len(s.bounds)):
@@ -310,8 +311,9 @@ def keep_limits(s: System, q: np.ndarray, shift: np.ndarray) -> None:
             share, doll = 1.0, s.doll_of[s.bone_of[bound.v]]
         way = shift[bound.v]
         room = q[bound.q] - bound.lower if way < 0 else bound.upper - q[bound.q]
-        if room > 0 and abs(way) > room + TOUCHING:
-            share = min(share, (room + TOUCHING) / abs(way))
+        most = room + TOUCHING if room > 0 else max(0.0, room + BEYOND / 2)
+        if abs(way) > most:
+            share = min(share, most / abs(way))
     shorten(s, doll, share, shift)
 
 
