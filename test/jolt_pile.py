@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ragdoll_ros.accuracy.depth import BoneDepth
-from ragdoll_ros.accuracy.pile import DURATION, HEAD, LOOKS, Course, enter_depths
+from ragdoll_ros.accuracy.pile import DURATION, HEAD, LOOKS, Outcome, enter_depths
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.ragdoll import joint_axes
@@ -77,20 +77,20 @@ def main() -> None:
     given = parser.parse_args()
     scene = load_scene('pile')
     scale, heights = BoneDepth(scene), GroundHeights(scene)
-    course = Course(past=np.nan, cpu=np.nan)
+    outcome = Outcome(past=np.nan, cpu=np.nan)
     done = subprocess.run(['node', SCRIPT, given.module.resolve()], input=told(scene, given.steps),
                           capture_output=True, text=True, check=True)
     for tick, line in enumerate(done.stdout.splitlines()):
         one = json.loads(line)
-        course.costs.append(one['seconds'])
+        outcome.costs.append(one['seconds'])
         if not one['awake']:
-            course.asleep = min(course.asleep, (tick + 1) * scene.step)
+            outcome.asleep = min(outcome.asleep, (tick + 1) * scene.step)
         if 'poses' in one:
             poses = np.array(one['poses'])
             still = np.zeros((len(poses), 3))
-            enter_depths(course, heights, scale,
+            enter_depths(outcome, heights, scale,
                          State(poses[:, :3], poses[:, 3:], still, still))
-    print(f'{HEAD}\n{f"Jolt, steps {given.steps}":30}{course.row()}')
+    print(f'{HEAD}\n{f"Jolt, steps {given.steps}":30}{outcome.row()}')
 
 
 if __name__ == '__main__':

@@ -51,7 +51,7 @@ class Ended(Exception):
 
 
 @dataclass
-class Course:
+class Outcome:
     """What one engine made of the pile."""
 
     costs: list[float] = field(default_factory=list)
@@ -86,47 +86,47 @@ HEAD = (f'{"ms a tick, depths in mm":30}{"CPU":>9}{"mean":>9}{"worst":>9}{"p99":
 
 
 def watched(scene: Scene, scale: BoneDepth, advance: Callable[[], State],
-            past: Callable[[], float]) -> Course:
+            past: Callable[[], float]) -> Outcome:
     """Take a scene on for DURATION; ``advance`` goes a tick, ``past`` tells of limits, rad."""
-    course, heights = Course(), GroundHeights(scene)
+    outcome, heights = Outcome(), GroundHeights(scene)
     try:
         for tick in range(round(DURATION / scene.step)):
             used, begin = time.process_time(), time.perf_counter()
             state = advance()
-            course.costs.append(time.perf_counter() - begin)
-            course.cpu += time.process_time() - used
-            _look(course, heights, scale, state, tick, scene.step)
-            course.past = max(course.past, past())
-            if sum(course.costs) > PATIENCE:
+            outcome.costs.append(time.perf_counter() - begin)
+            outcome.cpu += time.process_time() - used
+            _look(outcome, heights, scale, state, tick, scene.step)
+            outcome.past = max(outcome.past, past())
+            if sum(outcome.costs) > PATIENCE:
                 raise Ended(f'ended after {PATIENCE:g} s')
     except Ended as reason:
-        course.ended = f'{reason}, at {len(course.costs) * scene.step:.2f} s'
-    return course
+        outcome.ended = f'{reason}, at {len(outcome.costs) * scene.step:.2f} s'
+    return outcome
 
 
-def _look(course: Course, heights: GroundHeights, scale: BoneDepth, state: State, tick: int,
+def _look(outcome: Outcome, heights: GroundHeights, scale: BoneDepth, state: State, tick: int,
           step: float) -> None:
     """Enter what the state after a tick of ``step`` s shows."""
     speeds = np.abs(state.linear_velocities).max()
     if not speeds < RUNAWAY:
         raise Ended('exploded')
     if speeds > 0:
-        course.asleep = math.inf
-    elif course.asleep == math.inf:
-        course.asleep = (tick + 1) * step
+        outcome.asleep = math.inf
+    elif outcome.asleep == math.inf:
+        outcome.asleep = (tick + 1) * step
     if tick % LOOKS == 0:
-        enter_depths(course, heights, scale, state)
+        enter_depths(outcome, heights, scale, state)
 
 
-def enter_depths(course: Course, heights: GroundHeights, scale: BoneDepth, state: State) -> None:
+def enter_depths(outcome: Outcome, heights: GroundHeights, scale: BoneDepth, state: State) -> None:
     """Enter how deep bones are in each other and below the ground."""
     depths = scale.depths(state.positions, state.orientations)
-    course.between = max(course.between, float(depths.max(initial=0.0)))
-    course.sunk = max(course.sunk, -float(heights(state).min()))
+    outcome.between = max(outcome.between, float(depths.max(initial=0.0)))
+    outcome.sunk = max(outcome.sunk, -float(heights(state).min()))
 
 
-def simulated(scene: Scene, scale: BoneDepth, **how: object) -> Course:
-    """The course by an engine of the package; ``how`` goes to Simulation."""
+def simulated(scene: Scene, scale: BoneDepth, **how: object) -> Outcome:
+    """The outcome by an engine of the package; ``how`` goes to Simulation."""
     with Simulation(scene, **how) as simulation:
         return watched(scene, scale, simulation.advance, lambda: float(
             simulation._engine.layout.past_limits(simulation.coordinates.q).max()))
@@ -138,9 +138,9 @@ def pile() -> None:
     scale = BoneDepth(scene)
     print(f'\n{len(scene.dolls)} dolls dropped into a heap, {DURATION:g} s\n{HEAD}')
     for accuracy, workers in itertools.product(('draft', 'normal'), (1, 2)):
-        course = simulated(scene, scale, engine='rigid', accuracy=accuracy, workers=workers)
-        print(f'{f"rigid {accuracy}, workers {workers}":30}{course.row()}', flush=True)
+        outcome = simulated(scene, scale, engine='rigid', accuracy=accuracy, workers=workers)
+        print(f'{f"rigid {accuracy}, workers {workers}":30}{outcome.row()}', flush=True)
     for engine, name in ((MujocoEngine, 'MuJoCo'), (RungeKutta, 'MuJoCo by RK4'),
                          (BulletEngine, 'PyBullet')):
-        course = simulated(scene, scale, engine=engine, accuracy='draft')
-        print(f'{name + ", 4 substeps":30}{course.row()}', flush=True)
+        outcome = simulated(scene, scale, engine=engine, accuracy='draft')
+        print(f'{name + ", 4 substeps":30}{outcome.row()}', flush=True)

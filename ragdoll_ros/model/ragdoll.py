@@ -274,7 +274,7 @@ class Ragdoll:
         for bone in self.bones:
             if bone.name == name:
                 return bone
-        raise errors.UnknownBone('', name, 'one of ' + ', '.join(b.name for b in self.bones))
+        raise errors.UnknownBone('', name, errors.one_of([b.name for b in self.bones], name))
 
     def joints_from_root(self) -> tuple[Joint, ...]:
         """All joints, each parent's before its children's."""
@@ -326,7 +326,7 @@ def tree_errors(names: list[str], edges: list[tuple[str, str]]) -> list[errors.M
     for index, (parent, child) in enumerate(edges):
         for end, name in (('parent', parent), ('child', child)):
             if name not in names:
-                expected = 'one of ' + ', '.join(names)
+                expected = errors.one_of(names, name)
                 found.append(errors.UnknownBone(f'joints[{index}].{end}', name, expected))
         if child in parent_of:
             found.append(errors.ConnectedTwice(
@@ -349,7 +349,7 @@ def carried_errors(key: str, names: list[str],
     known, seen = set(names), set()
     for index, (name, bone) in enumerate(carried):
         if bone not in known:
-            expected = 'one of ' + ', '.join(names)
+            expected = errors.one_of(names, bone)
             found.append(errors.UnknownBone(f'{key}[{index}].bone', bone, expected))
         if name in seen:
             found.append(errors.DuplicateName(f'{key}[{index}].name', name, 'a name of its own'))

@@ -7,12 +7,10 @@ Erleben, The Visual Computer 26, 2010).
 """
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from .machine import compiled
-from .solver import LIMIT, OPENING, ROLLING, on_disc, one_contact
+from .solver import LIMIT, OPENING, ROLLING, on_disc, one_contact, weaken
 from .system import COMPLIANCE, STICKS, Room
 
 MOST_SWEEPS = 100
@@ -49,9 +47,7 @@ def solve_large(r: Room, count: int, n: int, h: float, thrown: bool, deep: bool)
     if not left <= ROUGHLY:
         r.tally[0].unsolved += 1
         if not work + spent / 2 <= 0:
-            share = max(0.0, -2 * work / spent) if spent > 0 else 0.0
-            for i in range(n):
-                p[i] = share * p[i] if math.isfinite(p[i]) and math.isfinite(share) else 0.0
+            weaken(p, n, work, spent)
     r.left[0] = max(r.left[0], left)
     if deep:
         normals_alone(r, count)

@@ -27,7 +27,7 @@ limit or the ground may be in the way, and do not yield."""
 FASTEST_BACK = 1.0
 """rad/s at which a joint that began far outside is brought back at the most."""
 
-OPENING = 1e-3
+PARTING = 1e-3
 """m/s or rad/s: what comes apart faster as a step begins is not held sideways in it."""
 
 SLACK = 1e-9
@@ -121,7 +121,7 @@ def ask(s: System, r: Room, count: int, n: int, h: float) -> tuple[bool, bool]:
                 b[c.row] += c.restitution * c.before
                 thrown = True
         elif c.begun:
-            r.need[3, k] = 1.0 if c.start[0] > OPENING else 0.0
+            r.need[3, k] = 1.0 if c.start[0] > PARTING else 0.0
             for e in range(c.kind):
                 curve[c.row + e] = was[c.row + e] - c.start[e]
             if c.gap > 0:

@@ -7,7 +7,7 @@ import numpy as np
 
 from .cholesky import solve
 from .machine import compiled
-from .solver import solve_impulses, solve_normals
+from .solver import solve_impulses, solve_normals, weaken
 from .system import COMPLIANCE, OF_IMPACTS, Room
 
 SWEEPS = 4
@@ -148,7 +148,7 @@ def gained(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> float:
 
 @compiled
 def weaken_impulses(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> None:
-    """Scale impulses that are no solution so that they make no energy; no number becomes none."""
+    """Scale impulses that are no solution so that they make no energy."""
     work = spent = 0.0
     for i in range(n):
         w = 0.0
@@ -156,11 +156,7 @@ def weaken_impulses(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> None
             w += W[i * n + j] * p[j]
         work += p[i] * u[i]
         spent += p[i] * w
-    share = min(1.0, max(0.0, -2 * work / spent)) if spent > 0 else 0.0
-    if not math.isfinite(share) or not math.isfinite(work):
-        share = 0.0
-    for i in range(n):
-        p[i] = share * p[i] if share > 0 else 0.0
+    weaken(p, n, work, spent)
 
 
 @compiled

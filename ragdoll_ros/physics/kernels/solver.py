@@ -455,3 +455,15 @@ def solve_normals(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.
     solve_cones(kinds, rows, mu, roll, m, m, W, b, own, 1e-9, 4, room, G)
     for c in range(m):
         p[int(room[6, c])] = max(0.0, own[c])
+
+
+@compiled
+def weaken(p: np.ndarray, n: int, work: float, spent: float) -> None:
+    """Scale impulses p (n,) whose energy is ``work`` + ``spent`` / 2, J, so that it is none; what
+    is no number becomes none.
+    """
+    share = min(1.0, max(0.0, -2 * work / spent)) if spent > 0 else 0.0
+    if not math.isfinite(share) or not math.isfinite(work):
+        share = 0.0
+    for i in range(n):
+        p[i] = share * p[i] if share > 0 else 0.0

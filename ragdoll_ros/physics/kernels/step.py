@@ -30,7 +30,7 @@ from .mass import (
 )
 from .momentum import give_contacts, inner_energy, keep_momentum, sum_dolls
 from .quaternion import cross
-from .response import OPENING, respond
+from .response import PARTING, respond
 from .system import STICKS, Course, Room, System
 
 STEP_TOLERANCE = 1e-8
@@ -202,7 +202,7 @@ def warm_start(s: System, r: Room, m: int, known: np.ndarray, h: float) -> None:
             c.gap = old.gap
             for e in range(5):
                 c.start[e] = old.start[e]
-            if c.kind > 1 and old.start[0] > OPENING:
+            if c.kind > 1 and old.start[0] > PARTING:
                 c.friction = c.rolling = 0.0
                 for e in range(1, 5):
                     c.impulse[e] = 0.0
