@@ -37,7 +37,7 @@ NUMBAS = {'llvmlite'}
 """What numba is made of: who has numba has it."""
 LAUNCHED = {'launch', 'launch_ros', 'launch_xml'}
 """What the files in launch/ are read by."""
-EXTRAS = {'fit': 'fit', 'viewer': 'viewer', 'accuracy': 'report'}
+EXTRAS = {'fit': 'fit', 'viewer': 'viewer', 'accuracy': 'report', 'replay': 'replay'}
 """The other rooms, and the extra that brings what each needs beyond that."""
 
 COUNT_POSES = """

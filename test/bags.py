@@ -1,0 +1,68 @@
+"""Recordings as rosbag2 makes them, written by a library that the package does not use."""
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from ragdoll_ros.files.run_scene import run_scene_text, scene_digest
+from ragdoll_ros.physics.recorded import RecordedSimulation, state_digest
+
+STORAGE = {'.mcap': StoragePlugin.MCAP, '.db3': StoragePlugin.SQLITE3}
+
+
+class BagWriter:
+    """Writes Strings into a new folder, as `ros2 bag record` does; for `with`."""
+
+    def __init__(self, folder: Path, suffix: str = '.mcap') -> None:
+        self._store = get_typestore(Stores.ROS2_JAZZY)
+        self._writer = Writer(folder, version=9, storage_plugin=STORAGE[suffix])
+        self._topics: dict = {}
+        self._time = 0
+
+    def __enter__(self) -> BagWriter:
+        self._writer.open()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._writer.close()
+
+    def write(self, topic: str, text: str) -> None:
+        """Write a String."""
+        kind = 'std_msgs/msg/String'
+        if topic not in self._topics:
+            self._topics[topic] = self._writer.add_connection(topic, kind, typestore=self._store)
+        message = self._store.types[kind](data=text)
+        self._time += 1
+        data = self._store.serialize_cdr(message, kind)
+        self._writer.write(self._topics[topic], self._time, data)
+
+
+def write_bag(folder: Path, messages: list[tuple[str, str]], suffix: str = '.mcap') -> Path:
+    """Write topics and texts; give the file in which they are."""
+    with BagWriter(folder, suffix) as bag:
+        for topic, text in messages:
+            bag.write(topic, text)
+    return next(folder.glob(f'*{suffix}'))
+
+
+def messages_of_a_run(scene, ticks, act, hashed=10, engine='auto', node='/ragdoll'):
+    """What a node says of a run: ``act(simulation, tick)`` is called before each of the ticks."""
+    text, events, tick = run_scene_text(scene), [], 0
+
+    def tell(kind, fields):
+        begin = {'scene': scene_digest(text)} if kind in ('start', 'reset') else {}
+        events.append({'number': len(events), 'tick': tick, 'kind': kind, **begin, **fields})
+
+    with RecordedSimulation(scene, engine=engine) as simulation:
+        simulation.tell = tell
+        tell('start', {**simulation.conditions, 'state': state_digest(simulation.state)})
+        for tick in range(ticks):
+            act(simulation, tick)
+            simulation.advance()
+            if (tick + 1) % hashed == 0:
+                tick += 1
+                tell('state', {'sha256': state_digest(simulation.state)})
+    return [(f'{node}/scene', text), *((f'{node}/events', json.dumps(event)) for event in events)]
