@@ -83,7 +83,7 @@ setup(
         'report': ['scipy', 'matplotlib', 'mujoco'],
         'fit': ['matplotlib'],
         # The page: 3D, panels and plots in a browser, served from Python, with no build of its own.
-        'viewer': ['viser', 'imageio'],
+        'viewer': ['viser', 'imageio', 'mcap'],
         'replay': ['mcap'],
         'test': ['pytest', 'pytest-xdist', 'ruff', 'setuptools', 'wheel', 'yourdfpy', 'rosbags',
                  'playwright', 'mannequin-x; python_version >= "3.11"'],

@@ -4,10 +4,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from ragdoll_ros.files.run_scene import run_scene_text, scene_digest
+from ragdoll_ros.model.scene import SECOND
 from ragdoll_ros.physics.recorded import RecordedSimulation, state_digest
 
 STORAGE = {'.mcap': StoragePlugin.MCAP, '.db3': StoragePlugin.SQLITE3}
@@ -31,12 +33,24 @@ class BagWriter:
 
     def write(self, topic: str, text: str) -> None:
         """Write a String."""
-        kind = 'std_msgs/msg/String'
+        self._write(topic, 'std_msgs/msg/String', data=text)
+
+    def write_poses(self, topic: str, stamp: int, poses: np.ndarray) -> None:
+        """Write a PoseArray of poses (n, 7); stamp in ns."""
+        types = self._store.types
+        time = types['builtin_interfaces/msg/Time'](*divmod(stamp, SECOND))
+        header = types['std_msgs/msg/Header'](stamp=time, frame_id='map')
+        self._write(topic, 'geometry_msgs/msg/PoseArray', header=header, poses=[
+            types['geometry_msgs/msg/Pose'](
+                position=types['geometry_msgs/msg/Point'](*map(float, row[:3])),
+                orientation=types['geometry_msgs/msg/Quaternion'](*map(float, row[3:])))
+            for row in poses])
+
+    def _write(self, topic: str, kind: str, **fields: object) -> None:
         if topic not in self._topics:
             self._topics[topic] = self._writer.add_connection(topic, kind, typestore=self._store)
-        message = self._store.types[kind](data=text)
         self._time += 1
-        data = self._store.serialize_cdr(message, kind)
+        data = self._store.serialize_cdr(self._store.types[kind](**fields), kind)
         self._writer.write(self._topics[topic], self._time, data)
 
 

@@ -10,8 +10,8 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 
 FILES_THAT_NEED = {'rclpy': ['test_ros_*.py'],
-                   'mcap': ['test_replay*.py', 'test_ros_replay.py'],
-                   'rosbags': ['test_replay*.py', 'test_ros_replay.py'],
+                   'mcap': ['test_replay*.py', 'test_ros_replay.py', 'test_viewer_recording.py'],
+                   'rosbags': ['test_replay*.py', 'test_ros_replay.py', 'test_viewer_recording.py'],
                    'viser': ['test_viewer*.py', 'test_editor*.py', 'test_ros_browser.py']}
 
 collect_ignore_glob = [file for package, files in FILES_THAT_NEED.items()

@@ -32,7 +32,7 @@ DISTRIBUTIONS = {'yaml': 'pyyaml', 'mpl_toolkits': 'matplotlib'}
 
 ROBOT = ('model', 'files', 'physics', 'ros')
 """Rooms that run on a robot, with OPTIONAL modules or without."""
-OPTIONAL = {'mujoco'}
+OPTIONAL = {'mujoco', 'mcap'}
 NUMBAS = {'llvmlite'}
 """What numba is made of: who has numba has it."""
 LAUNCHED = {'launch', 'launch_ros', 'launch_xml'}

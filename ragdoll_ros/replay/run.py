@@ -6,10 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..files.bag import read_messages
+from ..files.cdr import STRING, text_of
 from ..files.run_scene import read_run_scene, scene_digest
 from ..model import errors
 from ..model.scene import Scene
-from .bag import read_texts
 
 RECORD = 'ros2 bag record /ragdoll/events /ragdoll/scene'
 
@@ -55,9 +56,10 @@ class Run:
 def read_run(path: Path, node: str | None, warn: Callable[[str], None]) -> Run:
     """The run of a ``node`` in a bag; of the one that is in it, if not said. RagdollError."""
     found: dict[tuple[str, str], list[str]] = {}
-    for topic, text in read_texts(path, warn):
+    for topic, kind, data in read_messages(path, warn):
         name, _, last = topic.rpartition('/')
-        found.setdefault((name, last), []).append(text)
+        if kind == STRING and last in ('events', 'scene'):
+            found.setdefault((name, last), []).append(text_of(data))
     nodes = sorted({name for name, last in found if last == 'events'})
     if not nodes:
         raise errors.Unreadable('', str(path), f'a recording of ~/events and ~/scene: {RECORD}')

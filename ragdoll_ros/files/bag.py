@@ -1,4 +1,4 @@
-"""The texts in a rosbag2 recording, MCAP or SQLite, whole or torn.
+"""Messages in a rosbag2 recording, MCAP or SQLite, whole or torn.
 
 Of a torn file all is read that is whole: of MCAP every record before the tear, also within a chunk
 that is not compressed; of SQLite every row on a page that is there.
@@ -8,23 +8,20 @@ from __future__ import annotations
 import io
 import re
 import sqlite3
-import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
 from ..model import errors
 
-STRING = ('std_msgs/msg/String', 'std_msgs/String')
-
 NO_MCAP = "MCAP files need mcap: pip install 'ragdoll_ros[replay]'"
 
-Texts = Iterator[tuple[str, str]]
-"""Topics and texts in the order in which they were recorded."""
+Messages = Iterator[tuple[str, str, bytes]]
+"""Topics, types and contents in CDR, in the order in which they were recorded."""
 
 
-def read_texts(path: Path, warn: Callable[[str], None]) -> Texts:
-    """All Strings of a recording: a folder of rosbag2, or one of its files.
+def read_messages(path: Path, warn: Callable[[str], None]) -> Messages:
+    """All messages of a recording: a folder of rosbag2, or one of its files.
 
     ``warn`` is told where a file breaks off. Unreadable for what is no recording.
     """
@@ -49,42 +46,33 @@ def _files(path: Path) -> list[Path]:
                                            for part in re.split(r'(\d+)', file.name)])
 
 
-def _text(data: bytes) -> str:
-    """A String's text from CDR: four bytes that tell the byte order, the length, the text, 0."""
-    length, = struct.unpack_from('<I' if data[1] & 1 else '>I', data, 4)
-    return data[8:8 + length - 1].decode()
-
-
-def _read_sqlite(file: Path) -> Texts:
+def _read_sqlite(file: Path) -> Messages:
     connection = sqlite3.connect(f'{file.resolve().as_uri()}?mode=ro', uri=True)
     try:
         # Else SQLite refuses a file that is shorter than its first page says.
         connection.execute('PRAGMA writable_schema = ON')
-        marks = ', '.join('?' * len(STRING))
-        for topic, data in connection.execute(
-                'SELECT topics.name, messages.data FROM messages JOIN topics '
-                f'ON topics.id = messages.topic_id WHERE topics.type IN ({marks}) '
-                'ORDER BY messages.id', STRING):
-            yield topic, _text(data)
+        yield from connection.execute(
+            'SELECT topics.name, topics.type, messages.data FROM messages JOIN topics '
+            'ON topics.id = messages.topic_id ORDER BY messages.id')
     finally:
         connection.close()
 
 
-def _read_mcap(file: Path) -> Texts:
+def _read_mcap(file: Path) -> Messages:
     try:
         from mcap.records import Channel, Message, Schema
     except ImportError:
         raise errors.Unreadable('', str(file), NO_MCAP) from None
-    strings: set[int] = set()
-    topics: dict[int, str] = {}
+    kinds: dict[int, str] = {}
+    channels: dict[int, tuple[str, str]] = {}
     with file.open('rb') as stream:
         for record in _records(stream):
-            if isinstance(record, Schema) and record.name in STRING:
-                strings.add(record.id)
-            elif isinstance(record, Channel) and record.schema_id in strings:
-                topics[record.id] = record.topic
-            elif isinstance(record, Message) and record.channel_id in topics:
-                yield topics[record.channel_id], _text(record.data)
+            if isinstance(record, Schema):
+                kinds[record.id] = record.name
+            elif isinstance(record, Channel):
+                channels[record.id] = record.topic, kinds.get(record.schema_id, '')
+            elif isinstance(record, Message):
+                yield *channels[record.channel_id], record.data
 
 
 def _records(stream: BinaryIO, in_chunk: bool = False) -> Iterator[object]:
