@@ -37,6 +37,7 @@ def messages():
 def replay(capsys):
     """Run the command; give its exit code, what it prints and what it warns of."""
     def run(*arguments):
+        capsys.readouterr()
         code = main([str(argument) for argument in arguments])
         return code, *capsys.readouterr()
     return run
@@ -274,7 +275,10 @@ def test_a_crowd_is_repeated_by_any_number_of_threads(tmp_path, replay):
     assert code == 0 and 'scene ten' in said and '5 of 5' in said
 
 
-def test_a_pace_is_a_number_in_its_range(tmp_path, capsys):
+@pytest.mark.parametrize(('words', 'told'), [
+    (['--pace', '0'], '0.001 to 100'), (['--publish', '--engine', 'rigid'], 'not with --engine'),
+    (['--ros-args', '-r', '__ns:=/stage'], 'only with --publish')])
+def test_a_call_that_cannot_be_says_why(tmp_path, capsys, words, told):
     with pytest.raises(SystemExit) as ended:
-        main([str(tmp_path), '--pace', '0'])
-    assert ended.value.code == 2 and '0.001 to 100' in capsys.readouterr().err
+        main([str(tmp_path), *words])
+    assert ended.value.code == 2 and told in capsys.readouterr().err

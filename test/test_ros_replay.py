@@ -78,6 +78,8 @@ def log(peer):
 
 
 def replayed(capsys, *arguments):
+    """Exit code of the command, what it prints, and what it warns of."""
+    capsys.readouterr()
     code = main([str(argument) for argument in arguments])
     return code, *capsys.readouterr()
 

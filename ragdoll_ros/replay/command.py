@@ -21,7 +21,7 @@ EXAMPLE = """examples:
   ragdoll_replay run.mcap --publish --pace 0.5    on the topics of a node `ragdoll`
 """
 
-NO_ROS = ("--publish needs ROS 2: source it, or pip install 'ragdoll_ros[ros]'")
+NO_ROS = "--publish needs ROS 2: source it, or pip install 'ragdoll_ros[ros]'"
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -29,10 +29,15 @@ def main(arguments: list[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     at = arguments.index('--ros-args') if '--ros-args' in arguments else len(arguments)
     options, for_ros = parser().parse_args(arguments[:at]), arguments[at:]
+    compares = options.engine or options.accuracy
+    if compares and options.publish:
+        parser().error('--publish: not with --engine or --accuracy, which compare')
+    if for_ros and not options.publish:
+        parser().error(f'{" ".join(for_ros)}: only with --publish')
     try:
         run = read_run(options.bag, options.node, warn)
         tell(run)
-        if options.engine or options.accuracy:
+        if compares:
             return compare(run, options.engine, options.accuracy)
         return replay(run, options.publish, options.pace, for_ros)
     except errors.RagdollError as error:
