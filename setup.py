@@ -14,6 +14,7 @@ EXECUTABLES = {
     'ragdoll_viewer': 'ragdoll_ros.viewer.command:main',
     'ragdoll_fit': 'ragdoll_ros.fit.command:main',
     'ragdoll_report': 'ragdoll_ros.accuracy.command:main',
+    'ragdoll_replay': 'ragdoll_ros.replay.command:main',
 }
 CONFIG, LAUNCH = (sorted(str(path) for path in Path(folder).iterdir() if path.is_file())
                   for folder in ('config', 'launch'))
@@ -82,8 +83,9 @@ setup(
         'report': ['scipy', 'matplotlib', 'mujoco'],
         'fit': ['matplotlib'],
         # The page: 3D, panels and plots in a browser, served from Python, with no build of its own.
-        'viewer': ['viser', 'imageio'],
-        'test': ['pytest', 'pytest-xdist', 'ruff', 'setuptools', 'wheel', 'yourdfpy',
+        'viewer': ['viser', 'imageio', 'mcap'],
+        'replay': ['mcap'],
+        'test': ['pytest', 'pytest-xdist', 'ruff', 'setuptools', 'wheel', 'yourdfpy', 'rosbags',
                  'playwright', 'mannequin-x; python_version >= "3.11"'],
         'colcon': ['colcon-core', 'colcon-ros', 'colcon-python-setup-py',
                    'colcon-common-extensions', 'setuptools<80'],

@@ -20,8 +20,8 @@ from test_rooms import PACKAGE, imports, modules  # noqa: E402
 IDEAS = {'model': 'what a scene is', 'files': 'model as text and back',
          'physics': 'how a scene moves', 'fit': 'a character becomes a doll',
          'ros': 'topics, parameters, services', 'viewer': 'the page in the browser',
-         'accuracy': 'the report and its references'}
-COLUMNS = {'viewer': 0.0, 'ros': -3.0, 'accuracy': 3.0, 'physics': -1.6, 'fit': 1.6}
+         'replay': 'a recorded run again', 'accuracy': 'the report and its references'}
+COLUMNS = {'viewer': 1.6, 'replay': -1.4, 'ros': -3.0, 'accuracy': 3.0, 'physics': -1.6, 'fit': 1.6}
 WIDE, HIGH = 2.7, 0.62
 
 

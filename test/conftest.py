@@ -10,6 +10,8 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 
 FILES_THAT_NEED = {'rclpy': ['test_ros_*.py'],
+                   'mcap': ['test_replay*.py', 'test_ros_replay.py', 'test_viewer_recording.py'],
+                   'rosbags': ['test_replay*.py', 'test_ros_replay.py', 'test_viewer_recording.py'],
                    'viser': ['test_viewer*.py', 'test_editor*.py', 'test_ros_browser.py']}
 
 collect_ignore_glob = [file for package, files in FILES_THAT_NEED.items()
@@ -20,7 +22,8 @@ LONGEST = ('test_ros_viewer.py', 'test_ros_programs.py', 'test_viewer_command.py
            'test_viewer_browser.py', 'test_ros_browser.py', 'test_ros_process.py',
            'test_references.py', 'test_contact.py', 'test_grab.py', 'test_swing.py',
            'test_pushes.py', 'test_dynamics.py', 'test_package.py', 'test_simulation.py',
-           'test_viewer_network.py', 'test_ros_node.py', 'test_compiled_cache.py')
+           'test_viewer_network.py', 'test_ros_node.py', 'test_compiled_cache.py',
+           'test_ros_replay.py', 'test_replay.py')
 
 
 def pytest_configure(config):

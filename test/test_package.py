@@ -32,12 +32,12 @@ DISTRIBUTIONS = {'yaml': 'pyyaml', 'mpl_toolkits': 'matplotlib'}
 
 ROBOT = ('model', 'files', 'physics', 'ros')
 """Rooms that run on a robot, with OPTIONAL modules or without."""
-OPTIONAL = {'mujoco'}
+OPTIONAL = {'mujoco', 'mcap'}
 NUMBAS = {'llvmlite'}
 """What numba is made of: who has numba has it."""
 LAUNCHED = {'launch', 'launch_ros', 'launch_xml'}
 """What the files in launch/ are read by."""
-EXTRAS = {'fit': 'fit', 'viewer': 'viewer', 'accuracy': 'report'}
+EXTRAS = {'fit': 'fit', 'viewer': 'viewer', 'accuracy': 'report', 'replay': 'replay'}
 """The other rooms, and the extra that brings what each needs beyond that."""
 
 COUNT_POSES = """

@@ -17,12 +17,13 @@ ARROWS = {
     'fit': {'files', 'model'},
     'ros': {'physics', 'files', 'model'},
     'viewer': {'physics', 'fit', 'files', 'model'},
+    'replay': {'physics', 'files', 'model'},
     'accuracy': {'physics', 'files', 'model'}}
 """What a room may import of others."""
 
 ONLY = {'pybullet': 'physics/engine/bullet.py', 'mujoco': 'physics/engine/mujoco.py',
         'numba': 'physics/kernels/', 'viser': 'viewer/', 'matplotlib': ('fit/', 'accuracy/'),
-        'scipy': 'accuracy/'}
+        'scipy': 'accuracy/', 'mcap': ('files/bag.py', 'viewer/sources/recording_file.py')}
 """Libraries, and the one place of each. The report's pendulum in three lines of PyBullet alone is
 what a user would write without this package: it shares no code with it."""
 
@@ -77,8 +78,8 @@ def broken_arrows(edges: Edges) -> list[str]:
         room, other = name.partition('.')[0], target.partition('.')[0]
         if target.startswith(':') or room == other or room in ('', 'riders') or target == '':
             continue
-        remote = name.startswith('viewer.sources.remote') and other == 'ros'
-        if not remote and other not in ARROWS.get(room, set()):
+        tied = name.startswith(('viewer.sources.remote', 'replay.published')) and other == 'ros'
+        if not tied and other not in ARROWS.get(room, set()):
             found.append(f'{name} -> {target}')
         if room == 'physics' and other == 'files' and not name.startswith('physics.engine.'):
             found.append(f'{name} -> {target}: only an engine wants a text')

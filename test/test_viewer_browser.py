@@ -14,7 +14,7 @@ from test_fit_broken import BROKEN
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.viewer.sources.recording import Recording
-from ragdoll_ros.viewer.sources.recording_file import load_recording, recording_text
+from ragdoll_ros.viewer.sources.recording_file import load_recording, recording_bytes
 
 SCENE = load_scene('drop')
 START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])
@@ -161,9 +161,9 @@ def test_a_run_is_recorded(view, states, tmp_path):
     view.wait(lambda: far(view, START, 0.3))  # a quarter of a second, 15 pictures
     with view.page.expect_download() as download:
         view.press('Stop and download')
-    download.value.save_as(tmp_path / 'run.json')
+    download.value.save_as(tmp_path / 'run.mcap')
     view.hold_at(SCENE, START)
-    recording = load_recording(tmp_path / 'run.json')
+    recording = load_recording(tmp_path / 'run.mcap')
     assert recording.scene == SCENE and len(recording) > 5
     for time_, positions in zip(recording.times, recording.positions, strict=True):
         np.testing.assert_array_equal(positions, states[round(time_ / SCENE.step)].positions)
@@ -176,11 +176,11 @@ def test_a_run_is_played_back(browser, states, tmp_path):
     recording = Recording(SCENE, np.array((0, 10, 20)) * SCENE.step,
                           np.array([state.positions for state in made]),
                           np.array([state.orientations for state in made]))
-    (tmp_path / 'run.json').write_text(recording_text(recording))
-    with (serving('--port', '0', '--play', str(tmp_path / 'run.json')) as url,
+    (tmp_path / 'run.mcap').write_bytes(recording_bytes(recording))
+    with (serving('--port', '0', '--play', str(tmp_path / 'run.mcap')) as url,
           opened(browser, url, SCENE) as page):
         page.wait(lambda: abs(page.bodies(SCENE) - recording.positions[-1]).max() < 1e-6)
-        page.page.get_by_text(re.compile(r'run\.json: [0-9.]+ of [0-9.]+ s')).wait_for()
+        page.page.get_by_text(re.compile(r'run\.mcap: [0-9.]+ of [0-9.]+ s')).wait_for()
 
 
 def test_the_view_is_saved_as_png(view, tmp_path):

@@ -1,17 +1,18 @@
 """A run recorded, written, read and asked for poses."""
-import json
-import math
-
 import numpy as np
 import pytest
+from bags import BagWriter
+from mcap.reader import make_reader
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from ragdoll_ros.files.run_scene import run_scene_text
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.scene import SECOND
 from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.viewer.sources.recording import Pose, Recorder, Recording
-from ragdoll_ros.viewer.sources.recording_file import load_recording, recording_text
+from ragdoll_ros.viewer.sources.recording_file import load_recording, recording_bytes
 
 UNTURNED = np.tile((0, 0, 0, 1.0), (10, 1))
 
@@ -37,14 +38,17 @@ def run():
 
 @pytest.fixture
 def written(run, tmp_path):
-    (tmp_path / 'run.json').write_text(recording_text(run[0]), encoding='utf-8')
-    return tmp_path / 'run.json'
+    (tmp_path / 'run.mcap').write_bytes(recording_bytes(run[0]))
+    return tmp_path / 'run.mcap'
 
 
 def assert_equal(one, other):
+    """Poses to the bit; instants to the ns; rods, which are made of the masses, to rounding."""
     assert one.scene == other.scene
-    for key in ('times', 'positions', 'orientations', 'rods'):
+    for key in ('positions', 'orientations'):
         np.testing.assert_array_equal(getattr(one, key), getattr(other, key))
+    np.testing.assert_allclose(one.times, other.times, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(one.rods, other.rods, rtol=0, atol=1e-14)
 
 
 def test_holds_every_state_to_the_bit(run):
@@ -72,15 +76,54 @@ def test_round_trip_is_exact(run, written):
     assert_equal(load_recording(written), run[0])
 
 
-def test_any_json_reader_can_read_it(run, written):
-    """No NaN, no Infinity: RFC 8259; the scene has a friction without limit."""
-    def refuse(text):
-        raise AssertionError(text)
-    data = json.loads(written.read_text(), parse_constant=refuse)
-    assert run[0].scene.material.friction == math.inf
-    assert data['scene']['material']['friction'] == '.inf'
-    assert data['names'] == list(run[0].scene.bone_names)
-    assert np.shape(data['positions']) == (49, 10, 3)
+def test_others_can_read_it(run, written):
+    """By mcap's reader, which wants an index, and by the definitions that the file has with it."""
+    store, poses = get_typestore(Stores.EMPTY), []
+    with written.open('rb') as stream:
+        reader = make_reader(stream)
+        assert reader.get_header().profile == 'ros2'
+        for schema, channel, message in reader.iter_messages():
+            assert (schema.encoding, channel.message_encoding) == ('ros2msg', 'cdr')
+            store.register(get_types_from_msg(schema.data.decode(), schema.name))
+            told = store.deserialize_cdr(message.data, schema.name)
+            if channel.topic == '/ragdoll/poses':
+                assert told.header.stamp.sec * SECOND + told.header.stamp.nanosec == (
+                    message.log_time)
+                poses.append([(p.position.x, p.position.y, p.position.z) for p in told.poses])
+    np.testing.assert_array_equal(poses, run[0].positions)
+
+
+@pytest.mark.parametrize('suffix', ['.mcap', '.db3'])
+def test_what_was_recorded_of_a_node_is_a_recording(run, tmp_path, suffix):
+    """Its stamps are ROS time, and what it says while paused comes twice."""
+    recording, _ = run
+    begin = 1_700_000_000 * SECOND + 3
+    with BagWriter(tmp_path / 'bag', suffix) as bag:
+        bag.write('/stage/ragdoll/scene', run_scene_text(recording.scene))
+        bag.write('/stage/robot_description', '<robot/>')
+        for index in (*range(len(recording)), len(recording) - 1):
+            pose, stamp = recording.pose(index), begin + round(recording.times[index] * SECOND)
+            masses = pose.rods[:, 1]
+            bag.write_poses('/stage/ragdoll/poses', stamp,
+                            np.hstack([pose.positions, pose.orientations]))
+            bag.write_poses('/stage/ragdoll/swings', stamp,
+                            np.hstack([masses, np.tile((0, 0, 0, 1), (len(masses), 1))]))
+    assert_equal(load_recording(tmp_path / 'bag'), recording)
+
+
+def test_of_a_torn_file_the_whole_instants_are_read(run, written, capsys):
+    """Written as one chunk, compressed, nothing; so the file is made anew as rosbag2 does."""
+    recording, _ = run
+    with BagWriter(written.parent / 'bag') as bag:
+        bag.write('/ragdoll/scene', run_scene_text(recording.scene))
+        for index in range(len(recording)):
+            pose = recording.pose(index)
+            bag.write_poses('/ragdoll/poses', index, np.hstack([pose.positions, pose.orientations]))
+    file = next((written.parent / 'bag').glob('*.mcap'))
+    file.write_bytes(file.read_bytes()[:file.stat().st_size // 2])
+    read = load_recording(file)
+    assert 10 < len(read) < len(recording) and 'breaks off' in capsys.readouterr().err
+    np.testing.assert_array_equal(read.positions, recording.positions[:len(read)])
 
 
 def test_pose_at_an_instant(run):
@@ -120,64 +163,56 @@ def test_nothing_taken_is_no_recording():
         Recorder(load_scene('drop')).recording()
 
 
-def change(key, value):
-    return lambda data: data.__setitem__(key, value)
-
-
-def change_first(key, value):
-    def apply(data):
-        data[key][1][2] = value
-    return apply
+def poses(count=10, **changed):
+    """Poses (count, 7), some numbers of which are ``changed``: _0 is the first."""
+    rows = np.tile((0.0, 0, 1, 0, 0, 0, 1), (count, 1))
+    for place, value in changed.items():
+        rows[0, int(place[1:])] = value
+    return rows
 
 
 RUBBISH = {
-    'another format': (change('format', 'rosbag'), 'format: WrongForm'),
-    'a newer version': (change('version', 2), 'version: OutOfRange: 2; expected 1'),
-    'another frame': (change('frame', 'map'), 'frame: OutOfRange'),
-    'a key too many': (change('extra', 1), 'extra'),
-    'a key too few': (lambda data: data.pop('times'), 'times'),
-    'unknown bones': (change('names', ['a']), 'names: UnknownBone'),
-    'names of no text': (change('names', 5), 'names: UnknownBone'),
-    'times as text': (change('times', ['0'] * 49), 'times: WrongForm'),
-    'one number too few': (lambda data: data['positions'][3][4].pop(), 'positions: WrongForm'),
-    'one pose too few': (lambda data: data['positions'].pop(), 'positions: WrongForm'),
-    'null for a number': (change_first('positions', None), 'positions: WrongForm'),
-    'a number beyond float': (change_first('positions', [10 ** 400] * 3), 'positions: WrongForm'),
-    'no number': (change_first('positions', [math.nan] * 3), 'NotFinite'),
-    'infinity by exponent': (change('times', '1e999'), 'times'),
-    'time that goes back': (lambda data: data['times'].reverse(), 'times: OutOfRange'),
-    'no poses': (lambda data: data.update(times=[], positions=[], orientations=[]), 'positions'),
-    'one rod too few': (lambda data: data['rods'][3].pop(), 'rods: WrongForm'),
-    'rods of no kind': (change('rods', 7), 'rods: WrongForm'),
-    'quaternions of another length': (change_first('orientations', [0, 0, 0, 2]),
-                                      'orientations: NotUnit'),
-    'a scene with an error': (lambda data: data['scene'].update(step=-1), 'scene.step: OutOfRange'),
-    'a scene of no kind': (change('scene', [1]), 'scene'),
-}
+    'no scene': (['poses'], '0 scenes, 1 instants'),
+    'no poses': (['scene'], '1 scenes, 0 instants'),
+    'two scenes': (['scene', 'another', 'poses'], '2 scenes'),
+    'a scene that is none': ([('scene', 'dolls: 3'), 'poses'], 'versions'),
+    'a scene with an error': ([('scene', '# versions: x\ndolls: []'), 'poses'], 'dolls'),
+    'a pose too few': (['scene', ('poses', poses(9))], '9 poses'),
+    'no number': (['scene', ('poses', poses(_1=np.nan))], 'positions: NotFinite'),
+    'quaternions of another length': (['scene', ('poses', poses(_6=2))], 'orientations: NotUnit'),
+    'masses of no swing': (['scene', 'poses', ('swings', poses(3))], '3 masses'),
+    'poses that are texts': (['scene', ('poses', 'up')], '0 instants')}
 
 
-@pytest.mark.parametrize(('spoil', 'told'), RUBBISH.values(), ids=RUBBISH)
-def test_rubbish_is_refused_where_it_stands(written, spoil, told):
-    data = json.loads(written.read_text())
-    spoil(data)
-    written.write_text(json.dumps(data).replace('"1e999"', '[1e999]'))
+@pytest.mark.parametrize(('written', 'told'), RUBBISH.values(), ids=RUBBISH)
+def test_rubbish_is_refused(tmp_path, written, told):
+    plain = {'scene': run_scene_text(load_scene('drop')), 'poses': poses(),
+             'another': run_scene_text(load_scene('flight'))}
+    with BagWriter(tmp_path / 'bag') as bag:
+        for entry in written:
+            last, content = entry if isinstance(entry, tuple) else (entry, plain[entry])
+            topic = '/ragdoll/' + last.replace('another', 'scene')
+            if isinstance(content, str):
+                bag.write(topic, content)
+            else:
+                bag.write_poses(topic, 0, content)
     with pytest.raises(errors.ModelErrors) as caught:
-        load_recording(written)
-    assert told in str(caught.value) and 'run.json: 1 error' in str(caught.value)
+        load_recording(tmp_path / 'bag')
+    assert told in str(caught.value) and 'expected' in str(caught.value)
 
 
-@pytest.mark.parametrize('content', [b'', b'{', b'\xff\xfe', b'[' * 100_000, b'[]', b'{}', b'3'])
-def test_a_file_that_is_no_recording_is_refused(tmp_path, content):
-    (tmp_path / 'run.json').write_bytes(content)
-    with pytest.raises(errors.ModelErrors, match=r'run\.json: 1 error'):
-        load_recording(tmp_path / 'run.json')
+@pytest.mark.parametrize('name', ['run.mcap', 'run.db3', 'run.json'])
+@pytest.mark.parametrize('content', [b'', b'{', b'\xff\xfe' * 100])
+def test_a_file_that_is_no_recording_is_refused(tmp_path, name, content):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(errors.ModelErrors, match='1 error'):
+        load_recording(tmp_path / name)
 
 
 def test_a_missing_file_is_refused(tmp_path):
-    with pytest.raises(errors.ModelErrors, match='No such file'):
-        load_recording(tmp_path / 'nowhere.json')
-    with pytest.raises(errors.ModelErrors, match='directory'):
-        load_recording(tmp_path)
+    for path in (tmp_path / 'nowhere.mcap', tmp_path):
+        with pytest.raises(errors.ModelErrors, match=r'expected a folder of `ros2 bag record`'):
+            load_recording(path)
 
 
 @pytest.fixture

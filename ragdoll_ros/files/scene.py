@@ -44,14 +44,18 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
         return None, found
     placements = []
     entries = data.get('dolls')
-    named = functools.cache(lambda name: _named_doll(name, path))  # a crowd's is read once
+    # A crowd's is read once, also where it stands in the file itself, with aliases for the others.
+    named = functools.cache(lambda name: _named_doll(name, path))
+    inline: dict[int, tuple] = {}
     for index, entry in enumerate(entries if isinstance(entries, list) else ()):
         where = f'dolls[{index}]'
         if not isinstance(entry, dict) or 'doll' not in entry:
             continue
         source = entry['doll']
         if isinstance(source, dict):
-            doll, more = build_doll(source, path.with_name('doll'))
+            if id(source) not in inline:
+                inline[id(source)] = build_doll(source, path.with_name('doll'))
+            doll, more = inline[id(source)]
         else:
             doll, more = named(source) if isinstance(source, str) else (None, [])
         found += [error.at(f'{where}.doll') for error in more]
@@ -79,14 +83,20 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
 
 
 def scene_data(scene: Scene, folder: Path | None = None) -> dict:
-    """A scene as plain lists and numbers, the form of scene.schema.json; see doll_data."""
+    """A scene as plain lists and numbers, the form of scene.schema.json; see doll_data.
+
+    Where placements share a doll, so do their entries: YAML writes it once.
+    """
+    dolls: dict[int, dict] = {}
     data = {'name': scene.name, 'gravity': list(scene.gravity), 'step': scene.step,
             'pace': scene.pace, 'self_collision': scene.self_collision,
             'material': dict(vars(scene.material)), 'ground': None, 'dolls': []}
     if scene.ground is not None:
         data['ground'] = {'normal': list(scene.ground.normal), 'offset': scene.ground.offset}
     for placement in scene.dolls:
-        entry = {'doll': doll_data(placement.doll, folder), 'name': placement.name}
+        if id(placement.doll) not in dolls:
+            dolls[id(placement.doll)] = doll_data(placement.doll, folder)
+        entry = {'doll': dolls[id(placement.doll)], 'name': placement.name}
         for key in ('position', 'orientation', 'velocity', 'spin'):
             entry[key] = list(getattr(placement, key))
         data['dolls'].append(entry)

@@ -24,6 +24,9 @@ class _Loader(getattr(yaml, 'CSafeLoader', yaml.SafeLoader)):
     """YAML's safe loader, with 1e-3 read as a number (YAML 1.1 makes a text of it)."""
 
 
+_Dumper = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
+"""As safe_dump's, three times as quick."""
+
 _Loader.add_implicit_resolver(
     'tag:yaml.org,2002:float', re.compile(r'^[-+]?[0-9][0-9_]*[eE][-+]?[0-9]+$'),
     list('-+0123456789'))
@@ -112,6 +115,6 @@ def to_text(data: dict, schema: str, head: str) -> str:
     lines = [f'# yaml-language-server: $schema={schema}.schema.json',
              '# Units: m, kg, s, degrees where a key ends in _deg. x forward, y left, z up.']
     lines += ['# ' + line if line else '#' for line in head.splitlines()]
-    text = yaml.safe_dump(data, sort_keys=False, width=100, allow_unicode=True,
-                          default_flow_style=None)
+    text = yaml.dump(data, Dumper=_Dumper, sort_keys=False, width=100, allow_unicode=True,
+                     default_flow_style=None)
     return '\n'.join(lines) + '\n' + text

@@ -17,7 +17,7 @@ from .errors import set_fields
 from .pose import Pose
 from .ragdoll import Bone, Ragdoll
 from .rotation import IDENTITY
-from .vectors import Quaternion, Vector, finite, floats, unit
+from .vectors import Quaternion, Vector, finite, unit
 
 SECOND = 1_000_000_000
 """Nanoseconds in a second: time is counted in whole nanoseconds, as in ROS."""
@@ -70,11 +70,7 @@ class Ground:
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        normal = finite('normal', self.normal)
-        length = math.hypot(*normal)
-        if length < 1e-9:
-            raise errors.NotUnit('normal', normal, 'a direction, not zero')
-        set_fields(self, normal=floats(n / length for n in normal), offset=float(self.offset))
+        set_fields(self, normal=unit('normal', self.normal), offset=float(self.offset))
         errors.check_finite('offset', self.offset)
 
 

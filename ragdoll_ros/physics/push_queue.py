@@ -51,9 +51,11 @@ class PushQueue:
         end = start + max(1, round(push.duration * SECOND))
         self._queue.append(_Active(push, bone, start, end, channel))
 
-    def release(self, channel: str) -> None:
-        """End the push on a channel now."""
-        self._queue = [active for active in self._queue if active.channel != channel]
+    def release(self, channel: str) -> bool:
+        """End the push on a channel now; whether there was one."""
+        left = [active for active in self._queue if active.channel != channel]
+        ended, self._queue = len(left) < len(self._queue), left
+        return ended
 
     def drop_ended(self, now: int) -> None:
         """Forget pushes that are over."""

@@ -128,9 +128,9 @@ class Simulation:
         """
         self._pushes.add(push, channel, self.time)
 
-    def release(self, channel: str) -> None:
-        """End the push on a channel now."""
-        self._pushes.release(channel)
+    def release(self, channel: str) -> bool:
+        """End the push on a channel now; whether there was one."""
+        return self._pushes.release(channel)
 
     def grab(self, hand: str, bone: str, point: Sequence[float] = (0.0, 0.0, 0.0),
              target: Sequence[float] | None = None) -> None:

@@ -27,6 +27,7 @@ from .interactive import Interactive
 from .namesakes import Namesakes
 from .outputs import Outputs
 from .parameters import Parameters, Settings, make_simulation, step_of
+from .run_log import RunLog
 from .services import Services
 from .session import ros_session
 from .signals import ended_by_signals
@@ -69,6 +70,7 @@ class RagdollNode(Node):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._stamps = Stamps(self._ros_time)
         self._outputs = Outputs(self)
+        self._log = RunLog(self)
         self.inputs = Inputs(self, self.tally)
         self.interactive = Interactive(self, self.tally, time.monotonic_ns)
         self._diagnostics = Diagnostics(self, self._steady, self.tally, self._facts,
@@ -110,7 +112,9 @@ class RagdollNode(Node):
         ``due``: when, ns of the steady clock; now, if it is not said.
         """
         start = time.monotonic_ns()
-        if not self._advance():
+        if self._advance():
+            self._log.count_tick()
+        else:
             self.tally.refuse('state', 'not finite; the simulation was built anew')
             self._replace(make_simulation(self._tuning.scene, self.settings))
         self._stamps.take(due)
@@ -126,6 +130,7 @@ class RagdollNode(Node):
     def pause(self, wanted: bool) -> None:
         """Hold the time, or let it go on from where it is."""
         self.paused = wanted
+        self._log.tell('pause', {'paused': wanted})
         self._go_on()
         if wanted:
             # What is not published with every tick.
@@ -201,6 +206,7 @@ class RagdollNode(Node):
 
     def _use(self, simulation: Simulation) -> None:
         """Let all parts work with this simulation and the settings as they are."""
+        self._log.follow(simulation)
         self.simulation = self.inputs.simulation = self._diagnostics.simulation = simulation
         self.inputs.settings = self.settings
         self._outputs.describe(simulation.scene, self.settings.frame_id,
@@ -225,6 +231,7 @@ class RagdollNode(Node):
     def _apply(self, changed: set[str]) -> None:
         """Carry a change of the settings out."""
         settings = self.inputs.settings = self.interactive.settings = self.settings
+        self._log.tell('parameters', {name: getattr(settings, name) for name in sorted(changed)})
         self._outputs.be_clock(settings.publish_clock)
         if self._prepared is not None:
             simulation, self._prepared = self._prepared, None
@@ -235,7 +242,8 @@ class RagdollNode(Node):
             self._use(self.simulation)
             if self.paused:
                 self._publish()
-        self.simulation.accuracy = settings.accuracy
+        if 'accuracy' in changed:
+            self.simulation.accuracy = settings.accuracy
         if changed & {'scene', 'rate', 'real_time_factor'}:
             self.simulation.step = step_of(settings)
             self._go_on()

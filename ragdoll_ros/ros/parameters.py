@@ -21,8 +21,9 @@ from ..model.errors import RagdollError
 from ..model.ragdoll import WORLD
 from ..model.scene import STEP_RANGE, Scene
 from ..physics.engine.registry import ENGINES, check_engine
+from ..physics.recorded import RecordedSimulation
 from ..physics.settings import ACCURACIES
-from ..physics.simulation import MOST_WORKERS, Simulation
+from ..physics.simulation import MOST_WORKERS
 from .transforms import TREES
 from .written import as_numbers, unknown
 
@@ -218,10 +219,10 @@ def step_of(settings: Settings) -> float:
     return min(max(1 / settings.rate, STEP_RANGE[0]), STEP_RANGE[1])
 
 
-def make_simulation(scene: Scene, settings: Settings) -> Simulation:
+def make_simulation(scene: Scene, settings: Settings) -> RecordedSimulation:
     """Build the simulation that the settings ask for."""
-    return Simulation(scene, step_of(settings), settings.accuracy, settings.engine,
-                      settings.workers or 'auto')
+    return RecordedSimulation(scene, step_of(settings), settings.accuracy, settings.engine,
+                              settings.workers or 'auto')
 
 
 def _given(parameters: list[Parameter]) -> dict:

@@ -29,7 +29,7 @@ EXAMPLE = """examples:
   ragdoll_viewer --ros-args -r __ns:=/stage     ... in another namespace
   ragdoll_viewer --scene doll.yaml        simulate a doll or scene here
   ragdoll_viewer --scene crowd --port 9000 --engine bullet
-  ragdoll_viewer --play run.json          show a recording
+  ragdoll_viewer --play run.mcap          show a recording
 """
 
 NO_VISER = ("ragdoll_viewer needs viser: pip install 'ragdoll_ros[viewer]', or, for the Python of "
@@ -65,7 +65,8 @@ def parser() -> argparse.ArgumentParser:
         'ragdoll_viewer', description=__doc__, epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter)
     shown = parser.add_mutually_exclusive_group()
-    shown.add_argument('--play', metavar='RUN.json', help='show what the page has recorded')
+    shown.add_argument('--play', metavar='RUN.mcap', help='show what the page, or '
+                       '`ros2 bag record`, has recorded')
     shown.add_argument('--scene', help='a name in config/ or a path: simulate it here, without '
                         'ROS (else: listen to the node `ragdoll`)')
     parser.add_argument('--engine', choices=ENGINES, help='with --scene: what simulates (auto); a '

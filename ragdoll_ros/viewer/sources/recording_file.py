@@ -1,123 +1,116 @@
-"""Recordings as files.
+"""Recordings as files: MCAP, which Foxglove and `ros2 bag play` open as well.
 
-JSON in UTF-8, one object:
-
-    format        'ragdoll_ros recording'
-    version       1
-    frame         'world': x forward, y left, z up (REP 103)
-    names         n bones, the order of all that follows
-    times         k instants in s of simulated time, the first 0, each later than the last
-    positions     k lists of n [x, y, z]: each bone's centre of mass, m
-    orientations  k lists of n [x, y, z, w]: unit quaternions, shape's axes to the frame's
-    rods          k lists of m [[x, y, z], [x, y, z]]: both ends of each rod of the scene's
-                  swings, m; null for a scene without any, or where they were not told
-    scene         all of the scene, in the form of config/scene.schema.json, its dolls within
-
-Numbers are written so that they read back to the same bits. JSON knows no infinity: friction
-without limit is the text '.inf', as in YAML.
+Three topics, as those of the node: /ragdoll/scene tells the scene once; /ragdoll/poses is where its
+bones are at each instant, the stamp being s of simulated time since the first; /ragdoll/swings the
+masses of its swings, where they were told. What `ros2 bag record` makes of a node's topics of these
+names is a recording, too.
 """
 from __future__ import annotations
 
-import json
+import io
+import sys
 from pathlib import Path
 
 import numpy as np
 
-from ...files.scene import build_scene, scene_data
+from ...files.bag import read_messages
+from ...files.cdr import (
+    DEFINITIONS,
+    POSE_ARRAY,
+    STRING,
+    poses_bytes,
+    poses_of,
+    string_bytes,
+    text_of,
+)
+from ...files.run_scene import read_run_scene, run_scene_text
 from ...model import errors
 from ...model.errors import ModelError, ModelErrors
-from .recording import Recording
+from ...model.ragdoll import WORLD
+from ...model.rotation import IDENTITY
+from ...model.scene import SECOND, Scene
+from ...model.state import State
+from .recording import Pose, Recorder, Recording
+from .rods import Rods
 
-FORMAT = 'ragdoll_ros recording'
-VERSION = 1
-FRAME = 'world'
-KEYS = ('format', 'version', 'frame', 'names', 'times', 'positions', 'orientations', 'rods',
-        'scene')
+KINDS = {'scene': STRING, 'poses': POSE_ARRAY, 'swings': POSE_ARRAY}
 
 LARGEST_RECORDING = 1_000_000_000
-"""Bytes; a minute of ten bones at 60 Hz takes 6 MB."""
+"""Bytes; a minute of ten bones at 60 Hz takes 2 MB."""
+
+Stamped = list[tuple[int, np.ndarray]]
+"""Poses (n, 7) with their stamps, ns."""
 
 
-def recording_text(recording: Recording) -> str:
-    """A recording as JSON, from which load_recording makes an equal one."""
-    return json.dumps({
-        'format': FORMAT, 'version': VERSION, 'frame': FRAME,
-        'names': list(recording.scene.bone_names), 'times': recording.times.tolist(),
-        'positions': recording.positions.tolist(),
-        'orientations': recording.orientations.tolist(),
-        'rods': None if recording.rods is None else recording.rods.tolist(),
-        'scene': _without_infinity(scene_data(recording.scene))}, allow_nan=False)
+def recording_bytes(recording: Recording) -> bytes:
+    """A recording as MCAP, from which load_recording makes an equal one, but for parts of a ns."""
+    from mcap.writer import Writer
+    stream = io.BytesIO()
+    writer = Writer(stream)
+    writer.start('ros2')
+    channels = {topic: writer.register_channel(
+        f'/ragdoll/{topic}', 'cdr', writer.register_schema(
+            kind, 'ros2msg', DEFINITIONS[kind].encode())) for topic, kind in KINDS.items()}
+
+    def write(topic: str, stamp: int, data: bytes) -> None:
+        writer.add_message(channels[topic], stamp, data, stamp)
+
+    write('scene', 0, string_bytes(run_scene_text(recording.scene)))
+    for index, time in enumerate(recording.times):
+        stamp, pose = round(time * SECOND), recording.pose(index)
+        write('poses', stamp, poses_bytes(stamp, WORLD, np.hstack(
+            [pose.positions, pose.orientations])))
+        if pose.rods is not None:
+            masses = pose.rods[:, 1]
+            write('swings', stamp, poses_bytes(stamp, WORLD, np.hstack(
+                [masses, np.tile(IDENTITY, (len(masses), 1))])))
+    writer.finish()
+    return stream.getvalue()
 
 
 def load_recording(path: str | Path) -> Recording:
-    """Read a recording; ModelErrors with the file's name and what is wrong in it."""
+    """Read a recording; ModelErrors with the file's name and what is wrong in it.
+
+    Of a file that breaks off, what stands before that is read, with a warning.
+    """
     path = Path(path)
     try:
-        return _recording(_read(path), path)
+        return _recording(path)
     except ModelError as error:
         raise ModelErrors(str(path), [error]) from None
 
 
-def _read(path: Path) -> dict:
-    try:
-        size = path.stat().st_size
-        if size > LARGEST_RECORDING:
-            raise errors.OutOfRange('', f'{size} bytes', f'at most {LARGEST_RECORDING}')
-        data = json.loads(path.read_text(encoding='utf-8'), parse_constant=_no_constant)
-    except OSError as error:
-        raise errors.Unreadable('', error.strerror, 'a recording, run.json') from None
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise errors.Unreadable('', str(error), 'JSON in UTF-8') from None
-    if not isinstance(data, dict) or data.get('format') != FORMAT:
-        said = data.get('format') if isinstance(data, dict) else type(data).__name__
-        raise errors.WrongForm('format', said, repr(FORMAT))
-    return data
+def _recording(path: Path) -> Recording:
+    if path.is_file() and path.stat().st_size > LARGEST_RECORDING:
+        raise errors.OutOfRange('', f'{path.stat().st_size} bytes', f'at most {LARGEST_RECORDING}')
+    scenes: set[str] = set()
+    heard: dict[str, Stamped] = {'poses': [], 'swings': []}
+    for topic, kind, data in read_messages(path, lambda text: print(text, file=sys.stderr)):
+        last = topic.rpartition('/')[2]
+        if KINDS.get(last) == kind == STRING:
+            scenes.add(text_of(data))
+        elif KINDS.get(last) == kind:
+            heard[last].append(poses_of(data))
+    if len(scenes) != 1 or not heard['poses']:
+        raise errors.WrongForm('', f'{len(scenes)} scenes, {len(heard["poses"])} instants',
+                               'one scene and its poses: ros2 bag record /ragdoll/scene '
+                               '/ragdoll/poses /ragdoll/swings')
+    scene, _ = read_run_scene(scenes.pop())
+    return _recorded(scene, heard['poses'], dict(heard['swings']))
 
 
-def _no_constant(text: str) -> None:
-    raise errors.NotFinite('', text, 'finite numbers')
-
-
-def _recording(data: dict, path: Path) -> Recording:
-    for key, only in (('version', VERSION), ('frame', FRAME)):
-        if data.get(key) != only:
-            raise errors.OutOfRange(key, data.get(key), repr(only))
-    if set(data) != set(KEYS):
-        odd = sorted(set(data) ^ set(KEYS))
-        raise errors.WrongForm('', odd, 'the keys ' + ', '.join(KEYS))
-    scene, found = build_scene(_with_infinity(data['scene']), path)
-    if found:
-        raise ModelErrors(str(path), [error.at('scene') for error in found])
-    if data['names'] != list(scene.bone_names):
-        raise errors.UnknownBone('names', data['names'],
-                                 "the scene's bones, " + ', '.join(scene.bone_names))
-    rods = None if data['rods'] is None else _array(data, 'rods')
-    return Recording(scene, _array(data, 'times'), _array(data, 'positions'),
-                     _array(data, 'orientations'), rods)
-
-
-def _array(data: dict, key: str) -> np.ndarray:
-    """Numbers in nested lists of even lengths as float64."""
-    try:
-        array = np.array(data[key])
-        if array.dtype.kind in 'iuf':
-            return array.astype(float)
-    except (ValueError, OverflowError):
-        pass
-    raise errors.WrongForm(key, data[key], 'lists of numbers, all of one length')
-
-
-def _without_infinity(value: object) -> object:
-    if isinstance(value, dict):
-        return {key: _without_infinity(each) for key, each in value.items()}
-    if isinstance(value, list):
-        return [_without_infinity(each) for each in value]
-    return '.inf' if value == float('inf') else value
-
-
-def _with_infinity(value: object) -> object:
-    """Undo _without_infinity; only a friction can be without limit, a name stays a name."""
-    if isinstance(value, dict):
-        return {key: float('inf') if key == 'friction' and each == '.inf'
-                else _with_infinity(each) for key, each in value.items()}
-    return [_with_infinity(each) for each in value] if isinstance(value, list) else value
+def _recorded(scene: Scene, heard: Stamped, swings: dict[int, np.ndarray]) -> Recording:
+    """A recording of poses and, by their stamps, of swings' masses."""
+    recorder, rods, bones = Recorder(scene), Rods(scene), len(scene.bones)
+    for stamp, poses in heard:
+        if len(poses) != bones:
+            raise errors.WrongForm('poses', f'{len(poses)} poses', f'{bones}, one for each bone')
+        positions, orientations = poses[:, :3], poses[:, 3:]
+        masses, ends = swings.get(stamp), None
+        if masses is not None:
+            if len(masses) != rods.count:
+                raise errors.WrongForm('swings', f'{len(masses)} masses', f'{rods.count} masses')
+            unknown = np.zeros_like(positions)
+            ends = rods.between(masses[:, :3], State(positions, orientations, unknown, unknown))
+        recorder.add((stamp - heard[0][0]) / SECOND, Pose(positions, orientations, ends))
+    return recorder.recording()

@@ -1,0 +1,110 @@
+"""Messages in a rosbag2 recording, MCAP or SQLite, whole or torn.
+
+Of a torn file all is read that is whole: of MCAP every record before the tear, also within a chunk
+that is not compressed; of SQLite every row on a page that is there.
+"""
+from __future__ import annotations
+
+import io
+import re
+import sqlite3
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+from ..model import errors
+
+NO_MCAP = "MCAP files need mcap: pip install 'ragdoll_ros[replay]'"
+
+Messages = Iterator[tuple[str, str, bytes]]
+"""Topics, types and contents in CDR, in the order in which they were recorded."""
+
+
+def read_messages(path: Path, warn: Callable[[str], None]) -> Messages:
+    """All messages of a recording: a folder of rosbag2, or one of its files.
+
+    ``warn`` is told where a file breaks off. Unreadable for what is no recording.
+    """
+    for file in _files(path):
+        read = _read_mcap if file.suffix == '.mcap' else _read_sqlite
+        try:
+            yield from read(file)
+        except errors.ModelError:
+            raise
+        except Exception as error:  # whatever torn bytes are to who reads them
+            warn(f'{file} breaks off ({str(error) or type(error).__name__}): '
+                 'what stands before that is read')
+
+
+def _files(path: Path) -> list[Path]:
+    """Files of a recording, the first first: their names end in numbers."""
+    found = [path] if path.is_file() else list(path.glob('*')) if path.is_dir() else []
+    found = [file for file in found if file.suffix in ('.mcap', '.db3')]
+    if not found:
+        raise errors.Unreadable('', str(path), 'a folder of `ros2 bag record`, a .mcap or a .db3')
+    return sorted(found, key=lambda file: [int(part) if part.isdigit() else part
+                                           for part in re.split(r'(\d+)', file.name)])
+
+
+def _read_sqlite(file: Path) -> Messages:
+    connection = sqlite3.connect(f'{file.resolve().as_uri()}?mode=ro', uri=True)
+    try:
+        # Else SQLite refuses a file that is shorter than its first page says.
+        connection.execute('PRAGMA writable_schema = ON')
+        yield from connection.execute(
+            'SELECT topics.name, topics.type, messages.data FROM messages JOIN topics '
+            'ON topics.id = messages.topic_id ORDER BY messages.id')
+    finally:
+        connection.close()
+
+
+def _read_mcap(file: Path) -> Messages:
+    try:
+        from mcap.records import Channel, Message, Schema
+    except ImportError:
+        raise errors.Unreadable('', str(file), NO_MCAP) from None
+    kinds: dict[int, str] = {}
+    channels: dict[int, tuple[str, str]] = {}
+    with file.open('rb') as stream:
+        for record in _records(stream):
+            if isinstance(record, Schema):
+                kinds[record.id] = record.name
+            elif isinstance(record, Channel):
+                channels[record.id] = record.topic, kinds.get(record.schema_id, '')
+            elif isinstance(record, Message):
+                yield *channels[record.channel_id], record.data
+
+
+def _records(stream: BinaryIO, in_chunk: bool = False) -> Iterator[object]:
+    """Records of a file, or of what is there of a chunk's content; EndOfFile where it is torn."""
+    from mcap.exceptions import EndOfFile
+    from mcap.records import Chunk
+    from mcap.stream_reader import StreamReader, breakup_chunk
+    end = 0
+    try:
+        for record in StreamReader(stream, skip_magic=in_chunk, emit_chunks=True).records:
+            end = stream.tell()
+            if isinstance(record, Chunk):
+                yield from breakup_chunk(record, validate_crc=True)
+            else:
+                yield record
+    except EndOfFile:
+        stream.seek(end)
+        yield from _records_of_torn(stream)
+        raise
+
+
+def _records_of_torn(stream: BinaryIO) -> Iterator[object]:
+    """What is whole in the record at which a file ends too early."""
+    from mcap.data_stream import ReadDataStream
+    from mcap.exceptions import EndOfFile
+    from mcap.opcode import Opcode
+    from mcap.records import Chunk
+    if stream.read(9)[:1] != bytes([Opcode.CHUNK]):
+        return
+    chunk = Chunk.read(ReadDataStream(stream))
+    if not chunk.compression:
+        try:
+            yield from _records(io.BytesIO(chunk.data), in_chunk=True)
+        except EndOfFile:
+            return

@@ -1,0 +1,1 @@
+"""Recorded runs: read, repeated to the bit, compared."""

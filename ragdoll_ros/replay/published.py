@@ -1,0 +1,68 @@
+"""A run on the topics of a node `ragdoll`, by the clock on the wall."""
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import rclpy
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+from ..model.ragdoll import WORLD
+from ..physics.simulation import Simulation
+from ..ros.outputs import Outputs
+from ..ros.session import ros_session
+from ..ros.signals import ended_by_signals
+from ..ros.stamps import Stamps
+from ..ros.ticker import Ticker
+
+BONE_NAMES = 'bone_names'
+
+
+def publish(steps: Iterator[Simulation], pace: float, arguments: list[str]) -> int:
+    """Publish each of the ``steps``, ``pace`` s of them in each s on the wall, until they end.
+
+    ``arguments`` are those for ROS, from --ros-args on. The exit code.
+    """
+    def spin() -> int:
+        with ros_session(arguments):
+            node = PublishedRun(steps, pace)
+            try:
+                while not node.is_over:
+                    rclpy.spin_once(node)
+            finally:
+                node.destroy_node()
+        return 0
+    return ended_by_signals(spin)
+
+
+class PublishedRun(Node):
+    """Publishes what the node did whose run it was, with the stamps of now."""
+
+    def __init__(self, steps: Iterator[Simulation], pace: float) -> None:
+        super().__init__('ragdoll')
+        self.is_over = False
+        self._steps, self._pace = steps, pace
+        self._simulation: Simulation | None = None
+        self._stamps, self._outputs = Stamps(time.time_ns), Outputs(self)
+        self.declare_parameter(BONE_NAMES, [''])
+        self._ticker = Ticker(self, Clock(clock_type=ClockType.STEADY_TIME), self._tick)
+        self._period = 0.0
+        self._tick()
+
+    def _tick(self, due: float | None = None) -> None:
+        simulation = next(self._steps, None)
+        if simulation is None:
+            self.is_over = True
+            self._ticker.stop()
+            return
+        if simulation is not self._simulation:
+            self._simulation = simulation
+            self._outputs.describe(simulation.scene, WORLD, 'all')
+            self.set_parameters([rclpy.Parameter(BONE_NAMES, value=list(
+                simulation.scene.bone_names))])
+        self._stamps.take(due)
+        self._outputs.publish(simulation, self._stamps.newest, time.monotonic_ns())
+        if simulation.tick / self._pace != self._period:
+            self._period = simulation.tick / self._pace
+            self._ticker.start(self._period)

@@ -1,0 +1,140 @@
+"""What acts on a simulation, told and done again: the same bits, through JSON, by every engine."""
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import struct
+
+import pytest
+from digests import disturb
+
+from ragdoll_ros.files.run_scene import read_run_scene, run_scene_text, versions
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.model import errors
+from ragdoll_ros.model.push import Push
+from ragdoll_ros.model.scene import Ground
+from ragdoll_ros.physics.recorded import RecordedSimulation, accuracy_from, repeat, state_digest
+from ragdoll_ros.physics.settings import NORMAL, Accuracy
+from ragdoll_ros.physics.simulation import Simulation
+
+QUIET = {'advance', 'measures', 'close', 'swings', 'contacts', 'coordinates'}
+"""Public names of Simulation that change nothing, or only by the ticks that are counted."""
+
+
+def disturb_more(simulation, tick):
+    """What disturb() leaves out, with numbers that no short decimal gives."""
+    disturb(simulation, tick)
+    if tick == 30:
+        simulation.push(Push('head', (1 / 3, 0.1, -2e-7), duration=1 / 7), 'keys')
+    elif tick == 33:
+        simulation.release('keys')
+    elif tick == 100:
+        simulation.accuracy = 'draft'
+    elif tick == 120:
+        simulation.step = 1 / 240
+    elif tick == 130:
+        simulation.place(simulation.coordinates)
+    elif tick == 170:
+        simulation.accuracy = dataclasses.replace(NORMAL, step=1 / 300)
+    elif tick == 180:
+        simulation.reset()
+
+
+def recorded_run(scene, engine, ticks):
+    """Digests of all states, and all acts as lines of JSON, each with its tick."""
+    lines, digests = [], []
+    with RecordedSimulation(scene, engine=engine) as simulation:
+        simulation.tell = lambda name, given: lines.append(json.dumps([len(digests), name, given]))
+        for tick in range(ticks):
+            disturb_more(simulation, tick)
+            digests.append(state_digest(simulation.advance()))
+    return digests, lines
+
+
+@pytest.mark.parametrize('engine', ['rigid', 'bullet', 'mujoco'])
+def test_the_same_acts_give_the_same_bits(engine):
+    pytest.importorskip({'rigid': 'numba', 'bullet': 'pybullet', 'mujoco': 'mujoco'}[engine])
+    scene = load_scene('drop')
+    digests, lines = recorded_run(scene, engine, 220)
+    acts = [json.loads(line) for line in lines]
+    assert len({name for _, name, _ in acts}) == 9, 'every kind of act'
+    again, _ = read_run_scene(run_scene_text(scene))
+    with Simulation(again, engine=engine) as simulation:
+        for tick, digest in enumerate(digests):
+            for _, name, arguments in [act for act in acts if act[0] == tick]:
+                repeat(simulation, name, arguments)
+            assert state_digest(simulation.advance()) == digest, tick
+
+
+def test_every_way_to_act_is_told():
+    """A method that is added to Simulation must be told, or stand among the quiet ones."""
+    ways = {name for name, value in vars(Simulation).items() if not name.startswith('_') and (
+        callable(value) or getattr(value, 'fset', None))}
+    assert ways - QUIET == {name for name in vars(RecordedSimulation) if name in ways}
+
+
+def test_a_digest_is_that_of_the_rows_of_doubles():
+    with Simulation(load_scene('crowd')) as simulation:
+        state = simulation.advance()
+    numbers = [value for row in state.rows.tolist() for value in row]
+    packed = struct.pack(f'<{len(numbers)}d', *numbers)
+    assert state_digest(state) == hashlib.sha256(packed).hexdigest()
+
+
+def test_what_ends_no_push_is_not_told():
+    told = []
+    with RecordedSimulation(load_scene('flight')) as simulation:
+        simulation.tell = lambda name, given: told.append(name)
+        simulation.release('keys')
+        simulation.push(Push('head', (1, 0, 0)), 'keys')
+        simulation.release('keys')
+    assert told == ['push', 'release']
+
+
+def test_what_is_refused_is_not_told():
+    told = []
+    with RecordedSimulation(load_scene('flight')) as simulation:
+        simulation.tell = lambda name, given: told.append(name)
+        with pytest.raises(errors.UnknownBone):
+            simulation.push(Push('tail', (1, 0, 0)))
+        with pytest.raises(errors.OutOfRange):
+            simulation.step = 10.0
+    assert told == []
+
+
+@pytest.mark.parametrize(('name', 'arguments'), [
+    ('explode', {}), ('__class__', {}), ('push', {'bone': 'head'}), ('grab', {'hand': 'a'}),
+    ('push', {'bone': 'head', 'channel': None, 'x': 1}),
+    ('push', {'bone': 'head', 'channel': None, 'force': 'abc'}),
+    ('drag', {'hand': 'a', 'target': ['x', 0, 0], 'within': 0.1}), ('step', {'step': 'a'}),
+    ('accuracy', {'step': 'a'}), ('place', {'q': [], 'v': []})])
+def test_what_is_no_act_is_refused_by_name(name, arguments):
+    with Simulation(load_scene('flight')) as simulation, pytest.raises(errors.ModelError) as caught:
+        repeat(simulation, name, arguments)
+    assert 'expected' in str(caught.value)
+
+
+@pytest.mark.parametrize('wrong', [{'step': 'a'}, {'stride': 1}, {},
+                                   {**dataclasses.asdict(NORMAL), 'step': 'a'},
+                                   {**dataclasses.asdict(NORMAL), 'step': -1}])
+def test_an_accuracy_that_is_none_is_refused(wrong):
+    assert accuracy_from(dataclasses.asdict(NORMAL)) == NORMAL
+    assert isinstance(accuracy_from(dataclasses.asdict(NORMAL)), Accuracy)
+    with pytest.raises(errors.ModelError, match='accuracy'):
+        accuracy_from(wrong)
+
+
+@pytest.mark.parametrize('name', ['drop', 'crowd', 'ponytail', 'field'])
+def test_a_scene_is_read_again_as_it_was(name):
+    scene = dataclasses.replace(load_scene(name), ground=Ground((0.1, 0.2, 1 / 3), 1 / 3))
+    text = run_scene_text(scene)
+    again, told = read_run_scene(text)
+    assert again == scene and told == versions()
+    assert len({id(each.doll) for each in again.dolls}) == len({id(e.doll) for e in scene.dolls})
+    assert text.count('bones:') == 1, 'equal dolls are written once'
+
+
+def test_a_text_without_versions_is_no_scene_of_a_run():
+    with pytest.raises(errors.RagdollError, match='versions'):
+        read_run_scene('dolls: []')
