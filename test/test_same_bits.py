@@ -2,6 +2,7 @@
 
 Each is a process whose libraries and compiler are told that the processor is another one.
 """
+import ast
 import os
 import subprocess
 import sys
@@ -87,6 +88,23 @@ def old(tmp_path_factory):
     if not {'lm', 'sse2'} <= features():
         pytest.skip('not x86-64, or not Linux')
     return fall(tmp_path_factory.mktemp('old'), OLD)
+
+
+ROUNDED_ONCE = {'sqrt', 'floor', 'ceil', 'copysign', 'isfinite', 'inf', 'pi', 'factorial'}
+"""Of the module math: what is exact, or rounded as IEEE 754 says."""
+
+
+def test_machine_code_calls_nothing_that_rounds_as_it_likes():
+    for path in (ROOT / 'ragdoll_ros' / 'physics' / 'kernels').glob('*.py'):
+        for node in ast.walk(ast.parse(path.read_text())):
+            where = f'{path.name}:{getattr(node, "lineno", 0)}'
+            if isinstance(node, ast.Attribute) and ast.unparse(node.value) == 'math':
+                assert node.attr in ROUNDED_ONCE, where
+            elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
+                assert isinstance(getattr(node.right, 'value', None), int) or ast.unparse(
+                    node.left) == '-1', f'{where}: a power that is none of products'
+            elif isinstance(node, ast.keyword):
+                assert node.arg != 'fastmath', where
 
 
 @pytest.mark.slow
