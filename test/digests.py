@@ -1,7 +1,7 @@
 """SHA-256 of what the package computes: what a change of structure must leave as it is, to the bit.
 
-Machine code rounds as the processor does, so a record is good for one machine and one set of
-libraries alone: make it before the change, compare after it.
+Swings and other engines than rigid round as the processor and the libraries do, so a record is
+good for one machine and one set of libraries: make it before the change, compare after it.
 
     python test/digests.py --out build/before.json
     python test/digests.py --against build/before.json

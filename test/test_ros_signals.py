@@ -70,4 +70,19 @@ def test_fifty_signals_at_random_instants(ros):
         process.send_signal(draw.choice((signal.SIGINT, signal.SIGTERM)))
         code, _, errors = outcome(process)
         assert code == 0 and 'Traceback' not in errors
-        assert time.monotonic() - sent < 5
+        assert time.monotonic() - sent < 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('delay', [0.0, 3.0, 10.0])
+def test_a_signal_while_it_compiles_ends_it(ros, monkeypatch, tmp_path, delay):
+    monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path))
+    process = start('node', compiled=True)
+    assert 'Compiling' in process.stderr.readline()
+    end = time.monotonic() + delay
+    wait(lambda: time.monotonic() > end)
+    sent = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    code, _, errors = outcome(process)
+    assert code == 0 and 'Traceback' not in errors
+    assert time.monotonic() - sent < 5

@@ -9,6 +9,8 @@ import math
 
 import numpy as np
 
+from .angle import sine_and_cosine
+
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 
@@ -66,10 +68,13 @@ _PRODUCTS = _products_to_matrix()
 
 
 def matrix(q: np.ndarray) -> np.ndarray:
-    """Rotation matrices (..., 3, 3) of unit quaternions; one product, as this runs every tick."""
+    """Rotation matrices (..., 3, 3) of unit quaternions.
+
+    By einsum, which sums in one order: BLAS has another one on each kind of processor.
+    """
     q = np.asarray(q, float)
-    products = q[..., :, None] * q[..., None, :]
-    return (products.reshape(*q.shape[:-1], 16) @ _PRODUCTS).reshape(*q.shape[:-1], 3, 3)
+    products = (q[..., :, None] * q[..., None, :]).reshape(*q.shape[:-1], 16)
+    return np.einsum('...i,ij->...j', products, _PRODUCTS).reshape(*q.shape[:-1], 3, 3)
 
 
 def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -98,7 +103,8 @@ def from_matrix(r: np.ndarray) -> np.ndarray:
 
 def from_axis_angle(axis: np.ndarray, angle: float) -> np.ndarray:
     """Unit quaternion (4,) of a turn by ``angle`` rad about ``axis``, right-handed."""
-    return np.append(normalized(axis) * math.sin(angle / 2), math.cos(angle / 2))
+    sine, cosine = sine_and_cosine(angle / 2)
+    return np.append(normalized(axis) * sine, cosine)
 
 
 def from_rotation_vector(vectors: np.ndarray) -> np.ndarray:

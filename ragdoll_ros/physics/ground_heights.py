@@ -32,10 +32,10 @@ class GroundHeights:
         if self._ground is None:
             return np.full(self._count, math.inf)
         normal = np.array(self._ground.normal)
-        down = -(normal @ state.rotation_matrices)[self._bones]
+        down = -np.einsum('i,nij->nj', normal, state.rotation_matrices)[self._bones]
         reach = (down * self._positions).sum(axis=1) + support_distance(
             self._supports, np.einsum('pj,pji->pi', down, self._turns))
-        return (state.positions @ normal - self._ground.offset
+        return ((state.positions * normal).sum(axis=1) - self._ground.offset
                 - np.maximum.reduceat(reach, self._first))
 
 

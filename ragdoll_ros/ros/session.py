@@ -1,6 +1,7 @@
 """ROS from its start to a signal."""
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
@@ -14,9 +15,14 @@ def ros_session(arguments: list[str]) -> Iterator[None]:
     """Have ROS until the context ends, or until SIGINT or SIGTERM ends it, which is no error.
 
     rclpy shuts down where the signal finds it, so that whatever a callback in progress does
-    next with ROS fails: errors after a shutdown are its consequence.
+    next with ROS fails: errors after a shutdown are its consequence. Where ROS does not even start
+    the process ends with 2, and says why.
     """
-    rclpy.init(args=arguments)
+    try:
+        rclpy.init(args=arguments)
+    except RCLError as error:  # such as a log that has no folder
+        print(f'ROS does not start: {error}', file=sys.stderr)
+        raise SystemExit(2) from error
     try:
         yield
     except (KeyboardInterrupt, ExternalShutdownException):

@@ -74,7 +74,7 @@ class Neighbours:
         """
         if self._ground is None:
             return np.zeros(len(groups), bool)
-        heights = rows[:, :3] @ np.array(self._ground.normal) - self._ground.offset
+        heights = (rows[:, :3] * self._ground.normal).sum(axis=1) - self._ground.offset
         near = np.minimum.reduceat(heights - balls, self._first) < 0
         return (np.bincount(groups, near) > 0)[groups]
 

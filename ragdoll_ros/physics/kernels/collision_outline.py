@@ -14,8 +14,11 @@ SQUARE = 0.1
 LYING = 0.7
 """Cosine between n and a cylinder's axis up to which it shows its side."""
 
-CORNERS = 8
-"""Corners of a disc."""
+SLANT = math.sqrt(0.5)
+DISC = np.array(((1, 0), (SLANT, SLANT), (0, 1), (-SLANT, SLANT),
+                 (-1, 0), (-SLANT, -SLANT), (0, -1), (SLANT, -SLANT)))
+CORNERS = len(DISC)
+"""Corners of a disc of radius 1."""
 
 
 @compiled
@@ -39,9 +42,12 @@ def outline(kind: int, size: np.ndarray, r: np.ndarray, x: float, y: float, z: f
     if across < 1e-9:
         x, y, _ = into(r, tx, ty, tz)
         across = math.sqrt(x * x + y * y)
-    deepest = round(math.atan2(y, x) * CORNERS / (2 * math.pi)) % CORNERS
+    deepest = 0
+    for k in range(1, CORNERS):
+        if x * DISC[k, 0] + y * DISC[k, 1] > x * DISC[deepest, 0] + y * DISC[deepest, 1]:
+            deepest = k
     for k in range(CORNERS):
-        a, b = math.cos(2 * math.pi * k / CORNERS), math.sin(2 * math.pi * k / CORNERS)
+        a, b = DISC[k, 0], DISC[k, 1]
         if k == deepest and across > 1e-9:
             a, b = x / across, y / across
         corners[k, 0], corners[k, 1], corners[k, 2] = out_of(r, size[0] * a, size[0] * b, end)

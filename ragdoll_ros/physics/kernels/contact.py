@@ -14,6 +14,7 @@ from .dynamics import Work, pose
 from .machine import compiled
 from .quaternion import cross, times, to_matrix, turned
 from .system import OUTSIDE, WITHIN, Room, System
+from .transcendental import asinh
 
 TOUCHING = 1e-6
 """m or rad: what is nearer touches."""
@@ -361,7 +362,7 @@ def shrink(r: Room, begin: int, end: int) -> None:
         a, b, c = p[0] - x, p[1] - y, p[2] - z
         u, v = a * t[0] + b * t[1] + c * t[2], a * w[0] + b * w[1] + c * w[2]
         corners += math.sqrt(u * u + v * v) / count
-        angle, k = math.atan2(v, u), e - begin
+        angle, k = way(u, v), e - begin
         while k > 0 and flat[0, k - 1] > angle:
             flat[0, k], flat[1, k], flat[2, k] = flat[0, k - 1], flat[1, k - 1], flat[2, k - 1]
             k -= 1
@@ -384,6 +385,13 @@ def shrink(r: Room, begin: int, end: int) -> None:
 
 
 @compiled
+def way(x: float, y: float) -> float:
+    """What orders directions as their angle does: -2 to 2 for -pi to pi."""
+    size = abs(x) + abs(y)
+    return math.copysign(1 - x / size, y) if size > 0.0 else 0.0
+
+
+@compiled
 def triangle(ax: float, ay: float, bx: float, by: float) -> tuple[float, float]:
     """Area of the triangle of the origin, a and b, and the integral over it of the distance from
     the origin: d^3/6 (sec tan + ln(sec + tan)) from foot to corner, d the height of the side ab.
@@ -401,7 +409,7 @@ def triangle(ax: float, ay: float, bx: float, by: float) -> tuple[float, float]:
 @compiled
 def sector(tangent: float) -> float:
     """The sum sec tan + ln(sec + tan) of the angle of that tangent."""
-    return tangent * math.sqrt(1 + tangent * tangent) + math.asinh(tangent)
+    return tangent * math.sqrt(1 + tangent * tangent) + asinh(tangent)
 
 
 @compiled

@@ -18,6 +18,7 @@ import numpy as np
 from .cholesky import solve
 from .machine import compiled, inlined
 from .quaternion import cross, times, to_matrix, turned
+from .transcendental import sine_and_cosine
 
 Work = collections.namedtuple(
     'Work', 'turns centres moves axes inertias biases drifts pulls matrix')
@@ -63,7 +64,7 @@ def pose(tree: np.ndarray, q: np.ndarray, v: np.ndarray, work: Work) -> None:
             for j in range(6):
                 moves[i, j] += axes[rate, j] * v[rate]
             if not bone.free:
-                sine, cosine = math.sin(q[at + k] / 2), math.cos(q[at + k] / 2)
+                sine, cosine = sine_and_cosine(q[at + k] / 2)
                 x, y, z, w = times(x, y, z, w, d * sine, e * sine, f * sine, cosine)
             rate += 1
         turns[i, 0], turns[i, 1], turns[i, 2], turns[i, 3] = x, y, z, w

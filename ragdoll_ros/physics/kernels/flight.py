@@ -111,7 +111,7 @@ def begin_path(s: System, r: Room, course: Course, loads: np.ndarray, tolerance:
         error = path_step(s, r, loads, course, h)
         r.tally[0].flights += 1
         ratio = error / tolerance
-        factor = SAFETY * ratio ** -0.125 if ratio > 0 else LONGER
+        factor = SAFETY / math.sqrt(math.sqrt(math.sqrt(ratio))) if ratio > 0 else LONGER
         good = ratio <= 1 or (HELPED * before < error < math.inf)
         path.length, path.error = h, error
         path.next = h * min(LONGER, max(SHORTER, factor))

@@ -14,6 +14,7 @@ import numpy as np
 from .dynamics import Work
 from .machine import compiled
 from .quaternion import cross, times, to_matrix, turned
+from .transcendental import sine_and_cosine
 
 
 @compiled
@@ -259,9 +260,9 @@ def integrate(tree: np.ndarray, q: np.ndarray, v: np.ndarray, h: float, out: np.
         if bone.free:
             a, b, c = v[rate] * h, v[rate + 1] * h, v[rate + 2] * h
             n = math.sqrt(a * a + b * b + c * c)
-            s = 0.5 - n * n / 48 if n < 1e-3 else math.sin(n / 2) / n
-            x, y, z, w = times(q[at], q[at + 1], q[at + 2], q[at + 3], a * s, b * s, c * s,
-                               math.cos(n / 2))
+            sine, cosine = sine_and_cosine(n / 2)
+            s = 0.5 - n * n / 48 if n < 1e-3 else sine / n
+            x, y, z, w = times(q[at], q[at + 1], q[at + 2], q[at + 3], a * s, b * s, c * s, cosine)
             n = math.sqrt(x * x + y * y + z * z + w * w)
             out[at], out[at + 1], out[at + 2], out[at + 3] = x / n, y / n, z / n, w / n
         else:

@@ -1,0 +1,49 @@
+"""Sines, cosines and inverse hyperbolic sines against the C library's and against many digits."""
+import math
+
+import pytest
+
+from ragdoll_ros.model.angle import sine_and_cosine
+
+numba = pytest.importorskip('numba')
+from ragdoll_ros.physics.kernels import transcendental  # noqa: E402
+
+ANGLES = [0.0, -0.0, 1e-300, 1e-9, 0.3, math.pi / 4, 0.8, math.pi / 2, 2.0, math.pi, 4.0, 5.0,
+          2 * math.pi, 100.0, 1e4, 1e6]
+
+
+@pytest.fixture(scope='module')
+def compiled():
+    """The kernels' two functions as Python calls them."""
+    sine_and_cosine, asinh = transcendental.sine_and_cosine, transcendental.asinh
+    return (numba.njit(lambda x: sine_and_cosine(x), error_model='numpy'),
+            numba.njit(lambda x: asinh(x), error_model='numpy'))
+
+
+@pytest.mark.parametrize('angle', [*ANGLES, *(-angle for angle in ANGLES)])
+def test_sine_and_cosine_are_those_of_the_c_library(compiled, angle):
+    right = math.sin(angle), math.cos(angle)
+    assert compiled[0](angle) == pytest.approx(right, rel=0, abs=3e-16)  # 1.5 units of the last bit
+    for found, wanted in zip(sine_and_cosine(angle), right, strict=True):
+        assert abs(found - wanted) <= math.ulp(wanted) if abs(wanted) > 1e-9 else 1e-16
+
+
+def test_sine_and_cosine_far_from_0_and_without_bound(compiled):
+    s, c = compiled[0](1e9)
+    assert (s, c) == pytest.approx((math.sin(1e9), math.cos(1e9)), abs=1e-6)  # 1e9 rounds
+    assert s * s + c * c == pytest.approx(1, abs=1e-6)
+    for angle in (math.inf, math.nan):
+        assert all(map(math.isnan, compiled[0](angle)))
+
+
+def test_half_a_bit_decides():
+    """sin(pi + 1e-16) as many digits have it: what the C library takes for exact is not needed."""
+    assert sine_and_cosine(math.pi) == (1.2246467991473532e-16, -1.0)
+    assert sine_and_cosine(0.0) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize('x', [0.0, 1e-300, 1e-5, 0.049, 0.051, 0.5, 1.0, 30.0, 1e8])
+def test_inverse_hyperbolic_sine(compiled, x):
+    for signed in (x, -x):
+        assert compiled[1](signed) == pytest.approx(math.asinh(signed), rel=2e-15)  # some roundings
+    assert math.isnan(compiled[1](math.nan))
