@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 import time
 from collections.abc import Iterator
@@ -27,6 +26,7 @@ from .interactive import Interactive
 from .namesakes import Namesakes
 from .outputs import Outputs
 from .parameters import Parameters, Settings, make_simulation, step_of
+from .rescue import Rescue
 from .services import Services
 from .session import ros_session
 from .signals import ended_by_signals
@@ -75,6 +75,7 @@ class RagdollNode(Node):
                                         self._wanted_pace, self._time_of_report)
         Services(self, self)
         self._namesakes = Namesakes(self)
+        self._rescue = Rescue(self)
         self.paused = False
         self._use(self.simulation)
         self._tell_start()
@@ -105,13 +106,12 @@ class RagdollNode(Node):
         return super().waitables if self._ticker.looks(MISFITS) else iter(())
 
     def tick(self, due: float | None = None) -> None:
-        """Go on by one tick and publish; a state that is not finite is never shown.
+        """Go on by one tick and publish; a bad state is never shown.
 
         ``due``: when, ns of the steady clock; now, if it is not said.
         """
         start = time.monotonic_ns()
-        if not self._advance():
-            self.tally.refuse('state', 'not finite; the simulation was built anew')
+        if not self._rescue.advance(self.settings.dump_directory):
             self._replace(make_simulation(self._tuning.scene, self.settings))
         self._stamps.take(due)
         self._publish()
@@ -156,14 +156,6 @@ class RagdollNode(Node):
                 simulation.close()
         super().destroy_node()
 
-    def _advance(self) -> bool:
-        """Go on by a tick; whether all numbers stay finite. What runs away may fail within it."""
-        try:
-            state = self.simulation.advance()
-        except (ArithmeticError, ValueError):
-            return False
-        return self.simulation.asleep or math.isfinite(float(state.rows.sum()))
-
     def _ros_time(self) -> int:
         """Of the node's clock, ns; of the computer's where that is the same, which is quicker."""
         clock = self.get_clock()
@@ -203,6 +195,7 @@ class RagdollNode(Node):
         """Let all parts work with this simulation and the settings as they are."""
         self.simulation = self.inputs.simulation = self._diagnostics.simulation = simulation
         self.inputs.settings = self.settings
+        self._rescue.use(simulation)
         self._outputs.describe(simulation.scene, self.settings.frame_id,
                                self.settings.publish_tf)
         self.interactive.use(simulation, self.settings)
@@ -249,7 +242,8 @@ class RagdollNode(Node):
         return {'paused': self.paused, 'real_time_factor': settings.real_time_factor,
                 'lost_time': ticker.lost / 1e9, 'dropped_ticks': ticker.dropped,
                 'stamp_pace': pace, 'namesakes': self._namesakes.count,
-                'stamp_of_zero': self.stamp - round(self.simulation.time / pace)}
+                'stamp_of_zero': self.stamp - round(self.simulation.time / pace),
+                **self._rescue.facts()}
 
 
 def main(arguments: list[str] | None = None) -> int:
