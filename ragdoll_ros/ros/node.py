@@ -115,6 +115,7 @@ class RagdollNode(Node):
             self._replace(make_simulation(self._tuning.scene, self.settings))
         self._stamps.take(due)
         self._publish()
+        self._ticker.doze(self.simulation.asleep and not self._outputs.heard)
         late = 0.0 if due is None else max(0.0, start - due)
         self._diagnostics.count(time.monotonic_ns() - start, late, self.simulation.tick)
 
