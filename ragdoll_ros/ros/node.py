@@ -75,7 +75,7 @@ class RagdollNode(Node):
                                         self._wanted_pace, self._time_of_report)
         Services(self, self)
         self._namesakes = Namesakes(self)
-        self._rescue = Rescue(self)
+        self.rescue = Rescue(self)
         self.paused = False
         self._use(self.simulation)
         self._tell_start()
@@ -111,7 +111,7 @@ class RagdollNode(Node):
         ``due``: when, ns of the steady clock; now, if it is not said.
         """
         start = time.monotonic_ns()
-        if not self._rescue.advance(self.settings.dump_directory):
+        if not self.rescue.advance(self.settings.dump_directory):
             self._replace(make_simulation(self._tuning.scene, self.settings))
         self._stamps.take(due)
         self._publish()
@@ -196,7 +196,7 @@ class RagdollNode(Node):
         """Let all parts work with this simulation and the settings as they are."""
         self.simulation = self.inputs.simulation = self._diagnostics.simulation = simulation
         self.inputs.settings = self.settings
-        self._rescue.use(simulation)
+        self.rescue.use(simulation)
         self._outputs.describe(simulation.scene, self.settings.frame_id,
                                self.settings.publish_tf)
         self.interactive.use(simulation, self.settings)
@@ -244,7 +244,7 @@ class RagdollNode(Node):
                 'lost_time': ticker.lost / 1e9, 'dropped_ticks': ticker.dropped,
                 'stamp_pace': pace, 'namesakes': self._namesakes.count,
                 'stamp_of_zero': self.stamp - round(self.simulation.time / pace),
-                **self._rescue.facts()}
+                **self.rescue.facts()}
 
 
 def main(arguments: list[str] | None = None) -> int:

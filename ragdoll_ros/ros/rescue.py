@@ -30,7 +30,9 @@ class Rescue:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._count = self._dumps = 0
+        self.count = 0
+        """Bad states so far."""
+        self._dumps = 0
         self._reason = self._dump = ''
 
     def use(self, simulation: Simulation) -> None:
@@ -48,7 +50,7 @@ class Rescue:
             self._last_states.note()
             self._in_a_row = 0
             return True
-        self._count += 1
+        self.count += 1
         self._in_a_row += 1
         self._reason = bad.reason
         self._tell(bad, directory)
@@ -56,7 +58,7 @@ class Rescue:
 
     def facts(self) -> dict[str, object]:
         """For /diagnostics."""
-        return {'bad_states': self._count, 'bad_state': self._reason, 'state_dump': self._dump}
+        return {'bad_states': self.count, 'bad_state': self._reason, 'state_dump': self._dump}
 
     def _tell(self, bad: BadState, directory: str) -> None:
         """Log it; write a file for the first of several in a row, as all others begin alike."""
