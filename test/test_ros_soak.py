@@ -27,6 +27,7 @@ def test_growth_is_what_memory_grows_by_once_it_is_warm(rate):
     assert error < GROWTH / 2, 'else it could not tell'
 
 
+@pytest.mark.slow
 def test_a_short_soak_counts_hears_and_finds_nothing_bad(ros):
     """PyBullet will do, and 1000 ticks: whether memory grows they cannot tell."""
     done = subprocess.run(
