@@ -22,7 +22,7 @@ else
 VENV_FLAGS := --system-site-packages
 endif
 
-.PHONY: help run test pictures lint slow bench hard report colcon users-versions clean
+.PHONY: help run test pictures lint slow soak bench hard report colcon users-versions clean
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 22
 
@@ -52,6 +52,9 @@ lint: $(READY) ## ruff
 
 slow: $(COMPILED) ## the tests that take minutes
 	@$(BIN)/python -m pytest -m slow
+
+soak: $(COMPILED) ## 864 000 ticks, pushed, set back, with other scenes: nothing may grow; 25 min
+	@$(BIN)/python -m ragdoll_ros.ros.soak
 
 bench: $(COMPILED) ## cost of a tick and of its parts, of crowds, swings and the page, 30 min
 	@$(BIN)/python -m ragdoll_ros.ros.bench

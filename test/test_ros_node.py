@@ -1,7 +1,6 @@
 """The node in this process: time, services, exactness, what it leaves behind."""
 from __future__ import annotations
 
-import dataclasses
 import gc
 import hashlib
 import os
@@ -269,24 +268,6 @@ def test_a_node_that_uses_simulated_time_does_not_wait_for_itself(make_node, pee
     node = make_node(publish_clock=True, use_sim_time=True)
     peer.executor_.add_node(node)
     peer.wait(lambda: node.simulation.time > 10 * node.simulation.tick)
-
-
-def test_a_state_that_is_not_finite_is_not_shown_and_the_doll_goes_on(make_node, peer):
-    node = make_node()
-    got = peer.collect(PoseArray, 'ragdoll/poses')
-    peer.wait_heard(node, POSES)
-    coordinates = node.simulation.coordinates
-    node.simulation.place(dataclasses.replace(
-        coordinates, v=np.full_like(coordinates.v, 1e300)))
-    for _ in range(3):
-        node.tick()
-    assert node.tally.refused == {'state': 1}
-    peer.wait(lambda: len(got) == 3)
-    with Simulation(load_scene('drop')) as anew:
-        wanted = [anew.state.positions, anew.advance().positions, anew.advance().positions]
-    np.testing.assert_array_equal(
-        [[(pose.position.x, pose.position.y, pose.position.z) for pose in message.poses]
-         for _, message in got], wanted)
 
 
 def left_behind():

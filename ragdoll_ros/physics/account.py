@@ -1,7 +1,7 @@
 """The account of energy: what each doll began with, what was put in, what it may have."""
 from __future__ import annotations
 
-import copy
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,10 +44,15 @@ class Account:
 
     def copy(self) -> Account:
         """As it is now."""
-        return copy.deepcopy(self)
+        return dataclasses.replace(self, start=self.start.copy(), allowed=self.allowed.copy(),
+                                   put_in=self.put_in.copy())
+
+    def excess(self, energy: np.ndarray) -> float:
+        """What dolls that have an ``energy`` (d,) J have above their start and all work since."""
+        return float((energy - self.start).sum()) - self.pushes - self.grabs
 
     def measures(self, energy: np.ndarray) -> dict[str, float]:
         """What it says where dolls have an ``energy`` (d,) J: names end in their units."""
-        return {'energy_excess_J': float((energy - self.start).sum()) - self.pushes - self.grabs,
+        return {'energy_excess_J': self.excess(energy),
                 'energy_projected_J': self.taken,
                 'work_of_pushes_J': self.pushes, 'work_of_grabs_J': self.grabs}

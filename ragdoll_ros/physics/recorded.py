@@ -89,6 +89,12 @@ class RecordedSimulation(Simulation):
         self.tell('reset', self.conditions)
         return state
 
+    def go_back(self, checkpoint: object) -> State:
+        """As Simulation's; told as from where it comes back to, as no tick stands in between."""
+        state = super().go_back(checkpoint)
+        self.tell('go_back', {})
+        return state
+
 
 def repeat(simulation: Simulation, name: str, arguments: dict) -> None:
     """Do again what was told. WrongForm for what is no act; else what the act itself raises."""
@@ -123,6 +129,7 @@ _ACTS: dict[str, Callable[..., object]] = {
     'step': lambda simulation, step: setattr(simulation, 'step', step),
     'accuracy': lambda simulation, **fields: setattr(simulation, 'accuracy', accuracy_from(fields)),
     'place': lambda simulation, q, v: simulation.place(GeneralizedState(np.array(q), np.array(v))),
+    'go_back': lambda simulation: simulation.go_back(simulation.checkpoint()),
     # What it tells beside is for who begins there.
     'reset': lambda simulation, **_: simulation.reset()}
 

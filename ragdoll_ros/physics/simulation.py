@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -43,11 +44,14 @@ class Simulation:
         errors.check_range('workers', workers, 1, MOST_WORKERS)
         self.scene = scene
         self.step = scene.step if step is None else step
+        self.starts = 0
+        """How often it has begun, at first, by reset() or by place()."""
         choice = resolve_engine(engine)
         self.engine_name, self.engine_reason = choice.name, choice.reason
         """The engine that is taken; why it is not the one that 'auto' takes first."""
-        self._engine: Engine = choice.make(scene, resolve_accuracy(accuracy),
-                                           workers=int(workers))
+        self._make = partial(choice.make, scene, workers=int(workers))
+        self._engine: Engine = self._make(resolve_accuracy(accuracy))
+        self._placed: GeneralizedState | None = None
         self._start = self._engine.save()
         self._gap, self._heights = JointGap(scene), GroundHeights(scene)
         self._sleep_detector = SleepDetector(scene)
@@ -90,6 +94,21 @@ class Simulation:
     @accuracy.setter
     def accuracy(self, accuracy: str | Accuracy) -> None:
         self._engine.accuracy = resolve_accuracy(accuracy)
+
+    @property
+    def kinetic_energy(self) -> float:
+        """Of all dolls now, J."""
+        return float(self._engine.motion.kinetic.sum())
+
+    @property
+    def energy_excess(self) -> float:
+        """Energy that nothing has put in since the start, J; losses make it negative."""
+        return self._engine.energy_excess
+
+    @property
+    def energy_error(self) -> float:
+        """Share of the energy at hand that a tick of this engine may make from nothing."""
+        return self._engine.energy_error
 
     @property
     def pushes(self) -> tuple[Push, ...]:
@@ -178,13 +197,39 @@ class Simulation:
             raise errors.OutOfRange('coordinates', (q.shape, v.shape), f'{layout.sizes} numbers')
         errors.check_finite('coordinates', (*q.tolist(), *v.tolist()))
         layout.check_orientations(q)
-        self._engine.place(GeneralizedState(q, v))
+        self._placed = GeneralizedState(q, v)
+        self._engine.place(self._placed)
         self._engine.forget(self._start)
         self._start = self._engine.save()
         return self.reset()
 
+    def checkpoint(self) -> object:
+        """Where all is now, for go_back(); cheap enough for each tick."""
+        return self.time, self._engine.checkpoint()
+
+    def go_back(self, checkpoint: tuple) -> State:
+        """Go on from where all was at a checkpoint; swings hang at rest there. Pushes and hands go
+        on as they are.
+
+        A new engine does: what was bad may have spread through the old one, as a NaN does through
+        PyBullet's search for contacts.
+        """
+        self.time, there = checkpoint
+        self._engine.close()
+        self._engine = self._make(self.accuracy)
+        if self._placed is not None:
+            self._engine.place(self._placed)
+        self._start = self._engine.save()
+        self._engine.go_back(there)
+        self._sleep_detector.disturb()
+        self.asleep = bool(self._engine.resting.all())
+        if self._swings:
+            self._swings.begin(self.time, self.state)
+        return self.state
+
     def reset(self) -> State:
         """Go back to the start, to the bit; pushes that wait are dropped, and hands let go."""
+        self.starts += 1
         self._engine.restore(self._start)
         self.time = 0
         """Nanoseconds simulated since the start."""

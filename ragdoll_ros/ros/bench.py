@@ -1,4 +1,4 @@
-"""What a tick costs and what of: simulation, conversion, messages.
+"""What a tick costs and what of: simulation, by itself and checked, conversion, messages.
 
 Beside it, in the same process and turn by turn, the barest loop that does the same job: PyBullet
 stepped at a fixed 1 ms, one getLinkStates, one publish of a ready message. Take the ratios; the
@@ -18,6 +18,7 @@ from rclpy.node import Node
 from ..files.scene import load_scene
 from ..model.scene import Scene
 from ..physics.engine.bullet import BulletEngine
+from ..physics.guard import Guard
 from ..physics.settings import ACCURACIES
 from ..physics.simulation import Simulation
 from .messages import poses_of, to_pose_array
@@ -53,7 +54,9 @@ def row(node: Node, scene: Scene, accuracy: str, ticks_before: int) -> dict[str,
         bare.advance(scene.step)
         _ = bare.state
 
+    guard = Guard(simulation)
     rounds = [{'simulation': cost(simulation.advance),
+               'checked': cost(guard.advance),
                'conversion': cost(lambda: poses_of(simulation.state)),
                'messages': cost(lambda: outputs.publish(simulation, 0, 0)),
                'bare engine': cost(step_barely),
@@ -72,13 +75,13 @@ def main() -> None:
         drop.dolls[0], position=(0, 0, 1000), spin=(0.2, 0.1, 0.3)),))
     print('us a tick of 10 ms, median; bare: fixed 1 ms substeps, getLinkStates, a ready message')
     print(' ' * 22 + ''.join(f'{name:>14}' for name in (
-        'simulation', 'conversion', 'messages', 'bare engine',
+        'simulation', 'checked', 'conversion', 'messages', 'bare engine',
         'bare publish', 'tick / bare')))
     for label, scene, before in (('in flight', high, 0), ('on the ground', drop, 100),
                                  ('asleep', drop, 1500)):
         for accuracy in ACCURACIES:
             costs = row(node, scene, accuracy, before)
-            ratio = ((costs['simulation'] + costs['messages'])
+            ratio = ((costs['checked'] + costs['messages'])
                      / (costs['bare engine'] + costs['bare publish']))
             print(f'{label + ", " + accuracy:22}' + ''.join(
                 f'{us:14.1f}' for us in costs.values()) + f'{ratio:14.2f}', flush=True)

@@ -37,7 +37,7 @@ class Diagnostics:
         self._node, self._steady, self._tally = node, steady, tally
         self._facts, self._wanted_pace, self._stamp = facts, wanted_pace, stamp
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self._counted = self._dropped = 0
+        self._counted = self._dropped = self._bad = 0
         self._last: dict[str, float] | None = None
         self.simulation: Simulation
         self.begin()
@@ -87,7 +87,7 @@ class Diagnostics:
         self._late = self._latest = 0.0
 
     def _judge(self) -> tuple[bytes, str]:
-        """Level and message: what was refused since the last report, what stalled, else OK."""
+        """Level and message: what was bad, refused or late since the last report, else OK."""
         tally, wanted = self._tally, self._wanted_pace()
         counted = tally.refused.total() + tally.clamped.total()
         refused, self._counted = counted > self._counted, counted
@@ -96,6 +96,11 @@ class Diagnostics:
         if facts['namesakes']:
             warnings.append(f'{facts["namesakes"] + 1} nodes have this name')
         warnings += self._stalls(wanted, facts)
+        bad, self._bad = facts['bad_states'] - self._bad, facts['bad_states']
+        if bad:
+            dump = facts['state_dump'] and f'; the states before are in {facts["state_dump"]}'
+            return DiagnosticStatus.ERROR, '; '.join(
+                [f'{bad} bad states were not published: {facts["bad_state"]}{dump}', *warnings])
         if warnings:
             return DiagnosticStatus.WARN, '; '.join(warnings)
         return DiagnosticStatus.OK, 'running' if wanted else 'paused'

@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 import time
 from collections.abc import Iterator
@@ -27,6 +26,7 @@ from .interactive import Interactive
 from .namesakes import Namesakes
 from .outputs import Outputs
 from .parameters import Parameters, Settings, make_simulation, step_of
+from .rescue import Rescue
 from .run_log import RunLog
 from .services import Services
 from .session import ros_session
@@ -77,6 +77,7 @@ class RagdollNode(Node):
                                         self._wanted_pace, self._time_of_report)
         Services(self, self)
         self._namesakes = Namesakes(self)
+        self.rescue = Rescue(self)
         self.paused = False
         self._use(self.simulation)
         self._tell_start()
@@ -107,18 +108,18 @@ class RagdollNode(Node):
         return super().waitables if self._ticker.looks(MISFITS) else iter(())
 
     def tick(self, due: float | None = None) -> None:
-        """Go on by one tick and publish; a state that is not finite is never shown.
+        """Go on by one tick and publish; a bad state is never shown.
 
         ``due``: when, ns of the steady clock; now, if it is not said.
         """
         start = time.monotonic_ns()
-        if self._advance():
+        if self.rescue.advance(self.settings.dump_directory):
             self._log.count_tick()
-        else:
-            self.tally.refuse('state', 'not finite; the simulation was built anew')
+        elif self.rescue.failed:
             self._replace(make_simulation(self._tuning.scene, self.settings))
         self._stamps.take(due)
         self._publish()
+        self._ticker.doze(self.simulation.asleep and not self._outputs.heard)
         late = 0.0 if due is None else max(0.0, start - due)
         self._diagnostics.count(time.monotonic_ns() - start, late, self.simulation.tick)
 
@@ -161,14 +162,6 @@ class RagdollNode(Node):
                 simulation.close()
         super().destroy_node()
 
-    def _advance(self) -> bool:
-        """Go on by a tick; whether all numbers stay finite. What runs away may fail within it."""
-        try:
-            state = self.simulation.advance()
-        except (ArithmeticError, ValueError):
-            return False
-        return self.simulation.asleep or math.isfinite(float(state.rows.sum()))
-
     def _ros_time(self) -> int:
         """Of the node's clock, ns; of the computer's where that is the same, which is quicker."""
         clock = self.get_clock()
@@ -209,6 +202,7 @@ class RagdollNode(Node):
         self._log.follow(simulation)
         self.simulation = self.inputs.simulation = self._diagnostics.simulation = simulation
         self.inputs.settings = self.settings
+        self.rescue.use(simulation)
         self._outputs.describe(simulation.scene, self.settings.frame_id,
                                self.settings.publish_tf)
         self.interactive.use(simulation, self.settings)
@@ -257,7 +251,8 @@ class RagdollNode(Node):
         return {'paused': self.paused, 'real_time_factor': settings.real_time_factor,
                 'lost_time': ticker.lost / 1e9, 'dropped_ticks': ticker.dropped,
                 'stamp_pace': pace, 'namesakes': self._namesakes.count,
-                'stamp_of_zero': self.stamp - round(self.simulation.time / pace)}
+                'stamp_of_zero': self.stamp - round(self.simulation.time / pace),
+                **self.rescue.facts()}
 
 
 def main(arguments: list[str] | None = None) -> int:

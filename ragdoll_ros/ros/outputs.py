@@ -55,6 +55,13 @@ class Outputs:
         self._transforms.describe(scene, frame, tree)
         self._description.publish(String(data=scene_to_urdf(scene, frame)))
 
+    @property
+    def heard(self) -> bool:
+        """Whether somebody listens to what goes out with each tick."""
+        topics = self._poses, self._state, self._joints, self._contacts, self._swings
+        return self._clock is not None or self._transforms.heard or any(
+            topic is not None and topic.get_subscription_count() for topic in topics)
+
     def publish(self, simulation: Simulation, stamp: int, now: int, still: bool = False) -> None:
         """Publish where the simulation is; ``stamp`` and the steady clock's ``now`` in ns.
 

@@ -68,6 +68,8 @@ class Settings:
     publish_clock: bool = _setting(False, 'Publish simulated time on /clock and stamp by it')
     publish_tf: str = _setting('all', 'Frames on /tf: of all links, of the roots alone, or none',
                                constraints='one of ' + ', '.join(TREES))
+    dump_directory: str = _setting(
+        '', 'Directory for the states before one that could not be; empty: where ROS has its logs')
     accuracy: str = _setting('normal', 'How finely to simulate',
                              constraints='one of ' + ', '.join(ACCURACIES))
     engine: str = _setting('auto', 'What simulates; another one starts anew',

@@ -20,6 +20,10 @@ LONGEST_BURST = 20_000_000
 CATCH_UP = 2
 """Times the wanted pace at which a stall is caught up: listeners' queues are ten messages long."""
 
+DOZING = 2
+"""Ticks at once while none matters: who comes to listen, and what pushes, waits for one more at the
+most, and no stamp is late by more than a tick."""
+
 CALLS, MISFITS = 100_000_000, 1_000_000_000
 """ns for which the call of a service may wait while ticks follow each other closely, and the
 warning that another's topic does not fit."""
@@ -55,15 +59,28 @@ class Ticker:
         """Begin anew: the first tick comes one ``period``, ns, from now."""
         self._pacer.period = period
         self._pacer.start(time.monotonic_ns())
-        self._timer.timer_period_ns = max(SHORTEST_PERIOD, round(period))
-        self._most_ticks = math.ceil(CATCH_UP * self._timer.timer_period_ns / period)
+        self._wake_for(1)
         self._timer.reset()
         self._runs = True
+
+    def doze(self, wanted: bool) -> None:
+        """Wake for every second tick, to make two then, or for each: to wake costs rclpy more than
+        a tick costs that nobody hears, of dolls that sleep.
+        """
+        ticks = DOZING if wanted else 1
+        if ticks != self._at_once:
+            self._wake_for(ticks)
 
     def stop(self) -> None:
         """No tick from now on."""
         self._timer.cancel()
         self._runs = False
+
+    def _wake_for(self, ticks: int) -> None:
+        """Have the timer wake once for so many ticks."""
+        self._at_once, period = ticks, self._pacer.period
+        self._timer.timer_period_ns = max(SHORTEST_PERIOD, round(period)) * ticks
+        self._most_ticks = math.ceil(CATCH_UP * self._timer.timer_period_ns / period)
 
     def _catch_up(self) -> None:
         """Make the ticks that are due, as far as there is time."""

@@ -63,6 +63,11 @@ class Transforms:
         elif tree != 'none' and self._publisher is None:
             self._publisher = self._node.create_publisher(TFMessage, '/tf', DEPTH)
 
+    @property
+    def heard(self) -> bool:
+        """Whether somebody listened as it was last published."""
+        return self._listeners > 0
+
     def publish(self, simulation: Simulation, stamp: int) -> None:
         """Publish where the links are; stamp in ns."""
         self._listeners = self._count()

@@ -13,6 +13,7 @@ from ...model.scene import Scene
 from ..kernels.bundle import bind
 from ..kernels.loaded import advance as kernels
 from ..kernels.system import (
+    TALLY,
     Course,
     Room,
     System,
@@ -27,6 +28,9 @@ from .protocol import GROUND
 COUNTS = ('flights', 'steps', 'impacts', 'sweeps', 'unsolved', 'left_out', 'stalls', 'softened',
           'gains', 'pushed', 'handed', 'lifted')
 """What of a tally is summed over clusters."""
+
+UNSEEN = ('q', 'v', 'within', 'tally')
+"""What of the courses is in a checkpoint: all else follows from it."""
 
 SHARES = 4
 """Parts of the work for each thread: who is done early takes one more."""
@@ -79,6 +83,9 @@ class Clusters:
         self.q, self.v, self.rows = whole['q'], whole['v'], whole['rows'].reshape(-1, 13)
         self.sums, self.tally = whole['sums'], whole['tally']
         """A joined cluster counts where its first doll does."""
+        first = TALLY.fields['pushed'][1] // TALLY.fields['handed'][0].itemsize
+        self._work = self.tally.view(float).reshape(len(self.tally), -1)[:, first:first + 2]
+        """(d, 2) J, of pushes and of hands."""
         trees = {id(system): system.tree['bone'] for system in self._systems}
         self._records = np.concatenate([bones[trees[id(system)]] for system, bones in zip(
             self._systems, self._bones, strict=True)])
@@ -180,6 +187,10 @@ class Clusters:
             self._threads.shutdown()
             self._threads = None
 
+    def work(self) -> float:
+        """Of pushes and hands since the start, J."""
+        return float(self._work.sum())
+
     def totals(self) -> dict[str, float]:
         """What has been counted since the start."""
         return {name: self.tally[name].sum() for name in COUNTS}
@@ -216,6 +227,16 @@ class Clusters:
             for name in KEPT:
                 getattr(cluster.course, name)[:] = getattr(course, name)
             cluster.course.known[:len(course.known)] = course.known
+
+    def checkpoint(self) -> dict[str, np.ndarray]:
+        """What no look at the scene would tell; as bytes, as numpy copies records slowly."""
+        return {name: self._courses.whole[name].view(np.uint8).copy() for name in UNSEEN}
+
+    def go_back(self, checkpoint: dict[str, np.ndarray]) -> None:
+        """Go on from a checkpoint, all by themselves."""
+        for name, values in checkpoint.items():
+            self._courses.whole[name].view(np.uint8)[:] = values
+        self.begin()
 
     def _numbers(self, couples: np.ndarray) -> np.ndarray:
         """A number for each couple (k, 2)."""

@@ -116,6 +116,9 @@ class Engine(Protocol):
     layout: DofLayout
     accuracy: Accuracy
     """May be changed between ticks."""
+    energy_error: float
+    """Share of the energy at hand that a tick may make from nothing; more is no error of the method
+    but a bad state."""
     resting: np.ndarray
     """(d,) dolls that stand until something pushes, grabs or comes near them."""
 
@@ -161,6 +164,10 @@ class Engine(Protocol):
     def contacts(self) -> Contacts:
         """What touches now."""
 
+    @property
+    def energy_excess(self) -> float:
+        """Energy, J, above that at the start and all work since; losses make it negative."""
+
     def measures(self) -> dict[str, float]:
         """What went wrong since the start: names end in their units."""
 
@@ -172,6 +179,12 @@ class Engine(Protocol):
 
     def forget(self, snapshot: object) -> None:
         """Release what a snapshot holds."""
+
+    def checkpoint(self) -> object:
+        """Where all is and what the accounts say: far cheaper than save()."""
+
+    def go_back(self, checkpoint: object) -> None:
+        """Go on from the checkpoint of an engine of the same scene; what touches is found anew."""
 
     def close(self) -> None:
         """Release everything; a second time does nothing."""

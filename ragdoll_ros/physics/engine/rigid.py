@@ -37,6 +37,8 @@ NO_HANDS = np.zeros((0, 18))
 class RigidEngine:
     """An Engine by the rigid core; see Engine."""
 
+    energy_error = 1e-2
+
     def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
         self.scene, self.accuracy = scene, accuracy
         self.layout = DofLayout([placement.doll for placement in scene.dolls])
@@ -119,15 +121,18 @@ class RigidEngine:
         return Contacts(bones[:, 0], bones[:, 1], known['point'], known['normal'], -known['gap'],
                         known['impulse'][:, 0] / lasted)
 
+    @property
+    def energy_excess(self) -> float:
+        """Energy, J, above that at the start and all work since."""
+        return (float(self._motion.energy.sum()) - self._start_energy
+                - self._clusters.work())
+
     def measures(self) -> dict[str, float]:
         """What went wrong since the start, and what was done: names end in their units."""
         tally = self._clusters.totals()
-        pushed, handed = float(tally['pushed']), float(tally['handed'])
-        energy = float(self.motion.energy.sum())
         return {
-            'energy_excess_J': energy - self._start_energy - (pushed + handed),
-            'energy_lifted_J': float(tally['lifted']),
-            'work_of_pushes_J': pushed, 'work_of_grabs_J': handed,
+            'energy_excess_J': self.energy_excess, 'energy_lifted_J': float(tally['lifted']),
+            'work_of_pushes_J': float(tally['pushed']), 'work_of_grabs_J': float(tally['handed']),
             'error_estimate_m': self._estimate_error(), 'error_trusted': True,
             'flights': int(tally['flights']), 'substeps': int(tally['steps']),
             'impacts': int(tally['impacts']), 'unsolved_total': int(tally['unsolved'])}
@@ -145,6 +150,18 @@ class RigidEngine:
 
     def forget(self, snapshot: object) -> None:
         """Nothing to release: the memory goes with the object."""
+
+    def checkpoint(self) -> object:
+        """Where all is and what the accounts say: far cheaper than save()."""
+        return self._clusters.checkpoint(), self.resting.copy(), self._start_energy
+
+    def go_back(self, checkpoint: tuple) -> None:
+        """Go on from a checkpoint; see Engine."""
+        kept, self.resting[:], self._start_energy = checkpoint
+        self._clusters.go_back(kept)
+        self._age = KEPT
+        self._departure = None
+        self._look()
 
     def close(self) -> None:
         """End the threads."""

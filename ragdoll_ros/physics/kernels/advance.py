@@ -278,6 +278,15 @@ def sinks(s: System, r: Room) -> bool:
 
 
 @compiled
+def is_finite(values: np.ndarray) -> bool:
+    """Whether all values (k,) are, and their sum."""
+    total = 0.0
+    for j in range(len(values)):
+        total += values[j]
+    return math.isfinite(total)
+
+
+@compiled
 def observe(s: System, r: Room, q: np.ndarray, v: np.ndarray, rows: np.ndarray) -> None:
     """Position, orientation, linear and angular velocity (n, 13) of all bones, world frame."""
     pose(s.tree, q, v, r.work)
@@ -307,7 +316,8 @@ def go_on(s: System, r: Room, course: Course, duration: float, step: float,
     if parted or not tally.seen or duration == 0.0:
         look(s, r, q, v, r.gaps, math.inf, r.gaps)
         tally.seen = 1
-    while time < duration - 1e-12:
+    # What is no number would be gone through in the finest steps, which takes a second.
+    while time < duration - 1e-12 and is_finite(q) and is_finite(v):
         left = duration - time
         if (not path.valid and flies and events < most
                 and may_fly(s, r, course, loads, step)
