@@ -18,7 +18,7 @@ from ragdoll_ros.physics.recorded import RecordedSimulation, accuracy_from, repe
 from ragdoll_ros.physics.settings import NORMAL, Accuracy
 from ragdoll_ros.physics.simulation import Simulation
 
-QUIET = {'advance', 'measures', 'close', 'swings', 'contacts', 'coordinates'}
+QUIET = {'checkpoint', 'advance', 'measures', 'close', 'swings', 'contacts', 'coordinates'}
 """Public names of Simulation that change nothing, or only by the ticks that are counted."""
 
 

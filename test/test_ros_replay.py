@@ -159,20 +159,24 @@ def test_nothing_is_hashed_while_nobody_listens(make_node, monkeypatch):
     assert made == []
 
 
-def test_a_simulation_that_is_built_anew_after_a_bad_tick_is_a_start(
-        make_node, peer, log, tmp_path, capsys, monkeypatch):
+@pytest.mark.parametrize(('bad', 'starts'), [(1, [0]), (3, [0, 70])])
+def test_bad_ticks_are_told_as_going_back_and_three_as_a_start(
+        bad, starts, make_node, peer, log, tmp_path, capsys, monkeypatch):
     node = make_node()
     peer.wait_heard(node, EVENTS, SCENE)
     for tick in range(200):
         if tick == 70:
             with monkeypatch.context() as patch:
                 patch.setattr(node.simulation, 'advance', lambda: 1 / 0)
-                node.tick()
+                for _ in range(bad):
+                    node.tick()
         node.tick()
     peer.wait(lambda: len(log.of('state')) == 2)
-    assert [event['tick'] for event in log.of('start')] == [0, 70]
+    assert [event['tick'] for event in log.of('start')] == starts
+    assert [event['tick'] for event in log.of('go_back')] == bad * [70]
     code, said, _ = replayed(capsys, log.write(tmp_path / 'bag'))
-    assert code == 0 and '200 ticks' in said and '4 of 4' in said
+    hashes = 2 + len(starts)
+    assert code == 0 and '200 ticks' in said and f'{hashes} of {hashes}' in said
 
 
 def test_a_run_is_published_again(make_node, peer, log, tmp_path, nothing_runs_on):

@@ -21,8 +21,8 @@ WRITERS = {
     'fit/command.py': '--out, --urdf', 'fit/picture.py': '--picture',
     'physics/engine/bullet.py': 'a temporary file', 'physics/engine/hush.py': 'os.devnull',
     'physics/kernels/cache.py': 'machine code, NUMBA_CACHE_DIR',
-    'ros/crowd_bench.py': 'a temporary file', 'ros/state_dump.py': 'dump_directory',
-    'viewer/editor/folder.py': '--folder'}
+    'ros/crowd_bench.py': 'a temporary file', 'ros/rescue.py': 'dump_directory',
+    'ros/state_dump.py': 'dump_directory', 'viewer/editor/folder.py': '--folder'}
 """Files that write files, and what says where."""
 
 
