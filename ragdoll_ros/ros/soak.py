@@ -47,6 +47,9 @@ and the allocator has what it keeps."""
 GROWTH = 1.0
 """MB an hour on the wall that memory may grow by."""
 
+LONG_ENOUGH = 300.0
+"""s of the warm part from which on its growth is judged: in less, some pages more are too much."""
+
 
 @dataclass(frozen=True)
 class Sample:
@@ -174,13 +177,16 @@ def _judge(samples: Sequence[Sample], soak: Soak) -> int:
     slope, error = growth(samples)
     warm = samples[int(WARM * len(samples)):]
     middle, last = warm[:len(warm) // 2], warm[len(warm) // 2:]
+    told = warm[-1].time - warm[0].time >= LONG_ENOUGH
     flat = all(max(getattr(sample, name) for sample in last)
                <= max(getattr(sample, name) for sample in middle) for name in ('threads', 'files'))
     print(f'{samples[-1].time - samples[0].time:.0f} s; memory grew by {slope:.2f} +- {error:.2f} '
-          f'MB an hour, {warm[0].memory:.1f} to {warm[-1].memory:.1f} MB; threads and descriptors '
+          f'MB an hour{"" if told else " (too short a run to tell)"}, {warm[0].memory:.1f} to '
+          f'{warm[-1].memory:.1f} MB; threads and descriptors '
           f'{"flat" if flat else "GREW"}; {soak.heard} PoseArrays heard, {soak.bad} of them bad; '
           f'{soak.taken_back} bad states taken back')
-    return int(slope - error > GROWTH or not flat or soak.bad > 0 or soak.heard == 0)
+    grew = told and slope - error > GROWTH
+    return int(grew or not flat or soak.bad > 0 or soak.taken_back > 0 or soak.heard == 0)
 
 
 def _say(share: float, sample: Sample, gone: float) -> None:
