@@ -1,15 +1,13 @@
 """The programs as a user starts and ends them: exit codes, help, the terminal."""
 from __future__ import annotations
 
-import os
 import re
-import select
 import signal
-import time
 
 import pytest
-from geometry_msgs.msg import PoseArray, Wrench
+from geometry_msgs.msg import PoseArray
 from peer import PATIENCE, Peer, end, start, start_on_terminal
+from screen import Screen
 
 from ragdoll_ros.ros import node, run, teleop
 
@@ -60,34 +58,6 @@ def test_help_has_an_example_and_a_wrong_option_is_named(capsys, program, option
     assert ended.value.code == code and word in getattr(capsys.readouterr(), stream)
 
 
-class Screen:
-    """What a program on a terminal has written, and keys for it."""
-
-    def __init__(self, terminal):
-        self.text = ''
-        self._terminal = terminal
-
-    def type(self, keys):
-        os.write(self._terminal, keys)
-
-    def shows(self, pattern):
-        """Tell whether the pattern has come up since the last match, which is then forgotten."""
-        if select.select([self._terminal], [], [], 0.1)[0]:
-            try:
-                self.text += os.read(self._terminal, 65536).decode('utf-8', 'replace')
-            except OSError:
-                return False
-        match = re.search(pattern, self.text)
-        if match:
-            self.text = self.text[match.end():]
-        return bool(match)
-
-    def wait(self, pattern):
-        end = time.monotonic() + PATIENCE
-        while not self.shows(pattern):
-            assert time.monotonic() < end, f'{pattern} did not come up in {self.text[-500:]}'
-
-
 def line(push):
     """The live line with this push."""
     return rf'pace [01]\.\d\d  \d+\.\d s  push {push}  tick \d+\.\d\d ms  torso .* m \d+\.\d m/s'
@@ -112,21 +82,6 @@ def test_run_shows_a_live_line_and_the_arrows_push(ros):
     screen.type(b'q')
     process.communicate(timeout=PATIENCE)
     assert process.returncode == 0
-
-
-def test_the_teleop_sends_what_the_keys_say(peer):
-    got = peer.collect(Wrench, '/typed/ragdoll/force')
-    process, terminal = start_on_terminal('teleop', '--ros-args', '-r', '__ns:=/typed')
-    peer.wait(lambda: peer.count_publishers('/typed/ragdoll/force'))
-    screen = Screen(terminal)
-    screen.wait('waiting for the node')
-    screen.type(b'\x1b[B\x1b[D')
-    peer.wait(lambda: got and got[-1][1] == Wrench())
-    forces = [(w.force.x, w.force.y, w.force.z) for _, w in got]
-    assert (2000.0, -2000.0, 2.0) in forces
-    assert forces.count((0.0, 0.0, 0.0)) == 1
-    code, _ = end(process, signal.SIGINT)
-    assert code == 0
 
 
 def test_without_a_terminal_the_line_is_logged_each_second(ros):

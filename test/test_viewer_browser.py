@@ -88,11 +88,13 @@ def test_sees_ten_bodies_fall(states, view):
     (lambda view: view.press('←'), 1, -1), (lambda view: view.press('→'), 1, 1),
     (lambda view: view.key('ArrowUp'), 0, -1)], ids=['up', 'down', 'left', 'right', 'key'])
 def test_a_button_or_a_key_pushes(view, act, axis, sign):
-    """2000 N for 0.6 s: the torso is 1 m off at once; the fall alone takes it 0.5 m."""
+    """A tap gives the doll 1 m/s: the torso is 0.2 m off before it lies; nothing else takes it
+    that way before it has touched the ground.
+    """
     view.hold_at(SCENE, START)
     act(view)
     go_on(view)
-    view.wait(lambda: view.bodies(SCENE)[0][axis] * sign > 1)
+    view.wait(lambda: view.bodies(SCENE)[0][axis] * sign > 0.2)
 
 
 @pytest.mark.parametrize('click', [
@@ -106,7 +108,7 @@ def test_what_was_clicked_gives_the_keys_back(view, click):
     click(view)
     view.key('ArrowLeft')
     go_on(view)
-    view.wait(lambda: view.bodies(SCENE)[0][1] < -0.5)
+    view.wait(lambda: view.bodies(SCENE)[0][1] < -0.2)
 
 
 @pytest.mark.slow  # test_viewer.py has what the camera is told
@@ -124,7 +126,7 @@ def test_the_camera_follows_on_demand(view):
     view.wait(lambda: off() < 2)
     view.key('ArrowLeft')
     go_on(view)
-    view.wait(lambda: view.bodies(SCENE)[0][1] < -1.5)
+    view.wait(lambda: view.bodies(SCENE)[0][1] < -0.2)
     view.key(' ')
     view.wait(lambda: off() < 2)
     view.hold_at(SCENE, START)

@@ -21,11 +21,15 @@ def total(arrows: Iterable[str]) -> Vector:
     return tuple(map(sum, zip(*forces, strict=True))) if forces else (0.0, 0.0, 0.0)
 
 
-FIRST = 0.6
-"""s that a key counts as held after its first press: until a terminal begins to repeat it."""
+TAP = 0.025
+"""s of simulated time that a tap pushes: a doll of 55 kg gets 0.9 m/s."""
 
-REPEAT = 0.15
-"""s that it counts as held after a repeat: a few repeats."""
+REPEAT = 0.1
+"""s within which a key comes again that a terminal repeats, at ten times a second or more, and
+nobody taps twice; keys that come within it of each other are pressed together."""
+
+FIRST = 0.7
+"""s within which a terminal repeats a held key for the first time."""
 
 STUCK = 2.0
 """s after which a key counts as let go even if its release was never told (a lost focus)."""
@@ -34,31 +38,42 @@ OPPOSITE = {'up': 'down', 'down': 'up', 'left': 'right', 'right': 'left'}
 
 
 class Held:
-    """Arrows that count as held at a time ``now``, s of any steady clock.
+    """Arrows that push at a time ``now``, s of any steady clock.
 
-    An arrow pressed while others are held joins them, and they last as long as it does; it takes
-    the place of its opposite. Where the terminal tells releases, these alone count.
+    A key that comes once is a tap; one that is repeated is held, until shortly after its last
+    repeat. An arrow pressed while others push joins them, and they last as long as it does; it
+    takes the place of its opposite. Where releases are told, a held key ends with them.
     """
 
     def __init__(self) -> None:
+        self.tap = TAP
+        """s of the clock that a tap pushes."""
         self._keys: list[str] = []
         self._last = ''
-        self._until = 0.0
-        self._exact = False
+        self._came = self._until = 0.0
+        self._exact = self._lasts = False
 
     def take(self, key: str, down: bool, now: float) -> None:
         """Enter an arrow that went down or up."""
         if not down:
             self._exact = True
             self._keys = [other for other in self._keys if other != key]
-            self._until = now + STUCK
+            self._until = now + STUCK if self._lasts else self._until
             return
-        keys = self.at(now)
-        again = key in keys and key == self._last
-        self._keys = [other for other in keys if other not in (key, OPPOSITE[key])] + [key]
-        self._last = key
-        self._until = now + (STUCK if self._exact else REPEAT if again else FIRST)
+        since, pushing = now - self._came, self.left(now) > 0
+        again = key == self._last and key in self._keys and since <= FIRST
+        self._lasts = again and (self._exact or since <= REPEAT)
+        if not again:
+            joined = self._keys if pushing or since <= REPEAT else []
+            self._keys = [other for other in joined if other not in (key, OPPOSITE[key])] + [key]
+        self._last, self._came = key, now
+        self._until = now + (
+            self.tap if not self._lasts else STUCK if self._exact else REPEAT)
 
     def at(self, now: float) -> list[str]:
-        """Arrows held."""
-        return list(self._keys) if now <= self._until else []
+        """Arrows that push."""
+        return list(self._keys) if self.left(now) > 0 else []
+
+    def left(self, now: float) -> float:
+        """How long they push on if no key comes, s."""
+        return max(0.0, self._until - now) if self._keys else 0.0

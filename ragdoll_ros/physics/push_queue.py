@@ -1,4 +1,4 @@
-"""Pushes that wait or act: a bounded queue, and the wrench that each gives while it acts."""
+"""Pushes and drives that wait or act: a bounded queue, and what each does while it acts."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import errors, rotation
+from ..model.drive import Drive
 from ..model.push import Push
 from ..model.scene import SECOND, Scene
 from ..model.state import State
-from .engine.protocol import AppliedWrench
+from .engine.protocol import AppliedDrive, AppliedWrench
 
 MOST_PUSHES = 1000
 """Pushes that may wait at once; one more is refused."""
@@ -19,7 +20,7 @@ MOST_PUSHES = 1000
 class _Active:
     """A push with its times in ns; its wrench once it has begun."""
 
-    push: Push
+    push: Push | Drive
     bone: int
     start: int
     end: int
@@ -28,7 +29,7 @@ class _Active:
 
 
 class PushQueue:
-    """Pushes of a scene in the order in which they came. Times in ns."""
+    """Pushes and drives of a scene in the order in which they came. Times in ns."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -38,7 +39,7 @@ class PushQueue:
         """The bones that are being pushed."""
         return [active.bone for active in self._acting(now)]
 
-    def add(self, push: Push, channel: str | None, now: int) -> None:
+    def add(self, push: Push | Drive, channel: str | None, now: int) -> None:
         """Queue a push; on a ``channel`` it takes the place of the last. See Simulation.push."""
         bone = self._scene.bone_index(push.bone)
         start = now if push.start is None else round(push.start * SECOND)
@@ -62,12 +63,19 @@ class PushQueue:
         self._queue = [active for active in self._queue if active.end > now]
 
     def acting(self, now: int) -> tuple[Push, ...]:
-        """Pushes that act."""
-        return tuple(active.push for active in self._acting(now))
+        """Pushes that act; a drive as the push that it is on a bone at rest."""
+        return tuple(active.push.at_rest if isinstance(active.push, Drive) else active.push
+                     for active in self._acting(now))
 
     def wrenches(self, now: int, state: State) -> list[AppliedWrench]:
-        """What acts on the bones; a push's point is tied to its bone when it begins."""
-        return [self._wrench(active, state) for active in self._acting(now)]
+        """What pushes do to the bones; a push's point is tied to its bone when it begins."""
+        return [self._wrench(active, state) for active in self._acting(now)
+                if isinstance(active.push, Push)]
+
+    def drives(self, now: int) -> list[AppliedDrive]:
+        """What drives do to the bones."""
+        return [_applied(active.push, active.bone) for active in self._acting(now)
+                if isinstance(active.push, Drive)]
 
     def next_change(self, now: int) -> int | None:
         """Instant at which the next push begins or ends; None if none does."""
@@ -87,3 +95,13 @@ class PushQueue:
             active.wrench = AppliedWrench(active.bone, np.array(push.force), np.array(push.torque),
                                           point, push.local)
         return active.wrench
+
+
+def _applied(drive: Drive, bone: int) -> AppliedDrive:
+    targets = drive.velocity, drive.angular_velocity
+    gains = drive.force_per_speed, drive.torque_per_speed
+    return AppliedDrive(
+        bone, np.array([target or (0.0, 0.0, 0.0) for target in targets]),
+        tuple(0.0 if target is None else gain
+              for target, gain in zip(targets, gains, strict=True)),
+        (drive.most_force, drive.most_torque))

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..model import errors
 from ..model.coordinates import GeneralizedState
+from ..model.drive import Drive
 from ..model.push import Push
 from ..model.scene import SECOND, STEP_RANGE, Scene
 from ..model.state import State
@@ -112,7 +113,7 @@ class Simulation:
 
     @property
     def pushes(self) -> tuple[Push, ...]:
-        """Pushes that act now."""
+        """Pushes that act now; a drive as the push that it is on a bone at rest."""
         return self._pushes.acting(self.time)
 
     @property
@@ -140,7 +141,7 @@ class Simulation:
         """What the joint angles change by, rad/s."""
         return self._engine.layout.joint_rates(self.coordinates)
 
-    def push(self, push: Push, channel: str | None = None) -> None:
+    def push(self, push: Push | Drive, channel: str | None = None) -> None:
         """Let a push act from its start on; on a ``channel`` it takes the place of the last.
 
         Raises UnknownBone, or OutOfRange for a start in the past or a queue that is full.
@@ -260,12 +261,13 @@ class Simulation:
 
     def _advance_until(self, end: int) -> None:
         """Go on to an instant, ns, before which no push begins or ends."""
-        wrenches, springs = self._pushes.wrenches(self.time, self.state), self._hands.springs
-        if wrenches or springs:
+        acting = (self._pushes.wrenches(self.time, self.state), self._hands.springs,
+                  self._pushes.drives(self.time))
+        if any(acting):
             self.asleep = False
         if not self.asleep:
             duration = (end - self.time) / SECOND
-            self._engine.advance(duration, wrenches, springs)
+            self._engine.advance(duration, *acting)
             self._hands.move(duration)
         self.time = end
 

@@ -1,7 +1,7 @@
-"""Messages that push: from Wrench, Twist and WrenchStamped to Push.
+"""Messages that push: from Wrench and WrenchStamped to Push, from Twist to Drive.
 
-What is not finite or names no bone is refused, what is too strong is clamped to its direction;
-both are counted, and the doll goes on.
+What is not finite or names no bone is refused, what is too strong or fast is clamped to its
+direction; both are counted, and the doll goes on.
 """
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from geometry_msgs.msg import Twist, Vector3, Wrench, WrenchStamped
 from rclpy.node import Node
 
 from ..model import errors
+from ..model.drive import FASTEST, MOST_FORCE, MOST_TORQUE, Drive
 from ..model.push import Push
 from ..model.ragdoll import WORLD
 from ..model.scene import Scene
@@ -29,8 +30,8 @@ class Pushed(Protocol):
 
     scene: Scene
 
-    def push(self, push: Push, channel: str) -> None:
-        """Let a push act in place of the last one of its channel."""
+    def push(self, push: Push | Drive, channel: str) -> None:
+        """Let a push or drive act in place of the last one of its channel."""
 
     def release(self, channel: str) -> None:
         """End the push of a channel."""
@@ -59,11 +60,28 @@ class Inputs:
                    settings.push_timeout)
 
     def take_velocity(self, message: Twist) -> None:
-        """Push the pushed bone in proportion to a wanted velocity, along the world's axes."""
+        """Drive the pushed bone towards a velocity, along the world's axes.
+
+        A part that is zero leaves it free: a doll is passive, and a command to turn does not hold
+        it in the air. Zero altogether lets go.
+        """
         settings = self.settings
-        self._take('cmd_vel', 'cmd_vel', settings.pushed_bone, message.linear, message.angular,
-                   settings.cmd_vel_timeout,
-                   (settings.force_per_speed, settings.torque_per_speed))
+        try:
+            linear, angular = (self._limited('cmd_vel', name, vector, FASTEST, 'the most')
+                               for name, vector in (('linear', message.linear),
+                                                    ('angular', message.angular)))
+            if any(linear) or any(angular):
+                self.simulation.push(Drive(
+                    settings.pushed_bone, linear if any(linear) else None,
+                    angular if any(angular) else None,
+                    settings.force_per_speed, settings.torque_per_speed,
+                    min(MOST_FORCE, settings.max_force),
+                    min(MOST_TORQUE, settings.max_force * LEVER),
+                    duration=settings.cmd_vel_timeout), 'cmd_vel')
+            else:
+                self.simulation.release('cmd_vel')
+        except errors.ModelError as error:
+            self._tally.refuse('cmd_vel', error)
 
     def take_push(self, message: WrenchStamped) -> None:
         """Push the pushed bone along the world's axes, or the bone named in its own."""
@@ -79,12 +97,11 @@ class Inputs:
                    wrench.torque, settings.push_timeout, local=local)
 
     def _take(self, source: str, channel: str, bone: str, force: Vector3, torque: Vector3,
-              duration: float, scales: tuple[float, float] = (1.0, 1.0),
-              local: bool = False) -> None:
+              duration: float, local: bool = False) -> None:
+        most = self.settings.max_force
         try:
-            forces = self._limited(source, 'force', force, scales[0], self.settings.max_force)
-            torques = self._limited(source, 'torque', torque, scales[1],
-                                    self.settings.max_force * LEVER)
+            forces = self._limited(source, 'force', force, most, 'max_force')
+            torques = self._limited(source, 'torque', torque, most * LEVER, 'max_force')
             if any(forces) or any(torques):
                 self.simulation.push(Push(bone, forces, torques, duration=duration, local=local),
                                      channel)
@@ -93,28 +110,27 @@ class Inputs:
         except errors.ModelError as error:
             self._tally.refuse(source, error)
 
-    def _limited(self, source: str, name: str, vector: Vector3, scale: float,
-                 most: float) -> Vector:
-        """Vector times scale, at most ``most`` long; NotFinite if the message is not finite."""
+    def _limited(self, source: str, name: str, vector: Vector3, most: float, limit: str) -> Vector:
+        """Vector, at most ``most`` long; NotFinite if the message is not finite."""
         values = (vector.x, vector.y, vector.z)
         errors.check_finite(name, values)
-        result, length = shortened(values, scale, most)
+        result, length = shortened(values, most)
         if length > most:
-            self._tally.clamp(source, f'{name} of {length:g} to max_force, {most:g}')
+            self._tally.clamp(source, f'{name} of {length:g} to {limit}, {most:g}')
         return result
 
 
-def shortened(values: Sequence[float], scale: float, most: float) -> tuple[Vector, float]:
-    """A finite vector times ``scale``, at most ``most`` long, and the length it would have had.
+def shortened(values: Sequence[float], most: float) -> tuple[Vector, float]:
+    """A finite vector, at most ``most`` long, and the length that it had.
 
     The vector is first divided by its largest component, so that nothing overflows on the way.
     """
     largest = max(map(abs, values))
-    if largest == 0 or scale == 0:
+    if largest == 0:
         return (0.0, 0.0, 0.0), 0.0
     direction = [value / largest for value in values]
     spread = math.hypot(*direction)
-    length = largest * scale * spread
+    length = largest * spread
     if length <= most:
-        return tuple(value * scale for value in values), length
+        return tuple(values), length
     return tuple(value * (most / spread) for value in direction), length

@@ -1,4 +1,4 @@
-"""Keys of a terminal: which come in, and which arrows count as held.
+"""Keys of a terminal: which come in.
 
 A terminal sends a held key again and again, after a pause of up to 0.6 s, and says nothing when
 it is let go; of two held keys it repeats the last one alone. Terminals that know the kitty

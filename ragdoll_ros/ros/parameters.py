@@ -17,6 +17,7 @@ from rclpy.parameter import Parameter
 
 from ..files.scene import load_scene
 from ..model import errors
+from ..model.drive import FORCE_PER_SPEED, TORQUE_PER_SPEED
 from ..model.errors import RagdollError
 from ..model.ragdoll import WORLD
 from ..model.scene import STEP_RANGE, Scene
@@ -57,9 +58,10 @@ class Settings:
     cmd_vel_timeout: float = _setting(
         0.6, 'Simulated time that a message on cmd_vel lasts, s', (0.001, 60.0))
     force_per_speed: float = _setting(
-        1000.0, 'Force for each m/s on cmd_vel, N/(m/s)', (0.0, 1e5))
+        FORCE_PER_SPEED, 'Force for each m/s that the pushed bone lacks of cmd_vel, N/(m/s)',
+        (0.0, 1e5))
     torque_per_speed: float = _setting(
-        30.0, 'Torque for each rad/s on cmd_vel, N m/(rad/s)', (0.0, 1e4))
+        TORQUE_PER_SPEED, 'Torque for each rad/s that it lacks, N m/(rad/s)', (0.0, 1e4))
     max_force: float = _setting(
         10000.0, 'Longest force, N, and ten times the longest torque, N m; longer is clamped',
         (0.0, 1e5))

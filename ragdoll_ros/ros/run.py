@@ -115,7 +115,7 @@ def _log(teleop: Teleop, node: subprocess.Popen, _: subprocess.Popen | None) -> 
             executor.spin_once(timeout_sec=LOG_PERIOD)
             if time.monotonic() >= next_line:
                 next_line += LOG_PERIOD
-                print(teleop.status.line(), flush=True)
+                print(teleop.line(''), flush=True)
 
 
 def _show_log(process: subprocess.Popen) -> None:

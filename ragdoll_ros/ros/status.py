@@ -12,19 +12,25 @@ from .diagnostics import status_name
 
 
 class Status:
-    """Listens to a ragdoll's state and diagnostics."""
+    """Listens to the state and diagnostics of the ragdoll node of a full ``name``."""
 
-    def __init__(self, node: Node) -> None:
-        self._name = status_name(node.get_namespace(), 'ragdoll')
+    def __init__(self, node: Node, name: str) -> None:
+        self._name = status_name(*name.rsplit('/', 1))
         self._values: dict[str, str] = {}
         self._state: MultiDOFJointState | None = None
-        node.create_subscription(DiagnosticArray, '/diagnostics', self._take_diagnostics, 10)
-        node.create_subscription(MultiDOFJointState, 'ragdoll/state', self._take_state, 1)
+        self.subscriptions = [
+            node.create_subscription(DiagnosticArray, '/diagnostics', self._take_diagnostics, 10),
+            node.create_subscription(MultiDOFJointState, f'{name}/state', self._take_state, 1)]
 
     @property
     def paused(self) -> bool:
         """Whether the node said last that it is paused."""
         return self._values.get('paused') == 'true'
+
+    @property
+    def pace(self) -> float:
+        """Simulated s for each s on the wall that the node is to make, as it said last."""
+        return float(self._values.get('real_time_factor', 1.0))
 
     def line(self, push: str = '') -> str:
         """Pace, simulated time, the push that acts, tick cost, the root's place and speed.

@@ -79,10 +79,10 @@ class Controls:
                 trigger(lambda _, action=action: action())
 
     def push(self, arrow: str) -> None:
-        """Push, together with the other arrows of the last tenths of a second."""
+        """Push, together with the arrows that came just before; a key that is held comes again."""
         now = time.monotonic()
         self._held.take(arrow, True, now)
-        self.source.push(total(self._held.at(now)))
+        self.source.push(total(self._held.at(now)), self._held.left(now))
 
     def toggle_pause(self) -> None:
         """Hold the time, or let it go on."""

@@ -106,6 +106,24 @@ class Spring:
 Springs = Sequence[Spring]
 
 
+@dataclass(frozen=True)
+class AppliedDrive:
+    """Pushes a bone at its centre of mass with c (u - v), ``most`` N at the most, where v is its
+    velocity and u that which it shall have, and turns it likewise; world axes.
+    """
+
+    bone: int
+    targets: np.ndarray
+    """(2, 3) u, m/s, and that of turning, rad/s."""
+    gains: tuple[float, float]
+    """c, N s/m, and that of turning, N m s; 0 leaves it free."""
+    most: tuple[float, float]
+    """N and N m."""
+
+
+Drives = Sequence[AppliedDrive]
+
+
 class Engine(Protocol):
     """A scene in motion: where it is, what moves it on, what went wrong.
 
@@ -148,9 +166,10 @@ class Engine(Protocol):
         they have come apart; a doll that is deeper in the ground is lifted onto it.
         """
 
-    def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = ()) -> None:
-        """Go on by ``duration`` s under wrenches that neither begin nor end within it, and springs
-        of hands.
+    def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
+                drives: Drives = ()) -> None:
+        """Go on by ``duration`` s under wrenches and drives that neither begin nor end within it,
+        and springs of hands.
         """
 
     def stop(self, dolls: np.ndarray) -> None:

@@ -1,4 +1,4 @@
-"""A hand's spring as a force that is steady for a stretch: for engines that know no springs."""
+"""Hands' springs and drives as loads that are steady for a stretch: for engines without them."""
 from __future__ import annotations
 
 import numpy as np
@@ -6,10 +6,10 @@ import numpy as np
 from ...model.state import State
 from ..motion import point_motion
 from ..sums import DollSums
-from .protocol import AppliedWrench, Spring, Springs
+from .protocol import AppliedDrive, AppliedWrench, Drives, Spring, Springs
 
 LONGEST = 2.5e-3
-"""s for which a hand's force stays as it is."""
+"""s for which the force of a hand or a drive stays as it is."""
 
 
 class Pull(AppliedWrench):
@@ -39,8 +39,30 @@ def _pull(spring: Spring, sharing: int, sums: DollSums, state: State, h: float) 
     softened = np.eye(3) + h * (spring.damping + h * spring.stiffness) * sharing * mobility(
         sums, state, spring.bone, spring.point)
     force = np.linalg.solve(softened, force)
-    force *= min(1.0, spring.most / max(np.linalg.norm(force), 1e-300))
-    return Pull(spring.bone, force, np.zeros(3), spring.point)
+    return Pull(spring.bone, _limited(force, spring.most), np.zeros(3), spring.point)
+
+
+def driven(drives: Drives, sums: DollSums, state: State, duration: float) -> list[AppliedWrench]:
+    """Loads of all drives for the next ``duration`` s."""
+    return [_driven(drive, sums, state, duration) for drive in drives]
+
+
+def _driven(drive: AppliedDrive, sums: DollSums, state: State, h: float) -> AppliedWrench:
+    """Force and torque of a drive at the end of the step that they make, as of a hand's damper."""
+    bone = drive.bone
+    turn = state.rotation_matrices[bone]
+    missing = drive.targets - np.stack([state.linear_velocities[bone] + h * sums.gravity,
+                                        state.angular_velocities[bone]])
+    force, torque = (
+        _limited(gain * np.linalg.solve(np.eye(3) + h * gain * ease, lack), most)
+        for gain, ease, lack, most in zip(
+            drive.gains, (np.eye(3) / sums.masses[bone], (turn / sums.inertias[bone]) @ turn.T),
+            missing, drive.most, strict=True))
+    return AppliedWrench(bone, force, torque, np.zeros(3))
+
+
+def _limited(force: np.ndarray, most: float) -> np.ndarray:
+    return force * min(1.0, most / max(np.linalg.norm(force), 1e-300))
 
 
 def mobility(sums: DollSums, state: State, bone: int, point: np.ndarray) -> np.ndarray:

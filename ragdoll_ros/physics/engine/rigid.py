@@ -17,9 +17,10 @@ from ..ground_heights import GroundHeights
 from ..kernels.system import OUTSIDE, WITHIN
 from ..motion import Motion
 from ..settings import Accuracy
+from .acting import NO_LOADS, NO_SPRINGS, load_rows, spring_rows
 from .clusters import Cluster, Clusters
 from .neighbours import Neighbours
-from .protocol import GROUND, Contacts, Spring, Springs, Wrenches, pressed
+from .protocol import GROUND, Contacts, Drives, Springs, Wrenches, pressed
 
 FINER = 0.25
 """Share of the step by which the last stretch is gone again to tell its error."""
@@ -29,9 +30,6 @@ AHEAD = 0.05
 
 KEPT = 10
 """Stretches for which clusters are kept, unless others come near."""
-
-NO_LOADS = np.zeros((0, 11))
-NO_HANDS = np.zeros((0, 18))
 
 
 class RigidEngine:
@@ -91,14 +89,15 @@ class RigidEngine:
         self._start_energy = float(self.motion.energy.sum())
         self._departure = None
 
-    def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = ()) -> None:
+    def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
+                drives: Drives = ()) -> None:
         """Go on by ``duration`` s; see Engine."""
-        clusters = self._clusters
-        self._departure = clusters.q.copy(), clusters.v.copy(), duration, wrenches, springs
-        for acts in (*wrenches, *springs):
+        clusters, acting = self._clusters, (wrenches, springs, drives)
+        self._departure = clusters.q.copy(), clusters.v.copy(), duration, acting
+        for acts in (*wrenches, *springs, *drives):
             self.resting[self.groups == self.groups[self.scene.doll_of_bone[acts.bone]]] = False
         self._meet(duration)
-        self._go(duration, wrenches, springs, self.accuracy)
+        self._go(duration, acting, self.accuracy)
 
     def stop(self, dolls: np.ndarray) -> None:
         """Bring dolls (d,) to rest where they are; the energy that is left is lost for good."""
@@ -190,13 +189,13 @@ class RigidEngine:
         self._clusters.group(np.unique(np.concatenate([near, asleep]), axis=0))
         self._age = 0
 
-    def _go(self, duration: float, wrenches: Wrenches, springs: Springs,
+    def _go(self, duration: float, acting: tuple[Wrenches, Springs, Drives],
             accuracy: Accuracy) -> None:
         """Take all clusters on that do not rest."""
-        acted = self._act(wrenches, springs) if wrenches or springs else ()
+        acted = self._act(acting) if any(acting) else ()
         self._clusters.advance(duration, accuracy, self.resting)
         for cluster in acted:
-            cluster.use(cluster.course._replace(loads=NO_LOADS, springs=NO_HANDS))
+            cluster.use(cluster.course._replace(loads=NO_LOADS, springs=NO_SPRINGS))
             cluster.course.path[:] = 0
         self._show()
 
@@ -205,21 +204,21 @@ class RigidEngine:
         self._state = State.of(self._clusters.rows.copy())
         self._motion = Motion.of(self._clusters.sums.view(float).reshape(-1, 20).copy())
 
-    def _act(self, wrenches: Wrenches, springs: Springs) -> list[Cluster]:
+    def _act(self, acting: tuple[Wrenches, Springs, Drives]) -> list[Cluster]:
         """Enter what acts where it acts; the clusters concerned, whose flights begin anew."""
-        acts: dict[int, tuple[list, list]] = {}
-        for kind, given in enumerate((wrenches, springs)):
+        acts: dict[int, tuple[list, list, list]] = {}
+        for kind, given in enumerate(acting):
             for one in given:
                 place = int(self._clusters.of_doll[self.scene.doll_of_bone[one.bone]])
-                acts.setdefault(place, ([], []))[kind].append(one)
+                acts.setdefault(place, ([], [], []))[kind].append(one)
         acted = []
-        for place, (loads, hands) in acts.items():
+        for place, (loads, hands, drives) in acts.items():
             cluster = self._clusters.members[place]
             bones = cluster.bones.tolist()
             records = cluster.system.tree['bone'].tolist()
-            cluster.use(cluster.course._replace(loads=_loads(loads, bones), springs=np.array([
-                _hand(records.index(bones.index(spring.bone)), spring) for spring in hands])
-                if hands else NO_HANDS))
+            cluster.use(cluster.course._replace(
+                loads=load_rows(loads, bones),
+                springs=spring_rows(hands, drives, self.scene, bones, records)))
             cluster.course.path[:] = 0
             acted.append(cluster)
         return acted
@@ -261,7 +260,7 @@ class RigidEngine:
         """
         if self._departure is None:
             return 0.0
-        q, v, duration, wrenches, springs = self._departure
+        q, v, duration, acting = self._departure
         finer = dataclasses.replace(self.accuracy, step=FINER * self.accuracy.step,
                                     flight_error=self.accuracy.flight_error / 100)
         here, there = self.save(), self.state.positions
@@ -269,25 +268,9 @@ class RigidEngine:
         clusters.q[:], clusters.v[:] = q, v
         clusters.gather()
         clusters.forget()
-        self._go(duration, wrenches, springs, finer)
+        self._go(duration, acting, finer)
         missed = np.linalg.norm(self.state.positions - there, axis=1).max()
         departure = self._departure
         self.restore(here)
         self._departure = departure
         return float(missed / (1 - FINER ** 2))
-
-
-def _loads(wrenches: Wrenches, bones: list[int]) -> np.ndarray:
-    """Wrenches as a table (m, 11) for compiled code, on bones of a cluster."""
-    rows = np.zeros((len(wrenches), 11))
-    for row, load in zip(rows, wrenches, strict=True):
-        row[0], row[1:4], row[4:7], row[7:10], row[10] = (
-            bones.index(load.bone), load.force, load.torque, load.point, load.local)
-    return rows
-
-
-def _hand(record: int, spring: Spring) -> np.ndarray:
-    spring = spring.after(0.0)
-    speed = (spring.target - spring.position) / spring.left if spring.left > 0 else np.zeros(3)
-    return np.concatenate([[record], spring.point, spring.position, speed, [
-        spring.left, spring.stiffness, spring.damping, spring.most, 1.0, 0.0, 0.0, 0.0]])

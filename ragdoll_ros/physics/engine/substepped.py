@@ -16,8 +16,8 @@ from ..motion import Motion
 from ..settings import Accuracy
 from ..sums import DollSums
 from ..work import longest_stretch, work
-from .protocol import GROUND, Springs, Wrenches, pressed
-from .pull import LONGEST, Pull, pulls
+from .protocol import GROUND, Drives, Springs, Wrenches, pressed
+from .pull import LONGEST, Pull, driven, pulls
 
 SPAN = 0.01
 """s for which Accuracy counts substeps, and the longest stretch of which work or an account is
@@ -85,14 +85,16 @@ class SubsteppedEngine(ABC):
         self._account = Account.opened(self.motion.energy)
         self._taken = 0
 
-    def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = ()) -> None:
+    def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
+                drives: Drives = ()) -> None:
         """Go on by ``duration`` s; see Engine."""
         self.resting[:] = False
         self._taken, least, left = 0, LEAST_SHARE * duration, duration
         while left > 1e-12 * duration:
-            longest = max(least, min(left, *self._steady(wrenches, springs)))
+            longest = max(least, min(left, *self._steady(wrenches, springs or drives)))
             length = left / math.ceil(left / longest - 1e-6)
-            self._stretch(length, [*wrenches, *pulls(springs, self._sums, self.state, length)])
+            self._stretch(length, [*wrenches, *pulls(springs, self._sums, self.state, length),
+                                   *driven(drives, self._sums, self.state, length)])
             springs = [spring.after(length) for spring in springs]
             left -= length
 
@@ -148,7 +150,7 @@ class SubsteppedEngine(ABC):
         """Whether an account is closed after each stretch."""
         return False
 
-    def _steady(self, wrenches: Wrenches, springs: Springs) -> Iterator[float]:
+    def _steady(self, wrenches: Wrenches, springs: Springs | Drives) -> Iterator[float]:
         """For how long loads may be taken as steady, and an account may wait, s."""
         yield SPAN if wrenches or springs or self._accounts else math.inf
         yield LONGEST if springs else math.inf

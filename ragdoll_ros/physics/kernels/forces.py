@@ -1,4 +1,7 @@
-"""What pushes and hands do: their forces, the work of these, and how stiff springs make a step."""
+"""What pushes, hands and drives do: forces, their work, and how stiff a step is for them.
+
+A drive is two rows of ``springs`` that only damp: one its bone's velocity, one its turning.
+"""
 from __future__ import annotations
 
 import math
@@ -10,7 +13,7 @@ from .machine import compiled
 from .mass import root_axes
 from .momentum import give
 from .quaternion import cross, times, turned
-from .system import Room, System
+from .system import HAND, TURNS, Room, System
 
 
 @compiled
@@ -24,24 +27,49 @@ def spring_point(bone: np.record, work: Work, i: int,
 
 
 @compiled
+def lag(fast: float) -> float:
+    """Share of a step's end at which damping is taken: the middle, later where it is stiff
+    (Liniger and Willoughby, SIAM J. Numer. Anal. 7, 1970).
+    """
+    return max(0.5, 1 - 1 / fast) if fast > 0 else 0.5
+
+
+@compiled
+def resistance(spring: np.ndarray, h: float) -> float:
+    """What a spring's mean force in a step of h s loses for each m/s that its end gains, N s/m."""
+    if spring[14] == 0.0:
+        return 0.0
+    if spring[18] == HAND:
+        return spring[11] * h / 4 + spring[12] / 2
+    return spring[12] * lag(h * spring[12] * spring[19])
+
+
+@compiled
+def rate(axis: np.ndarray, spring: np.ndarray, x: float, y: float,
+         z: float) -> tuple[float, float, float]:
+    """What moves for each unit of the velocity along an axis: the point x, y, z, or the turning."""
+    if spring[18] == TURNS:
+        return axis[0], axis[1], axis[2]
+    ux, uy, uz = cross(axis[0], axis[1], axis[2], x, y, z)
+    return axis[3] + ux, axis[4] + uy, axis[5] + uz
+
+
+@compiled
 def stiffen(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, H: np.ndarray,
             spring: np.ndarray, h: float) -> None:
-    """Add to H what a spring's end resists: h (k h / 4 + c / 2) J^T J. A bone's velocities are of
-    one branch, so that H keeps its pattern.
+    """Add to H what a spring's end resists, of a hand h (k h / 4 + c / 2) J^T J. A bone's
+    velocities are of one branch, so that H keeps its pattern.
     """
     i = int(spring[0])
     x, y, z = spring_point(tree[i], work, i, spring[1:4])
-    share = h * (spring[11] * h / 4 + spring[12] / 2) if spring[14] > 0 else 0.0
+    share = h * resistance(spring, h)
     a = last[i]
     while a >= 0:
-        axis = work.axes[a]
-        ux, uy, uz = cross(axis[0], axis[1], axis[2], x, y, z)
-        ux, uy, uz = axis[3] + ux, axis[4] + uy, axis[5] + uz
+        ux, uy, uz = rate(work.axes[a], spring, x, y, z)
         b = a
         while b >= 0:
-            axis = work.axes[b]
-            wx, wy, wz = cross(axis[0], axis[1], axis[2], x, y, z)
-            H[a, b] += share * (ux * (axis[3] + wx) + uy * (axis[4] + wy) + uz * (axis[5] + wz))
+            wx, wy, wz = rate(work.axes[b], spring, x, y, z)
+            H[a, b] += share * (ux * wx + uy * wy + uz * wz)
             b = up[b]
         a = up[a]
 
@@ -56,15 +84,16 @@ def root_q(s: System, spring: np.ndarray) -> int:
 def spring_force(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, q: np.ndarray,
                  root: int, v: np.ndarray, spring: np.ndarray, time: float,
                  ) -> tuple[float, float, float, float, float, float]:
-    """Force, N, of a hand's spring on its point and the point's velocity, m/s, at q and v."""
+    """Force, N, of a spring on its point and the point's velocity, m/s, at q and v; of a drive's
+    turning torque, N m, and angular velocity, rad/s.
+    """
     i = int(spring[0])
     x, y, z = spring_point(tree[i], work, i, spring[1:4])
     ux = uy = uz = 0.0
     j = last[i]
     while j >= 0:
-        axis = work.axes[j]
-        a, b, c = cross(axis[0], axis[1], axis[2], x, y, z)
-        ux, uy, uz = ux + (axis[3] + a) * v[j], uy + (axis[4] + b) * v[j], uz + (axis[5] + c) * v[j]
+        a, b, c = rate(work.axes[j], spring, x, y, z)
+        ux, uy, uz = ux + a * v[j], uy + b * v[j], uz + c * v[j]
         j = up[j]
     if spring[14] == 0.0:
         return spring[15], spring[16], spring[17], ux, uy, uz
@@ -86,9 +115,8 @@ def pull(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, q: np.n
     x, y, z = spring_point(tree[i], work, i, spring[1:4])
     j = last[i]
     while j >= 0:
-        axis = work.axes[j]
-        a, b, c = cross(axis[0], axis[1], axis[2], x, y, z)
-        out[j] += fx * (axis[3] + a) + fy * (axis[4] + b) + fz * (axis[5] + c)
+        a, b, c = rate(work.axes[j], spring, x, y, z)
+        out[j] += fx * a + fy * b + fz * c
         j = up[j]
 
 
@@ -99,7 +127,7 @@ def mean_force(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, q
     """Mean force, N, of a spring in a step of h s, and its point's mean velocity, m/s."""
     fx, fy, fz, ux, uy, uz = spring_force(tree, up, last, work, q, root, v, spring, time)
     _, _, _, wx, wy, wz = spring_force(tree, up, last, work, q, root, end_v, spring, time)
-    share = spring[11] * h / 4 + spring[12] / 2 if spring[14] > 0 else 0.0
+    share = resistance(spring, h)
     return (fx - share * (wx - ux), fy - share * (wy - uy), fz - share * (wz - uz),
             (ux + wx) / 2, (uy + wy) / 2, (uz + wz) / 2)
 
@@ -126,8 +154,8 @@ def weaken(s: System, r: Room, q: np.ndarray, v: np.ndarray, free: np.ndarray,
 @compiled
 def enter_work(s: System, r: Room, v: np.ndarray, end_v: np.ndarray, h: float,
                loads: np.ndarray, springs: np.ndarray, since: float) -> None:
-    """Book the work, J, of loads and hands in a step of h s, and their impulses in r.given; that of
-    forces along the world's axes is that of reached() alone.
+    """Book the work, J, of loads, hands and drives in a step of h s, and their impulses in
+    r.given; that of forces along the world's axes is that of reached() alone.
     """
     middle, mean = r.states[0], r.vectors[0]
     for j in range(len(v)):
@@ -142,8 +170,17 @@ def enter_work(s: System, r: Room, v: np.ndarray, end_v: np.ndarray, h: float,
         fx, fy, fz, ux, uy, uz = mean_force(
             s.tree, s.up, s.last, r.work, middle, root_q(s, springs[k]), v, end_v, springs[k],
             since + h / 2, h)
-        r.tally[0].handed += h * (fx * ux + fy * uy + fz * uz)
+        done = h * (fx * ux + fy * uy + fz * uz)
         i = int(springs[k, 0])
+        if springs[k, 18] == HAND:
+            r.tally[0].handed += done
+        else:
+            r.tally[0].pushed += done
+        if springs[k, 18] == TURNS:
+            moment = r.given[s.doll_of[i]].moment
+            moment[0], moment[1], moment[2] = moment[0] + h * fx, moment[1] + h * fy, (
+                moment[2] + h * fz)
+            continue
         x, y, z = spring_point(s.tree[i], r.work, i, springs[k, 1:4])
         root = s.tree[s.root_of[i]].q
         give(r.given[s.doll_of[i]], h, middle[root] + x, middle[root + 1] + y,

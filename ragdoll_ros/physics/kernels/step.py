@@ -3,9 +3,9 @@
 Forces, contacts and their rows are those at the middle of the way, so that it is of order 2 where
 no contact begins or ends (Moreau 1988; Studer, Numerics of Unilateral Contacts and Friction,
 2009). Of the velocities there, half of what contacts change is a part: what they changed in the
-step before stands in for it. Joint damping and hands' springs are taken implicitly at the middle as
-well. Then depths are given back in position alone, and momentum is kept where the ground bears
-nothing.
+step before stands in for it. Joint damping, hands' springs and drives are taken implicitly at the
+middle as well. Then depths are given back in position alone, and momentum is kept where the ground
+bears nothing.
 """
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from .contact import BEYOND, BURIED, TOUCHING, contact_rates, find_contacts, look, place_geoms
 from .dynamics import pose
-from .forces import enter_work, pull, reached, root_q, stiffen, weaken
+from .forces import enter_work, lag, pull, reached, root_q, stiffen, weaken
 from .machine import compiled
 from .mass import (
     bias_forces,
@@ -220,14 +220,6 @@ def find_key(contacts: np.ndarray, count: int, key: int, near: int) -> int:
         if contacts[j].key == key:
             return j
     return count
-
-
-@compiled
-def lag(fast: float) -> float:
-    """Share of a step's end at which damping is taken: the middle, later where it is stiff
-    (Liniger and Willoughby, SIAM J. Numer. Anal. 7, 1970).
-    """
-    return max(0.5, 1 - 1 / fast) if fast > 0 else 0.5
 
 
 @compiled

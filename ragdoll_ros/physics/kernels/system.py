@@ -96,7 +96,7 @@ joint in between is OUTSIDE its
 limits; the contacts ``known`` from the last step; all ``gaps``, m or rad; the ``reaction`` (nv,),
 accelerations that contacts gave in the last step, zero unless all of them lasted on. What comes of
 a stretch: bones' ``rows`` (n, 13) and the dolls' ``sums`` (d,). What acts in it: ``loads`` (m, 11),
-and ``springs`` (k, 18) of hands."""
+and ``springs`` (k, 20) of hands and drives; see engine/acting.py."""
 
 Room = collections.namedtuple(
     'Room', 'work own composite H contacts table at turn gaps later Y support W G p solver '
@@ -111,6 +111,9 @@ and ``G`` have room for a small island, ``blocks`` for W of each contact by itse
 sought; ``left`` (1,), m/s by which contacts of large islands may err."""
 
 WITHIN, OUTSIDE = 1, 2
+
+HAND, MOVES, TURNS = 0, 1, 2
+"""What a spring is: a hand's, or of a drive what damps its bone's velocity or its turning."""
 
 COMPLIANCE, OF_IMPACTS = 1e-8, 1e-10
 """Of contacts and limits, as a share of their own W, in steps and at impacts: what several of them
@@ -136,7 +139,7 @@ def make_course(system: System, contacts: int = 0) -> Course:
         within=np.zeros(len(system.pairs), np.int64), known=np.zeros(contacts, CONTACT),
         gaps=np.zeros(count_gaps(system)), reaction=np.zeros(nv),
         rows=np.zeros((len(system.tree), 13)), sums=np.zeros(len(system.doll_masses), DOLL),
-        loads=np.zeros((0, 11)), springs=np.zeros((0, 18)))
+        loads=np.zeros((0, 11)), springs=np.zeros((0, 20)))
 
 
 def count_gaps(system: System) -> int:

@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Twist, Vector3
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import SingleThreadedExecutor
@@ -31,6 +30,7 @@ from ...model.vectors import Vector
 from ...ros.diagnostics import status_name
 from ...ros.inputs import Inputs
 from ...ros.outputs import LATCHED
+from .remote_force import RemoteForce
 from .remote_frames import RemoteFrames
 from .remote_hands import RemoteHands
 from .remote_pushes import HeardPushes, Silent
@@ -75,7 +75,7 @@ class Remote(Source):
         self._known = RemoteScene(self._ask, self._full, self._go_on)
         self._pushes: HeardPushes | None = None
         self._inputs: Inputs | None = None
-        self._velocity = self._node.create_publisher(Twist, 'cmd_vel', 10)
+        self._force = RemoteForce(self._node, NAME)
         self._wanted = Wanted()
         self._told = Report()
         self._simulated = 0.0
@@ -112,11 +112,8 @@ class Remote(Source):
             self._wanted = wanted
             self._executor.create_task(self._listen)
 
-    def push(self, force: Vector) -> None:
-        """Send the velocity that gives this force; the node holds it for its cmd_vel_timeout."""
-        scale = self._known.settings.force_per_speed
-        x, y, z = (value / scale if scale else 0.0 for value in force)
-        self._velocity.publish(Twist(linear=Vector3(x=x, y=y, z=z)))
+    def push(self, force: Vector, duration: float) -> None:
+        self._force.send(force, duration / self._told.pace)
 
     def pause(self, wanted: bool) -> None:
         self._ask.pause(wanted)
@@ -167,6 +164,7 @@ class Remote(Source):
 
     def close(self) -> None:
         self._ended.set()
+        self._force.close()
         self._executor.wake()
         self._thread.join(1.0)
         self._executor.shutdown(timeout_sec=0)

@@ -1,6 +1,7 @@
 """Pushes that a node is sent, by whomever: taken from the topics, as the node takes them."""
 from __future__ import annotations
 
+from ...model.drive import Drive
 from ...model.push import Push
 from ...model.scene import Scene
 
@@ -24,9 +25,9 @@ class HeardPushes:
         """s simulated, of the newest poses."""
         self._pushes: dict[str, tuple[float, Push]] = {}
 
-    def push(self, push: Push, channel: str) -> None:
+    def push(self, push: Push | Drive, channel: str) -> None:
         """A push acts from now on in place of the last one of its channel."""
-        self._pushes[channel] = (self.time, push)
+        self._pushes[channel] = (self.time, push.at_rest if isinstance(push, Drive) else push)
 
     def release(self, channel: str) -> None:
         """End the push of a channel."""

@@ -20,9 +20,6 @@ from ...physics.pacing import Pacer
 from ...physics.simulation import Simulation
 from .source import PACES, Frame, Held, Report, Source, Wanted
 
-HOLD = 0.6
-"""s of simulated time that a push holds, as the node's cmd_vel_timeout."""
-
 MEASURE_PERIOD = 0.1
 """s on the wall between two looks at what went wrong so far, at the least."""
 
@@ -67,8 +64,8 @@ class Simulated(Source):
         if wanted != self._wanted:
             self._commands.put(lambda: self._want(wanted))
 
-    def push(self, force: Vector) -> None:
-        self._commands.put(lambda: self._push(force))
+    def push(self, force: Vector, duration: float) -> None:
+        self._commands.put(lambda: self._push(force, duration))
 
     def pause(self, wanted: bool) -> None:
         self._commands.put(lambda: self._tell(paused=wanted))
@@ -159,11 +156,11 @@ class Simulated(Source):
         self._pacer.period = self._simulation.tick / self._report.pace
         self._pacer.start(time.monotonic_ns())
 
-    def _push(self, force: Vector) -> None:
+    def _push(self, force: Vector, duration: float) -> None:
         scene = self._simulation.scene
         doll = scene.dolls[0]
         bone = scene.qualified(doll, doll.doll.root.name)
-        self._simulation.push(Push(bone, force, duration=HOLD), 'page')
+        self._simulation.push(Push(bone, force, duration=duration), 'page')
 
     def _replace(self, scene: Scene, engine: str) -> None:
         simulation = Simulation(scene, engine=engine, workers='auto')

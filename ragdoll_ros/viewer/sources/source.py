@@ -92,8 +92,11 @@ class Source(Protocol):
     def want(self, wanted: Wanted) -> None:
         """Say what is shown from now on."""
 
-    def push(self, force: Vector) -> None:
-        """Push the pushed bone with a force, N, world axes, for some tenths of a second."""
+    def push(self, force: Vector, duration: float) -> None:
+        """Push the pushed bone with a force, N, world axes, for so many s of simulated time.
+
+        The next push takes its place.
+        """
 
     def pause(self, wanted: bool) -> None:
         """Hold the time, or let it go on."""

@@ -1,0 +1,133 @@
+"""The teleop on a terminal: what a tap, a held key and other keys send, and to which node."""
+from __future__ import annotations
+
+import itertools
+import signal
+import time
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import Wrench
+from peer import PATIENCE, Peer, end, kill, start, start_on_terminal
+from screen import Screen
+from sensor_msgs.msg import MultiDOFJointState
+
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.ros.followed import Followed
+
+pytestmark = pytest.mark.usefixtures('nothing_runs_on')
+MASSES = np.array([bone.mass for bone in load_scene('flight').bones])
+
+
+@pytest.fixture(scope='module')
+def peer(ros):
+    peer = Peer('teleop_peer')
+    yield peer
+    peer.destroy_node()
+
+
+def forces(got):
+    return [(w.force.x, w.force.y, w.force.z) for _, w in got]
+
+
+def stamp(message):
+    return message.header.stamp.sec + message.header.stamp.nanosec / 1e9
+
+
+def centre_speed(message):
+    """Speed, m/s, of a doll's centre of mass."""
+    twists = [(t.linear.x, t.linear.y, t.linear.z) for t in message.twist]
+    return np.linalg.norm(MASSES @ np.array(twists)) / MASSES.sum()
+
+
+def test_the_teleop_sends_what_the_keys_say(peer):
+    got = peer.collect(Wrench, '/typed/ragdoll/force')
+    process, terminal = start_on_terminal('teleop', '--ros-args', '-r', '__ns:=/typed')
+    peer.wait(lambda: peer.count_publishers('/typed/ragdoll/force'))
+    screen = Screen(terminal)
+    screen.wait('waiting for the node')
+
+    def tapped():
+        """Told again and again: this listener may not have found the teleop yet."""
+        screen.type(b'\x1b[B\x1b[D')
+        screen.read(0.2)
+        return (2000.0, -2000.0, 2.0) in forces(got) and got[-1][1] == Wrench()
+    peer.wait(tapped)
+    sent = forces(got)
+    # Once zero, after each tap.
+    assert all(any(one) or any(other) for one, other in itertools.pairwise(sent))
+    code, _ = end(process, signal.SIGINT)
+    assert code == 0
+
+
+def test_a_key_that_a_terminal_repeats_pushes_without_a_gap(peer):
+    """After the first repeats, 30 in a second, no zero comes until they end."""
+    got = peer.collect(Wrench, '/held/ragdoll/force')
+    _, terminal = start_on_terminal('teleop', '--ros-args', '-r', '__ns:=/held')
+    peer.wait(lambda: peer.count_publishers('/held/ragdoll/force'))
+    screen = Screen(terminal)
+    screen.wait('waiting for the node')
+    begin = time.monotonic()
+    while time.monotonic() < begin + 1.0:
+        screen.type(b'\x1b[A')
+        screen.read()
+        peer.executor_.spin_once(timeout_sec=1 / 30)
+    peer.wait(lambda: got and got[-1][1] == Wrench())
+    assert len(got) > 20
+    assert set(forces(got)[:-1]) == {(-2000.0, 0.0, 1.0)}
+
+
+@pytest.mark.parametrize('where', [
+    ('-r', '__node:=puppet'), ('-r', '__ns:=/stage', '-r', '__node:=puppet')],
+    ids=['renamed', 'namespaced'])
+def test_a_tap_gives_a_metre_a_second_to_a_node_of_any_name(peer, where):
+    """The middle of five taps: a stall of this machine cuts or stretches one by ticks, of 0.4 m/s
+    each, and the first may come before the node has found the teleop.
+    """
+    name = ('/stage' if len(where) > 2 else '') + '/puppet'
+    node = start('node', '--ros-args', *where, '-p', 'scene:=flight')
+    states = peer.collect(MultiDOFJointState, f'{name}/state')
+    peer.wait(lambda: states)
+    process, terminal = start_on_terminal('teleop')
+    screen = Screen(terminal)
+    screen.wait(r'pace \d')
+    before, gained = 0.0, []
+    for _ in range(5):
+        screen.type(b'\x1b[A')
+        screen.wait(r'\(-2000 0 1\) N')
+        # What was on its way is older than this, and the push has ended in 0.1 s at any rate.
+        later = time.time() + 0.2
+        peer.wait(lambda later=later: stamp(states[-1][1]) > later)
+        speed = centre_speed(states[-1][1])
+        gained.append(speed - before)
+        before = speed
+    assert 0.5 < np.median(gained) < 1.2, gained
+    assert end(process, signal.SIGINT)[0] == 0
+    kill(node)
+
+
+def test_of_several_nodes_a_user_says_which(peer):
+    for name in ('one', 'other'):
+        start('node', '--ros-args', '-r', f'__node:={name}', '-r', '__ns:=/two', '-p',
+              'scene:=flight')
+    sent = peer.collect(Wrench, '/two/other/force')
+    peer.wait(lambda: all(peer.count_publishers(f'/two/{name}/poses') for name in ('one', 'other')))
+    followed = Followed(peer, '')
+    assert not followed.look() and not followed.look()
+    assert '/two/one, /two/other' in followed.problem
+    _, terminal = start_on_terminal('teleop', 'two/other')
+    screen = Screen(terminal)
+
+    def pushed():
+        """Told again and again: the listener may not have found the teleop yet."""
+        screen.type(b'\x1b[C')
+        screen.read()
+        return (0.0, 2000.0, 1.0) in forces(sent)
+    peer.wait(pushed)
+
+
+def test_a_name_that_no_node_can_have_is_refused(peer):
+    process, _ = start_on_terminal('teleop', 'no/such name')
+    _, said = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 2
+    assert 'no/such name' in said and 'Traceback' not in said
