@@ -14,6 +14,7 @@ import numpy as np
 
 from ..model import errors
 from ..model.coordinates import GeneralizedState
+from ..model.drive import Drive
 from ..model.push import Push
 from ..model.state import State
 from .grab import EVENLY
@@ -44,10 +45,11 @@ class RecordedSimulation(Simulation):
         Simulation.accuracy.fset(self, accuracy)
         self.tell('accuracy', dataclasses.asdict(self.accuracy))
 
-    def push(self, push: Push, channel: str | None = None) -> None:
-        """As Simulation's."""
+    def push(self, push: Push | Drive, channel: str | None = None) -> None:
+        """As Simulation's; a drive is told as one."""
         super().push(push, channel)
-        self.tell('push', {**vars(push), 'channel': channel})
+        self.tell('drive' if isinstance(push, Drive) else 'push',
+                  {**vars(push), 'channel': channel})
 
     def release(self, channel: str) -> bool:
         """As Simulation's; told where it ends a push."""
@@ -124,6 +126,7 @@ def state_digest(state: State) -> str:
 
 _ACTS: dict[str, Callable[..., object]] = {
     'push': lambda simulation, channel, **push: simulation.push(Push(**push), channel),
+    'drive': lambda simulation, channel, **drive: simulation.push(Drive(**drive), channel),
     **{name: lambda simulation, name=name, **arguments: getattr(simulation, name)(**arguments)
        for name in ('release', 'grab', 'drag', 'let_go')},
     'step': lambda simulation, step: setattr(simulation, 'step', step),

@@ -6,8 +6,8 @@ is seen, ``tick`` the ticks made before it, ``kind`` says what the rest is:
 - start: a simulation is new; its scene's SHA-256, engine, accuracy, step in s, its first state's
   SHA-256 as ``state``
 - reset: it is back at its start; the same, but for the state
-- push, release, grab, drag, let_go, step, accuracy, go_back: an act of physics/recorded.py, its
-  arguments
+- push, drive, release, grab, drag, let_go, step, accuracy, go_back: an act of physics/recorded.py,
+  its arguments
 - state: ``sha256`` of the state, every HASHED ticks, while somebody listens
 - pause, parameters: for who reads along; what they do to the simulation is told by the others
 
