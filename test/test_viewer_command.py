@@ -89,7 +89,7 @@ def signals():
     (('--scene', 'drop', '--engine', 'steam'), ['steam', 'rigid', 'bullet']),
     (('--engine', 'bullet'), ['--engine', '--scene']),
     (('--scene', 'drop', '--ros-args', '-r', '__ns:=/a'), ['--ros-args', '--scene']),
-    (('--scene', 'drop', '--folder', '/nonexistent'), ['/nonexistent', 'folder'])])
+    (('--scene', 'drop', '--folder', '/dev/null/x'), ['/dev/null/x', 'folder'])])
 def test_refuses_with_exit_code_two(arguments, words, signals, capsys):
     try:
         code = main(list(arguments))
