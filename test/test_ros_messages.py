@@ -140,7 +140,8 @@ def test_the_benchmark_times_all_parts(ros, monkeypatch):
     node = rclpy.create_node('bench')
     costs = bench.row(node, load_scene('drop'), 'draft', 0)
     node.destroy_node()
-    assert set(costs) == {'simulation', 'conversion', 'messages', 'bare engine', 'bare publish'}
+    assert set(costs) == {
+        'simulation', 'checked', 'conversion', 'messages', 'bare engine', 'bare publish'}
     assert min(costs.values()) > 0
 
 
