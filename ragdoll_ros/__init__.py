@@ -9,8 +9,9 @@ import importlib
 
 _HOMES = {
     'Bone': 'model.ragdoll', 'Box': 'model.shapes', 'Capsule': 'model.shapes',
-    'Compound': 'model.compound', 'Cylinder': 'model.shapes', 'Ground': 'model.scene',
-    'Joint': 'model.ragdoll', 'Part': 'model.shapes', 'Placement': 'model.scene',
+    'Compound': 'model.compound', 'Cylinder': 'model.shapes', 'Drive': 'model.drive',
+    'Ground': 'model.scene', 'Joint': 'model.ragdoll', 'Part': 'model.shapes',
+    'Placement': 'model.scene',
     'Push': 'model.push', 'Ragdoll': 'model.ragdoll', 'RagdollError': 'model.errors',
     'Scene': 'model.scene', 'Simulation': 'physics.simulation', 'Sphere': 'model.shapes',
     'State': 'model.state', 'load_doll': 'files.doll', 'load_scene': 'files.scene',
