@@ -40,12 +40,18 @@ def centre_speed(message):
     return np.linalg.norm(MASSES @ np.array(twists)) / MASSES.sum()
 
 
-def test_the_teleop_sends_what_the_keys_say(peer):
-    got = peer.collect(Wrench, '/typed/ragdoll/force')
-    process, terminal = start_on_terminal('teleop', '--ros-args', '-r', '__ns:=/typed')
-    peer.wait(lambda: peer.count_publishers('/typed/ragdoll/force'))
+def heard_teleop(peer, namespace):
+    """What a teleop without a node sends, its process and its screen."""
+    got = peer.collect(Wrench, f'{namespace}/ragdoll/force')
+    process, terminal = start_on_terminal('teleop', '--ros-args', '-r', f'__ns:={namespace}')
+    peer.wait(lambda: peer.count_publishers(f'{namespace}/ragdoll/force'))
     screen = Screen(terminal)
     screen.wait('waiting for the node')
+    return got, process, screen
+
+
+def test_the_teleop_sends_what_the_keys_say(peer):
+    got, process, screen = heard_teleop(peer, '/typed')
 
     def tapped():
         """Told again and again: this listener may not have found the teleop yet."""
@@ -65,11 +71,7 @@ def test_a_key_that_a_terminal_repeats_pushes_without_a_gap(peer):
 
     A busy machine may hold the keys back for longer than a tap lasts: then they come once more.
     """
-    got = peer.collect(Wrench, '/held/ragdoll/force')
-    _, terminal = start_on_terminal('teleop', '--ros-args', '-r', '__ns:=/held')
-    peer.wait(lambda: peer.count_publishers('/held/ragdoll/force'))
-    screen = Screen(terminal)
-    screen.wait('waiting for the node')
+    got, _, screen = heard_teleop(peer, '/held')
 
     def held():
         got.clear()
