@@ -7,7 +7,8 @@ import pytest
 from geometry_msgs.msg import Twist, Vector3, Wrench, WrenchStamped
 from std_msgs.msg import Header
 
-from ragdoll_ros.ros.inputs import LEVER, shortened
+from ragdoll_ros.model.vectors import shortened
+from ragdoll_ros.ros.inputs import LEVER
 
 HUGE = 1.7e308
 BAD = (math.nan, math.inf, -math.inf)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from . import errors
 from .errors import set_fields
-from .push import LARGEST, Push
-from .vectors import Vector, finite
+from .push import LARGEST, Push, check_times
+from .vectors import Vector, finite, shortened
 
 FASTEST = 1e3
 """m/s and rad/s: beyond it a drive is refused."""
@@ -49,10 +49,7 @@ class Drive:
                 raise errors.OutOfRange(key, getattr(self, key), f'at most {FASTEST:g} long')
         for key in ('force_per_speed', 'torque_per_speed', 'most_force', 'most_torque'):
             errors.check_range(key, getattr(self, key), 0, LARGEST)
-        errors.check_positive('duration', self.duration)
-        errors.check_range('duration', self.duration, 0, 1e6)
-        if self.start is not None:
-            errors.check_range('start', self.start, 0, 1e9)
+        check_times(self.duration, self.start)
 
     @property
     def at_rest(self) -> Push:
@@ -63,8 +60,4 @@ class Drive:
 
 
 def _at_most(most: float, gain: float, missing: Vector | None) -> Vector:
-    if missing is None:
-        return 0.0, 0.0, 0.0
-    length = gain * math.hypot(*missing)
-    scale = gain if length <= most else gain * most / length
-    return tuple(scale * value for value in missing)
+    return shortened([gain * value for value in missing or (0.0, 0.0, 0.0)], most)[0]

@@ -17,6 +17,14 @@ ARROW = 0.5
 """m: length of the arrow of a push of 1 kN; longer and shorter ones go by the square root."""
 
 
+def check_times(duration: float, start: float | None) -> None:
+    """Check for how long, s, and from when on, s or None, something acts; see Push."""
+    errors.check_positive('duration', duration)
+    errors.check_range('duration', duration, 0, 1e6)
+    if start is not None:
+        errors.check_range('start', start, 0, 1e9)
+
+
 @dataclass(frozen=True)
 class Push:
     """A steady ``force`` (N) and ``torque`` (N m) on one bone.
@@ -41,10 +49,7 @@ class Push:
         for key in ('force', 'torque'):
             if math.hypot(*getattr(self, key)) > LARGEST:
                 raise errors.OutOfRange(key, getattr(self, key), f'at most {LARGEST:g} long')
-        errors.check_positive('duration', self.duration)
-        errors.check_range('duration', self.duration, 0, 1e6)
-        if self.start is not None:
-            errors.check_range('start', self.start, 0, 1e9)
+        check_times(self.duration, self.start)
 
     def arrow(self, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
         """Tail and tip (2, 3) m, world frame, of an arrow that ends where the force attacks.

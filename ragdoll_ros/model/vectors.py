@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from . import errors
 
@@ -34,3 +35,19 @@ def unit(path: str, values: object, expected: str = 'a direction, not zero',
     if length < 1e-9:
         raise errors.NotUnit(path, values, expected)
     return values if abs(length - 1) < 1e-15 else floats(value / length for value in values)
+
+
+def shortened(values: Sequence[float], most: float) -> tuple[Vector, float]:
+    """A finite vector, at most ``most`` long, and the length that it had.
+
+    The vector is first divided by its largest component, so that nothing overflows on the way.
+    """
+    largest = max(map(abs, values))
+    if largest == 0:
+        return (0.0, 0.0, 0.0), 0.0
+    direction = [value / largest for value in values]
+    spread = math.hypot(*direction)
+    length = largest * spread
+    if length <= most:
+        return tuple(values), length
+    return tuple(value * (most / spread) for value in direction), length

@@ -5,8 +5,6 @@ direction; both are counted, and the doll goes on.
 """
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from typing import Protocol
 
 from geometry_msgs.msg import Twist, Vector3, Wrench, WrenchStamped
@@ -17,7 +15,7 @@ from ..model.drive import FASTEST, MOST_FORCE, MOST_TORQUE, Drive
 from ..model.push import Push
 from ..model.ragdoll import WORLD
 from ..model.scene import Scene
-from ..model.vectors import Vector
+from ..model.vectors import Vector, shortened
 from .parameters import Settings
 from .tally import Tally
 
@@ -118,19 +116,3 @@ class Inputs:
         if length > most:
             self._tally.clamp(source, f'{name} of {length:g} to {limit}, {most:g}')
         return result
-
-
-def shortened(values: Sequence[float], most: float) -> tuple[Vector, float]:
-    """A finite vector, at most ``most`` long, and the length that it had.
-
-    The vector is first divided by its largest component, so that nothing overflows on the way.
-    """
-    largest = max(map(abs, values))
-    if largest == 0:
-        return (0.0, 0.0, 0.0), 0.0
-    direction = [value / largest for value in values]
-    spread = math.hypot(*direction)
-    length = largest * spread
-    if length <= most:
-        return tuple(values), length
-    return tuple(value * (most / spread) for value in direction), length

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from .machine import compiled
-from .solver import LIMIT, OPENING, ROLLING, on_disc, one_contact, weaken
+from .solver import LIMIT, OPENING, ROLLING, on_disc, one_contact, weaken_by
 from .system import COMPLIANCE, STICKS, Room
 
 MOST_SWEEPS = 100
@@ -47,7 +47,7 @@ def solve_large(r: Room, count: int, n: int, h: float, thrown: bool, deep: bool)
     if not left <= ROUGHLY:
         r.tally[0].unsolved += 1
         if not work + spent / 2 <= 0:
-            weaken(p, n, work, spent)
+            weaken_by(p, n, work, spent)
     r.left[0] = max(r.left[0], left)
     if deep:
         normals_alone(r, count)

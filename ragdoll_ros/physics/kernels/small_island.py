@@ -7,7 +7,7 @@ import numpy as np
 
 from .cholesky import solve
 from .machine import compiled
-from .solver import solve_impulses, solve_normals, weaken
+from .solver import solve_impulses, solve_normals, weaken_by
 from .system import COMPLIANCE, OF_IMPACTS, Room
 
 SWEEPS = 4
@@ -156,7 +156,7 @@ def weaken_impulses(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> None
             w += W[i * n + j] * p[j]
         work += p[i] * u[i]
         spent += p[i] * w
-    weaken(p, n, work, spent)
+    weaken_by(p, n, work, spent)
 
 
 @compiled

@@ -458,7 +458,7 @@ def solve_normals(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.
 
 
 @compiled
-def weaken(p: np.ndarray, n: int, work: float, spent: float) -> None:
+def weaken_by(p: np.ndarray, n: int, work: float, spent: float) -> None:
     """Scale impulses p (n,) whose energy is ``work`` + ``spent`` / 2, J, so that it is none; what
     is no number becomes none.
     """
