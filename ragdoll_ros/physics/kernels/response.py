@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .contact import BURIED, jacobian, through_factor
+from .contact import jacobian, through_factor
 from .large_island import solve_large
 from .machine import compiled
 from .mass import solve_lower
@@ -21,8 +21,8 @@ FASTEST_OUT = 0.3
 move on."""
 
 YIELDING = 0.01
-"""Compliance, as a share of their own W, at which bones BURIED in each other are brought apart: a
-limit or the ground may be in the way, and do not yield."""
+"""Compliance, as a share of their own W, at which bones in each other are brought apart: a limit or
+the ground may be in the way, and do not yield."""
 
 FASTEST_BACK = 1.0
 """rad/s at which a joint that began far outside is brought back at the most."""
@@ -136,7 +136,7 @@ def ask(s: System, r: Room, count: int, n: int, h: float) -> tuple[bool, bool]:
             if r.unsought[0] and not c.begun:
                 r.need[0, k] = -c.gap
             deep |= r.need[0, k] > 0
-            if c.b >= 0 and c.kind > 1 and c.gap < -BURIED:
+            if c.b >= 0 and c.kind > 1:
                 r.need[2, k] = YIELDING
         for e in range(c.kind):
             p[c.row + e] = c.impulse[e]

@@ -291,10 +291,7 @@ def pay(s: System, r: Room, m: int, shift: np.ndarray) -> None:
 
 @compiled
 def keep_limits(s: System, q: np.ndarray, shift: np.ndarray) -> None:
-    """Shorten a ``shift`` (nv,) of a doll that would take a joint past a limit that it does not
-    touch, or farther past one that it has passed: bones that are put or come back within each
-    other do not come apart at the price of a joint.
-    """
+    """Shorten a ``shift`` (nv,) of a doll that would take a joint past a limit not touched yet."""
     share, doll = 1.0, -1
     for k in range(len(s.bounds)):
         bound = s.bounds[k]
@@ -303,9 +300,8 @@ def keep_limits(s: System, q: np.ndarray, shift: np.ndarray) -> None:
             share, doll = 1.0, s.doll_of[s.bone_of[bound.v]]
         way = shift[bound.v]
         room = q[bound.q] - bound.lower if way < 0 else bound.upper - q[bound.q]
-        most = room + TOUCHING if room > 0 else max(0.0, room + BEYOND / 2)
-        if abs(way) > most:
-            share = min(share, most / abs(way))
+        if room > 0 and abs(way) > room + TOUCHING:
+            share = min(share, (room + TOUCHING) / abs(way))
     shorten(s, doll, share, shift)
 
 

@@ -1,0 +1,49 @@
+"""The impulse of one contact by itself against Signorini's and Coulomb's laws."""
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+numba = pytest.importorskip('numba')
+
+from ragdoll_ros.physics.kernels.solver import one_contact  # noqa: E402
+
+
+@numba.njit
+def _one_contact(ease, c, last, mu):
+    return one_contact(ease, 3, 0, c[0], c[1], c[2], last[0], last[1], last[2], mu)
+
+
+def breach(ease, c, p, mu):
+    """By how much, in velocities, an impulse p (3,) breaks the laws; ``ease`` is W (3, 3)."""
+    u, cone = ease @ p + c, mu * p[0]
+    size, speed = np.linalg.norm(p[1:]), np.linalg.norm(u[1:])
+    if p[0] == 0:
+        return max(-u[0], np.abs(p).max() * ease.trace())
+    slides = 0.0 if size < cone * (1 - 1e-9) else size
+    against = np.linalg.norm(u[1:] * slides + p[1:] * speed) / size if slides else speed
+    return max(abs(u[0]), against, (size - cone) * ease.trace())
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_a_contact_by_itself_keeps_the_laws(seed):
+    """Whatever its bodies, its friction (.01 to 100: beyond Painleve's) and the last impulse."""
+    draw = np.random.default_rng(seed)
+    for _ in range(1000):
+        ways = draw.normal(size=(3, draw.integers(3, 6))) * np.exp(draw.normal(size=(3, 1)))
+        ease, mu = ways @ ways.T, 10 ** draw.uniform(-2, 2)
+        c = draw.normal(size=3) * np.exp(2 * draw.normal(size=3))
+        last = np.abs(draw.normal(size=3)) * draw.integers(0, 2)
+        p = np.array(_one_contact(ease.ravel(), c, last, mu))
+        # Rounding of the sums, times what a quotient of nearly dependent ways loses.
+        sums = (np.abs(ease) @ np.abs(p) + np.abs(c)).max()
+        assert breach(ease, c, p, mu) <= 1e-9 * sums, (ease, c, p, mu, last)
+
+
+def test_what_slides_and_closes_under_much_friction_is_stopped():
+    """An edge of a doll at friction 10: normal and friction by turns went in circles here."""
+    ease = np.array([[0.504, 0.213, 0.0], [0.213, 0.3, 0.0], [0.0, 0.0, 0.5]])
+    c = np.array([-0.79, -1.78, -0.02])
+    p = np.array(_one_contact(ease.ravel(), c, np.zeros(3), 10.0))
+    assert p[0] > 0.1
+    assert breach(ease, c, p, 10.0) <= 1e-12
