@@ -115,7 +115,7 @@ $(READY): setup.py pyproject.toml
 	@touch $@
 
 # Once, and after a change, with a word on it: else the first programs that need it would.
-$(COMPILED): $(READY) $(wildcard ragdoll_ros/physics/kernels/*.py)
+$(COMPILED): $(READY) $(wildcard ragdoll_ros/physics/kernels/*.py ragdoll_ros/physics/kernels/*/*.py)
 	@$(BIN)/python -m ragdoll_ros.physics.kernels >/dev/null
 	@touch $@
 

@@ -12,8 +12,8 @@ import pytest
 pytest.importorskip('numba')
 import numba
 
-from ragdoll_ros.physics.kernels.bundle import bind, bundle_at, bundle_type
-from ragdoll_ros.physics.kernels.machine import compiled
+from ragdoll_ros.physics.kernels.compiling.bundle import bind, bundle_at, bundle_type
+from ragdoll_ros.physics.kernels.compiling.decorators import compiled
 
 
 @compiled

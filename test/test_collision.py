@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 pytest.importorskip('numba')
 import numba
 
-from ragdoll_ros.physics.kernels.collision import (
+from ragdoll_ros.physics.kernels.collision.pair import (
     BOX,
     CAPSULE,
     CYLINDER,

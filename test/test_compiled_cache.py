@@ -10,9 +10,9 @@ import pytest
 
 pytest.importorskip('numba')
 
-from ragdoll_ros.physics.kernels import cache, notices
+from ragdoll_ros.physics.kernels.compiling import cache, notices
 
-ROOT = Path(cache.__file__).resolve().parents[3]
+ROOT = Path(cache.__file__).resolve().parents[4]
 """Where the package is that is tested: here or installed."""
 
 USE = """
@@ -26,7 +26,7 @@ for name, accuracy in (('article', 'draft'), ('flight', 'exact'), ('crowd', 'nor
 AGAIN = 'from ragdoll_ros.physics.kernels.__main__ import main; main([])'
 READY = 'from ragdoll_ros.physics.kernels import ready; print(ready())'
 SAMPLE = """
-from ragdoll_ros.physics.kernels.machine import REAL, entry
+from ragdoll_ros.physics.kernels.compiling.decorators import REAL, entry
 
 @entry(REAL)
 def double(x):

@@ -9,12 +9,11 @@ import pytest
 
 pytest.importorskip('numba')
 
-from ragdoll_ros.physics.kernels import cache, notices
+from ragdoll_ros.physics.kernels.compiling import cache, notices
 
-KERNELS = Path(cache.__file__).parent
-FRAME = ('cache.py', 'linking.py', 'machine.py', 'notices.py')
+FRAME = Path(cache.__file__).parent
 INNER = """
-from .machine import compiled
+from .compiling.decorators import compiled
 
 @compiled
 def doubled(x):
@@ -22,7 +21,7 @@ def doubled(x):
 """
 OUTER = """
 from .inner import doubled
-from .machine import REAL, entry
+from .compiling.decorators import REAL, entry
 
 @entry(REAL)
 def more(x):
@@ -33,7 +32,7 @@ def yet_more(x):
     return more(x) + 10
 """
 USE = """
-from tiny.cache import alone
+from tiny.compiling.cache import alone
 with alone():
     from tiny.outer import more, yet_more
 print(more(3.0), yet_more(3.0))
@@ -59,9 +58,7 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 def tiny(tmp_path):
     """A package of two kernels, one of which calls the other, in two files."""
     package = tmp_path / 'tiny'
-    package.mkdir()
-    for name in FRAME:
-        shutil.copy(KERNELS / name, package)
+    shutil.copytree(FRAME, package / FRAME.name, ignore=shutil.ignore_patterns('__pycache__'))
     (package / '__init__.py').touch()
     (package / 'inner.py').write_text(INNER)
     (package / 'outer.py').write_text(OUTER)
@@ -158,9 +155,9 @@ def test_a_disk_that_is_full_is_told_once(tiny):
 @pytest.mark.parametrize('file_instead', [False, True])
 def test_a_folder_may_go_while_it_runs(tiny, file_instead):
     """It is made anew; where that is impossible nothing is kept."""
-    gone = 'import shutil, tiny.cache\nshutil.rmtree(tiny.cache.FOLDER)\n'
+    gone = 'import shutil, tiny.compiling.cache\nshutil.rmtree(tiny.compiling.cache.FOLDER)\n'
     if file_instead:
-        gone += 'tiny.cache.FOLDER.touch()\n'
+        gone += 'tiny.compiling.cache.FOLDER.touch()\n'
     printed, said = run(tiny, gone + USE)
     assert printed == '7.0 17.0' and said[0] == ONCE and len(said) == 1 + file_instead
     assert len(list(folder(tiny).glob('*.nbc'))) == (0 if file_instead else 2)

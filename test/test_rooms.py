@@ -27,6 +27,10 @@ ONLY = {'pybullet': 'physics/engine/bullet.py', 'mujoco': 'physics/engine/mujoco
 """Libraries, and the one place of each. The report's pendulum in three lines of PyBullet alone is
 what a user would write without this package: it shares no code with it."""
 
+FLOORS = ('compiling', 'maths', 'dynamics', 'record', 'system', 'collision', 'contact', 'impulses',
+          'stepping', 'flight', 'advance', 'loaded', '__main__')
+"""Of machine code: each stands on those before it."""
+
 Edges = list[tuple[str, str]]
 
 MACHINE_CODE = {'numba', 'llvmlite', 'numpy', *sys.stdlib_module_names}
@@ -87,6 +91,10 @@ def broken_arrows(edges: Edges) -> list[str]:
         if name.startswith('physics.kernels') and not target.startswith('physics.kernels') and (
                 target[0] != ':' or target[1:].partition('.')[0] not in MACHINE_CODE):
             found.append(f'{name} -> {target}: kernels are machine code and nothing else')
+        elif name.startswith('physics.kernels.') and target.startswith('physics.kernels.'):
+            floor, other = (FLOORS.index(side.split('.')[2]) for side in (name, target))
+            if other > floor:
+                found.append(f'{name} -> {target}: a floor above it')
     return found
 
 
@@ -137,7 +145,8 @@ def copy_with(tmp_path: Path, file: str, line: str) -> Path:
     """A small package with one import more than it may have."""
     package = tmp_path / 'ragdoll_ros'
     for name in ('model/scene.py', 'model/push.py', 'physics/simulation.py', 'ros/node.py',
-                 'physics/kernels/step.py', 'viewer/page.py', 'viewer/sources/remote.py'):
+                 'physics/kernels/contact/rows.py', 'physics/kernels/stepping/step.py',
+                 'viewer/page.py', 'viewer/sources/remote.py'):
         path = package / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text('')
@@ -153,8 +162,9 @@ def copy_with(tmp_path: Path, file: str, line: str) -> Path:
     ('physics/simulation.py', 'def late():\n    from ..ros import node'),
     ('viewer/page.py', 'from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n'
                        '    from ..ros.node import RagdollNode'),
-    ('physics/kernels/step.py', 'from ...model.scene import Scene'),
-    ('physics/kernels/step.py', 'import scipy.linalg')])
+    ('physics/kernels/stepping/step.py', 'from ....model.scene import Scene'),
+    ('physics/kernels/stepping/step.py', 'import scipy.linalg'),
+    ('physics/kernels/contact/rows.py', 'from ..stepping.step import settle')])
 def test_an_arrow_that_is_broken_on_purpose_is_found(tmp_path, file, line):
     assert broken_arrows(imports(copy_with(tmp_path, 'model/push.py', ''))) == []
     assert len(broken_arrows(imports(copy_with(tmp_path, file, line)))) == 1

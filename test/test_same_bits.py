@@ -95,7 +95,7 @@ ROUNDED_ONCE = {'sqrt', 'floor', 'ceil', 'copysign', 'isfinite', 'inf', 'pi', 'f
 
 
 def test_machine_code_calls_nothing_that_rounds_as_it_likes():
-    for path in (ROOT / 'ragdoll_ros' / 'physics' / 'kernels').glob('*.py'):
+    for path in (ROOT / 'ragdoll_ros' / 'physics' / 'kernels').rglob('*.py'):
         for node in ast.walk(ast.parse(path.read_text())):
             where = f'{path.name}:{getattr(node, "lineno", 0)}'
             if isinstance(node, ast.Attribute) and ast.unparse(node.value) == 'math':

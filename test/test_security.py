@@ -11,7 +11,7 @@ EVALUATORS = {'eval', 'exec', 'compile', '__import__', 'os.system', 'os.popen'}
 LOADERS = {'pickle', 'cPickle', 'marshal', 'shelve', 'dill', 'joblib', 'cloudpickle'}
 UNSAFE_YAML = {'load', 'load_all', 'unsafe_load', 'full_load', 'Loader', 'UnsafeLoader',
                'FullLoader', 'CLoader', 'CUnsafeLoader', 'unsafe_load_all', 'full_load_all'}
-OWN = 'physics/kernels/cache.py'
+OWN = 'physics/kernels/compiling/cache.py'
 """Unpickles machine code that the same user has kept."""
 
 WRITERS = {
@@ -20,7 +20,7 @@ WRITERS = {
     'files/doll.py': 'save_doll(path)', 'files/scene.py': 'save_scene(path)',
     'fit/command.py': '--out, --urdf', 'fit/picture.py': '--picture',
     'physics/engine/bullet.py': 'a temporary file', 'physics/engine/hush.py': 'os.devnull',
-    'physics/kernels/cache.py': 'machine code, NUMBA_CACHE_DIR',
+    'physics/kernels/compiling/cache.py': 'machine code, NUMBA_CACHE_DIR',
     'ros/crowd_bench.py': 'a temporary file', 'ros/rescue.py': 'dump_directory',
     'ros/state_dump.py': 'dump_directory', 'viewer/editor/folder.py': '--folder'}
 """Files that write files, and what says where."""

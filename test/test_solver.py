@@ -6,7 +6,7 @@ import pytest
 
 numba = pytest.importorskip('numba')
 
-from ragdoll_ros.physics.kernels.solver import one_contact  # noqa: E402
+from ragdoll_ros.physics.kernels.impulses.one_contact import one_contact  # noqa: E402
 
 
 @numba.njit

@@ -6,7 +6,7 @@ import pytest
 from ragdoll_ros.model.angle import sine_and_cosine
 
 numba = pytest.importorskip('numba')
-from ragdoll_ros.physics.kernels import transcendental  # noqa: E402
+from ragdoll_ros.physics.kernels.maths import transcendental  # noqa: E402
 
 ANGLES = [0.0, -0.0, 1e-300, 1e-9, 0.3, math.pi / 4, 0.8, math.pi / 2, 2.0, math.pi, 4.0, 5.0,
           2 * math.pi, 100.0, 1e4, 1e6]

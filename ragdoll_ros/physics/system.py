@@ -14,14 +14,14 @@ from .motion import damping_rate
 from .tree import table
 
 KINDS = {'sphere': 0, 'capsule': 1, 'box': 2, 'cylinder': 3}
-"""Numbers of the kinds of shapes, as in kernels/collision_shapes.py."""
+"""Numbers of the kinds of shapes, as in kernels/collision/shapes.py."""
 
 STIFFEST = 1000.0
 """1/s at which joint damping may end a motion for it to be flown; above, steps take it
 implicitly."""
 
 GROUND_POINTS = {'sphere': 1, 'capsule': 2, 'box': 8, 'cylinder': 10}
-"""Points of each kind that may touch the ground, see kernels/contact.py."""
+"""Points of each kind that may touch the ground, see kernels/contact/gaps.py."""
 
 Law = tuple[float, float, float]
 """Friction, rolling friction (m), restitution."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...model.coordinates import DofLayout
 from ...model.scene import Scene
-from ..kernels.bundle import bind
+from ..kernels.compiling.bundle import bind
 from ..kernels.loaded import advance as kernels
 from ..kernels.system import (
     TALLY,
@@ -53,7 +53,7 @@ class Cluster:
     course: Course
     rooms: list[Room]
     bundles: list[list[np.ndarray]]
-    """The rows that bind system, course, and a room for each worker; see bundle.py."""
+    """The rows that bind system, course, and a room for each worker; see compiling/bundle.py."""
 
     def addresses(self, worker: int) -> list[int]:
         """Of its bundles, for compiled code."""

@@ -25,7 +25,8 @@ def main(arguments: list[str] | None = None) -> int:
         print(NOT_READY.format(problem()), file=sys.stderr)
         return 2
     began = time.monotonic()
-    from . import cache, loaded  # noqa: F401  importing compiles
+    from . import loaded  # noqa: F401  importing compiles
+    from .compiling import cache
     is_kept = cache.KEPT and cache.KernelCache.failure is None
     kept = f'kept in {cache.FOLDER}' if is_kept else 'kept nowhere'
     print(f'The dynamics are compiled: {time.monotonic() - began:.1f} s, {kept}')

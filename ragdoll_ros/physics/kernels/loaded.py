@@ -1,5 +1,5 @@
 """The kernels. What importing them compiles, one process compiles for all that start together."""
-from .cache import alone
+from .compiling.cache import alone
 
 with alone():
     from . import advance

@@ -8,8 +8,8 @@ import collections
 import numba
 import numpy as np
 
-from .bundle import bundle_type
-from .dynamics import Work
+from .compiling.bundle import bundle_type
+from .dynamics.forward import Work
 from .record import RECORD
 
 GEOM = np.dtype([
@@ -106,9 +106,9 @@ Room = collections.namedtuple(
 
 The rows ``Y`` of contacts have entries for the velocities that they see, ``support``, alone; ``W``
 and ``G`` have room for a small island, ``blocks`` for W of each contact by itself. Of a step:
-``met``, the gaps that tell what touches in it; ``bracket``, ``above`` and ``below`` of touch.py;
-``unsought`` (1,), whether touches in it are not
-sought; ``left`` (1,), m/s by which contacts of large islands may err."""
+``met``, the gaps that tell what touches in it; ``bracket``, ``above`` and ``below`` of
+stepping/touch.py; ``unsought`` (1,), whether touches in it are not sought; ``left`` (1,), m/s by
+which contacts of large islands may err."""
 
 WITHIN, OUTSIDE = 1, 2
 
@@ -121,7 +121,7 @@ bear together is then decided, and their impulses stay small where they jam. Wha
 creeps by some 1e-10 m/s for it, and what strikes misses as large a share of its velocity."""
 
 LARGE = 96
-"""Rows of an island from which on it is solved without W; see large_island.py."""
+"""Rows of an island from which on it is solved without W; see impulses/large_island.py."""
 
 STICKS = 1e5
 """Coefficient from which friction has no limit."""

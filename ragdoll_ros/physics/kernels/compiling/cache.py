@@ -1,0 +1,178 @@
+"""Where machine code is kept for the next process, one file for each function that Python calls.
+
+Numba's own cache notices a change of the file of the function that is called, but not of the files
+of those that this one calls, and fails where it cannot write. Here a file's name has a digest of
+all kernels; where they cannot be kept, all is compiled at every start.
+"""
+from __future__ import annotations
+
+import contextlib
+import gc
+import hashlib
+import os
+import pickle
+import re
+import sysconfig
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import ClassVar
+
+import numba
+import numpy as np
+from numba.core import caching, compiler, event, registry, serialize
+from numba.core.dispatcher import Dispatcher
+from numba.misc.appdirs import AppDirs
+
+from . import notices
+
+PATIENCE = 1.0
+"""s to wait for another process without a word: it may just be loading what was kept."""
+
+KERNELS, SOURCES = __package__.rpartition('.')[0], Path(__file__).parent.parent
+"""The package of all kernels, and its folder."""
+
+OURS = re.compile(r'[\w.]+-[0-9a-f]{16}-[0-9a-f]{8}\.nbc(\.\d+)?'  # begun by a process of a number
+                  r'|[\w.]+-\d+\.py\d+\w*(\.\d+)?\.nb[ic]')  # as numba itself names them
+
+
+def digest(folder: Path) -> str:
+    """Digest of all Python files of a folder and those in it, with their names."""
+    found = hashlib.sha256()
+    for path in sorted(folder.rglob('*.py')):
+        content = path.read_bytes()
+        found.update(f'{path.relative_to(folder)} {len(content)} '.encode() + content)
+    return found.hexdigest()[:16]
+
+
+def _machine() -> str:
+    """Digest of what else the code depends on: versions, and the processor and what it can."""
+    processor = registry.cpu_target.target_context.codegen().magic_tuple()
+    known = sysconfig.get_config_var('SOABI'), numba.__version__, np.__version__, processor
+    return hashlib.sha256(repr(known).encode()).hexdigest()[:8]
+
+
+DIGEST = digest(SOURCES)
+KEY = f'{DIGEST}-{_machine()}'
+
+
+def _places() -> list[Path]:
+    """Folders to keep code in, the better one first: those that numba would choose from."""
+    if not any(SOURCES.glob('*.py')):  # in an archive: no telling when the sources change
+        return []
+    own = caching._CacheLocator.get_suitable_cache_subpath(__file__)
+    if numba.config.CACHE_DIR:
+        return [Path(numba.config.CACHE_DIR, own)]
+    return [SOURCES / '__pycache__', Path(AppDirs('numba', False).user_cache_dir, own)]
+
+
+def _serves(place: Path) -> bool:
+    """Whether our code is there already, be the folder read-only or not, or can be kept there."""
+    try:
+        if any(place.glob(f'*-{KEY}.nbc')):
+            return True
+        place.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=place).close()
+    except OSError:
+        return False
+    return True
+
+
+FOLDER = next(filter(_serves, _places()), None)
+KEPT = FOLDER is not None
+"""Whether there is a folder to keep code in."""
+
+
+class KernelCache(caching._Cache):
+    """What numba asks for the code of one function of a module, compiled for one signature."""
+
+    failure: ClassVar[OSError | None] = None
+    """Why something could not be kept: the rest is not tried then."""
+
+    def __init__(self, function: Callable) -> None:
+        module = function.__module__.removeprefix(f'{KERNELS}.')
+        self._path = FOLDER / f'{module}.{function.__qualname__}-{KEY}.nbc'
+
+    @property
+    def cache_path(self) -> str:
+        """The folder."""
+        return str(FOLDER)
+
+    def load_overload(self, sig: tuple, target_context: object) -> compiler.CompileResult | None:
+        """The function as it was kept; None if it was not, or the file is not whole."""
+        target_context.refresh()
+        try:
+            kept = pickle.loads(self._path.read_bytes())
+            return compiler.CompileResult._rebuild(target_context, *kept)
+        except Exception:  # a pickle that was damaged may raise anything
+            return None
+
+    def save_overload(self, sig: tuple, data: compiler.CompileResult) -> None:
+        """Keep the function that was compiled, unless addresses of this process are in it."""
+        if KernelCache.failure is None and not data.library.has_dynamic_globals:
+            try:
+                _keep(self._path, serialize.dumps(data._reduce()))
+            except OSError as error:
+                KernelCache.failure = error
+                notices.say(notices.NOT_KEPT.format(error))
+
+    def enable(self) -> None:
+        """Nothing to do, nor below: it is always used, and never emptied."""
+
+    def disable(self) -> None:
+        """See enable."""
+
+    def flush(self) -> None:
+        """See enable."""
+
+
+def _keep(path: Path, content: bytes) -> None:
+    """Write a file that is there as a whole or not at all, in the place of what is out of date."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    for other in path.parent.iterdir():
+        if OURS.fullmatch(other.name) and f'-{DIGEST}-' not in other.name:
+            other.unlink(missing_ok=True)
+    begun = path.with_name(f'{path.name}.{os.getpid()}')
+    try:
+        begun.write_bytes(content)
+        begun.replace(path)
+    finally:
+        begun.unlink(missing_ok=True)
+
+
+def keep(dispatcher: Dispatcher) -> None:
+    """Let numba look for a function's code among what is kept, and keep it there."""
+    if KEPT:
+        dispatcher._cache = KernelCache(dispatcher.py_func)
+
+
+@contextlib.contextmanager
+def alone() -> Iterator[None]:
+    """Let processes compile one after another: the next one finds what the first has kept. No
+    garbage is looked for meanwhile, which takes a seventh of the time and finds little.
+    """
+    with contextlib.ExitStack() as stack:
+        if gc.isenabled():
+            gc.disable()
+            stack.callback(gc.enable)
+        if FOLDER is not None:
+            with contextlib.suppress(OSError, ImportError):  # a system without such locks
+                lock = os.open(FOLDER / 'ragdoll_ros.lock', os.O_RDONLY | os.O_CREAT, 0o666)
+                stack.callback(os.close, lock)
+                _wait_for(lock)
+        yield
+
+
+def _wait_for(lock: int) -> None:
+    import fcntl
+    word = threading.Timer(PATIENCE, notices.say, (notices.WAITING,))
+    word.start()
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+    finally:
+        word.cancel()
+
+
+event.register('numba:compile',
+               notices.Teller(notices.ONCE if KEPT else notices.EVERY_TIME))

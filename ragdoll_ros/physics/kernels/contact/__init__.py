@@ -1,0 +1,1 @@
+"""What of a scene touches: gaps, contacts with whole patches, and their rows."""

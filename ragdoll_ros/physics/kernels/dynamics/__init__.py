@@ -1,0 +1,1 @@
+"""How trees of bodies move in the air: kinematics, mass matrices, accelerations."""

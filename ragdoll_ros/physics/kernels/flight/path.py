@@ -1,0 +1,151 @@
+"""A path through the air: a step of order 8 with its error, and where all is along it.
+
+It is one step of Hairer's DOP853 with its dense output, gone tick by tick.
+"""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..compiling.decorators import compiled
+from ..contact.gaps import bone_velocity
+from ..dynamics.forward import Work, normalize, pose, rates
+from ..maths.quaternion import cross
+from ..system import Course, Room, System
+from .dop853 import CONTINUED, STAGES, add_up, step_error
+
+SAFETY, SHORTER, LONGER = 0.8, 0.2, 2.0
+"""Share of the longest step that the tolerance allows, and bounds of a step over the last."""
+
+HELPED = 0.5
+"""Share of a step's error that a shorter one must come below; else what is left is rounding."""
+
+FIRST_TURN = 0.2
+"""rad that the fastest bone turns in the first step that is tried."""
+
+STEADY = 1.5
+"""Times the change of velocities along a path, over its length, that accelerations may reach."""
+
+
+@compiled
+def path_step(s: System, r: Room, loads: np.ndarray, course: Course, h: float) -> float:
+    """Enter the step of h s from where all is as the course's path; its error."""
+    tree, gravity, work, k, y = s.tree, s.gravity, r.work, r.stages, r.row
+    q, v, dense, ends = course.q, course.v, course.dense, course.ends
+    nq, size = len(q), len(q) + len(v)
+    start = dense[0]
+    for j in range(nq):
+        start[j] = q[j]
+    for j in range(nq, size):
+        start[j] = v[j - nq]
+    normalize(tree, start[:nq])
+    if course.path[0].begun:
+        for j in range(size):
+            k[0, j] = ends[0, j]
+    else:
+        rates(tree, gravity, loads, start[:nq], start[nq:], work, k[0])
+    for stage in range(1, 16):
+        add_up(STAGES[stage], stage, k, h, y)
+        for j in range(size):
+            y[j] += start[j]
+        normalize(tree, y[:nq])
+        if stage == 12:
+            for j in range(size):
+                dense[1, j] = y[j]
+        rates(tree, gravity, loads, y[:nq], y[nq:], work, k[stage])
+    for j in range(size):
+        dense[1, j] -= start[j]
+        dense[2, j] = h * k[0, j] - dense[1, j]
+        dense[3, j] = 2 * dense[1, j] - h * (k[12, j] + k[0, j])
+        ends[0, j], ends[1, j] = k[0, j], k[12, j]
+    for row in range(4):
+        add_up(CONTINUED[row], 16, k, h, dense[4 + row])
+    return step_error(k, h, nq, y)
+
+
+@compiled
+def along(tree: np.ndarray, course: Course, time: float, q: np.ndarray, v: np.ndarray) -> None:
+    """Coordinates and velocities at an instant of the path, s from its start."""
+    nq, dense = len(q), course.dense
+    share = time / course.path[0].length
+    for j in range(nq + len(v)):
+        y = 0.0
+        for row in range(7, 0, -1):
+            y = (y + dense[row, j]) * (share if row % 2 else 1 - share)
+        y += dense[0, j]
+        if j < nq:
+            q[j] = y
+        else:
+            v[j - nq] = y
+    normalize(tree, q)
+
+
+@compiled
+def begin_path(s: System, r: Room, course: Course, loads: np.ndarray, tolerance: float,
+               longest: float) -> bool:
+    """Make a path from where all is, as long as its error allows, at most ``longest`` s. False:
+    none was found that errs little enough.
+    """
+    path = course.path[0]
+    pose(s.tree, course.q, course.v, r.work)
+    if path.next <= 0:
+        fast = 1e-9
+        for i in range(len(s.tree)):
+            move = r.work.moves[i]
+            fast = max(fast, move[0] ** 2 + move[1] ** 2 + move[2] ** 2)
+        path.next = FIRST_TURN / math.sqrt(fast)
+    h, before = min(longest, path.next), math.inf
+    for _ in range(30):
+        error = path_step(s, r, loads, course, h)
+        r.tally[0].flights += 1
+        ratio = error / tolerance
+        factor = SAFETY / math.sqrt(math.sqrt(math.sqrt(ratio))) if ratio > 0 else LONGER
+        good = ratio <= 1 or (HELPED * before < error < math.inf)
+        path.length, path.error = h, error
+        path.next = h * min(LONGER, max(SHORTER, factor))
+        if good:
+            path.valid, path.along, path.event = 1, 0.0, math.inf
+            return True
+        before, h = error, min(h * SHORTER if error == math.inf else path.next, longest)
+        path.begun = 1 if math.isfinite(course.ends[0, 0]) else 0
+    path.valid = 0
+    return False
+
+
+@compiled
+def point_velocity(work: Work, i: int, q: np.ndarray, root: int, point: np.ndarray,
+                   n: np.ndarray) -> float:
+    """Velocity of a bone's point (3,) m in the world along n; ``root``: where in q its doll's root
+    stands. Work is posed.
+    """
+    m = work.moves[i]
+    x, y, z = cross(m[0], m[1], m[2], point[0] - q[root], point[1] - q[root + 1],
+                    point[2] - q[root + 2])
+    return n[0] * (m[3] + x) + n[1] * (m[4] + y) + n[2] * (m[5] + z)
+
+
+@compiled
+def accelerations_of(s: System, r: Room, course: Course, q: np.ndarray, v: np.ndarray) -> float:
+    """Acceleration, m/s^2, that no point exceeds on the path, as its ends tell; q, v: room."""
+    bones, h = len(s.tree), course.path[0].length
+    along(s.tree, course, 0.0, q, v)
+    pose(s.tree, q, v, r.work)
+    for i in range(bones):
+        x, y, z, w = bone_velocity(r.work, i)
+        r.own[i, 0], r.own[i, 1], r.own[i, 2], r.own[i, 3] = x, y, z, w
+        r.own[i, 4] = 0.0
+    along(s.tree, course, h, q, v)
+    pose(s.tree, q, v, r.work)
+    for k in range(len(s.geoms)):
+        i = s.geoms[k].bone
+        r.own[i, 4] = max(r.own[i, 4], s.geoms[k].reach)
+    most = 0.0
+    for i in range(bones):
+        x, y, z, w = bone_velocity(r.work, i)
+        own, reach = r.own[i], r.own[i, 4]
+        size = math.sqrt((x - own[0]) ** 2 + (y - own[1]) ** 2 + (z - own[2]) ** 2) / h
+        size += abs(w - own[3]) / h * reach + 2 * max(w, own[3]) ** 2 * reach
+        most = max(most, size)
+    g = math.sqrt(s.gravity[0] ** 2 + s.gravity[1] ** 2 + s.gravity[2] ** 2)
+    return STEADY * (most + g) + 1e-3

@@ -1,0 +1,1 @@
+"""Vectors, rotations, sines and small systems of equations, number by number."""

@@ -1,0 +1,1 @@
+"""Where something touches: steps, impacts, and what both keep."""

@@ -1,0 +1,76 @@
+"""Depths given back in position alone, as far as motion can pay and joints allow."""
+from __future__ import annotations
+
+import numpy as np
+
+from ..compiling.decorators import compiled
+from ..contact.gaps import BEYOND, TOUCHING
+from ..maths.quaternion import cross
+from ..system import Room, System
+from .momentum import inner_energy
+
+BURIED = 1e-3
+"""m: what is deeper in the ground comes out whatever it costs; bones, as far as the motion pays."""
+
+PAID = 0.005
+"""Share of the kinetic energy that giving depths back may cost in a step."""
+
+
+@compiled
+def lifted(s: System, r: Room, shift: np.ndarray) -> float:
+    """Energy of height, J, that a displacement (nv,) gives; axes, composites are those of now."""
+    total, g = 0.0, s.gravity
+    for j in range(len(shift)):
+        if shift[j] != 0.0:
+            a, c = r.work.axes[j], r.composite[s.bone_of[j]]
+            x, y, z = cross(a[0], a[1], a[2], c[1], c[2], c[3])
+            total -= shift[j] * (g[0] * (c[0] * a[3] + x) + g[1] * (c[0] * a[4] + y)
+                                 + g[2] * (c[0] * a[5] + z))
+    return total
+
+
+@compiled
+def pay(s: System, r: Room, m: int, shift: np.ndarray) -> None:
+    """Let the motion pay for giving depths back, by a ``shift`` (nv,) that costs r.lift[0] J: where
+    it would be more than a part of its energy, they are given back by less. What is deep in the
+    ground or beyond a limit comes out whatever it costs: what the motion does not pay is booked.
+    """
+    deep = False
+    for i in range(m):
+        c = r.contacts[i]
+        deep |= c.b < 0 and c.gap < -(BEYOND if c.kind == 1 else BURIED)
+    paid = PAID * max(0.0, inner_energy(s, r))
+    if r.lift[0] <= paid:
+        return
+    if deep:
+        r.tally[0].lifted += r.lift[0] - paid
+    else:
+        share = paid / r.lift[0]
+        for j in range(len(shift)):
+            shift[j] *= share
+        r.lift[0] *= share
+
+
+@compiled
+def keep_limits(s: System, q: np.ndarray, shift: np.ndarray) -> None:
+    """Shorten a ``shift`` (nv,) of a doll that would take a joint past a limit not touched yet."""
+    share, doll = 1.0, -1
+    for k in range(len(s.bounds)):
+        bound = s.bounds[k]
+        if s.doll_of[s.bone_of[bound.v]] != doll:
+            shorten(s, doll, share, shift)
+            share, doll = 1.0, s.doll_of[s.bone_of[bound.v]]
+        way = shift[bound.v]
+        room = q[bound.q] - bound.lower if way < 0 else bound.upper - q[bound.q]
+        if room > 0 and abs(way) > room + TOUCHING:
+            share = min(share, (room + TOUCHING) / abs(way))
+    shorten(s, doll, share, shift)
+
+
+@compiled
+def shorten(s: System, doll: int, share: float, shift: np.ndarray) -> None:
+    """Scale what of a ``shift`` (nv,) is a doll's."""
+    if share < 1:
+        for j in range(len(shift)):
+            if s.doll_of[s.bone_of[j]] == doll:
+                shift[j] *= share

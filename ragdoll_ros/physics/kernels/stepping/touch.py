@@ -1,0 +1,100 @@
+"""The instant of a touch within a step: lengths of the step are tried until one ends there.
+
+What is apart when a step begins may meet before it ends; a length at which nothing has met and one
+at which something has are drawn together by chords, those of Anderson and Bjoerck (BIT 13, 1973).
+"""
+from __future__ import annotations
+
+import math
+
+from ..compiling.decorators import compiled
+from ..contact.gaps import NEVER, TOUCHING, of_limit
+from ..system import Room, System
+from .step import SLOW, SLOW_TURN
+
+SUNK = -1e-7
+"""m or rad: what is found deeper than this at a step's end has met on the way."""
+
+SHORTEST = 1e-9
+"""s: no step is made shorter to find a touch."""
+
+
+@compiled
+def met_fast(s: System, r: Room, j: int, h: float) -> bool:
+    """Whether what gap j parts met in the step of h s just gone, too fast for the next one."""
+    slow = SLOW_TURN if of_limit(s, r.gaps, j) else SLOW
+    return (r.gaps[j] > TOUCHING and r.later[j] <= TOUCHING
+            and r.gaps[j] - r.later[j] > slow * h)
+
+
+@compiled
+def touched(s: System, r: Room, h: float) -> tuple[bool, bool, bool]:
+    """Whether something that met fast in the step of h s just gone, or whose touch is sought, is
+    SUNK at its end; whether something is there or touches; and whether that came fast.
+    """
+    sunk = landed = fast = False
+    for j in range(len(r.gaps)):
+        quick = met_fast(s, r, j, h)
+        if quick or (r.below[j] < 0 and r.later[j] <= TOUCHING):
+            fast |= quick
+            landed = True
+            sunk |= r.later[j] < SUNK
+    return sunk, landed, fast
+
+
+@compiled
+def open_bracket(r: Room) -> None:
+    """Begin to seek the instant of a touch: all that is known is that it is after the start."""
+    r.bracket[0], r.bracket[1], r.bracket[2] = 0.0, math.inf, 0.0
+    for j in range(len(r.gaps)):
+        r.above[j], r.below[j] = r.gaps[j], NEVER
+
+
+@compiled
+def narrow(s: System, r: Room, h: float, sunk: bool, landed: bool) -> bool:
+    """Let a step of h s, at the end of which something is ``sunk``, or nothing is, be an end of
+    r.bracket; whether the instant of the touch is to be sought between its ends.
+
+    The bracket: lengths, s, at which nothing is sunk, with the gaps r.above, and at which something
+    is, r.below; which of them moved last. The gaps of the one that stays twice count less: bent().
+    """
+    ends = r.bracket
+    if sunk:
+        for j in range(len(r.gaps)):
+            low = NEVER
+            if r.later[j] < SUNK and (r.below[j] < 0 or met_fast(s, r, j, h)):
+                low = r.later[j]
+            if ends[2] > 0:
+                r.above[j] *= bent(r.below[j], low)
+            r.below[j] = low
+        ends[1], ends[2] = h, 1.0
+        return h > SHORTEST
+    if landed or not ends[1] - h > SHORTEST or h <= ends[0]:
+        return False
+    for j in range(len(r.gaps)):
+        if ends[2] < 0:
+            r.below[j] *= bent(r.above[j], r.later[j])
+        r.above[j] = r.later[j]
+    ends[0], ends[2] = h, -1.0
+    return ends[1] < math.inf
+
+
+@compiled
+def bent(before: float, now: float) -> float:
+    """By how much the far end of a chord counts less when the near end moves from a value to one
+    of the same sign; by half where that says nothing.
+    """
+    share = 1 - now / before if before != 0.0 and (now < 0) == (before < 0) else 0.5
+    return share if share > 0 else 0.5
+
+
+@compiled
+def between(r: Room) -> float:
+    """Length of a step, s, at the end of which the first of those meets that r.bracket parts."""
+    share = 1.0
+    for j in range(len(r.gaps)):
+        if r.below[j] < 0:
+            above = max(0.0, r.above[j])
+            share = min(share, above / (above - r.below[j]))
+    low, high = r.bracket[0], r.bracket[1]
+    return max(SHORTEST, low + share * (high - low))
