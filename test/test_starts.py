@@ -106,11 +106,13 @@ def test_energy_never_rises_in_a_random_scene_but_by_work(number):
 
 
 @pytest.mark.parametrize(('number', 'accuracy'), [
-    (16, 'normal'), (73, 'normal'), (95, 'normal'), (98, 'normal'), (671, 'draft')])
+    (16, 'normal'), (73, 'normal'), (95, 'normal'), (98, 'normal'), (671, 'draft'),
+    (111, 'exact')])
 def test_a_fall_that_begins_beyond_limits_ends_as_others_do(number, accuracy):
     """From when all joints are back and all bones apart: no energy of nothing, nothing deep.
 
-    In 671 two bones come back 45 mm within each other, and could part past a joint's limit alone.
+    In 671 two bones come back 45 mm within each other, and could part past a joint's limit alone;
+    in 111 one is bound 30 mm in another, and is not to press into a third for that.
     """
     pytest.importorskip('mujoco')
     from ragdoll_ros.accuracy.methods import by_name, run

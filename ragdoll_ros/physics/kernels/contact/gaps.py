@@ -30,6 +30,9 @@ NEARLY = 1e-3
 BEYOND = 2e-3
 """rad by which a joint is outside its limits."""
 
+BURIED = 1e-3
+"""m: what is deeper in the ground comes out whatever it costs; bones, as far as the motion pays."""
+
 NEVER = 1e6
 """m: the gap of two bones that do not collide."""
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiling.decorators import compiled
+from ..contact.gaps import BURIED
 from ..contact.rows import jacobian, through_factor
 from ..dynamics.mass import solve_lower
 from ..system import LARGE, Room, System
@@ -20,9 +21,9 @@ FASTEST_OUT = 0.3
 """m/s at which what began far inside is brought out at the most: what is in its way has time to
 move on."""
 
-YIELDING = 0.01
-"""Compliance, as a share of their own W, at which bones in each other are brought apart: a limit or
-the ground may be in the way, and do not yield."""
+YIELDING, BURIED_YIELDING = 1e-4, 0.01
+"""Compliance, as a share of their own W, at which bones in each other are brought apart, and bones
+BURIED in each other: a limit or the ground may be in the way, which do not yield."""
 
 FASTEST_BACK = 1.0
 """rad/s at which a joint that began far outside is brought back at the most."""
@@ -137,7 +138,7 @@ def ask(s: System, r: Room, count: int, n: int, h: float) -> tuple[bool, bool]:
                 r.need[0, k] = -c.gap
             deep |= r.need[0, k] > 0
             if c.b >= 0 and c.kind > 1:
-                r.need[2, k] = YIELDING
+                r.need[2, k] = BURIED_YIELDING if c.gap < -BURIED else YIELDING
         for e in range(c.kind):
             p[c.row + e] = c.impulse[e]
     return thrown, deep

@@ -4,13 +4,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..contact.gaps import BEYOND, TOUCHING
+from ..contact.gaps import BEYOND, BURIED, TOUCHING
 from ..maths.quaternion import cross
 from ..system import Room, System
 from .momentum import inner_energy
-
-BURIED = 1e-3
-"""m: what is deeper in the ground comes out whatever it costs; bones, as far as the motion pays."""
 
 PAID = 0.005
 """Share of the kinetic energy that giving depths back may cost in a step."""
