@@ -50,12 +50,14 @@ def ros():
     """ROS in this process, in a domain that it shares with the processes it starts alone."""
     import rclpy
     from peer import free_domain
+    from rclpy.signals import SignalHandlerOptions
     domain, lock = free_domain()
     os.environ['ROS_DOMAIN_ID'] = str(domain)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ['PYTHONPATH'] = os.pathsep.join(
         filter(None, [str(ROOT), os.environ.get('PYTHONPATH', '')]))
-    rclpy.init(args=[])
+    # By itself rclpy takes SIGTERM, such as timeout's, and shuts down: all tests that follow fail.
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     yield
     rclpy.try_shutdown()
     lock.close()
