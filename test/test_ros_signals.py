@@ -1,15 +1,28 @@
 """Signals at any instant of a node's life: it ends with 0 and says no more than it should."""
 from __future__ import annotations
 
+import json
+import os
 import random
 import signal
+import subprocess
 import time
+from contextlib import suppress
 
 import pytest
 from geometry_msgs.msg import PoseArray
 from peer import PATIENCE, start
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
+
+from ragdoll_ros.ros.run_log import PAST
 
 pytestmark = pytest.mark.usefixtures('nothing_runs_on')
+
+SIGNS = (signal.SIGINT, signal.SIGTERM)
+
+RESETS = 10
+"""Asked for at once: as many as wait at a service."""
 
 
 def imports(process):
@@ -58,19 +71,74 @@ def test_more_signals_while_it_ends_change_nothing(ros, peer):
     assert errors.count('ended at') == 1 and 'of simulated time; 0 inputs refused' in errors
 
 
+def linger(process, longest, draw):
+    """Let a random time go by, or less if the process ends."""
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(draw.uniform(0, longest))
+
+
+def begins(process, peer, draw):
+    wait(lambda: imports(process))
+    linger(process, 3.0, draw)
+
+
+def runs(process, peer, draw):
+    peer.hear_once(PoseArray, 'ragdoll/poses')
+    linger(process, 0.5, draw)
+
+
+def ends(process, peer, draw):
+    """By another signal than the one that counts."""
+    runs(process, peer, draw)
+    process.send_signal(draw.choice(SIGNS))
+    linger(process, 0.2, draw)
+
+
+def end_well(process, sign):
+    """Send a signal; assert that it is the process's end, and that nothing is left of it."""
+    before = time.monotonic()
+    process.send_signal(sign)
+    code, _, errors = outcome(process)
+    assert code == 0 and 'Traceback' not in errors, errors
+    assert time.monotonic() - before < 2
+    with pytest.raises(ProcessLookupError):
+        os.killpg(process.pid, 0)
+
+
 @pytest.mark.slow
-def test_fifty_signals_at_random_instants(ros):
-    draw = random.Random(2)
-    for _ in range(50):
-        process = start('node')
-        wait(lambda process=process: imports(process))
-        end = time.monotonic() + draw.uniform(0, 4)
-        wait(lambda end=end: time.monotonic() > end)
-        sent = time.monotonic()
-        process.send_signal(draw.choice((signal.SIGINT, signal.SIGTERM)))
-        code, _, errors = outcome(process)
-        assert code == 0 and 'Traceback' not in errors
-        assert time.monotonic() - sent < 2
+@pytest.mark.parametrize('does, times', [(begins, 20), (runs, 10), (ends, 10)])
+def test_forty_signals_at_random_instants(ros, peer, does, times):
+    draw, alive = random.Random(2), 0
+    for _ in range(times):
+        process = start('node', compiled=True)
+        does(process, peer, draw)
+        alive += process.poll() is None
+        end_well(process, draw.choice(SIGNS))
+    assert alive > times / 2, 'else nothing was sent'
+
+
+@pytest.mark.slow
+def test_ten_signals_into_resets(ros, peer):
+    """A thousand dolls, as their reset takes 30 ms, are set back again and again; a reset that was
+    begun, as an event tells, and is not answered has been cut short.
+    """
+    draw, cut = random.Random(3), 0
+    for _ in range(10):
+        begun = peer.collect(String, 'ragdoll/events', PAST)
+        process = start('node', '--ros-args', '-p', 'scene:=field', compiled=True)
+        peer.call(SetBool, 'ragdoll/pause', SetBool.Request(data=True))
+        peer.wait(lambda begun=begun: begun)
+        caller = peer.create_client(Trigger, 'ragdoll/reset')
+        peer.wait(caller.service_is_ready)
+        answers = [caller.call_async(Trigger.Request()) for _ in range(RESETS)]
+        peer.wait(answers[0].done)
+        linger(process, 0.1, draw)
+        end_well(process, draw.choice(SIGNS))
+        for _ in range(4 * RESETS):  # takes all that has come, and waits for nothing
+            peer.executor_.spin_once(timeout_sec=0)
+        told = sum(json.loads(event.data)['kind'] == 'reset' for _, event in begun)
+        cut += told > sum(answer.done() for answer in answers)
+    assert cut, 'else none fell into a reset'
 
 
 @pytest.mark.slow
