@@ -562,6 +562,7 @@ def test_a_character_becomes_the_scene_and_its_skin_stays_with_it(desk, rig):
     content = fit_rigs.document(fit_rigs.RIGS[rig]).glb()
     desk.files.fit(f'../{rig}.glb', content)
     assert 'fitted' in desk.said() and not desk.files.progress.visible
+    assert 'verdict: good' in desk.said()
     placement, = desk.editor.scene.dolls
     doll = placement.doll
     assert dataclasses.replace(doll, model=None) == fit_rigs.fitted(rig).doll

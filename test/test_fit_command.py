@@ -79,6 +79,13 @@ def test_a_robot_goes_limp(glb, tmp_path, capsys):
     assert [joint.limits for joint in limp.joints] == [joint.limits for joint in fitted.joints]
 
 
+def test_strict_ends_with_3_where_the_doll_is_not_good(glb, capsys):
+    assert main([str(glb), '--strict']) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == 'verdict: good'
+    assert main(['article_doll.yaml', '--strict']) == 3
+    assert capsys.readouterr().out.splitlines()[-1] == 'verdict: doubtful'
+
+
 def test_a_doll_is_checked(capsys):
     assert main(['article_doll.yaml']) == 0
     assert 'density of 10000' in capsys.readouterr().out

@@ -14,7 +14,7 @@ ARROWS = {
     'model': set(),
     'files': {'model'},
     'physics': {'files', 'model'},
-    'fit': {'files', 'model'},
+    'fit': {'physics', 'files', 'model'},
     'ros': {'physics', 'files', 'model'},
     'viewer': {'physics', 'fit', 'files', 'model'},
     'replay': {'physics', 'files', 'model'},
@@ -87,6 +87,8 @@ def broken_arrows(edges: Edges) -> list[str]:
             found.append(f'{name} -> {target}')
         if room == 'physics' and other == 'files' and not name.startswith('physics.engine.'):
             found.append(f'{name} -> {target}: only an engine wants a text')
+        if room == 'fit' and other == 'physics' and name != 'fit.trial':
+            found.append(f'{name} -> {target}: only a fall of the finished doll wants physics')
     for name, target in edges:
         if name.startswith('physics.kernels') and not target.startswith('physics.kernels') and (
                 target[0] != ':' or target[1:].partition('.')[0] not in MACHINE_CODE):

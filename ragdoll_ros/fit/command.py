@@ -13,6 +13,7 @@ from .character import read_character
 from .pipeline import Options, fit_character
 from .report import doll_report, fit_report
 from .robot import read_urdf
+from .verdict import Verdict, judge
 
 EXAMPLE = """\
 example:
@@ -20,7 +21,8 @@ example:
   ros2 run ragdoll_ros ragdoll_node --ros-args -p scene:=doll.yaml
 
 A .urdf becomes a doll too: a robot that goes limp. A doll's own .yaml is checked and reported.
-Exit code 0: done; 2: a file or an option is wrong."""
+The report ends with a verdict on the doll: good, doubtful or wrong.
+Exit code 0: done; 2: a file or an option is wrong; 3: --strict, and the doll is not good."""
 
 PICTURES = ('.png', '.jpg', '.svg', '.pdf')
 
@@ -32,19 +34,19 @@ FITTING = ('mass', 'masses', 'scale', 'shape', 'orientation', 'weight', 'smalles
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command; exit code 0, or 2 where a file or an option is wrong."""
+    """Run the command; exit code 0, 2 where a file or an option is wrong, 3 as --strict says."""
     parser = _parser()
     options = parser.parse_args(arguments)
     try:
         _check(options, parser)
-        _run(options)
+        verdict = _run(options)
     except errors.RagdollError as error:
         print(f'ragdoll_fit: {_one_line(error)}', file=sys.stderr)
         return 2
     except OSError as error:
         print(f'ragdoll_fit: {error.filename}: {error.strerror}', file=sys.stderr)
         return 2
-    return 0
+    return 3 if options.strict and verdict.word != 'good' else 0
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -75,10 +77,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--smallest', type=float, metavar='M',
                         help='bones with less skin than this are merged into their parents '
                         '(default: 0.055 of the character)')
+    parser.add_argument('--strict', action='store_true',
+                        help='exit with 3 where the verdict is not good')
     return parser
 
 
-def _run(options: argparse.Namespace) -> None:
+def _run(options: argparse.Namespace) -> Verdict:
     path = Path(options.input)
     fit = None
     if path.suffix.lower() in DOLLS:
@@ -92,6 +96,8 @@ def _run(options: argparse.Namespace) -> None:
             options.shape, options.orientation, options.weight, options.smallest, options.mass,
             options.masses))
         doll, report = dataclasses.replace(fit.doll, model=str(path)), fit_report(fit)
+    verdict = judge(doll, fit, measured=path.suffix.lower() in ROBOTS)
+    report = f'{report}\n{verdict}'
     print(report)
     if options.output:
         save_doll(doll, options.output, f'Fitted to {path.name}\n\n{report}')
@@ -100,6 +106,7 @@ def _run(options: argparse.Namespace) -> None:
     if options.picture:
         from .picture import draw
         draw(doll, fit.character if fit else None, options.picture)
+    return verdict
 
 
 def _check(options: argparse.Namespace, parser: argparse.ArgumentParser) -> None:

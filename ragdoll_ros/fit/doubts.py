@@ -8,10 +8,14 @@ import numpy as np
 from ..model import rotation
 from ..model.ragdoll import Joint, Ragdoll
 from .character import LARGEST_METRES, SMALLEST_METRES
-from .names import roles_of
+from .finding import Finding
+from .names import doll_roles
 
 DENSEST = 3000.0
 """kg/m^3; bone has 1 900, stone 2 700."""
+
+IMPOSSIBLE = 25_000.0
+"""kg/m^3; osmium, the densest of all, has 22 600."""
 
 BENDS = {'shin': (-1, 'a knee that bends forwards'),
          'forearm': (1, 'an elbow that bends backwards'),
@@ -19,8 +23,8 @@ BENDS = {'shin': (-1, 'a knee that bends forwards'),
 """By role: which way along x the first axis takes the child, and what it is if it does not."""
 
 
-def find_doubts(doll: Ragdoll) -> list[str]:
-    """A sentence for each doubt: about the size, a density, a joint that bends the wrong way."""
+def find_doubts(doll: Ragdoll) -> list[Finding]:
+    """About the size, a density, a joint that bends the wrong way."""
     return [*_size(doll), *_densities(doll), *_bends(doll)]
 
 
@@ -33,34 +37,34 @@ def extent(doll: Ragdoll) -> float:
     return float((furthest[:3] + furthest[3:]).max())
 
 
-def _size(doll: Ragdoll) -> list[str]:
+def _size(doll: Ragdoll) -> list[Finding]:
     size = extent(doll)
     if size > LARGEST_METRES:
         unit = 'centimetres' if size < 1000 else 'millimetres'
-        return [f'a doll {size:.4g} m long: the size smells of {unit}']
+        return [Finding(f'a doll {size:.4g} m long: the size smells of {unit}')]
     if size < SMALLEST_METRES:
-        return [f'a doll {size:.4g} m long: the size smells of a scale applied twice']
+        return [Finding(f'a doll {size:.4g} m long: the size smells of a scale applied twice')]
     return []
 
 
-def _densities(doll: Ragdoll) -> list[str]:
+def _densities(doll: Ragdoll) -> list[Finding]:
     densities = {bone.name: bone.mass / bone.shape.volume for bone in doll.bones}
-    return [f'{name}: a density of {density:.0f} kg/m^3, over {DENSEST:.0f}'
+    return [Finding(f'{name}: a density of {density:.0f} kg/m^3, over {DENSEST:.0f}',
+                    density > IMPOSSIBLE)
             for name, density in densities.items() if density > DENSEST]
 
 
-def _bends(doll: Ragdoll) -> list[str]:
-    joints = doll.joints_from_root()
-    names = (doll.root.name, *(joint.child for joint in joints))
-    parents = (-1, *(names.index(joint.parent) for joint in joints))
-    roles = dict(zip(names, roles_of(names, parents), strict=True))
+def _bends(doll: Ragdoll) -> list[Finding]:
+    role_of = dict(zip((bone.name for bone in doll.bones), doll_roles(doll), strict=True))
     found = []
     for joint in doll.joints:
-        if roles[joint.child] in BENDS and joint.kind in ('hinge', 'universal'):
-            sign, complaint = BENDS[roles[joint.child]]
+        role = role_of[joint.child]
+        if role in BENDS and joint.kind in ('hinge', 'universal'):
+            sign, complaint = BENDS[role]
             if sign * _reach_forward(doll, joint) < -0.05:
                 low, high = (math.degrees(angle) for angle in joint.limits[0])
-                found.append(f'{joint.child}: {complaint} (limits {low:.0f} to {high:.0f} degrees)')
+                found.append(Finding(f'{joint.child}: {complaint} '
+                                     f'(limits {low:.0f} to {high:.0f} degrees)', True))
     return found
 
 

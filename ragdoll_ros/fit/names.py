@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import re
 
+from ..model.ragdoll import Ragdoll
+
 WORDS = (
     # The first role with a word in the name wins: a handindex is a finger, no hand.
     ('finger', 'finger thumb index middle ring pinky little metacarpal'),
@@ -78,6 +80,15 @@ def roles_of(names: tuple[str, ...], parents: tuple[int, ...]) -> tuple[str | No
             role = None
         roles.append(role)
     return tuple(roles)
+
+
+def doll_roles(doll: Ragdoll) -> tuple[str | None, ...]:
+    """Role of each of the doll's bones, by their names; see roles_of."""
+    order = [doll.root.name, *(joint.child for joint in doll.joints_from_root())]
+    above = {joint.child: order.index(joint.parent) for joint in doll.joints}
+    roles = dict(zip(order, roles_of(tuple(order), tuple(above.get(n, -1) for n in order)),
+                     strict=True))
+    return tuple(roles[bone.name] for bone in doll.bones)
 
 
 def _next(limb: tuple[str, ...], above: str | None) -> str:

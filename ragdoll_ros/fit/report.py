@@ -1,4 +1,7 @@
-"""What was fitted and how well, as text: for the terminal and for the head of the doll's file."""
+"""What was fitted and how well, as text: for the terminal and for the head of the doll's file.
+
+What to think of it is in verdict.py.
+"""
 from __future__ import annotations
 
 import textwrap
@@ -6,7 +9,7 @@ import textwrap
 from ..model.compound import Compound
 from ..model.ragdoll import Ragdoll
 from ..model.shapes import Shape
-from .doubts import extent, find_doubts
+from .doubts import extent
 from .overlap import covered, overlapping_pairs, shared_volume
 from .pipeline import BodyFit, Fit
 from .shapes import TOLERANCE
@@ -25,7 +28,7 @@ def fit_report(fit: Fit) -> str:
         f'volume {1000 * volume:.4g} l' + (
             f", {volume / skin:.2f} of the skin's" if skin > 0 else '')
         + f', {100 * shared_volume(bones):.0f} % of it shared',
-        *_swings(fit.doll), *_overlaps(fit.doll), *_warnings([*fit.notes, *find_doubts(fit.doll)])])
+        *_swings(fit.doll), *_overlaps(fit.doll), *_warnings(fit.notes)])
 
 
 def doll_report(doll: Ragdoll, notes: tuple[str, ...] = ()) -> str:
@@ -33,7 +36,7 @@ def doll_report(doll: Ragdoll, notes: tuple[str, ...] = ()) -> str:
     return '\n'.join([
         *_table(doll, '', [''] * len(doll.bones)), '',
         f'{len(doll.bones)} bodies, {doll.mass:.4g} kg, {extent(doll):.3g} m',
-        *_overlaps(doll), *_warnings([*notes, *find_doubts(doll)])])
+        *_overlaps(doll), *_warnings(notes)])
 
 
 def _table(doll: Ragdoll, title: str, columns: list[str]) -> list[str]:
@@ -77,5 +80,5 @@ def _overlaps(doll: Ragdoll) -> list[str]:
                          subsequent_indent='  ', break_long_words=False)
 
 
-def _warnings(sentences: list[str]) -> list[str]:
+def _warnings(sentences: tuple[str, ...]) -> list[str]:
     return [f'warning: {sentence}' for sentence in sentences]

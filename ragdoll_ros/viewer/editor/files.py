@@ -70,11 +70,15 @@ class Files:
             return
         try:
             self.progress.visible = True
-            self._try(lambda: self._take(self._folder.fit(name, content, self._show_progress),
-                                         'fit', name))
+            self._try(lambda: self._fitted(name, content))
         finally:
             self.progress.visible = False
             self._fitting.release()
+
+    def _fitted(self, name: str, content: bytes) -> str:
+        scene, verdict = self._folder.fit(name, content, self._show_progress)
+        found = ''.join(f'; {finding.sentence}' for finding in verdict.findings)
+        return f'{self._take(scene, "fit", name)}; verdict: {verdict.word}{found}'
 
     def _take(self, scene: Scene, what: str, name: str) -> str:
         self._go_on_with(scene, f'{what} {name}')

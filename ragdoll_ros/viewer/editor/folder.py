@@ -8,6 +8,7 @@ import dataclasses
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ...files import yaml_text
 from ...files.config import scene_names
@@ -15,6 +16,9 @@ from ...files.scene import load_scene, save_scene, scene_from, scene_text
 from ...model import errors
 from ...model.ragdoll import Ragdoll
 from ...model.scene import Scene, above_ground
+
+if TYPE_CHECKING:
+    from ...fit.verdict import Verdict
 
 LARGEST_UPLOAD = 100_000_000
 """Bytes: characters with large textures have tens of MB."""
@@ -77,10 +81,11 @@ class Folder:
         except errors.ModelErrors as error:
             raise errors.ModelErrors(name, error.errors) from None
 
-    def fit(self, name: str, content: bytes, progress: Progress) -> Scene:
+    def fit(self, name: str, content: bytes, progress: Progress) -> tuple[Scene, Verdict]:
         """Scene of a doll that is fitted, as ragdoll_fit does, to a character that was sent.
 
-        The doll hangs above level ground; its character stays here, and it names that.
+        The doll hangs above level ground; its character stays here, and it names that. And what
+        ragdoll_fit thinks of it.
         """
         name = plain(name)
         suffix = Path(name).suffix.lower()
@@ -91,7 +96,7 @@ class Folder:
             with tempfile.TemporaryDirectory() as inbox:
                 path = Path(inbox, name)
                 path.write_bytes(content)
-                doll = _fitted(path, progress)
+                doll, verdict = _fitted(path, progress)
         except errors.ModelError as error:
             raise errors.ModelErrors(name, [error]) from None
         except errors.ModelErrors as error:
@@ -99,7 +104,7 @@ class Folder:
         if suffix != '.urdf':
             progress(0.9, 'keeping the character')
             doll = dataclasses.replace(doll, model=str(self._keep(name, content)))
-        return above_ground(doll)
+        return above_ground(doll), verdict
 
     def _check_dolls(self, data: object) -> None:
         """Refuse dolls that lie neither here nor in config/: no other file is read."""
@@ -162,17 +167,21 @@ def _check_size(content: bytes) -> None:
         raise errors.Unreadable('', f'{len(content)} bytes', f'at most {LARGEST_UPLOAD}')
 
 
-def _fitted(path: Path, progress: Progress) -> Ragdoll:
+def _fitted(path: Path, progress: Progress) -> tuple[Ragdoll, Verdict]:
     # Here, as matters of files that few pages need.
     from ...fit.character import read_character
     from ...fit.pipeline import fit_character
+    from ...fit.verdict import judge
     progress(0.1, 'reading')
     if path.suffix.lower() == '.urdf':
         from ...fit.robot import read_urdf
-        return read_urdf(path)[0]
+        doll = read_urdf(path)[0]
+        return doll, judge(doll, measured=True)
     character = read_character(path)
     progress(0.4, f'fitting {len(character.bone_names)} bones, {len(character.vertices)} vertices')
-    return fit_character(character).doll
+    fit = fit_character(character)
+    progress(0.7, 'letting it fall')
+    return fit.doll, judge(fit.doll, fit)
 
 
 def _alone(error: errors.ModelError) -> errors.ModelError:
