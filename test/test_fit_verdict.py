@@ -185,10 +185,10 @@ def test_a_robots_bodies_are_where_its_file_says():
 
 
 def test_a_joint_past_its_limits_is_told_by_a_fall():
-    """Bound 57 degrees outside its range, and stiff: what pushes it back takes longer."""
+    """Bound 57 degrees outside its range."""
     doll = fitted('mixamo').doll
     assert find_in_a_fall(doll, 1.8) == []
     foot = joint_of(doll, 'mixamorig:LeftFoot')
     twin = with_joint(doll, foot.child, limits=((1.0, 1.2), foot.limits[1]))
     finding, = find_in_a_fall(twin, 1.8)
-    assert 'degrees past its limits' in finding.sentence and finding.wrong
+    assert '57 degrees past its limits' in finding.sentence and finding.wrong

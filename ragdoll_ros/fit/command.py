@@ -62,8 +62,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--picture', metavar='OUT.png', help='draw skin and bodies side by side')
     parser.add_argument('--mass', type=float, metavar='KG',
                         help='of the whole doll (default: as much water as the skin holds)')
-    parser.add_argument('--masses', choices=('volume', 'proportions'), default='volume',
-                        help='share the mass by volume, or as in a human body')
+    parser.add_argument('--masses', choices=('best', 'volume', 'proportions'), default='best',
+                        help="share the mass by the skin's volume, by a person's proportions, or "
+                        'by volume and for a person half way between (default)')
     parser.add_argument('--scale', type=float, metavar='M',
                         help='metres to one unit of the file (default: 1, or a guess)')
     parser.add_argument('--shape', default='best',

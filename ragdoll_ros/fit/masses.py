@@ -1,51 +1,74 @@
-"""Masses of bodies: by their volumes, or by the proportions of a human body."""
+"""Masses of bodies: by the volume of their skin, by a person's proportions, or half way between."""
 from __future__ import annotations
 
+import numpy as np
+
 from ..model import errors
-from .groups import Group
-from .names import side_of
+from .character import Character
+from .groups import Group, partner
+from .person import SEGMENTS, is_person, segment
+from .skin_volume import skin_volumes
 
 WATER = 1000.0
 """kg/m^3; animals are within 10 % of it."""
 
-SEGMENTS = {'head': 6.94, 'neck': 1.0, 'trunk': 43.46, 'upper_arm': 2.71, 'forearm': 1.62,
-            'hand': 0.61, 'thigh': 14.16, 'shin': 4.33, 'foot': 1.37}
-"""Percent of a man's mass, each limb of one side (de Leva 1996, table 4)."""
-
-PART_OF = {'spine': 'trunk', 'hips': 'trunk', 'clavicle': 'trunk', 'finger': 'hand', 'toe': 'foot',
-           None: 'trunk', 'soft': 'head'}
+LEAST, MOST = 0.2, 1.5
+"""The skin of a body holds this share of its shape's volume; else it is open, flat or in layers."""
 
 
-def share_mass(total: float | None, sharing: str, groups: list[Group], volumes: list[float],
-               skin: float) -> list[float]:
-    """Mass of each group's body, kg, from the bodies' volumes, m^3.
+def share_mass(total: float | None, sharing: str, character: Character, groups: list[Group],
+               shapes: list[float], notes: list[str]) -> list[float]:
+    """Mass of each group's body, kg; ``shapes`` are the volumes of the bodies' shapes, m^3.
 
-    ``total`` is the whole doll's, kg; None takes as much water as there is in the skin's volume
-    ``skin``, m^3. ``sharing`` is 'volume' or 'proportions' (a human body's). NotPositive,
-    NotFinite: a total that cannot be.
+    ``total`` is the whole doll's, kg; None takes as much water as the skin holds. ``sharing`` is
+    'volume' (the skin's), 'proportions' (a person's) or 'best': by volume, but of a person by the
+    geometric mean of both, as a skin says where limbs change hands and not where joints are. A
+    note says where the skin tells no volume. NotPositive, NotFinite: a total that cannot be.
     """
+    volumes = _volumes(character, groups, np.array(shapes), notes)
     if total is None:
-        # Bodies overlap; a closed skin knows better how much of the character there is.
-        plausible = 0.3 * sum(volumes) < skin < 1.2 * sum(volumes)
-        total = WATER * (skin if plausible else sum(volumes))
+        total = WATER * float(volumes.sum())
     errors.check_positive('mass', total)
-    shares = _proportions(groups, volumes) if sharing == 'proportions' else volumes
-    whole = sum(shares)
-    return [float(f'{total * share / whole:.9g}') for share in shares]
+    roles = [group.role for group in groups]
+    person = is_person(roles, character.positions[[group.bone for group in groups]])
+    shares = volumes
+    if sharing == 'proportions' or (sharing == 'best' and person):
+        shares = _proportions(groups, volumes)
+    if sharing == 'best' and person:
+        shares = np.sqrt(shares / shares.sum() * volumes / volumes.sum())
+    return [float(f'{total * share / shares.sum():.9g}') for share in shares]
 
 
-def _proportions(groups: list[Group], volumes: list[float]) -> list[float]:
-    """Percent of a human's mass; within a segment by volume.
+def _volumes(character: Character, groups: list[Group], shapes: np.ndarray,
+             notes: list[str]) -> np.ndarray:
+    """Volume of the skin of each group, m^3, the same on both sides of the character."""
+    carriers = np.full(len(character.vertices), -1)
+    for index, group in enumerate(groups):
+        carriers[group.vertices[group.vertices < len(carriers)]] = index
+    volumes = skin_volumes(character, carriers, len(groups))
+    pairs = [partner(character, groups, index) for index in range(len(groups))]
+    volumes = (volumes + volumes[pairs]) / 2
+    if not LEAST * shapes.sum() < volumes.sum() < MOST * shapes.sum():
+        notes.append(f'the skin holds {1000 * volumes.sum():.3g} l and the bodies '
+                     f'{1000 * shapes.sum():.3g} l: it is open, or several; masses follow the '
+                     'bodies (--mass says otherwise)')
+        return shapes
+    bounded = np.clip(volumes, LEAST * shapes, MOST * shapes)
+    changed = [group.name for group, here in zip(groups, bounded != volumes, strict=True) if here]
+    if changed:
+        notes.append(f'the skin of {", ".join(changed)} is flat, open or in layers: what their '
+                     'bodies hold bounds their masses')
+    return bounded
 
-    Segments that the doll lacks leave the others in proportion; what is no part of a human
-    body weighs as much as its volume of the trunk does.
+
+def _proportions(groups: list[Group], volumes: np.ndarray) -> np.ndarray:
+    """Percent of a man's mass; within a segment by volume.
+
+    Segments that the doll lacks leave the others in proportion.
     """
-    segments = [(PART_OF.get(group.role, group.role), side_of(group.name)) for group in groups]
-    held: dict[tuple, float] = {}
-    for segment, volume in zip(segments, volumes, strict=True):
-        held[segment] = held.get(segment, 0) + volume
-    trunk = sum(volume for (name, _), volume in held.items() if name == 'trunk') or sum(volumes)
-    return [SEGMENTS[segment[0]] * volume / held[segment]
-            if segment[0] in SEGMENTS and segment[0] != 'trunk'
-            else SEGMENTS['trunk'] * volume / trunk
-            for segment, volume in zip(segments, volumes, strict=True)]
+    segments = [segment(group.role, group.name) for group in groups]
+    held: dict[tuple[str, int], float] = {}
+    for part, volume in zip(segments, volumes, strict=True):
+        held[part] = held.get(part, 0.0) + volume
+    return np.array([SEGMENTS[part[0]] * volume / held[part]
+                     for part, volume in zip(segments, volumes, strict=True)])

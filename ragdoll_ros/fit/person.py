@@ -37,13 +37,14 @@ FACTOR, WRONG_FACTOR = 2.2, 6.0
 def is_person(roles: Sequence[str | None], positions: np.ndarray) -> bool:
     """Whether bones of these roles at (n, 3) m, x forward and z up, are an upright person's."""
     count = Counter(roles)
-    if any(count[role] < 2 for role in LIMBS) or not count['head']:
+    if any(count[role] < 2 for role in LIMBS) or not count['head'] + count['neck']:
         return False
+
     def middle(*wanted: str) -> np.ndarray:
         return np.mean([at for role, at in zip(roles, positions, strict=True) if role in wanted],
                        axis=0)
 
-    rise = middle('head') - middle('thigh')
+    rise = middle('head', 'neck') - middle('thigh')
     return bool(rise[2] > 0 and np.linalg.norm(rise[:2]) < LEAN * rise[2]
                 and middle('shin')[2] < middle('thigh')[2])
 

@@ -39,8 +39,8 @@ class Options:
     """m; bones with a shorter cluster get no body. None: a share of the character."""
     mass: float | None = None
     """kg, of the whole doll; None: as much water as the skin holds."""
-    masses: str = 'volume'
-    """Mass shared by 'volume', or by the 'proportions' of a human body."""
+    masses: str = 'best'
+    """Mass shared by the skin's 'volume', by a person's 'proportions', or 'best'; see masses.py."""
 
 
 @dataclass(frozen=True)
@@ -84,8 +84,8 @@ def fit_character(character: Character, options: Options | None = None) -> Fit:
                      options.orientation)
             for group, direction in zip(groups, directions, strict=True)]
     fits = _fit_shapes(character, groups, axes, options.shape)
-    masses = share_mass(options.mass, options.masses, groups,
-                        [fit.shape.volume for fit in fits], character.volume())
+    masses = share_mass(options.mass, options.masses, given, groups,
+                        [fit.shape.volume for fit in fits], notes)
     bodies = [_body(given, *parts) for parts in zip(groups, fits, axes, masses, strict=True)]
     bones = [body.bone for body in bodies]
     joints = [damped(make_joint(character, groups, index, directions[index]),
