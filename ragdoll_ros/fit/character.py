@@ -12,14 +12,12 @@ from ..model.ragdoll import WORLD
 from .gltf_file import GltfFile
 from .names import plain_name, side_of
 from .nodes import Nodes, read_nodes
+from .scale import metres_per_unit
 from .skins import Skins, read_skins
 from .spring_bones import Spring, placed, read_springs, without_short_rods
 
 TO_ROS = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
 """glTF is Y up and faces +Z, its left is +X: (x, y, z) here is (z, x, y) there."""
-
-LARGEST_METRES, SMALLEST_METRES = 20.0, 0.05
-"""What is longer or shorter than this is taken to be in other units, m."""
 
 
 @dataclass(frozen=True)
@@ -71,9 +69,10 @@ class Character:
 def read_character(path: str | Path, scale: float | None = None) -> Character:
     """Character of a .glb or .gltf file; ModelErrors with what keeps it from being one.
 
-    ``scale`` is m to one unit of the file; None takes 1, or what brings a size that cannot be
-    metres back to one that can, with a note.
+    ``scale`` is m to one unit of the file; None takes 1, or a guess with a note; see scale.py.
     """
+    if scale is not None:
+        errors.check_positive('scale', scale)
     try:
         file = GltfFile(path)
         # What overflows is found where it ends up.
@@ -110,11 +109,12 @@ def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) 
         upright = np.round(rotation.matrix(rotation.from_axis_angle((0, 0, 1), np.radians(yaw))))
         positions, vertices, linear = positions @ upright.T, vertices @ upright.T, upright @ linear
         axes = upright @ axes
-    metres = _metres(vertices, scale, notes)
+    parents = tuple(_parent_bone(node, nodes.parents, place) for node in joints)
+    metres = metres_per_unit(names, parents, positions, vertices, notes) if scale is None else scale
     springs = _springs(file, nodes, skins, place, metres * axes, notes)
     stem = _bone_names([file.path.stem])[0]
     return Character(
-        stem, names, tuple(_parent_bone(node, nodes.parents, place) for node in joints),
+        stem, names, parents,
         positions * metres, np.stack([_nearest_rotation(matrix) for matrix in linear]),
         vertices * metres, skins.triangles, lookup[skins.nodes], skins.weights, metres,
         tuple(notes), springs)
@@ -170,28 +170,6 @@ def _yaw_to_front(names: tuple[str, ...], positions: np.ndarray) -> int:
     if reach < 0.02 * np.ptp(positions, axis=0).max():
         return 0
     return round(float(np.degrees(np.arctan2(left[0], left[1]))) / 90) % 4 * 90
-
-
-def _metres(vertices: np.ndarray, scale: float | None, notes: list[str]) -> float:
-    """Metres to one unit; a guess from the size where the user gives none."""
-    extent = float(np.ptp(vertices, axis=0).max())
-    if scale is not None:
-        errors.check_positive('scale', scale)
-        return scale
-    if not 0 < extent < 1e30:
-        raise errors.OutOfRange('meshes', extent, 'a skin with a size')
-    if extent > LARGEST_METRES:
-        metres, unit = (0.01, 'centimetres') if extent <= 1000 else (0.001, 'millimetres')
-        if extent * metres > LARGEST_METRES:
-            metres, unit = 2.0 / extent, 'no known unit'
-    elif extent < SMALLEST_METRES:
-        metres, unit = (100.0, 'hundreds of metres') if extent > 0.002 else (
-            2.0 / extent, 'no known unit')
-    else:
-        return 1.0
-    notes.append(f'a size of {extent:.4g} smells of {unit}: one unit is taken for {metres:g} m '
-                 '(--scale says otherwise)')
-    return metres
 
 
 def _nearest_rotation(matrix: np.ndarray) -> np.ndarray:

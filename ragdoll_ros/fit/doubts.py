@@ -7,9 +7,9 @@ import numpy as np
 
 from ..model import rotation
 from ..model.ragdoll import Joint, Ragdoll
-from .character import LARGEST_METRES, SMALLEST_METRES
 from .finding import Finding
 from .names import doll_roles
+from .scale import SMALLEST, TALLEST
 
 DENSEST = 3000.0
 """kg/m^3; bone has 1 900, stone 2 700."""
@@ -39,10 +39,10 @@ def extent(doll: Ragdoll) -> float:
 
 def _size(doll: Ragdoll) -> list[Finding]:
     size = extent(doll)
-    if size > LARGEST_METRES:
+    if size > TALLEST:
         unit = 'centimetres' if size < 1000 else 'millimetres'
         return [Finding(f'a doll {size:.4g} m long: the size smells of {unit}')]
-    if size < SMALLEST_METRES:
+    if size < SMALLEST:
         return [Finding(f'a doll {size:.4g} m long: the size smells of a scale applied twice')]
     return []
 
