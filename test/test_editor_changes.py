@@ -10,7 +10,7 @@ import pytest
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.compound import Compound
-from ragdoll_ros.model.ragdoll import JOINT_KINDS
+from ragdoll_ros.model.ragdoll import JOINT_KINDS, joint_axes
 from ragdoll_ros.model.scene import above_ground
 from ragdoll_ros.model.shapes import SHAPES, Box, Capsule, Part
 from ragdoll_ros.model.skeleton import Riders
@@ -391,3 +391,23 @@ def test_whatever_is_typed_is_taken_or_refused(seed):
         sheet.apply(DROP, name, fields)
     except errors.ModelErrors as error:
         assert all(error.path in fields for error in error.errors)
+
+
+def test_a_shoulder_of_three_ranges_is_mirrored_and_typed(fitted):
+    """The right arm of a fitted person is its left one's image already, to the fit's rounding."""
+    names = 'mixamorig:LeftArm', 'mixamorig:RightArm'
+    scene = mirror.mirrored(fitted, names[0])
+    before, after = (changes.joint_of(each, names[1]) for each in (fitted, scene))
+    # About an axis the other way round, its angles are the other way round.
+    flips = np.sign(np.sum(joint_axes(after) * joint_axes(before), axis=1))
+    assert np.allclose(flips[:, None] * joint_axes(after), joint_axes(before), atol=1e-5)
+    limits = [pair if flip > 0 else (-pair[1], -pair[0])
+              for flip, pair in zip(flips, after.angle_limits, strict=True)]
+    assert np.allclose(limits, before.angle_limits, atol=1e-5)
+    scene = sheet.apply(fitted, names[0], {'limits_3': '-10, 30'})
+    assert np.degrees(changes.joint_of(scene, names[0]).limits[2]) == pytest.approx((-10, 30))
+    # The form shows nine digits.
+    assert np.allclose(changes.joint_of(scene, names[0]).limits[:2],
+                       changes.joint_of(fitted, names[0]).limits[:2], atol=1e-8)
+    scene = changes.set_joint_kind(fitted, names[0], 'hinge')
+    assert changes.joint_of(scene, names[0]).kind == 'hinge'

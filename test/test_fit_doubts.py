@@ -11,7 +11,7 @@ from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.doubts import extent, find_doubts
 from ragdoll_ros.fit.pipeline import Options, fit_character
 from ragdoll_ros.model import rotation
-from ragdoll_ros.model.ragdoll import Ragdoll
+from ragdoll_ros.model.ragdoll import Ragdoll, joint_axes
 
 
 @pytest.fixture
@@ -85,7 +85,7 @@ def test_a_scale_applied_twice(tmp_path):
 def bent(doll, child, angle):
     """Where a bone's middle goes by a turn about its first axis, from where it was."""
     joint = next(joint for joint in doll.joints if joint.child == child)
-    turn = rotation.from_axis_angle(np.array(joint.axes[0]), angle)
+    turn = rotation.from_axis_angle(joint_axes(joint)[0], angle)
     arm = np.subtract(doll.bone(child).position, joint.anchor)
     return rotation.rotate(turn, arm) - arm
 
@@ -103,12 +103,9 @@ def test_knees_and_elbows_of_fitted_humanoids(style):
             forward = bent(fit.doll, body.bone.name, 0.5)[0]
             assert forward < 0 if body.role == 'shin' else forward > 0
         if body.role == 'thigh':
-            low, high = joints[body.bone.name].limits[0]
+            low, high = joints[body.bone.name].angle_limits[0]
             assert bent(fit.doll, body.bone.name, low)[0] > 0.05
             assert -low > 2 * high
-            outward = joints[body.bone.name].limits[1]
-            side = np.sign(body.bone.position[1])
-            assert abs(outward[0 if side < 0 else 1]) > abs(outward[1 if side < 0 else 0])
 
 
 def test_a_bent_leg_without_names_straightens_and_folds():
@@ -130,11 +127,12 @@ def test_left_and_right_mirror_in_their_limits():
             continue
         other = joints[name[:-1] + 'r']
         assert other.kind == joint.kind
-        if joint.kind == 'ball':
+        if len(joint.axes) == 1 and joint.kind == 'ball':
             assert other.limits == joint.limits
             assert np.allclose(other.axes[0], np.multiply(joint.axes[0], (1, -1, 1)), atol=0.01)
             continue
-        for axis, pair, mirrored, limits in zip(joint.axes, joint.limits, other.axes, other.limits,
+        for axis, pair, mirrored, limits in zip(joint_axes(joint), joint.angle_limits,
+                                                joint_axes(other), other.angle_limits,
                                                 strict=True):
             # A mirrored turn is one about the mirrored axis the other way round.
             image = -np.multiply(axis, (1, -1, 1))

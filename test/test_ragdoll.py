@@ -7,7 +7,7 @@ from specimens import HANDLE, HEAD, SPECIMENS
 
 from ragdoll_ros.model import errors
 from ragdoll_ros.model.compound import Compound
-from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
+from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, joint_axes
 from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Part, Sphere
 
 BALL = Sphere(0.1)
@@ -112,3 +112,18 @@ def test_limits_in_degrees_survive_radians_to_the_bit():
         again = hinge('a', 'b', limits=joint.limits)
         assert joint == again
         assert round(math.degrees(joint.limits[0][0]), 9) == degrees
+
+
+def test_a_ball_with_two_axes_has_three_ranges_of_its_own():
+    limits = ((-0.2, 2.5), (-1.0, 0.3), (-0.4, 0.9))
+    ball = Joint('a', 'b', 'ball', (0, 0, 0), ((0, 0, 2), (0, 1, 0)), limits)
+    assert ball.dof == 3 and not ball.is_free_ball
+    assert np.allclose(ball.angle_limits, limits)
+    # The first about the axis across, the last the twist, the second about twist times across.
+    assert np.allclose(joint_axes(ball), [(0, 1, 0), (-1, 0, 0), (0, 0, 1)])
+    for axes, wrong in ((((0, 0, 1), (0, 1, 1)), limits), (((0, 0, 1), (0, 1, 0)), limits[:2]),
+                        (((0, 0, 1), (0, 1, 0)), (limits[0], (-1.5, 1.5), limits[2])),
+                        (((0, 0, 1), (0, 1, 0)), (limits[0], None, limits[2])),
+                        (((0, 0, 1), (0, 1, 0)), ())):
+        with pytest.raises(errors.ModelError):
+            Joint('a', 'b', 'ball', (0, 0, 0), axes, wrong)

@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from ..model import rotation
-from ..model.ragdoll import Joint, Ragdoll
+from ..model.ragdoll import Joint, Ragdoll, joint_axes
 from .finding import Finding
 from .names import doll_roles
 from .scale import SMALLEST, TALLEST
@@ -59,10 +59,10 @@ def _bends(doll: Ragdoll) -> list[Finding]:
     found = []
     for joint in doll.joints:
         role = role_of[joint.child]
-        if role in BENDS and joint.kind in ('hinge', 'universal'):
+        if role in BENDS and joint.kind in ('hinge', 'universal', 'ball'):
             sign, complaint = BENDS[role]
             if sign * _reach_forward(doll, joint) < -0.05:
-                low, high = (math.degrees(angle) for angle in joint.limits[0])
+                low, high = (math.degrees(angle) for angle in joint.angle_limits[0])
                 found.append(Finding(f'{joint.child}: {complaint} '
                                      f'(limits {low:.0f} to {high:.0f} degrees)', True))
     return found
@@ -70,11 +70,12 @@ def _bends(doll: Ragdoll) -> list[Finding]:
 
 def _reach_forward(doll: Ragdoll, joint: Joint) -> float:
     """How far the middle of its range takes the child's centre along x, by its distance."""
-    if joint.limits[0] is None:
+    pair = joint.angle_limits[0]
+    if pair is None:
         return 0.0
     arm = np.array(doll.bone(joint.child).position) - joint.anchor
     length = float(np.linalg.norm(arm))
     if length < 1e-9:
         return 0.0
-    turn = rotation.from_axis_angle(np.array(joint.axes[0]), sum(joint.limits[0]) / 2)
+    turn = rotation.from_axis_angle(joint_axes(joint)[0], sum(pair) / 2)
     return float(rotation.rotate(turn, arm)[0] - arm[0]) / length

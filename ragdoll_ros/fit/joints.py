@@ -7,18 +7,18 @@ import math
 import numpy as np
 
 from ..model.ragdoll import Bone, Joint
+from .anatomy import ELBOW, FORWARD, KNEE, LEFT, RANGES, UP, persons_joint
 from .character import Character
 from .groups import Group
 from .names import side_of
+from .person import is_person
 from .shapes import DECIMALS
-
-FORWARD, LEFT, UP = np.eye(3)
 
 STRAIGHT = math.radians(12)
 """A joint bent less than this in the bind pose tells nothing about its axis."""
 
 FOLDED = math.radians(145)
-"""How far a knee or an elbow folds from straight."""
+"""How far a limb of no known name folds from straight."""
 
 BALLS = {'neck': (35, 40), 'head': (45, 55), 'spine': (25, 25), 'hips': (25, 25),
          'clavicle': (15, 10), 'upper_arm': (80, 50), 'thigh': (60, 30), 'tail': (45, 20),
@@ -49,6 +49,11 @@ def make_joint(character: Character, groups: list[Group], index: int, along: np.
         above = step / length
     children = [sum(other.parent == k for other in groups) for k in (index, group.parent)]
     side = side_of(group.name) or int(np.sign(anchor[1]))
+    if group.role in RANGES and is_person([each.role for each in groups],
+                                          character.positions[[each.bone for each in groups]]):
+        joint = persons_joint(parent.name, group.name, group.role, side, anchor, along)
+        if joint is not None:
+            return joint
     return _by_role(parent.name, group.name, group.role, side, anchor, above, along,
                     children[0] <= 1 and children[1] == 1)
 
@@ -64,7 +69,7 @@ def _by_role(parent: str, child: str, role: str | None, side: int, anchor: np.nd
     if role == 'shin' or role == 'forearm':
         # A knee takes the foot backwards, an elbow the hand forwards (or up).
         toward = -FORWARD if role == 'shin' else FORWARD
-        axis, limits = _folding(above, along, toward)
+        axis, limits = _folding(above, along, toward, KNEE if role == 'shin' else ELBOW)
         return Joint(parent, child, 'hinge', anchor, (axis,), (limits,))
     if role == 'thigh' and abs(along @ UP) > 0.7:
         outward = (-20, 45) if side >= 0 else (-45, 20)
@@ -108,9 +113,9 @@ def _by_topology(parent: str, child: str, anchor: np.ndarray, above: np.ndarray 
     return _ball(parent, child, anchor, along, *LATER)
 
 
-def _folding(above: np.ndarray | None, along: np.ndarray,
-             toward: np.ndarray) -> tuple[np.ndarray, tuple[float, float]]:
-    """Axis and limits of a hinge that takes ``along`` toward a direction.
+def _folding(above: np.ndarray | None, along: np.ndarray, toward: np.ndarray,
+             folded: float) -> tuple[np.ndarray, tuple[float, float]]:
+    """Axis and limits of a hinge that takes ``along`` toward a direction, to ``folded`` rad.
 
     Bent that way in the bind pose already, it rotates about the axis of that bend and stops
     where it is straight.
@@ -118,9 +123,9 @@ def _folding(above: np.ndarray | None, along: np.ndarray,
     axis = _across(along, toward)
     if above is not None:
         bend, turned = _angle(above, along), np.cross(above, along)
-        if STRAIGHT < bend < FOLDED and turned @ axis > 0.5 * np.linalg.norm(turned):
-            return turned, (-bend, FOLDED - bend)
-    return axis, (0.0, FOLDED)
+        if STRAIGHT < bend < folded and turned @ axis > 0.5 * np.linalg.norm(turned):
+            return turned, (-bend, folded - bend)
+    return axis, (0.0, folded)
 
 
 def _across(along: np.ndarray, toward: np.ndarray) -> np.ndarray:

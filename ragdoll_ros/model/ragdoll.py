@@ -115,7 +115,9 @@ class Joint:
     - universal: the first axis is fixed in the parent, the second in the child; they turn in
       that order and are perpendicular in the bind pose.
     - ball: one axis, the twist axis; either free, or limited by a swing (-s, s) about each of
-      two axes across it (a pyramid, as in PhysX; s at most 85 degrees) and a twist (-t, t).
+      two axes across it (a pyramid, as in PhysX; s at most 85 degrees) and a twist (-t, t). Or two
+      axes, the twist axis and x across it, and three pairs of limits: about x, which is fixed in
+      the parent, about y = twist axis times x (85 degrees at the most), and the twist.
     - fixed: no axes.
 
     ``limits`` in rad, None for a free axis; kept to 1e-9 degrees, so that files written in
@@ -134,6 +136,8 @@ class Joint:
         if self.kind not in JOINT_KINDS:
             raise errors.WrongAxes('kind', self.kind, 'one of ' + ', '.join(JOINT_KINDS))
         kind = JOINT_KINDS[self.kind]
+        if self.kind == 'ball' and len(self.axes) == 2:
+            kind = dataclasses.replace(kind, axes=2, limits=3)
         set_fields(self, anchor=finite('anchor', self.anchor), damping=float(self.damping),
                    axes=tuple(unit('axes', axis) for axis in self.axes),
                    limits=tuple(_angles(pair) for pair in self.limits or (None,) * kind.limits))
@@ -144,7 +148,7 @@ class Joint:
         if not 0 <= self.damping < math.inf:
             raise errors.OutOfRange('damping', self.damping, 'zero or above, finite')
         self._check_limits()
-        if self.kind == 'universal' and abs(np.dot(*self.axes)) > 1e-6:
+        if len(self.axes) == 2 and abs(np.dot(*self.axes)) > 1e-6:
             raise errors.WrongAxes('axes', self.axes, 'two perpendicular axes')
 
     def _check_limits(self) -> None:
@@ -157,7 +161,10 @@ class Joint:
                 raise errors.LimitsReversed(path, pair, 'lower <= upper')
             if max(map(abs, pair)) > 2 * math.pi:
                 raise errors.OutOfRange(path, pair, 'within one turn')
-        if self.kind == 'ball' and any(self.limits):
+        if len(self.limits) == 3:
+            if self.limits[1] is None or max(map(abs, self.limits[1])) > LARGEST_SWING:
+                raise errors.OutOfRange('limits[1]', self.limits[1], 'a swing up to 85 degrees')
+        elif self.kind == 'ball' and any(self.limits):
             self._check_ball(*self.limits)
 
     def _check_ball(self, swing: Limits | None, twist: Limits | None) -> None:
@@ -187,7 +194,7 @@ class Joint:
     @property
     def angle_limits(self) -> tuple[Limits | None, ...]:
         """Limits of each angle of angle_names, rad; None where it is free."""
-        if self.kind == 'ball':
+        if self.kind == 'ball' and len(self.limits) == 2:
             swing, twist = self.limits
             return (swing, swing, twist)
         return self.limits
@@ -361,6 +368,9 @@ def joint_frame(joint: Joint) -> np.ndarray:
     """Orientation (4,) of a joint's frame in the doll's: of a ball joint, z is the twist axis."""
     if joint.kind != 'ball':
         return np.array(rotation.IDENTITY)
+    if len(joint.axes) == 2:
+        twist, x = np.array(joint.axes)
+        return rotation.from_matrix(np.stack([x, np.cross(twist, x), twist], axis=1))
     return rotation.shortest_arc(np.array([0.0, 0.0, 1.0]), np.array(joint.axes[0]))
 
 

@@ -70,6 +70,12 @@ def _copied_over(scene: Scene, name: str, other: str, middle: float) -> Scene:
 def _axes_and_limits(joint: Joint, theirs: Joint) -> dict[str, tuple]:
     """Mirror axes and limits. The image of a rotation by t about a is one by -t about a's image."""
     axes, limits = [], list(joint.limits)
+    if len(limits) == 3:
+        # The image of y = z times x is -z' times x', so that its angle stays.
+        twist, x = (tuple(np.array(axis) * (1, -1, 1) + 0.0) for axis in joint.axes)
+        about_x, turn = (limits[index] and (-limits[index][1], -limits[index][0])
+                         for index in (0, 2))
+        return {'axes': (twist, x), 'limits': (about_x, limits[1], turn)}
     for index, axis in enumerate(joint.axes):
         image = np.array(axis) * (1, -1, 1)
         like = theirs.axes[index] if theirs.kind == joint.kind else axis

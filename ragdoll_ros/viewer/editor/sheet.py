@@ -5,6 +5,7 @@ the scene as it is, to the bit: what a form shows is rounded.
 """
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -60,6 +61,7 @@ JOINT = (
     Field('limits_1', 'limits 1, °', 'text',
           'lower, upper; a ball: swing; child relative to parent; empty: free'),
     Field('limits_2', 'limits 2, °', 'text', 'lower, upper; a ball: twist; empty: free'),
+    Field('limits_3', 'limits 3, °', 'text', 'lower, upper; a ball of two axes: twist'),
     Field('damping', 'damping', 'number', 'N m s/rad on each axis'))
 
 
@@ -138,7 +140,7 @@ def _joint_steps(name: str, shown: Sheet) -> list[Step]:
         old = changes.joint_of(scene, name).anchor
         return changes.change_joint(scene, name, anchor=_near(new['anchor'], old))
 
-    return [(('kind', 'axis_1', 'axis_2', 'limits_1', 'limits_2'),
+    return [(('kind', 'axis_1', 'axis_2', 'limits_1', 'limits_2', 'limits_3'),
              lambda scene, new: _set_axes_and_limits(scene, name, new, shown)),
             (('anchor',), anchor),
             (('damping',), lambda scene, new: changes.change_joint(
@@ -159,14 +161,17 @@ def _set_axes_and_limits(scene: Scene, name: str, new: Sheet, shown: Sheet) -> S
     """Set kind, axes and limits at once, as each kind asks for its own number of them."""
     kind, joint = JOINT_KINDS[new['kind']], changes.joint_of(scene, name)
     axes = []
+    if kind.name == joint.kind and len(joint.limits) == 3:
+        kind = dataclasses.replace(kind, axes=2, limits=3)
     for index in range(kind.axes):
         key = f'axis_{index + 1}'
         # A limb that was rotated has rotated its axes already.
         kept = kind.name == joint.kind and _same(key, new[key], shown[key])
         axes.append(joint.axes[index] if kept else unit(key, new[key]))
-    if kind.name == 'universal':
+    if kind.axes == 2:
         axes[1] = _straightened(*axes)
-    pairs = [_pair(f'limits_{number}', new.get(f'limits_{number}', ''), kind.name == 'ball')
+    symmetric = kind.name == 'ball' and kind.limits == 2
+    pairs = [_pair(f'limits_{number}', new.get(f'limits_{number}', ''), symmetric)
              for number in range(1, kind.limits + 1)]
     limits = tuple(pair and tuple(map(math.radians, pair)) for pair in pairs)
     try:
