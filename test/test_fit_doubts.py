@@ -116,7 +116,7 @@ def test_a_bent_leg_without_names_straightens_and_folds():
     for joint in hinges:
         # The legs lie in planes of constant y.
         assert abs(joint.axes[0][1]) > 0.95 or abs(joint.anchor[1]) < 0.01
-        assert joint.limits[0][0] < 0 < joint.limits[0][1]
+        assert joint.limits[0][0] <= 0 < joint.limits[0][1]
 
 
 def test_left_and_right_mirror_in_their_limits():

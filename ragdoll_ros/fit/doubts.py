@@ -9,6 +9,7 @@ from ..model import rotation
 from ..model.ragdoll import Joint, Ragdoll, joint_axes
 from .finding import Finding
 from .names import doll_roles
+from .person import is_person
 from .scale import SMALLEST, TALLEST
 
 DENSEST = 3000.0
@@ -21,6 +22,11 @@ BENDS = {'shin': (-1, 'a knee that bends forwards'),
          'forearm': (1, 'an elbow that bends backwards'),
          'thigh': (1, 'a hip that lifts the knee backwards')}
 """By role: which way along x the first axis takes the child, and what it is if it does not."""
+
+
+BENT, PAST = math.radians(35), math.radians(20)
+"""A limb bent by more than BENT in the bind pose tells which way it folds (paws are bound past
+straight); how far past straight is doubtful, and wrong twice that."""
 
 
 def find_doubts(doll: Ragdoll) -> list[Finding]:
@@ -55,17 +61,42 @@ def _densities(doll: Ragdoll) -> list[Finding]:
 
 
 def _bends(doll: Ragdoll) -> list[Finding]:
-    role_of = dict(zip((bone.name for bone in doll.bones), doll_roles(doll), strict=True))
+    roles = doll_roles(doll)
+    if not is_person(roles, np.array([bone.position for bone in doll.bones])):
+        return _unfolding(doll)
+    role_of = dict(zip((bone.name for bone in doll.bones), roles, strict=True))
     found = []
     for joint in doll.joints:
         role = role_of[joint.child]
         if role in BENDS and joint.kind in ('hinge', 'universal', 'ball'):
             sign, complaint = BENDS[role]
             if sign * _reach_forward(doll, joint) < -0.05:
-                low, high = (math.degrees(angle) for angle in joint.angle_limits[0])
-                found.append(Finding(f'{joint.child}: {complaint} '
-                                     f'(limits {low:.0f} to {high:.0f} degrees)', True))
+                found.append(_told(joint, complaint, True))
     return found
+
+
+def _unfolding(doll: Ragdoll) -> list[Finding]:
+    """Hinges that are bent in the bind pose, and whose range takes them far past straight."""
+    anchors = {joint.child: np.array(joint.anchor) for joint in doll.joints}
+    found = []
+    for joint in doll.joints:
+        if joint.kind != 'hinge' or joint.parent not in anchors or joint.limits[0] is None:
+            continue
+        below = [anchors[each.child] for each in doll.joints if each.parent == joint.child]
+        end = np.mean(below, axis=0) if below else np.array(doll.bone(joint.child).position)
+        above, along = anchors[joint.child] - anchors[joint.parent], end - joint.anchor
+        bend = math.atan2(float(np.cross(above, along) @ joint.axes[0]), float(above @ along))
+        low, high = joint.limits[0] if bend > 0 else (-joint.limits[0][1], -joint.limits[0][0])
+        past = -low - abs(bend)
+        if abs(bend) > BENT and past > PAST:
+            found.append(_told(joint, f'a limb that goes {math.degrees(past):.0f} degrees past '
+                                      'straight', past > 2 * PAST or past > abs(bend) + high))
+    return found
+
+
+def _told(joint: Joint, complaint: str, wrong: bool) -> Finding:
+    low, high = (math.degrees(angle) for angle in joint.angle_limits[0])
+    return Finding(f'{joint.child}: {complaint} (limits {low:.0f} to {high:.0f} degrees)', wrong)
 
 
 def _reach_forward(doll: Ragdoll, joint: Joint) -> float:

@@ -9,16 +9,11 @@ import numpy as np
 from ..model.ragdoll import Bone, Joint
 from .anatomy import ELBOW, FORWARD, KNEE, LEFT, RANGES, UP, persons_joint
 from .character import Character
+from .folding import FOLDED, STRAIGHT, above_of, animal_fold
 from .groups import Group
 from .names import side_of
 from .person import is_person
 from .shapes import DECIMALS
-
-STRAIGHT = math.radians(12)
-"""A joint bent less than this in the bind pose tells nothing about its axis."""
-
-FOLDED = math.radians(145)
-"""How far a limb of no known name folds from straight."""
 
 BALLS = {'neck': (35, 40), 'head': (45, 55), 'spine': (25, 25), 'hips': (25, 25),
          'clavicle': (15, 10), 'upper_arm': (80, 50), 'thigh': (60, 30), 'tail': (45, 20),
@@ -42,18 +37,20 @@ def make_joint(character: Character, groups: list[Group], index: int, along: np.
     anchor = np.round(character.positions[group.bone], DECIMALS) + 0.0
     if group.tied:
         return Joint(parent.name, group.name, 'fixed', anchor)
-    above = None
-    step = character.positions[group.bone] - character.positions[parent.bone]
-    length = float(np.linalg.norm(step))
-    if parent.parent >= 0 and length > 1e-6:
-        above = step / length
+    above = above_of(character, groups, index)
     children = [sum(other.parent == k for other in groups) for k in (index, group.parent)]
     side = side_of(group.name) or int(np.sign(anchor[1]))
-    if group.role in RANGES and is_person([each.role for each in groups],
-                                          character.positions[[each.bone for each in groups]]):
-        joint = persons_joint(parent.name, group.name, group.role, side, anchor, along)
-        if joint is not None:
-            return joint
+    joint = fold = None
+    if is_person([each.role for each in groups],
+                 character.positions[[each.bone for each in groups]]):
+        if group.role in RANGES:
+            joint = persons_joint(parent.name, group.name, group.role, side, anchor, along)
+    else:
+        fold = animal_fold(character, groups, index, along)
+    if joint is not None:
+        return joint
+    if fold is not None:
+        return fold.joint(parent.name, group.name, anchor)
     return _by_role(parent.name, group.name, group.role, side, anchor, above, along,
                     children[0] <= 1 and children[1] == 1)
 

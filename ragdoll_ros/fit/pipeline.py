@@ -14,6 +14,7 @@ from ..model.shapes import Shape
 from . import carried
 from .axes import Axes, fit_axes
 from .character import Character
+from .folding import guesses
 from .groups import Group, group_bones, partner, vertices_by_bone
 from .joints import damped, make_joint
 from .masses import share_mass
@@ -91,6 +92,7 @@ def fit_character(character: Character, options: Options | None = None) -> Fit:
     joints = [damped(make_joint(character, groups, index, directions[index]),
                      bones[group.parent], bones[index])
               for index, group in enumerate(groups) if group.parent >= 0]
+    notes += guesses(character, groups, directions)
     notes += [f'no bone joins {group.name} to the rest: it is tied to {groups[group.parent].name}'
               for group in groups if group.tied]
     carrier = {index: bone for group, bone in zip(groups, bones, strict=True)

@@ -1,0 +1,89 @@
+"""Legs fold as an animal's do: bent or straight, named or not, in front or behind."""
+import dataclasses
+
+import fit_rigs
+import numpy as np
+import pytest
+from fit_rigs import Rig, limb
+
+from ragdoll_ros.fit.character import read_character
+from ragdoll_ros.fit.pipeline import fit_character
+from ragdoll_ros.fit.verdict import judge
+from ragdoll_ros.model import rotation
+
+BENT = {'front': [(.55, .33), (.33, .25), (.1, .33), (0, .36)],
+        'hind': [(.55, -.38), (.35, -.3), (.15, -.45), (0, -.4)]}
+STRAIGHT = {'front': [(.55, .33), (.36, .33), (.17, .33), (0, .33)],
+            'hind': [(.55, -.38), (.36, -.38), (.17, -.38), (0, -.38)]}
+"""Joints of a leg from the hip to the toes: height and how far in front, m."""
+
+NAMES = {'arms': {'front': ('UpperArm', 'ForeArm', 'Hand'), 'hind': ('Thigh', 'Shin', 'Foot')},
+         'legs': {'front': ('FrontThigh', 'FrontShin', 'FrontFoot'),
+                  'hind': ('BackThigh', 'BackShin', 'BackFoot')},
+         'unknown': {'front': ('a', 'b', 'c'), 'hind': ('d', 'e', 'f')}}
+
+TOWARD = {('front', 1): 1, ('front', 2): -1, ('hind', 1): -1, ('hind', 2): 1}
+"""Which way along x the end of a leg goes by its first and its second inner joint."""
+
+
+def animal(folder, points, names):
+    bones = []
+    chest = limb(bones, -1, ['hips', 'spine', 'chest'],
+                 [(0, .6, -.4), (0, .62, -.1), (0, .62, .15), (0, .62, .4)], [.13, .13, .14])
+    limb(bones, chest, ['neck', 'head'], [(0, .65, .4), (0, .82, .55), (0, .85, .8)], [.07, .09])
+    for x, side in ((.1, 'Left'), (-.1, 'Right')):
+        for end, parent in (('front', chest), ('hind', 0)):
+            limb(bones, parent, [f'{side}{name}' for name in NAMES[names][end]],
+                 [(x, *point) for point in points[end]], [.06, .04, .03])
+    rig = Rig('animal', bones)
+    return fit_character(read_character(fit_rigs.write(rig, folder)))
+
+
+def goes(joint, doll):
+    """Way along x, -1 or 1, that the middle of its range takes what hangs on the joint."""
+    turn = rotation.from_axis_angle(joint.axes[0], sum(joint.limits[0]) / 2)
+    arm = np.subtract(doll.bone(joint.child).position, joint.anchor)
+    return np.sign((rotation.rotate(turn, arm) - arm)[0])
+
+
+@pytest.mark.parametrize('names', NAMES)
+@pytest.mark.parametrize('points', [BENT, STRAIGHT], ids=['bent', 'straight'])
+def test_knees_hocks_elbows_and_wrists(tmp_path, points, names):
+    fit = animal(tmp_path, points, names)
+    joints = {joint.child: joint for joint in fit.doll.joints}
+    for (end, order), way in TOWARD.items():
+        for side in ('Left', 'Right'):
+            joint = joints[side + NAMES[names][end][order]]
+            assert joint.kind == 'hinge', joint.child
+            assert goes(joint, fit.doll) == way, joint.child
+            low, high = joint.limits[0]
+            # It straightens from where it is bound, and folds far.
+            assert low <= 0 and high > 1.2
+    guessed = [note for note in fit.notes if 'no name and no bend' in note]
+    if names == 'unknown' and points is STRAIGHT:
+        assert 'Lefte' in guessed[0] and 'as legs in their place do' in guessed[0]
+    elif points is STRAIGHT:
+        assert guessed == []
+    assert judge(fit.doll, fit, falls=False).word == 'good'
+
+
+def test_a_hock_that_folds_the_other_way_is_not_good(tmp_path):
+    fit = animal(tmp_path, BENT, 'unknown')
+    twin = dataclasses.replace(fit.doll, joints=tuple(
+        dataclasses.replace(joint, limits=tuple((-high, -low) for low, high in joint.limits))
+        if joint.child.endswith('f') else joint for joint in fit.doll.joints))
+    verdict = judge(twin, fit, falls=False)
+    assert verdict.word != 'good'
+    assert 'Leftf: a limb that goes 3' in str(verdict) and 'past straight' in str(verdict)
+
+
+def test_limbs_that_nothing_tells_of_are_told():
+    notes = fit_rigs.fitted('star').notes
+    assert any('ball joints are taken' in note for note in notes)
+
+
+def test_legs_of_a_spider_fold_in_their_own_planes():
+    """They stand sideways: a bend across the walk is no leg's that is bound past straight."""
+    for joint in fit_rigs.fitted('spider').doll.joints:
+        if joint.kind == 'hinge':
+            assert abs(joint.axes[0][2]) < 0.01
