@@ -1,39 +1,19 @@
 """Roles of bones (a thigh, a hand), from the names that well-known skeletons give them.
 
-Mixamo, MakeHuman, CMU (both its ASF and its BVH names), VRM, Unreal, 3ds Max's Biped, SMPL.
+The words are in config/bone_names.yaml.
 """
 from __future__ import annotations
 
+import functools
 import re
+import unicodedata
+from collections import Counter
 
 from ..model.ragdoll import Ragdoll
+from .vocabulary import vocabulary
 
-WORDS = (
-    # The first role with a word in the name wins: a handindex is a finger, no hand.
-    ('finger', 'finger thumb index middle ring pinky little metacarpal'),
-    ('tail', 'tail'),
-    ('soft', 'ear hair jaw eye tongue breast brow lip lid skirt cape cloth teeth beard'),
-    ('wing', 'wing feather'),
-    ('toe', 'toe toebase toes ball'),
-    ('forearm', 'forearm lowerarm lowarm radius ulna elbow'),
-    ('hand', 'hand wrist palm'),
-    ('clavicle', 'clavicle collar scapula'),
-    ('upper_arm', 'upperarm uparm humerus bicep'),
-    ('thigh', 'thigh upleg upperleg femur'),
-    ('shin', 'shin calf lowerleg lowleg knee tibia shank'),
-    ('foot', 'foot ankle heel'),
-    ('neck', 'neck'),
-    ('head', 'head skull'),
-    ('hips', 'hips pelvis'),
-    ('spine', 'spine chest torso abdomen back lowerback upperback waist belly'),
-    # Words whose meaning hangs on the bones around.
-    ('?hip', 'hip'), ('?thorax', 'thorax'), ('?shoulder', 'shoulder'),
-    ('?arm', 'arm'), ('?leg', 'leg'))
-
-SIDES = {'l': 1, 'left': 1, 'lft': 1, 'r': -1, 'right': -1, 'rgt': -1}
-
-FILLERS = {'joint', 'jnt', 'bone', 'skeleton', 'armature', 'bind', 'def', 'org', 'mch', 'rig', 'b',
-           'j', 'bip', 'cc', 'base', 'sec', 'mixamorig', 'character', 'biped'}
+FEWEST, COMMON = 8, 0.7
+"""Of so many names, a word that this share of them begin or end with says nothing of any."""
 
 LIMBS = {'clavicle', 'upper_arm', 'forearm', 'hand', 'thigh', 'shin', 'foot', 'toe', 'head'}
 """Roles of which a limb has one: a second bone of the same role is a piece of the first."""
@@ -58,7 +38,7 @@ def roles_of(names: tuple[str, ...], parents: tuple[int, ...]) -> tuple[str | No
 
     ``parents`` are indices of the bones, which come parents first; -1 for a bone without one.
     """
-    raw = [_raw_role(name) for name in names]
+    raw = [_raw_role(words) for words in _own_words(names)]
     roles: list[str | None] = []
     for bone, (role, parent) in enumerate(zip(raw, parents, strict=True)):
         above = roles[parent] if parent >= 0 else None
@@ -98,28 +78,67 @@ def _next(limb: tuple[str, ...], above: str | None) -> str:
     return limb[min(limb.index(above) + 1, len(limb) - 1)]
 
 
-def _raw_role(name: str) -> str | None:
-    key = ''.join(_side_and_words(name)[1])
-    words = [(role, word) for role, text in WORDS for word in text.split()]
-    for role, word in words:
+def _raw_role(words: tuple[str, ...]) -> str | None:
+    """Role by the first word of the vocabulary that is the name, else that is in it."""
+    key, roles = ''.join(words), vocabulary().roles
+    for role, word in roles:
         if key == word:
             return role
-    for role, word in words:
+    for role, word in roles:
         # Three letters are found in too many words: an ear in a forearm's 'fear'.
-        if word in key and (len(word) > 3 or word in _side_and_words(name)[1]):
+        if word in key and (len(word) > 3 or not word.isascii() or word in words):
             return role
     return None
 
 
-def _side_and_words(name: str) -> tuple[int, list[str]]:
-    """Split a name into words without fillers and numbers, and the side it names."""
-    tail = re.split(r'[:|]', name)[-1]
-    words = [word.lower() for word in re.findall(r'[A-Z]+(?![a-z])|[A-Z]?[a-z]+', tail)]
-    side = next((SIDES[word] for word in words if word in SIDES), 0)
-    words = [word for word in words if word not in SIDES and word not in FILLERS]
-    if not side and len(words) == 1 and words[0][0] in 'lr':
-        # CMU writes lhumerus and rfoot.
-        known = {word for _, text in WORDS for word in text.split()}
-        if words[0] not in known and words[0][1:] in known:
-            side, words = SIDES[words[0][0]], [words[0][1:]]
-    return side, words
+def _own_words(names: tuple[str, ...]) -> list[tuple[str, ...]]:
+    """Words of each name without those that most begin or end with: Ringmaster_LeftArm_skin."""
+    words = [_side_and_words(name)[1] for name in names]
+    for end in (0, -1):
+        while len(words) >= FEWEST:
+            first = Counter(each[end] for each in words if each).most_common(1)
+            if not first or first[0][1] < COMMON * len(words):
+                break
+            rest = slice(1, None) if end == 0 else slice(None, -1)
+            words = [each[rest] if each and each[end] == first[0][0] else each for each in words]
+    return words
+
+
+@functools.lru_cache(4096)
+def _side_and_words(name: str) -> tuple[int, tuple[str, ...]]:
+    """Split a name into plain words without fillers and numbers, and the side it names."""
+    known = vocabulary()
+    words = [word.lower() for word in re.findall(
+        r'[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[^\W\d_A-Za-z]+', _plain(re.split(r'[:|]', name)[-1]))]
+    side = next((known.sides[word] for word in words if word in known.sides), 0)
+    words = [word for word in words if word not in known.sides and word not in known.fillers]
+    for index, word in enumerate([] if side else words):
+        rest, side = _without_side(word, len(words) == 1)
+        if side:
+            words[index] = rest
+            break
+    return side, tuple(word for word in words if word)
+
+
+def _without_side(word: str, alone: bool) -> tuple[str, int]:
+    """What is left of a word without the side that it is written in one with, and that side.
+
+    CMU writes lhumerus and rfoot; others leftarm, and 左ひじ.
+    """
+    known = vocabulary()
+    for mark, side in known.sides.items():
+        if not mark.isascii():
+            if mark in word:
+                return word.replace(mark, '', 1), side
+        elif (len(mark) > 1 or alone) and word not in known.known:
+            for rest in (word[len(mark):] if word.startswith(mark) else '',
+                         word[:-len(mark)] if len(mark) > 1 and word.endswith(mark) else ''):
+                if rest in known.known:
+                    return rest, side
+    return word, 0
+
+
+def _plain(name: str) -> str:
+    """The name without accents and with the usual forms of letters: Fuß is Fuss, ﾋｼﾞ is ヒジ."""
+    parts = unicodedata.normalize('NFD', unicodedata.normalize('NFKC', name).replace('ß', 'ss'))
+    return unicodedata.normalize('NFC', re.sub('[\u0300-\u036f]', '', parts))
