@@ -47,11 +47,17 @@ def test_urdf_and_picture(glb, tmp_path, capsys):
     names = {link.get('name') for link in ElementTree.parse(tmp_path / 'doll.urdf').iter('link')}
     assert names == BOTH
     pixels = image.imread(tmp_path / 'doll.png')[:, :, :3]
-    # Skin and bodies side by side: something is drawn in each third, colours in the last.
-    for third in np.array_split(pixels, 3, axis=1):
-        assert (third.min(axis=2) < 0.9).mean() > 0.02
-    last = np.array_split(pixels, 3, axis=1)[2]
-    assert (np.ptp(last, axis=2) > 0.2).mean() > 0.01
+    # Skin, both, bodies and joints side by side: something is drawn in each, colours in the third.
+    quarters = np.array_split(pixels, 4, axis=1)
+    for quarter in quarters:
+        assert (quarter.min(axis=2) < 0.9).mean() > 0.02
+    assert (np.ptp(quarters[2], axis=2) > 0.2).mean() > 0.01
+    # The joint between the two: a black dot, and a ball's three angles in red, green and blue.
+    joints = quarters[3]
+    assert (joints.max(axis=2) < 0.1).sum() > 20
+    for color in range(3):
+        others = np.delete(joints, color, axis=2).max(axis=2)
+        assert (joints[:, :, color] > others + 0.15).sum() > 20
 
 
 def test_a_fitted_doll_loads_in_yourdfpy_and_pybullet(glb, tmp_path, capsys):

@@ -59,7 +59,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--dialect', choices=('ros', 'bullet'), default='ros',
                         help='of that URDF: PyBullet has capsules, and takes links of no mass '
                         'as such only where they say so')
-    parser.add_argument('--picture', metavar='OUT.png', help='draw skin and bodies side by side')
+    parser.add_argument('--picture', metavar='OUT.png',
+                        help='draw skin, bodies, joints and their ranges side by side')
     parser.add_argument('--mass', type=float, metavar='KG',
                         help='of the whole doll (default: as much water as the skin holds)')
     parser.add_argument('--masses', choices=('best', 'volume', 'proportions'), default='best',
