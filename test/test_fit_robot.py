@@ -147,6 +147,37 @@ def test_bare_links_between_make_one_joint(tmp_path):
     assert row('0.6 0.8 0').joints[0].kind == 'ball'
 
 
+def test_a_link_without_a_mass_gives_its_shapes_to_what_carries_it(tmp_path):
+    doll, _ = read(tmp_path, link('a'), link('b', mass=0), link('c', '<sphere radius="1"/>', 0,
+                                                               tag='visual'),
+                   joint('b', kind='fixed', xyz='0 0 0.2'), joint('c', kind='fixed'))
+    assert [bone.name for bone in doll.bones] == ['a']
+    assert [part.shape for part in doll.root.shape.parts] == [Box((0.1, 0.1, 0.1))] * 2
+    # Two cubes, 0.2 m apart, reach from -0.05 to 0.25 m.
+    ends = doll.root.position[2] + np.array([-1, 1]) * doll.root.shape.reach(
+        np.array([[0, 0, -1], [0, 0, 1]]))
+    assert ends == pytest.approx([-0.05, 0.25])
+
+
+def test_what_is_only_seen_is_a_body_where_nothing_has_a_mass(tmp_path):
+    seen = link('b', mass=0, tag='visual')
+    assert len(read(tmp_path, link('a', mass=0), seen, joint('b'))[0].bones) == 2
+    assert len(read(tmp_path, link('a'), seen, joint('b'))[0].bones) == 1
+
+
+def test_a_joint_that_mimics_turns_by_itself_and_is_named(tmp_path):
+    doll, notes = read(tmp_path, link('a'), link('b'), link('c'), joint('b'),
+                       joint('c', inside='<mimic joint="to_b" multiplier="2"/>'))
+    assert [j.kind for j in doll.joints] == ['hinge', 'hinge']
+    assert notes == ('to_c: mimics to_b: in the doll it turns by itself',)
+
+
+def test_a_shape_of_no_size_is_left_out_and_named(tmp_path):
+    doll, notes = read(tmp_path, link('a'), link('b', '<sphere radius="0"/>', 0),
+                       joint('b', kind='fixed'))
+    assert len(doll.bones) == 1 and notes == ('b: a <sphere> of no size is left out',)
+
+
 def test_hinges_apart_keep_the_first_and_say_so(tmp_path):
     doll, notes = read(tmp_path, link('a'), link('v', '', 0), link('b'), joint('v'),
                        joint('b', 'v', xyz='0 0 0.5'))
@@ -269,8 +300,9 @@ def test_what_is_only_a_mesh_becomes_the_box_of_the_same_inertia(tmp_path):
     assert sorted(doll.root.shape.size) == pytest.approx([0.1, 0.2, 0.4])
     assert sorted(doll.root.inertia) == pytest.approx(sorted((x, y, z)))
     assert np.allclose(doll.root.position, (0, 0, 0.5))
-    assert 'only meshes' in notes[0]
-    # What no solid could have: a cube of water.
+    assert 'a.stl is left out: no such file' in notes[0]
+    assert 'box of the same inertia' in notes[1]
+    # What no box as dense as matter could have: a cube of water's size.
     doll, notes = read(tmp_path, mesh.replace(f'ixx="{x}"', 'ixx="1"').replace(
         f'iyy="{y}"', 'iyy="1"').replace(f'izz="{z}"', 'izz="1"'))
     assert doll.root.shape.volume == pytest.approx(2e-3)
@@ -290,6 +322,10 @@ def test_what_is_only_a_mesh_becomes_the_box_of_the_same_inertia(tmp_path):
     (robot(link('a'), link('b'), joint('b').replace('"-1"', '"3"')), errors.LimitsReversed),
     (robot(link('a', '<box size="1 1 -1"/>')), errors.NotPositive),
     (robot(link('a', '<box size="1 1"/>')), errors.WrongForm),
+    # A decimal comma makes two numbers of one.
+    (robot(link('a', '<box size="0,1 0,1 0,1"/>')), errors.WrongForm),
+    (robot(link('a', '<sphere radius="0,1"/>')), errors.WrongForm),
+    (robot(link('a', '<box size="1 1 ${height}"/>')), errors.WrongForm),
     (robot(link('a', '<sphere/>')), errors.WrongForm),
     (robot(link('a', mass=-1)), errors.OutOfRange), (robot(link('a', '')), errors.WrongForm)])
 def test_broken_urdf_is_a_named_error(text, kind):

@@ -21,6 +21,15 @@ LARGEST_TEXT = 32_000_000
 JOINT_TYPES = ('revolute', 'continuous', 'fixed', 'prismatic', 'planar', 'floating', 'spherical')
 
 
+@dataclass(frozen=True)
+class UrdfMesh:
+    """A mesh where it stands in a link: the name of its file as given, ``scale`` (3,), its pose."""
+
+    file: str
+    scale: tuple[float, ...]
+    pose: Pose
+
+
 @dataclass
 class UrdfLink:
     """``shapes`` with their poses in the link's frame; ``mass`` kg, zero where none is given."""
@@ -31,7 +40,11 @@ class UrdfLink:
     inertia: np.ndarray | None = None
     """(3, 3) kg m^2 about the centre of mass, in the axes of ``centre``."""
     shapes: list[tuple[Shape, Pose]] = field(default_factory=list)
-    meshes: int = 0
+    meshes: list[UrdfMesh] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+    """What else it is described by, which no doll has: the tags."""
+    collides: bool = False
+    """Whether its shapes and meshes are those of <collision>; else they are what is seen."""
 
 
 @dataclass
@@ -46,6 +59,8 @@ class UrdfJoint:
     axis: np.ndarray
     limits: tuple[float, float] | None
     damping: float
+    mimics: str | None = None
+    """Name of the joint that a gear or a tendon couples it to."""
 
 
 @dataclass
@@ -85,8 +100,7 @@ def parse_urdf(text: str) -> UrdfTree:
     if '<!DOCTYPE' in text or '<!ENTITY' in text:
         raise errors.Unreadable('', 'a DOCTYPE', 'URDF without entities')
     try:
-        # Bytes, as a text that names another encoding would be refused.
-        root = ElementTree.fromstring(text.encode('utf-8'))
+        root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError, RecursionError) as error:
         raise errors.Unreadable('', str(error), 'XML: a <robot> (expand a xacro first)') from None
     if root.tag != 'robot':
@@ -111,15 +125,33 @@ def _link(element: ElementTree.Element) -> UrdfLink:
         errors.check_range(f'{where}.mass', link.mass, 0, math.inf)
         link.centre = _pose(inertial, where)
         link.inertia = _inertia(inertial.find('inertia'), where)
+    collisions = element.findall('collision')
+    link.collides = bool(collisions)
     # Some describe only what is seen.
-    for part in element.findall('collision') or element.findall('visual'):
-        geometry = part.find('geometry')
-        shape = None if geometry is None else _shape(geometry, where)
-        if shape is None:
-            link.meshes += 1
-        else:
-            link.shapes.append((shape, _pose(part, where)))
+    for part in collisions or element.findall('visual'):
+        for geometry in part.findall('geometry/*')[:1]:
+            _add_geometry(link, geometry, _pose(part, where), where)
     return link
+
+
+def _add_geometry(link: UrdfLink, element: ElementTree.Element, pose: Pose, where: str) -> None:
+    """Add the shape or the mesh to the link; what is neither, or a point, to what is left out."""
+    kind = element.tag
+    if kind == 'mesh':
+        scale = tuple(_vector(element, 'scale', where, (1, 1, 1)))
+        link.meshes.append(UrdfMesh(_text(element, 'filename', f'{where}.mesh'), scale, pose))
+    elif kind not in SIZES:
+        link.left_out.append(f'a <{kind}>')
+    else:
+        sizes = {key: tuple(_vector(element, key, where)) if key == 'size'
+                 else _number(element, key, where) for key in SIZES[kind]}
+        if not np.any(list(sizes.values())):
+            link.left_out.append(f'a <{kind}> of no size')
+            return
+        try:
+            link.shapes.append((SHAPES[kind](**sizes), pose))
+        except errors.ModelError as error:
+            raise error.at(where) from None
 
 
 def _joint(element: ElementTree.Element) -> UrdfJoint:
@@ -148,21 +180,10 @@ def _joint(element: ElementTree.Element) -> UrdfJoint:
             raise errors.LimitsReversed(f'{where}.limit', limits, 'lower <= upper')
     found = element.find('dynamics')
     damping = 0.0 if found is None else _number(found, 'damping', where, 0.0)
+    found = element.find('mimic')
+    mimics = None if found is None else found.get('joint', '')
     return UrdfJoint(name, kind, *ends, _pose(element, where), axis / np.linalg.norm(axis), limits,
-                     max(damping, 0.0))
-
-
-def _shape(geometry: ElementTree.Element, where: str) -> Shape | None:
-    """The shape; None for a mesh and whatever else is no plain shape."""
-    for element in geometry:
-        if element.tag in SIZES:
-            sizes = {key: tuple(_vector(element, key, where)) if key == 'size'
-                     else _number(element, key, where) for key in SIZES[element.tag]}
-            try:
-                return SHAPES[element.tag](**sizes)
-            except errors.ModelError as error:
-                raise error.at(where) from None
-    return None
+                     max(damping, 0.0), mimics)
 
 
 def _inertia(element: ElementTree.Element | None, where: str) -> np.ndarray | None:
@@ -205,10 +226,13 @@ def _vector(element: ElementTree.Element, key: str, where: str,
 def _numbers(element: ElementTree.Element, key: str, length: int, where: str) -> np.ndarray:
     text = element.get(key, '')
     try:
-        numbers = np.array([float(word) for word in text.split()])
+        # A comma between numbers is read over; a decimal one makes too many of them.
+        numbers = np.array([float(word) for word in text.replace(',', ' ').split()])
     except ValueError:
         numbers = np.zeros(0)
     if len(numbers) != length or not np.isfinite(numbers).all():
         what = f'{length} finite numbers' if length > 1 else 'a finite number'
+        if '$' in text:
+            what += ' (expand a xacro first)'
         raise errors.WrongForm(f'{where}.{element.tag}.{key}', text, what)
     return numbers

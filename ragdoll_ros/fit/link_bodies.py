@@ -17,6 +17,7 @@ from ..model.compound import Compound, principal_axes
 from ..model.pose import Pose
 from ..model.ragdoll import Bone
 from ..model.shapes import Box, Capsule, Part, Shape
+from .link_meshes import LinkMeshes, Placed
 
 DENSITY = 1000.0
 """kg/m^3 of a link that moves and has a shape but no mass."""
@@ -27,26 +28,20 @@ THINNEST = 0.005
 ROUNDING = 1e-6
 """What numbers of six digits differ by."""
 
-Placed = tuple[Shape, Pose]
-"""A shape and where it stands."""
-
-
-def link_shapes(link: UrdfLink, notes: list[str]) -> list[Placed]:
+def link_shapes(link: UrdfLink, meshes: LinkMeshes, notes: list[str]) -> list[Placed]:
     """What a link is for contact, its shapes in its own frame; none if nothing gives any."""
-    if link.shapes:
-        if link.meshes:
-            notes.append(f'{link.name}: meshes left out, plain shapes taken')
-        return _with_capsules(link.shapes)
-    if link.mass <= 0 or (link.inertia is None and not link.meshes):
-        return []
+    notes += [f'{link.name}: {what} is left out' for what in link.left_out]
+    shapes = [*_with_capsules(link.shapes), *meshes.shapes(link, notes)]
+    if shapes or link.mass <= 0 or (link.inertia is None and not link.meshes):
+        return shapes
     box = _same_inertia(link)
     if box is not None:
         if link.meshes:
-            notes.append(f'{link.name}: only meshes; the box of the same inertia is taken')
+            notes.append(f'{link.name}: the box of the same inertia is taken')
         return [box]
     if not link.meshes:
         return []
-    notes.append(f'{link.name}: only meshes and no inertia that could be; a cube of water is taken')
+    notes.append(f'{link.name}: no inertia that could be; a cube of water is taken')
     return [(Box(((link.mass / DENSITY) ** (1 / 3),) * 3), link.centre)]
 
 
@@ -69,7 +64,7 @@ def make_bone(name: str, shapes: Sequence[Placed], link: UrdfLink, frame: Pose,
         bone = Bone(name, whole.seen_from(pose), mass, *pose)
     if _is_possible(link):
         return _with_inertia(bone, whole, axes, *_combined([(link, frame), *carried]))
-    if link.inertia is not None and link.shapes:
+    if link.inertia is not None:
         notes.append(f'{name}: no body has its inertia: that of a uniform solid is taken')
     return bone
 
@@ -118,8 +113,6 @@ def _combined(links: Sequence[tuple[UrdfLink, Pose]]) -> tuple[np.ndarray, np.nd
 def _is_possible(link: UrdfLink) -> bool:
     """Whether a link has an inertia that a body can have."""
     if link.inertia is None or link.mass <= 0:
-        return False
-    if link.meshes and not link.shapes and _same_inertia(link) is None:
         return False
     least, middle, most = np.linalg.eigvalsh(link.inertia)
     return bool(least > 0 and most <= (least + middle) * (1 + ROUNDING))

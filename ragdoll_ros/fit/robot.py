@@ -1,9 +1,9 @@
 """URDF to Ragdoll: a robot that goes limp.
 
-A link with a shape becomes a body; its joint becomes a hinge, or part of a universal or ball
-joint where links of no shape stand between (as to_urdf writes them). A link without a shape
-is carried by its parent and gives it its mass and inertia. Every link's frame is one of the doll's
-riders, so that it can be published.
+A link with a shape or a mesh becomes a body; its joint becomes a hinge, or part of a universal or
+ball joint where links of no shape stand between (as to_urdf writes them). A link without a shape
+is carried by its parent and gives it its mass and inertia, one without a mass its shapes. Every
+link's frame is one of the doll's riders, so that it can be published.
 """
 from __future__ import annotations
 
@@ -13,11 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ..files.urdf_text import urdf_text
 from ..files.urdf_tree import LARGEST_TEXT, UrdfJoint, UrdfTree, parse_urdf
 from ..model import errors, rotation
 from ..model.pose import Pose
 from ..model.ragdoll import LARGEST_SWING, WORLD, Bone, Joint, Ragdoll, SkeletonFrame
 from .link_bodies import link_shapes, make_bone
+from .link_meshes import LinkMeshes
 from .names import plain_name
 
 SAME_PLACE = 1e-6
@@ -44,26 +46,30 @@ def read_urdf(path: str | Path) -> tuple[Ragdoll, tuple[str, ...]]:
             raise errors.Unreadable('', str(path), 'a URDF file')
         if path.stat().st_size > LARGEST_TEXT:
             raise errors.Unreadable('', path.stat().st_size, f'at most {LARGEST_TEXT} bytes')
-        try:
-            text = path.read_text(encoding='utf-8')
-        except UnicodeDecodeError as error:
-            raise errors.Unreadable('', str(error), 'a text in UTF-8') from None
-        doll, notes = _doll(parse_urdf(text))
+        doll, notes = _doll(parse_urdf(urdf_text(path.read_bytes())), path.parent)
         return doll, tuple(notes)
     except errors.ModelError as error:
         raise errors.ModelErrors(str(path), [error]) from None
 
 
-def _doll(tree: UrdfTree) -> tuple[Ragdoll, list[str]]:
+def _doll(tree: UrdfTree, folder: Path | None = None) -> tuple[Ragdoll, list[str]]:
     notes: list[str] = []
     # Zero may lie outside a joint's limits; the doll starts at the nearest angle inside.
     angles = {child: float(np.clip(0.0, *joint.limits)) for child, joint in tree.joints.items()
               if joint.limits}
     poses = tree.poses(angles)
-    shapes = {name: link_shapes(link, notes) for name, link in tree.links.items()}
+    meshes = LinkMeshes(folder)
+    # What has no mass and only is seen is a body where nothing has a mass: a sketch of a robot.
+    sketch = all(link.mass <= 0 for link in tree.links.values())
+    shapes = {name: link_shapes(link, meshes, notes)
+              if sketch or link.mass > 0 or link.collides else []
+              for name, link in tree.links.items()}
     if not any(shapes.values()):
-        raise errors.WrongForm('link', list(tree.links)[:5], 'a link with a shape or an inertia')
+        why = f' ({notes[0]})' if notes else ''
+        raise errors.WrongForm('link', list(tree.links)[:5],
+                               f'a link with a shape or an inertia{why}')
     carriers = _carriers(tree, shapes)
+    _merge_massless(tree, shapes, carriers, poses)
     names = _names([name for name in tree.links if carriers[name] == name], [WORLD])
     root = next(name for name in tree.order if carriers[name] == name)
     bones = [make_bone(text, shapes[name], tree.links[name], poses[name],
@@ -95,6 +101,16 @@ def _carriers(tree: UrdfTree, shapes: dict[str, list]) -> dict[str, str]:
     return {name: carrier or first for name, carrier in carriers.items()}
 
 
+def _merge_massless(tree: UrdfTree, shapes: dict[str, list], carriers: dict[str, str],
+                    poses: dict[str, Pose]) -> None:
+    """Give what a link without a mass collides as to the link that carries it."""
+    for name, link in tree.links.items():
+        carrier = carriers[name]
+        if carrier != name and link.collides:
+            shapes[carrier] += [(shape, poses[carrier].relative(poses[name].compose(place)))
+                                for shape, place in shapes[name]]
+
+
 def _joint(tree: UrdfTree, name: str, carriers: dict[str, str], names: dict[str, str],
            poses: dict[str, Pose], angles: dict[str, float], notes: list[str]) -> Joint:
     """Joint of a body: of the joints in a row from the body that carries its parent."""
@@ -108,6 +124,8 @@ def _joint(tree: UrdfTree, name: str, carriers: dict[str, str], names: dict[str,
             notes.append(f'{joint.name}: a doll has no {joint.kind} joint: it is fixed')
         if joint.kind == 'floating':
             notes.append(f'{joint.name}: no doll has a floating joint: it becomes a ball joint')
+        if joint.mimics is not None and joint.kind in ('revolute', 'continuous'):
+            notes.append(f'{joint.name}: mimics {joint.mimics}: in the doll it turns by itself')
     if any(joint.kind in ('floating', 'spherical') for joint in row):
         ball = next(joint for joint in row if joint.kind in ('floating', 'spherical'))
         anchor, turn = poses[ball.child]
