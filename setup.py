@@ -81,7 +81,7 @@ setup(
     extras_require={
         'ros': ['ros-jazzy-rclpy', 'ros-jazzy-rmw-fastrtps-cpp', 'ros-jazzy-common-interfaces'],
         'report': ['scipy', 'matplotlib', 'mujoco'],
-        'fit': ['matplotlib', 'trimesh', 'pycollada'],
+        'fit': ['matplotlib', 'trimesh', 'pycollada', 'DracoPy'],
         # The page: 3D, panels and plots in a browser, served from Python, with no build of its own.
         'viewer': ['viser', 'imageio', 'mcap'],
         'replay': ['mcap'],

@@ -27,7 +27,7 @@ SCENES = ('import ragdoll_ros; from ragdoll_ros.files import config; '
 ROSDEP_KEYS = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml',
                'jsonschema': 'python3-jsonschema', 'numba': 'python3-numba',
                'pybullet': 'python3-pybullet-pip'}
-DISTRIBUTIONS = {'yaml': 'pyyaml', 'mpl_toolkits': 'matplotlib'}
+DISTRIBUTIONS = {'yaml': 'pyyaml', 'mpl_toolkits': 'matplotlib', 'DracoPy': 'dracopy'}
 """Where a package on PyPI is called otherwise than its module."""
 
 ROBOT = ('model', 'files', 'physics', 'ros')

@@ -23,7 +23,7 @@ ARROWS = {
 
 ONLY = {'pybullet': 'physics/engine/bullet.py', 'mujoco': 'physics/engine/mujoco.py',
         'numba': 'physics/kernels/', 'viser': 'viewer/', 'matplotlib': ('fit/', 'accuracy/'),
-        'trimesh': 'fit/mesh_file.py', 'scipy': 'accuracy/',
+        'trimesh': 'fit/mesh_file.py', 'DracoPy': 'fit/draco.py', 'scipy': 'accuracy/',
         'mcap': ('files/bag.py', 'viewer/sources/recording_file.py')}
 """Libraries, and the one place of each. The report's pendulum in three lines of PyBullet alone is
 what a user would write without this package: it shares no code with it."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..model import errors, rotation
 from ..model.ragdoll import WORLD
+from .draco import decompressed
 from .gltf_file import GltfFile
 from .names import plain_name, side_of
 from .nodes import Nodes, read_nodes
@@ -74,7 +75,7 @@ def read_character(path: str | Path, scale: float | None = None) -> Character:
     if scale is not None:
         errors.check_positive('scale', scale)
     try:
-        file = GltfFile(path)
+        file = decompressed(GltfFile(path))
         # What overflows is found where it ends up.
         with np.errstate(over='ignore', invalid='ignore'):
             nodes = read_nodes(file)

@@ -24,7 +24,8 @@ LARGEST_JSON = 32_000_000
 LARGEST_STRUCTURE = 500_000
 """Commas and brackets in the JSON: what becomes Python objects, 64 bytes each and more."""
 
-UNREADABLE_EXTENSIONS = ('KHR_draco_mesh_compression', 'EXT_meshopt_compression')
+UNREADABLE_EXTENSIONS = ('EXT_meshopt_compression', 'KHR_meshopt_compression')
+"""What is on PyPI for them has no wheels."""
 
 LARGEST_WHOLE = 2 ** 53
 """Whole numbers of the JSON stay below (section 2.7 of the specification)."""
@@ -98,6 +99,14 @@ class GltfFile:
             raise errors.OutOfRange(place, f'bytes {start} to {start + length}',
                                     f'within the {buffer.size} bytes of the buffer')
         return buffer.read(start + offset, size, place)
+
+    def add_view(self, data: bytes) -> int:
+        """Index of a new buffer view, of all of a new buffer that holds ``data``."""
+        buffers, views = self.json['buffers'], self.json['bufferViews']
+        self._buffers[len(buffers)] = Buffer(len(data), data=data)
+        buffers.append({'byteLength': len(data)})
+        views.append({'buffer': len(buffers) - 1, 'byteLength': len(data)})
+        return len(views) - 1
 
     def _buffer(self, index: object, where: str) -> Buffer:
         entry = self.entry('buffers', index, where)
