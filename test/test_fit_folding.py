@@ -86,4 +86,5 @@ def test_legs_of_a_spider_fold_in_their_own_planes():
     """They stand sideways: a bend across the walk is no leg's that is bound past straight."""
     for joint in fit_rigs.fitted('spider').doll.joints:
         if joint.kind == 'hinge':
-            assert abs(joint.axes[0][2]) < 0.01
+            # Level, to 3 degrees.
+            assert abs(joint.axes[0][2]) < 0.05

@@ -1,4 +1,4 @@
-"""How much of its skin each body holds, and how much of all bodies is skin."""
+"""How much of its skin each body holds, how much of all bodies is skin, and what that weighs."""
 from __future__ import annotations
 
 from ..model.ragdoll import Ragdoll
@@ -15,6 +15,10 @@ FEWEST = 12
 
 BLOATED, SWOLLEN = 2.5, 5.0
 """Volume of all bodies over the skin's that is doubtful, or wrong."""
+
+LIGHTEST, HEAVIEST = 300.0, 2500.0
+"""kg/m^3 of the whole; a skin that is open tells too little volume, so a share of the bodies'
+counts as skin."""
 
 
 def find_uncovered(doll: Ragdoll, character: Character,
@@ -41,6 +45,10 @@ def find_uncovered(doll: Ragdoll, character: Character,
         found.append(Finding(f'the bodies hold {100 * whole:.0f} % of the skin',
                              whole < LITTLE))
     skin, volume = character.volume(), sum(bone.shape.volume for bone in doll.bones)
+    density = doll.mass / max(skin, volume / BLOATED)
+    if not LIGHTEST < density < HEAVIEST:
+        found.append(Finding(f'{doll.mass:.3g} kg in a skin of {1000 * skin:.3g} l: '
+                             f'{density:.0f} kg/m^3, where animals have 1000 (--mass)'))
     if skin > 0 and volume > BLOATED * skin:
         found.append(Finding(f'the bodies have {volume / skin:.2g} times the volume of the skin',
                              volume > SWOLLEN * skin))
