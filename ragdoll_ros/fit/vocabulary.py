@@ -31,14 +31,16 @@ class Vocabulary:
 
 def users_file() -> Path:
     """Where a user's own words are, if there are any."""
-    return Path(os.environ.get('XDG_CONFIG_HOME') or Path.home() / '.config', 'ragdoll_ros', FILE)
+    # Path.home() fails where the user has no entry.
+    folder = os.environ.get('XDG_CONFIG_HOME') or os.path.expanduser('~/.config')
+    return Path(folder, 'ragdoll_ros', FILE)
 
 
 @functools.cache
 def vocabulary() -> Vocabulary:
     """The words of both files; ModelErrors for a file that is none."""
     return read_vocabulary([path for path in (users_file(), config_folder() / FILE)
-                            if path.is_file()])
+                            if os.path.isfile(path)])
 
 
 def read_vocabulary(paths: list[Path]) -> Vocabulary:

@@ -12,6 +12,9 @@ from ...model.scene import Scene
 from .folder import CHARACTERS, DOLLS, LARGEST_UPLOAD, Folder
 from .form import GREEN, RED, colored
 
+MOST_TOLD = 3
+"""Reasons of a verdict that the page tells."""
+
 
 class Files:
     """Widgets for files in the GUI container that is current. Callbacks run in viser's threads.
@@ -77,8 +80,10 @@ class Files:
 
     def _fitted(self, name: str, content: bytes) -> str:
         scene, verdict = self._folder.fit(name, content, self._show_progress)
-        found = ''.join(f'; {finding.sentence}' for finding in verdict.findings)
-        return f'{self._take(scene, "fit", name)}; verdict: {verdict.word}{found}'
+        told = [finding.sentence for finding in verdict.findings]
+        told = [*told[:MOST_TOLD], *([f'{len(told) - MOST_TOLD} more, which ragdoll_fit lists']
+                                     if len(told) > MOST_TOLD else [])]
+        return '; '.join([self._take(scene, 'fit', name), f'verdict: {verdict.word}', *told])
 
     def _take(self, scene: Scene, what: str, name: str) -> str:
         self._go_on_with(scene, f'{what} {name}')

@@ -15,7 +15,7 @@ from ...model.vectors import Quaternion, Vector
 from .changes import change_bone, change_joint, find, joint_of, limb, set_pose
 
 OTHER = {'left': 'right', 'right': 'left', 'l': 'r', 'r': 'l', 'lft': 'rgt', 'rgt': 'lft'}
-"""Words for a side in names of bones, as fit/names.py knows them."""
+"""Words for a side in names of bones: the English ones of config/bone_names.yaml."""
 
 NEAR = 0.05
 """How far from the mirrored place a partner without such a name may be, of the doll's size."""
