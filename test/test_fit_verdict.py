@@ -189,6 +189,16 @@ def test_a_robots_bodies_are_where_its_file_says():
     assert judge(twin, falls=False, measured=True).word == 'good'
 
 
+def test_a_robot_may_be_of_steel():
+    doll = fitted('chain').doll
+    name = doll.bones[0].name
+    for density, words in ((7800, ('doubtful', 'good')), (9000, ('doubtful', 'doubtful')),
+                           (30_000, ('wrong', 'doubtful'))):
+        twin = doll.replace_bone(name, mass=density * doll.bone(name).shape.volume)
+        assert tuple(judge(twin, falls=False, measured=measured).word
+                     for measured in (False, True)) == words
+
+
 def test_a_joint_past_its_limits_is_told_by_a_fall():
     """Bound 57 degrees outside its range."""
     doll = fitted('mixamo').doll

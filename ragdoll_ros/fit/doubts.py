@@ -12,8 +12,8 @@ from .names import doll_roles
 from .person import is_person
 from .scale import SMALLEST, TALLEST
 
-DENSEST = 3000.0
-"""kg/m^3; bone has 1 900, stone 2 700."""
+DENSEST, STEEL = 3000.0, 8000.0
+"""kg/m^3 of animals (bone has 1 900, stone 2 700), and of robots."""
 
 IMPOSSIBLE = 25_000.0
 """kg/m^3; osmium, the densest of all, has 22 600."""
@@ -29,9 +29,14 @@ BENT, PAST = math.radians(35), math.radians(20)
 straight); how far past straight is doubtful, and wrong twice that."""
 
 
-def find_doubts(doll: Ragdoll) -> list[Finding]:
-    """About the size, a density, a joint that bends the wrong way."""
-    return [*_size(doll), *_densities(doll), *_bends(doll)]
+def find_doubts(doll: Ragdoll, measured: bool = False) -> list[Finding]:
+    """About the size, a density, a joint that bends the wrong way.
+
+    A robot is ``measured``: may be of steel, and bend as it likes.
+    """
+    if measured:
+        return [*_size(doll), *_densities(doll, STEEL, math.inf)]
+    return [*_size(doll), *_densities(doll, DENSEST, IMPOSSIBLE), *_bends(doll)]
 
 
 def extent(doll: Ragdoll) -> float:
@@ -53,11 +58,11 @@ def _size(doll: Ragdoll) -> list[Finding]:
     return []
 
 
-def _densities(doll: Ragdoll) -> list[Finding]:
+def _densities(doll: Ragdoll, most: float, impossible: float) -> list[Finding]:
     densities = {bone.name: bone.mass / bone.shape.volume for bone in doll.bones}
-    return [Finding(f'{name}: a density of {density:.0f} kg/m^3, over {DENSEST:.0f}',
-                    density > IMPOSSIBLE)
-            for name, density in densities.items() if density > DENSEST]
+    return [Finding(f'{name}: a density of {density:.0f} kg/m^3, over {most:.0f}',
+                    density > impossible)
+            for name, density in densities.items() if density > most]
 
 
 def _bends(doll: Ragdoll) -> list[Finding]:

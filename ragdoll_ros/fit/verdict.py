@@ -43,12 +43,12 @@ def judge(doll: Ragdoll, fit: Fit | None = None, falls: bool = True,
     file says, so that where they are tells nothing.
     """
     size, roles = extent(doll), doll_roles(doll)
-    found = find_doubts(doll)
+    found = find_doubts(doll, measured)
     if not measured:
         found += find_gaps(doll, size) + find_wrong_root(doll, roles)
         found += find_asymmetries(doll, size)
     positions = np.array([bone.position for bone in doll.bones])
-    if is_person(roles, positions):
+    if is_person(roles, positions) and not measured:
         found += find_masses(doll, roles, size)
     if fit is not None:
         found += find_uncovered(doll, fit.character,
