@@ -28,20 +28,27 @@ def no_folder(tmp_path):
     return path
 
 
-def test_without_a_log_it_says_why_it_does_not_start(ros, monkeypatch, no_folder):
-    monkeypatch.setenv('ROS_LOG_DIR', str(no_folder))
-    process = start('node')
-    output, errors = process.communicate(timeout=PATIENCE)
-    line, = errors.splitlines()
-    assert (process.returncode, output) == (2, '')
+@pytest.mark.parametrize('module', ['ros.node', 'viewer.command'])
+def test_without_a_log_it_says_why_it_does_not_start(ros, no_folder, module):
+    if module.startswith('viewer'):
+        pytest.importorskip('viser')
+    done = subprocess.run([sys.executable, '-m', f'ragdoll_ros.{module}'], capture_output=True,
+                          text=True, timeout=PATIENCE,
+                          env={**light(), 'ROS_LOG_DIR': str(no_folder)})
+    line, = done.stderr.splitlines()
+    assert (done.returncode, done.stdout) == (2, '')
     assert line.startswith('ROS does not start: ') and str(no_folder) in line
 
 
-def test_without_a_home_it_runs(ros, peer, monkeypatch, tmp_path, no_folder):
-    """And without a folder for machine code or for temporary files, as long as there is a log."""
-    for name in ('HOME', 'XDG_CACHE_HOME', 'NUMBA_CACHE_DIR', 'MPLCONFIGDIR'):
+@pytest.fixture
+def homeless(monkeypatch, tmp_path, no_folder):
+    """No home, and no folder for machine code or for temporary files: a log alone."""
+    for name in ('HOME', 'XDG_CACHE_HOME', 'NUMBA_CACHE_DIR', 'MPLCONFIGDIR', 'TMPDIR'):
         monkeypatch.setenv(name, str(no_folder))
     monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path / 'log'))
+
+
+def test_without_a_home_it_runs(ros, peer, homeless):
     got = peer.collect(PoseArray, 'ragdoll/poses')
     process = start('node')
     peer.wait(lambda: got)
@@ -50,8 +57,7 @@ def test_without_a_home_it_runs(ros, peer, monkeypatch, tmp_path, no_folder):
 
 
 @pytest.mark.slow
-def test_without_a_folder_for_machine_code_it_compiles_and_runs(ros, peer, monkeypatch, no_folder):
-    monkeypatch.setenv('NUMBA_CACHE_DIR', str(no_folder))
+def test_without_a_folder_for_machine_code_it_compiles_and_runs(ros, peer, homeless):
     got = peer.collect(PoseArray, 'ragdoll/poses')
     process = start('node', compiled=True)
     peer.wait(lambda: got, timeout=4 * PATIENCE)  # the minute that compiling takes, and load
@@ -60,9 +66,13 @@ def test_without_a_folder_for_machine_code_it_compiles_and_runs(ros, peer, monke
     assert 'Traceback' not in process.stderr_text
 
 
-@pytest.mark.parametrize('then, starts', [('true', True), ('mount -o remount,ro "$1"', False)])
-def test_on_a_file_system_that_is_full_or_read_only(ros, peer, tmp_path, then, starts):
-    """Full: a log is begun and has no lines. Read-only: no log can be begun."""
+READ_ONLY = 'mount -o remount,ro "$1"'
+
+
+@pytest.mark.parametrize('then, log, starts', [
+    ('true', '', True), (READ_ONLY, '', False), (READ_ONLY, 'log', False)])
+def test_on_a_file_system_that_is_full_or_read_only(ros, peer, tmp_path, then, log, starts):
+    """Full: a log is begun and has no lines. Read-only: no log can be begun, nor its folder."""
     own = ['unshare', '--mount', 'sh', '-c', SMALL.format(then), 'sh', str(tmp_path)]
     if subprocess.run([*own, 'true'], capture_output=True).returncode:
         pytest.skip('no file system can be mounted here')
@@ -70,8 +80,8 @@ def test_on_a_file_system_that_is_full_or_read_only(ros, peer, tmp_path, then, s
     process = subprocess.Popen(
         [*own, sys.executable, '-m', 'ragdoll_ros.ros.node'], text=True, stdout=subprocess.PIPE,
         stderr=subprocess.PIPE, env={**light(), 'HOME': str(tmp_path), 'TMPDIR': str(tmp_path),
-                                     'ROS_LOG_DIR': str(tmp_path / 'log') if not starts else
-                                     str(tmp_path), 'NUMBA_CACHE_DIR': str(tmp_path)})
+                                     'ROS_LOG_DIR': str(tmp_path / log),
+                                     'NUMBA_CACHE_DIR': str(tmp_path)})
     try:
         if starts:
             peer.wait(lambda: got or process.poll() is not None)

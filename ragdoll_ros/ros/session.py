@@ -20,7 +20,7 @@ def ros_session(arguments: list[str]) -> Iterator[None]:
     """
     try:
         rclpy.init(args=arguments)
-    except RCLError as error:  # such as a log that has no folder
+    except RuntimeError as error:  # such as a log that has no folder, or one that is read-only
         print(f'ROS does not start: {error}', file=sys.stderr)
         raise SystemExit(2) from error
     try:

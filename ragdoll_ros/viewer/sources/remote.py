@@ -17,7 +17,6 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
@@ -37,8 +36,6 @@ from .remote_pushes import HeardPushes, Silent
 from .remote_scene import RemoteScene
 from .remote_services import Ask, Refused
 from .source import Frame, Report, Source, Wanted
-
-InvalidROSArguments = rclpy_implementation.RCLInvalidROSArgsError
 
 NAME = 'ragdoll'
 
@@ -64,8 +61,8 @@ class Remote(Source):
         try:
             rclpy.init(args=arguments, context=self._context,
                        signal_handler_options=SignalHandlerOptions.NO)
-        except InvalidROSArguments as error:
-            raise Refused(str(error)) from None
+        except RuntimeError as error:  # arguments, or a log that can not be written
+            raise Refused(f'ROS does not start: {error}') from None
         self._node = Node('ragdoll_viewer', context=self._context)
         self._full = f'{self._node.get_namespace().rstrip("/")}/{NAME}'
         self._status = status_name(self._node.get_namespace(), NAME)
