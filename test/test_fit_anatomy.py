@@ -11,6 +11,8 @@ from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.pipeline import fit_character
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.ragdoll import joint_axes
+from ragdoll_ros.model.scene import above_ground
+from ragdoll_ros.physics.simulation import Simulation
 
 FORWARD, LEFT, UP = np.eye(3)
 DOWN = -UP
@@ -120,6 +122,18 @@ def test_arms_bound_forward_are_counted_from_there(tmp_path):
     """20 degrees ahead of the trunk: what is left ahead is less by that, behind more."""
     back, ahead = degrees(joint_of(person(tmp_path, forward=20), 'LeftArm'))[1]
     assert (back, ahead) == pytest.approx((-80, 65), abs=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('arms', [0, 45])
+def test_a_fall_keeps_the_ranges(tmp_path, arms):
+    """Three ranges that are not about zero: no angle leaves its own, by more than half a degree."""
+    with Simulation(above_ground(person(tmp_path, arms))) as simulation:
+        past = 0.0
+        while simulation.time < 2_000_000_000:
+            simulation.advance()
+            past = max(past, simulation.measures()['limit_overshoot_rad'])
+    assert np.degrees(past) < 0.5
 
 
 def test_what_is_no_person_keeps_ranges_about_its_bind_pose():
