@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from specimens import HAMMER
 
-from ragdoll_ros.files.doll import load_doll
+from ragdoll_ros.files.doll import load_doll, save_doll
 from ragdoll_ros.files.urdf import to_urdf
 from ragdoll_ros.fit.robot import doll_from_urdf, read_urdf
 from ragdoll_ros.model import errors, rotation
@@ -70,6 +70,13 @@ def test_what_to_urdf_writes_comes_back(name):
                                atol=1e-12)
         assert np.allclose(other.axes, joint.axes, atol=1e-12)
         assert np.allclose(other.limits, joint.limits, atol=1e-9)
+
+
+def test_what_is_read_can_be_written(tmp_path):
+    """As plain numbers: YAML knows none of numpy's, and would crash on one."""
+    doll = doll_from_urdf(to_urdf(every_kind().replace_bone('root', shape=HAMMER)))
+    save_doll(doll, tmp_path / 'doll.yaml')
+    assert load_doll(str(tmp_path / 'doll.yaml')) == doll
 
 
 def link(name, shape='<box size="0.1 0.1 0.1"/>', mass=1.0, origin='', tag='collision'):

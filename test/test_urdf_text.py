@@ -1,7 +1,6 @@
 """URDF files as they are found: what surrounds the XML, or encodes it otherwise, is read over."""
 import pytest
 
-from ragdoll_ros.files.doll import load_doll, save_doll
 from ragdoll_ros.files.urdf_text import urdf_text
 from ragdoll_ros.fit.robot import read_urdf
 from ragdoll_ros.model import errors
@@ -35,12 +34,3 @@ def test_errors_name_the_line_of_the_file(tmp_path):
 def test_a_declaration_within_the_robot_stays_an_error():
     text = urdf_text(('<robot>' + DECLARED + '</robot>').encode())
     assert '<?xml' in text
-
-
-def test_what_is_read_can_be_written(tmp_path):
-    """Numbers of numpy's, which YAML does not know, stop at the model."""
-    path = tmp_path / 'robot.urdf'
-    path.write_text(BODY.replace('Fuß', 'a'))
-    doll, _ = read_urdf(path)
-    save_doll(doll, tmp_path / 'doll.yaml')
-    assert load_doll(str(tmp_path / 'doll.yaml')).bones == doll.bones
