@@ -39,11 +39,11 @@ def make_joint(character: Character, groups: list[Group], index: int, along: np.
     """
     group = groups[index]
     parent = groups[group.parent]
-    anchor = np.round(character.positions[group.bone], DECIMALS) + 0.0
+    anchor = np.round(group.anchor, DECIMALS) + 0.0
     if group.tied:
         return Joint(parent.name, group.name, 'fixed', anchor)
     above = None
-    step = character.positions[group.bone] - character.positions[parent.bone]
+    step = group.anchor - parent.anchor
     length = float(np.linalg.norm(step))
     if parent.parent >= 0 and length > 1e-6:
         above = step / length
