@@ -12,6 +12,7 @@ from ..model.ragdoll import WORLD
 from .gltf_file import GltfFile
 from .names import plain_name, side_of
 from .nodes import Nodes, read_nodes
+from .rigid_meshes import add_rigid_meshes
 from .skins import Skins, read_skins
 from .spring_bones import Spring, placed, read_springs, without_short_rods
 
@@ -80,6 +81,7 @@ def read_character(path: str | Path, scale: float | None = None) -> Character:
         with np.errstate(over='ignore', invalid='ignore'):
             nodes = read_nodes(file)
             skins = read_skins(file, nodes)
+            add_rigid_meshes(file, nodes, skins)
         if len(skins.vertices) == 0:
             raise errors.WrongForm('meshes', 0, 'a skin with vertices')
         return _character(file, nodes, skins, scale)
