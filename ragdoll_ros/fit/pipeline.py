@@ -4,7 +4,7 @@ Everything is in the bind pose and the doll's frame, which is the character's.
 """
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from .groups import Group, group_bones, partner, vertices_by_bone
 from .joints import damped, make_joint
 from .masses import share_mass
 from .names import roles_of
+from .overlap import colliding_pairs
 from .refine import refined
 from .shapes import DECIMALS, TOLERANCE, Fitted, fit_best, fit_shape
 from .skin_tree import SkinTree, find_skin_tree
@@ -103,6 +104,7 @@ def fit_character(character: Character, options: Options | None = None) -> Fit:
     swings = carried.swings(character, carrier, notes)
     doll = Ragdoll(character.name, tuple(bones), tuple(joints), swings,
                    carried.skeleton_frames(character, carrier))
+    doll = replace(doll, no_collision=colliding_pairs(doll))
     return Fit(doll, given, tuple(bodies), tuple(notes))
 
 
