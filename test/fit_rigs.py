@@ -339,7 +339,7 @@ def document(rig, mesh=None):
         points = np.einsum('vij,vj->vi', inverse[:, :3, :3], points) + inverse[:, :3, 3]
         weights = np.tile((1.0, 0, 0, 0), (len(points), 1))
     attributes = {'POSITION': made.accessor(points, 'f4', 'VEC3'),
-                  'JOINTS_0': made.accessor(joints, 'u1', 'VEC4'),
+                  'JOINTS_0': made.accessor(joints, 'u1' if joints.max() < 256 else 'u2', 'VEC4'),
                   'WEIGHTS_0': made.accessor(weights, 'f4', 'VEC4')}
     indices = made.accessor(faces.reshape(-1, 1), 'u2' if len(points) < 65536 else 'u4', 'SCALAR')
     made.data['meshes'] = [{'primitives': [{'attributes': attributes, 'indices': indices}]}]

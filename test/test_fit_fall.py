@@ -2,7 +2,9 @@
 import fit_rigs
 import numpy as np
 import pytest
+import wild_rigs
 from fit_rigs import RIGS, fitted
+from wild_rigs import WILD
 
 from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.pipeline import fit_character
@@ -24,6 +26,18 @@ def energy(doll, state, gravity):
     return total
 
 
+def gaps(doll, state):
+    """How far the anchor of each joint is from itself as its two bones see it, m."""
+    places = []
+    for joint in doll.joints:
+        for name in (joint.parent, joint.child):
+            k = [bone.name for bone in doll.bones].index(name)
+            at = doll.bones[k].pose.inward(np.reshape(joint.anchor, (1, 3)))[0]
+            places.append(state.positions[k] + rotation.rotate(state.orientations[k], at))
+    places = np.reshape(places, (-1, 2, 3))
+    return np.linalg.norm(places[:, 0] - places[:, 1], axis=1)
+
+
 def falls_and_settles(doll):
     scene = above_ground(doll)
     with Simulation(scene) as simulation:
@@ -39,9 +53,15 @@ def falls_and_settles(doll):
     assert (energies - energies[0]).max() < 0.001 * energies[0]
     # A contact that has sunk in gives back a little of what it took in the ticks before.
     assert (energies - np.minimum.accumulate(energies)).max() < 0.05 * fall
+    # Anchors stay in their bodies: both bodies of each have it in one place, to rounding.
+    assert gaps(doll, state).max(initial=0) < 1e-9
     # Settled: nothing moves faster than a slow roll.
     assert np.abs(state.linear_velocities).max() < 0.1
     assert state.positions[:, 2].max() < max(bone.position[2] for bone in doll.bones) + 0.4
+
+
+def test_a_person_whose_feet_hung_from_nothing_falls_in_one_piece():
+    falls_and_settles(wild_rigs.fitted('feet_of_nothing-smooth').doll)
 
 
 @pytest.mark.slow
@@ -54,6 +74,12 @@ def test_it_falls_without_energy_from_nothing_and_settles(name):
 @pytest.mark.parametrize('name', [name for name in RIGS if name not in QUICK])
 def test_all_others_fall_and_settle_too(name):
     falls_and_settles(fitted(name).doll)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('name', WILD)
+def test_rigs_made_for_animation_fall_and_settle(name):
+    falls_and_settles(wild_rigs.fitted(name).doll)
 
 
 @pytest.mark.slow

@@ -35,11 +35,10 @@ class BoneDepth:
         self._own, self._places = own, self._model.geom_pos[own]
         self._turns = self._model.geom_quat[own][:, [1, 2, 3, 0]]
         self._radii = np.array([np.linalg.norm(bone.shape.half_extents) for bone in scene.bones])
-        jointed = {frozenset(scene.bone_index(scene.qualified(placement, name))
-                             for name in (joint.parent, joint.child))
-                   for placement in scene.dolls for joint in placement.doll.joints}
+        apart = {frozenset(scene.bone_index(scene.qualified(placement, name)) for name in pair)
+                 for placement in scene.dolls for pair in placement.doll.never_collide}
         pairs = itertools.combinations(range(len(bodies)), 2) if scene.self_collision else ()
-        self._pairs = np.array([pair for pair in pairs if frozenset(pair) not in jointed],
+        self._pairs = np.array([pair for pair in pairs if frozenset(pair) not in apart],
                                int).reshape(-1, 2)
 
     def depths(self, positions: np.ndarray, orientations: np.ndarray) -> np.ndarray:

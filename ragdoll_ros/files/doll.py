@@ -10,7 +10,15 @@ from pathlib import Path
 
 from ..model.compound import Compound
 from ..model.errors import ModelError
-from ..model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame, carried_errors, tree_errors
+from ..model.ragdoll import (
+    Bone,
+    Joint,
+    Ragdoll,
+    SkeletonFrame,
+    carried_errors,
+    pair_errors,
+    tree_errors,
+)
 from ..model.rotation import IDENTITY
 from ..model.shapes import SHAPES, Part, Shape
 from . import yaml_text
@@ -48,11 +56,13 @@ def build_doll(data: object, path: Path = Path('doll')) -> tuple[Ragdoll | None,
             carried = [(entry.get('name'), entry.get('bone')) for entry in entries(data, key)]
             if all(isinstance(text, str) for text in sum(carried, ())):
                 found += carried_errors(key, names, carried)
+        if not found:
+            found += pair_errors(names, data.get('no_collision', ()))
     if found:
         return None, found
     model = str(path.parent / data['model']) if 'model' in data else None
     return Ragdoll(data.get('name', path.stem), tuple(bones), tuple(joints), tuple(swings),
-                   tuple(riders), model), found
+                   tuple(riders), model, tuple(map(tuple, data.get('no_collision', ())))), found
 
 
 def doll_data(doll: Ragdoll, folder: Path | None = None) -> dict:
@@ -62,6 +72,8 @@ def doll_data(doll: Ragdoll, folder: Path | None = None) -> dict:
     """
     data = {'name': doll.name, 'bones': [_bone_data(bone) for bone in doll.bones],
             'joints': [_joint_data(joint) for joint in doll.joints]}
+    if doll.no_collision:
+        data['no_collision'] = [list(pair) for pair in doll.no_collision]
     if doll.swings:
         data['swings'] = [swing_data(swing) for swing in doll.swings]
     if doll.riders:

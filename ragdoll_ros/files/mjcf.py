@@ -33,7 +33,7 @@ def to_mjcf(scene: Scene, apart: Collection[frozenset[str]] = ()) -> str:
     """Write a scene as MJCF.
 
     ``apart`` lists further pairs of bones (names as in scene.bone_names) that must not collide,
-    beside the pairs that share a joint: those that overlap at the start.
+    beside the pairs of which the dolls say so: those that overlap at the start.
     """
     root = ET.Element('mujoco', model=scene.name)
     ET.SubElement(root, 'compiler', angle='radian', autolimits='true', inertiafromgeom='false')
@@ -45,7 +45,7 @@ def to_mjcf(scene: Scene, apart: Collection[frozenset[str]] = ()) -> str:
     for placement in scene.dolls:
         _add_doll(world, scene, placement)
     contact = ET.SubElement(root, 'contact')
-    for index, (a, b) in enumerate(sorted(map(sorted, {*_jointed(scene), *apart}))):
+    for index, (a, b) in enumerate(sorted(map(sorted, {*_never_collide(scene), *apart}))):
         ET.SubElement(contact, 'exclude', name=f'apart_{index}', body1=a, body2=b)
     ET.indent(root)
     return ET.tostring(root, encoding='unicode') + '\n'
@@ -68,10 +68,9 @@ def damping_ratio(restitution: float) -> float:
     return max(0.01, high)
 
 
-def _jointed(scene: Scene) -> set[frozenset[str]]:
-    return {frozenset((scene.qualified(placement, joint.parent),
-                       scene.qualified(placement, joint.child)))
-            for placement in scene.dolls for joint in placement.doll.joints}
+def _never_collide(scene: Scene) -> set[frozenset[str]]:
+    return {frozenset(scene.qualified(placement, name) for name in pair)
+            for placement in scene.dolls for pair in placement.doll.never_collide}
 
 
 def _add_ground(world: ET.Element, scene: Scene) -> None:

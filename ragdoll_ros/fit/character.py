@@ -13,6 +13,7 @@ from .draco import decompressed
 from .gltf_file import GltfFile
 from .names import plain_name, side_of
 from .nodes import Nodes, read_nodes
+from .rigid_meshes import add_rigid_meshes
 from .scale import metres_per_unit
 from .skins import Skins, read_skins
 from .spring_bones import Spring, placed, read_springs, without_short_rods
@@ -80,6 +81,7 @@ def read_character(path: str | Path, scale: float | None = None) -> Character:
         with np.errstate(over='ignore', invalid='ignore'):
             nodes = read_nodes(file)
             skins = read_skins(file, nodes)
+            add_rigid_meshes(file, nodes, skins)
         if len(skins.vertices) == 0:
             raise errors.WrongForm('meshes', 0, 'a skin with vertices')
         return _character(file, nodes, skins, scale)

@@ -98,7 +98,7 @@ def guesses(character: Character, groups: list[Group], directions: list[np.ndarr
 def above_of(character: Character, groups: list[Group], index: int) -> np.ndarray | None:
     """Unit direction (3,) from the parent's joint to the group's; None below the root."""
     group, parent = groups[index], groups[groups[index].parent]
-    step = character.positions[group.bone] - character.positions[parent.bone]
+    step = group.anchor - parent.anchor
     length = float(np.linalg.norm(step))
     return step / length if group.parent >= 0 <= parent.parent and length > 1e-6 else None
 
@@ -123,22 +123,20 @@ def _is_paired(character: Character, groups: list[Group], first: int) -> bool:
 
 def _is_front(character: Character, groups: list[Group], first: int) -> bool | None:
     """Whether a leg is one of the front ones; None where there are no two pairs."""
-    bones = [group.bone for group in groups]
     inner = {group.parent for group in groups}
     # What steps down from the trunk, and goes on.
     starts = [_leg(groups, index)[0] for index, group in enumerate(groups)
               if index not in inner and group.parent >= 0
               and _goes_down(character, groups, index)]
-    places = [character.positions[bones[start]][0] for start in starts
+    places = [groups[start].anchor[0] for start in starts
               if _is_paired(character, groups, start)]
     if not places or max(places) - min(places) < APART * character.extent:
         return None
-    return bool(character.positions[bones[first]][0] > (max(places) + min(places)) / 2)
+    return bool(groups[first].anchor[0] > (max(places) + min(places)) / 2)
 
 
 def _goes_down(character: Character, groups: list[Group], end: int) -> bool:
     """Whether a limb's last joint is below its first by most of their distance."""
     leg = _leg(groups, end)
-    step = (character.positions[groups[end].bone]
-            - character.positions[groups[leg[0]].bone])
+    step = groups[end].anchor - groups[leg[0]].anchor
     return bool(len(leg) > 1 and -step @ UP > STEEP * np.linalg.norm(step))

@@ -1,18 +1,21 @@
 """Which bones of a skeleton become one rigid body: small ones are merged into their parents.
 
+The parents are those that the skin shows (see skin_tree.py), from the trunk on.
+
 The vertices that a bone moves are its cluster. A group is the bones that become one body, with
 their clusters.
 """
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from .axes import spread
 from .character import Character
-from .names import LIMBS
+from .names import LIMBS, side_of
+from .skin_tree import SkinTree
 
 SMALLEST = 0.055
 """A cluster shorter than this share of the whole character gets no body of its own."""
@@ -29,7 +32,7 @@ class Group:
     """Bones that become one body; all by their index in the character."""
 
     bone: int
-    """The topmost, at whose root the body's joint is; the root group's: the one with most skin."""
+    """The one next to the parent's body; the root group's: the one with most skin."""
     bones: list[int]
     """All of them."""
     vertices: np.ndarray
@@ -42,13 +45,25 @@ class Group:
     """Of ``bone``; see roles_of."""
     tied: bool = False
     """Whether no bone joins it to its parent, so that it is tied to it rigidly."""
+    anchors: list[np.ndarray] = field(default_factory=list)
+    """Points (3,) m at which its joint may be, best first; of the root, its bone's."""
+    anchor: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    """The one of them that is taken."""
 
 
-def vertices_by_bone(character: Character, share: float | None = None) -> list[np.ndarray]:
+def vertices_by_bone(character: Character, share: float | None = None,
+                     swinging: frozenset[int] = frozenset()) -> list[np.ndarray]:
     """Cluster of each bone: indices (p,) of the vertices that it moves most.
 
-    With a ``share``: of all that it moves by at least this skin weight, 0 to 1.
+    With a ``share``: of all that it moves by at least this skin weight, 0 to 1. A bone that is
+    ``swinging`` has none.
     """
+    clusters = _clusters(character, share)
+    return [np.zeros(0, np.int64) if bone in swinging else cluster
+            for bone, cluster in enumerate(clusters)]
+
+
+def _clusters(character: Character, share: float | None) -> list[np.ndarray]:
     count = len(character.bone_names)
     same = character.bones[:, :, None] == character.bones[:, None, :]
     totals = np.einsum('vij,vj->vi', same, character.weights)
@@ -66,28 +81,28 @@ def vertices_by_bone(character: Character, share: float | None = None) -> list[n
 
 
 def group_bones(character: Character, roles: tuple[str | None, ...], clusters: list[np.ndarray],
-                smallest: float | None = None,
+                tree: SkinTree, smallest: float | None = None,
                 swinging: frozenset[int] = frozenset()) -> list[Group]:
     """Groups of a character's bones, parents first.
 
-    ``roles`` and ``clusters`` are each bone's. A bone whose cluster is shorter than ``smallest``
-    m (None: SMALLEST of the character) goes into its parent's group; so do a further piece of a
-    limb, a finger, and a bone that is ``swinging``, which does so without its cluster.
+    ``roles`` and ``clusters`` are each bone's, and parents are those of ``tree``. A bone whose
+    cluster is shorter than ``smallest`` m (None: SMALLEST of the character) goes into its parent's
+    group; so do a further piece of a limb or of the pelvis, a finger, and a bone that is
+    ``swinging``.
     """
-    clusters = [np.zeros(0, np.int64) if bone in swinging else cluster
-                for bone, cluster in enumerate(clusters)]
     smallest = SMALLEST * character.extent if smallest is None else smallest
-    merging = _Merging(character, clusters, smallest)
+    merging = _Merging(character, clusters, tree.parents)
     depths = [len(merging.lineage(bone)) for bone in range(len(clusters))]
     for depth in range(max(depths), 1, -1):
         level = [bone for bone, own in enumerate(depths) if own == depth]
         sizes = {bone: merging.size(bone) for bone in level}
         for bone in level:
-            parent = character.parents[bone]
+            parent = tree.parents[bone]
             paired = max(sizes[bone], sizes[_partner(character, bone, level)])
-            if bone in swinging or paired < smallest or _one_limb(roles[parent], roles[bone]):
+            if (bone in swinging or bone in tree.halves or paired < smallest
+                    or _one_body(character, roles, parent, bone)):
                 merging.merge(bone, parent)
-    merging.settle_roots()
+    merging.fill_root(smallest)
     heads = sorted(merging.heads, key=lambda bone: (len(merging.lineage(bone)), bone))
     groups = [merging.groups[bone] for bone in heads]
     # Without a joint, the root may as well be called by the bone that gave it its skin.
@@ -96,17 +111,20 @@ def group_bones(character: Character, roles: tuple[str | None, ...], clusters: l
         above = merging.parent(head)
         group.parent = heads.index(above) if above >= 0 else -1
         group.name, group.role = character.bone_names[group.bone], roles[group.bone]
+        group.tied = head in tree.tied
+        group.anchors = tree.anchors.get(head, [character.positions[group.bone]])
+        group.anchor = group.anchors[0]
     return groups
 
 
 class _Merging:
     """Groups in the making: at first each bone is one; ``heads`` are the topmost bones of each."""
 
-    def __init__(self, character: Character, clusters: list[np.ndarray], smallest: float) -> None:
+    def __init__(self, character: Character, clusters: list[np.ndarray],
+                 parents: tuple[int, ...]) -> None:
         self.groups = [Group(bone, [bone], cluster) for bone, cluster in enumerate(clusters)]
-        self._character, self._smallest = character, smallest
+        self._character, self._above = character, parents
         self._into = list(range(len(clusters)))
-        self._above = list(character.parents)
 
     @property
     def heads(self) -> list[int]:
@@ -123,7 +141,7 @@ class _Merging:
         return bone
 
     def lineage(self, bone: int) -> list[int]:
-        """The head ``bone``, then those of the groups above it up to a root."""
+        """The head ``bone``, then those of the groups above it up to the root."""
         line = [bone]
         while (bone := self.parent(bone)) >= 0:
             line.append(bone)
@@ -135,28 +153,14 @@ class _Merging:
         group.vertices = np.union1d(group.vertices, other.vertices)
         self._into[bone] = target
 
-    def settle_roots(self) -> None:
-        """Leave one root, and one with a body: a small root takes in its largest child.
-
-        A bone without a parent that is not the root (a file may hold several skeletons) is tied
-        to the root, or merged into it where it is small.
-        """
-        roots = [bone for bone in self.heads if self._above[bone] < 0]
-        for root in roots:
-            while self.size(root) < self._smallest:
-                below = [bone for bone in self.heads if self.parent(bone) == root]
-                if not below:
-                    break
-                self.merge(max(below, key=self.size), root)
-        vertices = dict.fromkeys(roots, 0)
-        for bone in self.heads:
-            vertices[self.lineage(bone)[-1]] += len(self.groups[bone].vertices)
-        first = max(roots, key=lambda root: vertices[root])
-        for root in roots:
-            if root != first and self.size(root) < self._smallest:
-                self.merge(root, first)
-            elif root != first:
-                self._above[root], self.groups[root].tied = first, True
+    def fill_root(self, smallest: float) -> None:
+        """Let a root without a body of its own take in its largest child."""
+        root = self._above.index(-1)
+        while self.size(root) < smallest:
+            below = [bone for bone in self.heads if self.parent(bone) == root]
+            if not below:
+                break
+            self.merge(max(below, key=self.size), root)
 
 
 def cluster_size(character: Character, vertices: np.ndarray) -> float:
@@ -168,7 +172,12 @@ def cluster_size(character: Character, vertices: np.ndarray) -> float:
     return float((high - low).max())
 
 
-def _one_limb(above: str | None, role: str | None) -> bool:
+def _one_body(character: Character, roles: tuple[str | None, ...], parent: int,
+              bone: int) -> bool:
+    """Whether both are pieces of one limb, of a hand, or of the pelvis."""
+    above, role = roles[parent], roles[bone]
+    if role == 'hips' and side_of(character.bone_names[bone]):
+        return above in ('hips', 'spine')
     return (role == above and role in LIMBS) or (role == 'finger' and above in ('hand', 'finger'))
 
 

@@ -34,7 +34,7 @@ def make_joint(character: Character, groups: list[Group], index: int, along: np.
     """
     group = groups[index]
     parent = groups[group.parent]
-    anchor = np.round(character.positions[group.bone], DECIMALS) + 0.0
+    anchor = np.round(group.anchor, DECIMALS) + 0.0
     if group.tied:
         return Joint(parent.name, group.name, 'fixed', anchor)
     above = above_of(character, groups, index)

@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model.ragdoll import Bone
+from ..model.ragdoll import Bone, Ragdoll
 from ..model.shapes import Shape
 
 DEEP = 0.001
@@ -38,6 +38,12 @@ def overlapping_pairs(bones: tuple[Bone, ...]) -> list[tuple[str, str]]:
                     or depth_in(second, clouds[i]).max() > DEEP):
                 found.append((first.name, second.name))
     return found
+
+
+def colliding_pairs(doll: Ragdoll) -> tuple[tuple[str, str], ...]:
+    """Names of the pairs of bodies that overlap and that the doll lets collide."""
+    return tuple(pair for pair in overlapping_pairs(doll.bones)
+                 if frozenset(pair) not in doll.never_collide)
 
 
 def covered(bones: tuple[Bone, ...], points: np.ndarray, tolerance: float) -> np.ndarray:

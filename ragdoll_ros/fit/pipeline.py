@@ -4,7 +4,7 @@ Everything is in the bind pose and the doll's frame, which is the character's.
 """
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from ..model import rotation
 from ..model.ragdoll import Bone, Ragdoll
 from ..model.shapes import Shape
 from . import carried
+from .anchors import place_anchors
 from .axes import Axes, fit_axes
 from .character import Character
 from .folding import guesses
@@ -19,8 +20,10 @@ from .groups import Group, group_bones, partner, vertices_by_bone
 from .joints import damped, make_joint
 from .masses import share_mass
 from .names import roles_of
+from .overlap import colliding_pairs
 from .refine import refined
 from .shapes import DECIMALS, TOLERANCE, Fitted, fit_best, fit_shape
+from .skin_tree import SkinTree, find_skin_tree
 
 THINNEST = 0.01
 """No body is thinner than this share of the whole character."""
@@ -75,16 +78,19 @@ def fit_character(character: Character, options: Options | None = None) -> Fit:
     options = options or Options()
     given, character = character, refined(character)
     roles = roles_of(character.bone_names, character.parents)
-    clusters = vertices_by_bone(character, options.share)
     swinging = frozenset(bone for spring in character.springs for bone in spring.bones)
-    groups = group_bones(character, roles, clusters, options.smallest, swinging)
+    clusters = vertices_by_bone(character, options.share, swinging)
+    tree = find_skin_tree(character, clusters, roles)
+    roles = _roles_along(tree, character.bone_names)
+    groups = group_bones(character, roles, clusters, tree, options.smallest, swinging)
     notes = [*character.notes, *_unmoved(character, len(given.vertices), groups)]
     directions = [_direction(character, groups, index) for index in range(len(groups))]
     areas = character.vertex_areas()
     axes = [fit_axes(character.vertices[group.vertices], areas[group.vertices], direction,
                      options.orientation)
             for group, direction in zip(groups, directions, strict=True)]
-    fits = _fit_shapes(character, groups, axes, options.shape)
+    fits = place_anchors(groups, _fit_shapes(character, groups, axes, options.shape),
+                         [own.frame for own in axes])
     masses = share_mass(options.mass, options.masses, given, groups,
                         [fit.shape.volume for fit in fits], notes)
     bodies = [_body(given, *parts) for parts in zip(groups, fits, axes, masses, strict=True)]
@@ -100,7 +106,20 @@ def fit_character(character: Character, options: Options | None = None) -> Fit:
     swings = carried.swings(character, carrier, notes)
     doll = Ragdoll(character.name, tuple(bones), tuple(joints), swings,
                    carried.skeleton_frames(character, carrier))
+    doll = replace(doll, no_collision=colliding_pairs(doll))
     return Fit(doll, given, tuple(bodies), tuple(notes))
+
+
+def _roles_along(tree: SkinTree, names: tuple[str, ...]) -> tuple[str | None, ...]:
+    """Role of each bone by its name and its neighbours in the tree."""
+    order = tree.order
+    place = {bone: index for index, bone in enumerate(order)}
+    found = roles_of(tuple(names[bone] for bone in order),
+                     tuple(place.get(tree.parents[bone], -1) for bone in order))
+    roles = [found[place[bone]] for bone in range(len(names))]
+    for half in tree.halves:
+        roles[half] = roles[tree.parents[half]] = 'hips'
+    return tuple(roles)
 
 
 def _unmoved(character: Character, given: int, groups: list[Group]) -> list[str]:
@@ -119,10 +138,10 @@ def _unmoved(character: Character, given: int, groups: list[Group]) -> list[str]
 def _direction(character: Character, groups: list[Group], index: int) -> np.ndarray:
     """Unit direction (3,) of a group's bone: to its children's roots, else to its skin's mean."""
     group = groups[index]
-    root = character.positions[group.bone]
+    root = group.anchor
     points = character.vertices[group.vertices]
     mean = points.mean(axis=0) - root if len(points) else np.zeros(3)
-    children = [character.positions[g.bone] - root for g in groups if g.parent == index]
+    children = [g.anchor - root for g in groups if g.parent == index]
     steps = [np.mean(children, axis=0)] if children else []
     if not points.size:
         steps += [character.positions[bone] - root for bone in group.bones[1:]]
@@ -149,7 +168,7 @@ def _fit_shapes(character: Character, groups: list[Group], axes: list[Axes],
         elif index not in fits:
             pair = sorted({index, partner(character, groups, index)})
             fits.update(zip(pair, fit_best([clouds[k] for k in pair], *sizes), strict=True))
-    return [Fitted(_rounded(fits[index].shape), own.frame @ fits[index].centre, fits[index].share)
+    return [Fitted(fits[index].shape, own.frame @ fits[index].centre, fits[index].share)
             for index, own in enumerate(axes)]
 
 
@@ -160,7 +179,7 @@ def _rounded(shape: Shape) -> Shape:
 
 
 def _body(character: Character, group: Group, fitted: Fitted, axes: Axes, mass: float) -> BodyFit:
-    bone = Bone(group.name, fitted.shape, mass, np.round(fitted.centre, DECIMALS) + 0.0,
+    bone = Bone(group.name, _rounded(fitted.shape), mass, np.round(fitted.centre, DECIMALS) + 0.0,
                 np.round(rotation.from_matrix(axes.frame), 12) + 0.0)
     points = character.vertices[group.vertices[group.vertices < len(character.vertices)]]
     off = bone.shape.signed_distance(bone.pose.inward(points))

@@ -10,7 +10,7 @@ from ..model.compound import Compound
 from ..model.ragdoll import Ragdoll
 from ..model.shapes import Shape
 from .doubts import extent
-from .overlap import covered, overlapping_pairs, shared_volume
+from .overlap import colliding_pairs, covered, shared_volume
 from .pipeline import BodyFit, Fit
 from .shapes import TOLERANCE
 
@@ -71,8 +71,7 @@ def _swings(doll: Ragdoll) -> list[str]:
 
 
 def _overlaps(doll: Ragdoll) -> list[str]:
-    jointed = {frozenset((joint.parent, joint.child)) for joint in doll.joints}
-    pairs = [pair for pair in overlapping_pairs(doll.bones) if frozenset(pair) not in jointed]
+    pairs = [*doll.no_collision, *colliding_pairs(doll)]
     if not pairs:
         return []
     listed = ', '.join(f'{first} and {second}' for first, second in pairs)

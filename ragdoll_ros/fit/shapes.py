@@ -70,6 +70,24 @@ def fit_best(clusters: list[np.ndarray], thinnest: float, tolerance: float) -> l
                 for kind in MAKERS), key=badness)
 
 
+def extended(shape: Shape, point: np.ndarray) -> Fitted:
+    """The shape, made as much larger as it takes to hold a point (3,) m of its own frame."""
+    if isinstance(shape, Sphere):
+        away = float(np.linalg.norm(point))
+        grown = max(away - shape.radius, 0.0) / 2
+        return Fitted(Sphere(shape.radius + grown), point * grown / max(away, 1e-12))
+    half = np.array(shape.half_extents)
+    if isinstance(shape, Box):
+        low, high = np.minimum(-half, point), np.maximum(half, point)
+        return Fitted(Box(tuple(high - low)), (low + high) / 2)
+    across = float(np.hypot(*point[:2]))
+    radius = max(shape.radius, across)
+    # A capsule is so much longer at this distance from its axis.
+    dome = np.sqrt(radius ** 2 - across ** 2) if isinstance(shape, Capsule) else 0.0
+    low, high = min(-shape.length / 2, point[2] + dome), max(shape.length / 2, point[2] - dome)
+    return Fitted(type(shape)(radius, high - low), np.array([0, 0, (low + high) / 2]))
+
+
 def _boxes(points: np.ndarray, thinnest: float) -> Iterator[Fitted]:
     cuts = np.array([0.0, 0.005, 0.01, 0.02, 0.03, 0.045])
     for low, high in zip(*np.quantile(points, [cuts, 1 - cuts], axis=0), strict=True):

@@ -8,6 +8,7 @@ the file's nodes show may be another pose, a step of a walk for one; B is then n
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -53,29 +54,33 @@ class Skins:
 
 
 def read_skins(file: GltfFile, nodes: Nodes) -> Skins:
-    """Every mesh that a skin moves; WrongForm where the file has none, ModelError where broken."""
+    """Every mesh that a skin moves; a ModelError where one is broken."""
     skins = Skins()
-    loose = 0
     for index, node in enumerate(file.json['nodes']):
-        if node.get('mesh') is None:
-            continue
-        mesh = file.entry('meshes', node['mesh'], f'nodes[{index}].mesh')
-        if node.get('skin') is None:
-            loose += 1
+        if node.get('mesh') is None or node.get('skin') is None:
             continue
         joints, inverses = _read_skin(file, node['skin'], f'nodes[{index}].skin')
         _add_rests(skins, nodes, joints, inverses)
         matrices = np.stack([skins.rests[joint] for joint in joints]) @ inverses
-        where = f'meshes[{node["mesh"]}]'
-        for number, primitive in enumerate(objects(mesh, 'primitives', where)):
-            _add_primitive(file, skins, primitive, joints, matrices,
-                           f'{where}.primitives[{number}]')
-    if not skins.rests:
-        raise errors.WrongForm('skins', 'no skin that moves a mesh',
-                               'a skinned mesh: a node with both mesh and skin')
-    if loose:
-        skins.notes.append(f'{loose} mesh{"es" * (loose > 1)} without a skin left out')
+        for primitive, where in primitives(file, node, index):
+            _add_primitive(file, skins, primitive, joints, matrices, where)
     return skins
+
+
+def primitives(file: GltfFile, node: dict, index: int) -> Iterator[tuple[dict, str]]:
+    """The primitives of the mesh of a node, and where each is in the file."""
+    mesh = file.entry('meshes', node['mesh'], f'nodes[{index}].mesh')
+    where = f'meshes[{node["mesh"]}]'
+    for number, primitive in enumerate(objects(mesh, 'primitives', where)):
+        yield primitive, f'{where}.primitives[{number}]'
+
+
+def primitive_points(file: GltfFile, primitive: dict, where: str) -> np.ndarray:
+    """Vertices (v, 3) of a primitive, the mesh's frame and the file's units."""
+    attributes = nested(primitive, 'attributes', dict, where)
+    if attributes.get('POSITION') is None:
+        raise errors.WrongForm(f'{where}.attributes', sorted(attributes), 'POSITION')
+    return read_floats(file, attributes['POSITION'], 'VEC3', f'{where}.POSITION')
 
 
 def _read_skin(file: GltfFile, index: object, where: str) -> tuple[np.ndarray, np.ndarray]:
@@ -151,11 +156,8 @@ def _nearest_upright(matrix: np.ndarray) -> np.ndarray:
 
 def _add_primitive(file: GltfFile, skins: Skins, primitive: dict, joints: np.ndarray,
                    matrices: np.ndarray, where: str) -> None:
-    attributes = nested(primitive, 'attributes', dict, where)
-    if attributes.get('POSITION') is None:
-        raise errors.WrongForm(f'{where}.attributes', sorted(attributes), 'POSITION')
-    points = read_floats(file, attributes['POSITION'], 'VEC3', f'{where}.POSITION')
-    slots, weights = [], []
+    points = primitive_points(file, primitive, where)
+    attributes, slots, weights = primitive['attributes'], [], []
     for number in itertools.count():
         if attributes.get(f'JOINTS_{number}') is None:
             break
@@ -178,7 +180,7 @@ def _add_primitive(file: GltfFile, skins: Skins, primitive: dict, joints: np.nda
     total = weight.sum(axis=1, keepdims=True)
     weight = np.divide(weight, total, out=np.zeros_like(weight), where=total > 0)
     vertices = _skinned(points, used, weight, matrices)
-    triangles = _triangles(file, primitive, len(points), where)
+    triangles = triangles_of(file, primitive, len(points), where)
     skins.add(vertices, triangles, joints[used].astype(np.int32), weight)
 
 
@@ -196,7 +198,8 @@ def _skinned(points: np.ndarray, slots: np.ndarray, weights: np.ndarray,
     return vertices
 
 
-def _triangles(file: GltfFile, primitive: dict, points: int, where: str) -> np.ndarray:
+def triangles_of(file: GltfFile, primitive: dict, points: int, where: str) -> np.ndarray:
+    """Triangles (t, 3) of a primitive with so many points; none of one of points or lines."""
     mode = count(primitive, 'mode', where, TRIANGLES)
     if mode not in (TRIANGLES, STRIP, FAN):
         return np.zeros((0, 3), np.int32)

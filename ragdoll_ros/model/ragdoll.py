@@ -10,7 +10,7 @@ import dataclasses
 import math
 import os
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -226,7 +226,8 @@ class Ragdoll:
 
     ``swings`` ride on bones and do not act back on them; ``riders`` are what else moves with the
     bones, in the order of the skeleton they are of. ``model`` is the path of the character that
-    the riders are of, made absolute; nothing here opens it.
+    the riders are of, made absolute; nothing here opens it. ``no_collision`` are pairs of bones,
+    by name, that do not collide with each other, beside those that a joint connects.
     """
 
     name: str
@@ -235,17 +236,20 @@ class Ragdoll:
     swings: tuple[Swing, ...] = ()
     riders: tuple[SkeletonFrame, ...] = ()
     model: str | None = None
+    no_collision: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
         set_fields(self, bones=tuple(self.bones), joints=tuple(self.joints),
                    swings=tuple(self.swings), riders=tuple(self.riders),
-                   model=self.model and os.path.abspath(self.model))
+                   model=self.model and os.path.abspath(self.model),
+                   no_collision=tuple(tuple(pair) for pair in self.no_collision))
         names = [bone.name for bone in self.bones]
         edges = [(joint.parent, joint.child) for joint in self.joints]
         found = tree_errors(names, edges)
         for key in ('swings', 'riders'):
             carried = [(each.name, each.bone) for each in getattr(self, key)]
             found += carried_errors(key, names, carried)
+        found += pair_errors(names, self.no_collision)
         for error in found:
             raise error
 
@@ -271,6 +275,12 @@ class Ragdoll:
     def mass_centre(self) -> np.ndarray:
         """Centre of mass (3,) m, doll's frame, bind pose."""
         return sum(bone.mass * np.array(bone.position) for bone in self.bones) / self.mass
+
+    @property
+    def never_collide(self) -> frozenset[frozenset[str]]:
+        """Pairs of bones, by name, that pass through each other: jointed ones, ``no_collision``."""
+        jointed = ((joint.parent, joint.child) for joint in self.joints)
+        return frozenset(frozenset(pair) for pair in (*jointed, *self.no_collision))
 
     def __repr__(self) -> str:
         return (f'Ragdoll {self.name!r}: {len(self.bones)} bones, {len(self.joints)} joints, '
@@ -318,7 +328,8 @@ class Ragdoll:
         bones = tuple(dataclasses.replace(bone, name=rename(bone.name)) for bone in self.bones)
         joints = tuple(dataclasses.replace(joint, parent=rename(joint.parent),
                                            child=rename(joint.child)) for joint in self.joints)
-        return dataclasses.replace(self, bones=bones, joints=joints)
+        pairs = tuple(tuple(map(rename, pair)) for pair in self.no_collision)
+        return dataclasses.replace(self, bones=bones, joints=joints, no_collision=pairs)
 
 
 def tree_errors(names: list[str], edges: list[tuple[str, str]]) -> list[errors.ModelError]:
@@ -361,6 +372,18 @@ def carried_errors(key: str, names: list[str],
         if name in seen:
             found.append(errors.DuplicateName(f'{key}[{index}].name', name, 'a name of its own'))
         seen.add(name)
+    return found
+
+
+def pair_errors(names: list[str], pairs: Sequence[Sequence[str]]) -> list[errors.ModelError]:
+    """Find what of pairs that do not collide is no pair of two bones."""
+    found: list[errors.ModelError] = []
+    for index, pair in enumerate(pairs):
+        where = f'no_collision[{index}]'
+        found += [errors.UnknownBone(where, name, errors.one_of(names, name))
+                  for name in pair if name not in names]
+        if len(pair) != 2 or pair[0] == pair[1]:
+            found.append(errors.WrongForm(where, list(pair), 'two bones'))
     return found
 
 

@@ -169,17 +169,17 @@ def _radius(shape: object) -> float:
 
 
 def _within_dolls(scene: Scene) -> np.ndarray:
-    """Pairs (p, 2) of geoms of one doll whose bones are not one, nor jointed to each other."""
+    """Pairs (p, 2) of geoms of one doll whose bones are two that may collide."""
     if not scene.self_collision:
         return np.zeros((0, 2), np.int64)
     owner = np.repeat(np.arange(len(scene.bones)), [len(b.shape.parts) for b in scene.bones])
-    jointed = set()
+    apart = set()
     for own, placement in zip(scene.bone_slices, scene.dolls, strict=True):
         place = {bone.name: own.start + k for k, bone in enumerate(placement.doll.bones)}
-        jointed |= {frozenset((place[j.parent], place[j.child])) for j in placement.doll.joints}
+        apart |= {frozenset(place[name] for name in pair) for pair in placement.doll.never_collide}
     doll = scene.doll_of_bone[owner]
     found = [(a, b) for d in range(len(scene.dolls))
              for members in [np.flatnonzero(doll == d)]
              for n, a in enumerate(members) for b in members[n + 1:]
-             if owner[a] != owner[b] and frozenset((owner[a], owner[b])) not in jointed]
+             if owner[a] != owner[b] and frozenset((owner[a], owner[b])) not in apart]
     return np.array(found, np.int64).reshape(-1, 2)

@@ -138,10 +138,9 @@ class _World:
         order = [links[bone.name] for bone in doll.bones]
         for bone, link in zip(doll.bones, order, strict=True):
             self._set_material(body, link, bone)
-        # Bones that share a joint do not collide.
-        for joint in doll.joints:
-            pybullet.setCollisionFilterPair(body, body, links[joint.parent], links[joint.child],
-                                            0, physicsClientId=self._client)
+        for pair in doll.never_collide:
+            pybullet.setCollisionFilterPair(body, body, *(links[name] for name in pair), 0,
+                                            physicsClientId=self._client)
         return _Doll(body, order, [link for link in order if link >= 0], order.index(-1),
                      joints, widths)
 

@@ -42,4 +42,5 @@ def remove_limb(scene: Scene, name: str) -> Scene:
         joints=tuple(joint for joint in doll.joints if joint.child not in gone),
         swings=tuple(swing for swing in doll.swings if swing.bone not in gone),
         riders=tuple(carried(rider, doll.bone(rider.bone), doll.bone(joint.parent))
-                     if rider.bone in gone else rider for rider in doll.riders))
+                     if rider.bone in gone else rider for rider in doll.riders),
+        no_collision=tuple(pair for pair in doll.no_collision if gone.isdisjoint(pair)))
