@@ -162,7 +162,7 @@ def spider():
 
 
 def two_skeletons():
-    other = [replace(bone, name=f'hair{k}', parent=bone.parent if k == 0 else k - 1 + 22,
+    other = [replace(bone, name=f'whip{k}', parent=bone.parent if k == 0 else k - 1 + 22,
                      head=(bone.head[0], bone.head[1] + 1.4, bone.head[2] * .2 - .4),
                      tail=(bone.tail[0], bone.tail[1] + 1.4, bone.tail[2] * .2 - .4))
              for k, bone in enumerate(chain(4, 2.0, .05))]

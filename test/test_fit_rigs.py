@@ -127,18 +127,18 @@ def test_weights_of_zero_everywhere(tmp_path):
 def test_another_skeleton_is_jointed_where_it_touches():
     fit = fitted('two_skeletons')
     parents = {joint.child: joint for joint in fit.doll.joints}
-    hair = parents.keys() & {f'hair{k}' for k in range(4)}
-    [first] = [parents[name] for name in hair if not parents[name].parent.startswith('hair')]
+    whip = parents.keys() & {f'whip{k}' for k in range(4)}
+    [first] = [parents[name] for name in whip if not parents[name].parent.startswith('whip')]
     assert (first.parent, first.kind) == ('mixamorig:Head', 'ball')
 
 
 def test_another_skeleton_that_touches_nothing_is_tied_and_told(tmp_path):
     far = [dataclasses.replace(bone, head=(*bone.head[:2], bone.head[2] - 1),
                                tail=(*bone.tail[:2], bone.tail[2] - 1))
-           if bone.name.startswith('hair') else bone for bone in RIGS['two_skeletons'].bones]
+           if bone.name.startswith('whip') else bone for bone in RIGS['two_skeletons'].bones]
     fit = fit_character(read_character(fit_rigs.write(fit_rigs.Rig('far', far), tmp_path)))
-    assert any('no bone joins hair0' in note for note in fit.notes)
-    assert next(joint for joint in fit.doll.joints if joint.child == 'hair0').kind == 'fixed'
+    assert any('no bone joins whip0' in note for note in fit.notes)
+    assert next(joint for joint in fit.doll.joints if joint.child == 'whip0').kind == 'fixed'
 
 
 def test_the_mannequin(tmp_path):

@@ -127,7 +127,7 @@ def split_pelvis(bones):
     """A person whose hips are a left and a right half."""
     halves = [Bone(f'pelvis_{side}', -1, (sign * .04, 1.0, 0), (sign * .08, .92, 0), .12)
               for sign, side in ((1, 'L'), (-1, 'R'))]
-    spine = replace(bones[1], parent=0, head=(0, 1.12, 0))
+    spine = replace(bones[1], parent=0, head=(0, 1.06, 0))
     place = {0: 0, 1: 2} | {k: k + 1 for k in range(2, len(bones))}
     rest = [replace(bone, parent=place[bone.parent]) for bone in bones[2:]]
     rest = [replace(bone, parent=0 if bone.head[0] > 0 else 1, head=(*bone.head[:1], .84, 0))

@@ -22,6 +22,10 @@ TO_ROS = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
 """glTF is Y up and faces +Z, its left is +X: (x, y, z) here is (z, x, y) there."""
 
 
+MOST_BONES = 1500
+"""A face in every detail has some 900."""
+
+
 @dataclass(frozen=True)
 class Character:
     """Bones (n, parents first) and skin (v vertices, t triangles) in the bind pose."""
@@ -94,6 +98,8 @@ def read_character(path: str | Path, scale: float | None = None) -> Character:
 
 def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) -> Character:
     joints = [node for node in nodes.order if node in skins.rests]
+    if len(joints) > MOST_BONES:
+        raise errors.OutOfRange('skins', len(joints), f'at most {MOST_BONES} joints')
     place = {node: bone for bone, node in enumerate(joints)}
     lookup = np.zeros(len(nodes.order), np.int32)
     lookup[joints] = range(len(joints))

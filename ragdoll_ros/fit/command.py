@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import math
 import sys
 from pathlib import Path
 
@@ -78,7 +79,7 @@ def _parser() -> argparse.ArgumentParser:
                         '(default: for the one that moves it most)')
     parser.add_argument('--smallest', type=float, metavar='M',
                         help='bones with less skin than this are merged into their parents '
-                        '(default: 0.055 of the character)')
+                        '(default: 0.055 of the character; 0: none, fingers stay too)')
     parser.add_argument('--strict', action='store_true',
                         help='exit with 3 where the verdict is not good')
     return parser
@@ -117,9 +118,11 @@ def _check(options: argparse.Namespace, parser: argparse.ArgumentParser) -> None
         if getattr(options, key) != parser.get_default(key):
             raise errors.WrongForm(f'--{key}', getattr(options, key),
                                    f'a .glb or .gltf to fit: what a {suffix} says of bodies stays')
-    for key in ('mass', 'scale', 'smallest'):
+    for key in ('mass', 'scale'):
         if getattr(options, key) is not None:
             errors.check_positive(f'--{key}', getattr(options, key))
+    if options.smallest is not None:
+        errors.check_range('--smallest', options.smallest, 0, math.inf)
     if options.weight is not None:
         errors.check_range('--weight', options.weight, 0, 1)
     if options.picture and Path(options.picture).suffix.lower() not in PICTURES:

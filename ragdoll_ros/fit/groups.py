@@ -58,8 +58,12 @@ def vertices_by_bone(character: Character, share: float | None = None,
     With a ``share``: of all that it moves by at least this skin weight, 0 to 1. A bone that is
     ``swinging`` has none.
     """
-    clusters = _clusters(character, share)
-    return [np.zeros(0, np.int64) if bone in swinging else cluster
+    return without(_clusters(character, share), swinging)
+
+
+def without(clusters: list[np.ndarray], bones: frozenset[int]) -> list[np.ndarray]:
+    """The clusters, those of some bones empty."""
+    return [np.zeros(0, np.int64) if bone in bones else cluster
             for bone, cluster in enumerate(clusters)]
 
 
@@ -87,9 +91,11 @@ def group_bones(character: Character, roles: tuple[str | None, ...], clusters: l
 
     ``roles`` and ``clusters`` are each bone's, and parents are those of ``tree``. A bone whose
     cluster is shorter than ``smallest`` m (None: SMALLEST of the character) goes into its parent's
-    group; so do a further piece of a limb or of the pelvis, a finger, and a bone that is
-    ``swinging``.
+    group; so do a further piece of a limb or of the pelvis, a finger (unless ``smallest`` is 0),
+    and a bone that is ``swinging``, which does so without its cluster.
     """
+    clusters = without(clusters, swinging)
+    fingers = smallest == 0
     smallest = SMALLEST * character.extent if smallest is None else smallest
     merging = _Merging(character, clusters, tree.parents)
     depths = [len(merging.lineage(bone)) for bone in range(len(clusters))]
@@ -99,8 +105,8 @@ def group_bones(character: Character, roles: tuple[str | None, ...], clusters: l
         for bone in level:
             parent = tree.parents[bone]
             paired = max(sizes[bone], sizes[_partner(character, bone, level)])
-            if (bone in swinging or bone in tree.halves or paired < smallest
-                    or _one_body(character, roles, parent, bone)):
+            if (bone in swinging or bone in tree.halves or paired == 0 or paired < smallest
+                    or _one_body(character, roles, parent, bone, fingers)):
                 merging.merge(bone, parent)
     merging.fill_root(smallest)
     heads = sorted(merging.heads, key=lambda bone: (len(merging.lineage(bone)), bone))
@@ -172,13 +178,14 @@ def cluster_size(character: Character, vertices: np.ndarray) -> float:
     return float((high - low).max())
 
 
-def _one_body(character: Character, roles: tuple[str | None, ...], parent: int,
-              bone: int) -> bool:
-    """Whether both are pieces of one limb, of a hand, or of the pelvis."""
+def _one_body(character: Character, roles: tuple[str | None, ...], parent: int, bone: int,
+              fingers: bool) -> bool:
+    """Whether both are pieces of one limb, of the pelvis, or of a hand without ``fingers``."""
     above, role = roles[parent], roles[bone]
     if role == 'hips' and side_of(character.bone_names[bone]):
         return above in ('hips', 'spine')
-    return (role == above and role in LIMBS) or (role == 'finger' and above in ('hand', 'finger'))
+    return (role == above and role in LIMBS) or (
+        role == 'finger' and above in ('hand', 'finger') and not fingers)
 
 
 def _partner(character: Character, bone: int, level: list[int]) -> int:

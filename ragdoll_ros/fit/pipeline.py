@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..model import rotation
+from ..model import errors, rotation
 from ..model.ragdoll import Bone, Ragdoll
 from ..model.shapes import Shape
 from . import carried
@@ -24,9 +24,15 @@ from .overlap import colliding_pairs
 from .refine import refined
 from .shapes import DECIMALS, TOLERANCE, Fitted, fit_best, fit_shape
 from .skin_tree import SkinTree, find_skin_tree
+from .soft_chains import soft_chains, thinned
+from .spring_bones import without_short_rods
 
 THINNEST = 0.01
 """No body is thinner than this share of the whole character."""
+
+
+MOST_ASKED_FOR = 200
+"""Bodies that a doll may have where the user says how small: a tick of it takes 0.2 s."""
 
 
 @dataclass(frozen=True)
@@ -77,13 +83,8 @@ def fit_character(character: Character, options: Options | None = None) -> Fit:
     """Doll of a character, in its bind pose; ModelError where an option is out of range."""
     options = options or Options()
     given, character = character, refined(character)
-    roles = roles_of(character.bone_names, character.parents)
-    swinging = frozenset(bone for spring in character.springs for bone in spring.bones)
-    clusters = vertices_by_bone(character, options.share, swinging)
-    tree = find_skin_tree(character, clusters, roles)
-    roles = _roles_along(tree, character.bone_names)
-    groups = group_bones(character, roles, clusters, tree, options.smallest, swinging)
-    notes = [*character.notes, *_unmoved(character, len(given.vertices), groups)]
+    character, groups, notes = _grouped(character, options)
+    notes = [*notes, *_unmoved(character, len(given.vertices), groups)]
     directions = [_direction(character, groups, index) for index in range(len(groups))]
     areas = character.vertex_areas()
     axes = [fit_axes(character.vertices[group.vertices], areas[group.vertices], direction,
@@ -108,6 +109,37 @@ def fit_character(character: Character, options: Options | None = None) -> Fit:
                    carried.skeleton_frames(character, carrier))
     doll = replace(doll, no_collision=colliding_pairs(doll))
     return Fit(doll, given, tuple(bodies), tuple(notes))
+
+
+def _grouped(character: Character,
+             options: Options) -> tuple[Character, list[Group], list[str]]:
+    """The character with all its springs, the groups of its bones, and what is to be told."""
+    swinging = frozenset(bone for spring in character.springs for bone in spring.bones)
+    clusters = vertices_by_bone(character, options.share, swinging)
+    tree = find_skin_tree(character, clusters, roles_of(character.bone_names, character.parents))
+    roles = _roles_along(tree, character.bone_names)
+    springs = soft_chains(character, tree, roles, clusters)
+    swinging |= {bone for spring in springs for bone in spring.bones} | tree.strangers
+    groups = group_bones(character, roles, clusters, tree, options.smallest, swinging)
+    notes = list(character.notes)
+    if tree.strangers:
+        first = character.bone_names[min(tree.strangers)]
+        notes.append(f'another character, of {len(tree.strangers)} bones from {first} on, is apart '
+                     'from this one: it gets no bodies and goes along with the root; export each '
+                     'by itself')
+    if options.smallest is None:
+        before = len(groups)
+        groups, thin = thinned(character, groups)
+        springs += thin
+        if thin:
+            notes.append(f'{before} bodies are too many: the {len(thin)} thinnest branches became '
+                         'swings, which collide with nothing')
+    elif len(groups) > MOST_ASKED_FOR:
+        raise errors.OutOfRange('smallest', options.smallest, f'a larger one, for {len(groups)} '
+                                f'bodies are more than {MOST_ASKED_FOR}')
+    springs = [without_short_rods(spring, notes) for spring in springs]
+    springs = [spring for spring in springs if spring.rods]
+    return replace(character, springs=(*character.springs, *springs)), groups, notes
 
 
 def _roles_along(tree: SkinTree, names: tuple[str, ...]) -> tuple[str | None, ...]:
