@@ -44,7 +44,8 @@ def read_mesh(path: Path, scale: tuple[float, ...] = (1.0, 1.0, 1.0)) -> np.ndar
             triangles = np.asarray(mesh.triangles, float) * _metres(mesh.units) * scale
     # Whatever a broken file does to a library that does not check it.
     except Exception as error:
-        raise errors.Unreadable('', f'{type(error).__name__}: {error}', 'a mesh') from None
+        said = ' '.join(f'{type(error).__name__}: {error}'.split())
+        raise errors.Unreadable('', said[:100], 'a mesh') from None
     # NaN is no less than anything.
     if not triangles.size or not np.abs(triangles).max() < FARTHEST:
         raise errors.Unreadable('', f'{len(triangles)} triangles',

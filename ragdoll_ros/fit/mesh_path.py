@@ -23,7 +23,8 @@ def find_mesh(name: str, folder: Path | None) -> Path | None:
     if scheme in PACKAGES:
         tried = _in_packages(*rest.split('/', 1), folder) if '/' in rest else ()
     elif scheme == 'file':
-        tried = [above / rest.replace('\\', '/') for above in _upwards(folder)] or [Path(rest)]
+        rest = rest.replace('\\', '/')
+        tried = [above / rest for above in _upwards(folder) or [Path('/')]]
     else:
         tried = ()
     return next((path for path in tried if _is_file(path)), None)

@@ -23,7 +23,7 @@ WORTH = 0.3
 """A cut that saves less than this share of a box is not made."""
 
 CUTS = np.arange(1, 16) / 16
-"""Where along each axis it is tried; then between those."""
+"""Where a cut is tried, as shares of the extent along each axis."""
 
 THINNEST, TOLERANCE = 0.01, 0.006
 """Of the mesh's extent: the least edge, and how far out a point still counts as inside."""
