@@ -97,8 +97,9 @@ def _own_words(names: tuple[str, ...]) -> list[tuple[str, ...]]:
     for end in (0, -1):
         while len(words) >= FEWEST:
             first = Counter(each[end] for each in words if each).most_common(1)
-            # Where most of a character is hair, hair still says something.
-            if not first or first[0][1] < COMMON * len(words) or _raw_role((first[0][0],)):
+            # A word that may be a bone's has to be on all: most bones of some are hair.
+            least = 1.0 if first and _raw_role((first[0][0],)) else COMMON
+            if not first or first[0][1] < least * len(words):
                 break
             rest = slice(1, None) if end == 0 else slice(None, -1)
             words = [each[rest] if each and each[end] == first[0][0] else each for each in words]
