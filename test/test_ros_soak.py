@@ -8,15 +8,20 @@ import numpy as np
 import pytest
 from conftest import light
 
-from ragdoll_ros.ros.soak import GROWTH, WARM, Sample, growth
+from ragdoll_ros.ros.soak import CHANGES, GROWTH, SAMPLES, SCENES, WARM, Sample, growth
+
+ROUND = SAMPLES // CHANGES * len(SCENES)
 
 
-def samples(rate, wobble, hours=0.5, count=200):
-    """Of a process that takes 30 MB as it warms up, then ``rate`` MB an hour."""
+def samples(rate, wobble, hours=0.5, count=SAMPLES):
+    """Of a process that takes 30 MB as it warms up, then ``rate`` MB an hour, and 2 MB for a while
+    in each round of scenes.
+    """
     rng = np.random.default_rng(3)
     times = np.linspace(0, 3600 * hours, count)
     warm = times / times[-1] / WARM
-    memory = 200 + 30 * np.minimum(1, warm) + rate * times / 3600 + wobble * rng.normal(size=count)
+    memory = (200 + 30 * np.minimum(1, warm) + rate * times / 3600 + wobble * rng.normal(size=count)
+              + 2 * (np.arange(count) % ROUND < ROUND / 4))
     return [Sample(time, each, 16, 21) for time, each in zip(times, memory, strict=True)]
 
 
