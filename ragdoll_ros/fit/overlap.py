@@ -18,6 +18,11 @@ def filling(shape: Shape) -> np.ndarray:
     return points[shape.signed_distance(points) <= 0]
 
 
+def cloud(bone: Bone) -> np.ndarray:
+    """Points (p, 3) m on a body and in it, doll's frame."""
+    return bone.pose.outward(np.concatenate([bone.shape.mesh()[0], filling(bone.shape)]))
+
+
 def depth_in(bone: Bone, points: np.ndarray) -> np.ndarray:
     """How deep (p,) m points (p, 3) of the doll's frame are in a body; below zero outside."""
     return -bone.shape.signed_distance(bone.pose.inward(points))
@@ -25,8 +30,7 @@ def depth_in(bone: Bone, points: np.ndarray) -> np.ndarray:
 
 def overlapping_pairs(bones: tuple[Bone, ...]) -> list[tuple[str, str]]:
     """Names of the pairs of bodies that overlap by more than DEEP."""
-    clouds = [bone.pose.outward(np.concatenate([bone.shape.mesh()[0], filling(bone.shape)]))
-              for bone in bones]
+    clouds = [cloud(bone) for bone in bones]
     reaches = [float(np.linalg.norm(bone.shape.half_extents)) for bone in bones]
     found = []
     for i, first in enumerate(bones):

@@ -26,6 +26,7 @@ from .shapes import DECIMALS, TOLERANCE, Fitted, fit_best, fit_shape
 from .skin_tree import SkinTree, find_skin_tree
 from .soft_chains import soft_chains, thinned
 from .spring_bones import without_short_rods
+from .trim import trimmed
 
 THINNEST = 0.01
 """No body is thinner than this share of the whole character."""
@@ -90,8 +91,9 @@ def fit_character(character: Character, options: Options | None = None) -> Fit:
     axes = [fit_axes(character.vertices[group.vertices], areas[group.vertices], direction,
                      options.orientation)
             for group, direction in zip(groups, directions, strict=True)]
-    fits = place_anchors(groups, _fit_shapes(character, groups, axes, options.shape),
-                         [own.frame for own in axes])
+    frames = [own.frame for own in axes]
+    fits = trimmed(groups, place_anchors(
+        groups, _fit_shapes(character, groups, axes, options.shape), frames), frames)
     masses = share_mass(options.mass, options.masses, given, groups,
                         [fit.shape.volume for fit in fits], notes)
     bodies = [_body(given, *parts) for parts in zip(groups, fits, axes, masses, strict=True)]
