@@ -36,8 +36,8 @@ def test_a_stack_bears_its_weight(count):
     # GOOD, 1e-6 m/s, in a step of 2.5 ms: 1e-6 / (g h) is 4e-5 of the weight of a box.
     assert forces == pytest.approx(weights, rel=1e-3)
     assert state.positions[:, 2] == pytest.approx(0.1 + 0.2 * np.arange(count), abs=5e-4)
-    # What the sweeps leave, some 3e-5 m/s, for 2 s, and ten times that at the top of what leans.
-    assert state.positions[:, :2] == pytest.approx(0, abs=1e-6 if count == 5 else 1e-3)
+    # What the sweeps leave, some 1e-4 m/s, for 2 s, and ten times that at the top of what leans.
+    assert state.positions[:, :2] == pytest.approx(0, abs=1e-6 if count == 5 else 2e-3)
 
 
 @pytest.mark.parametrize(('accuracy', 'error'), [('draft', 0.06), ('normal', 0.03),
