@@ -12,8 +12,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from ragdoll_ros.fit.doubts import find_doubts
-from ragdoll_ros.fit.robot import read_urdf
+from ragdoll_ros.fit.judging.doubts import find_doubts
+from ragdoll_ros.fit.robots.robot import read_urdf
 from ragdoll_ros.model.errors import RagdollError
 from ragdoll_ros.model.ragdoll import Ragdoll
 from ragdoll_ros.model.scene import above_ground

@@ -355,8 +355,8 @@ def write(rig, folder):
 @functools.cache
 def fitted(name):
     """Fit a rig without options, once for all tests."""
-    from ragdoll_ros.fit.character import read_character
     from ragdoll_ros.fit.pipeline import fit_character
+    from ragdoll_ros.fit.reading.character import read_character
     with tempfile.TemporaryDirectory() as folder:
         return fit_character(read_character(write(RIGS[name], Path(folder))))
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from fit_rigs import RIGS, Rig
 
-from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.pipeline import fit_character
+from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.ragdoll import joint_axes
 from ragdoll_ros.model.scene import above_ground

@@ -3,9 +3,9 @@ import numpy as np
 import pytest
 from specimens import SPECIMENS
 
-from ragdoll_ros.fit.axes import STANDS_OUT, fit_axes, spread
-from ragdoll_ros.fit.overlap import filling
-from ragdoll_ros.fit.shapes import MAKERS, fit_best, fit_shape
+from ragdoll_ros.fit.bodies.overlap import filling
+from ragdoll_ros.fit.shapes.axes import STANDS_OUT, fit_axes, spread
+from ragdoll_ros.fit.shapes.shapes import MAKERS, fit_best, fit_shape
 from ragdoll_ros.model.shapes import SHAPES
 
 UP = np.array([0.0, 0.0, 1.0])

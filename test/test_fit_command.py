@@ -135,8 +135,8 @@ def test_help_has_an_example():
 @pytest.mark.slow
 def test_a_large_character_takes_less_than_a_second(tmp_path, capsys):
     """60 bones and more than 25 000 vertices, from file to doll; the best of three runs."""
-    from ragdoll_ros.fit.character import read_character
     from ragdoll_ros.fit.pipeline import fit_character
+    from ragdoll_ros.fit.reading.character import read_character
     rig = RIGS['chain_60']
     path = tmp_path / 'large.glb'
     mesh = fit_rigs.skin(rig.bones, around=24, rings=18)

@@ -7,9 +7,9 @@ import pytest
 from fit_rigs import RIGS
 
 from ragdoll_ros.files.doll import load_doll
-from ragdoll_ros.fit.character import read_character
-from ragdoll_ros.fit.doubts import extent, find_doubts
+from ragdoll_ros.fit.judging.doubts import extent, find_doubts
 from ragdoll_ros.fit.pipeline import Options, fit_character
+from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.ragdoll import Ragdoll, joint_axes
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from fit_rigs import RIGS, document, skin
 
-from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.command import main
+from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.model import errors
 
 EXTENSION = 'KHR_draco_mesh_compression'

@@ -6,8 +6,8 @@ import wild_rigs
 from fit_rigs import RIGS, fitted
 from wild_rigs import WILD
 
-from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.pipeline import fit_character
+from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.scene import above_ground
 from ragdoll_ros.physics.simulation import Simulation

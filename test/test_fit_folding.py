@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from fit_rigs import Rig, limb
 
-from ragdoll_ros.fit.character import read_character
+from ragdoll_ros.fit.judging.verdict import judge
 from ragdoll_ros.fit.pipeline import fit_character
-from ragdoll_ros.fit.verdict import judge
+from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.model import rotation
 
 BENT = {'front': [(.55, .33), (.33, .25), (.1, .33), (0, .36)],

@@ -7,8 +7,8 @@ import pytest
 import wild_rigs
 from fit_rigs import Rig, limb
 
-from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.pipeline import Options, fit_character
+from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.model import errors
 from ragdoll_ros.model.scene import above_ground
 from ragdoll_ros.physics.simulation import Simulation

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from fit_rigs import RIGS, fitted
 
-from ragdoll_ros.fit.character import Character, read_character
+from ragdoll_ros.fit.bodies.skin_volume import skin_volumes
 from ragdoll_ros.fit.pipeline import Options, fit_character
-from ragdoll_ros.fit.skin_volume import skin_volumes
+from ragdoll_ros.fit.reading.character import Character, read_character
 
 DE_LEVA = {'head': 6.94, 'trunk': 43.46, 'upper_arm': 5.42, 'forearm': 3.24, 'hand': 1.22,
            'thigh': 28.32, 'shin': 8.66, 'foot': 2.74}

@@ -4,9 +4,9 @@ import struct
 import numpy as np
 import pytest
 
-from ragdoll_ros.fit.mesh_path import find_mesh
-from ragdoll_ros.fit.mesh_shapes import fit_mesh
-from ragdoll_ros.fit.robot import read_urdf
+from ragdoll_ros.fit.robots.mesh_path import find_mesh
+from ragdoll_ros.fit.robots.mesh_shapes import fit_mesh
+from ragdoll_ros.fit.robots.robot import read_urdf
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.compound import Compound
 from ragdoll_ros.model.pose import Pose

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from ragdoll_ros.fit.robot import read_urdf
+from ragdoll_ros.fit.robots.robot import read_urdf
 from ragdoll_ros.model import errors
 
 data = pytest.importorskip('pybullet_data')

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from fit_rigs import RIGS
 
-from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.pipeline import fit_character
+from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.model.errors import ModelErrors
 
 PERSON = RIGS['vrm']

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from fit_rigs import RIGS, fitted
 
-from ragdoll_ros.fit.character import read_character
-from ragdoll_ros.fit.doubts import find_doubts
-from ragdoll_ros.fit.overlap import covered
+from ragdoll_ros.fit.bodies.overlap import covered
+from ragdoll_ros.fit.judging.doubts import find_doubts
 from ragdoll_ros.fit.pipeline import Options, fit_character
+from ragdoll_ros.fit.reading.character import read_character
 
 HUMANOIDS = ('mixamo', 'unreal', 'vrm', 'cmu', 'makehuman', 'unnamed', 'z_up', 'scaled_nodes')
 

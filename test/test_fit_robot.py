@@ -8,7 +8,7 @@ from specimens import HAMMER
 
 from ragdoll_ros.files.doll import load_doll, save_doll
 from ragdoll_ros.files.urdf import to_urdf
-from ragdoll_ros.fit.robot import doll_from_urdf, read_urdf
+from ragdoll_ros.fit.robots.robot import doll_from_urdf, read_urdf
 from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.compound import Compound
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll

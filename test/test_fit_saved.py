@@ -5,8 +5,8 @@ import pytest
 from fit_rigs import RIGS, fitted
 
 from ragdoll_ros.files.doll import load_doll, save_doll
-from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.pipeline import fit_character
+from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.fit.report import fit_report
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.scene import above_ground

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from fit_rigs import fitted
 
-from ragdoll_ros.fit.scale import metres_per_unit
+from ragdoll_ros.fit.reading.scale import metres_per_unit
 from ragdoll_ros.model import errors
 
 

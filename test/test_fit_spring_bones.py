@@ -5,12 +5,12 @@ import pytest
 from fit_rigs import HALF, Rig, document, humanoid, limb, matrix
 
 from ragdoll_ros.files.doll import load_doll, save_doll
-from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.command import main
 from ragdoll_ros.fit.pipeline import fit_character
+from ragdoll_ros.fit.reading.character import read_character
+from ragdoll_ros.fit.reading.spring_bones import Rod, Spring
+from ragdoll_ros.fit.reading.spring_recipe import swing_of
 from ragdoll_ros.fit.report import fit_report
-from ragdoll_ros.fit.spring_bones import Rod, Spring
-from ragdoll_ros.fit.spring_recipe import swing_of
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.scene import above_ground
 from ragdoll_ros.model.state import State

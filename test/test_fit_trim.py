@@ -5,9 +5,9 @@ import pytest
 import wild_rigs
 from fit_rigs import RIGS
 
-from ragdoll_ros.fit.groups import Group
-from ragdoll_ros.fit.shapes import Fitted
-from ragdoll_ros.fit.trim import trimmed
+from ragdoll_ros.fit.bodies.trim import trimmed
+from ragdoll_ros.fit.shapes.shapes import Fitted
+from ragdoll_ros.fit.skeleton.groups import Group
 from ragdoll_ros.model.ragdoll import Bone
 from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Sphere
 

@@ -8,10 +8,10 @@ import pytest
 from fit_rigs import RIGS, fitted
 
 from ragdoll_ros.files.doll import load_doll
-from ragdoll_ros.fit.character import read_character
+from ragdoll_ros.fit.judging.trial import find_in_a_fall
+from ragdoll_ros.fit.judging.verdict import judge
 from ragdoll_ros.fit.pipeline import fit_character
-from ragdoll_ros.fit.trial import find_in_a_fall
-from ragdoll_ros.fit.verdict import judge
+from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.model.shapes import Sphere
 
 PEOPLE = ('mixamo', 'unreal', 'vrm', 'cmu', 'makehuman', 'centimetres', 'z_up')

@@ -2,7 +2,7 @@
 import pytest
 
 from ragdoll_ros.files.urdf_text import urdf_text
-from ragdoll_ros.fit.robot import read_urdf
+from ragdoll_ros.fit.robots.robot import read_urdf
 from ragdoll_ros.model import errors
 
 BODY = ('<robot name="r"><link name="Fuß"><inertial><mass value="1"/></inertial><collision>'

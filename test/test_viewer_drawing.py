@@ -13,8 +13,8 @@ from fit_rigs import RIGS
 from specimens import SPECIMENS
 
 from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.fit.character import read_character
 from ragdoll_ros.fit.pipeline import fit_character
+from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame

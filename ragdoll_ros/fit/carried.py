@@ -6,8 +6,8 @@ import numpy as np
 from ..model.pose import Pose
 from ..model.ragdoll import Bone, SkeletonFrame
 from ..model.swing import Swing
-from .character import Character
-from .spring_recipe import swing_of
+from .reading.character import Character
+from .reading.spring_recipe import swing_of
 
 
 def skeleton_frames(character: Character, carrier: dict[int, Bone]) -> tuple[SkeletonFrame, ...]:

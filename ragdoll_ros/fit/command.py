@@ -10,11 +10,11 @@ from pathlib import Path
 from ..files.doll import load_doll, save_doll
 from ..files.urdf import to_urdf
 from ..model import errors
-from .character import read_character
+from .judging.verdict import Verdict, judge
 from .pipeline import Options, fit_character
+from .reading.character import read_character
 from .report import doll_report, fit_report
-from .robot import read_urdf
-from .verdict import Verdict, judge
+from .robots.robot import read_urdf
 
 EXAMPLE = """\
 example:

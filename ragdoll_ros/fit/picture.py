@@ -7,8 +7,8 @@ import numpy as np
 
 from ..model import errors
 from ..model.ragdoll import Bone, Ragdoll
-from .character import Character
 from .dials import dials
+from .reading.character import Character
 
 COLORS = np.array([[0.90, 0.45, 0.35], [0.35, 0.60, 0.85], [0.50, 0.75, 0.45], [0.95, 0.75, 0.35],
                    [0.65, 0.50, 0.80], [0.45, 0.75, 0.75], [0.85, 0.60, 0.75], [0.70, 0.65, 0.50]])

@@ -12,21 +12,21 @@ from ..model import errors, rotation
 from ..model.ragdoll import Bone, Ragdoll
 from ..model.shapes import Shape
 from . import carried
-from .anchors import place_anchors
-from .axes import Axes, fit_axes
-from .character import Character
-from .folding import guesses
-from .groups import Group, group_bones, partner, vertices_by_bone
-from .joints import damped, make_joint
-from .masses import share_mass
-from .names import roles_of
-from .overlap import colliding_pairs
-from .refine import refined
-from .shapes import DECIMALS, TOLERANCE, Fitted, fit_best, fit_shape
-from .skin_tree import SkinTree, find_skin_tree
-from .soft_chains import soft_chains, thinned
-from .spring_bones import without_short_rods
-from .trim import trimmed
+from .bodies.masses import share_mass
+from .bodies.overlap import colliding_pairs
+from .bodies.refine import refined
+from .bodies.trim import trimmed
+from .joints.folding import guesses
+from .joints.joints import damped, make_joint
+from .reading.character import Character
+from .reading.spring_bones import without_short_rods
+from .roles.names import roles_of
+from .shapes.axes import Axes, fit_axes
+from .shapes.shapes import DECIMALS, TOLERANCE, Fitted, fit_best, fit_shape
+from .skeleton.anchors import place_anchors
+from .skeleton.groups import Group, group_bones, partner, vertices_by_bone
+from .skeleton.skin_tree import SkinTree, find_skin_tree
+from .skeleton.soft_chains import soft_chains, thinned
 
 THINNEST = 0.01
 """No body is thinner than this share of the whole character."""

@@ -9,10 +9,10 @@ import textwrap
 from ..model.compound import Compound
 from ..model.ragdoll import Ragdoll
 from ..model.shapes import Shape
-from .doubts import extent
-from .overlap import colliding_pairs, covered, shared_volume
+from .bodies.overlap import colliding_pairs, covered, shared_volume
+from .judging.doubts import extent
 from .pipeline import BodyFit, Fit
-from .shapes import TOLERANCE
+from .shapes.shapes import TOLERANCE
 
 
 def fit_report(fit: Fit) -> str:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
-from ...fit.character import Character, read_character
+from ...fit.reading.character import Character, read_character
 from ...model import errors, rotation
 from ...model.ragdoll import Ragdoll
 from ...model.scene import Placement, Scene

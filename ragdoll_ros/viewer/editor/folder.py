@@ -18,7 +18,7 @@ from ...model.ragdoll import Ragdoll
 from ...model.scene import Scene, above_ground
 
 if TYPE_CHECKING:
-    from ...fit.verdict import Verdict
+    from ...fit.judging.verdict import Verdict
 
 LARGEST_UPLOAD = 100_000_000
 """Bytes: characters with large textures have tens of MB."""
@@ -169,12 +169,12 @@ def _check_size(content: bytes) -> None:
 
 def _fitted(path: Path, progress: Progress) -> tuple[Ragdoll, Verdict]:
     # Here, as matters of files that few pages need.
-    from ...fit.character import read_character
+    from ...fit.judging.verdict import judge
     from ...fit.pipeline import fit_character
-    from ...fit.verdict import judge
+    from ...fit.reading.character import read_character
     progress(0.1, 'reading')
     if path.suffix.lower() == '.urdf':
-        from ...fit.robot import read_urdf
+        from ...fit.robots.robot import read_urdf
         doll = read_urdf(path)[0]
         return doll, judge(doll, measured=True)
     character = read_character(path)

@@ -9,7 +9,7 @@ from std_msgs.msg import String
 
 from ...files.scene import load_scene
 from ...files.urdf import scene_to_urdf
-from ...fit.robot import doll_from_urdf
+from ...fit.robots.robot import doll_from_urdf
 from ...model import errors
 from ...model.ragdoll import WORLD
 from ...model.scene import Ground, Placement, Scene

@@ -1,0 +1,1 @@
+"""What bodies weigh, and where they may not be in each other."""

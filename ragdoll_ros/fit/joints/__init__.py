@@ -1,0 +1,1 @@
+"""Kinds, axes and ranges of joints."""

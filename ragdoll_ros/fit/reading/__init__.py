@@ -1,0 +1,1 @@
+"""A character's file: its skin, skeleton and springs, in metres and REP 103's axes."""

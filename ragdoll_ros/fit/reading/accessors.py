@@ -1,0 +1,115 @@
+"""Arrays out of a glTF file: strides, sparse accessors, normalised integers.
+
+As in sections 3.6.2 and 3.11 of the glTF 2.0 specification.
+"""
+from __future__ import annotations
+
+import numpy as np
+
+from ...model import errors
+from .gltf_file import GltfFile, count, nested
+
+LARGEST_SCALARS, LARGEST_VECTORS = 3_000_000, 500_000
+"""Elements in one array: a skin of a million triangles has three million indices."""
+
+COMPONENTS = {5120: np.dtype('<i1'), 5121: np.dtype('<u1'), 5122: np.dtype('<i2'),
+              5123: np.dtype('<u2'), 5125: np.dtype('<u4'), 5126: np.dtype('<f4')}
+
+WIDTHS = {'SCALAR': 1, 'VEC3': 3, 'VEC4': 4, 'MAT4': 16}
+
+
+def read_floats(file: GltfFile, index: object, kind: str, where: str) -> np.ndarray:
+    """Values (count, width) float64 of the accessor at an index, of type ``kind`` ('VEC3', ...).
+
+    NotFinite where one is not finite, else a ModelError about what is broken, at ``where`` or in
+    the accessor.
+    """
+    values = _read(file, index, kind, where)
+    if not np.isfinite(values).all():
+        bad = values[~np.isfinite(values)][0]
+        raise errors.NotFinite(where, float(bad), 'finite numbers')
+    return values.astype(float)
+
+
+def read_indices(file: GltfFile, index: object, kind: str, limit: int, where: str) -> np.ndarray:
+    """Values (count, width) int32 of the accessor at an index, each from 0 to below ``limit``.
+
+    WrongForm where they are floats, OutOfRange for one outside; else as read_floats.
+    """
+    values = _read(file, index, kind, where)
+    if values.dtype.kind == 'f':
+        raise errors.WrongForm(where, 'floats', 'whole numbers')
+    values = values.astype(np.int32)
+    outside = (values < 0) | (values >= limit)
+    if outside.any():
+        raise errors.OutOfRange(where, int(values[outside][0]), f'an index from 0 to {limit - 1}')
+    return values
+
+
+def _read(file: GltfFile, index: object, kind: str, where: str) -> np.ndarray:
+    accessor = file.entry('accessors', index, where)
+    place = f'accessors[{index}]'
+    if accessor.get('type') != kind:
+        raise errors.WrongForm(f'{place}.type', accessor.get('type'), kind)
+    number = count(accessor, 'count', place)
+    most = LARGEST_SCALARS if kind == 'SCALAR' else LARGEST_VECTORS
+    if number > most:
+        raise errors.OutOfRange(f'{place}.count', number, f'at most {most}')
+    if accessor.get('bufferView') is None:
+        values = np.zeros((number, WIDTHS[kind]), _dtype(accessor, place))
+    else:
+        values = _strided(file, accessor, number, WIDTHS[kind], place)
+    sparse = nested(accessor, 'sparse', dict, place)
+    if sparse:
+        values = _substituted(file, sparse, values, f'{place}.sparse')
+    return _normalised(values) if accessor.get('normalized') else values
+
+
+def _strided(file: GltfFile, accessor: dict, number: int, width: int, place: str) -> np.ndarray:
+    dtype, index = _dtype(accessor, place), accessor['bufferView']
+    view = file.entry('bufferViews', index, place)
+    element = dtype.itemsize * width
+    stride = count(view, 'byteStride', f'bufferViews[{index}]', 0) or element
+    if stride < element or stride > 252:
+        raise errors.OutOfRange(f'bufferViews[{index}].byteStride', stride, f'{element} to 252')
+    if number == 0:
+        return np.zeros((0, width), dtype)
+    start = count(accessor, 'byteOffset', place, 0)
+    data = file.read(index, start, stride * (number - 1) + element, place)
+    return np.ndarray((number, width), dtype, data, strides=(stride, dtype.itemsize))
+
+
+def _substituted(file: GltfFile, sparse: dict, values: np.ndarray, place: str) -> np.ndarray:
+    number = count(sparse, 'count', place)
+    if number > len(values):
+        raise errors.OutOfRange(f'{place}.count', number, f'at most {len(values)}')
+    part = nested(sparse, 'indices', dict, place)
+    dtype = _dtype(part, f'{place}.indices')
+    at = _packed(file, part, dtype, number, f'{place}.indices')
+    if dtype.kind != 'u' or (at >= len(values)).any():
+        raise errors.OutOfRange(f'{place}.indices', 'an index', f'from 0 to {len(values) - 1}')
+    values = values.copy()
+    values[at] = _packed(file, nested(sparse, 'values', dict, place), values.dtype,
+                         number * values.shape[1], f'{place}.values').reshape(-1, values.shape[1])
+    return values
+
+
+def _packed(file: GltfFile, part: dict, dtype: np.dtype, number: int, place: str) -> np.ndarray:
+    data = file.read(part.get('bufferView'), count(part, 'byteOffset', place, 0),
+                     number * dtype.itemsize, place)
+    return np.frombuffer(data, dtype)
+
+
+def _dtype(accessor: dict, place: str) -> np.dtype:
+    kind = accessor.get('componentType')
+    if type(kind) is not int or kind not in COMPONENTS:
+        expected = 'one of ' + ', '.join(map(str, COMPONENTS))
+        raise errors.WrongForm(f'{place}.componentType', kind, expected)
+    return COMPONENTS[kind]
+
+
+def _normalised(values: np.ndarray) -> np.ndarray:
+    """Integers as fractions of their largest value; the lowest of a signed kind is -1 too."""
+    if values.dtype.kind == 'f':
+        return values
+    return np.maximum(values / np.iinfo(values.dtype).max, -1.0)

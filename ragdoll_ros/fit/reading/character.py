@@ -1,0 +1,189 @@
+"""A rigged, skinned character in this package's frame: x forward, y left, z up, metres."""
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ...model import errors, rotation
+from ...model.ragdoll import WORLD
+from ..roles.names import plain_name, side_of
+from .draco import decompressed
+from .gltf_file import GltfFile
+from .nodes import Nodes, read_nodes
+from .rigid_meshes import add_rigid_meshes
+from .scale import metres_per_unit
+from .skins import Skins, read_skins
+from .spring_bones import Spring, placed, read_springs, without_short_rods
+
+TO_ROS = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
+"""glTF is Y up and faces +Z, its left is +X: (x, y, z) here is (z, x, y) there."""
+
+
+MOST_BONES = 1500
+"""A face in every detail has some 900."""
+
+
+@dataclass(frozen=True)
+class Character:
+    """Bones (n, parents first) and skin (v vertices, t triangles) in the bind pose."""
+
+    name: str
+    bone_names: tuple[str, ...]
+    parents: tuple[int, ...]
+    """Index of each bone's parent, -1 for a bone without one."""
+    positions: np.ndarray
+    """(n, 3) m, the root of each bone."""
+    orientations: np.ndarray
+    """(n, 4) x, y, z, w, of the axes that the file gives each bone."""
+    vertices: np.ndarray
+    """(v, 3) m."""
+    triangles: np.ndarray
+    """(t, 3) vertex indices."""
+    bones: np.ndarray
+    """(v, k) indices of the bones that move each vertex."""
+    weights: np.ndarray
+    """(v, k) their skin weights; a row's sum is 1, or 0 where no bone moves the vertex."""
+    scale: float = 1.0
+    """Metres to one unit of the file."""
+    notes: tuple[str, ...] = ()
+    """A sentence for each thing that could not be taken over as it is."""
+    springs: tuple[Spring, ...] = ()
+    """Its points in m, the character's frame."""
+
+    @functools.cached_property
+    def extent(self) -> float:
+        """Longest edge of the skin's bounding box, m."""
+        return float(np.ptp(self.vertices, axis=0).max())
+
+    def vertex_areas(self) -> np.ndarray:
+        """Area (v,) m^2 that each vertex stands for: a third of its triangles'."""
+        corners = self.vertices[self.triangles]
+        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0],
+                                        corners[:, 2] - corners[:, 0]), axis=1) / 6
+        return np.bincount(self.triangles.ravel(), np.repeat(areas, 3), len(self.vertices))
+
+    def volume(self) -> float:
+        """Volume inside the skin, m^3, by the divergence theorem; right if the skin is closed."""
+        corners = self.vertices[self.triangles] - self.vertices.mean(axis=0)
+        return float(abs(np.einsum('ti,ti->', corners[:, 0],
+                                   np.cross(corners[:, 1], corners[:, 2])) / 6))
+
+
+def read_character(path: str | Path, scale: float | None = None) -> Character:
+    """Character of a .glb or .gltf file; ModelErrors with what keeps it from being one.
+
+    ``scale`` is m to one unit of the file; None takes 1, or a guess with a note; see scale.py.
+    """
+    if scale is not None:
+        errors.check_positive('scale', scale)
+    try:
+        file = decompressed(GltfFile(path))
+        # What overflows is found where it ends up.
+        with np.errstate(over='ignore', invalid='ignore'):
+            nodes = read_nodes(file)
+            skins = read_skins(file, nodes)
+            add_rigid_meshes(file, nodes, skins)
+        if len(skins.vertices) == 0:
+            raise errors.WrongForm('meshes', 0, 'a skin with vertices')
+        return _character(file, nodes, skins, scale)
+    except errors.ModelError as error:
+        raise errors.ModelErrors(str(path), [error]) from None
+    except OSError as error:
+        error = errors.Unreadable('', error.strerror or str(error), 'a file that can be read')
+        raise errors.ModelErrors(str(path), [error]) from None
+
+
+def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) -> Character:
+    joints = [node for node in nodes.order if node in skins.rests]
+    if len(joints) > MOST_BONES:
+        raise errors.OutOfRange('skins', len(joints), f'at most {MOST_BONES} joints')
+    place = {node: bone for bone, node in enumerate(joints)}
+    lookup = np.zeros(len(nodes.order), np.int32)
+    lookup[joints] = range(len(joints))
+    rests = np.stack([skins.rests[node] for node in joints])
+    if not np.isfinite(skins.vertices).all() or not np.isfinite(rests).all():
+        raise errors.NotFinite('meshes', 'vertices in the bind pose', 'finite numbers')
+    names = _bone_names([file.json['nodes'][node].get('name') for node in joints])
+    notes = list(skins.notes)
+    axes = TO_ROS
+    positions, vertices = rests[:, :3, 3] @ axes.T, skins.vertices @ axes.T
+    # A bone keeps the axes that the file gives it, so that its inverse bind matrix fits on.
+    linear = axes @ rests[:, :3, :3]
+    yaw = _yaw_to_front(names, positions)
+    if yaw:
+        notes.append(f'its left limbs say that it does not face +Z: turned by {yaw} degrees')
+        upright = np.round(rotation.matrix(rotation.from_axis_angle((0, 0, 1), np.radians(yaw))))
+        positions, vertices, linear = positions @ upright.T, vertices @ upright.T, upright @ linear
+        axes = upright @ axes
+    parents = tuple(_parent_bone(node, nodes.parents, place) for node in joints)
+    metres = metres_per_unit(names, parents, positions, vertices, notes) if scale is None else scale
+    springs = _springs(file, nodes, skins, place, metres * axes, notes)
+    stem = _bone_names([file.path.stem])[0]
+    return Character(
+        stem, names, parents,
+        positions * metres, np.stack([_nearest_rotation(matrix) for matrix in linear]),
+        vertices * metres, skins.triangles, lookup[skins.nodes], skins.weights, metres,
+        tuple(notes), springs)
+
+
+def _springs(file: GltfFile, nodes: Nodes, skins: Skins, place: dict[int, int],
+             matrix: np.ndarray, notes: list[str]) -> tuple[Spring, ...]:
+    """Springs on the character's bones, their points taken to its frame by ``matrix`` (3, 3)."""
+    found = []
+    for spring in read_springs(file, nodes, notes):
+        carrier = _parent_bone(spring.nodes[0], nodes.parents, place)
+        if carrier < 0:
+            notes.append(f'spring {spring.name} has no bone above it: left out')
+            continue
+        spring = placed(spring, nodes, skins.rests)
+        found.append(without_short_rods(replace(
+            spring, points=spring.points @ matrix.T, carrier=carrier,
+            bones=tuple(place[node] for node in spring.nodes if node in place)), notes))
+    found = [spring for spring in found if spring.rods]
+    names = _bone_names([spring.name for spring in found])
+    return tuple(replace(spring, name=name) for spring, name in zip(found, names, strict=True))
+
+
+def _parent_bone(node: int, parents: list[int], place: dict[int, int]) -> int:
+    """Bone of the nearest node above that is one, -1 if there is none."""
+    node = parents[node]
+    while node >= 0 and node not in place:
+        node = parents[node]
+    return place.get(node, -1)
+
+
+def _bone_names(given: list[object]) -> tuple[str, ...]:
+    """Names as a doll takes them, each once: what has none is called bone_N."""
+    taken = {WORLD: 1}
+    names = []
+    for number, name in enumerate(given):
+        text = plain_name(name if isinstance(name, str) else '', f'bone_{number}')
+        while text in taken:
+            taken[text] += 1
+            text = f'{text}_{taken[text]}'
+        taken[text] = 1
+        names.append(text)
+    return tuple(names)
+
+
+def _yaw_to_front(names: tuple[str, ...], positions: np.ndarray) -> int:
+    """Rotation about the vertical, degrees, that brings the bones named left to +y."""
+    sides = np.array([side_of(name) for name in names])
+    if not (sides > 0).any() or not (sides < 0).any():
+        return 0
+    left = positions[sides > 0].mean(axis=0) - positions[sides < 0].mean(axis=0)
+    reach = np.abs(left[:2]).max()
+    if reach < 0.02 * np.ptp(positions, axis=0).max():
+        return 0
+    return round(float(np.degrees(np.arctan2(left[0], left[1]))) / 90) % 4 * 90
+
+
+def _nearest_rotation(matrix: np.ndarray) -> np.ndarray:
+    """Quaternion (4,) of the rotation nearest to a matrix (3, 3) that may scale and mirror."""
+    u, _, vt = np.linalg.svd(matrix)
+    if np.linalg.det(u @ vt) < 0:
+        u = u * (1.0, 1.0, -1.0)
+    return rotation.from_matrix(u @ vt)

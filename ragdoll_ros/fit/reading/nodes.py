@@ -1,0 +1,79 @@
+"""The nodes of a glTF file as one forest with the place of each in the file's world."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model import errors, rotation
+from .gltf_file import GltfFile, nested
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """The n nodes of a file, as its list of nodes numbers them."""
+
+    parents: list[int]
+    """-1 for a node without one."""
+    children: list[list[int]]
+    order: list[int]
+    """Every node once, parents first."""
+    worlds: np.ndarray
+    """(n, 4, 4) that take a point of a node's frame to the file's world; the file's units."""
+
+
+def read_nodes(file: GltfFile) -> Nodes:
+    """Nodes of a file; JointCycle or ConnectedTwice where they form no forest.
+
+    OutOfRange for a child that is no node, WrongForm, NotFinite or NotUnit for a broken matrix.
+    """
+    nodes = file.json['nodes']
+    parents = [-1] * len(nodes)
+    below = [nested(node, 'children', list, f'nodes[{index}]') for index, node in enumerate(nodes)]
+    for index, children in enumerate(below):
+        for child in children:
+            file.entry('nodes', child, f'nodes[{index}].children')
+            if parents[child] >= 0:
+                raise errors.ConnectedTwice(f'nodes[{index}].children', child,
+                                            'a node that has no parent yet')
+            parents[child] = index
+    order = [index for index, parent in enumerate(parents) if parent < 0]
+    for index in order:
+        order.extend(below[index])
+    if len(order) < len(nodes):
+        missing = min(set(range(len(nodes))) - set(order))
+        raise errors.JointCycle(f'nodes[{missing}]', 'a cycle among the nodes',
+                                'nodes that form trees')
+    worlds = np.zeros((len(nodes), 4, 4))
+    for index in order:
+        local = _local(nodes[index], f'nodes[{index}]')
+        parent = parents[index]
+        worlds[index] = local if parent < 0 else worlds[parent] @ local
+    return Nodes(parents, below, order, worlds)
+
+
+def _local(node: dict, where: str) -> np.ndarray:
+    """Matrix (4, 4) of a node in its parent: column-major, or translation, rotation, scale."""
+    given = node.get('matrix')
+    if given is not None:
+        return _numbers(given, 16, f'{where}.matrix').reshape(4, 4).T
+    translation, quaternion, scale = (
+        default if node.get(key) is None else _numbers(node[key], len(default), f'{where}.{key}')
+        for key, default in (('translation', (0, 0, 0)), ('rotation', rotation.IDENTITY),
+                             ('scale', (1, 1, 1))))
+    if np.linalg.norm(quaternion) < 1e-9:
+        raise errors.NotUnit(f'{where}.rotation', node['rotation'], 'a quaternion, not zero')
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation.matrix(rotation.normalized(quaternion)) * scale
+    matrix[:3, 3] = translation
+    return matrix
+
+
+def _numbers(values: object, length: int, where: str) -> np.ndarray:
+    plain = isinstance(values, list) and len(values) == length
+    if not plain or not all(type(value) in (int, float) for value in values):
+        raise errors.WrongForm(where, values, f'{length} numbers')
+    # Products of a few hundred such numbers must stay finite.
+    if not all(abs(value) < 1e30 for value in values):
+        raise errors.NotFinite(where, values, f'{length} finite numbers of sensible size')
+    return np.array(values, float)

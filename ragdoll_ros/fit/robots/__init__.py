@@ -1,0 +1,1 @@
+"""Dolls of robots' URDFs and meshes."""

@@ -1,0 +1,1 @@
+"""Axes and shapes of a cloud of points."""

@@ -1,0 +1,1 @@
+"""Which bones become bodies, and how they hang together."""
