@@ -13,7 +13,7 @@ from ...model import rotation
 from ...model.ragdoll import Bone
 from ...model.shapes import Box, Shape, Sphere
 from ..shapes.shapes import Fitted
-from ..skeleton.anchors import NEAR
+from ..skeleton.anchors import NEAR, outside
 from ..skeleton.groups import Group
 from .overlap import DEEP
 
@@ -58,8 +58,7 @@ def trimmed(groups: list[Group], fits: list[Fitted], frames: list[np.ndarray]) -
 
 def _holds(bone: Bone, anchors: np.ndarray) -> bool:
     """Whether a body is still at all its joints (k, 3)."""
-    off = bone.shape.signed_distance(bone.pose.inward(anchors)) / (2 * max(bone.shape.half_extents))
-    return bool((off <= NEAR).all())
+    return bool((outside(bone.shape, bone.pose.inward(anchors)) <= NEAR).all())
 
 
 def _cuts(bones: list[Bone], pair: tuple[int, int],

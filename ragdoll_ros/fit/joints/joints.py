@@ -40,17 +40,15 @@ def make_joint(character: Character, groups: list[Group], index: int, along: np.
     above = above_of(character, groups, index)
     children = [sum(other.parent == k for other in groups) for k in (index, group.parent)]
     side = side_of(group.name) or int(np.sign(anchor[1]))
-    joint = fold = None
     if is_person([each.role for each in groups],
                  character.positions[[each.bone for each in groups]]):
-        if group.role in RANGES:
-            joint = persons_joint(parent.name, group.name, group.role, side, anchor, along)
+        joint = persons_joint(parent.name, group.name, group.role, side, anchor,
+                              along) if group.role in RANGES else None
     else:
         fold = animal_fold(character, groups, index, along)
+        joint = fold.joint(parent.name, group.name, anchor) if fold else None
     if joint is not None:
         return joint
-    if fold is not None:
-        return fold.joint(parent.name, group.name, anchor)
     return _by_role(parent.name, group.name, group.role, side, anchor, above, along,
                     children[0] <= 1 and children[1] == 1)
 

@@ -60,10 +60,14 @@ class Character:
 
     def vertex_areas(self) -> np.ndarray:
         """Area (v,) m^2 that each vertex stands for: a third of its triangles'."""
+        return np.bincount(self.triangles.ravel(), np.repeat(self.corner_areas(), 3),
+                           len(self.vertices))
+
+    def corner_areas(self) -> np.ndarray:
+        """Third (t,) m^2 of each triangle's area."""
         corners = self.vertices[self.triangles]
-        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0],
-                                        corners[:, 2] - corners[:, 0]), axis=1) / 6
-        return np.bincount(self.triangles.ravel(), np.repeat(areas, 3), len(self.vertices))
+        return np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0],
+                                       corners[:, 2] - corners[:, 0]), axis=1) / 6
 
     def volume(self) -> float:
         """Volume inside the skin, m^3, by the divergence theorem; right if the skin is closed."""

@@ -5,6 +5,7 @@ import dataclasses
 
 import numpy as np
 
+from ...model.shapes import Shape
 from ..shapes.shapes import Fitted, extended
 from .groups import Group
 
@@ -39,8 +40,12 @@ def place_anchors(groups: list[Group], fits: list[Fitted],
 
 def _off(fit: Fitted, frame: np.ndarray, point: np.ndarray) -> float:
     """How far a point is outside a body, as a share of the body's longest extent."""
-    off = float(fit.shape.signed_distance(((point - fit.centre) @ frame)[None])[0])
-    return max(off, 0.0) / (2 * max(fit.shape.half_extents))
+    return max(0.0, float(outside(fit.shape, ((point - fit.centre) @ frame)[None])[0]))
+
+
+def outside(shape: Shape, points: np.ndarray) -> np.ndarray:
+    """How far (k,) points (k, 3) of a shape's frame are outside it, of its longest extent."""
+    return shape.signed_distance(points) / (2 * max(shape.half_extents))
 
 
 def _reaching(fit: Fitted, frame: np.ndarray, point: np.ndarray) -> Fitted:

@@ -55,9 +55,6 @@ def find_borders(character: Character) -> Borders:
 def _edges(character: Character) -> tuple[np.ndarray, np.ndarray]:
     """Edges (e, 2) of the skin by their vertices, and the area (e,) m^2 that each stands for."""
     triangles = character.triangles
-    corners = character.vertices[triangles]
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0],
-                                    corners[:, 2] - corners[:, 0]), axis=1) / 6
     ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
     grid = np.round(character.vertices / (EQUAL * character.extent)).astype(np.int64)
     order = np.lexsort(grid.T)
@@ -65,7 +62,8 @@ def _edges(character: Character) -> tuple[np.ndarray, np.ndarray]:
     seams = np.stack([order[:-1], order[1:]], axis=1)[equal]
     own = character.vertex_areas()
     return (np.concatenate([ends, seams]),
-            np.concatenate([np.repeat(areas, 3), own[seams].min(axis=1, initial=np.inf)]))
+            np.concatenate([np.repeat(character.corner_areas(), 3),
+                            own[seams].min(axis=1, initial=np.inf)]))
 
 
 def find_gaps(character: Character, clusters: list[np.ndarray]) -> np.ndarray:

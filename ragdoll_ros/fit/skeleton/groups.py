@@ -15,6 +15,7 @@ import numpy as np
 from ..reading.character import Character
 from ..roles.names import LIMBS, side_of
 from ..shapes.axes import spread
+from .skin_forest import PAIRED
 from .skin_tree import SkinTree
 
 SMALLEST = 0.055
@@ -22,9 +23,6 @@ SMALLEST = 0.055
 
 FEWEST = 4
 """Vertices of a cluster that has a size."""
-
-PAIRED = 0.02
-"""Two bones are a left and a right one if one mirrored is this near to the other, of the whole."""
 
 
 @dataclass
