@@ -1,4 +1,4 @@
-"""The impulse of one contact by itself against Signorini's and Coulomb's laws."""
+"""Impulses against Signorini's and Coulomb's laws: of one contact by itself, of many that stick."""
 from __future__ import annotations
 
 import numpy as np
@@ -6,12 +6,20 @@ import pytest
 
 numba = pytest.importorskip('numba')
 
+from ragdoll_ros.physics.kernels.impulses.active_set import solve_active_set  # noqa: E402
 from ragdoll_ros.physics.kernels.impulses.one_contact import one_contact  # noqa: E402
 
 
 @numba.njit
 def _one_contact(ease, c, last, mu):
     return one_contact(ease, 3, 0, c[0], c[1], c[2], last[0], last[1], last[2], mu)
+
+
+@numba.njit
+def _active_set(kinds, rows, mu, ease, b, p, tolerance):
+    n = len(b)
+    return solve_active_set(kinds, rows, mu, len(kinds), n, ease, b, p, tolerance,
+                            np.zeros((9, 2 * n)), np.zeros(n * n))
 
 
 def breach(ease, c, p, mu):
@@ -47,3 +55,28 @@ def test_what_slides_and_closes_under_much_friction_is_stopped():
     p = np.array(_one_contact(ease.ravel(), c, np.zeros(3), 10.0))
     assert p[0] > 0.1
     assert breach(ease, c, p, 10.0) <= 1e-12
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_many_that_stick_keep_the_laws(seed):
+    """Faces, limits and what is let go, far more rows than ways to move, from any start."""
+    draw = np.random.default_rng(seed)
+    for _ in range(50):
+        kinds = draw.choice([1, 3], size=draw.integers(2, 25))
+        rows = np.cumsum(kinds) - kinds
+        n = int(kinds.sum())
+        mu = np.where(draw.random(len(kinds)) < 0.2, 0.0, 1e5)
+        ways = draw.normal(size=(n, draw.integers(3, 12))) * np.exp(draw.normal(size=(n, 1)))
+        W = ways @ ways.T
+        W[np.diag_indices(n)] *= 1 + 1e-8
+        b, p = ways @ draw.normal(size=ways.shape[1]), np.abs(draw.normal(size=n))
+        assert _active_set(kinds, rows, mu, W.ravel(), b, p, 1e-9)
+        u = W @ p + b
+        # Rounding of the sums.
+        small = 1e-9 + 1e-12 * (np.abs(W) @ np.abs(p)).max()
+        along = np.setdiff1d(np.arange(n), rows)
+        sticks = np.repeat(mu, kinds)[along] > 0
+        assert p[rows].min() >= 0 and u[rows].min() >= -small
+        assert np.abs(u[rows] * (p[rows] > 0)).max() <= small
+        assert np.abs(u[along[sticks]]).max(initial=0.0) <= small
+        assert not p[along[~sticks]].any()

@@ -99,16 +99,16 @@ a stretch: bones' ``rows`` (n, 13) and the dolls' ``sums`` (d,). What acts in it
 and ``springs`` (k, 20) of hands and drives; see engine/acting.py."""
 
 Room = collections.namedtuple(
-    'Room', 'work own composite H contacts table at turn gaps later Y support W G p solver '
+    'Room', 'work own composite H contacts table at turn gaps later Y YT support W G p solver '
     'kinds rows mu roll need label vectors states given before after begun count lift tally '
     'within armed met above below bracket stages row place blocks unsought left')
 """Scratch of the rigid core, but for ``tally``, ``within`` and ``gaps``, which are the course's.
 
-The rows ``Y`` of contacts have entries for the velocities that they see, ``support``, alone; ``W``
-and ``G`` have room for a small island, ``blocks`` for W of each contact by itself. Of a step:
-``met``, the gaps that tell what touches in it; ``bracket``, ``above`` and ``below`` of
-stepping/touch.py; ``unsought`` (1,), whether touches in it are not sought; ``left`` (1,), m/s by
-which contacts of large islands may err."""
+The rows ``Y`` of contacts have entries for the velocities that they see, ``support``, alone, and
+the columns of ``YT`` for all; ``W`` and ``G`` have room for a small island, ``blocks`` for W of
+each contact by itself. Of a step: ``met``, the gaps that tell what touches in it; ``bracket``,
+``above`` and ``below`` of stepping/touch.py; ``unsought`` (1,), whether touches in it are not
+sought; ``left`` (1,), m/s by which contacts of large islands may err."""
 
 WITHIN, OUTSIDE = 1, 2
 
@@ -163,7 +163,7 @@ def make_room(system: System, course: Course) -> Room:
         work=work, own=np.zeros((bones, 6)), composite=np.zeros((bones, 10)),
         H=np.zeros((nv, nv)), contacts=np.zeros(contacts, CONTACT), table=np.zeros((16, 8)),
         at=np.zeros((geoms, 3)), turn=np.zeros((geoms, 3, 3)), gaps=course.gaps,
-        later=np.zeros(gaps), Y=np.zeros((rows, wide)),
+        later=np.zeros(gaps), Y=np.zeros((rows, wide)), YT=np.zeros((nv, few)),
         support=np.zeros((contacts, wide), np.int64), W=np.zeros(few * few),
         G=np.zeros(few * few), p=np.zeros((6, rows)),
         solver=np.zeros((9, 2 * max(rows, 8))), kinds=np.zeros(contacts, np.int64),

@@ -38,10 +38,11 @@ def due(gaps: np.ndarray, armed: np.ndarray, j: int) -> float:
 
 @compiled
 def time_free(s: System, r: Room, q: np.ndarray, v: np.ndarray, gaps: np.ndarray,
-              armed: np.ndarray, acceleration: float, ends: np.ndarray) -> float:
+              armed: np.ndarray, acceleration: float, relative: float, ends: np.ndarray) -> float:
     """Least time, s, until a gap may be gone; work is posed at q and v, geoms are placed.
 
-    ``ends`` (2, nq + nv): rates at the path's ends, for those of the limited joints.
+    No point exceeds ``acceleration``, m/s^2, nor ``relative`` as seen by what falls freely, as both
+    of a pair do. ``ends`` (2, nq + nv): rates at the path's ends, for those of the limited joints.
     """
     least, n, point = math.inf, 0, r.table[15]
     for k in range(len(s.geoms)):
@@ -68,7 +69,7 @@ def time_free(s: System, r: Room, q: np.ndarray, v: np.ndarray, gaps: np.ndarray
         n += 2
     for k in range(len(s.pairs)):
         closing = pair_closing(s, r, q, k, gaps[n + k])
-        least = min(least, time_to_close(due(gaps, armed, n + k), closing, 2 * acceleration))
+        least = min(least, time_to_close(due(gaps, armed, n + k), closing, 2 * relative))
     return least
 
 
@@ -105,7 +106,7 @@ def find_event(s: System, r: Room, course: Course) -> None:
     """
     q, v, path, gaps, armed = r.states[1], r.vectors[0], course.path[0], r.later, r.armed
     length = path.length
-    acceleration = accelerations_of(s, r, course, q, v)
+    acceleration, relative = accelerations_of(s, r, course, q, v)
     for j in range(len(gaps)):
         armed[j] = 1.0 if r.gaps[j] > TOUCHING else 0.0
     time = before = 0.0
@@ -119,7 +120,7 @@ def find_event(s: System, r: Room, course: Course) -> None:
         if least <= MET:
             path.event = time
             return
-        step = time_free(s, r, q, v, gaps, armed, acceleration, course.ends)
+        step = time_free(s, r, q, v, gaps, armed, acceleration, relative, course.ends)
         before = time
         time += max(step, 1e-9)
         if time >= length:

@@ -75,7 +75,7 @@ def may_fly(s: System, r: Room, course: Course, loads: np.ndarray, step: float) 
         fast = max(fast, (move[0] ** 2 + move[1] ** 2 + move[2] ** 2) * s.geoms[k].reach)
     for j in range(len(armed)):
         armed[j] = 1.0 if r.gaps[j] > TOUCHING else 0.0
-    return time_free(s, r, q, v, r.gaps, armed, g + 2 * fast + 1e-3,
+    return time_free(s, r, q, v, r.gaps, armed, g + 2 * fast + 1e-3, g + 2 * fast + 1e-3,
                      course.ends) > WORTH * step
 
 

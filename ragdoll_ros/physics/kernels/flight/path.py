@@ -126,8 +126,11 @@ def point_velocity(work: Work, i: int, q: np.ndarray, root: int, point: np.ndarr
 
 
 @compiled
-def accelerations_of(s: System, r: Room, course: Course, q: np.ndarray, v: np.ndarray) -> float:
-    """Acceleration, m/s^2, that no point exceeds on the path, as its ends tell; q, v: room."""
+def accelerations_of(s: System, r: Room, course: Course, q: np.ndarray,
+                     v: np.ndarray) -> tuple[float, float]:
+    """Acceleration, m/s^2, that no point exceeds on the path, and that none exceeds as seen by what
+    falls freely, as its ends tell; q, v: room.
+    """
     bones, h = len(s.tree), course.path[0].length
     along(s.tree, course, 0.0, q, v)
     pose(s.tree, q, v, r.work)
@@ -140,12 +143,14 @@ def accelerations_of(s: System, r: Room, course: Course, q: np.ndarray, v: np.nd
     for k in range(len(s.geoms)):
         i = s.geoms[k].bone
         r.own[i, 4] = max(r.own[i, 4], s.geoms[k].reach)
-    most = 0.0
+    most = falling = 0.0
+    gx, gy, gz = s.gravity[0], s.gravity[1], s.gravity[2]
     for i in range(bones):
         x, y, z, w = bone_velocity(r.work, i)
         own, reach = r.own[i], r.own[i, 4]
-        size = math.sqrt((x - own[0]) ** 2 + (y - own[1]) ** 2 + (z - own[2]) ** 2) / h
-        size += abs(w - own[3]) / h * reach + 2 * max(w, own[3]) ** 2 * reach
-        most = max(most, size)
-    g = math.sqrt(s.gravity[0] ** 2 + s.gravity[1] ** 2 + s.gravity[2] ** 2)
-    return STEADY * (most + g) + 1e-3
+        x, y, z = (x - own[0]) / h, (y - own[1]) / h, (z - own[2]) / h
+        turning = abs(w - own[3]) / h * reach + 2 * max(w, own[3]) ** 2 * reach
+        most = max(most, math.sqrt(x * x + y * y + z * z) + turning)
+        falling = max(falling, math.sqrt((x - gx) ** 2 + (y - gy) ** 2 + (z - gz) ** 2) + turning)
+    g = math.sqrt(gx * gx + gy * gy + gz * gz)
+    return STEADY * (most + g) + 1e-3, STEADY * falling + 1e-3

@@ -11,6 +11,7 @@ import numpy as np
 from ..compiling.decorators import compiled
 from ..system import STICKS
 from .one_contact import on_disc
+from .sweep import velocities
 
 NEWTON_STEPS = 40
 """At the most; from the sweeps' end some three are. All are taken in full: on the way the residual
@@ -26,11 +27,7 @@ def residual(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarr
              phi: np.ndarray) -> float:
     """Alart and Curnier's function, in velocities: zero where p is the solution; its largest."""
     worst = 0.0
-    for i in range(n):
-        s = b[i]
-        for j in range(n):
-            s += W[i * n + j] * p[j]
-        u[i] = s
+    velocities(W, b, p, n, u)
     for c in range(m):
         a = rows[c]
         own = W[a * n + a]

@@ -59,28 +59,31 @@ def solve_small(r: Room, count: int, n: int, h: float, tolerance: float, thrown:
 
 @compiled
 def form_matrix(r: Room, count: int, n: int, compliance: float) -> None:
-    """W = Y Y^T, flat (n * n), its diagonal with the compliance."""
-    Y, W, wide = r.Y, r.W, r.vectors[5]
-    for j in range(len(wide)):
-        wide[j] = 0.0
+    """W = Y Y^T, flat (n * n), its diagonal with the compliance; row by row of Y^T, which a
+    processor does several columns of at once.
+    """
+    Y, W, YT = r.Y, r.W, r.YT
+    for x in range(len(YT)):
+        for e in range(n):
+            YT[x, e] = 0.0
     for k in range(count):
         i = int(r.need[1, k])
-        a, size = r.rows[k], r.contacts[i].support
-        for e in range(a, a + r.kinds[k]):
-            for x in range(size):
-                wide[r.support[i, x]] = Y[e, x]
-            for g in range(k + 1):
-                j = int(r.need[1, g])
-                for f in range(r.rows[g], r.rows[g] + r.kinds[g]):
-                    if f <= e:
-                        total = 0.0
-                        for x in range(r.contacts[j].support):
-                            total += Y[f, x] * wide[r.support[j, x]]
-                        W[e * n + f] = W[f * n + e] = total
-            for x in range(size):
-                wide[r.support[i, x]] = 0.0
-    for i in range(n):
-        W[i * n + i] *= 1 + compliance
+        for e in range(r.rows[k], r.rows[k] + r.kinds[k]):
+            for x in range(r.contacts[i].support):
+                YT[r.support[i, x], e] = Y[e, x]
+    for k in range(count):
+        i = int(r.need[1, k])
+        for e in range(r.rows[k], r.rows[k] + r.kinds[k]):
+            own = W[e * n:e * n + e + 1]
+            for f in range(e + 1):
+                own[f] = 0.0
+            for x in range(r.contacts[i].support):
+                share, row = Y[e, x], YT[r.support[i, x]]
+                for f in range(e + 1):
+                    own[f] += share * row[f]
+            for f in range(e):
+                W[f * n + e] = own[f]
+            own[e] *= 1 + compliance
 
 
 @compiled

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..system import STICKS
+from .active_set import is_convex, solve_active_set
 from .newton import newton
 from .one_contact import on_disc
 from .sweep import LIMIT, sweep
@@ -48,13 +49,19 @@ def solve_cones(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.nd
     Each round that Newton's method ends without a solution makes do with ten times as much.
     """
     done, worst = 0, math.inf
+    convex = is_convex(kinds, mu, roll, m)
+    if convex:
+        sweeps = 1
     for _ in range(ROUNDS):
         tolerance *= 10
         for _ in range(min(sweeps, 100)):
             done += 1
-            worst = sweep(kinds, rows, mu, roll, m, n, W, b, p)
+            worst = sweep(kinds, rows, mu, roll, m, n, W, b, p, room[0])
             if worst <= tolerance / 10:
                 return worst, done
+        if convex and solve_active_set(
+                kinds, rows, mu, m, n, W, b, p, tolerance / 10, room, G):
+            return tolerance / 10, done
         left = newton(kinds, rows, mu, roll, m, n, W, b, p, tolerance / 10, room, G)
         admissible(kinds, rows, mu, roll, m, p)
         if left <= tolerance:
