@@ -35,6 +35,9 @@ class PushQueue:
         self._scene = scene
         self._queue: list[_Active] = []
 
+    def __len__(self) -> int:
+        return len(self._queue)
+
     def bones(self, now: int) -> list[int]:
         """The bones that are being pushed."""
         return [active.bone for active in self._acting(now)]

@@ -176,6 +176,8 @@ class Simulation:
     def advance(self) -> State:
         """Go on by one tick; the state at its end. Raises Closed after close()."""
         end = self.time + self.tick
+        if self.asleep and not self._pushes and not self._hands.springs:
+            self.time = end
         while self.time < end:
             change = self._pushes.next_change(self.time)
             self._advance_until(end if change is None else min(end, change))
@@ -284,7 +286,7 @@ class Simulation:
             doll = self.scene.doll_of_bone[bone]
             self._sleep_detector.disturb(doll)
             ready[doll] = False
-        if not ready.any():
+        if not np.count_nonzero(ready):
             return
         ready |= engine.resting
         awake = np.bincount(engine.groups, ~ready) > 0

@@ -63,7 +63,7 @@ class SleepDetector:
         ``kinetic`` (d,) J are the dolls' energies of motion.
         """
         slow = kinetic <= self._most
-        if not self._pulled or not slow.any():
+        if not self._pulled or not np.count_nonzero(slow):
             self.disturb()
             return np.zeros(len(slow), bool)
         speeds = np.maximum(

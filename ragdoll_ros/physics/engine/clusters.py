@@ -139,7 +139,9 @@ class Clusters:
 
     def advance(self, duration: float, accuracy: Accuracy, resting: np.ndarray) -> None:
         """Take all clusters on by ``duration`` s, but for those of ``resting`` dolls (d,)."""
-        jobs = self._jobs[:, ~resting[self._firsts]] if resting.any() else self._jobs
+        jobs = self._jobs
+        if np.count_nonzero(resting):
+            jobs = jobs[:, ~resting[self._firsts]]
         if self._workers == 1 or jobs.shape[1] < 2:
             kernels.advance(jobs[0], duration, accuracy.step, accuracy.flight_error)
         else:
