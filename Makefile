@@ -56,11 +56,12 @@ slow: $(COMPILED) ## the tests that take minutes
 soak: $(COMPILED) ## 864 000 ticks, pushed, set back, with other scenes: nothing may grow; 25 min
 	@$(BIN)/python -m ragdoll_ros.ros.soak
 
-bench: $(COMPILED) ## cost of a tick and of its parts, of crowds, swings and the page, 30 min
+bench: $(COMPILED) ## cost of a tick and of its parts, of crowds, swings, people, the page, 30 min
 	@$(BIN)/python -m ragdoll_ros.ros.bench
 	@$(BIN)/python -m ragdoll_ros.ros.crowd_bench
 	@$(BIN)/python -m ragdoll_ros.accuracy.crowds
 	@$(BIN)/python -m ragdoll_ros.physics.swing.bench
+	@$(BIN)/python test/fit_cost.py
 	@$(BIN)/python test/page_cost.py
 
 report: $(COMPILED) ## accuracy against independent references, into docs/, 40 min

@@ -35,7 +35,7 @@ def _collide(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb, margin, out):
 
 @numba.njit
 def _separation(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb):
-    return separation(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb)
+    return separation(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb, math.inf)
 
 
 class Body:

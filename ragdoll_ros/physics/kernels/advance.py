@@ -64,12 +64,15 @@ def go_on(s: System, r: Room, course: Course, duration: float, step: float,
     parted = part_pairs(s, r, q, v)
     if parted:
         path.valid = path.begun = 0
-    if parted or not tally.seen or duration == 0.0:
+    if parted or duration == 0.0:
         look(s, r, q, v, r.gaps, math.inf, r.gaps)
         tally.seen = 1
     # What is no number would be gone through in the finest steps, which takes a second.
     while time < duration - 1e-12 and is_finite(q) and is_finite(v):
         left = duration - time
+        if not path.valid and not tally.seen:
+            look(s, r, q, v, r.gaps, math.inf, r.gaps)
+            tally.seen = 1
         if (not path.valid and flies and events < most
                 and may_fly(s, r, course, loads, step)
                 and begin_path(s, r, course, loads, tolerance,
@@ -78,8 +81,10 @@ def go_on(s: System, r: Room, course: Course, duration: float, step: float,
             tally.contacts = 0
         if path.valid:
             gone, touched = fly(s, r, course, left, loads)
+            tally.seen = 0
             if touched:
                 look(s, r, q, v, r.gaps, math.inf, r.gaps)
+                tally.seen = 1
         else:
             if not flies or events >= most:
                 look(s, r, q, v, r.gaps, math.inf, r.gaps)

@@ -135,11 +135,11 @@ def refined(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b
 
 @compiled
 def widest_axis(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int, size_b: np.ndarray,
-                rb: np.ndarray, cx: float, cy: float, cz: float) -> Axis:
-    """The axis of the largest s of all."""
+                rb: np.ndarray, cx: float, cy: float, cz: float, enough: float) -> Axis:
+    """The axis of the largest s of all, or one of which s is larger than ``enough``."""
     s, x, y, z = best_axis(
-        kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, 0.0, math.inf)
-    if kind_a == CYLINDER or kind_b == CYLINDER:
+        kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, 0.0, enough)
+    if s <= enough and (kind_a == CYLINDER or kind_b == CYLINDER):
         return refined(kind_a, size_a, ra, kind_b, size_b, rb, cx, cy, cz, s, x, y, z)
     return s, x, y, z
 

@@ -47,8 +47,9 @@ def collide(kind_a: int, size_a: np.ndarray, pa: np.ndarray, ra: np.ndarray, kin
 
 @compiled
 def separation(kind_a: int, size_a: np.ndarray, pa: np.ndarray, ra: np.ndarray, kind_b: int,
-               size_b: np.ndarray, pb: np.ndarray, rb: np.ndarray) -> float:
-    """Signed distance of two bodies, m: positive just when they are disjoint.
+               size_b: np.ndarray, pb: np.ndarray, rb: np.ndarray, enough: float) -> float:
+    """Signed distance of two bodies, m: positive just when they are disjoint. Of what is farther
+    apart than ``enough`` a bound below it that is too will do.
 
     It is continuous, and while they touch its rate is the relative velocity along the normal. With
     a sphere or capsule, or a cylinder, it is the distance while they are apart; of two boxes the
@@ -60,5 +61,5 @@ def separation(kind_a: int, size_a: np.ndarray, pa: np.ndarray, ra: np.ndarray, 
     if kind_a <= CAPSULE:
         return round_separation(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb)
     s, _, _, _ = widest_axis(kind_a, size_a, ra, kind_b, size_b, rb, pa[0] - pb[0], pa[1] - pb[1],
-                             pa[2] - pb[2])
+                             pa[2] - pb[2], enough)
     return s

@@ -130,7 +130,7 @@ def round_separation(kind_a: int, size_a: np.ndarray, pa: np.ndarray, ra: np.nda
     gap, _, _, _ = distance(kind_b, size_b, px + t * ux, py + t * uy, pz + t * uz, ux, uy)
     if gap < 0 and kind_b >= BOX and size_a[1] > 0:
         gap, _, _, _ = widest_axis(kind_a, size_a, ra, kind_b, size_b, rb, pa[0] - pb[0],
-                                   pa[1] - pb[1], pa[2] - pb[2])
+                                   pa[1] - pb[1], pa[2] - pb[2], math.inf)
     return gap - size_a[0]
 
 
@@ -153,7 +153,7 @@ def round_contacts(kind_a: int, size_a: np.ndarray, pa: np.ndarray, ra: np.ndarr
     name, count = 2.0, 0
     if gap < 0 and kind_b >= BOX and half > 0:
         gap, nx, ny, nz = widest_axis(kind_a, size_a, ra, kind_b, size_b, rb, pa[0] - pb[0],
-                                      pa[1] - pb[1], pa[2] - pb[2])
+                                      pa[1] - pb[1], pa[2] - pb[2], math.inf)
         nx, ny, nz = into(rb, nx, ny, nz)
     elif half > 0:
         lo, hi = _shadow(kind_b, size_b, px, py, pz, ux, uy, uz, half, nx, ny, nz)

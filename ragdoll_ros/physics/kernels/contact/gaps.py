@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from ..collision.pair import separation
+from ..collision.shapes import CAPSULE, SPHERE, extent
 from ..compiling.decorators import compiled
 from ..dynamics.forward import Work, pose
 from ..maths.quaternion import cross, times, to_matrix, turned
@@ -125,7 +126,9 @@ def ground_point(geom: np.record, k: int, at: np.ndarray, turn: np.ndarray, n: n
 @compiled
 def all_gaps(s: System, q: np.ndarray, r: Room, before: np.ndarray, h: float,
              out: np.ndarray) -> None:
-    """All gaps; work is posed at q. ``before``: those h s earlier; h infinite: unknown."""
+    """All gaps; work is posed at q. ``before``: those h s earlier; h infinite: unknown. What bones
+    were moved and turned since beside their velocities: r.own[:, 2] m, r.own[:, 3] rad.
+    """
     place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
     n = 0
     for k in range(len(s.geoms)):
@@ -145,12 +148,17 @@ def all_gaps(s: System, q: np.ndarray, r: Room, before: np.ndarray, h: float,
             out[n + k] = NEVER
             continue
         a, b = s.geoms[s.pairs[k].a], s.geoms[s.pairs[k].b]
-        least = before[n + k] - 2 * h * (
-            r.own[a.bone, 0] + r.own[b.bone, 0] + r.own[a.bone, 1] * a.reach
-            + r.own[b.bone, 1] * b.reach)
+        least = before[n + k] - 2 * (
+            way(r.own[a.bone], a.reach, h) + way(r.own[b.bone], b.reach, h))
         out[n + k] = least if least > NEAR else pair_gap(
             a, b, r.at[s.pairs[k].a], r.turn[s.pairs[k].a], r.at[s.pairs[k].b],
             r.turn[s.pairs[k].b])
+
+
+@compiled
+def way(own: np.ndarray, reach: float, h: float) -> float:
+    """How far, m, a point of a bone within its reach goes in h s; see all_gaps()."""
+    return h * (own[0] + own[1] * reach) + own[2] + own[3] * reach
 
 
 @compiled
@@ -207,14 +215,31 @@ def bone_velocity(work: Work, i: int) -> tuple[float, float, float, float]:
 
 
 @compiled
+def along(kind: int, size: np.ndarray, r: np.ndarray, x: float, y: float, z: float) -> float:
+    """How far, m, a geom reaches from its centre along a unit vector of the world."""
+    if kind == SPHERE:
+        return size[0]
+    reach = extent(kind, size, r, x, y, z)
+    return reach + size[0] if kind == CAPSULE else reach
+
+
+@compiled
 def pair_gap(a: np.record, b: np.record, pa: np.ndarray, ra: np.ndarray, pb: np.ndarray,
              rb: np.ndarray) -> float:
-    """Separation of two geoms, m; of what is farther apart than NEAR, a bound below it."""
-    far = math.sqrt((pa[0] - pb[0]) ** 2 + (pa[1] - pb[1]) ** 2 + (pa[2] - pb[2]) ** 2) - (
-        a.radius + b.radius)
+    """Separation of two geoms, m; of what is farther apart than NEAR, a bound below it: that of
+    spheres around them, then that along the line of their centres.
+    """
+    x, y, z = pa[0] - pb[0], pa[1] - pb[1], pa[2] - pb[2]
+    length = math.sqrt(x * x + y * y + z * z)
+    far = length - (a.radius + b.radius)
     if far > NEAR:
         return far
-    return separation(a.kind, a.size, pa, ra, b.kind, b.size, pb, rb)
+    if length > NEAR:
+        x, y, z = x / length, y / length, z / length
+        far = length - along(a.kind, a.size, ra, x, y, z) - along(b.kind, b.size, rb, x, y, z)
+        if far > NEAR:
+            return far
+    return separation(a.kind, a.size, pa, ra, b.kind, b.size, pb, rb, NEAR)
 
 
 @compiled

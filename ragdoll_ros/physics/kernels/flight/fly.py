@@ -7,7 +7,7 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..contact.find import find_contacts
-from ..contact.gaps import TOUCHING, look
+from ..contact.gaps import TOUCHING, look, place_geoms
 from ..dynamics.forward import pose, rates
 from ..stepping.control import forget_reaction
 from ..stepping.work import power
@@ -44,7 +44,8 @@ def may_fly(s: System, r: Room, course: Course, loads: np.ndarray, step: float) 
     for i in range(tally.contacts):
         if tally.settled and course.known[i].impulse[0] > least:
             return False
-    look(s, r, q, v, r.gaps, math.inf, r.gaps)
+    pose(s.tree, q, v, r.work)
+    place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
     m = find_contacts(s, q, r, r.gaps, TOUCHING)
     leaning = False
     for i in range(m):
@@ -69,6 +70,7 @@ def may_fly(s: System, r: Room, course: Course, loads: np.ndarray, step: float) 
         pose(s.tree, q, v, r.work)
     if m == 0 or len(s.tree) == len(r.given):
         return True
+    look(s, r, q, v, r.gaps, math.inf, r.gaps)
     fast = 0.0
     for k in range(len(s.geoms)):
         move = r.work.moves[s.geoms[k].bone]

@@ -6,11 +6,10 @@ squares) goes downhill at every turn, so it ends, however alike the rows of one 
 """
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ..compiling.decorators import compiled
+from ..maths.cholesky import factor_row, substitute
 from ..system import STICKS
 from .sweep import LIMIT, ROLLING, velocities
 
@@ -41,7 +40,9 @@ def solve_active_set(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, m: int
     if not factor_rows(W, n, places, 0, count, U):
         return False
     for _ in range(TURNS * m + 8):
-        solve_rows(U, n, places, count, b, z)
+        for k in range(count):
+            z[k] = -b[int(places[k])]
+        substitute(U, n, count, z)
         share, drop = 1.0, -1
         for k in range(count):
             i = int(places[k])
@@ -100,18 +101,11 @@ def factor_rows(W: np.ndarray, n: int, places: np.ndarray, start: int, count: in
                 U: np.ndarray) -> bool:
     """Cholesky's factor, U^T U = W at ``places``, from row ``start`` on; whether there is one."""
     for i in range(start, count):
-        at, own = int(places[i]) * n, U[i * n:i * n + count]
+        at = int(places[i]) * n
         for j in range(i, count):
-            own[j] = W[at + int(places[j])]
-        for k in range(i):
-            above, share = U[k * n:k * n + count], U[k * n + i]
-            for j in range(i, count):
-                own[j] -= share * above[j]
-        if not own[i] > 0:
+            U[i * n + j] = W[at + int(places[j])]
+        if not factor_row(U, n, i, count):
             return False
-        scale = 1 / math.sqrt(own[i])
-        for j in range(i, count):
-            own[j] *= scale
     return True
 
 
@@ -134,24 +128,6 @@ def leave_out(U: np.ndarray, n: int, places: np.ndarray, drop: int, count: int) 
     for k in range(drop):
         for j in range(drop, count):
             U[k * n + j] = U[k * n + j + 1]
-
-
-@compiled
-def solve_rows(U: np.ndarray, n: int, places: np.ndarray, count: int, b: np.ndarray,
-               z: np.ndarray) -> None:
-    """Put the solution of U^T U z = -b at ``places`` into z (count,)."""
-    for k in range(count):
-        z[k] = -b[int(places[k])]
-    for k in range(count):
-        own = U[k * n:k * n + count]
-        z[k] /= own[k]
-        for j in range(k + 1, count):
-            z[j] -= z[k] * own[j]
-    for k in range(count - 1, -1, -1):
-        s = z[k]
-        for j in range(k + 1, count):
-            s -= U[k * n + j] * z[j]
-        z[k] = s / U[k * n + k]
 
 
 @compiled

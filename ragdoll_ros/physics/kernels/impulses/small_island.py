@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..maths.cholesky import solve
+from ..maths.cholesky import factor_row, substitute
 from ..system import COMPLIANCE, OF_IMPACTS, Room
 from .solver import solve_impulses, solve_normals, weaken_by
 
@@ -113,7 +113,9 @@ def follow_curve(r: Room, count: int, n: int) -> None:
                 for j in range(n):
                     G[i * n + j] = G[j * n + i] = 0.0
                 G[i * n + i], x[i] = 1.0, 0.0
-    solve(G[:n * n].reshape((n, n)), x[:n])
+    for i in range(n):
+        factor_row(G, n, i, n)
+    substitute(G, n, n, x)
     for i in range(n):
         b[i] += curve[i] - (NO_MOTION * W[i * n + i] + LOCKED * most) * x[i]
 

@@ -1,10 +1,13 @@
 """Depths given back in position alone, as far as motion can pay and joints allow."""
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..contact.gaps import BEYOND, BURIED, TOUCHING
+from ..contact.gaps import BEYOND, BURIED, TOUCHING, bone_velocity
+from ..dynamics.bias import update_moves
 from ..maths.quaternion import cross
 from ..system import Room, System
 from .momentum import inner_energy
@@ -46,6 +49,23 @@ def pay(s: System, r: Room, m: int, shift: np.ndarray) -> None:
         for j in range(len(shift)):
             shift[j] *= share
         r.lift[0] *= share
+
+
+@compiled
+def enter_shift(s: System, r: Room, q: np.ndarray, shift: np.ndarray) -> None:
+    """Enter by how much a ``shift`` (nv,) moves and turns each bone, m and rad, into r.own[:, 2:4];
+    work is posed about there.
+    """
+    some = False
+    for j in range(len(shift)):
+        some |= shift[j] != 0.0
+    if some:
+        update_moves(s.tree, q, shift, r.work)
+    for i in range(len(s.tree)):
+        r.own[i, 2] = r.own[i, 3] = 0.0
+        if some:
+            x, y, z, r.own[i, 3] = bone_velocity(r.work, i)
+            r.own[i, 2] = math.sqrt(x * x + y * y + z * z)
 
 
 @compiled

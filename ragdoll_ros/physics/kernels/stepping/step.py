@@ -21,7 +21,7 @@ from ..dynamics.mass import crba, factor, root_axes, solve_lower, solve_upper, t
 from ..impulses.response import respond
 from ..system import STICKS, Course, Room, System
 from .forces import lag, pull, root_q, stiffen, weaken
-from .give_back import keep_limits, lifted, pay
+from .give_back import enter_shift, keep_limits, lifted, pay
 from .momentum import give_contacts, keep_momentum, sum_dolls
 from .warm_start import warm_start
 from .work import enter_work, reached
@@ -176,6 +176,7 @@ def settle(s: System, r: Room, course: Course, h: float, loads: np.ndarray, spri
         pose(s.tree, end_q, end_v, r.work)
         sum_dolls(s, end_q, r, r.after)
         keep_momentum(s, r, h, end_q, end_v)
+    enter_shift(s, r, end_q, r.vectors[3])
     look(s, r, end_q, end_v, r.gaps, h, r.later)
     sum_dolls(s, end_q, r, r.after)
     r.tally[0].pushed += reached(s, r, end_q, loads) - r.lift[1]
