@@ -78,6 +78,13 @@ class Teleop(Node):
             self._reset.call_async(Trigger.Request())
         return key not in 'qQ'
 
+    def go_on(self) -> bool:
+        """Let the time go on; False if there is no node to tell."""
+        if not self._pause.service_is_ready():
+            return False
+        self._pause.call_async(SetBool.Request(data=False))
+        return True
+
     def send(self, now: float) -> str:
         """Send the push of the keys that are held, once zero when none is; say which it is."""
         keys = self.held.at(now)

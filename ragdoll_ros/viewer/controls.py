@@ -58,7 +58,7 @@ class Controls:
         self.pause = gui.add_button('Pause', icon='player-pause', hint='Space')
         self.step_button = gui.add_button('Step', icon='player-track-next', disabled=True,
                                           hint='N; while paused; ends editing')
-        reset = gui.add_button('Reset', icon='player-skip-back', hint='R')
+        self.reset = gui.add_button('Reset', icon='player-skip-back', hint='R')
         self.pace = gui.add_slider('Pace', *PACES, step=0.05, initial_value=1.0,
                                    hint='simulated seconds for each second on the wall')
         self.scene = gui.add_dropdown('Scene', (OTHER, *scene_names()), initial_value=OTHER)
@@ -73,7 +73,8 @@ class Controls:
             command.on_trigger(lambda _, arrow=arrow: self.push(arrow))
         for button, label, key, action in (
                 (self.pause, 'Pause, or go on', 'space', self.toggle_pause),
-                (self.step_button, 'Step', 'N', self.step), (reset, 'Reset', 'R', source.reset)):
+                (self.step_button, 'Step', 'N', self.step),
+                (self.reset, 'Reset', 'R', source.reset)):
             command = gui.add_command(label, hotkey=key)
             for trigger in (button.on_click, command.on_trigger):
                 trigger(lambda _, action=action: action())
@@ -104,6 +105,12 @@ class Controls:
         if report.pace != self._shown.pace:
             self.pace.value = min(max(report.pace, PACES[0]), PACES[1])
         self._shown = report
+
+    def show_rest(self, lies: bool) -> None:
+        """Invite to another fall once one is over."""
+        label = 'Again' if lies else 'Reset'
+        if label != self.reset.label:
+            self.reset.label, self.reset.color = label, 'green' if lies else None
 
     def show_scene(self, name: str) -> None:
         """Show which scene it is.
