@@ -20,7 +20,7 @@ from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 from std_srvs.srv import SetBool, Trigger
 
-from ..physics.arrow_keys import FORCES, TAP, Held, total
+from ..physics.arrow_keys import DIRECTIONS, TAP, Held, total
 from .followed import Followed
 from .keys import Keyboard
 from .session import ros_session
@@ -69,7 +69,7 @@ class Teleop(Node):
 
     def take(self, key: str, down: bool, now: float) -> bool:
         """Do what a key says; False to quit."""
-        if key in FORCES:
+        if key in DIRECTIONS:
             self.held.tap = TAP / self.status.pace
             self.held.take(key, down, now)
         elif key == ' ':

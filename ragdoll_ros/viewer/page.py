@@ -81,6 +81,7 @@ class Page:
         clients = list(self.server.get_clients().values())
         is_open = bool(clients)
         self.source.want(self.view.wanted if is_open else Wanted())
+        self.controls.pushes.keep(time.monotonic())
         if is_open:
             frame, report = self.source.frame, self.source.report
             if frame is not None and frame is not self.frame:
@@ -106,6 +107,7 @@ class Page:
             self.stage = Stage(self.server, frame)
             self._pointer.attach(self.stage.bodies, self.stage.skins)
             self.controls.show_scene(frame.scene.name)
+            self.controls.pushes.show_scene(frame.scene)
             self.view.show_scene(has_skin=bool(self.stage.skins.handles))
             self._edit(frame.scene)
         self.frame = frame
