@@ -107,8 +107,9 @@ def chromium():
 class View:
     """One page of a viewer, at ``url``."""
 
-    def __init__(self, context, url):
+    def __init__(self, context, url, size=SIZE):
         self.page = context.new_page()
+        self.page.set_viewport_size(size)
         self.errors = []
         self.page.on('pageerror', lambda error: self.errors.append(str(error)))
         self.go(url)
@@ -193,9 +194,9 @@ class View:
 
 
 @contextmanager
-def opened(browser, url, scene):
+def opened(browser, url, scene, size=SIZE):
     """A page at an address, with all bones in it; no script of it has failed at the end."""
-    view = View(browser, url)
+    view = View(browser, url, size)
     try:
         view.wait(lambda: np.isfinite(view.bodies(scene)).all())
         yield view

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import time
 
 import numpy as np
@@ -135,14 +136,27 @@ def test_arrow_keys_push(page, label, axis, sign):
 
 
 def test_a_key_that_comes_again_and_again_is_held(page):
-    """As a browser sends it: 2000 N all the while, 36 m/s^2."""
+    """As a browser tells it: 2000 N all the while, 36 m/s^2; nothing once it is let go."""
     client = page.open()
     wait(lambda: page.frame)
+    counts = itertools.count()
 
     def fast():
-        client.press(page, 'Push up')
+        client.update(page.controls.pushes.told, f'{next(counts)} up')
         return page.frame.state.linear_velocities[0, 0] < -5
     wait(fast)
+    client.update(page.controls.pushes.told, f'{next(counts)}')
+    wait(lambda: not any(any(push.force) for push in page.frame.pushes))
+
+
+def test_the_strength_is_that_of_the_slider(page):
+    client = page.open()
+    wait(lambda: page.frame)
+    client.press(page, 'Pause, or go on')
+    wait(lambda: page.source.report.paused)
+    client.update(page.controls.pushes.strength, 350.0)
+    client.update(page.controls.pushes.told, '0 right')
+    wait(lambda: page.frame.pushes and page.frame.pushes[0].force[:2] == (0, 350))
 
 
 def test_arrows_pressed_together_add_up(page):
@@ -150,8 +164,7 @@ def test_arrows_pressed_together_add_up(page):
     wait(lambda: page.frame)
     client.press(page, 'Pause, or go on')
     wait(lambda: page.source.report.paused)
-    client.press(page, 'Push up')
-    client.press(page, 'Push left')
+    client.update(page.controls.pushes.told, '0 up left')
     wait(lambda: page.frame.pushes and page.frame.pushes[0].force == (-2000, -2000, 2))
 
 

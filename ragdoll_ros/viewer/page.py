@@ -17,8 +17,11 @@ from .drawing.stage import Stage
 from .drawing.view import View
 from .editor.editor import Editor
 from .editor.form import RED, colored
+from .hint import hint
+from .opening import Opening
 from .pointer import Pointer
 from .recording_panel import RecordingPanel
+from .rest import Rest
 from .sources.source import Frame, Source, Wanted
 
 PERIOD = 1 / 60
@@ -44,6 +47,8 @@ class Page:
         """What is shown; None before the first."""
         self.stage: Stage | None = None
         """All that is drawn of the scene that is shown; None before the first frame."""
+        self.opening: Opening | None = None
+        """Lets a source go that waits to be seen; None where none does."""
         self._folder = folder
         light(server)
         server.gui.configure_theme(show_logo=False, show_share_button=False)
@@ -58,6 +63,8 @@ class Page:
         with self.tabs.add_tab('Plots'):
             self.plots = Plots(server)
         self._follower = Follower(server)
+        server.on_client_connect(hint)
+        self._rest = Rest()
         self._pointer = Pointer(source, lambda: self.frame, self._select)
 
     def run(self, stop: threading.Event) -> None:
@@ -71,8 +78,10 @@ class Page:
 
     def update(self) -> bool:
         """Draw what has changed; returns whether any page is open."""
-        is_open = bool(self.server.get_clients())
+        clients = list(self.server.get_clients().values())
+        is_open = bool(clients)
         self.source.want(self.view.wanted if is_open else Wanted())
+        self.controls.pushes.keep(time.monotonic())
         if is_open:
             frame, report = self.source.frame, self.source.report
             if frame is not None and frame is not self.frame:
@@ -81,12 +90,15 @@ class Page:
                 now = time.monotonic()
                 self.plots.show(frame, report, now)
                 self._follower.follow(frame, now, self.view.follow.value)
+                self.controls.show_rest(self._rest.lies(frame, report.paused, now))
             if self.stage is not None:
                 self.stage.be_visible(bones=self.view.bones.value, skins=self.view.skin.value)
             if self.editor is not None:
                 self.editor.take_note(report.paused)
             self._tell(report.problem, report.note)
             self.controls.show(report)
+        if self.opening is not None:
+            self.opening.look(clients, self.frame is not None, time.monotonic())
         return is_open
 
     def _draw(self, frame: Frame) -> None:
@@ -95,6 +107,7 @@ class Page:
             self.stage = Stage(self.server, frame)
             self._pointer.attach(self.stage.bodies, self.stage.skins)
             self.controls.show_scene(frame.scene.name)
+            self.controls.pushes.show_scene(frame.scene)
             self.view.show_scene(has_skin=bool(self.stage.skins.handles))
             self._edit(frame.scene)
         self.frame = frame
