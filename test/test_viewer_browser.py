@@ -13,8 +13,8 @@ from test_fit_broken import BROKEN
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.viewer.sources.recording import Recording
-from ragdoll_ros.viewer.sources.recording_file import load_recording, recording_bytes
+from ragdoll_ros.recordings.mcap_file import load_recording, recording_bytes
+from ragdoll_ros.recordings.recording import Recording
 
 SCENE = load_scene('drop')
 START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])

@@ -122,8 +122,8 @@ def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
     if options.engine is not None and options.scene is None:
         raise CannotServe(f'--engine {options.engine}: only with --scene')
     if options.play is not None:
+        from ..recordings.mcap_file import load_recording
         from .sources.playback import Playback
-        from .sources.recording_file import load_recording
         return Playback(load_recording(options.play), Path(options.play).name)
     if options.scene is not None:
         scene = load_scene(options.scene)

@@ -9,7 +9,7 @@ import numpy as np
 from ...model import errors
 from ...model.scene import Scene
 from ...model.state import State
-from .recording import Recording
+from ...recordings.recording import Recording
 from .source import PACES, Frame, Report, Source, Wanted
 
 
