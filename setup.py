@@ -86,7 +86,7 @@ setup(
         'viewer': ['viser', 'imageio', 'mcap'],
         'replay': ['mcap'],
         'test': ['pytest', 'pytest-xdist', 'ruff', 'setuptools', 'wheel', 'yourdfpy', 'rosbags',
-                 'playwright', 'mannequin-x; python_version >= "3.11"'],
+                 'playwright', 'pygltflib', 'bvhio', 'mannequin-x; python_version >= "3.11"'],
         'colcon': ['colcon-core', 'colcon-ros', 'colcon-python-setup-py',
                    'colcon-common-extensions', 'setuptools<80'],
     },

@@ -13,9 +13,11 @@ _HOMES = {
     'Ground': 'model.scene', 'Joint': 'model.ragdoll', 'Part': 'model.shapes',
     'Placement': 'model.scene',
     'Push': 'model.push', 'Ragdoll': 'model.ragdoll', 'RagdollError': 'model.errors',
+    'Recorder': 'recordings.recording',
     'Scene': 'model.scene', 'Simulation': 'physics.simulation', 'Sphere': 'model.shapes',
     'State': 'model.state', 'load_doll': 'files.doll', 'load_scene': 'files.scene',
-    'save_doll': 'files.doll', 'save_scene': 'files.scene'}
+    'save_doll': 'files.doll', 'save_scene': 'files.scene',
+    'save_recording': 'recordings.save'}
 __all__ = list(_HOMES)
 
 

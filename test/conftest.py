@@ -10,7 +10,8 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 
 FILES_THAT_NEED = {'rclpy': ['test_ros_*.py'],
-                   'mcap': ['test_replay*.py', 'test_ros_replay.py', 'test_viewer_recording.py'],
+                   'mcap': ['test_replay*.py', 'test_ros_replay.py', 'test_viewer_recording.py',
+                            'test_recordings_formats.py'],
                    'rosbags': ['test_replay*.py', 'test_ros_replay.py', 'test_viewer_recording.py'],
                    'viser': ['test_viewer*.py', 'test_editor*.py', 'test_ros_browser.py']}
 

@@ -33,8 +33,8 @@ from page_cost import cpu  # noqa: E402
 from ragdoll_ros.files.scene import load_scene  # noqa: E402
 from ragdoll_ros.model import rotation  # noqa: E402
 from ragdoll_ros.model.scene import Scene  # noqa: E402
+from ragdoll_ros.recordings.recording import Recording  # noqa: E402
 from ragdoll_ros.viewer.sources.playback import Playback  # noqa: E402
-from ragdoll_ros.viewer.sources.recording import Recording  # noqa: E402
 
 SECONDS = 5.0
 """That a measurement lasts."""

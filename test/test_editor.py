@@ -20,10 +20,10 @@ from ragdoll_ros.files.scene import load_scene, save_scene  # noqa: E402
 from ragdoll_ros.model import errors, rotation  # noqa: E402
 from ragdoll_ros.model.scene import above_ground  # noqa: E402
 from ragdoll_ros.physics.simulation import Simulation  # noqa: E402
+from ragdoll_ros.recordings.recording import Recording  # noqa: E402
 from ragdoll_ros.viewer.editor import changes, folder  # noqa: E402
 from ragdoll_ros.viewer.editor.editor import Editor  # noqa: E402
 from ragdoll_ros.viewer.sources.playback import Playback  # noqa: E402
-from ragdoll_ros.viewer.sources.recording import Recording  # noqa: E402
 from ragdoll_ros.viewer.sources.simulated import Simulated  # noqa: E402
 from ragdoll_ros.viewer.sources.source import Wanted  # noqa: E402
 
@@ -586,7 +586,7 @@ def test_characters_do_not_overwrite_each_other(desk):
 
 def test_a_limb_moves_with_its_skin(desk):
     """The skin's own bones go with the bodies that carry them; the size is not guessed anew."""
-    from ragdoll_ros.viewer.drawing.skin import skin_of
+    from ragdoll_ros.fit.skin import skin_of
     desk.files.fit('mixamo.glb', fit_rigs.document(fit_rigs.RIGS['mixamo']).glb())
     before = skin_of(desk.editor.scene.dolls[0].doll)
     desk.editor.select('mixamorig:LeftArm')

@@ -39,7 +39,8 @@ LAUNCHED = {'launch', 'launch_ros', 'launch_xml'}
 """What the files in launch/ are read by."""
 CALLED = {'pycollada'}
 """What a library imports in our stead: trimesh, to read DAE."""
-EXTRAS = {'fit': 'fit', 'viewer': 'viewer', 'accuracy': 'report', 'replay': 'replay'}
+EXTRAS = {'fit': 'fit', 'viewer': 'viewer', 'accuracy': 'report', 'replay': 'replay',
+          'recordings': 'replay'}
 """The other rooms, and the extra that brings what each needs beyond that."""
 
 COUNT_POSES = """

@@ -5,8 +5,10 @@ import importlib
 import importlib.util
 import io
 import json
+import os
 import re
 import shlex
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -64,10 +66,14 @@ def words_of(line):
 
 @functools.cache
 def run(text):
-    """Names that a block of Python leaves, and what it has `printed`."""
-    names, printed = {'__name__': 'block'}, io.StringIO()
-    with contextlib.redirect_stdout(printed):
-        exec(compile(text, 'block', 'exec'), names)
+    """Names that a block of Python leaves, and what it has `printed`; its files are nobody's."""
+    names, printed, here = {'__name__': 'block'}, io.StringIO(), Path.cwd()
+    with contextlib.redirect_stdout(printed), tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        try:
+            exec(compile(text, 'block', 'exec'), names)
+        finally:
+            os.chdir(here)
     return {**names, 'printed': printed.getvalue()}
 
 

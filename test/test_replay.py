@@ -5,6 +5,7 @@ import dataclasses
 import json
 import sys
 
+import numpy as np
 import pytest
 from bags import messages_of_a_run, write_bag
 from digests import disturb
@@ -13,6 +14,8 @@ from mcap.writer import Writer as McapWriter
 
 from ragdoll_ros.files.run_scene import run_scene_text, versions
 from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.recordings.save import FORMATS
 from ragdoll_ros.replay.command import main
 
 TICKS = 200
@@ -282,3 +285,28 @@ def test_a_call_that_cannot_be_says_why(tmp_path, capsys, words, told):
     with pytest.raises(SystemExit) as ended:
         main([str(tmp_path), *words])
     assert ended.value.code == 2 and told in capsys.readouterr().err
+
+
+def test_a_run_is_saved_as_it_was_repeated(tmp_path, replay, messages):
+    """Every tick's poses as a simulation here has them, over the reset; in each format a file."""
+    with Simulation(load_scene('drop')) as simulation:
+        expected = []
+        for tick in range(TICKS):
+            act(simulation, tick)
+            expected.append(simulation.advance().positions[0].tolist())
+    write_bag(tmp_path / 'bag', messages)
+    files = [tmp_path / f'run{suffix}' for suffix in FORMATS]
+    code, said, warned = replay(tmp_path / 'bag', *(f'--save={file}' for file in files))
+    assert (code, warned) == (0, '') and all(f'{file}: ' in said for file in files)
+    table = np.genfromtxt(tmp_path / 'run.csv', delimiter=',', skip_header=1)
+    # The start comes first; the instant of the reset is the one that was there.
+    kept = {tuple(row) for row in table[:, 1:4].tolist()}
+    assert {tuple(row) for row in expected} <= kept and len(kept) <= TICKS + 1
+    code, said, _ = replay(tmp_path / 'run.mcap', '--save', tmp_path / 'again.csv')
+    assert code == 0 and (tmp_path / 'again.csv').read_text().splitlines()[5] == (
+        tmp_path / 'run.csv').read_text().splitlines()[5]
+
+
+def test_a_name_without_a_format_is_refused_at_once(tmp_path, replay):
+    code, said, warned = replay(tmp_path / 'nowhere', '--save', 'run.fbx')
+    assert (code, said) == (2, '') and 'run.fbx' in warned and '.glb' in warned

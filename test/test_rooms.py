@@ -16,15 +16,16 @@ ARROWS = {
     'physics': {'files', 'model'},
     'fit': {'physics', 'files', 'model'},
     'ros': {'physics', 'files', 'model'},
-    'viewer': {'physics', 'fit', 'files', 'model'},
-    'replay': {'physics', 'files', 'model'},
+    'recordings': {'physics', 'files', 'model'},
+    'viewer': {'physics', 'fit', 'recordings', 'files', 'model'},
+    'replay': {'physics', 'fit', 'recordings', 'files', 'model'},
     'accuracy': {'physics', 'files', 'model'}}
 """What a room may import of others."""
 
 ONLY = {'pybullet': 'physics/engine/bullet.py', 'mujoco': 'physics/engine/mujoco.py',
         'numba': 'physics/kernels/', 'viser': 'viewer/', 'matplotlib': ('fit/', 'accuracy/'),
         'trimesh': 'fit/robots/mesh_file.py', 'DracoPy': 'fit/reading/draco.py',
-        'scipy': 'accuracy/', 'mcap': ('files/bag.py', 'viewer/sources/recording_file.py')}
+        'scipy': 'accuracy/', 'mcap': ('files/bag.py', 'recordings/mcap_file.py')}
 """Libraries, and the one place of each. The report's pendulum in three lines of PyBullet alone is
 what a user would write without this package: it shares no code with it."""
 
@@ -33,7 +34,7 @@ FLOORS = {
                         'contact', 'impulses', 'stepping', 'flight', 'advance', 'loaded',
                         '__main__'),
     'fit': ('roles', 'shapes', 'reading', 'skeleton', 'bodies', 'joints', 'robots', 'carried',
-            'pipeline', 'judging', 'report', 'dials', 'picture', 'command')}
+            'skin', 'pipeline', 'judging', 'report', 'dials', 'picture', 'command')}
 """Of a room: each stands on those before it."""
 
 Edges = list[tuple[str, str]]

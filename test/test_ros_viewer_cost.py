@@ -1,10 +1,17 @@
 """What the page costs and what the node keeps meanwhile; `make bench` prints the figures."""
 from __future__ import annotations
 
+import threading
+import time
+
 import pytest
 
 pytest.importorskip('viser')
-from page_cost import many_dolls, one_doll, row
+
+from page_client import served, wait
+from page_cost import bench, many_dolls, one_doll, row
+
+from ragdoll_ros.viewer.sources.remote import Remote
 
 pytestmark = pytest.mark.slow
 
@@ -51,3 +58,34 @@ def test_five_hundred_bones_are_shown(ros):
     assert cost.viewer < 0.3
     # Steady: not in bursts.
     assert cost.gaps[0] < 1.5 / cost.pages
+
+
+def test_a_minute_of_scrubbing_costs_the_node_nothing(ros):
+    """Twenty instants a second, as a hand drags: the node keeps its rate, and needs what it needs
+    for a page that looks at it live. The viewer is in this process, with the page's other half.
+    """
+    with bench(1, twin=True) as node, served(Remote([])) as page:
+        client = page.open()
+        wait(lambda: page.timeline.cut is not None and page.timeline.cut.duration > 5)
+        live = node.measure()
+        stop = threading.Event()
+
+        def scrub():
+            count = 0
+            while not stop.wait(0.05):
+                count += 1
+                client.update(page.timeline.slider, round(count * 0.07 % 5, 3))
+
+        hand = threading.Thread(target=scrub)
+        hand.start()
+        wait(lambda: not page.timeline.is_live)
+        begin, used = time.monotonic(), time.process_time()
+        costs = [node.measure() for _ in range(6)]
+        share = (time.process_time() - used) / (time.monotonic() - begin)
+        stop.set()
+        hand.join()
+    print(row('live', live), *(row('scrubbed', cost) for cost in costs), share, sep='\n')
+    assert not page.timeline.is_live and share < 0.25
+    assert sum(cost.rate for cost in costs) / 6 == pytest.approx(100, rel=0.01)
+    ratios = sorted(cost.node / cost.twin for cost in costs)
+    assert ratios[2] < live.node / live.twin * (1 + NOISE)

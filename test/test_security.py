@@ -21,6 +21,7 @@ WRITERS = {
     'fit/command.py': '--out, --urdf', 'fit/picture.py': '--picture',
     'physics/engine/bullet.py': 'a temporary file', 'physics/engine/hush.py': 'os.devnull',
     'physics/kernels/compiling/cache.py': 'machine code, NUMBA_CACHE_DIR',
+    'recordings/save.py': '--save, save_recording(path)', 'viewer/static.py': '--static',
     'ros/crowd_bench.py': 'a temporary file', 'ros/rescue.py': 'dump_directory',
     'ros/state_dump.py': 'dump_directory', 'viewer/editor/folder.py': '--folder'}
 """Files that write files, and what says where."""

@@ -17,8 +17,8 @@ from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame
 from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.model.shapes import Capsule, Sphere
 from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.recordings.recording import Recording
 from ragdoll_ros.viewer.sources.playback import Playback
-from ragdoll_ros.viewer.sources.recording import Recording
 from ragdoll_ros.viewer.sources.simulated import Simulated
 from ragdoll_ros.viewer.sources.source import Wanted
 

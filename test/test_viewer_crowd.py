@@ -17,11 +17,11 @@ from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.recordings.recording import Recording
 from ragdoll_ros.viewer.drawing import joint_limits, skin
 from ragdoll_ros.viewer.drawing.joint_limits import PIECES, Limits
 from ragdoll_ros.viewer.drawing.stage import Stage
 from ragdoll_ros.viewer.sources.playback import Playback
-from ragdoll_ros.viewer.sources.recording import Recording
 from ragdoll_ros.viewer.sources.source import Frame
 
 FIELD = load_scene('field')

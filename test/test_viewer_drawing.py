@@ -15,6 +15,7 @@ from specimens import SPECIMENS
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.fit.pipeline import fit_character
 from ragdoll_ros.fit.reading.character import read_character
+from ragdoll_ros.fit.skin import skin_of
 from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame
@@ -23,13 +24,13 @@ from ragdoll_ros.model.shapes import Box, Sphere
 from ragdoll_ros.model.skeleton import Riders
 from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.recordings.rods import Rods
 from ragdoll_ros.viewer.drawing.bodies import Bodies
 from ragdoll_ros.viewer.drawing.joint_limits import PIECES, Limits
 from ragdoll_ros.viewer.drawing.marks import arrow_before
 from ragdoll_ros.viewer.drawing.meshes import COARSE, MESHES, ROUND
-from ragdoll_ros.viewer.drawing.skin import Skins, skin_of
+from ragdoll_ros.viewer.drawing.skin import Skins
 from ragdoll_ros.viewer.pointer import kept_distance, nearest, on_bone
-from ragdoll_ros.viewer.sources.rods import Rods
 
 CORNERS = ROUND / 2 * np.sin(2 * np.pi / ROUND)
 """Area of the polygon of ROUND corners in a circle of radius 1, which stands for pi."""

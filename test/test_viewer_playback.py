@@ -6,8 +6,8 @@ import pytest
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import errors
+from ragdoll_ros.recordings.recording import Recording
 from ragdoll_ros.viewer.sources.playback import Playback
-from ragdoll_ros.viewer.sources.recording import Recording
 from ragdoll_ros.viewer.sources.source import Wanted
 
 TURNS = np.tile((0, 0, 0, 1.0), (10, 1))

@@ -11,8 +11,8 @@ from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.scene import SECOND
 from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.viewer.sources.recording import Pose, Recorder, Recording
-from ragdoll_ros.viewer.sources.recording_file import load_recording, recording_bytes
+from ragdoll_ros.recordings.mcap_file import load_recording, recording_bytes
+from ragdoll_ros.recordings.recording import Pose, Recorder, Recording
 
 UNTURNED = np.tile((0, 0, 0, 1.0), (10, 1))
 

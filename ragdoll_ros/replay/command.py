@@ -6,18 +6,23 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from ..files.bag import read_messages
 from ..files.run_scene import versions
 from ..model import errors
 from ..physics.engine.registry import ENGINES
 from ..physics.settings import ACCURACIES
 from ..physics.simulation import Simulation
+from ..recordings.mcap_file import load_recording
+from ..recordings.save import check_format
 from .comparison import Comparison
+from .kept import Keeper, save
 from .player import Player
 from .run import Run, read_run
 
 EXAMPLE = """examples:
   ragdoll_replay rosbag2_2026_01_31-12_00_00      are its hashes those of the run?
   ragdoll_replay run.mcap --accuracy exact        where does a finer one part from it?
+  ragdoll_replay run.mcap --save fall.glb --save fall.bvh     for Blender; .csv and .mcap, too
   ragdoll_replay run.mcap --publish --pace 0.5    on the topics of a node `ragdoll`
 """
 
@@ -32,14 +37,21 @@ def main(arguments: list[str] | None = None) -> int:
     compares = options.engine or options.accuracy
     if compares and options.publish:
         parser().error('--publish: not with --engine or --accuracy, which compare')
+    if compares and options.save:
+        parser().error('--save: not with --engine or --accuracy, which compare')
     if for_ros and not options.publish:
         parser().error(f'{" ".join(for_ros)}: only with --publish')
     try:
+        for path in options.save:
+            check_format(path)
+        if options.save and not options.publish and has_poses_alone(options.bag):
+            save(load_recording(options.bag), options.save, warn)
+            return 0
         run = read_run(options.bag, options.node, warn)
         tell(run)
         if compares:
             return compare(run, options.engine, options.accuracy)
-        return replay(run, options.publish, options.pace, for_ros)
+        return replay(run, options, for_ros)
     except errors.RagdollError as error:
         print(error, file=sys.stderr)
         return 2
@@ -55,6 +67,10 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument('--node', help='whose run, where a bag holds several: /east/ragdoll')
     parser.add_argument('--engine', choices=ENGINES, help='compare with this engine')
     parser.add_argument('--accuracy', choices=ACCURACIES, help='compare with this accuracy')
+    parser.add_argument('--save', metavar='FILE', type=Path, action='append', default=[],
+                        help='write the run, or the poses that were recorded, as an animation '
+                        '(.glb: glTF, .bvh) or a table (.csv), or as poses for ragdoll_viewer '
+                        '--play (.mcap); more than once for several')
     parser.add_argument('--publish', action='store_true', help='publish the run on the topics of '
                         'a node `ragdoll` as it goes, by the clock on the wall')
     parser.add_argument('--pace', type=pace, default=1.0, help='with --publish: simulated s in '
@@ -78,17 +94,20 @@ def tell(run: Run) -> None:
             warn(f'recorded by {recorded}; here is {versions()}: the last bits may differ')
 
 
-def replay(run: Run, wants_topics: bool, pace: float, for_ros: list[str]) -> int:
-    """Repeat a run and check it; the exit code."""
-    player = Player(run, warn)
+def replay(run: Run, options: argparse.Namespace, for_ros: list[str]) -> int:
+    """Repeat a run and check it, publish and save it as asked; the exit code."""
+    player, keeper = Player(run, warn), Keeper(warn)
+    steps = keeper.through(player.ticks()) if options.save else player.ticks()
     try:
-        if wants_topics:
-            _publish(player.ticks(), pace, for_ros)
+        if options.publish:
+            _publish(steps, options.pace, for_ros)
         else:
-            for _ in player.ticks():
+            for _ in steps:
                 pass
     finally:
         player.close()
+    if options.save:
+        save(keeper.recording(), options.save, warn)
     checks = player.checks
     parted = next((index for index, check in enumerate(checks) if not check.equal), None)
     print(f'{player.made} ticks and {player.acts} acts repeated, '
@@ -98,6 +117,12 @@ def replay(run: Run, wants_topics: bool, pace: float, for_ros: list[str]) -> int
     before = f'after tick {checks[parted - 1].tick}, ' if parted else ''
     print(f'The runs part {before}at tick {checks[parted].tick} at the latest')
     return 1
+
+
+def has_poses_alone(bag: Path) -> bool:
+    """Whether a recording tells where all was, as the page's do, and not what acted."""
+    topics = {topic.rpartition('/')[2] for topic, *_ in read_messages(bag, lambda _: None)}
+    return 'poses' in topics and 'events' not in topics
 
 
 def compare(run: Run, engine: str | None, accuracy: str | None) -> int:

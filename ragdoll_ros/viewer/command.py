@@ -34,6 +34,7 @@ EXAMPLE = """examples:
   ragdoll_viewer --scene doll.yaml        simulate a doll or scene here
   ragdoll_viewer --scene crowd --port 9000 --engine bullet
   ragdoll_viewer --play run.mcap          show a recording
+  ragdoll_viewer --static out/ --scene drop     write a page that needs no server
 """
 
 NO_VISER = ("ragdoll_viewer needs viser: pip install 'ragdoll_ros[viewer]', or, for the Python of "
@@ -56,7 +57,10 @@ def main(arguments: list[str] | None = None) -> int:
     for sign in (signal.SIGINT, signal.SIGTERM):
         signal.signal(sign, lambda *_: stop.set())
     try:
-        serve(options, for_ros, stop)
+        if options.static is not None:
+            write_static(options, for_ros)
+        else:
+            serve(options, for_ros, stop)
     except errors.RagdollError as error:
         print(error, file=sys.stderr)
         return 2
@@ -73,6 +77,9 @@ def parser() -> argparse.ArgumentParser:
                        '`ros2 bag record`, has recorded')
     shown.add_argument('--scene', help='a name in config/ or a path: simulate it here, without '
                         'ROS (else: listen to the node `ragdoll`)')
+    parser.add_argument('--static', metavar='FOLDER', help='serve nothing: write the fall of the '
+                        '--scene, or the run to --play, as FOLDER/index.html, which any web server '
+                        'shows, or a browser without one')
     parser.add_argument('--engine', choices=ENGINES, help='with --scene: what simulates (auto); a '
                         'node has a parameter for it')
     parser.add_argument('--host', default=HOST, help='address to serve at (%(default)s: this '
@@ -112,6 +119,23 @@ def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event
         source.close()
 
 
+def write_static(options: argparse.Namespace, for_ros: list[str]) -> None:
+    """Write the page that needs no server; RagdollError if it cannot be as asked."""
+    if (options.scene is None and options.play is None) or for_ros:
+        raise CannotServe('--static: expected --scene or --play with it, and nothing of ROS; a '
+                          "node's run is recorded first: ros2 bag record")
+    scene = None if options.scene is None else load_scene(options.scene)
+    page_class()
+    from .static import fall, save_static
+    if scene is not None:
+        recording = fall(scene, options.engine or 'auto')
+    else:
+        from ..recordings.mcap_file import load_recording
+        recording = load_recording(options.play)
+    path = save_static(recording, options.static)
+    print(f'{path}: {recording.duration:.1f} s, {path.stat().st_size / 1e6:.1f} MB')
+
+
 def page_class() -> type:
     """Import what takes longest, only once all else is as it should be; CannotServe without it."""
     try:
@@ -130,8 +154,8 @@ def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
     if options.engine is not None and options.scene is None:
         raise CannotServe(f'--engine {options.engine}: only with --scene')
     if options.play is not None:
+        from ..recordings.mcap_file import load_recording
         from .sources.playback import Playback
-        from .sources.recording_file import load_recording
         return Playback(load_recording(options.play), Path(options.play).name)
     if options.scene is not None:
         scene = load_scene(options.scene)

@@ -22,7 +22,8 @@ from .opening import Opening
 from .pointer import Pointer
 from .recording_panel import RecordingPanel
 from .rest import Rest
-from .sources.source import Frame, Source, Wanted
+from .sources.source import Frame, Report, Source, Wanted
+from .timeline.timeline import Timeline
 
 PERIOD = 1 / 60
 """s between two drawings at the least."""
@@ -49,6 +50,7 @@ class Page:
         """All that is drawn of the scene that is shown; None before the first frame."""
         self.opening: Opening | None = None
         """Lets a source go that waits to be seen; None where none does."""
+        self._live: Frame | None = None
         self._folder = folder
         light(server)
         server.gui.configure_theme(show_logo=False, show_share_button=False)
@@ -58,6 +60,7 @@ class Page:
         with self.tabs.add_tab('Play'):
             self.controls = Controls(server, source)
             self.view = View(server)
+            self.timeline = Timeline(server, source)
             self._recording = RecordingPanel(server)
         self._edit_tab = self.tabs.add_tab('Edit')
         with self.tabs.add_tab('Plots'):
@@ -65,7 +68,7 @@ class Page:
         self._follower = Follower(server)
         server.on_client_connect(hint)
         self._rest = Rest()
-        self._pointer = Pointer(source, lambda: self.frame, self._select)
+        self._pointer = Pointer(source, self._at_hand, self._select)
 
     def run(self, stop: threading.Event) -> None:
         """Draw until told to stop."""
@@ -84,12 +87,9 @@ class Page:
         self.controls.pushes.keep(time.monotonic())
         if is_open:
             frame, report = self.source.frame, self.source.report
-            if frame is not None and frame is not self.frame:
-                self._draw(frame)
             if frame is not None:
                 now = time.monotonic()
-                self.plots.show(frame, report, now)
-                self._follower.follow(frame, now, self.view.follow.value)
+                self._show(frame, report, now)
                 self.controls.show_rest(self._rest.lies(frame, report.paused, now))
             if self.stage is not None:
                 self.stage.be_visible(bones=self.view.bones.value, skins=self.view.skin.value)
@@ -100,6 +100,23 @@ class Page:
         if self.opening is not None:
             self.opening.look(clients, self.frame is not None, time.monotonic())
         return is_open
+
+    def _show(self, live: Frame, report: Report, now: float) -> None:
+        """Draw the source's newest frame, or the one on the timeline that is looked at."""
+        if live is not self._live:
+            self._live = live
+            self._recording.take(live)
+            self.timeline.take(live)
+        self.plots.take(live, self.timeline.instant(live), report, now)
+        self.plots.show(self.timeline.looked_at(now))
+        frame = self.timeline.shown(live, now)
+        if frame is not self.frame:
+            self._draw(frame)
+        self._follower.follow(frame, now, self.view.follow.value)
+
+    def _at_hand(self) -> Frame | None:
+        """What a pointer may take hold of: nothing of what is over."""
+        return self.frame if self.timeline.is_live else None
 
     def _draw(self, frame: Frame) -> None:
         new = self.stage is None or frame.scene is not self.stage.scene
@@ -115,7 +132,6 @@ class Page:
             self.stage.show(frame)
         # Else viser waits for more to send along, up to its own 60th of a second.
         self.server.flush()
-        self._recording.take(frame)
 
     def _edit(self, scene: Scene) -> None:
         """Hand the scene to the editor, which the first one makes."""

@@ -8,8 +8,8 @@ import imageio.v3 as iio
 import numpy as np
 import viser
 
-from .sources.recording import Pose, Recorder
-from .sources.recording_file import recording_bytes
+from ..recordings.mcap_file import recording_bytes
+from ..recordings.recording import Pose, Recorder
 from .sources.source import Frame
 
 MOST_NUMBERS = 5_000_000

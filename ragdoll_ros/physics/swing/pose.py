@@ -86,6 +86,11 @@ class SwingState:
                 for level, links in zip(self.levels, self.links, strict=True)]
         return self.order.gather(tips, self.flight.positions)
 
+    @property
+    def rods(self) -> np.ndarray:
+        """(m, 2, 3) m, world frame: both ends of the rod of each mass."""
+        return np.stack([self.roots, self.positions], axis=1)
+
     @cached_property
     def velocities(self) -> np.ndarray:
         """(m, 3) m/s, world frame."""

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 import viser
@@ -14,7 +15,10 @@ PERIOD = 0.25
 """s between two points."""
 
 SPAN = 20.0
-"""s on the wall that are shown."""
+"""s of the timeline that are shown."""
+
+MOST = 600
+"""Points that are kept: 150 s on the wall, which hold the timeline's 60 s at half the real time."""
 
 HEIGHT = 170
 
@@ -37,57 +41,77 @@ class Plots:
         self._last = (0.0, 0.0)
         self._measured: object = None
 
-    def show(self, frame: Frame, report: Report, now: float) -> None:
-        """Take a frame and a report at ``now`` s of a steady clock; draws at a modest rate."""
+    def take(self, frame: Frame, instant: float, report: Report, now: float) -> None:
+        """Take a frame at an ``instant`` of the timeline, s, and a report, at a modest rate.
+
+        ``now`` is s of a steady clock. With a reset, or another scene, all begins anew.
+        """
         if now < self._next:
             return
-        if frame.scene != self._scene or frame.time < self._last[0]:
+        if frame.scene is not self._scene or frame.time < self._last[0]:
             self._begin(frame)
         elif now - self._last[1] < 2 * PERIOD:
             pace = (frame.time - self._last[0]) / (now - self._last[1])
-            self.pace.add(frame.time, pace, 0.0 if report.paused else report.pace)
+            self.pace.add(instant, frame.time, pace, 0.0 if report.paused else report.pace)
         self._next, self._last = now + PERIOD, (frame.time, now)
         # Without what is less than a nanometre: rounding, which would fill the plot.
         gap = 1e6 * self._gaps.gaps(frame.state).max(initial=0.0)
-        self.gap.add(frame.time, round(float(gap), 3))
+        self.gap.add(instant, frame.time, round(float(gap), 3))
         measures = report.measures
         if measures and measures is not self._measured:
             self._measured = measures
             put_in = measures['work_of_pushes_J'] + measures.get('work_of_grabs_J', 0.0)
-            self.energy.add(frame.time, put_in + measures['energy_excess_J'], put_in)
+            self.energy.add(instant, frame.time, put_in + measures['energy_excess_J'], put_in)
+
+    def show(self, instant: float | None = None) -> None:
+        """Draw the SPAN s before an instant of the timeline; None: before the newest."""
+        for plot in (self.energy, self.gap, self.pace):
+            plot.show(instant)
 
     def _begin(self, frame: Frame) -> None:
-        self._scene = frame.scene
-        self._gaps = JointGap(frame.scene)
+        if frame.scene is not self._scene:
+            self._scene = frame.scene
+            self._gaps = JointGap(frame.scene)
         for plot in (self.energy, self.gap, self.pace):
-            plot.clear()
+            plot.begin()
 
 
 class _Plot:
-    """Some lines over the last while."""
+    """Some lines over the last while: of one run, from a reset to the next."""
 
     def __init__(self, server: viser.ViserServer, title: str,
                  lines: tuple[tuple[str, str], ...]) -> None:
-        self._rows: deque[tuple[float, ...]] = deque(maxlen=round(SPAN / PERIOD))
+        self._rows: deque[tuple[float, ...]] = deque(maxlen=MOST)
+        """Instant of the timeline, number of the run, s simulated, values."""
+        self._run = 0
+        self._shown: object = None
         self._width = 1 + len(lines)
         series = (uplot.Series(label='s'), *(
             uplot.Series(label=label, stroke=color, width=2) for label, color in lines))
         self.handle = server.gui.add_uplot(
-            self._data(), series, title=title, height=HEIGHT, padding=PADDING,
+            self._data(()), series, title=title, height=HEIGHT, padding=PADDING,
             scales={'x': uplot.Scale(time=False)})
 
-    def add(self, *row: float) -> None:
-        """Add one point to each line: the instant, then the values; not finite, none."""
-        if not np.isfinite(row).all() or (self._rows and row[0] <= self._rows[-1][0]):
+    def add(self, instant: float, *row: float) -> None:
+        """Add one point to each line: s simulated, then the values; not finite, none."""
+        if not np.isfinite(row).all() or (self._rows and instant <= self._rows[-1][0]):
             return
-        self._rows.append(row)
-        self.handle.data = self._data()
+        self._rows.append((instant, self._run, *row))
 
-    def clear(self) -> None:
-        """Begin anew."""
-        self._rows.clear()
-        self.handle.data = self._data()
+    def begin(self) -> None:
+        """Begin a run."""
+        self._run += 1
 
-    def _data(self) -> tuple[np.ndarray, ...]:
-        rows = np.array(self._rows, float).reshape(-1, self._width)
-        return tuple(np.ascontiguousarray(column) for column in rows.T)
+    def show(self, instant: float | None) -> None:
+        """Draw the last SPAN s of the run at an instant; at None, of the newest."""
+        rows = [row for row in self._rows if instant is None or row[0] <= instant]
+        run = self._run if instant is None or not rows else rows[-1][1]
+        rows = [row[2:] for row in rows if row[1] == run and row[0] > rows[-1][0] - SPAN]
+        shown = rows and (rows[0], rows[-1], len(rows))
+        if shown != self._shown:
+            self._shown = shown
+            self.handle.data = self._data(rows)
+
+    def _data(self, rows: Sequence[tuple[float, ...]]) -> tuple[np.ndarray, ...]:
+        table = np.array(rows, float).reshape(-1, self._width)
+        return tuple(np.ascontiguousarray(column) for column in table.T)

@@ -9,7 +9,7 @@ import numpy as np
 from ...model import errors
 from ...model.scene import Scene
 from ...model.state import State
-from .recording import Recording
+from ...recordings.recording import Recording
 from .source import PACES, Frame, Report, Source, Wanted
 
 
@@ -33,14 +33,18 @@ class Playback(Source):
         self._time = 0.0
         """s of the recording at the instant _since on the wall."""
         self._since = time.monotonic()
-        self._frame = self._frame_at(0.0)
+        self._frame = self.frame_at(0.0)
+
+    @property
+    def recording(self) -> Recording:
+        return self._recording
 
     @property
     def frame(self) -> Frame:
         with self._lock:
             instant = self._now()
             if instant != self._frame.time:
-                self._frame = self._frame_at(instant)
+                self._frame = self.frame_at(instant)
             return self._frame
 
     @property
@@ -101,7 +105,8 @@ class Playback(Source):
     def _go_on_from(self, instant: float) -> None:
         self._time, self._since = instant, time.monotonic()
 
-    def _frame_at(self, instant: float) -> Frame:
+    def frame_at(self, instant: float) -> Frame:
+        """What is there at an instant, s."""
         pose = self._recording.at(instant)
         unknown = np.full(pose.positions.shape, np.nan)
         state = State(pose.positions, pose.orientations, unknown, unknown)

@@ -15,12 +15,12 @@ from sensor_msgs.msg import JointState
 
 from ...model.scene import SECOND, Scene
 from ...model.state import State
+from ...recordings.rods import Rods
 from ...ros.outputs import LATCHED
 from ...ros.packed import poses_in
 from .remote_hands import RemoteHands
 from .remote_pushes import HeardPushes
 from .remote_topic import Newest
-from .rods import Rods
 from .source import Frame, Wanted
 
 

@@ -189,7 +189,7 @@ class Simulated(Source):
         self._frame = Frame(
             simulation.scene, simulation.time / SECOND, simulation.state, simulation.pushes,
             held=tuple(self._held()),
-            rods=None if swings is None else np.stack([swings.roots, swings.positions], axis=1),
+            rods=None if swings is None else swings.rods,
             contacts=simulation.contacts.positions if wanted.contacts else None,
             angles=simulation.joint_angles if wanted.angles else None)
         if time.monotonic() >= self._next_measure:

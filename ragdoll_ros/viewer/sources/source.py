@@ -14,6 +14,7 @@ from ...model.push import Push
 from ...model.scene import Scene
 from ...model.state import State
 from ...model.vectors import Vector
+from ...recordings.recording import Recording
 
 PACES = (0.001, 100.0)
 """Slowest and fastest, as the node's real_time_factor."""
@@ -84,6 +85,14 @@ class Source(Protocol):
     @property
     def frame(self) -> Frame | None:
         """The newest frame; None before the first. Another instant, another object."""
+
+    @property
+    def recording(self) -> Recording | None:
+        """All that it will ever show, where that is known from the start."""
+        return None
+
+    def frame_at(self, instant: float) -> Frame:
+        """What its recording has at an instant, s."""
 
     @property
     def report(self) -> Report:

@@ -2,11 +2,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...model import errors, rotation
-from ...model.scene import Scene
+from ..model import errors, rotation
+from ..model.scene import SECOND, Scene
+
+if TYPE_CHECKING:
+    from ..physics.simulation import Simulation
 
 UNIT = 1e-6
 """How far a quaternion's length may be from 1."""
@@ -111,6 +115,12 @@ class Recorder:
         if not self._times or time + self._shift > self.duration:
             self._times.append(time + self._shift)
             self._poses.append(pose)
+
+    def take(self, simulation: Simulation) -> None:
+        """Take where all of a simulation is now."""
+        state, swings = simulation.state, simulation.swings
+        self.add(simulation.time / SECOND, Pose(state.positions, state.orientations,
+                                                None if swings is None else swings.rods))
 
     def recording(self) -> Recording:
         """What was taken; OutOfRange if that is nothing."""

@@ -3,10 +3,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...model import rotation
-from ...model.scene import Scene
-from ...model.state import State
-from ...physics.swing.mount import mounts
+from ..model import rotation
+from ..model.scene import Scene
+from ..model.state import State
+from ..physics.swing.mount import mounts
 
 
 class Rods:

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...files.bag import read_messages
-from ...files.cdr import (
+from ..files.bag import read_messages
+from ..files.cdr import (
     DEFINITIONS,
     POSE_ARRAY,
     STRING,
@@ -23,13 +23,13 @@ from ...files.cdr import (
     string_bytes,
     text_of,
 )
-from ...files.run_scene import read_run_scene, run_scene_text
-from ...model import errors
-from ...model.errors import ModelError, ModelErrors
-from ...model.ragdoll import WORLD
-from ...model.rotation import IDENTITY
-from ...model.scene import SECOND, Scene
-from ...model.state import State
+from ..files.run_scene import read_run_scene, run_scene_text
+from ..model import errors
+from ..model.errors import ModelError, ModelErrors
+from ..model.ragdoll import WORLD
+from ..model.rotation import IDENTITY
+from ..model.scene import SECOND, Scene
+from ..model.state import State
 from .recording import Pose, Recorder, Recording
 from .rods import Rods
 

@@ -1,0 +1,33 @@
+"""Normals of meshes as one looks at them: smooth where they are round, sharp at edges."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+CREASE = math.radians(40)
+"""rad between two faces from which on their common edge is sharp: more than the 18 degrees between
+faces of a ball or cylinder of 20 corners, less than a box's 90."""
+
+
+def creased(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (3t, 3) m, three to a triangle of ``triangles`` (t, 3), and their unit normals.
+
+    A corner's normal is the mean of those of the faces around it that are within CREASE of its own
+    face's, by their areas. Faces without an area are left out.
+    """
+    corners = vertices[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1)
+    full = areas > 1e-9 * areas.max(initial=0.0)
+    corners, triangles, normals = corners[full], triangles[full], normals[full]
+    units = normals / areas[full, None]
+    _, at = np.unique(vertices.round(12), axis=0, return_inverse=True)
+    points = at.reshape(-1)[triangles]
+    smooth = np.empty_like(corners)
+    for point in np.unique(points):
+        faces, slots = np.nonzero(points == point)
+        near = units[faces] @ units[faces].T > math.cos(CREASE)
+        sums = near @ normals[faces]
+        smooth[faces, slots] = sums / np.linalg.norm(sums, axis=1, keepdims=True)
+    return corners.reshape(-1, 3), smooth.reshape(-1, 3)

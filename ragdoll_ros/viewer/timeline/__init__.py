@@ -1,0 +1,1 @@
+"""What has been shown: kept, looked at again, saved."""

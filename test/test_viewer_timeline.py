@@ -1,0 +1,243 @@
+"""The timeline: what was shown is kept for a minute, looked at again, saved, and costs no tick."""
+from __future__ import annotations
+
+import io
+import tracemalloc
+import zipfile
+
+import numpy as np
+import pytest
+
+pytest.importorskip('viser')
+from page_client import served, wait
+
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.model.push import Push
+from ragdoll_ros.model.scene import SECOND
+from ragdoll_ros.model.state import State
+from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.recordings.recording import Recorder
+from ragdoll_ros.recordings.save import FORMATS
+from ragdoll_ros.viewer.sources.playback import Playback
+from ragdoll_ros.viewer.sources.simulated import Simulated
+from ragdoll_ros.viewer.sources.source import Frame
+from ragdoll_ros.viewer.timeline.history import MOST_NUMBERS, SPAN, History
+from ragdoll_ros.viewer.timeline.look import Look
+from ragdoll_ros.viewer.timeline.package import zipped
+from ragdoll_ros.viewer.timeline.strip import WIDTH, strip
+
+DROP = load_scene('drop')
+
+
+def frame(time, height=5.0, scene=DROP, **changes):
+    count = len(scene.bones)
+    places = np.zeros((count, 3))
+    places[:, 0], places[:, 2] = time, height
+    still = np.zeros((count, 3))
+    return Frame(scene, time, State(places, np.tile((0, 0, 0, 1.0), (count, 1)), still, still),
+                 **changes)
+
+
+@pytest.fixture
+def history():
+    """1.0 s, a push in 0.2 to 0.3 s, the ground from 0.5 s on."""
+    history = History()
+    push = Push('torso', (10, 0, 0))
+    for tick in range(101):
+        history.take(frame(tick / 100, height=0.0 if tick >= 50 else 5.0,
+                           pushes=(push,) if 20 <= tick < 30 else ()))
+    return history
+
+
+def test_a_minute_is_kept_and_no_more():
+    """Of 90 s in frames at even times those of the last 60 s, the newest being the last."""
+    history = History()
+    for tick in range(901):
+        history.take(frame(tick / 10))
+    cut = history.cut()
+    assert len(history) == 601 and cut.duration == pytest.approx(SPAN)
+    assert cut.frame(600).time == 90.0 and cut.frame(0).time == 30.0
+
+
+@pytest.mark.parametrize('minutes', [3, pytest.param(30, marks=pytest.mark.slow)])
+def test_memory_is_bounded_whatever_comes(minutes):
+    """So many minutes at 60 frames a second, without waiting: no more than after the first.
+
+    A frame of ten bones is 1040 bytes of numbers and half as much of objects.
+    """
+    tracemalloc.start()
+    history, sizes = History(), []
+    for tick in range(minutes * 3600):
+        history.take(frame(tick / 60))
+        if tick in (3700, minutes * 3600 - 1):
+            sizes.append(tracemalloc.get_traced_memory()[0])
+    tracemalloc.stop()
+    assert sizes[1] < 1.02 * sizes[0] and sizes[1] < 15e6
+
+
+def test_a_crowd_is_kept_for_less_than_a_minute():
+    """By the numbers that its frames hold."""
+    history, crowd = History(), load_scene('crowd')
+    numbers = 13 * len(crowd.bones)
+    for tick in range(2 * MOST_NUMBERS // numbers):
+        history.take(frame(tick / 100, scene=crowd))
+        if tick > 5000:
+            break
+    assert len(history) * numbers <= MOST_NUMBERS and len(history) > 100
+
+
+def test_the_timeline_goes_on_over_a_reset(history):
+    """Time that goes back is a reset: a tick later; the same frame again is not kept."""
+    assert history.take(frame(1.0)) is None
+    moment = history.take(frame(0.0))
+    assert moment.begins and moment.time == pytest.approx(1.01)
+    history.take(frame(0.01))
+    cut = history.cut()
+    assert np.flatnonzero(cut.begins).tolist() == [101]
+    np.testing.assert_allclose(np.diff(cut.times), 0.01, atol=1e-12)
+
+
+def test_another_scene_begins_anew(history):
+    history.take(frame(3.0, scene=load_scene('drop')))
+    assert len(history) == 1 and history.end == 0
+
+
+def test_pushes_and_contacts_are_marked(history):
+    """When a push acted, and from when the doll lay; to the 0.05 s between two looks."""
+    cut = history.cut()
+    assert np.flatnonzero(cut.pushed).tolist() == list(range(20, 30))
+    touched = np.flatnonzero(cut.touching)
+    assert 50 <= touched[0] <= 55 and touched[-1] == 100 and len(touched) == 101 - touched[0]
+    picture = strip(cut)
+    assert f'x="{WIDTH * 20 // 100}"' in picture and '#e63219' in picture and '#f5be00' in picture
+    quiet = History()
+    quiet.take(frame(0.0))
+    assert '#e63219' not in strip(quiet.cut())
+
+
+def test_a_look_stands_plays_and_steps(history):
+    look = Look(history.cut(), 0.5)
+    assert look.frame(100.0).time == look.frame(200.0).time == 0.5
+    look.toggle(200.0)
+    assert look.frame(200.25).time == 0.75
+    look.set_speed(0.1, 200.25)
+    assert look.frame(201.25).time == 0.85
+    look.step(-1, 201.25)
+    assert look.frame(300.0).time == 0.84 and not look.plays
+    look.step(2, 300.0)
+    assert look.frame(300.0).time == 0.86
+    look.go_to(7.0, 300.0)
+    look.step(1, 300.0)
+    assert look.frame(300.0).time == 1.0
+    look.toggle(300.0)
+    assert look.frame(300.0).time == 0.0, 'from the beginning'
+    assert look.frame(999.0).time == 1.0 and not look.plays
+
+
+def drawn(page):
+    batches = page.stage.bodies.batches
+    return (np.concatenate([batch.handle.batched_positions for batch in batches]),
+            np.concatenate([batch.bones for batch in batches]))
+
+
+def shows(page, state):
+    """Whether the page draws a state; it gets numbers of 32 bits."""
+    places, bones = drawn(page)
+    return np.abs(places - state.positions[bones]).max() < 1e-6
+
+
+@pytest.fixture(scope='module')
+def states():
+    with Simulation(DROP) as simulation:
+        return [simulation.state, *(simulation.advance() for _ in range(400))]
+
+
+def test_what_was_is_drawn_while_the_doll_goes_on(states):
+    """The slider shows the instant that it names; J and L go by frames; Live is what goes on."""
+    with served(Simulated(DROP)) as page:
+        client = page.open()
+        wait(lambda: page.frame and page.frame.time > 1.0)
+        client.update(page.timeline.slider, 0.5)
+        wait(lambda: not page.timeline.is_live)
+        cut = page.timeline.cut
+        index = cut.index(0.5)
+        seen, following = cut.frame(index), cut.frame(index + 1)
+        assert seen.time - cut.frame(0).time <= 0.5 < following.time - cut.frame(0).time
+        wait(lambda: page.frame is seen)
+        wait(lambda: shows(page, states[round(seen.time * 100)]))
+        before = page.source.frame.time
+        wait(lambda: page.source.frame.time > before + 0.3)
+        assert page.frame is seen and page.timeline.cut.duration < before
+        client.press(page, 'A frame on')
+        wait(lambda: page.frame is following)
+        client.press(page, 'A frame back')
+        wait(lambda: page.frame is seen)
+        client.press(page, 'Play, or stand')
+        wait(lambda: page.frame.time > seen.time + 0.2)
+        assert not page.timeline.is_live
+        client.update(page.timeline.buttons, 'Live')
+        wait(lambda: page.timeline.is_live and page.frame is page.source.frame)
+
+
+def test_nothing_is_taken_hold_of_in_the_past_and_a_reset_leads_back():
+    with served(Simulated(DROP)) as page:
+        client = page.open()
+        wait(lambda: page.frame and page.frame.time > 0.3)
+        assert page._at_hand() is not None
+        client.update(page.timeline.slider, 0.1)
+        wait(lambda: not page.timeline.is_live)
+        assert page._at_hand() is None
+        client.press(page, 'Reset')
+        wait(lambda: page.timeline.is_live)
+
+
+def test_plots_follow_the_timeline():
+    """They end where one looks, and begin anew with a reset."""
+    with served(Simulated(DROP)) as page:
+        client = page.open()
+        ends = lambda: page.plots.gap.handle.data[0][-1]  # noqa: E731
+        wait(lambda: len(page.plots.gap.handle.data[0]) > 6)
+        client.update(page.timeline.slider, 0.8)
+        wait(lambda: not page.timeline.is_live and ends() <= 0.85)
+        client.update(page.timeline.buttons, 'Live')
+        wait(lambda: ends() > 1.0)
+        client.press(page, 'Reset')
+        wait(lambda: len(page.plots.gap.handle.data[0]) < 4 and page.frame.time < 1.0)
+
+
+def recording(states):
+    recorder = Recorder(DROP)
+    with Simulation(DROP) as simulation:
+        for _ in range(120):
+            recorder.take(simulation)
+            simulation.advance()
+    return recorder.recording()
+
+
+def test_a_file_has_the_same_timeline(states):
+    """All of it from the start on, with the ground that it touches."""
+    with served(Playback(recording(states))) as page:
+        client = page.open()
+        wait(lambda: page.frame)
+        cut = page.timeline.cut
+        assert cut.duration == pytest.approx(1.19) and 0 < cut.touching.sum() < 120
+        touched = next(k for k, state in enumerate(states) if state.positions[:, 2].min() < 0.11)
+        assert abs(np.flatnonzero(cut.touching)[0] - touched) < 10
+        client.update(page.timeline.slider, 1.0)
+        wait(lambda: page.frame.time == 1.0 and shows(page, states[100]))
+
+
+def test_save_this_has_the_run_in_every_format(states):
+    """What a page is sent: each file, and in the table the poses that were shown."""
+    with served(Simulated(DROP)) as page:
+        client = page.open()
+        wait(lambda: page.frame and page.frame.time > 0.5)
+        client.update(page.timeline.slider, 0.2)
+        wait(lambda: not page.timeline.is_live)
+        cut = page.timeline.cut
+        content = zipped(cut.recording(), 'run', lambda _: True)
+    with zipfile.ZipFile(io.BytesIO(content)) as package:
+        assert package.namelist() == [f'run{suffix}' for suffix in FORMATS]
+        table = np.genfromtxt(io.BytesIO(package.read('run.csv')), delimiter=',', skip_header=1)
+    ticks = [round(cut.frame(k).time * SECOND / 1e7) for k in range(len(cut.times))]
+    np.testing.assert_array_equal(table[:, 1:4], [states[k].positions[0] for k in ticks])
