@@ -20,9 +20,11 @@ from test_rooms import PACKAGE, imports, modules  # noqa: E402
 IDEAS = {'model': 'what a scene is', 'files': 'model as text and back',
          'physics': 'how a scene moves', 'fit': 'a character becomes a doll',
          'ros': 'topics, parameters, services', 'viewer': 'the page in the browser',
-         'replay': 'a recorded run again', 'accuracy': 'the report and its references'}
-COLUMNS = {'viewer': 1.6, 'replay': -1.4, 'ros': -3.0, 'accuracy': 3.0, 'physics': -1.6, 'fit': 0.0}
-WIDE, HIGH = 2.7, 0.62
+         'replay': 'a recorded run again',
+         'falls': 'data sets of falls', 'accuracy': 'the report and its references'}
+COLUMNS = {'viewer': 1.6, 'replay': -1.4, 'ros': -3.0, 'accuracy': 3.0,
+           'falls': 5.9, 'physics': 1.45, 'fit': 0.0}
+WIDE, HIGH, MIDDLE = 2.7, 0.62, 1.45
 
 
 def arrows() -> Counter:
@@ -50,12 +52,12 @@ def draw(path: Path) -> None:
     under = [room for room in IDEAS if all((other, room) in edges for other in IDEAS
                                            if level[other] > level[room])]
     under = [room for room in under if sum(level[o] == level[room] for o in IDEAS) == 1][:2]
-    figure, axes = plt.subplots(figsize=(10, 6))
+    figure, axes = plt.subplots(figsize=(12, 6))
     places = {}
     for height in sorted(set(level.values())):
         for room in [room for room in IDEAS if level[room] == height]:
-            x, y = COLUMNS.get(room, 0.0), 1.2 * height
-            places[room], wide = (x, y), 8.7 if room in under else WIDE
+            x, y = COLUMNS.get(room, MIDDLE), 1.2 * height
+            places[room], wide = (x, y), 11.6 if room in under else WIDE
             axes.add_patch(plt.Rectangle((x - wide / 2, y - HIGH / 2), wide, HIGH, zorder=3,
                                          fc='#dde8f4', ec='#3b5b7c'))
             axes.text(x, y + 0.1, f'{room}/', ha='center', va='center', weight='bold', zorder=4)
@@ -69,7 +71,7 @@ def draw(path: Path) -> None:
                       arrowprops={'arrowstyle': '-|>', 'color': '0.35', 'lw': 1.2, 'shrinkA': 0,
                                   'shrinkB': 0})
         axes.text((x + u) / 2 + 0.1, (y + v) / 2, str(count), size=7.5, color='0.35')
-    axes.set_xlim(-4.5, 4.5)
+    axes.set_xlim(-4.5, 7.4)
     axes.set_ylim(-0.5, 1.2 * max(level.values()) + 0.5)
     axes.axis('off')
     figure.savefig(path, dpi=110, bbox_inches='tight')
