@@ -86,7 +86,7 @@ setup(
         # The page: 3D, panels and plots in a browser, served from Python, with no build of its own.
         'viewer': ['viser', 'imageio', 'mcap'],
         'replay': ['mcap'],
-        'falls': ['pyarrow', 'mcap-ros2-support'],
+        'falls': ['pyarrow', 'mcap-ros2-support', 'matplotlib'],
         'ray': ['ray'],
         'test': ['pytest', 'pytest-xdist', 'ruff', 'setuptools', 'wheel', 'yourdfpy', 'rosbags',
                  'pandas', 'playwright', 'mannequin-x; python_version >= "3.11"'],

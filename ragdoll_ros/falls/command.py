@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from ..model.errors import RagdollError
-from . import cluster, pool
+from . import cluster, describe, pool
 from .formats.registry import FORMATS
 from .manifest import Manifest
 from .progress import Progress
@@ -19,12 +19,16 @@ from .shard import Order
 EXAMPLE = """examples:
   ragdoll_falls shove -o falls --count 1000       a recipe of config/, Parquet, all cores
   ragdoll_falls shove -o falls --count 1000 --resume    goes on where a run was ended
+  ragdoll_falls describe falls                    a page and pictures of what is in it
   ragdoll_falls mine.yaml -o csv --format kfall   one CSV a fall
 """
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command: 0, 1 if it had to stop on its way, 2 for a wrong call, 130 after Ctrl-C."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    if arguments[:1] == ['describe']:
+        return _describe(arguments[1:])
     options = parser().parse_args(arguments)
     progress = Progress(options.count)
     try:
@@ -49,6 +53,14 @@ def main(arguments: list[str] | None = None) -> int:
     progress.close()
     _say(manifest, options.out, progress.seconds)
     return 0
+
+
+def _describe(arguments: list[str]) -> int:
+    try:
+        return describe.main(arguments)
+    except (RagdollError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 2
 
 
 def parser() -> argparse.ArgumentParser:

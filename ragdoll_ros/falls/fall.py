@@ -1,10 +1,12 @@
 """One fall: how it began, what it went through, when it began, hit and ended."""
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..model import rotation
 from ..model.scene import Scene
 
 
@@ -55,6 +57,20 @@ class Fall:
     def masses(self) -> np.ndarray:
         """(n,) kg."""
         return np.array([bone.mass for bone in self.scene.bones])
+
+    @property
+    def direction(self) -> float:
+        """Degrees, from -180 to 180, in which the centre of mass goes from the start to the impact,
+        as seen from where the doll faces at the start: 0 forwards, 90 to its left; NaN without an
+        impact.
+        """
+        if self.phases.impact is None:
+            return math.nan
+        ends = self.states[[0, self.phases.impact], :, :2]
+        x, y = np.diff(np.einsum('tnk,n->tk', ends, self.masses), axis=0)[0]
+        faced = rotation.rotate(self.scene.dolls[0].orientation, (1.0, 0.0, 0.0))
+        turned = math.degrees(math.atan2(y, x) - math.atan2(faced[1], faced[0]))
+        return (turned + 180) % 360 - 180
 
     @property
     def impact_velocities(self) -> np.ndarray:

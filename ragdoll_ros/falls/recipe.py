@@ -119,6 +119,12 @@ def load_recipe(name: str | Path) -> Recipe:
     return raise_or_give(path, *build_recipe(data, path))
 
 
+def recipe_of(data: dict) -> Recipe:
+    """The recipe whose ``data`` this is."""
+    dolls = [raise_or_give(Path('recipe'), *build_doll(doll)) for doll in data['who']['dolls']]
+    return Recipe(data['name'], data, tuple(dolls))
+
+
 def build_recipe(data: object, path: Path) -> tuple[Recipe | None, list[ModelError]]:
     """Make a recipe from what the YAML file at ``path`` holds: it, or None and every error."""
     found = schema_errors('recipe', data)

@@ -51,6 +51,17 @@ def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
             'meta/tasks.parquet': _tasks(recipe.name)}
 
 
+def read_labels(folder: Path) -> dict[str, np.ndarray]:
+    """Of a data set's f falls: onset, impact and rest (f,) in frames, direction_deg (f,) and
+    impact_speeds (f, n) m/s; NaN where there is none.
+    """
+    keys = ('onset', 'impact', 'rest', 'direction_deg', 'impact_speeds')
+    parts = [parquet.read_table(path, columns=list(keys))
+             for path in sorted(folder.glob('meta/episodes/*/*.parquet'))]
+    table = pa.concat_tables(parts)
+    return {key: np.array(table.column(key).to_pylist(), float) for key in keys}
+
+
 def _frames(recipe: Recipe, fall: Fall) -> pa.Table:
     """Of one fall."""
     count = recipe.frames
@@ -85,6 +96,7 @@ def _episode(recipe: Recipe, fall: Fall, place: dict[str, int]) -> dict:
         'onset': fall.phases.onset, 'impact': fall.phases.impact, 'rest': fall.phases.rest,
         'failure': fall.failure, 'valid_frames': fall.valid,
         'energy_excess_J': fall.energy_excess,
+        'direction_deg': fall.direction,
         'impact_speeds': [None if np.isnan(speed) else speed for speed in speeds.tolist()],
         'drawn': json.dumps(fall.drawn, sort_keys=True)}
     for column in columns(recipe, fall):
