@@ -124,6 +124,19 @@ def _wait_until_no_process_of(leader):
         time.sleep(0.01)
 
 
+def test_ctrl_c_ends_the_run_in_one_line(command, tmp_path):
+    folder = tmp_path / 'falls'
+    process = command('-o', folder, '--count', 1000 * SIZE)
+    wait_for_shards(folder, 2, process)
+    # As a terminal does it: to all processes of the run.
+    os.killpg(process.pid, signal.SIGINT)
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    line, = errors.splitlines()
+    assert '--resume goes on' in line and Manifest.read(folder).done >= SIZE
+    _wait_until_no_process_of(process)
+
+
 def test_what_is_torn_is_made_again(order, whole, tmp_path):
     run(order, tmp_path, here)
     made = []

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing.connection import wait as wait_for
+from multiprocessing.connection import Connection
 
 from ..model.errors import RagdollError
 from .shard import Order, Shard, make_shard
@@ -33,23 +33,26 @@ def make_shards(order: Order, shards: Iterable[int], workers: int) -> Iterator[S
     """
     left, tries = list(shards)[::-1], Counter()
     while left:
-        with _pool(order, workers) as pool:
-            making: dict[Future, int] = {}
-            try:
-                while left or making:
-                    while left and len(making) < AHEAD * workers:
-                        making[pool.submit(_make, left[-1])] = left[-1]
-                        left.pop()
-                    for done in wait(making, return_when=FIRST_COMPLETED).done:
-                        shard = done.result()
-                        del making[done]
-                        yield shard
-            except BrokenProcessPool:
-                _count(tries, making.values())
-                left += sorted(making.values(), reverse=True)
-            finally:
-                # Where nobody takes shards any more, none is begun.
-                pool.shutdown(wait=False, cancel_futures=True)
+        watched, held = multiprocessing.Pipe(duplex=False)
+        # Not by fork: what threads hold at that instant is held for ever in the child.
+        pool = ProcessPoolExecutor(workers, multiprocessing.get_context('spawn'), _start,
+                                   (order, watched))
+        making: dict[Future, int] = {}
+        try:
+            while left or making:
+                while left and len(making) < AHEAD * workers:
+                    making[pool.submit(_make, left[-1])] = left[-1]
+                    left.pop()
+                for done in wait(making, return_when=FIRST_COMPLETED).done:
+                    shard = done.result()
+                    del making[done]
+                    yield shard
+        except BrokenProcessPool:
+            _count(tries, making.values())
+            left += sorted(making.values(), reverse=True)
+        finally:
+            held.close()
+            pool.shutdown(cancel_futures=True)
 
 
 def _count(tries: Counter, shards: Iterable[int]) -> None:
@@ -59,21 +62,18 @@ def _count(tries: Counter, shards: Iterable[int]) -> None:
         raise WorkersDied(f'shard {shard}: {most} processes died that were to make it')
 
 
-def _pool(order: Order, workers: int) -> ProcessPoolExecutor:
-    # Not by fork: what threads hold at that instant is held for ever in the child.
-    return ProcessPoolExecutor(workers, multiprocessing.get_context('spawn'), _start, (order,))
-
-
-def _start(order: Order) -> None:
-    """Begin as a worker: leave Ctrl-C to who started it, and end when that ends."""
+def _start(order: Order, watched: Connection) -> None:
+    """Begin as a worker: leave Ctrl-C to who started it, and end when that closes its end of a
+    pipe, or dies, whatever is being made.
+    """
     global _order
     _order = order
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=_end_with, args=(watched,), daemon=True).start()
 
 
-def _end_with_parent() -> None:
-    wait_for([multiprocessing.parent_process().sentinel])
+def _end_with(watched: Connection) -> None:
+    watched.poll(None)
     os._exit(1)
 
 
