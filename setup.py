@@ -16,6 +16,7 @@ EXECUTABLES = {
     'ragdoll_report': 'ragdoll_ros.accuracy.command:main',
     'ragdoll_replay': 'ragdoll_ros.replay.command:main',
     'ragdoll_falls': 'ragdoll_ros.falls.command:main',
+    'ragdoll_person': 'ragdoll_ros.people.command:main',
 }
 CONFIG, LAUNCH = (sorted(str(path) for path in Path(folder).iterdir() if path.is_file())
                   for folder in ('config', 'launch'))

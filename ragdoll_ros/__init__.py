@@ -15,7 +15,7 @@ _HOMES = {
     'Push': 'model.push', 'Ragdoll': 'model.ragdoll', 'RagdollError': 'model.errors',
     'Scene': 'model.scene', 'Simulation': 'physics.simulation', 'Sphere': 'model.shapes',
     'State': 'model.state', 'load_doll': 'files.doll', 'load_scene': 'files.scene',
-    'save_doll': 'files.doll', 'save_scene': 'files.scene'}
+    'person': 'people.person', 'save_doll': 'files.doll', 'save_scene': 'files.scene'}
 __all__ = list(_HOMES)
 
 

@@ -210,10 +210,10 @@ def test_a_node_with_neither_numba_nor_pybullet_says_so_in_a_line(ros):
 
 def test_pip_brings_what_the_core_imports_and_extras_what_their_rooms_do(wheel):
     """ROS is an extra too."""
-    core = imported('model', 'files', 'physics') - OPTIONAL - NUMBAS
+    core = imported('model', 'files', 'physics', 'people') - OPTIONAL - NUMBAS
     assert required(wheel) == distributions(core)
     rooms = {path.name for path in (ROOT / 'ragdoll_ros').iterdir() if any(path.glob('*.py'))}
-    assert rooms == {*ROBOT, *EXTRAS}
+    assert rooms == {*ROBOT, 'people', *EXTRAS}
     for room, extra in EXTRAS.items():
         needed = distributions(imported(room) - imported(*ROBOT)) - CLUSTER
         assert needed == required(wheel, extra) - OPTIONAL - CALLED, room

@@ -14,6 +14,7 @@ ARROWS = {
     'model': set(),
     'files': {'model'},
     'physics': {'files', 'model'},
+    'people': {'files', 'model'},
     'fit': {'physics', 'files', 'model'},
     'ros': {'physics', 'files', 'model'},
     'viewer': {'physics', 'fit', 'files', 'model'},
