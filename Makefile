@@ -1,7 +1,7 @@
 # Wants GNU make and a python3 of 3.10 or newer with its venv module; sets up the rest in .venv,
 # with ROS 2 Jazzy from PyPI's wheels, or with the ROS that the shell has sourced.
 PYTHON ?= python3
-EXTRAS := test,report,fit,viewer,replay
+EXTRAS := test,report,fit,viewer,replay,falls
 VENV := .venv
 BIN := $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check

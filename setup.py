@@ -15,6 +15,8 @@ EXECUTABLES = {
     'ragdoll_fit': 'ragdoll_ros.fit.command:main',
     'ragdoll_report': 'ragdoll_ros.accuracy.command:main',
     'ragdoll_replay': 'ragdoll_ros.replay.command:main',
+    'ragdoll_falls': 'ragdoll_ros.falls.command:main',
+    'ragdoll_person': 'ragdoll_ros.people.command:main',
 }
 CONFIG, LAUNCH = (sorted(str(path) for path in Path(folder).iterdir() if path.is_file())
                   for folder in ('config', 'launch'))
@@ -85,8 +87,11 @@ setup(
         # The page: 3D, panels and plots in a browser, served from Python, with no build of its own.
         'viewer': ['viser', 'imageio', 'mcap'],
         'replay': ['mcap'],
+        'falls': ['pyarrow', 'mcap-ros2-support', 'matplotlib'],
+        'ray': ['ray'],
         'test': ['pytest', 'pytest-xdist', 'ruff', 'setuptools', 'wheel', 'yourdfpy', 'rosbags',
-                 'playwright', 'pygltflib', 'bvhio', 'mannequin-x; python_version >= "3.11"'],
+                 'pandas', 'playwright', 'pygltflib', 'bvhio',
+                 'mannequin-x; python_version >= "3.11"'],
         'colcon': ['colcon-core', 'colcon-ros', 'colcon-python-setup-py',
                    'colcon-common-extensions', 'setuptools<80'],
     },

@@ -21,10 +21,11 @@ IDEAS = {'model': 'what a scene is', 'files': 'model as text and back',
          'physics': 'how a scene moves', 'fit': 'a character becomes a doll',
          'ros': 'topics, parameters, services', 'viewer': 'the page in the browser',
          'recordings': 'poses over time, as files', 'replay': 'a recorded run again',
+         'people': 'measured people', 'falls': 'data sets of falls',
          'accuracy': 'the report and its references'}
-COLUMNS = {'viewer': 1.8, 'replay': -2.2, 'ros': -4.2, 'accuracy': 4.2, 'physics': 0.0, 'fit': 1.4,
-           'recordings': -1.4}
-WIDE, HIGH = 2.6, 0.62
+COLUMNS = {'replay': -2.8, 'viewer': 0.4, 'ros': -6.0, 'recordings': -2.8, 'fit': 0.4, 'falls': 3.6,
+           'accuracy': 6.8, 'physics': -1.2, 'people': 5.0}
+WIDE, HIGH, MIDDLE = 2.9, 0.62, 0.4
 
 
 def arrows() -> Counter:
@@ -52,12 +53,12 @@ def draw(path: Path) -> None:
     under = [room for room in IDEAS if all((other, room) in edges for other in IDEAS
                                            if level[other] > level[room])]
     under = [room for room in under if sum(level[o] == level[room] for o in IDEAS) == 1][:2]
-    figure, axes = plt.subplots(figsize=(12, 6))
+    figure, axes = plt.subplots(figsize=(14, 6))
     places = {}
     for height in sorted(set(level.values())):
         for room in [room for room in IDEAS if level[room] == height]:
-            x, y = COLUMNS.get(room, 0.0), 1.2 * height
-            places[room], wide = (x, y), 11.0 if room in under else WIDE
+            x, y = COLUMNS.get(room, MIDDLE), 1.2 * height
+            places[room], wide = (x, y), 15.8 if room in under else WIDE
             axes.add_patch(plt.Rectangle((x - wide / 2, y - HIGH / 2), wide, HIGH, zorder=3,
                                          fc='#dde8f4', ec='#3b5b7c'))
             axes.text(x, y + 0.1, f'{room}/', ha='center', va='center', weight='bold', zorder=4)
@@ -71,7 +72,7 @@ def draw(path: Path) -> None:
                       arrowprops={'arrowstyle': '-|>', 'color': '0.35', 'lw': 1.2, 'shrinkA': 0,
                                   'shrinkB': 0})
         axes.text((x + u) / 2 + 0.1, (y + v) / 2, str(count), size=7.5, color='0.35')
-    axes.set_xlim(-5.7, 5.7)
+    axes.set_xlim(-7.6, 8.4)
     axes.set_ylim(-0.5, 1.2 * max(level.values()) + 0.5)
     axes.axis('off')
     figure.savefig(path, dpi=110, bbox_inches='tight')

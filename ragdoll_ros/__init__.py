@@ -16,7 +16,7 @@ _HOMES = {
     'Recorder': 'recordings.recording',
     'Scene': 'model.scene', 'Simulation': 'physics.simulation', 'Sphere': 'model.shapes',
     'State': 'model.state', 'load_doll': 'files.doll', 'load_scene': 'files.scene',
-    'save_doll': 'files.doll', 'save_scene': 'files.scene',
+    'person': 'people.person', 'save_doll': 'files.doll', 'save_scene': 'files.scene',
     'save_recording': 'recordings.save'}
 __all__ = list(_HOMES)
 

@@ -27,7 +27,8 @@ SCENES = ('import ragdoll_ros; from ragdoll_ros.files import config; '
 ROSDEP_KEYS = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml',
                'jsonschema': 'python3-jsonschema', 'numba': 'python3-numba',
                'pybullet': 'python3-pybullet-pip'}
-DISTRIBUTIONS = {'yaml': 'pyyaml', 'mpl_toolkits': 'matplotlib', 'DracoPy': 'dracopy'}
+DISTRIBUTIONS = {'yaml': 'pyyaml', 'mpl_toolkits': 'matplotlib', 'DracoPy': 'dracopy',
+                 'mcap_ros2': 'mcap-ros2-support'}
 """Where a package on PyPI is called otherwise than its module."""
 
 ROBOT = ('model', 'files', 'physics', 'ros')
@@ -37,10 +38,12 @@ NUMBAS = {'llvmlite'}
 """What numba is made of: who has numba has it."""
 LAUNCHED = {'launch', 'launch_ros', 'launch_xml'}
 """What the files in launch/ are read by."""
+CLUSTER = {'ray'}
+"""Wanted where there are several machines, by an extra of its name."""
 CALLED = {'pycollada'}
 """What a library imports in our stead: trimesh, to read DAE."""
 EXTRAS = {'fit': 'fit', 'viewer': 'viewer', 'accuracy': 'report', 'replay': 'replay',
-          'recordings': 'replay'}
+          'recordings': 'replay', 'falls': 'falls'}
 """The other rooms, and the extra that brings what each needs beyond that."""
 
 COUNT_POSES = """
@@ -207,12 +210,12 @@ def test_a_node_with_neither_numba_nor_pybullet_says_so_in_a_line(ros):
 
 def test_pip_brings_what_the_core_imports_and_extras_what_their_rooms_do(wheel):
     """ROS is an extra too."""
-    core = imported('model', 'files', 'physics') - OPTIONAL - NUMBAS
+    core = imported('model', 'files', 'physics', 'people') - OPTIONAL - NUMBAS
     assert required(wheel) == distributions(core)
     rooms = {path.name for path in (ROOT / 'ragdoll_ros').iterdir() if any(path.glob('*.py'))}
-    assert rooms == {*ROBOT, *EXTRAS}
+    assert rooms == {*ROBOT, 'people', *EXTRAS}
     for room, extra in EXTRAS.items():
-        needed = distributions(imported(room) - imported(*ROBOT))
+        needed = distributions(imported(room) - imported(*ROBOT)) - CLUSTER
         assert needed == required(wheel, extra) - OPTIONAL - CALLED, room
 
 

@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 
 import ragdoll_ros
+from ragdoll_ros.falls import generate, load_recipe
+from ragdoll_ros.falls.formats.registry import FORMATS
 
 ROOT = Path(__file__).resolve().parent.parent
 WRITTEN_BY_PROGRAMS = {'docs/accuracy.md', 'docs/starts/accuracy.md'}
@@ -157,9 +159,12 @@ def test_falls_part_at_the_touch():
 
 
 @pytest.mark.parametrize('text', blocks('yaml'))
-def test_yaml_is_a_scene_or_a_doll(tmp_path, text):
+def test_yaml_is_a_scene_a_doll_or_a_recipe(tmp_path, text):
     path = tmp_path / 'mine.yaml'
     path.write_text(text)
+    if re.search('^who:', text, re.M):
+        assert next(generate(load_recipe(path), [0])).failure == ''
+        return
     with ragdoll_ros.Simulation(ragdoll_ros.load_scene(str(path))) as simulation:
         assert np.isfinite(simulation.advance().positions).all()
 
@@ -183,6 +188,13 @@ def keys(schema):
     own = schema.get('properties', {})
     return set(own) | keys(list(own.values())) | keys(
         [value for key, value in schema.items() if key != 'properties'])
+
+
+def test_falls_page_names_every_key_and_every_format():
+    named = set(re.findall(r'`(\w+)[`:]', PAGES['docs/falls.md']))
+    data = json.loads((ROOT / 'config/recipe.schema.json').read_text())
+    assert keys(data) <= named, keys(data) - named
+    assert coded(table('docs/falls.md', 'Formats')) >= set(FORMATS)
 
 
 def test_measures_are_told_one_by_one():

@@ -14,17 +14,21 @@ ARROWS = {
     'model': set(),
     'files': {'model'},
     'physics': {'files', 'model'},
+    'people': {'files', 'model'},
     'fit': {'physics', 'files', 'model'},
     'ros': {'physics', 'files', 'model'},
     'recordings': {'physics', 'files', 'model'},
     'viewer': {'physics', 'fit', 'recordings', 'files', 'model'},
     'replay': {'physics', 'fit', 'recordings', 'files', 'model'},
-    'accuracy': {'physics', 'files', 'model'}}
+    'accuracy': {'physics', 'files', 'model'},
+    'falls': {'physics', 'people', 'fit', 'recordings', 'files', 'model'}}
 """What a room may import of others."""
 
 ONLY = {'pybullet': 'physics/engine/bullet.py', 'mujoco': 'physics/engine/mujoco.py',
-        'numba': 'physics/kernels/', 'viser': 'viewer/', 'matplotlib': ('fit/', 'accuracy/'),
+        'numba': 'physics/kernels/', 'viser': 'viewer/',
+        'matplotlib': ('fit/', 'accuracy/', 'falls/pictures.py'),
         'trimesh': 'fit/robots/mesh_file.py', 'DracoPy': 'fit/reading/draco.py',
+        'pyarrow': 'falls/formats/', 'ray': 'falls/cluster.py', 'mcap_ros2': 'falls/formats/',
         'scipy': 'accuracy/', 'mcap': ('files/bag.py', 'recordings/mcap_file.py')}
 """Libraries, and the one place of each. The report's pendulum in three lines of PyBullet alone is
 what a user would write without this package: it shares no code with it."""

@@ -15,6 +15,7 @@ from ..model.ragdoll import (
     Joint,
     Ragdoll,
     SkeletonFrame,
+    angle_errors,
     carried_errors,
     pair_errors,
     tree_errors,
@@ -57,7 +58,7 @@ def build_doll(data: object, path: Path = Path('doll')) -> tuple[Ragdoll | None,
             if all(isinstance(text, str) for text in sum(carried, ())):
                 found += carried_errors(key, names, carried)
         if not found:
-            found += pair_errors(names, data.get('no_collision', ()))
+            found += pair_errors(names, data.get('no_collision', ())) + angle_errors(joints)
     if found:
         return None, found
     model = str(path.parent / data['model']) if 'model' in data else None
@@ -175,4 +176,6 @@ def _joint_data(joint: Joint) -> dict:
                               for pair in joint.limits]
     if joint.damping:
         data['damping'] = joint.damping
+    if joint.names:
+        data['names'] = list(joint.names)
     return data

@@ -109,6 +109,16 @@ class DofLayout:
             angles[own] = rotation.to_xyz(q[at])
         return angles
 
+    def with_joint_angles(self, q: np.ndarray, angles: np.ndarray) -> np.ndarray:
+        """The same coordinates with other joint angles, rad, in the order of Scene.angle_names."""
+        q = q.copy()
+        free = np.ones(len(angles), bool)
+        for own, at, _ in self._free_angles:
+            free[own] = False
+            q[at] = rotation.from_xyz(*angles[own])
+        q[self._angles[free]] = angles[free]
+        return q
+
     def joint_rates(self, coordinates: GeneralizedState) -> np.ndarray:
         """What joint_angles() changes by, rad/s."""
         rates = coordinates.v[self._rates]

@@ -121,7 +121,8 @@ class Joint:
     - fixed: no axes.
 
     ``limits`` in rad, None for a free axis; kept to 1e-9 degrees, so that files written in
-    degrees read back to the same bits. ``damping`` is in N m s/rad on each axis.
+    degrees read back to the same bits. ``damping`` is in N m s/rad on each axis. ``names`` are
+    those of the joint's angles, one for each; without them they are called as the child.
     """
 
     parent: str
@@ -131,6 +132,7 @@ class Joint:
     axes: tuple[Vector, ...] = ()
     limits: tuple[Limits | None, ...] = ()
     damping: float = 0.0
+    names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.kind not in JOINT_KINDS:
@@ -139,7 +141,7 @@ class Joint:
         if self.kind == 'ball' and len(self.axes) == 2:
             kind = dataclasses.replace(kind, axes=2, limits=3)
         set_fields(self, anchor=finite('anchor', self.anchor), damping=float(self.damping),
-                   axes=tuple(unit('axes', axis) for axis in self.axes),
+                   axes=tuple(unit('axes', axis) for axis in self.axes), names=tuple(self.names),
                    limits=tuple(_angles(pair) for pair in self.limits or (None,) * kind.limits))
         if len(self.axes) != kind.axes:
             raise errors.WrongAxes('axes', self.axes, f'{kind.axes} for a {self.kind} joint')
@@ -147,6 +149,9 @@ class Joint:
             raise errors.WrongAxes('limits', self.limits, f'{kind.limits} for a {self.kind} joint')
         if not 0 <= self.damping < math.inf:
             raise errors.OutOfRange('damping', self.damping, 'zero or above, finite')
+        if self.names and len(self.names) != kind.dof:
+            raise errors.WrongForm('names', list(self.names),
+                                   f'{kind.dof} for a {self.kind} joint')
         self._check_limits()
         if len(self.axes) == 2 and abs(np.dot(*self.axes)) > 1e-6:
             raise errors.WrongAxes('axes', self.axes, 'two perpendicular axes')
@@ -186,7 +191,11 @@ class Joint:
 
     @property
     def angle_names(self) -> tuple[str, ...]:
-        """Name of each joint angle: the child's, with a suffix where there are several."""
+        """Name of each joint angle: its own, else the child's, with a suffix where there are
+        several.
+        """
+        if self.names:
+            return self.names
         suffixes = {'universal': ('_1', '_2'), 'ball': ('_x', '_y', '_z')}
         count = self.dof
         return tuple(self.child + s for s in suffixes.get(self.kind, ('',) * count))
@@ -250,6 +259,7 @@ class Ragdoll:
             carried = [(each.name, each.bone) for each in getattr(self, key)]
             found += carried_errors(key, names, carried)
         found += pair_errors(names, self.no_collision)
+        found += angle_errors(self.joints)
         for error in found:
             raise error
 
@@ -384,6 +394,17 @@ def pair_errors(names: list[str], pairs: Sequence[Sequence[str]]) -> list[errors
                   for name in pair if name not in names]
         if len(pair) != 2 or pair[0] == pair[1]:
             found.append(errors.WrongForm(where, list(pair), 'two bones'))
+    return found
+
+
+def angle_errors(joints: Sequence[Joint]) -> list[errors.ModelError]:
+    """Find joints whose angles are called as another's."""
+    found: list[errors.ModelError] = []
+    seen: set[str] = set()
+    for index, joint in enumerate(joints):
+        found += [errors.DuplicateName(f'joints[{index}].names', name, 'a name of its own')
+                  for name in joint.angle_names if name in seen]
+        seen.update(joint.angle_names)
     return found
 
 

@@ -159,6 +159,14 @@ def to_rpy(q: np.ndarray) -> tuple[float, float, float]:
     return roll, pitch, yaw
 
 
+def from_xyz(x: float, y: float, z: float) -> np.ndarray:
+    """Unit quaternion (4,) of turns in rad about x, then the new y, then the new z."""
+    q = np.array(IDENTITY)
+    for axis, angle in zip(np.eye(3), (x, y, z), strict=True):
+        q = multiply(q, from_axis_angle(axis, angle))
+    return q
+
+
 def to_xyz(q: np.ndarray) -> tuple[float, float, float]:
     """Angles in rad about x, then the new y, then the new z that make up one quaternion's turn."""
     r = matrix(q)

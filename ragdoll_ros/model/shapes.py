@@ -5,6 +5,7 @@ Several of them together are a Compound (compound.py).
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from dataclasses import dataclass
 from typing import ClassVar
@@ -37,12 +38,12 @@ class Solid:
     @property
     def parts(self) -> tuple[Part, ...]:
         """The simple shapes that it is for whatever collides with it: itself alone."""
-        return (Part(self),)
+        return _by_itself(self)
 
     @property
     def primitives(self) -> tuple[Part, ...]:
         """What it is drawn as: boxes, cylinders and spheres, as every viewer knows just these."""
-        return (Part(self),)
+        return _by_itself(self)
 
     def reach(self, direction: np.ndarray) -> np.ndarray:
         """How far (...,) m it extends along unit directions (..., 3) of its own axes."""
@@ -85,6 +86,12 @@ class Part:
     def pose(self) -> Pose:
         """Of its centre and axes, in those of the whole."""
         return Pose(np.array(self.position), np.array(self.orientation))
+
+
+@functools.lru_cache(4096)
+def _by_itself(shape: Shape) -> tuple[Part, ...]:
+    """Asked for many times while a simulation is built: a batch builds one for each fall."""
+    return (Part(shape),)
 
 
 @dataclass(frozen=True)

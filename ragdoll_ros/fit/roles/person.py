@@ -1,6 +1,6 @@
 """Whether a skeleton is a person's, and the segments that a person has.
 
-Shares of mass: a man's, de Leva 1996 (J Biomech 29:1223), table 4. His head has the neck.
+Shares of mass: a man's, by model/anthropometry.py. His head has the neck.
 """
 from __future__ import annotations
 
@@ -9,10 +9,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...model.anthropometry import MEN, TRUNK
 from .names import side_of
 
-SEGMENTS = {'head': 6.94, 'trunk': 43.46, 'upper_arm': 2.71, 'forearm': 1.62, 'hand': 0.61,
-            'thigh': 14.16, 'shin': 4.33, 'foot': 1.37}
+SEGMENTS = {'head': MEN.segments['head'].mass,
+            'trunk': sum(MEN.segments[part].mass for part in TRUNK),
+            **{name: part.mass for name, part in MEN.segments.items()
+               if name not in ('head', *TRUNK)}}
 """Percent of the whole, each limb of one side."""
 
 SEGMENT_OF = {**{name: name for name in SEGMENTS}, 'neck': 'head', 'soft': 'head', 'spine': 'trunk',

@@ -118,7 +118,8 @@ class _World:
     def _set_up(self, doll: Ragdoll, body: int) -> _Doll:
         """Find links and joints by name, and switch off what PyBullet switches on."""
         links, joints, widths = {doll.root.name: -1}, [], []
-        damping = {name: joint.damping for joint in doll.joints for name in joint.angle_names}
+        damping = {name: joint.damping for joint in doll.joints
+                   for name in (joint.child, *joint.angle_names)}
         for index in range(pybullet.getNumJoints(body, self._client)):
             info = pybullet.getJointInfo(body, index, self._client)
             name, kind, link = info[1].decode(), info[2], info[12].decode()
@@ -129,7 +130,7 @@ class _World:
             ball = kind == pybullet.JOINT_SPHERICAL
             widths.append((4, 3) if ball else (1, 1))
             self._free_joint(body, index, ball)
-            loss = damping.get(name, damping.get(f'{name}_x', 0.0))
+            loss = damping.get(name, 0.0)
             pybullet.changeDynamics(body, index, jointDamping=loss, physicsClientId=self._client)
         for link in range(-1, pybullet.getNumJoints(body, self._client)):
             pybullet.changeDynamics(

@@ -201,6 +201,8 @@ class Clusters:
         """Contacts (c,) of all last steps, none in flight; which bones (c, 2) of the scene touch,
         or GROUND; how long (c,) s the step lasted.
         """
+        if len(self._alone) == 1:
+            return self._touching_of_one()
         courses, lone = self._courses, np.bincount(self.of_doll)[self.of_doll] == 1
         known, dolls = courses.contacts_of(lone & (courses.whole['path']['valid'] == 0))
         found = [_touching(courses.whole['known'][known], self._records, self._first[dolls],
@@ -213,6 +215,13 @@ class Clusters:
                                        np.zeros(len(known), np.int64),
                                        np.full(len(known), tally['lasted'])))
         return tuple(map(np.concatenate, zip(*found, strict=True)))
+
+    def _touching_of_one(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The same of a scene of one doll, three times as quick."""
+        course = self._alone[0].course
+        count = 0 if course.path['valid'][0] else int(course.tally['contacts'][0])
+        return _touching(course.known[:count], self._records, np.zeros(count, np.int64),
+                         np.full(count, course.tally['lasted'][0]))
 
     def save(self) -> object:
         """A snapshot that restore() brings back to the bit."""
@@ -354,8 +363,9 @@ def _touching(known: np.ndarray, records: np.ndarray, first: np.ndarray,
     """
     touch = known['kind'] > 1
     known, first, lasted = known[touch], first[touch], lasted[touch]
-    bones = np.stack([records[first + known['a']], np.where(
-        known['b'] < 0, GROUND, records[first + known['b']])], axis=1)
+    bones = np.empty((len(known), 2), np.int64)
+    bones[:, 0] = records[first + known['a']]
+    bones[:, 1] = np.where(known['b'] < 0, GROUND, records[first + known['b']])
     return known, bones, np.where(lasted > 0, lasted, 1.0)
 
 

@@ -1,0 +1,109 @@
+"""What a fall of 3 s costs at each accuracy, where that goes, and what MuJoCo's rollout takes.
+
+python docs/falls_cost.py [--falls 40] [--recipe faint]
+"""
+from __future__ import annotations
+
+import argparse
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from types import SimpleNamespace
+
+import mujoco
+import numpy as np
+from mujoco.rollout import rollout
+
+from ragdoll_ros.falls import simulate as falls
+from ragdoll_ros.falls.formats import lerobot
+from ragdoll_ros.falls.recipe import Recipe, load_recipe, recipe_of
+from ragdoll_ros.falls.start import start_of
+from ragdoll_ros.physics.engine import clusters
+from ragdoll_ros.physics.settings import ACCURACIES
+from ragdoll_ros.physics.simulation import Simulation
+
+PARTS = ('machine code', 'the rest of ticks', 'frames', 'set up', 'Parquet')
+
+
+class Clock:
+    """Seconds of the processor that functions took, by their labels."""
+
+    def __init__(self) -> None:
+        self.spent: dict[str, float] = defaultdict(float)
+
+    def timed(self, label: str, function: Callable) -> Callable:
+        """The function, timed."""
+        def call(*arguments: object, **keywords: object) -> object:
+            began = time.process_time()
+            try:
+                return function(*arguments, **keywords)
+            finally:
+                self.spent[label] += time.process_time() - began
+        return call
+
+
+def watch(clock: Clock) -> None:
+    """Time the parts of a fall from now on."""
+    clusters.kernels = SimpleNamespace(
+        advance=clock.timed('machine code', clusters.kernels.advance))
+    falls.Guard.advance = clock.timed('ticks', falls.Guard.advance)
+    falls._Frames.add = clock.timed('frames', falls._Frames.add)
+
+
+def parts_of(recipe: Recipe, count: int, clock: Clock) -> list[float]:
+    """Milliseconds a fall in each of PARTS."""
+    list(falls.generate(recipe, range(2)))
+    clock.spent.clear()
+    began = time.process_time()
+    made = list(falls.generate(recipe, range(count)))
+    simulated = time.process_time() - began
+    lerobot.shard_files(recipe, made[:2], 0)
+    began = time.process_time()
+    lerobot.shard_files(recipe, made, 0)
+    written = time.process_time() - began
+    code, ticks, frames = (clock.spent[key] for key in ('machine code', 'ticks', 'frames'))
+    rest = simulated - ticks - frames
+    return [1000 / count * part for part in (code, ticks - code, frames, rest, written)]
+
+
+def mujocos(recipe: Recipe, count: int, accuracy: str, threads: int) -> float:
+    """Milliseconds a fall of the same starts by MuJoCo's rollout, every step kept."""
+    models, states = [], []
+    step = 0.01 / ACCURACIES[accuracy].substeps
+    for number in range(count):
+        start = start_of(recipe, number)
+        with Simulation(start.scene, accuracy=accuracy, engine='mujoco') as simulation:
+            falls.begin(simulation, start)
+            simulation._engine._run(step, 1, ())
+            model, data = simulation._engine._model, simulation._engine._data
+            state = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
+            mujoco.mj_getState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+            models.append(model)
+            states.append(state)
+    data = [mujoco.MjData(models[0]) for _ in range(threads)]
+    steps = round(recipe.data['duration'] / step)
+    began = time.process_time()
+    rollout(models, data, np.array(states), nstep=steps)
+    return 1000 / count * (time.process_time() - began)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--falls', type=int, default=40)
+    parser.add_argument('--recipe', default='faint')
+    options = parser.parse_args()
+    given, clock = load_recipe(options.recipe), Clock()
+    watch(clock)
+    print('| accuracy | ' + ' | '.join(PARTS) + ' | all, ms a fall | MuJoCo, ms a fall |')
+    print('| --- ' * (len(PARTS) + 3) + '|')
+    for accuracy in ACCURACIES:
+        recipe = recipe_of({**given.data, 'accuracy': accuracy})
+        parts = parts_of(recipe, options.falls, clock)
+        theirs = mujocos(recipe, options.falls, accuracy, 1)
+        print(f'| {accuracy} | ' + ' | '.join(f'{part:.1f}' for part in parts)
+              + f' | {sum(parts):.1f} | {theirs:.1f} |')
+
+
+if __name__ == '__main__':
+    main()

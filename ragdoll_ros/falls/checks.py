@@ -1,0 +1,120 @@
+"""What is wrong with a recipe's values, beyond what its schema tells."""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from ..files.building import any_under
+from ..model import errors
+from ..model.errors import ModelError
+from ..model.ragdoll import Ragdoll
+from ..model.rotation import IDENTITY
+from ..model.vectors import finite, unit
+from .distribution import choices, distribution_errors, support
+
+TURN = (-3600.0, 3600.0)
+RANGES = {
+    'start.heading_deg': TURN, 'start.lean_deg': (0, 180), 'start.lean_towards_deg': TURN,
+    'start.clearance': (0, 100), 'start.velocity': (-100, 100), 'start.spin': (-100, 100),
+    'start.other_angles': (0, 1), 'pushes.force': (0, 1e5), 'pushes.towards_deg': TURN,
+    'pushes.upwards_deg': (-90, 90), 'pushes.at': (0, 600), 'pushes.duration': (1e-3, 600),
+    'ground.friction': (0, math.inf), 'ground.restitution': (0, 1), 'ground.slope_deg': (0, 45),
+    'ground.downhill_deg': TURN, 'duration': (0.1, 600), 'record.rate': (5, 5000),
+    'phases.onset_speed': (0, 10), 'phases.rest_speed': (0, 10)}
+"""Smallest and largest of what each value may be, in the units of the schema."""
+
+
+def value_errors(data: dict, dolls: list[Ragdoll], found: list[ModelError]) -> list[ModelError]:
+    """What is wrong with data beside what was ``found`` so far; ``dolls`` are those it names."""
+    more = [error for key, part in data.items() if not any_under(found, key)
+            for error in distribution_errors(part, key)]
+    more += list(_out_of_range(data, [*found, *more]))
+    more += list(_wrong_imus(data, [*found, *more]))
+    if dolls and not any(any_under([*found, *more], key)
+                         for key in ('feet', 'start', 'pushes', 'record')):
+        more += _unknown_names(data, dolls)
+    return more
+
+
+def mounted(mount: dict) -> dict:
+    """Where an IMU is on its bone: position m, and a unit quaternion; NotFinite, NotUnit."""
+    return {'position': list(finite('position', mount.get('position', (0, 0, 0)))),
+            'orientation': list(unit('orientation', mount.get('orientation', IDENTITY), count=4))}
+
+
+def names_of(doll: Ragdoll) -> tuple:
+    """Names of all bones, and of all joint angles."""
+    return [bone.name for bone in doll.bones], _angle_names(doll)
+
+
+def _angle_names(doll: Ragdoll) -> list[str]:
+    return [name for joint in doll.joints for name in joint.angle_names]
+
+
+def _out_of_range(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
+    """Values of which some would be out of their ranges."""
+    for key, bounds in RANGES.items():
+        for path, value in _values(data, key):
+            if any_under(found, path) or isinstance(value, (str, bool)):
+                continue
+            low, high = support(value)
+            if not bounds[0] <= low <= high <= bounds[1]:
+                yield errors.OutOfRange(path, value, f'{bounds[0]:g} to {bounds[1]:g}')
+
+
+def _values(data: object, key: str, path: str = '') -> Iterator[tuple[str, object]]:
+    """Where a key like ``pushes.force`` stands in the data, and what stands there."""
+    if isinstance(data, list):
+        for index, part in enumerate(data):
+            yield from _values(part, key, f'{path}[{index}]')
+    elif not key:
+        yield path, data
+    elif isinstance(data, dict):
+        first, _, rest = key.partition('.')
+        if first in data:
+            yield from _values(data[first], rest, f'{path}.{first}' if path else first)
+
+
+def _wrong_imus(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
+    """IMUs of one name, or whose place or orientation is none."""
+    if any_under(found, 'record'):
+        return
+    names = []
+    for index, mount in enumerate(data.get('record', {}).get('imus', ())):
+        where = f'record.imus[{index}]'
+        try:
+            mounted(mount)
+        except ModelError as error:
+            yield error.at(where)
+        if mount['name'] in names:
+            yield errors.DuplicateName(f'{where}.name', mount['name'], 'a name of its own')
+        names.append(mount['name'])
+
+
+def _unknown_names(data: dict, dolls: list[Ragdoll]) -> Iterator[ModelError]:
+    """Bones and joint angles that the dolls do not have, and angles beyond their limits."""
+    bones, _ = names_of(dolls[0])
+    named = [(f'feet[{index}]', name) for index, name in enumerate(data.get('feet', ()))]
+    named += [(f'pushes[{index}].bone', name) for index, push in enumerate(data.get('pushes', ()))
+              for name in choices(push['bone'])]
+    imus = data.get('record', {}).get('imus', ())
+    named += [(f'record.imus[{index}].bone', mount['bone']) for index, mount in enumerate(imus)]
+    for path, name in named:
+        if name not in bones:
+            yield errors.UnknownBone(path, name, errors.one_of(bones, name))
+    for name, value in data.get('start', {}).get('angles_deg', {}).items():
+        path, ranges = f'start.angles_deg.{name}', [ranges_of(doll).get(name) for doll in dolls]
+        if name not in _angle_names(dolls[0]):
+            yield errors.WrongForm(path, name, errors.one_of(_angle_names(dolls[0]), name))
+            continue
+        low = max((pair[0] for pair in ranges if pair), default=-360.0)
+        high = min((pair[1] for pair in ranges if pair), default=360.0)
+        least, most = support(value)
+        if not low - 1e-9 <= least <= most <= high + 1e-9:
+            yield errors.OutOfRange(path, value, f'{low:g} to {high:g}, the limits of the joint')
+
+
+def ranges_of(doll: Ragdoll) -> dict[str, tuple[float, float]]:
+    """Limits of each limited joint angle, degrees."""
+    return {name: tuple(round(math.degrees(angle), 9) for angle in pair) for joint in doll.joints
+            for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True) if pair}

@@ -1,0 +1,1 @@
+"""Files of falls, one format each."""

@@ -1,0 +1,69 @@
+"""CSV as of KFall (Yu, Jang, Xiong, Front Aging Neurosci 2021, 10.3389/fnagi.2021.692865): one file
+a fall of what the recipe's first IMU reads, and a table of labels a shard.
+
+The columns are KFall's: time s, frame, acceleration g, rate deg/s, Euler angles deg (roll, pitch
+and yaw of the sensor in the world). A shard stands for a subject, a fall for a trial of task 1. The
+sensor's axes are the recipe's, not those of KFall's sensor.
+"""
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+import numpy as np
+
+from ...model import rotation
+from ...model.errors import WrongForm
+from ..fall import Fall
+from ..recipe import Recipe
+from ..worn import imu_samples, sensor_orientations
+
+SENSOR = 'sensor_data/SA{shard:06d}/S{shard:06d}T01R{trial:02d}.csv'
+LABELS = 'label_data/SA{shard:06d}_label.csv'
+COLUMNS = ('TimeStamp(s)', 'FrameCounter', 'AccX', 'AccY', 'AccZ', 'GyrX', 'GyrY', 'GyrZ',
+           'EulerX', 'EulerY', 'EulerZ')
+LABEL_COLUMNS = ('Task Code (Task ID)', 'Description', 'Trial ID', 'Fall_onset_frame',
+                 'Fall_impact_frame', 'Fall', 'Failure')
+G = 9.80665
+"""m/s^2: the standard acceleration, in which a g is counted."""
+
+
+def check(recipe: Recipe) -> None:
+    """WrongForm for a recipe without an IMU."""
+    if not recipe.imus:
+        raise WrongForm('record.imus', [], 'an IMU for the format kfall')
+
+
+def shard_files(recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, bytes]:
+    """A file for each fall, and the shard's labels."""
+    files = {SENSOR.format(shard=shard, trial=trial): _table(COLUMNS, _rows(recipe, fall))
+             for trial, fall in enumerate(falls, 1)}
+    labels = [('F01 (1)', recipe.name, trial, *_frames(fall), fall.number, fall.failure)
+              for trial, fall in enumerate(falls, 1)]
+    return {**files, LABELS.format(shard=shard): _table(LABEL_COLUMNS, labels)}
+
+
+def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
+    """None: each shard is whole by itself."""
+    return {}
+
+
+def _rows(recipe: Recipe, fall: Fall) -> list[list[float]]:
+    mount = recipe.imus[0]
+    samples = imu_samples(fall, mount)[:fall.valid]
+    angles = [rotation.to_rpy(turn) for turn in sensor_orientations(fall, mount)[:fall.valid]]
+    table = np.concatenate([samples[:, :3] / G, np.degrees(samples[:, 3:]),
+                            np.degrees(np.array(angles).reshape(-1, 3))], axis=1)
+    return [[f'{time:.6f}', frame, *(f'{number:.6f}' for number in row)]
+            for frame, (time, row) in enumerate(zip(fall.times, table.tolist(), strict=False))]
+
+
+def _frames(fall: Fall) -> list[object]:
+    return ['' if frame is None else frame for frame in (fall.phases.onset, fall.phases.impact)]
+
+
+def _table(header: tuple[str, ...], rows: list) -> bytes:
+    text = io.StringIO()
+    csv.writer(text, lineterminator='\n').writerows([header, *rows])
+    return text.getvalue().encode()

@@ -1,0 +1,180 @@
+"""Parquet in the layout of LeRobot v3: an episode is a fall, a data file is a shard.
+
+Of https://github.com/huggingface/lerobot (Apache-2.0) it has the layout, of its code nothing:
+meta/info.json, meta/stats.json, meta/tasks.parquet, meta/episodes/chunk-000/file-000.parquet and
+data/chunk-000/file-000.parquet. Numbers are float32. All falls have equally many frames, so that a
+shard knows where in the data set it stands.
+"""
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as parquet
+
+from ..fall import Fall
+from ..recipe import Recipe
+from .columns import Column, columns
+
+FILES_PER_CHUNK = 1000
+PLACE = 'chunk-{chunk_index:03d}/file-{file_index:03d}.parquet'
+DATA, EPISODES = f'data/{PLACE}', f'meta/episodes/{PLACE}'
+STATISTICS = ('min', 'max', 'mean', 'std', 'count')
+
+
+def shard_files(recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, bytes]:
+    """Data and episodes of a shard."""
+    place = dict(zip(('chunk_index', 'file_index'), divmod(shard, FILES_PER_CHUNK), strict=True))
+    tables = [_frames(recipe, fall) for fall in falls]
+    rows = [_episode(recipe, fall, place) for fall in falls]
+    return {DATA.format(**place): _parquet(pa.concat_tables(tables), recipe.frames),
+            EPISODES.format(**place): _parquet(pa.Table.from_pylist(rows, _episode_schema(rows[0])),
+                                               len(rows))}
+
+
+def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
+    """What LeRobot wants to know of the whole."""
+    names = sorted(folder.glob('meta/episodes/*/*.parquet'))
+    first = parquet.read_table(names[0]).slice(0, 1).to_pylist()[0]
+    keys = [key.split('/')[1] for key in first if key.startswith('stats/') and key.endswith('/min')]
+    stats = _whole_stats(names, keys)
+    info = {
+        'codebase_version': 'v3.0', 'robot_type': recipe.dolls[0].name, 'total_episodes': count,
+        'total_frames': count * recipe.frames, 'total_tasks': 1, 'chunks_size': FILES_PER_CHUNK,
+        'data_files_size_in_mb': 100, 'video_files_size_in_mb': 200, 'fps': recipe.rate,
+        'splits': {'train': f'0:{count}'}, 'data_path': DATA, 'video_path': None,
+        'features': _features(recipe, folder / DATA.format(chunk_index=0, file_index=0))}
+    return {'meta/info.json': _json(info), 'meta/stats.json': _json(stats),
+            'meta/tasks.parquet': _tasks(recipe.name)}
+
+
+def read_labels(folder: Path) -> dict[str, np.ndarray]:
+    """Of a data set's f falls: onset, impact and rest (f,) in frames, direction_deg (f,) and
+    impact_speeds (f, n) m/s; NaN where there is none.
+    """
+    keys = ('onset', 'impact', 'rest', 'direction_deg', 'impact_speeds')
+    parts = [parquet.read_table(path, columns=list(keys))
+             for path in sorted(folder.glob('meta/episodes/*/*.parquet'))]
+    table = pa.concat_tables(parts)
+    return {key: np.array(table.column(key).to_pylist(), float) for key in keys}
+
+
+def _frames(recipe: Recipe, fall: Fall) -> pa.Table:
+    """Of one fall."""
+    count = recipe.frames
+    made = {f'observation.{column.name}': _array(column) for column in columns(recipe, fall)}
+    frames = np.arange(count)
+    made['observation.valid'] = pa.array(frames < fall.valid)
+    made['timestamp'] = pa.array(fall.times.astype(np.float32))
+    made['frame_index'] = pa.array(frames)
+    made['episode_index'] = pa.array(np.full(count, fall.number))
+    made['index'] = pa.array(fall.number * count + frames)
+    made['task_index'] = pa.array(np.zeros(count, np.int64))
+    table = pa.table(made)
+    names = {f'observation.{column.name}': list(column.names) for column in columns(recipe, fall)}
+    return table.replace_schema_metadata({'names': json.dumps(names)})
+
+
+def _array(column: Column) -> pa.Array:
+    flags = column.values.dtype == bool
+    flat = column.values.ravel() if flags else column.values.ravel().astype(np.float32)
+    return pa.FixedSizeListArray.from_arrays(pa.array(flat), column.values.shape[1])
+
+
+def _episode(recipe: Recipe, fall: Fall, place: dict[str, int]) -> dict:
+    """LeRobot's columns, then this package's labels."""
+    first = fall.number * recipe.frames
+    speeds = -fall.impact_velocities[:, 2]
+    row = {
+        'episode_index': fall.number, 'tasks': [recipe.name], 'length': recipe.frames,
+        'dataset_from_index': first, 'dataset_to_index': first + recipe.frames,
+        **{f'{table}/{key}': value for table in ('data', 'meta/episodes')
+           for key, value in place.items()},
+        'onset': fall.phases.onset, 'impact': fall.phases.impact, 'rest': fall.phases.rest,
+        'failure': fall.failure, 'valid_frames': fall.valid,
+        'energy_excess_J': fall.energy_excess,
+        'direction_deg': fall.direction,
+        'impact_speeds': [None if np.isnan(speed) else speed for speed in speeds.tolist()],
+        'drawn': json.dumps(fall.drawn, sort_keys=True)}
+    for column in columns(recipe, fall):
+        values = column.values[:fall.valid].astype(float)
+        known = len(values) > 0
+        for name in STATISTICS[:-1]:
+            row[f'stats/observation.{column.name}/{name}'] = getattr(values, name)(
+                axis=0).tolist() if known else [None] * values.shape[1]
+        row[f'stats/observation.{column.name}/count'] = [fall.valid]
+    return row
+
+
+def _episode_schema(row: dict) -> pa.Schema:
+    """Types of an episode's columns, whatever is missing in a shard."""
+    kinds = {str: pa.string(), int: pa.int64(), float: pa.float64(), type(None): pa.int64()}
+    fields = {key: kinds[type(value)] for key, value in row.items() if not isinstance(value, list)}
+    fields.update(tasks=pa.list_(pa.string()), impact_speeds=pa.list_(pa.float64()),
+                  valid_frames=pa.int64())
+    for key in row:
+        if key.startswith('stats/'):
+            fields[key] = pa.list_(pa.int64() if key.endswith('/count') else pa.float64())
+    return pa.schema([(key, fields[key]) for key in row])
+
+
+def _whole_stats(paths: list[Path], keys: list[str]) -> dict:
+    """Of all frames, from those of the episodes, weighted by their counts."""
+    whole = {}
+    for key in keys:
+        parts = {name: [] for name in STATISTICS}
+        for path in paths:
+            table = parquet.read_table(path, columns=[f'stats/{key}/{name}' for name in STATISTICS])
+            for name in STATISTICS:
+                parts[name] += table.column(f'stats/{key}/{name}').to_pylist()
+        low, high, mean, deviation, count = (np.array(parts[name], float) for name in STATISTICS)
+        known = count[:, 0] > 0
+        low, high, mean, deviation, count = (
+            part[known] for part in (low, high, mean, deviation, count))
+        total = count.sum()
+        middle = (count * mean).sum(axis=0) / total
+        spread = (count * (deviation ** 2 + (mean - middle) ** 2)).sum(axis=0) / total
+        whole[key] = {'min': low.min(axis=0).tolist(), 'max': high.max(axis=0).tolist(),
+                      'mean': middle.tolist(), 'std': np.sqrt(spread).tolist(),
+                      'count': [int(total)]}
+    return whole
+
+
+def _features(recipe: Recipe, path: Path) -> dict:
+    """What LeRobot is told of each column."""
+    schema = parquet.read_schema(path)
+    names = json.loads(schema.metadata[b'names'])
+    features = {}
+    for field in schema:
+        many = pa.types.is_fixed_size_list(field.type)
+        kind = field.type.value_type if many else field.type
+        features[field.name] = {
+            'dtype': {'float': 'float32'}.get(str(kind), str(kind)),
+            'shape': [field.type.list_size if many else 1], 'names': names.get(field.name)}
+    return features
+
+
+def _tasks(name: str) -> bytes:
+    """The one task, which pandas reads as the table's index."""
+    columns = [{'name': 'task_index', 'field_name': 'task_index', 'pandas_type': 'int64',
+                'numpy_type': 'int64', 'metadata': None},
+               {'name': 'task', 'field_name': 'task', 'pandas_type': 'unicode',
+                'numpy_type': 'object', 'metadata': None}]
+    about = {'index_columns': ['task'], 'column_indexes': [], 'columns': columns,
+             'creator': {'library': 'pyarrow', 'version': pa.__version__}, 'pandas_version': None}
+    table = pa.table({'task_index': pa.array([0]), 'task': pa.array([name])})
+    return _parquet(table.replace_schema_metadata({'pandas': json.dumps(about)}), 1)
+
+
+def _parquet(table: pa.Table, rows_per_group: int) -> bytes:
+    """Bytes that depend on the table and pyarrow's version alone."""
+    stream = io.BytesIO()
+    parquet.write_table(table, stream, row_group_size=rows_per_group, compression='zstd')
+    return stream.getvalue()
+
+
+def _json(data: object) -> bytes:
+    return (json.dumps(data, indent=2) + '\n').encode()

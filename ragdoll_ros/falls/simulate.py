@@ -1,0 +1,104 @@
+"""A fall, from how it begins to its frames."""
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from ..model.coordinates import DofLayout, GeneralizedState
+from ..model.errors import RagdollError
+from ..physics.engine.protocol import GROUND
+from ..physics.ground_heights import GroundHeights
+from ..physics.guard import Guard
+from ..physics.simulation import Simulation
+from .fall import Fall, Phases
+from .phases import find_phases
+from .recipe import Recipe
+from .start import Start, start_of
+
+
+def generate(recipe: Recipe, falls: Iterable[int]) -> Iterator[Fall]:
+    """Falls of a recipe by their numbers, each from the recipe and its number alone."""
+    for number in falls:
+        yield simulate(recipe, start_of(recipe, number))
+
+
+def simulate(recipe: Recipe, start: Start) -> Fall:
+    """The fall that begins as ``start`` says."""
+    scene, frames = start.scene, _Frames(start, recipe.frames)
+    # Not 'auto': what falls are is not to depend on what is installed.
+    with Simulation(scene, accuracy=recipe.data['accuracy'], engine='rigid') as simulation:
+        try:
+            begin(simulation, start)
+            failure = ''
+        except RagdollError as error:
+            failure = str(error)
+        guard = Guard(simulation)
+        while frames.valid < recipe.frames and not failure:
+            frames.add(simulation)
+            if simulation.asleep and simulation.time > start.last_act:
+                frames.hold()
+            elif frames.valid < recipe.frames:
+                bad = guard.advance()
+                failure = bad.reason if bad else ''
+        excess = simulation.energy_excess if frames.valid else np.nan
+    states, touching = frames.states[:frames.valid], frames.touching[:frames.valid]
+    phases = find_phases(scene, states, touching, recipe.data['feet'],
+                         **recipe.data['phases']) if frames.valid else Phases()
+    return Fall(start.number, start.drawn, scene, np.arange(recipe.frames) / recipe.rate,
+                frames.states, *frames.joint_motion(), frames.touching, frames.valid, failure,
+                phases, excess)
+
+
+class _Frames:
+    """What is recorded, NaN where nothing is yet."""
+
+    def __init__(self, start: Start, count: int) -> None:
+        self._layout = DofLayout([placement.doll for placement in start.scene.dolls])
+        n, sizes = len(start.scene.bones), self._layout.sizes
+        self.states, self.touching = np.full((count, n, 13), np.nan), np.zeros((count, n), bool)
+        self._q, self._v = (np.full((count, size), np.nan) for size in sizes)
+        self.valid = 0
+
+    def add(self, simulation: Simulation) -> None:
+        """Record what is now."""
+        at, contacts, coordinates = self.valid, simulation.contacts, simulation.coordinates
+        self.states[at] = simulation.state.rows
+        self.touching[at, contacts.a[contacts.b == GROUND]] = True
+        self._q[at], self._v[at] = coordinates.q, coordinates.v
+        self.valid += 1
+
+    def hold(self) -> None:
+        """Nothing changes any more."""
+        at = self.valid - 1
+        for each in (self.states, self.touching, self._q, self._v):
+            each[at:] = each[at]
+        self.valid = len(self.states)
+
+    def joint_motion(self) -> tuple[np.ndarray, np.ndarray]:
+        """Joint angles (t, k) rad and rates (t, k) rad/s."""
+        motion = [GeneralizedState(q, v) for q, v in zip(self._q, self._v, strict=True)]
+        return (np.array([self._layout.joint_angles(each.q) for each in motion]),
+                np.array([self._layout.joint_rates(each) for each in motion]))
+
+
+def begin(simulation: Simulation, start: Start) -> None:
+    """Put the doll where it starts, its lowest point at its clearance, and queue the pushes."""
+    scene = start.scene
+    normal = np.array(scene.ground.normal)
+    high = start.coordinates(_far_up(simulation, normal))
+    simulation.place(high)
+    lowest = float(GroundHeights(scene)(simulation.state).min())
+    lift = np.zeros_like(high.q)
+    lift[:3] = normal * (start.clearance - lowest)
+    simulation.place(GeneralizedState(high.q + lift, high.v))
+    for push in start.pushes:
+        simulation.push(push)
+
+
+def _far_up(simulation: Simulation, normal: np.ndarray) -> GeneralizedState:
+    """Where the scene's placement stands, but so far from the ground that nothing is in it."""
+    bound = simulation.coordinates
+    q = bound.q.copy()
+    q[:3] += normal * 3 * simulation.scene.dolls[0].doll.extent
+    return GeneralizedState(q, bound.v)

@@ -1,0 +1,103 @@
+"""From what was drawn for a fall to how it begins: scene, coordinates, pushes."""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import rotation
+from ..model.angle import sine_and_cosine
+from ..model.coordinates import DofLayout, GeneralizedState
+from ..model.push import Push
+from ..model.ragdoll import Ragdoll
+from ..model.scene import SECOND, Ground, Material, Placement, Scene
+from .recipe import Recipe
+
+GRAVITY = (0.0, 0.0, -9.8)
+
+
+@dataclass(frozen=True)
+class Start:
+    """How fall ``number`` of a recipe begins; ``drawn`` is Recipe.draw's."""
+
+    number: int
+    drawn: dict
+    scene: Scene
+    clearance: float
+    """m that the lowest point is to be above the ground."""
+    angles: dict[str, float]
+    """Joint angles, rad, by name, that are not zero."""
+    pushes: tuple[Push, ...]
+
+    @property
+    def last_act(self) -> int:
+        """When the last push ends, ns; 0 without any."""
+        return max((round((push.start + push.duration) * SECOND) for push in self.pushes),
+                   default=0)
+
+    def coordinates(self, bound: GeneralizedState) -> GeneralizedState:
+        """Of the start at the height at which ``bound``, the scene's own, is."""
+        layout = DofLayout([placement.doll for placement in self.scene.dolls])
+        angles = layout.joint_angles(bound.q)
+        for name, angle in self.angles.items():
+            angles[self.scene.angle_names.index(name)] = angle
+        return GeneralizedState(layout.with_joint_angles(bound.q, angles), bound.v)
+
+
+def start_of(recipe: Recipe, number: int) -> Start:
+    """How fall ``number`` of a recipe begins, from the recipe and the number alone."""
+    drawn = recipe.draw(number)
+    doll, start = recipe.dolls[drawn['doll']], drawn['start']
+    heading = rotation.from_axis_angle((0, 0, 1), math.radians(start['heading_deg']))
+    orientation = (_any_orientation(*start['shares']) if start['tumbled']
+                   else rotation.multiply(heading, _lean(start)))
+    faced = orientation if start['tumbled'] else heading
+    placement = Placement(doll, orientation=tuple(orientation),
+                          velocity=tuple(rotation.rotate(faced, start['velocity'])),
+                          spin=tuple(rotation.rotate(faced, start['spin'])))
+    ground = drawn['ground']
+    scene = Scene(recipe.name, (placement,), _ground(ground), gravity=GRAVITY,
+                  material=Material(ground['friction'], restitution=ground['restitution']),
+                  step=1 / recipe.rate)
+    return Start(number, drawn, scene, start['clearance'], _angles(doll, start),
+                 tuple(_push(push, heading) for push in drawn['pushes']))
+
+
+def _lean(start: dict) -> np.ndarray:
+    """Turn (4,) that tilts what is upright towards a direction of the horizontal."""
+    sine, cosine = sine_and_cosine(math.radians(start['lean_towards_deg']))
+    return rotation.from_axis_angle((-sine, cosine, 0.0), math.radians(start['lean_deg']))
+
+
+def _any_orientation(first: float, second: float, third: float) -> np.ndarray:
+    """One of all orientations (4,), none likelier than another, from three shares (Shoemake,
+    Uniform Random Rotations, Graphics Gems III, 1992).
+    """
+    (s1, c1), (s2, c2) = (sine_and_cosine(2 * math.pi * share) for share in (second, third))
+    low, high = math.sqrt(1 - first), math.sqrt(first)
+    return np.array([low * s1, low * c1, high * s2, high * c2])
+
+
+def _ground(drawn: dict) -> Ground:
+    """A plane whose normal leans downhill."""
+    sine, cosine = sine_and_cosine(math.radians(drawn['slope_deg']))
+    y, x = sine_and_cosine(math.radians(drawn['downhill_deg']))
+    return Ground((sine * x, sine * y, cosine))
+
+
+def _angles(doll: Ragdoll, start: dict) -> dict[str, float]:
+    """Joint angles, rad, by name, that a start gives."""
+    limits = {name: pair for joint in doll.joints
+              for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
+    angles = {name: limits[name][0] + share * (limits[name][1] - limits[name][0])
+              for name, share in start['angle_shares'].items()}
+    return {**angles, **{name: math.radians(angle)
+                         for name, angle in start['angles_deg'].items()}}
+
+
+def _push(drawn: dict, heading: np.ndarray) -> Push:
+    sine, cosine = sine_and_cosine(math.radians(drawn['towards_deg']))
+    up, along = sine_and_cosine(math.radians(drawn['upwards_deg']))
+    force = drawn['force'] * rotation.rotate(heading, (along * cosine, along * sine, up))
+    return Push(drawn['bone'], tuple(force), start=drawn['at'], duration=drawn['duration'])

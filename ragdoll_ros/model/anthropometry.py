@@ -1,0 +1,124 @@
+"""What people measure and weigh: segments of the body as shares of its mass, height and length.
+
+Masses, centres, radii of gyration and lengths: de Leva 1996, J Biomech 29:1223, table 4, of 100
+men (1.741 m, 73.0 kg) and 15 women (1.735 m, 61.9 kg), young and fit. Limb segments go from joint
+centre to joint centre, the head from vertex to mid-gonion, the hand to the third metacarpal's
+head, the foot from heel to toe. Percentiles and breadths: ANSUR II, the survey of US soldiers of
+2012 (Gordon et al., NATICK/TR-15/007), so neither old nor general; breadths and circumferences are
+means over its men and women together.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+SEXES = ('female', 'male')
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A segment of one side; see the table that it is in for what it is of."""
+
+    mass: float
+    """Percent of the whole body's."""
+    length: float
+    """m, in the sample's mean person."""
+    centre: float
+    """Centre of mass from the end nearer to the head, of the foot from the heel: share of the
+    length."""
+    sagittal: float
+    transverse: float
+    longitudinal: float
+    """Radii of gyration about the centre of mass as shares of the length: about the axis from back
+    to front, from side to side, and along the segment. A foot's are those of a foot that points
+    down: as one stands, its sagittal axis is the vertical."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """The mean of the people that a table is of."""
+
+    height: float
+    """m"""
+    segments: dict[str, Segment]
+    """By name; the limbs' are of one side."""
+
+
+MEN = Sample(1.741, {
+    'head': Segment(6.94, 0.2033, 0.5976, 0.362, 0.376, 0.312),
+    'chest': Segment(15.96, 0.1707, 0.2999, 0.716, 0.454, 0.659),
+    'abdomen': Segment(16.33, 0.2155, 0.4502, 0.482, 0.383, 0.468),
+    'pelvis': Segment(11.17, 0.1457, 0.6115, 0.615, 0.551, 0.587),
+    'upper_arm': Segment(2.71, 0.2817, 0.5772, 0.285, 0.269, 0.158),
+    'forearm': Segment(1.62, 0.2689, 0.4574, 0.276, 0.265, 0.121),
+    'hand': Segment(0.61, 0.0862, 0.7900, 0.628, 0.513, 0.401),
+    'thigh': Segment(14.16, 0.4222, 0.4095, 0.329, 0.329, 0.149),
+    'shin': Segment(4.33, 0.4403, 0.4395, 0.251, 0.246, 0.102),
+    'foot': Segment(1.37, 0.2581, 0.4415, 0.257, 0.245, 0.124)})
+"""The trunk in three: to the xiphoid, to the omphalion, to the hips' middle."""
+
+WOMEN = Sample(1.735, {
+    'head': Segment(6.68, 0.2002, 0.5894, 0.330, 0.359, 0.318),
+    'chest': Segment(15.45, 0.1425, 0.2077, 0.746, 0.502, 0.718),
+    'abdomen': Segment(14.65, 0.2053, 0.4512, 0.433, 0.354, 0.415),
+    'pelvis': Segment(12.47, 0.1815, 0.4920, 0.433, 0.402, 0.444),
+    'upper_arm': Segment(2.55, 0.2751, 0.5754, 0.278, 0.260, 0.148),
+    'forearm': Segment(1.38, 0.2643, 0.4559, 0.261, 0.257, 0.094),
+    'hand': Segment(0.56, 0.0780, 0.7474, 0.531, 0.454, 0.335),
+    'thigh': Segment(14.78, 0.3685, 0.3612, 0.369, 0.364, 0.162),
+    'shin': Segment(4.81, 0.4386, 0.4352, 0.267, 0.263, 0.092),
+    'foot': Segment(1.29, 0.2283, 0.4014, 0.299, 0.279, 0.139)})
+
+SAMPLES = {'female': WOMEN, 'male': MEN}
+
+TRUNK = ('chest', 'abdomen', 'pelvis')
+MIDDLE = ('head', *TRUNK)
+"""Segments that the body has one of; of the others it has two."""
+
+PERCENTILES = {
+    'female': {5: (1.525, 51.3), 50: (1.626, 66.8), 95: (1.740, 87.1)},
+    'male': {5: (1.648, 64.4), 50: (1.755, 84.6), 95: (1.870, 110.7)}}
+"""Height, m, and mass, kg, at percentiles of ANSUR II."""
+
+ANKLE = 0.039
+"""Height of the ankle's joint above the sole, share of the standing height: Drillis and Contini
+1966 (Body Segment Parameters, New York University, Report 1163.03)."""
+
+
+@dataclass(frozen=True)
+class Girth:
+    """Lengths across a body, mm: means of ANSUR II, of people of HEIGHT and MASS in the mean."""
+
+    head: float = 570.04
+    neck: float = 375.44
+    chest: float = 1022.10
+    waist: float = 914.50
+    buttock: float = 1020.08
+    thigh: float = 622.20
+    lower_thigh: float = 406.48
+    calf: float = 386.04
+    ankle: float = 224.89
+    biceps: float = 340.93
+    forearm: float = 295.01
+    wrist: float = 169.00
+    """Circumferences."""
+    chest_breadth: float = 282.86
+    chest_depth: float = 251.74
+    waist_breadth: float = 317.75
+    waist_depth: float = 229.67
+    hip_breadth: float = 348.39
+    buttock_depth: float = 241.62
+    foot_breadth: float = 98.87
+    hand_length: float = 189.29
+    hand_breadth: float = 84.95
+    hand: float = 203.86
+    """The hand's circumference."""
+
+
+GIRTH, HEIGHT, MASS = Girth(), 1.71441, 79.709
+
+
+def shares(sex: str) -> dict[str, float]:
+    """Share of the mass of each segment, of limbs one side's; all segments together make 1."""
+    table = SAMPLES[sex].segments
+    whole = sum(part.mass * (1 if name in MIDDLE else 2) for name, part in table.items())
+    return {name: part.mass / whole for name, part in table.items()}

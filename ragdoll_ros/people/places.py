@@ -1,0 +1,99 @@
+"""Where a standing person's joints are: heights from the table's lengths, breadths from girths."""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ..model.anthropometry import ANKLE, GIRTH, HEIGHT, MASS, MIDDLE, SAMPLES
+
+SIDES = {'left': 1.0, 'right': -1.0}
+"""Names of sides and where they are: y is to the left."""
+
+LIMBS = ('upper_arm', 'forearm', 'hand', 'thigh', 'shin', 'foot')
+
+HEEL = 0.25
+"""Share of a foot's length by which the heel is behind the ankle; chosen, as seen on feet."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """Places on one person, m: x forwards, z up from the sole."""
+
+    height: float
+    tall: float
+    """Times the height of ANSUR II's mean person: what bones are in proportion to."""
+    wide: float
+    """Times its girths: the root of mass over height, as volume is girth^2 times length."""
+    lengths: dict[str, float]
+    """Of each segment."""
+    neck: float
+    ankle: float
+    hip: float
+    waist: float
+    xiphoid: float
+    sternum: float
+    """Heights of joints: hip, waist, that of chest on abdomen; top of the breastbone."""
+    hip_y: float
+    shoulder_y: float
+
+    @property
+    def segments(self) -> list[tuple[str, str]]:
+        """Name of each bone and its segment in the table, from the root out."""
+        return [(name, name) for name in reversed(MIDDLE)] + [
+            (f'{side}_{limb}', limb) for side in SIDES for limb in LIMBS]
+
+    def proximal(self, bone: str) -> tuple[float, float, float]:
+        """The end of a bone from which its centre is counted; of a foot the ankle."""
+        side, _, limb = bone.partition('_')
+        length = self.lengths
+        if bone in MIDDLE:
+            tops = {'head': self.height, 'chest': self.sternum, 'abdomen': self.xiphoid,
+                    'pelvis': self.waist}
+            return (0.0, 0.0, tops[bone])
+        down = {'upper_arm': 0.0, 'forearm': length['upper_arm'],
+                'hand': length['upper_arm'] + length['forearm']}
+        if limb in down:
+            return (0.0, SIDES[side] * self.shoulder_y, self.sternum - down[limb])
+        heights = {'thigh': self.hip, 'shin': self.hip - length['thigh'], 'foot': self.ankle}
+        return (0.0, SIDES[side] * self.hip_y, heights[limb])
+
+
+def radius(circumference: float, scale: float) -> float:
+    """Of a circle of a circumference in mm, m."""
+    return circumference / 1000 / (2 * math.pi) * scale
+
+
+def places(height: float, mass: float, sex: str) -> Places:
+    """Of a person of ``height`` m and ``mass`` kg.
+
+    The neck, from the mid-gonion's height to the breastbone's, is what the other lengths leave of
+    the height. Shoulders are at the breastbone's height, an arm's radius beside the chest; thighs
+    fill the hips' breadth.
+    """
+    sample = SAMPLES[sex]
+    lengths = {name: part.length / sample.height * height
+               for name, part in sample.segments.items()}
+    wide = math.sqrt((mass / height) / (MASS / HEIGHT))
+    ankle = ANKLE * height
+    hip = ankle + lengths['shin'] + lengths['thigh']
+    waist = hip + lengths['pelvis']
+    xiphoid = waist + lengths['abdomen']
+    sternum = xiphoid + lengths['chest']
+    thigh = radius((GIRTH.thigh + GIRTH.lower_thigh) / 2, wide)
+    chest, _ = trunk_sides('chest', wide)
+    return Places(height, height / HEIGHT, wide, lengths, height - lengths['head'] - sternum,
+                  ankle, hip, waist, xiphoid, sternum,
+                  hip_y=GIRTH.hip_breadth / 2000 * wide - thigh,
+                  shoulder_y=chest / 2 + radius(GIRTH.biceps, wide))
+
+
+def trunk_sides(part: str, wide: float) -> tuple[float, float]:
+    """Breadth and depth, m, of a part of the trunk as a box: its circumference is that of the body,
+    its sides are as breadth and depth there.
+    """
+    around, breadth, depth = {
+        'chest': (GIRTH.chest, GIRTH.chest_breadth, GIRTH.chest_depth),
+        'abdomen': (GIRTH.waist, GIRTH.waist_breadth, GIRTH.waist_depth),
+        'pelvis': (GIRTH.buttock, GIRTH.hip_breadth, GIRTH.buttock_depth)}[part]
+    scale = around / (2 * (breadth + depth)) / 1000 * wide
+    return breadth * scale, depth * scale

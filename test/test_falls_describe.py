@@ -1,0 +1,94 @@
+"""The page and the pictures say what is in a data set."""
+import math
+import re
+
+import numpy as np
+import pytest
+from falls_recipes import recipe
+
+from ragdoll_ros.falls import describe, generate, load_recipe
+from ragdoll_ros.falls.command import main
+from ragdoll_ros.falls.contents import read
+from ragdoll_ros.falls.pictures import hull
+from ragdoll_ros.falls.real_falls import bones_of
+from ragdoll_ros.falls.run import run
+from ragdoll_ros.falls.shard import Order, make_shard
+
+pytest.importorskip('pyarrow')
+pyplot = pytest.importorskip('matplotlib.pyplot')
+COUNT = 12
+
+
+@pytest.fixture(scope='module')
+def thrown():
+    """Falls that go where the doll faces."""
+    start = {'heading_deg': {'uniform': [0, 360]}, 'clearance': 0.3, 'velocity': [2, 0, 0]}
+    return recipe({**load_recipe('shove').data, 'start': start, 'pushes': [], 'duration': 1.0})
+
+
+@pytest.fixture(scope='module')
+def folder(thrown, tmp_path_factory):
+    folder = tmp_path_factory.mktemp('thrown')
+    run(Order(thrown, COUNT), folder, lambda order, shards: (make_shard(order, k) for k in shards))
+    return folder
+
+
+def test_page_says_what_the_falls_say(thrown, folder, capsys):
+    assert main(['describe', str(folder)]) == 0
+    page = (folder / 'README.md').read_text()
+    falls = list(generate(thrown, range(COUNT)))
+    assert f'{COUNT} falls of 1 s at 100 Hz' in page and '| fall forwards | 100.0% |' in page
+    for name in ('head', 'torso', 'left_thigh'):
+        speeds = np.array([-fall.impact_velocities[fall.scene.bone_index(name), 2]
+                           for fall in falls])
+        speeds = speeds[np.isfinite(speeds)]
+        row = re.search(rf'\| {name} \| (\d+)% \| (.*) \|', page)
+        assert int(row[1]) == round(100 * len(speeds) / COUNT)
+        if len(speeds):
+            assert row[2] == f'{speeds.mean():.2f} ± {speeds.std():.2f}'
+    for name in re.findall(r'!\[.*?\]\((.*?)\)', page):
+        pixels = pyplot.imread(folder / name)
+        assert pixels.shape[0] > 200 and np.ptp(pixels[..., :3]) > 0.5, name
+
+
+@pytest.mark.parametrize(('velocity', 'direction'), [
+    ([2, 0, 0], 0), ([0, 2, 0], 90), ([0, -2, 0], -90), ([-2, 1e-9, 0], 180)])
+def test_direction_is_as_the_doll_sees_it(velocity, direction):
+    made = recipe(start={'heading_deg': 130, 'clearance': 0.4, 'velocity': velocity})
+    fall = next(generate(made, [0]))
+    assert abs((fall.direction - direction + 180) % 360 - 180) < 1e-6
+
+
+def test_a_fall_without_an_impact_has_no_direction():
+    fall = next(generate(recipe(start={'clearance': 5}), [0]))
+    assert math.isnan(fall.direction) and np.isnan(fall.impact_velocities).all()
+
+
+def test_outlines_are_convex_hulls():
+    spatial = pytest.importorskip('scipy.spatial')
+    points = np.random.default_rng(2).normal(size=(60, 2))
+    reference = spatial.ConvexHull(points)
+    np.testing.assert_allclose(np.sort(hull(points), axis=0),
+                               np.sort(points[reference.vertices], axis=0))
+
+
+def test_bones_that_stand_for_parts():
+    names = ['torso', 'head', 'left_forearm', 'left_hand', 'right_hand']
+    assert bones_of('pelvis', names) == [0] and bones_of('hand', names) == [3, 4]
+    assert bones_of('hand', names[:3]) == [2] and bones_of('head', ['ball']) == []
+
+
+def test_what_cannot_be_described_is_refused(tmp_path, thrown, capsys):
+    assert main(['describe', str(tmp_path)]) == 2
+    assert 'manifest' in capsys.readouterr().err
+    run(Order(thrown, 1, 'amass'), tmp_path, lambda order, shards: (
+        make_shard(order, k) for k in shards))
+    assert main(['describe', str(tmp_path)]) == 2
+    assert 'lerobot' in capsys.readouterr().err
+
+
+def test_a_data_set_without_a_known_part_is_described(tmp_path):
+    run(Order(recipe(), 3), tmp_path, lambda order, shards: (make_shard(order, k) for k in shards))
+    contents = read(tmp_path)
+    assert '| ball | 100% |' in describe.text(contents, [])
+    assert describe.main([str(tmp_path)]) == 0

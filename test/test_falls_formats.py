@@ -1,0 +1,280 @@
+"""Each format, read by a library that is not ours, holds what the simulation gave."""
+import io
+import json
+import math
+import re
+
+import numpy as np
+import pytest
+from falls_recipes import DROP, recipe
+
+from ragdoll_ros.falls import generate, load_recipe
+from ragdoll_ros.falls.formats.registry import FORMATS
+from ragdoll_ros.falls.formats.settled import ALIKE, different
+from ragdoll_ros.falls.run import run
+from ragdoll_ros.falls.shard import Order, make_shard
+from ragdoll_ros.falls.worn import imu_samples
+from ragdoll_ros.model import rotation
+from ragdoll_ros.model.errors import OutOfRange, WrongForm
+
+parquet = pytest.importorskip('pyarrow.parquet')
+pandas = pytest.importorskip('pandas')
+COUNT = 3
+IMU = {'name': 'low_back', 'bone': 'torso', 'position': [-0.05, 0, -0.15]}
+
+
+@pytest.fixture(scope='module')
+def shoved():
+    """A recipe of falls of the doll, and three of them."""
+    made = recipe({**load_recipe('shove').data, 'start': {'lean_deg': {'uniform': [0, 5]}},
+                   'duration': 1.2, 'record': {'imus': [IMU], 'what': [
+                       'poses', 'velocities', 'angles', 'rates', 'touching']}})
+    return made, list(generate(made, range(COUNT)))
+
+
+@pytest.fixture
+def written(shoved, tmp_path):
+    """Write those falls in a format; the folder."""
+    def write(name):
+        run(Order(shoved[0], COUNT, name), tmp_path,
+            lambda order, shards: (make_shard(order, shard) for shard in shards))
+        return tmp_path
+    return write
+
+
+def frames_of(rows, name):
+    return np.array(rows[f'observation.{name}'].tolist())
+
+
+def test_lerobot_by_pandas(shoved, written):
+    made, falls = shoved
+    folder = written('lerobot')
+    info = json.loads((folder / 'meta/info.json').read_text())
+    assert (info['codebase_version'], info['fps'], info['total_episodes'], info['total_frames']) \
+        == ('v3.0', 100, COUNT, 120 * COUNT)
+    data = pandas.read_parquet(folder / info['data_path'].format(chunk_index=0, file_index=0))
+    assert list(data['index']) == list(range(120 * COUNT))
+    for fall in falls:
+        rows = data[data['episode_index'] == fall.number]
+        assert list(rows['frame_index']) == list(range(120))
+        # Numbers are float32: half a unit in the last of 24 places.
+        close = {'rtol': 2 ** -24, 'atol': 1e-37}
+        np.testing.assert_allclose(rows['timestamp'], fall.times, **close)
+        for name, values in (('poses', fall.states[:, :, :7]),
+                             ('velocities', fall.states[:, :, 7:]),
+                             ('angles', fall.angles), ('rates', fall.rates),
+                             ('imu.low_back', imu_samples(fall, made.imus[0]))):
+            np.testing.assert_allclose(frames_of(rows, name), values.reshape(120, -1), **close)
+        np.testing.assert_array_equal(frames_of(rows, 'touching'), fall.touching)
+        assert rows['observation.valid'].all()
+    poses = info['features']['observation.poses']
+    assert poses['shape'] == [70] and poses['names'][:7] == [
+        f'torso.{part}' for part in ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')]
+    assert set(info['features']) == set(data.columns)
+
+
+def test_lerobots_episodes_tasks_and_statistics(shoved, written):
+    _, falls = shoved
+    folder = written('lerobot')
+    data = parquet.read_table(folder / 'data/chunk-000/file-000.parquet')
+    rows = parquet.read_table(folder / 'meta/episodes/chunk-000/file-000.parquet').to_pylist()
+    for row, fall in zip(rows, falls, strict=True):
+        assert (row['dataset_from_index'], row['dataset_to_index']) == (
+            120 * fall.number, 120 * fall.number + 120)
+        assert (row['onset'], row['impact'], row['rest']) == (
+            fall.phases.onset, fall.phases.impact, fall.phases.rest)
+        assert json.loads(row['drawn']) == fall.drawn and row['tasks'] == ['shove']
+    tasks = pandas.read_parquet(folder / 'meta/tasks.parquet')
+    assert tasks.loc['shove', 'task_index'] == 0
+    stats = json.loads((folder / 'meta/stats.json').read_text())
+    values = np.array(data.column('observation.velocities').to_pylist())
+    for name in ('min', 'max', 'mean', 'std'):
+        # The statistics are of float64, the file holds float32 of up to some 10 rad/s.
+        np.testing.assert_allclose(stats['observation.velocities'][name],
+                                   getattr(values, name)(axis=0), atol=1e-5)
+    assert stats['observation.velocities']['count'] == [120 * COUNT]
+
+
+def test_bytes_name_pyarrows_version_and_nothing_of_the_machine(written):
+    folder = written('lerobot')
+    metadata = parquet.read_metadata(folder / 'data/chunk-000/file-000.parquet')
+    assert re.fullmatch(r'parquet-cpp-arrow version [\d.]+', metadata.created_by)
+    assert set(metadata.metadata) == {b'ARROW:schema', b'names'}
+
+
+def test_kfall_by_pandas(shoved, written):
+    made, falls = shoved
+    folder = written('kfall')
+    labels = pandas.read_csv(folder / 'label_data/SA000000_label.csv')
+    assert list(labels['Fall_onset_frame']) == [fall.phases.onset for fall in falls]
+    assert list(labels['Fall_impact_frame']) == [fall.phases.impact for fall in falls]
+    for trial, fall in enumerate(falls, 1):
+        table = pandas.read_csv(folder / f'sensor_data/SA000000/S000000T01R{trial:02d}.csv')
+        assert list(table.columns) == ['TimeStamp(s)', 'FrameCounter', 'AccX', 'AccY', 'AccZ',
+                                       'GyrX', 'GyrY', 'GyrZ', 'EulerX', 'EulerY', 'EulerZ']
+        # Six digits behind the point.
+        close = {'rtol': 0, 'atol': 0.6e-6}
+        samples = imu_samples(fall, made.imus[0])
+        np.testing.assert_allclose(table['TimeStamp(s)'], fall.times, **close)
+        np.testing.assert_allclose(table.iloc[:, 2:5], samples[:, :3] / 9.80665, **close)
+        np.testing.assert_allclose(table.iloc[:, 5:8], np.degrees(samples[:, 3:]), **close)
+        turns = [rotation.from_rpy(*np.radians(row)) for row in table.iloc[:, 8:].to_numpy()]
+        torso = fall.states[:, fall.scene.bone_index('torso'), 3:7]
+        assert rotation.angle_between(np.array(turns), torso).max() < 1e-7
+
+
+def test_kfall_wants_a_sensor():
+    with pytest.raises(WrongForm, match=r'record\.imus'):
+        Order(recipe(), 1, 'kfall')
+    with pytest.raises(OutOfRange, match='lerobot'):
+        Order(recipe(), 1, 'xml')
+
+
+def test_mcap_by_mcap_ros2_support(shoved, written):
+    reader = pytest.importorskip('mcap_ros2.reader')
+    made, falls = shoved
+    folder = written('mcap')
+    for fall in falls:
+        messages = {}
+        for message in reader.read_ros2_messages(folder / f'mcap/fall_{fall.number:07d}.mcap'):
+            messages.setdefault(message.channel.topic, []).append(message)
+        poses = messages['/ragdoll/poses']
+        assert [message.log_time_ns for message in poses] == [10_000_000 * k for k in range(120)]
+        assert poses[7].ros_msg.header.frame_id == 'world'
+        rows = [[(p.position.x, p.position.y, p.position.z, p.orientation.x, p.orientation.y,
+                  p.orientation.z, p.orientation.w) for p in message.ros_msg.poses]
+                for message in poses]
+        np.testing.assert_array_equal(rows, fall.states[:, :, :7])
+        joints = [message.ros_msg for message in messages['/ragdoll/joint_states']]
+        assert tuple(joints[0].name) == fall.scene.angle_names
+        np.testing.assert_array_equal([joint.position for joint in joints], fall.angles)
+        np.testing.assert_array_equal([joint.velocity for joint in joints], fall.rates)
+        imus = [message.ros_msg for message in messages['/ragdoll/imu/low_back/data_raw']]
+        force = [(m.linear_acceleration.x, m.linear_acceleration.y, m.linear_acceleration.z)
+                 for m in imus]
+        np.testing.assert_array_equal(force, imu_samples(fall, made.imus[0])[:, :3])
+        assert imus[0].orientation_covariance[0] == -1
+        description, = messages['/ragdoll/robot_description']
+        assert '<robot name="doll">' in description.ros_msg.data
+
+
+def test_mcaps_labels_by_mcap(shoved, written):
+    mcap = pytest.importorskip('mcap.reader')
+    _, falls = shoved
+    content = (written('mcap') / 'mcap/fall_0000001.mcap').read_bytes()
+    record, = mcap.make_reader(io.BytesIO(content)).iter_metadata()
+    assert int(record.metadata['impact']) == falls[1].phases.impact
+    assert json.loads(record.metadata['bone_names']) == list(falls[1].scene.bone_names)
+
+
+def test_mcap_has_the_definitions_of_ros():
+    """Those of the messages that ROS's own packages bring."""
+    store = pytest.importorskip('rosbags.typesys')
+    from ragdoll_ros.falls.formats.definitions import DEFINITIONS
+    ros = store.get_typestore(store.Stores.ROS2_JAZZY)
+    for kind, text in DEFINITIONS.items():
+        ours = store.get_types_from_msg(text, kind)
+        for name, fields in ours.items():
+            assert fields[1] == ros.fielddefs[name][1], name
+
+
+def test_amass_by_numpy(shoved, written):
+    """The poses of all bones, from the root down, are those of the simulation."""
+    _, falls = shoved
+    folder = written('amass')
+    for fall in falls:
+        with np.load(folder / f'amass/fall_{fall.number:07d}.npz') as file:
+            assert file['mocap_framerate'] == 100 and file['trans'].shape == (120, 3)
+            names = list(file['joint_names'])
+            vectors = file['poses'].reshape(120, len(names), 3)
+            trans, impact = file['trans'], int(file['impact'])
+        assert impact == fall.phases.impact
+        doll = fall.scene.dolls[0].doll
+        parents = {joint.child: joint.parent for joint in doll.joints}
+        turns = {}
+        for name, vector in zip(names, vectors.transpose(1, 0, 2), strict=True):
+            own = rotation.from_rotation_vector(vector)
+            turns[name] = rotation.multiply(turns[parents[name]], own) if name in parents else own
+            there = rotation.multiply(turns[name], doll.bone(name).orientation)
+            place = fall.scene.bone_index(name)
+            # Some turns of float64, one after the other.
+            assert rotation.angle_between(there, fall.states[:, place, 3:7]).max() < 1e-7
+        np.testing.assert_array_equal(trans, fall.states[:, 0, :3])
+
+
+def test_settled_states_are_those_that_rest(tmp_path):
+    made = recipe({**load_recipe('shove').data, 'start': {'lean_deg': {'uniform': [0, 5]}}})
+    run(Order(made, 5, 'settled'), tmp_path,
+        lambda order, shards: (make_shard(order, shard) for shard in shards))
+    falls = [fall for fall in generate(made, range(5)) if fall.phases.rest is not None]
+    with np.load(tmp_path / 'settled.npz') as file:
+        numbers = file['fall'].tolist()
+        assert numbers and set(numbers) <= {fall.number for fall in falls}
+        for place, number in enumerate(numbers):
+            fall, = (fall for fall in falls if fall.number == number)
+            np.testing.assert_array_equal(file['joint_positions'][place], fall.angles[-1])
+            np.testing.assert_array_equal(file['bone_poses'][place], fall.states[-1, :, :7])
+            # At rest no bone moves faster than 5 cm/s.
+            assert np.abs(fall.states[-1, :, 7:10]).max() <= 0.05
+        up = rotation.rotate(file['root_orientations'], file['gravity'])
+        np.testing.assert_allclose(up, [[0, 0, -1]] * len(numbers), atol=1e-12)
+
+
+def test_states_that_are_alike_are_kept_once():
+    """Beside the plain way: each compared with all that are kept."""
+    rows = np.random.default_rng(1).uniform(-0.3, 0.3, (400, 4))
+    plain = []
+    for index, row in enumerate(rows):
+        if not any(np.abs(rows[other] - row).max() <= ALIKE for other in plain):
+            plain.append(index)
+    assert different(rows) == plain and 10 < len(plain) < 390
+
+
+def test_every_format_is_tested_here():
+    assert set(FORMATS) == {'lerobot', 'kfall', 'mcap', 'amass', 'settled'}
+
+
+def test_a_sensor_in_free_fall_reads_nothing_and_at_rest_gravity():
+    made = recipe({**DROP, 'duration': 1.5, 'start': {'clearance': 0.3}},
+                  record={'rate': 100, 'imus': [{'name': 'a', 'bone': 'ball',
+                                                 'orientation': [math.sqrt(0.5), 0, 0,
+                                                                 math.sqrt(0.5)]}]})
+    fall = next(generate(made, [0]))
+    samples = imu_samples(fall, made.imus[0])
+    # The ball falls for 0.247 s; velocities of up to 3 m/s in float64 over 0.01 s.
+    np.testing.assert_allclose(samples[:24], 0, atol=1e-11)
+    # Turned by 90 degrees about x: the world's up is the sensor's y.
+    np.testing.assert_allclose(samples[-1], [0, 9.8, 0, 0, 0, 0], atol=1e-9)
+    # What the impact took: all of m v, within the frame that it is in.
+    assert samples[25, 1] == pytest.approx(math.sqrt(2 * 9.8 * 0.3) / 0.01, rel=0.05)
+
+
+def test_a_turning_arm_feels_its_centripetal_acceleration():
+    """A ball that spins in the air about z at 4 rad/s, the sensor 0.08 m off its axis."""
+    made = recipe({**DROP, 'duration': 0.2, 'start': {'clearance': 5, 'spin': [0, 0, 4]}},
+                  record={'rate': 1000, 'imus': [{'name': 'a', 'bone': 'ball',
+                                                  'position': [0.08, 0, 0]}]})
+    fall = next(generate(made, [0]))
+    samples = imu_samples(fall, made.imus[0])
+    # The mean over an angle a of 0.004 rad is sin(a / 2) / (a / 2) of it: 7e-7 less.
+    np.testing.assert_allclose(samples, [[-4 ** 2 * 0.08, 0, 0, 0, 0, 4]] * 200, atol=2e-6)
+
+
+def test_phases_of_a_hundred_falls_are_as_defined():
+    """Told again here, frame by frame, from the definitions alone."""
+    made = recipe({**load_recipe('tumble').data, 'start': {
+        'tumbled': True, 'clearance': {'uniform': [0.05, 0.4]}}}, duration=0.8,
+        feet=['left_shin', 'right_shin'])
+    hits = 0
+    for fall in generate(made, range(100)):
+        own = [name not in ('left_shin', 'right_shin') for name in fall.scene.bone_names]
+        impact = next((k for k in range(80) if fall.touching[k, own].any()), None)
+        assert fall.phases.impact == impact
+        if impact is None:
+            assert fall.phases.onset is None
+            continue
+        hits += 1
+        down = [-(fall.masses @ fall.states[k, :, 9]) / fall.masses.sum() for k in range(impact)]
+        onset = next((k for k in range(impact) if down[k] > 0.1), impact)
+        assert fall.phases.onset == onset
+    assert hits > 90

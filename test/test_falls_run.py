@@ -1,0 +1,268 @@
+"""A data set is the same bytes whoever makes its shards, in whatever order, however often a run is
+ended; what cannot be written ends it in one line.
+"""
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from functools import partial
+from pathlib import Path
+
+import pytest
+import yaml
+from conftest import ROOT
+from falls_recipes import DROP, contents, recipe
+
+from ragdoll_ros.falls.manifest import FILE, Manifest
+from ragdoll_ros.falls.pool import make_shards
+from ragdoll_ros.falls.run import run
+from ragdoll_ros.falls.shard import SIZE, Order, make_shard
+from ragdoll_ros.model.errors import Unreadable
+
+pytest.importorskip('pyarrow')
+PATIENCE = 60.0
+"""s that a process has for what takes some."""
+
+SHORT = {**DROP, 'duration': 0.2}
+
+COUNT = 3 * SIZE - 10
+"""Three shards, the last of them shorter."""
+
+
+@pytest.fixture(scope='module')
+def order():
+    return Order(recipe(SHORT), COUNT)
+
+
+@pytest.fixture(scope='module')
+def whole(order, tmp_path_factory):
+    """The data set as this process makes it, shard by shard."""
+    folder = tmp_path_factory.mktemp('whole') / 'falls'
+    run(order, folder, here)
+    return contents(folder)
+
+
+@pytest.fixture
+def command(tmp_path):
+    """Call the command for these falls; keywords as those of Popen."""
+    path = tmp_path / 'drops.yaml'
+    path.write_text(yaml.safe_dump(SHORT))
+
+    def call(*words, before=(), **options):
+        return subprocess.Popen(
+            [*before, sys.executable, '-m', 'ragdoll_ros.falls.command', str(path), '--count',
+             str(COUNT), *map(str, words)], cwd=ROOT, text=True, stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE, start_new_session=True, **options)
+    return call
+
+
+def here(order, shards):
+    """Make shards in this process."""
+    return (make_shard(order, shard) for shard in shards)
+
+
+def backwards(order, shards):
+    """Make them in this process, the last one first."""
+    return here(order, list(shards)[::-1])
+
+
+def wait_for_shards(folder, count, process):
+    """Wait until a run has so many shards more in its manifest."""
+    deadline = time.monotonic() + PATIENCE
+    while lines(folder) < count:
+        assert process.poll() is None and time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def lines(folder):
+    path = folder / FILE
+    return path.read_text().count('\n') if path.exists() else 0
+
+
+def test_the_same_bytes_in_reverse(order, whole, tmp_path):
+    run(order, tmp_path, backwards)
+    assert contents(tmp_path) == whole
+
+
+def test_the_same_bytes_by_two_processes(order, whole, tmp_path):
+    run(order, tmp_path, partial(make_shards, workers=2))
+    assert contents(tmp_path) == whole
+
+
+@pytest.mark.parametrize('times', [1, pytest.param(3, marks=pytest.mark.slow)])
+def test_a_run_that_is_killed_ends_with_the_same_bytes(command, tmp_path, times):
+    folder, shards = tmp_path / 'falls', 2 * times + 1
+    many = ('--count', shards * SIZE, '--resume')
+    for done in range(times):
+        process = command('-o', folder, *many)
+        wait_for_shards(folder, 2 + done, process)
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait(PATIENCE)
+        _wait_until_no_process_of(process)
+    # What was being written when it ended.
+    (folder / 'data/chunk-000/file-002.parquet.part').write_bytes(b'torn')
+    with (folder / FILE).open('a') as file:
+        file.write('{"shard": 2, "fal')
+    process = command('-o', folder, *many)
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, errors
+    run(Order(recipe(SHORT), shards * SIZE), tmp_path / 'whole', here)
+    assert contents(folder) == contents(tmp_path / 'whole')
+
+
+def _wait_until_no_process_of(leader):
+    """Workers end with who started them."""
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        try:
+            os.killpg(leader.pid, 0)
+        except ProcessLookupError:
+            return
+        assert time.monotonic() < deadline, 'workers outlive who started them'
+        time.sleep(0.01)
+
+
+def test_ctrl_c_ends_the_run_in_one_line(command, tmp_path):
+    folder = tmp_path / 'falls'
+    process = command('-o', folder, '--count', 1000 * SIZE)
+    wait_for_shards(folder, 2, process)
+    # As a terminal does it: to all processes of the run.
+    os.killpg(process.pid, signal.SIGINT)
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    line, = errors.splitlines()
+    assert '--resume goes on' in line and Manifest.read(folder).done >= SIZE
+    _wait_until_no_process_of(process)
+
+
+def test_what_is_torn_is_made_again(order, whole, tmp_path):
+    run(order, tmp_path, here)
+    made = []
+    (tmp_path / 'data/chunk-000/file-001.parquet').write_bytes(b'PAR1')
+    (tmp_path / 'meta/episodes/chunk-000/file-002.parquet').unlink()
+
+    def watched(order, shards):
+        made.extend(shards)
+        return here(order, made)
+    run(order, tmp_path, watched, resume=True)
+    assert made == [1, 2] and contents(tmp_path) == whole
+
+
+def test_more_falls_keep_those_that_are_there(order, tmp_path):
+    run(Order(recipe(SHORT), SIZE + 1), tmp_path, here)
+    made = []
+
+    def watched(order, shards):
+        made.extend(shards)
+        return here(order, made)
+    run(order, tmp_path, watched, resume=True)
+    # The second shard had one fall only.
+    assert made == [1, 2]
+
+
+def test_other_falls_are_not_mixed(order, tmp_path):
+    run(Order(recipe(), 1), tmp_path, here)
+    before = contents(tmp_path)
+    with pytest.raises(Unreadable, match='resume'):
+        run(Order(recipe(), 1), tmp_path, here)
+    with pytest.raises(Unreadable, match='recipe'):
+        run(Order(recipe(seed=1), 1), tmp_path, here, resume=True)
+    assert contents(tmp_path) == before
+
+
+def test_a_worker_that_is_killed_costs_its_shards_time(order, whole, tmp_path):
+    killed = []
+
+    def killing(order, shards):
+        for shard in make_shards(order, shards, workers=2):
+            if not killed:
+                killed.append(_workers()[0])
+                os.kill(killed[0], signal.SIGKILL)
+            yield shard
+    manifest = run(order, tmp_path, killing)
+    assert killed and manifest.done == COUNT and contents(tmp_path) == whole
+
+
+def _workers():
+    """Processes that this one has started and that make shards."""
+    found = []
+    for path in Path('/proc/self/task').glob('*/children'):
+        for child in path.read_text().split():
+            words = Path(f'/proc/{child}/cmdline').read_bytes()
+            if b'spawn_main' in words:
+                found.append(int(child))
+    return found
+
+
+def test_a_failed_fall_is_kept_with_its_reason(tmp_path):
+    import pyarrow.parquet as parquet
+    order = Order(recipe(), 3)
+    # A speed that no recipe may have: the fall ends as it begins.
+    order.recipe.data['start']['velocity'] = [1e12, 0.0, 0.0]
+    manifest = run(order, tmp_path, here)
+    assert set(manifest.failures) == {0, 1, 2} and manifest.done == 3
+    episodes = parquet.read_table(tmp_path / 'meta/episodes/chunk-000/file-000.parquet')
+    assert episodes.column('failure').to_pylist() == list(manifest.failures.values())
+    assert json.loads((tmp_path / 'meta/info.json').read_text())['total_episodes'] == 3
+
+
+FULL = """
+mount -t tmpfs -o size=250k tmpfs "$1" || exit 77
+shift
+"$@" && exit 1
+mount -o remount,size=100m "$(dirname "$0")" || exit 78
+"$@" --resume || exit 2
+cp -r "$(dirname "$0")" "$(dirname "$0").kept"
+"""
+"""On a file system that is full, then, with more room, to the end."""
+
+
+def test_a_full_disk_ends_the_run_in_one_line_and_it_goes_on_when_there_is_room(
+        whole, command, tmp_path):
+    folder = tmp_path / 'small'
+    folder.mkdir()
+    own = ['unshare', '--mount', 'sh', '-c', FULL, str(folder / 'x'), str(folder)]
+    process = command('-o', folder / 'falls', before=own)
+    _, errors = process.communicate(timeout=PATIENCE)
+    if process.returncode in (1, 77) and 'mount' in errors:
+        pytest.skip('no file system can be mounted here')
+    assert process.returncode == 0, errors
+    line, = errors.splitlines()
+    assert 'No space left on device' in line and '--resume goes on' in line
+    assert contents(tmp_path / 'small.kept/falls') == whole
+
+
+def test_the_command_says_what_it_made(command, tmp_path):
+    process = command('-o', tmp_path / 'falls', '--workers', 1)
+    out, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0 and errors == ''
+    assert out.startswith(f'{COUNT} falls in {tmp_path}/falls, ')
+    assert Manifest.read(tmp_path / 'falls').done == COUNT
+
+
+@pytest.mark.parametrize(('words', 'told'), [
+    (['--count', '0'], 'count'), (['--workers', 'many'], '--workers'),
+    (['--format', 'xml'], '--format'), (['-o', '/proc/nowhere'], '/proc/nowhere')])
+def test_a_wrong_call_says_why(command, tmp_path, words, told):
+    process = command('-o', tmp_path / 'falls', *words)
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode in (1, 2) and told in errors and 'Traceback' not in errors
+
+
+def test_a_recipe_with_five_errors_names_them_all(tmp_path):
+    path = tmp_path / 'broken.yaml'
+    path.write_text("""who: {dolls: [nobody]}
+duration: -3
+accuracy: perfect
+ground: {friction: {uniform: [1, -1]}}
+start: {lean_deg: {normal: [1, 2]}}
+""")
+    done = subprocess.run([sys.executable, '-m', 'ragdoll_ros.falls.command', str(path), '-o',
+                           str(tmp_path / 'falls')], cwd=ROOT, capture_output=True, text=True,
+                          timeout=PATIENCE)
+    assert (done.returncode, done.stdout) == (2, '')
+    assert done.stderr.startswith(f'{path}: 5 errors') and not (tmp_path / 'falls').exists()
+    for word in ('nobody', 'duration', 'accuracy', 'friction', 'lean_deg'):
+        assert word in done.stderr
