@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ...model import rotation
 from ...model.ragdoll import Bone, Joint
 from ..reading.character import Character
 from ..roles.names import side_of
@@ -23,7 +24,7 @@ BALLS = {'neck': (35, 40), 'head': (45, 55), 'spine': (25, 25), 'hips': (25, 25)
 FIRST, LATER = (60, 30), (45, 30)
 """The same by topology: a limb's first joint, and the others."""
 
-LOSS_TIME, SHORTEST_LOSS = 0.7, 0.1
+LOSS_TIME, SHORTEST_LOSS = 0.7, 0.01
 """Seconds: see ``damped``."""
 
 
@@ -84,15 +85,17 @@ def _by_role(parent: str, child: str, role: str | None, side: int, anchor: np.nd
 def damped(joint: Joint, parent: Bone, child: Bone) -> Joint:
     """The joint with a living body's damping, N m s/rad, so that the doll comes to rest.
 
-    The child alone, swinging about the joint, loses its speed within LOSS_TIME; about their
-    thin axes neither body must lose it within a step of the engine, where damping is explicit.
+    The child alone, swinging about the joint, loses its speed within LOSS_TIME; about no axis of
+    the joint do the two lose theirs sooner than within SHORTEST_LOSS, or flights would be stiff.
     """
     if joint.kind == 'fixed':
         return joint
-    least = min(*parent.inertia, *child.inertia)
+    axes = np.eye(3) if joint.kind == 'ball' else np.array(joint.axes)
+    eases = [1 / ((axes @ rotation.matrix(np.array(bone.orientation))) ** 2 @ bone.inertia)
+             for bone in (parent, child)]
     about = max(child.inertia) + child.mass * float(
         np.sum(np.subtract(child.position, joint.anchor) ** 2))
-    damping = min(about / LOSS_TIME, least / SHORTEST_LOSS)
+    damping = min(about / LOSS_TIME, float(1 / np.add(*eases).max()) / SHORTEST_LOSS)
     return dataclasses.replace(joint, damping=float(f'{damping:.3g}'))
 
 
