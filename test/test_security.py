@@ -17,6 +17,7 @@ OWN = 'physics/kernels/compiling/cache.py'
 WRITERS = {
     'accuracy/command.py': '--out', 'accuracy/figures.py': '--out', 'accuracy/plots.py': '--out',
     'accuracy/many_starts.py': '--out', 'accuracy/quickstart.py': 'a temporary file',
+    'falls/describe.py': '--out', 'falls/manifest.py': '--out', 'falls/pictures.py': '--out',
     'files/doll.py': 'save_doll(path)', 'files/scene.py': 'save_scene(path)',
     'fit/command.py': '--out, --urdf', 'fit/picture.py': '--picture',
     'physics/engine/bullet.py': 'a temporary file', 'physics/engine/hush.py': 'os.devnull',
