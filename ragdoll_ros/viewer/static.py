@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import contextlib
+import html
 import io
 import sys
 from pathlib import Path
@@ -51,6 +52,21 @@ def static_html(recording: Recording) -> str:
     finally:
         with contextlib.redirect_stdout(io.StringIO()):
             server.stop()
+
+
+class Embedded:
+    """A recording as a notebook shows it, below the cell whose last line it is.
+
+    It is ``height`` pixels high; see static_html.
+    """
+
+    def __init__(self, recording: Recording, height: int = 400) -> None:
+        page = html.escape(static_html(recording))
+        self._html = (f'<iframe srcdoc="{page}" width="100%" height="{height}" '
+                      'style="border:none;display:block"></iframe>')
+
+    def _repr_html_(self) -> str:
+        return self._html
 
 
 def save_static(recording: Recording, folder: str | Path) -> Path:
