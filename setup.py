@@ -87,7 +87,7 @@ setup(
         'replay': ['mcap'],
         'test': ['pytest', 'pytest-xdist', 'ruff', 'setuptools', 'wheel', 'yourdfpy', 'rosbags',
                  'playwright', 'pygltflib', 'bvhio', 'nbclient',
-                 'nbformat', 'ipykernel', 'mannequin-x; python_version >= "3.11"'],
+                 'nbformat', 'ipykernel', 'rtree', 'mannequin-x; python_version >= "3.11"'],
         'colcon': ['colcon-core', 'colcon-ros', 'colcon-python-setup-py',
                    'colcon-common-extensions', 'setuptools<80'],
     },

@@ -11,6 +11,7 @@ from ..model.scene import Scene
 from .controls import Controls
 from .drawing.camera import Follower
 from .drawing.ground import light
+from .drawing.paint import PAINT
 from .drawing.plots import Plots
 from .drawing.skin import KEEP_PAGE
 from .drawing.stage import Stage
@@ -50,6 +51,7 @@ class Page:
         light(server)
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         server.gui.add_html(KEEP_PAGE)
+        server.gui.add_html(PAINT)
         self.problem = server.gui.add_html('')
         self.tabs = server.gui.add_tab_group()
         with self.tabs.add_tab('Play'):

@@ -16,6 +16,7 @@ from ..physics.simulation import Simulation
 from ..recordings.recording import Recorder, Recording
 from .drawing.camera import CAMERA, FIELD
 from .drawing.ground import light
+from .drawing.paint import DRESS
 from .drawing.stage import Stage
 from .sources.playback import Playback
 
@@ -48,7 +49,8 @@ def static_html(recording: Recording) -> str:
         for time in np.arange(1, int(recording.duration * RATE) + 1) / RATE:
             serializer.insert_sleep(1 / RATE)
             stage.show(source.frame_at(float(time)))
-        return serializer.as_html()
+        head, end, tail = serializer.as_html().rpartition('</body>')
+        return f'{head}<script>{DRESS}</script>{end}{tail}'
     finally:
         with contextlib.redirect_stdout(io.StringIO()):
             server.stop()
