@@ -17,6 +17,7 @@ from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.model.shapes import Capsule, Sphere
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.recording import Recording
+from ragdoll_ros.viewer.drawing.marks import WEIGHT_LENGTH
 from ragdoll_ros.viewer.sources.playback import Playback
 from ragdoll_ros.viewer.sources.simulated import Simulated
 from ragdoll_ros.viewer.sources.source import Wanted
@@ -353,6 +354,13 @@ def test_contacts_on_demand(page):
     points = wait_for(page, '/scene/contacts').points
     # Bones of the doll touch each other as well, above the ground.
     assert points[:, 2].min() == pytest.approx(0, abs=0.01)
+    # At rest the ground bears the weight: 1 m of lines in all.
+    wait(lambda: page.source.frame is page.frame and np.linalg.norm(
+        page.frame.state.linear_velocities, axis=1).max() == 0)
+    lines = page.server.scene.get_handle_by_name('/scene/forces').points
+    below = lines[:, 0, 2] < 0.01
+    rises = (lines[below, 1, 2] - lines[below, 0, 2]).sum()
+    assert rises == pytest.approx(WEIGHT_LENGTH, rel=0.01)
     client.update(page.view.contacts, False)
     wait(lambda: page.frame.contacts is None)
     wait(lambda: not page.server.scene.get_handle_by_name('/scene/contacts').visible)

@@ -15,7 +15,7 @@ from .drawing.paint import PAINT
 from .drawing.plots import Plots
 from .drawing.skin import KEEP_PAGE
 from .drawing.stage import Stage
-from .drawing.view import View
+from .drawing.view import View, theme
 from .editor.editor import Editor
 from .editor.form import RED, colored
 from .pointer import Pointer
@@ -49,7 +49,7 @@ class Page:
         self._live: Frame | None = None
         self._folder = folder
         light(server)
-        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        theme(server, dark=False)
         server.gui.add_html(KEEP_PAGE)
         server.gui.add_html(PAINT)
         self.problem = server.gui.add_html('')
@@ -84,6 +84,7 @@ class Page:
                 self._show(frame, report, time.monotonic())
             if self.stage is not None:
                 self.stage.be_visible(bones=self.view.bones.value, skins=self.view.skin.value)
+                self.stage.be_dark(self.view.dark.value)
             if self.editor is not None:
                 self.editor.take_note(report.paused)
             self._tell(report.problem, report.note)

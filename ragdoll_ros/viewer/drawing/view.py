@@ -6,6 +6,11 @@ import viser
 from ..sources.source import Wanted
 
 
+def theme(server: viser.ViserServer, dark: bool) -> None:
+    """Set how pages look; the background follows."""
+    server.gui.configure_theme(show_logo=False, show_share_button=False, dark_mode=dark)
+
+
 class View:
     """What the page is asked to show."""
 
@@ -14,10 +19,14 @@ class View:
             self.follow = server.gui.add_checkbox(
                 'Follow', initial_value=False, hint='the camera goes where the doll goes')
             self.contacts = server.gui.add_checkbox(
-                'Contacts', initial_value=False, hint='where something touches, yellow')
+                'Contacts', initial_value=False, hint='where something touches, yellow, '
+                'and how hard: a line of 1 m is the weight of the first doll')
             self.limits = server.gui.add_checkbox(
                 'Joint limits', initial_value=False,
                 hint='an arc for what a joint may do; its needle is red at the end')
+            self.dark = server.gui.add_checkbox(
+                'Dark', initial_value=False, hint='a dark page and ground, for all who look')
+            self.dark.on_update(lambda _: theme(server, self.dark.value))
             self.skin = server.gui.add_checkbox(
                 'Skin', initial_value=True, visible=False,
                 hint="the fitted character's skin, following the bones")
