@@ -344,6 +344,17 @@ def test_a_click_chooses_the_bone_for_the_editor(page):
     wait(lambda: page.editor.bone == 'right_shin')
 
 
+def test_a_dark_page_has_a_dark_ground(page):
+    client = page.open()
+    wait(lambda: page.frame)
+    ground = page.server.scene.get_handle_by_name('/scene/ground')
+    assert min(ground.plane_color) > 200
+    client.update(page.view.dark, True)
+    wait(lambda: max(page.server.scene.get_handle_by_name('/scene/ground').plane_color) < 60)
+    client.update(page.view.dark, False)
+    wait(lambda: min(page.server.scene.get_handle_by_name('/scene/ground').plane_color) > 200)
+
+
 def test_contacts_on_demand(page):
     """At rest the doll touches the ground: the points are at its height, within its margin."""
     client = page.open()
