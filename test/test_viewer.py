@@ -262,9 +262,12 @@ def test_what_cannot_be_used_is_refused_and_the_old_goes_on(page, broken_scene):
 def test_a_dragged_bone_follows_at_the_distance_it_had(page):
     """The target is as far from the eye as the grabbed point was, in the pointer's direction."""
     eye = np.array([3.0, 1.0, 1.5])
-    client = page.open(position=tuple(eye))
+    client = page.open()
     wait(lambda: page.frame)
     frame = paused(page)
+    client.look(tuple(eye))
+    camera, = (each.camera for each in page.server.get_clients().values())
+    wait(lambda: np.array_equal(camera.position, eye))
     node, number, place = batch_of(page, 'left_forearm')
     client.drag(node, 'start', place, place, number)
     wait(lambda: page.source.frame.held)

@@ -9,7 +9,7 @@ import viser
 
 from ..model.scene import Scene
 from .controls import Controls
-from .drawing.camera import Follower
+from .drawing.camera import Cameras
 from .drawing.ground import light
 from .drawing.plots import Plots
 from .drawing.skin import KEEP_PAGE
@@ -17,8 +17,9 @@ from .drawing.stage import Stage
 from .drawing.view import View
 from .editor.editor import Editor
 from .editor.form import RED, colored
-from .hint import hint
+from .hint import HINT
 from .opening import Opening
+from .panel import FREE
 from .pointer import Pointer
 from .recording_panel import RecordingPanel
 from .rest import Rest
@@ -52,18 +53,21 @@ class Page:
         self._folder = folder
         light(server)
         server.gui.configure_theme(show_logo=False, show_share_button=False)
+        server.gui.main_panel.dock_right()
+        server.gui.add_html(FREE)
+        server.gui.add_html(HINT)
         server.gui.add_html(KEEP_PAGE)
         self.problem = server.gui.add_html('')
         self.tabs = server.gui.add_tab_group()
         with self.tabs.add_tab('Play'):
             self.controls = Controls(server, source)
             self.view = View(server)
+            self.view.on_home(lambda client: self.cameras.go_home(client))
             self._recording = RecordingPanel(server)
         self._edit_tab = self.tabs.add_tab('Edit')
         with self.tabs.add_tab('Plots'):
             self.plots = Plots(server)
-        self._follower = Follower(server)
-        server.on_client_connect(hint)
+        self.cameras = Cameras(server)
         self._rest = Rest()
         self._pointer = Pointer(source, lambda: self.frame, self._select)
 
@@ -89,7 +93,7 @@ class Page:
             if frame is not None:
                 now = time.monotonic()
                 self.plots.show(frame, report, now)
-                self._follower.follow(frame, now, self.view.follow.value)
+                self.cameras.follow(frame, now, self.view.follow.value)
                 self.controls.show_rest(self._rest.lies(frame, report.paused, now))
             if self.stage is not None:
                 self.stage.be_visible(bones=self.view.bones.value, skins=self.view.skin.value)
@@ -116,6 +120,7 @@ class Page:
         # Else viser waits for more to send along, up to its own 60th of a second.
         self.server.flush()
         self._recording.take(frame)
+        self.cameras.show(frame)
 
     def _edit(self, scene: Scene) -> None:
         """Hand the scene to the editor, which the first one makes."""
