@@ -7,7 +7,18 @@ from conserved import conserved
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model.push import Push
-from ragdoll_ros.physics.arrow_keys import FIRST, FORCES, REPEAT, STUCK, TAP, Held, total
+from ragdoll_ros.physics.arrow_keys import (
+    DIRECTIONS,
+    FIRST,
+    HOLD,
+    REPEAT,
+    SILENCE,
+    STUCK,
+    TAP,
+    Held,
+    Pressed,
+    total,
+)
 from ragdoll_ros.physics.simulation import Simulation
 
 FLIGHT = load_scene('flight')
@@ -27,16 +38,17 @@ def hold(held, key, begin, end, rate, delay=0.5):
 
 
 def test_forces_are_those_of_the_article():
-    assert FORCES == {'up': (-2000, 0, 1), 'down': (2000, 0, 1), 'right': (0, 2000, 1),
-                      'left': (0, -2000, 1)}
+    assert {arrow: total([arrow]) for arrow in DIRECTIONS} == {
+        'up': (-2000, 0, 1), 'down': (2000, 0, 1), 'right': (0, 2000, 1), 'left': (0, -2000, 1)}
+    assert total(['up'], 350.0)[0] == -350.0
     assert total([]) == (0.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize('arrow', FORCES)
+@pytest.mark.parametrize('arrow', DIRECTIONS)
 def test_a_tap_gives_about_a_metre_a_second(arrow):
     """2000 N for 25 ms on 55 kg: 0.91 m/s."""
     with Simulation(FLIGHT) as simulation:
-        simulation.push(Push('torso', FORCES[arrow], duration=TAP))
+        simulation.push(Push('torso', total([arrow]), duration=TAP))
         for _ in range(10):
             state = simulation.advance()
         momentum = conserved(FLIGHT, state).momentum
@@ -127,3 +139,47 @@ def test_a_key_whose_release_is_never_told_does_not_push_for_ever():
     last = hold(held, 'up', 1.0, 2.0, 30)
     assert held.at(last + 0.9 * STUCK) == ['up']
     assert held.at(last + 1.1 * STUCK) == []
+
+
+def pushing(pressed, begin, end, down=(), step=0.002):
+    """S for which an arrow pushes in a stretch of time in which ``down`` is told ten times a s."""
+    pushed, told = 0.0, begin
+    for now in np.arange(begin, end, step):
+        if down and now >= told:
+            pressed.take(down, now)
+            told += 0.1
+        pushed += step * bool(pressed.at(now))
+    return pushed
+
+
+@pytest.mark.parametrize('length', [0.01, 0.08, 0.13])
+def test_a_key_that_is_tapped_pushes_for_a_tap(length):
+    pressed = Pressed()
+    assert pressed.take(['up'], 7.0) and pressed.at(7.0) == ['up']
+    pushed = pushing(pressed, 7.0, 7.0 + length, ['up'])
+    assert not pressed.take([], 7.0 + length)
+    assert pushed + pushing(pressed, 7.0 + length, 8.0) == pytest.approx(TAP, abs=0.004)
+
+
+def test_a_key_that_is_held_pushes_until_it_is_let_go():
+    """But for the pause in which it might be a tap: 13 % of a second."""
+    pressed = Pressed()
+    pushed = pushing(pressed, 3.0, 4.0, ['left'])
+    pressed.take([], 4.0)
+    assert pushed == pytest.approx(1.0 - HOLD + TAP, abs=0.006) and pushed > 0.85
+    assert pressed.at(4.0) == []
+
+
+def test_keys_that_are_down_together_add_up():
+    pressed = Pressed()
+    pressed.take(['up'], 0.0)
+    pressed.take(['up', 'left'], 0.01)
+    assert total(pressed.at(0.01)) == (-2000.0, -2000.0, 2.0)
+    pressed.take(['up', 'left', 'elbow'], 0.2)
+    assert pressed.held(0.2) == ['left', 'up']
+
+
+def test_a_keyboard_of_which_nothing_more_is_heard_lets_go():
+    pressed = Pressed()
+    pressed.take(['up'], 0.0)
+    assert pressed.at(SILENCE - 0.01) == ['up'] and pressed.at(SILENCE + 0.01) == []

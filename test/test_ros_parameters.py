@@ -5,9 +5,11 @@ import dataclasses
 import math
 
 import pytest
+import rclpy
 import yaml
 from conftest import ROOT
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseArray
 from rcl_interfaces.msg import Log, ParameterType
 from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.parameter import (
@@ -53,6 +55,20 @@ def test_all_are_declared_with_a_description(node):
     assert value(node, 'bone_names') == list(load_scene('drop').bone_names)
     assert (value(node, 'rate'), value(node, 'real_time_factor')) == (100.0, 1.0)
     assert value(node, 'pushed_bone') == 'torso'
+
+
+def test_a_start_that_is_paused_stands_until_it_is_let_go(make_node, peer):
+    node = make_node(start_paused=True)
+    shown = peer.collect(PoseArray, f'{node.get_fully_qualified_name()}/poses', qos=LATCHED)
+    spun(node, peer, lambda: shown)
+    assert node.paused and node.simulation.time == 0
+    node.pause(False)
+    spun(node, peer, lambda: node.simulation.time > 0)
+
+
+def spun(node, peer, condition):
+    """Spin the node until a condition holds."""
+    peer.wait(lambda: rclpy.spin_once(node, timeout_sec=0.02) or condition())
 
 
 @pytest.mark.parametrize('name', RANGES)

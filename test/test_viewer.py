@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import time
 
 import numpy as np
@@ -136,14 +137,27 @@ def test_arrow_keys_push(page, label, axis, sign):
 
 
 def test_a_key_that_comes_again_and_again_is_held(page):
-    """As a browser sends it: 2000 N all the while, 36 m/s^2."""
+    """As a browser tells it: 2000 N all the while, 36 m/s^2; nothing once it is let go."""
     client = page.open()
     wait(lambda: page.frame)
+    counts = itertools.count()
 
     def fast():
-        client.press(page, 'Push up')
+        client.update(page.controls.pushes.told, f'{next(counts)} up')
         return page.frame.state.linear_velocities[0, 0] < -5
     wait(fast)
+    client.update(page.controls.pushes.told, f'{next(counts)}')
+    wait(lambda: not any(any(push.force) for push in page.frame.pushes))
+
+
+def test_the_strength_is_that_of_the_slider(page):
+    client = page.open()
+    wait(lambda: page.frame)
+    client.press(page, 'Pause, or go on')
+    wait(lambda: page.source.report.paused)
+    client.update(page.controls.pushes.strength, 350.0)
+    client.update(page.controls.pushes.told, '0 right')
+    wait(lambda: page.frame.pushes and page.frame.pushes[0].force[:2] == (0, 350))
 
 
 def test_arrows_pressed_together_add_up(page):
@@ -151,8 +165,7 @@ def test_arrows_pressed_together_add_up(page):
     wait(lambda: page.frame)
     client.press(page, 'Pause, or go on')
     wait(lambda: page.source.report.paused)
-    client.press(page, 'Push up')
-    client.press(page, 'Push left')
+    client.update(page.controls.pushes.told, '0 up left')
     wait(lambda: page.frame.pushes and page.frame.pushes[0].force == (-2000, -2000, 2))
 
 
@@ -250,9 +263,12 @@ def test_what_cannot_be_used_is_refused_and_the_old_goes_on(page, broken_scene):
 def test_a_dragged_bone_follows_at_the_distance_it_had(page):
     """The target is as far from the eye as the grabbed point was, in the pointer's direction."""
     eye = np.array([3.0, 1.0, 1.5])
-    client = page.open(position=tuple(eye))
+    client = page.open()
     wait(lambda: page.frame)
     frame = paused(page)
+    client.look(tuple(eye))
+    camera, = (each.camera for each in page.server.get_clients().values())
+    wait(lambda: np.array_equal(camera.position, eye))
     node, number, place = batch_of(page, 'left_forearm')
     client.drag(node, 'start', place, place, number)
     wait(lambda: page.source.frame.held)

@@ -9,16 +9,23 @@ from collections.abc import Iterable
 
 from ..model.vectors import Vector
 
-FORCES: dict[str, Vector] = {
-    'up': (-2000.0, 0.0, 1.0), 'down': (2000.0, 0.0, 1.0),
-    'right': (0.0, 2000.0, 1.0), 'left': (0.0, -2000.0, 1.0)}
-"""N, world axes (the article's keys)."""
+STRENGTH = 2000.0
+"""N: of a push of which nothing else is said."""
+
+LIFT = 0.0005
+"""N upwards for each N of a push, as the article has it."""
+
+DIRECTIONS: dict[str, Vector] = {
+    'up': (-1.0, 0.0, LIFT), 'down': (1.0, 0.0, LIFT),
+    'right': (0.0, 1.0, LIFT), 'left': (0.0, -1.0, LIFT)}
+"""World axes (the article's keys)."""
 
 
-def total(arrows: Iterable[str]) -> Vector:
-    """Sum of the forces of all these arrows, N."""
-    forces = [FORCES[arrow] for arrow in arrows]
-    return tuple(map(sum, zip(*forces, strict=True))) if forces else (0.0, 0.0, 0.0)
+def total(arrows: Iterable[str], strength: float = STRENGTH) -> Vector:
+    """Sum of the forces of all these arrows, N, world axes; each pushes with ``strength`` N."""
+    parts = [DIRECTIONS[arrow] for arrow in arrows]
+    return tuple(strength * part for part in map(sum, zip(*parts, strict=True))) if parts else (
+        0.0, 0.0, 0.0)
 
 
 TAP = 0.025
@@ -77,3 +84,40 @@ class Held:
     def left(self, now: float) -> float:
         """How long they push on if no key comes, s."""
         return max(0.0, self._until - now) if self._keys else 0.0
+
+
+HOLD = 0.15
+"""s after which a key that is still down is held: a tap on a key lasts 0.07 to 0.13 s."""
+
+SILENCE = 0.5
+"""s after which keys count as let go of which nothing more is told."""
+
+
+class Pressed:
+    """Arrows of a keyboard that tells which keys are down, again and again while any is.
+
+    A key pushes for a tap as it goes down, and on from HOLD later until it is let go. ``now``: s
+    of any steady clock.
+    """
+
+    def __init__(self) -> None:
+        self._since: dict[str, float] = {}
+        self._down: frozenset[str] = frozenset()
+        self._told = 0.0
+
+    def take(self, down: Iterable[str], now: float) -> bool:
+        """Enter which arrows are down; whether one has gone down just now."""
+        before, self._down, self._told = self._down, frozenset(down) & DIRECTIONS.keys(), now
+        new = self._down - before
+        self._since.update(dict.fromkeys(new, now))
+        return bool(new)
+
+    def held(self, now: float) -> list[str]:
+        """Arrows that are held."""
+        there = now - self._told <= SILENCE
+        return [arrow for arrow in sorted(self._down) if there and now - self._since[arrow] >= HOLD]
+
+    def at(self, now: float) -> list[str]:
+        """Arrows that push."""
+        tapped = [arrow for arrow, since in sorted(self._since.items()) if now - since < TAP]
+        return sorted({*tapped, *self.held(now)})

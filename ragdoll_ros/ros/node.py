@@ -84,7 +84,11 @@ class RagdollNode(Node):
         self._outputs.be_clock(self.settings.publish_clock)
         self._ticker = Ticker(self, self._steady, self.tick)
         self.create_timer(LOOK_AROUND, self._look_around, clock=self._steady)
-        self._go_on()
+        if self.settings.start_paused:
+            self.pause(True)
+            self._begin()
+        else:
+            self._go_on()
         self._tuning.watch(self._prepare, self._apply)
 
     @property

@@ -50,6 +50,8 @@ class Settings:
     real_time_factor: float = _setting(
         1.0, 'Seconds simulated in each second on the wall', (0.001, 100.0),
         scene_default=lambda scene: min(max(scene.pace, 0.001), 100.0))
+    start_paused: bool = _setting(
+        False, 'Stand at the start, paused, until ~/pause lets the doll go')
     pushed_bone: str = _setting(
         '', 'Bone that ~/force and cmd_vel push', constraints='one of bone_names',
         scene_default=lambda scene: scene.qualified(scene.dolls[0], scene.dolls[0].doll.root.name))

@@ -29,6 +29,12 @@ LOG_PERIOD = 1.0
 PATIENCE = 5.0
 """s that a process has to end."""
 
+WAITING = ['--ros-args', '-p', 'start_paused:=true', '--']
+"""Arguments by which the node lets the doll hang until the page lets it go."""
+
+LONGEST = 5.0
+"""s for which it does without a page that is open."""
+
 NO_PAGE = "No page in the browser without viser: pip install 'ragdoll_ros[viewer]' gets it"
 
 EXAMPLE = """examples:
@@ -56,7 +62,9 @@ def main(arguments: list[str] | None = None) -> int:
 def _run(arguments: list[str], own: list[str]) -> int:
     terminal, code = sys.stdin.isatty() and sys.stdout.isatty(), 0
     with ros_session(arguments):
-        with (started('ros.node', own, stderr=subprocess.PIPE if terminal else None) as node,
+        waiting = WAITING if importlib.util.find_spec('viser') is not None else []
+        with (started('ros.node', waiting + own,
+                      stderr=subprocess.PIPE if terminal else None) as node,
               page_process(own, terminal) as page):
             (_steer if terminal else _log)(Teleop(), node, page)
         code = node.returncode
@@ -89,7 +97,8 @@ def page_process(arguments: list[str], quiet: bool) -> Iterator[subprocess.Popen
         yield None
         return
     streams = {'stdout': subprocess.PIPE, 'stderr': subprocess.STDOUT} if quiet else {}
-    with started('viewer.command', arguments, **streams) as process:
+    with started('viewer.command', ['--start-after', f'{LONGEST:g}', *arguments],
+                 **streams) as process:
         yield process
 
 
@@ -98,24 +107,41 @@ def _steer(teleop: Teleop, node: subprocess.Popen, page: subprocess.Popen | None
     for process in told:
         os.set_blocking(_log_of(process).fileno(), False)
 
+    let_go = _LetGo(teleop, page)
+
     def attend() -> bool:
         for process in told:
             _show_log(process)
+        let_go.look()
         return node.poll() is None
 
     print(HELP)
     steer(teleop, attend)
 
 
-def _log(teleop: Teleop, node: subprocess.Popen, _: subprocess.Popen | None) -> None:
+def _log(teleop: Teleop, node: subprocess.Popen, page: subprocess.Popen | None) -> None:
+    let_go = _LetGo(teleop, page)
     next_line = time.monotonic() + LOG_PERIOD
     with SingleThreadedExecutor() as executor:
         executor.add_node(teleop)
         while rclpy.ok() and node.poll() is None:
             executor.spin_once(timeout_sec=LOG_PERIOD)
+            let_go.look()
             if time.monotonic() >= next_line:
                 next_line += LOG_PERIOD
                 print(teleop.line(''), flush=True)
+
+
+class _LetGo:
+    """Lets the doll go in the page's place, where that ends before it could."""
+
+    def __init__(self, teleop: Teleop, page: subprocess.Popen | None) -> None:
+        self._teleop, self._page = teleop, page
+
+    def look(self) -> None:
+        """Let go once the page's process is no more and the node can be told."""
+        if self._page is not None and self._page.poll() is not None and self._teleop.go_on():
+            self._page = None
 
 
 def _show_log(process: subprocess.Popen) -> None:

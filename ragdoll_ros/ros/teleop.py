@@ -20,7 +20,7 @@ from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 from std_srvs.srv import SetBool, Trigger
 
-from ..physics.arrow_keys import FORCES, TAP, Held, total
+from ..physics.arrow_keys import DIRECTIONS, TAP, Held, total
 from .followed import Followed
 from .keys import Keyboard
 from .session import ros_session
@@ -69,7 +69,7 @@ class Teleop(Node):
 
     def take(self, key: str, down: bool, now: float) -> bool:
         """Do what a key says; False to quit."""
-        if key in FORCES:
+        if key in DIRECTIONS:
             self.held.tap = TAP / self.status.pace
             self.held.take(key, down, now)
         elif key == ' ':
@@ -77,6 +77,13 @@ class Teleop(Node):
         elif key in 'rR':
             self._reset.call_async(Trigger.Request())
         return key not in 'qQ'
+
+    def go_on(self) -> bool:
+        """Let the time go on; False if there is no node to tell."""
+        if not self._pause.service_is_ready():
+            return False
+        self._pause.call_async(SetBool.Request(data=False))
+        return True
 
     def send(self, now: float) -> str:
         """Send the push of the keys that are held, once zero when none is; say which it is."""

@@ -11,11 +11,15 @@ import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..files.scene import load_scene
 from ..model import errors
 from ..physics.engine.registry import ENGINES
 from .sources.source import Source
+
+if TYPE_CHECKING:
+    from .opening import Opening
 
 PORT = 8080
 LAST_PORT = 65535
@@ -82,6 +86,9 @@ def parser() -> argparse.ArgumentParser:
                         'machine alone; 0.0.0.0: whoever reaches this machine may steer)')
     parser.add_argument('--port', type=port, help=f'port to serve at; it must be free ({PORT}, or '
                         'the next free one)')
+    parser.add_argument('--start-after', type=float, metavar='S', help='the node waits, started '
+                        'with start_paused: let it go once a page shows it, or after so many s '
+                        'without one')
     parser.add_argument('--folder', default='.', help='where the page saves and loads scenes, and '
                         'keeps the characters it is sent (default: the current one); pages '
                         'can write nowhere else')
@@ -105,6 +112,7 @@ def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event
         Page = page_class()
         with server_at(options.host, number) as server:
             page = Page(server, source, options.folder)
+            page.opening = opening(options, source)
             print(f'The page is at http://{shown(options.host)}:{server.get_port()}', flush=True)
             page.run(stop)
     finally:
@@ -158,6 +166,15 @@ def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
     except ImportError as error:
         raise CannotServe(f'{error}: {NO_ROS}') from None
     return Remote(for_ros)
+
+
+def opening(options: argparse.Namespace, source: Source) -> Opening | None:
+    """What lets a scene of its own, or a node that waits, go once it is seen; else None."""
+    from .opening import Opening
+    if options.scene is not None:
+        source.pause(True)
+        return Opening(source, None)
+    return None if options.start_after is None else Opening(source, options.start_after)
 
 
 def free_port(host: str, wanted: int | None) -> int:

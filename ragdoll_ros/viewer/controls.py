@@ -2,42 +2,21 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import Callable
 
 import viser
 
 from ..files.config import scene_names
 from ..model.errors import RagdollError
-from ..physics.arrow_keys import Held, total
 from ..physics.engine.registry import ENGINES
+from .push_keys import PushKeys
 from .sources.source import Report, Source
-
-ARROWS = {'←': 'left', '↑': 'up', '↓': 'down', '→': 'right'}
-"""Label of each push: short, so that all stand in one row."""
 
 PACES = (0.05, 2.0)
 """Slowest and fastest of the slider."""
 
 OTHER = '(other)'
 """Stands for a scene that has no name in config/."""
-
-KEEP_KEYS = """<img src="data:," style="display:none" onerror="
-  if (!window.ragdollKeys) {
-    window.ragdollKeys = true;
-    document.documentElement.addEventListener('keydown', (event) => {
-      if (event.key.startsWith('Arrow')) event.stopPropagation();
-    });
-    document.addEventListener('click', (event) => {
-      const at = document.activeElement;
-      const typed = at?.matches('input:not([type=checkbox]), textarea');
-      if (event.detail && (!typed || event.target.closest('[role=option]'))) at?.blur();
-    });
-  }">"""
-"""Keeps arrow keys from viser's camera, which would rotate with each push; commands still get them:
-they listen where this does, the camera further out. What was clicked gives the keys back, or
-Space would press it again, a checkbox keep all keys; but for a field in which one types."""
-
 
 class Controls:
     """The panel's first tab."""
@@ -46,43 +25,30 @@ class Controls:
         self.source = source
         self.before_step: Callable[[], None] = lambda: None
         """Called before a single tick is asked for."""
-        self._held = Held()
         self._shown = Report()
         self._scene_shown = OTHER
         self._loop = server.get_event_loop()
         gui = server.gui
-        gui.add_html(KEEP_KEYS)
-        pushes = gui.add_button_group(
-            'Push', tuple(ARROWS), hint='2000 N, as seen from in front of the doll: left, away, '
-            'toward you, right; arrow keys do the same')
+        self.pushes = PushKeys(server, source)
         self.pause = gui.add_button('Pause', icon='player-pause', hint='Space')
         self.step_button = gui.add_button('Step', icon='player-track-next', disabled=True,
                                           hint='N; while paused; ends editing')
-        reset = gui.add_button('Reset', icon='player-skip-back', hint='R')
+        self.reset = gui.add_button('Reset', icon='player-skip-back', hint='R')
         self.pace = gui.add_slider('Pace', *PACES, step=0.05, initial_value=1.0,
                                    hint='simulated seconds for each second on the wall')
         self.scene = gui.add_dropdown('Scene', (OTHER, *scene_names()), initial_value=OTHER)
         self.engine = gui.add_dropdown('Engine', ENGINES, initial_value=ENGINES[0],
                                        hint='what simulates; another one starts anew')
-        pushes.on_click(lambda event: self.push(ARROWS[event.target.value]))
         self.pace.on_update(lambda event: event.client and self.source.set_pace(self.pace.value))
         self.scene.on_update(self._choose)
         self.engine.on_update(self._choose_engine)
-        for arrow in ARROWS.values():
-            command = gui.add_command(f'Push {arrow}', hotkey=f'arrow{arrow}')
-            command.on_trigger(lambda _, arrow=arrow: self.push(arrow))
         for button, label, key, action in (
                 (self.pause, 'Pause, or go on', 'space', self.toggle_pause),
-                (self.step_button, 'Step', 'N', self.step), (reset, 'Reset', 'R', source.reset)):
+                (self.step_button, 'Step', 'N', self.step),
+                (self.reset, 'Reset', 'R', source.reset)):
             command = gui.add_command(label, hotkey=key)
             for trigger in (button.on_click, command.on_trigger):
                 trigger(lambda _, action=action: action())
-
-    def push(self, arrow: str) -> None:
-        """Push, together with the arrows that came just before; a key that is held comes again."""
-        now = time.monotonic()
-        self._held.take(arrow, True, now)
-        self.source.push(total(self._held.at(now)), self._held.left(now))
 
     def toggle_pause(self) -> None:
         """Hold the time, or let it go on."""
@@ -104,6 +70,12 @@ class Controls:
         if report.pace != self._shown.pace:
             self.pace.value = min(max(report.pace, PACES[0]), PACES[1])
         self._shown = report
+
+    def show_rest(self, lies: bool) -> None:
+        """Invite to another fall once one is over."""
+        label = 'Again' if lies else 'Reset'
+        if label != self.reset.label:
+            self.reset.label, self.reset.color = label, 'green' if lies else None
 
     def show_scene(self, name: str) -> None:
         """Show which scene it is.

@@ -9,7 +9,7 @@ import viser
 
 from ..model.scene import Scene
 from .controls import Controls
-from .drawing.camera import Follower
+from .drawing.camera import Cameras
 from .drawing.ground import light
 from .drawing.paint import PAINT
 from .drawing.plots import Plots
@@ -18,8 +18,12 @@ from .drawing.stage import Stage
 from .drawing.view import View, theme
 from .editor.editor import Editor
 from .editor.form import RED, colored
+from .hint import HINT
+from .opening import Opening
+from .panel import FREE
 from .pointer import Pointer
 from .recording_panel import RecordingPanel
+from .rest import Rest
 from .sources.source import Frame, Report, Source, Wanted
 from .timeline.timeline import Timeline
 
@@ -46,10 +50,15 @@ class Page:
         """What is shown; None before the first."""
         self.stage: Stage | None = None
         """All that is drawn of the scene that is shown; None before the first frame."""
+        self.opening: Opening | None = None
+        """Lets a source go that waits to be seen; None where none does."""
         self._live: Frame | None = None
         self._folder = folder
         light(server)
         theme(server, dark=False)
+        server.gui.main_panel.dock_right()
+        server.gui.add_html(FREE)
+        server.gui.add_html(HINT)
         server.gui.add_html(KEEP_PAGE)
         server.gui.add_html(PAINT)
         self.problem = server.gui.add_html('')
@@ -57,12 +66,14 @@ class Page:
         with self.tabs.add_tab('Play'):
             self.controls = Controls(server, source)
             self.view = View(server)
+            self.view.on_home(lambda client: self.cameras.go_home(client))
             self.timeline = Timeline(server, source)
             self._recording = RecordingPanel(server)
         self._edit_tab = self.tabs.add_tab('Edit')
         with self.tabs.add_tab('Plots'):
             self.plots = Plots(server)
-        self._follower = Follower(server)
+        self.cameras = Cameras(server)
+        self._rest = Rest()
         self._pointer = Pointer(source, self._at_hand, self._select)
 
     def run(self, stop: threading.Event) -> None:
@@ -76,8 +87,10 @@ class Page:
 
     def update(self) -> bool:
         """Draw what has changed; returns whether any page is open."""
-        is_open = bool(self.server.get_clients())
+        clients = list(self.server.get_clients().values())
+        is_open = bool(clients)
         self.source.want(self.view.wanted if is_open else Wanted())
+        self.controls.pushes.keep(time.monotonic())
         if is_open:
             frame, report = self.source.frame, self.source.report
             if frame is not None:
@@ -89,6 +102,8 @@ class Page:
                 self.editor.take_note(report.paused)
             self._tell(report.problem, report.note)
             self.controls.show(report)
+        if self.opening is not None:
+            self.opening.look(clients, self.frame is not None, time.monotonic())
         return is_open
 
     def _show(self, live: Frame, report: Report, now: float) -> None:
@@ -102,7 +117,10 @@ class Page:
         frame = self.timeline.shown(live, now)
         if frame is not self.frame:
             self._draw(frame)
-        self._follower.follow(frame, now, self.view.follow.value)
+            if self.timeline.is_live:
+                self.cameras.show(frame)
+        self.cameras.follow(frame, now, self.view.follow.value)
+        self.controls.show_rest(self._rest.lies(live, report.paused, now))
 
     def _at_hand(self) -> Frame | None:
         """What a pointer may take hold of: nothing of what is over."""
@@ -114,6 +132,7 @@ class Page:
             self.stage = Stage(self.server, frame)
             self._pointer.attach(self.stage.bodies, self.stage.skins)
             self.controls.show_scene(frame.scene.name)
+            self.controls.pushes.show_scene(frame.scene)
             self.view.show_scene(has_skin=bool(self.stage.skins.handles))
             self._edit(frame.scene)
         self.frame = frame

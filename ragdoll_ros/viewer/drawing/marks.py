@@ -1,6 +1,7 @@
 """Lines, arrows and points: swings, pushes, hands, contacts."""
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 import numpy as np
@@ -17,6 +18,9 @@ WEIGHT_LENGTH, LONGEST = 1.0, 2.0
 BROWN, RED, BLUE, YELLOW = (90, 50, 25), (230, 50, 25), (30, 110, 230), (245, 190, 0)
 ROD = 0.012
 """m: thickness of a swing's rods."""
+
+SEEN = 0.3
+"""s on the wall for which a push is drawn at least: a tap is over before anybody sees it."""
 
 
 class Marks:
@@ -38,13 +42,19 @@ class Marks:
             'forces': lambda name, points: add.add_line_segments(
                 name, points, YELLOW, thickness=4.0, thickness_units='screen')}
         self._handles: dict[str, viser.SceneNodeHandle] = {}
+        self._pushes: tuple[Push, ...] = ()
+        self._pushed = 0.0
 
     def show(self, frame: Frame) -> None:
         """Draw what there is; hide what has gone."""
         scene, state = frame.scene, frame.state
+        now = time.monotonic()
+        pushes = tuple(push for push in frame.pushes if any(push.force))
+        if pushes or now - self._pushed > SEEN:
+            self._pushes, self._pushed = pushes, now
         arrows = [arrow_before(scene.bones[bone], push, state.positions[bone],
                                state.orientations[bone])
-                  for push in frame.pushes if any(push.force)
+                  for push in self._pushes
                   for bone in (scene.bone_index(push.bone),)]
         lines = [np.stack([hand.point, hand.target]) for hand in frame.held]
         self._set('rods', frame.rods)

@@ -60,12 +60,13 @@ class Playback(Source):
             self._go_on_from(self._now())
             self._wanted = wanted.frames
 
-    def pause(self, wanted: bool) -> None:
+    def pause(self, wanted: bool) -> bool:
         """Hold the time, or let it go on; at the end it stands, and goes on from the start."""
         with self._lock:
             instant = self._now()
             self._paused = wanted and instant < self._recording.duration
             self._go_on_from(0.0 if instant >= self._recording.duration and not wanted else instant)
+        return True
 
     def step(self) -> None:
         with self._lock:

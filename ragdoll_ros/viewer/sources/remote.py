@@ -112,8 +112,8 @@ class Remote(Source):
     def push(self, force: Vector, duration: float) -> None:
         self._force.send(force, duration / self._told.pace)
 
-    def pause(self, wanted: bool) -> None:
-        self._ask.pause(wanted)
+    def pause(self, wanted: bool) -> bool:
+        return self._ask.pause(wanted)
 
     def step(self) -> None:
         self._ask.trigger('step')

@@ -35,9 +35,9 @@ class Ask:
         """Call ``reset`` or ``step``."""
         self._send(self._triggers[service], Trigger.Request())
 
-    def pause(self, wanted: bool) -> None:
-        """Hold the node's time, or let it go on."""
-        self._send(self._pause, SetBool.Request(data=wanted))
+    def pause(self, wanted: bool) -> bool:
+        """Hold the node's time, or let it go on; False if there is no node that could."""
+        return self._send(self._pause, SetBool.Request(data=wanted))
 
     def parameters(self, names: Sequence[str], take: Callable[[dict], None]) -> None:
         """Ask for parameters by name; no answer if there is no node."""

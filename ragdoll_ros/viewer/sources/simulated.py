@@ -67,8 +67,9 @@ class Simulated(Source):
     def push(self, force: Vector, duration: float) -> None:
         self._commands.put(lambda: self._push(force, duration))
 
-    def pause(self, wanted: bool) -> None:
+    def pause(self, wanted: bool) -> bool:
         self._commands.put(lambda: self._tell(paused=wanted))
+        return True
 
     def step(self) -> None:
         self._commands.put(lambda: self._report.paused and self._tick())

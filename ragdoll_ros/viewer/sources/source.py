@@ -109,8 +109,8 @@ class Source(Protocol):
         The next push takes its place.
         """
 
-    def pause(self, wanted: bool) -> None:
-        """Hold the time, or let it go on."""
+    def pause(self, wanted: bool) -> bool:
+        """Hold the time, or let it go on; False if there is none yet, as no node is there."""
 
     def step(self) -> None:
         """Make one tick while paused."""

@@ -1,0 +1,142 @@
+"""The first minute with `make run`, in headless Chromium: the fall is seen, a press has a feel."""
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+
+import numpy as np
+import pytest
+from browser import chromium, opened, serving
+from geometry_msgs.msg import PoseArray, Wrench
+from peer import Peer
+
+from ragdoll_ros.files.scene import load_scene
+
+SCENE = load_scene('drop')
+START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])
+
+FLIGHT = load_scene('flight')
+MASSES = np.array([bone.mass for bone in FLIGHT.bones])
+
+SIZES = {'desk': {'width': 1280, 'height': 800}, 'phone': {'width': 390, 'height': 844}}
+
+
+NOTE_KEYS = """() => {
+  window.noted = [];
+  for (const kind of ['keydown', 'keyup']) document.documentElement.addEventListener(
+    kind, () => window.noted.push(performance.now()), {once: true, capture: true});
+}"""
+"""Notes when a key goes down and up, ms."""
+
+
+@pytest.fixture(scope='module')
+def browser(ros):
+    with chromium() as context:
+        yield context
+
+
+@pytest.mark.parametrize('size', ['desk', pytest.param('phone', marks=pytest.mark.slow)])
+def test_the_first_fall_waits_for_the_first_page(browser, size):
+    """3 s without a page: in the first picture all hangs at the start; 3 s later it lies."""
+    with serving('--ros-args', '-r', f'__ns:=/{size}', module='ragdoll_ros.ros.run') as url:
+        time.sleep(3.0)  # what is waited for is that nothing happens
+        with opened(browser, url, SCENE, SIZES[size]) as view:
+            assert abs(view.bodies(SCENE) - START).max() < 0.3
+            view.wait(lambda: abs(view.bodies(SCENE)[:, 2] - START[:, 2]).min() > 0.1)
+            view.button('Again').wait_for()
+
+
+@pytest.fixture(scope='module')
+def peer(ros):
+    """A peer that listens in a thread of its own, so that what came last is new."""
+    peer = Peer()
+    thread = threading.Thread(target=peer.executor_.spin, daemon=True)
+    thread.start()
+    yield peer
+    peer.executor_.shutdown()
+    thread.join()
+    peer.destroy_node()
+
+
+@pytest.fixture(scope='module')
+def heard(peer):
+    """Poses and forces of a node that simulates a doll in free space, as they came."""
+    return peer.collect(PoseArray, '/free/ragdoll/poses'), peer.collect(Wrench,
+                                                                        '/free/ragdoll/force')
+
+
+@pytest.fixture(scope='module', params=['desk', pytest.param('phone', marks=pytest.mark.slow)])
+def view(browser, heard, request):
+    """A page of that node, in free space, where nothing but pushes moves the doll."""
+    with (serving('flight', '--ros-args', '-r', '__ns:=/free', module='ragdoll_ros.ros.run') as url,
+          opened(browser, url, FLIGHT, SIZES[request.param]) as view):
+        view.button('Pause').wait_for()
+        yield view
+
+
+def velocity(poses):
+    """Velocity (3,) m/s of the doll's centre of mass over the last ten poses."""
+    centres = [np.average([(p.position.x, p.position.y, p.position.z) for p in message.poses],
+                          axis=0, weights=MASSES) for _, message in poses[-11:]]
+    return (centres[-1] - centres[0]) / (0.01 * (len(centres) - 1))
+
+
+@contextlib.contextmanager
+def pushed(view, heard):
+    """From the start on: a list that gets, once it is over, the x of all forces and the velocity.
+
+    A push is over when a force of zero was heard, and ten poses after it.
+    """
+    poses, forces = heard
+    view.key('r')
+    view.page.wait_for_timeout(300)
+    view.wait(lambda: len(poses) > 11 and np.abs(velocity(poses)).max() < 1e-9)
+    forces.clear()
+    result = []
+    yield result
+    view.wait(lambda: forces and forces[-1][1].force.x == 0)
+    count = len(poses)
+    view.wait(lambda: len(poses) > count + 12)
+    result += [[message.force.x for _, message in forces], velocity(poses)]
+
+
+@pytest.mark.parametrize('act', [lambda view: view.press('↓'),
+                                 lambda view: view.key('ArrowDown')], ids=['button', 'key'])
+def test_a_press_is_a_shove(view, heard, act):
+    """25 ms of 2000 N give 55 kg 0.9 m/s: two ticks' push or three, of five presses the middle one.
+
+    The page times it on the wall: where the machine is busy, now and then a tick more or less.
+    """
+    gains = []
+    for _ in range(5):
+        with pushed(view, heard) as result:
+            act(view)
+        forces, gained = result
+        assert set(forces) == {2000.0, 0.0} and abs(gained[1]) < 1e-6
+        gains.append(gained[0])
+    assert 0.5 < np.median(gains) < 1.2, gains
+
+
+def test_a_key_that_is_held_pushes_as_long_as_it_is(view, heard):
+    """2000 N for a second, as the browser's clock has it: on a busy machine keys come late."""
+    with pushed(view, heard) as result:
+        view.page.evaluate(NOTE_KEYS)
+        view.page.keyboard.down('ArrowUp')
+        view.page.wait_for_timeout(1000)
+        view.page.keyboard.up('ArrowUp')
+    forces, gained = result
+    down, up = view.page.evaluate('window.noted')
+    assert set(forces) == {-2000.0, 0.0}
+    assert -gained[0] * MASSES.sum() == pytest.approx(2 * (up - down), rel=0.15)
+
+
+def test_the_strength_is_what_goes_out(view, heard):
+    field = view.field('Strength, N')
+    field.fill('350')
+    field.press('Enter')
+    view.see('350 N for 0.1 s give')
+    field.blur()  # else the keys would be the field's
+    with pushed(view, heard) as result:
+        view.key('ArrowDown')
+    assert set(result[0]) == {350.0, 0.0}
