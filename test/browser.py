@@ -36,6 +36,8 @@ REQUIRED = os.environ.get('RAGDOLL_BROWSER') == 'required'
 READY = "window.__viserMutable?.scene && window.__viserMutable.nodeRefFromName['']"
 
 PLAIN = """() => {
+  document.head.insertAdjacentHTML('beforeend',
+    '<style>.mantine-Notification-root {display: none}</style>');
   const {scene} = window.__viserMutable;
   Object.defineProperty(scene, 'environment', {get: () => null, set() {}});
   const unshade = () => {
@@ -44,7 +46,8 @@ PLAIN = """() => {
   };
   unshade();
 }"""
-"""Neither reflections nor shadows: without a GPU, those cost each page that is opened 8 s of a
+"""No notes, as of software rendering, which no user with a GPU gets, lie over the picture. Neither
+reflections nor shadows: without a GPU, those cost each page that is opened 8 s of a
 processor before its first pictures, and two thirds of every further one."""
 
 BODIES = """() => {
@@ -194,11 +197,17 @@ class View:
 
 
 @contextmanager
-def opened(browser, url, scene, size=SIZE):
-    """A page at an address, with all bones in it; no script of it has failed at the end."""
+def opened(browser, url, scene, size=SIZE, first=False):
+    """A page at an address, with all bones in it; no script of it has failed at the end.
+
+    ``first``: of a scene that waits for its first page: until it falls.
+    """
     view = View(browser, url, size)
     try:
         view.wait(lambda: np.isfinite(view.bodies(scene)).all())
+        if first:
+            before = view.bodies(scene)
+            view.wait(lambda: abs(view.bodies(scene) - before).max() > 0.01)
         yield view
     finally:
         view.close()

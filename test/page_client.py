@@ -30,6 +30,10 @@ class PageClient:
         self._thread = threading.Thread(target=self._run, args=(port,), daemon=True)
         self._thread.start()
         assert self._ready.wait(PATIENCE)
+        self.look(position, look_at)
+
+    def look(self, position, look_at=(0.0, 0.0, 0.8)):
+        """Tell where the camera is and what it looks at."""
         self.send(_messages.ViewerCameraMessage(
             wxyz=(1, 0, 0, 0), position=position, fov=0.8, near=0.01, far=1000.0,
             image_height=700, image_width=1100, look_at=look_at, up_direction=(0, 0, 1)))

@@ -18,6 +18,7 @@ from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.model.shapes import Capsule, Sphere
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.recording import Recording
+from ragdoll_ros.viewer.drawing.marks import WEIGHT_LENGTH
 from ragdoll_ros.viewer.sources.playback import Playback
 from ragdoll_ros.viewer.sources.simulated import Simulated
 from ragdoll_ros.viewer.sources.source import Wanted
@@ -262,9 +263,12 @@ def test_what_cannot_be_used_is_refused_and_the_old_goes_on(page, broken_scene):
 def test_a_dragged_bone_follows_at_the_distance_it_had(page):
     """The target is as far from the eye as the grabbed point was, in the pointer's direction."""
     eye = np.array([3.0, 1.0, 1.5])
-    client = page.open(position=tuple(eye))
+    client = page.open()
     wait(lambda: page.frame)
     frame = paused(page)
+    client.look(tuple(eye))
+    camera, = (each.camera for each in page.server.get_clients().values())
+    wait(lambda: np.array_equal(camera.position, eye))
     node, number, place = batch_of(page, 'left_forearm')
     client.drag(node, 'start', place, place, number)
     wait(lambda: page.source.frame.held)
@@ -356,6 +360,17 @@ def test_a_click_chooses_the_bone_for_the_editor(page):
     wait(lambda: page.editor.bone == 'right_shin')
 
 
+def test_a_dark_page_has_a_dark_ground(page):
+    client = page.open()
+    wait(lambda: page.frame)
+    ground = page.server.scene.get_handle_by_name('/scene/ground')
+    assert min(ground.plane_color) > 200
+    client.update(page.view.dark, True)
+    wait(lambda: max(page.server.scene.get_handle_by_name('/scene/ground').plane_color) < 60)
+    client.update(page.view.dark, False)
+    wait(lambda: min(page.server.scene.get_handle_by_name('/scene/ground').plane_color) > 200)
+
+
 def test_contacts_on_demand(page):
     """At rest the doll touches the ground: the points are at its height, within its margin."""
     client = page.open()
@@ -366,6 +381,13 @@ def test_contacts_on_demand(page):
     points = wait_for(page, '/scene/contacts').points
     # Bones of the doll touch each other as well, above the ground.
     assert points[:, 2].min() == pytest.approx(0, abs=0.01)
+    # At rest the ground bears the weight: 1 m of lines in all.
+    wait(lambda: page.source.frame is page.frame and np.linalg.norm(
+        page.frame.state.linear_velocities, axis=1).max() == 0)
+    lines = page.server.scene.get_handle_by_name('/scene/forces').points
+    below = lines[:, 0, 2] < 0.01
+    rises = (lines[below, 1, 2] - lines[below, 0, 2]).sum()
+    assert rises == pytest.approx(WEIGHT_LENGTH, rel=0.01)
     client.update(page.view.contacts, False)
     wait(lambda: page.frame.contacts is None)
     wait(lambda: not page.server.scene.get_handle_by_name('/scene/contacts').visible)

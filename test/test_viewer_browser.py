@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import zipfile
 
 import fit_rigs
 import imageio.v3 as iio
@@ -15,6 +16,7 @@ from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.mcap_file import load_recording, recording_bytes
 from ragdoll_ros.recordings.recording import Recording
+from ragdoll_ros.recordings.save import FORMATS
 
 SCENE = load_scene('drop')
 START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])
@@ -50,7 +52,7 @@ def url(folder):
 
 @pytest.fixture(scope='module')
 def view(browser, url):
-    with opened(browser, url, SCENE) as view:
+    with opened(browser, url, SCENE, first=True) as view:
         yield view
 
 
@@ -172,6 +174,26 @@ def test_a_run_is_recorded(view, states, tmp_path):
         np.testing.assert_array_equal(positions, states[tick].positions)
 
 
+def test_all_of_the_timeline_is_saved(view, states, tmp_path):
+    """What *Save this* sends: each format, and in the recording the simulation's poses to the bit.
+
+    A fall after a reset: its first pictures belong to what was before.
+    """
+    view.hold_at(SCENE, START)
+    go_on(view)
+    view.wait(lambda: far(view, START, 0.1))
+    with view.page.expect_download() as download:
+        view.press('Save this')
+    download.value.save_as(tmp_path / 'run.zip')
+    with zipfile.ZipFile(tmp_path / 'run.zip') as package:
+        assert package.namelist() == [f'run{suffix}' for suffix in FORMATS]
+        package.extractall(tmp_path)
+    recording = load_recording(tmp_path / 'run.mcap')
+    table = np.array([state.positions for state in states])
+    last = recording.positions[-3:]
+    assert len(recording) > 5 and all((table == each).all(axis=(1, 2)).any() for each in last)
+
+
 @pytest.mark.slow  # test_viewer_playback.py plays without a browser
 def test_a_run_is_played_back(browser, states, tmp_path):
     """To its last pose, where it stays."""
@@ -198,7 +220,8 @@ def test_the_view_is_saved_as_png(view, tmp_path):
     picture = iio.imread(tmp_path / 'view.png')
     share = picture.shape[0] / SIZE['height']
     x, y = (view.pixels(START[:1])[0] * share).astype(int)
-    assert share >= 0.75 * SHARPNESS and picture.shape[1:] == (share * SIZE['width'], 3)
+    width = view.page.locator('canvas').first.bounding_box()['width']
+    assert share >= 0.75 * SHARPNESS and picture.shape[1:] == (share * width, 3)
     assert (picture[2, 2] == 255).all() and picture[y, x].min() < 200
 
 

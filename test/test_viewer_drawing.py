@@ -17,6 +17,7 @@ from ragdoll_ros.fit.pipeline import fit_character
 from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.fit.skin import skin_of
 from ragdoll_ros.model import errors, rotation
+from ragdoll_ros.model.coordinates import GeneralizedState
 from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame
 from ragdoll_ros.model.scene import Placement, Scene, above_ground
@@ -26,7 +27,7 @@ from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.rods import Rods
 from ragdoll_ros.viewer.drawing.bodies import Bodies
-from ragdoll_ros.viewer.drawing.joint_limits import PIECES, Limits
+from ragdoll_ros.viewer.drawing.joint_limits import PIECES, RIM, SPOKES, Limits
 from ragdoll_ros.viewer.drawing.marks import arrow_before
 from ragdoll_ros.viewer.drawing.meshes import COARSE, MESHES, ROUND
 from ragdoll_ros.viewer.drawing.skin import Skins
@@ -116,7 +117,7 @@ def test_the_last_needle_of_each_joint_moves_with_the_child():
         assert np.abs(simulation.joint_angles).max() > 0.2
         limits.show(state, simulation.joint_angles)
     needles, before = drawn(server).points[-6:], first[-6:]
-    assert len(drawn(server).points) == 6 * (PIECES + 1)
+    assert len(drawn(server).points) == RIM + SPOKES + 6 * (PIECES + 1)
     for child, row in (('b', 0), ('c', 2), ('d', 5)):
         index = scene.bone_index(child)
         local = rotation.rotate(rotation.inverse(begin.orientations[index]),
@@ -125,6 +126,34 @@ def test_the_last_needle_of_each_joint_moves_with_the_child():
         assert np.abs(carried - needles[row]).max() < 1e-4
     limits.show(state, None)
     assert not drawn(server).visible
+    server.stop()
+
+
+@pytest.mark.parametrize('corner', [(0, -1, -1), (1, 1, -1), (2, 1, 1), (3, -1, 1)])
+def test_a_limb_at_both_ends_of_its_swing_points_at_the_corner_of_its_cone(corner):
+    """Its twist axis as the child, placed there by the engine, carries it; whatever the twist."""
+    import viser
+    quarter, x, y = corner
+    whole = all_kinds()
+    doll = Ragdoll('d', tuple(bone for bone in whole.bones if bone.name in 'ad'), whole.joints[-1:])
+    (joint,), child = doll.joints, doll.bone('d')
+    scene = Scene('s', (Placement(doll, orientation=(0.5, 0.1, 0.3, 0.8)),), gravity=(0, 0, 0))
+    server = viser.ViserServer('127.0.0.1', 0, verbose=False)
+    limits = Limits(server, scene)
+    with Simulation(scene) as simulation:
+        q, v = simulation.coordinates.q.copy(), simulation.coordinates.v
+        q[7:10] = 1.4 * x, 1.4 * y, 0.6
+        state = simulation.place(GeneralizedState(q, v))
+        assert simulation.joint_angles == pytest.approx((1.4 * x, 1.4 * y, 0.6), abs=1e-9)
+        limits.show(state, simulation.joint_angles)
+    index = scene.bone_index('d')
+    carried = rotation.multiply(state.orientations[index], rotation.inverse(child.orientation))
+    anchor = state.positions[index] + rotation.rotate(
+        carried, np.subtract(joint.anchor, child.position))
+    # The limb is on the other side of the anchor than the axis points to.
+    ahead = rotation.rotate(carried, -np.array(joint.axes[0]))
+    points = drawn(server).points[RIM * quarter // 4, 0] - anchor
+    assert points == pytest.approx(0.15 * ahead, abs=1e-6)
     server.stop()
 
 

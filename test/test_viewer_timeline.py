@@ -72,7 +72,8 @@ def test_memory_is_bounded_whatever_comes(minutes):
         if tick in (3700, minutes * 3600 - 1):
             sizes.append(tracemalloc.get_traced_memory()[0])
     tracemalloc.stop()
-    assert sizes[1] < 1.02 * sizes[0] and sizes[1] < 15e6
+    # It goes up and down by 2 %; one number kept of each frame would be 35 % in 30 minutes.
+    assert sizes[1] < 1.05 * sizes[0] and sizes[1] < 15e6
 
 
 def test_a_crowd_is_kept_for_less_than_a_minute():

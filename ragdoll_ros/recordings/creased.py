@@ -31,3 +31,16 @@ def creased(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np
         sums = near @ normals[faces]
         smooth[faces, slots] = sums / np.linalg.norm(sums, axis=1, keepdims=True)
     return corners.reshape(-1, 3), smooth.reshape(-1, 3)
+
+
+def smooth_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals (v, 3): the mean of the triangles' around each vertex, by their areas.
+
+    Of a vertex that no triangle has, or that has no mean, it is z.
+    """
+    corners = vertices[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sums = np.stack([np.bincount(triangles.ravel(), np.repeat(component, 3), len(vertices))
+                     for component in normals.T], axis=1)
+    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
+    return np.where(lengths > 1e-30, sums / np.maximum(lengths, 1e-30), (0.0, 0.0, 1.0))

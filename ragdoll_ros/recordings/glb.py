@@ -7,7 +7,7 @@ import struct
 import numpy as np
 
 COMPONENTS = {'float32': 5126, 'uint32': 5125, 'uint16': 5123}
-KINDS = {1: 'SCALAR', 3: 'VEC3', 4: 'VEC4', 16: 'MAT4'}
+KINDS = {1: 'SCALAR', 2: 'VEC2', 3: 'VEC3', 4: 'VEC4', 16: 'MAT4'}
 ATTRIBUTES, INDICES = 34962, 34963
 """Targets of buffer views (glTF 2.0, 5.11.5): what is drawn; None for what is not."""
 

@@ -10,22 +10,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..model import rotation
 from ..model.compound import Compound
-from ..model.pose import Pose
 from ..model.ragdoll import DEFAULT_COLOR, Bone
 from ..model.shapes import Shape
 from ..model.skin import Skin
 from .creased import creased
-from .glb import ATTRIBUTES, INDICES, Glb
+from .glb import ATTRIBUTES, Glb
+from .gltf_skin import add_material, add_skin
 from .recording import Recording
 from .y_up import orientations_y_up, points_y_up
-
-ROUGHNESS = 0.8
-"""Of all surfaces, as glTF's materials have it: no mirror, no chalk."""
-
-INFLUENCES = 4
-"""Bones that move a vertex, at the most: what every reader of glTF can do."""
 
 
 def gltf_bytes(recording: Recording, skins: Mapping[int, Skin] = {}) -> bytes:
@@ -60,7 +53,7 @@ def gltf_bytes(recording: Recording, skins: Mapping[int, Skin] = {}) -> bytes:
         roots.append(glb.add('nodes', name=placement.name, translation=origin.tolist(),
                              children=nodes))
         if index in skins:
-            roots.append(_add_skin(glb, skins[index], nodes, f'{placement.name} skin'))
+            roots.append(add_skin(glb, skins[index], nodes, f'{placement.name} skin'))
     glb.add('animations', name=recording.scene.name, channels=channels, samplers=samplers)
     glb.document['scene'] = glb.add('scenes', name=recording.scene.name, nodes=roots)
     return glb.content()
@@ -94,46 +87,6 @@ class _Shapes:
             self._attributes[shape] = {'POSITION': self._glb.accessor(places, ATTRIBUTES),
                                        'NORMAL': self._glb.accessor(normals, ATTRIBUTES)}
         return self._attributes[shape]
-
-
-def add_material(glb: Glb, color: tuple[float, ...]) -> int:
-    """A plain surface of an sRGB colour with opacity, each from 0 to 1."""
-    values = np.array(color[:3])
-    # IEC 61966-2-1: glTF's factors are linear.
-    linear = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
-    return glb.add('materials', alphaMode='OPAQUE' if color[3] == 1 else 'BLEND',
-                   pbrMetallicRoughness={'baseColorFactor': [*linear.tolist(), color[3]],
-                                         'metallicFactor': 0.0, 'roughnessFactor': ROUGHNESS})
-
-
-def _add_skin(glb: Glb, skin: Skin, nodes: list[int], name: str) -> int:
-    """Add a doll's skin, moved by the nodes of its bones; the node that shows it."""
-    weights = np.pad(skin.weights, ((0, 0), (0, max(0, INFLUENCES - skin.weights.shape[1]))))
-    joints = np.argsort(-weights, axis=1, kind='stable')[:, :INFLUENCES]
-    weights = np.take_along_axis(weights, joints, axis=1)
-    # The specification wants slots without weight to be zero.
-    joints = np.where(weights > 0, joints, 0).astype(np.uint16)
-    weights = weights / weights.sum(axis=1, keepdims=True)
-    attributes = {
-        'POSITION': glb.accessor(points_y_up(skin.vertices).astype(np.float32), ATTRIBUTES),
-        'JOINTS_0': glb.accessor(joints, ATTRIBUTES),
-        'WEIGHTS_0': glb.accessor(weights.astype(np.float32), ATTRIBUTES)}
-    primitive = {'attributes': attributes, 'material': add_material(glb, skin.color),
-                 'indices': glb.accessor(skin.triangles.astype(np.uint32).ravel(), INDICES)}
-    inverses = glb.accessor(_inverse_binds(skin).astype(np.float32))
-    bound = glb.add('skins', joints=[nodes[bone] for bone in skin.bones],
-                    inverseBindMatrices=inverses)
-    return glb.add('nodes', name=name, mesh=glb.add('meshes', primitives=[primitive]), skin=bound)
-
-
-def _inverse_binds(skin: Skin) -> np.ndarray:
-    """Matrices (b, 16), column by column, from the skin's place into its bones' axes."""
-    bound = Pose(points_y_up(skin.positions), orientations_y_up(skin.orientations))
-    inverses = np.zeros((len(skin.bones), 4, 4))
-    inverses[:, :3, :3] = rotation.matrix(rotation.inverse(bound.orientation))
-    inverses[:, :3, 3] = bound.inward(np.zeros(3))
-    inverses[:, 3, 3] = 1
-    return inverses.transpose(0, 2, 1).reshape(-1, 16)
 
 
 def _continuous(orientations: np.ndarray) -> np.ndarray:

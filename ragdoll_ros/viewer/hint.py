@@ -1,15 +1,16 @@
-"""What can be done on a page, said once to each that opens it."""
+"""What can be done on a page: said above its panel until it is closed, once in a browser."""
 from __future__ import annotations
 
-import viser
+WORDS = ('Drag a bone. Arrow keys push: tap or hold. Space pauses, R starts again, E edits, '
+         'H brings the view home.')
 
-PERIOD = 20.0
-"""s that it stays, unless it is closed."""
-
-KEYS = ('Drag a bone with the mouse. Arrow keys push: tap or hold. Space pauses, R starts again, '
-        'E edits.')
-
-
-def hint(client: viser.ClientHandle) -> None:
-    """Say it; a page that cannot be told has gone."""
-    client.add_notification('Try it', KEYS, auto_close_seconds=PERIOD)
+HINT = f"""<div class="ragdoll-hint" style="display: flex; gap: 0.5em; font-size: 0.85em;
+    margin: 0.6em 0.8em 0.2em; padding: 0.4em 0.6em; border-left: 3px solid #228be6;
+    background: rgba(34, 139, 230, 0.08)">
+  <span>{WORDS}</span>
+  <button aria-label="Close the hint" style="border: 0; background: none; color: inherit;
+      cursor: pointer; font-size: 1.2em; align-self: start" onclick="
+    localStorage.ragdollHint = 'closed';
+    this.parentElement.style.display = 'none'">&times;</button>
+</div><img src="data:," style="display:none" onerror="
+  if (localStorage.ragdollHint) this.previousElementSibling.style.display = 'none'">"""

@@ -9,16 +9,18 @@ import viser
 
 from ..model.scene import Scene
 from .controls import Controls
-from .drawing.camera import Follower
+from .drawing.camera import Cameras
 from .drawing.ground import light
+from .drawing.paint import PAINT
 from .drawing.plots import Plots
 from .drawing.skin import KEEP_PAGE
 from .drawing.stage import Stage
-from .drawing.view import View
+from .drawing.view import View, theme
 from .editor.editor import Editor
 from .editor.form import RED, colored
-from .hint import hint
+from .hint import HINT
 from .opening import Opening
+from .panel import FREE
 from .pointer import Pointer
 from .recording_panel import RecordingPanel
 from .rest import Rest
@@ -53,20 +55,24 @@ class Page:
         self._live: Frame | None = None
         self._folder = folder
         light(server)
-        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        theme(server, dark=False)
+        server.gui.main_panel.dock_right()
+        server.gui.add_html(FREE)
+        server.gui.add_html(HINT)
         server.gui.add_html(KEEP_PAGE)
+        server.gui.add_html(PAINT)
         self.problem = server.gui.add_html('')
         self.tabs = server.gui.add_tab_group()
         with self.tabs.add_tab('Play'):
             self.controls = Controls(server, source)
             self.view = View(server)
+            self.view.on_home(lambda client: self.cameras.go_home(client))
             self.timeline = Timeline(server, source)
             self._recording = RecordingPanel(server)
         self._edit_tab = self.tabs.add_tab('Edit')
         with self.tabs.add_tab('Plots'):
             self.plots = Plots(server)
-        self._follower = Follower(server)
-        server.on_client_connect(hint)
+        self.cameras = Cameras(server)
         self._rest = Rest()
         self._pointer = Pointer(source, self._at_hand, self._select)
 
@@ -88,11 +94,10 @@ class Page:
         if is_open:
             frame, report = self.source.frame, self.source.report
             if frame is not None:
-                now = time.monotonic()
-                self._show(frame, report, now)
-                self.controls.show_rest(self._rest.lies(frame, report.paused, now))
+                self._show(frame, report, time.monotonic())
             if self.stage is not None:
                 self.stage.be_visible(bones=self.view.bones.value, skins=self.view.skin.value)
+                self.stage.be_dark(self.view.dark.value)
             if self.editor is not None:
                 self.editor.take_note(report.paused)
             self._tell(report.problem, report.note)
@@ -112,7 +117,10 @@ class Page:
         frame = self.timeline.shown(live, now)
         if frame is not self.frame:
             self._draw(frame)
-        self._follower.follow(frame, now, self.view.follow.value)
+            if self.timeline.is_live:
+                self.cameras.show(frame)
+        self.cameras.follow(frame, now, self.view.follow.value)
+        self.controls.show_rest(self._rest.lies(live, report.paused, now))
 
     def _at_hand(self) -> Frame | None:
         """What a pointer may take hold of: nothing of what is over."""

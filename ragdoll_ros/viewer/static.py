@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import contextlib
+import html
 import io
 import sys
 from pathlib import Path
@@ -15,6 +16,7 @@ from ..physics.simulation import Simulation
 from ..recordings.recording import Recorder, Recording
 from .drawing.camera import CAMERA, FIELD
 from .drawing.ground import light
+from .drawing.paint import DRESS
 from .drawing.stage import Stage
 from .sources.playback import Playback
 
@@ -47,10 +49,26 @@ def static_html(recording: Recording) -> str:
         for time in np.arange(1, int(recording.duration * RATE) + 1) / RATE:
             serializer.insert_sleep(1 / RATE)
             stage.show(source.frame_at(float(time)))
-        return serializer.as_html()
+        head, end, tail = serializer.as_html().rpartition('</body>')
+        return f'{head}<script>{DRESS}</script>{end}{tail}'
     finally:
         with contextlib.redirect_stdout(io.StringIO()):
             server.stop()
+
+
+class Embedded:
+    """A recording as a notebook shows it, below the cell whose last line it is.
+
+    It is ``height`` pixels high; see static_html.
+    """
+
+    def __init__(self, recording: Recording, height: int = 400) -> None:
+        page = html.escape(static_html(recording))
+        self._html = (f'<iframe srcdoc="{page}" width="100%" height="{height}" '
+                      'style="border:none;display:block"></iframe>')
+
+    def _repr_html_(self) -> str:
+        return self._html
 
 
 def save_static(recording: Recording, folder: str | Path) -> Path:

@@ -15,7 +15,7 @@ LARGEST_SCALARS, LARGEST_VECTORS = 3_000_000, 500_000
 COMPONENTS = {5120: np.dtype('<i1'), 5121: np.dtype('<u1'), 5122: np.dtype('<i2'),
               5123: np.dtype('<u2'), 5125: np.dtype('<u4'), 5126: np.dtype('<f4')}
 
-WIDTHS = {'SCALAR': 1, 'VEC3': 3, 'VEC4': 4, 'MAT4': 16}
+WIDTHS = {'SCALAR': 1, 'VEC2': 2, 'VEC3': 3, 'VEC4': 4, 'MAT4': 16}
 
 
 def read_floats(file: GltfFile, index: object, kind: str, where: str) -> np.ndarray:

@@ -9,9 +9,11 @@ import numpy as np
 
 from ...model import errors, rotation
 from ...model.ragdoll import WORLD
+from ...model.skin import Paint
 from ..roles.names import plain_name, side_of
 from .draco import decompressed
 from .gltf_file import GltfFile
+from .materials import Materials
 from .nodes import Nodes, read_nodes
 from .rigid_meshes import add_rigid_meshes
 from .scale import metres_per_unit
@@ -52,6 +54,8 @@ class Character:
     """A sentence for each thing that could not be taken over as it is."""
     springs: tuple[Spring, ...] = ()
     """Its points in m, the character's frame."""
+    paint: Paint | None = None
+    """What its surface looks like; None where the file says nothing of that."""
 
     @functools.cached_property
     def extent(self) -> float:
@@ -125,12 +129,26 @@ def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) 
     parents = tuple(_parent_bone(node, nodes.parents, place) for node in joints)
     metres = metres_per_unit(names, parents, positions, vertices, notes) if scale is None else scale
     springs = _springs(file, nodes, skins, place, metres * axes, notes)
+    paint = _paint(file, skins, axes, notes)
     stem = _bone_names([file.path.stem])[0]
     return Character(
         stem, names, parents,
         positions * metres, np.stack([_nearest_rotation(matrix) for matrix in linear]),
         vertices * metres, skins.triangles, lookup[skins.nodes], skins.weights, metres,
-        tuple(notes), springs)
+        tuple(notes), springs, paint)
+
+
+def _paint(file: GltfFile, skins: Skins, axes: np.ndarray, notes: list[str]) -> Paint | None:
+    """What the surface looks like, normals taken to the character's frame by ``axes`` (3, 3)."""
+    materials = Materials(file, notes)
+    numbers = np.array([materials.number(each) for each in skins.materials], int)
+    if not materials.entries and not skins.normals.any():
+        return None
+    normals = skins.normals @ axes.T
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 1e-30)
+    return Paint(np.nan_to_num(normals), skins.uvs, numbers[skins.meshes],
+                 tuple(materials.entries), tuple(materials.textures))
 
 
 def _springs(file: GltfFile, nodes: Nodes, skins: Skins, place: dict[int, int],

@@ -123,9 +123,9 @@ class GltfFile:
         elif not isinstance(uri, str):
             raise errors.WrongForm(f'{where}.uri', uri, 'a text')
         elif uri.startswith('data:'):
-            buffer = _embedded(uri, where)
+            buffer = embedded(uri, where)
         else:
-            path = _inside(self.path.parent, uri, where)
+            path = inside(self.path.parent, uri, where)
             buffer = Buffer(path.stat().st_size, path)
         if wanted > buffer.size:
             raise errors.OutOfRange(f'{where}.byteLength', wanted,
@@ -221,7 +221,8 @@ def _parse(text: bytes) -> dict:
     return data | {key: objects(data, key) for key in LISTS}
 
 
-def _embedded(uri: str, where: str) -> Buffer:
+def embedded(uri: str, where: str) -> Buffer:
+    """What a data: URI holds; WrongForm where that is not base64."""
     head, comma, body = uri.partition(',')
     try:
         if not comma or not head.endswith(';base64'):
@@ -232,8 +233,8 @@ def _embedded(uri: str, where: str) -> Buffer:
     return Buffer(len(data), data=data)
 
 
-def _inside(folder: Path, uri: str, where: str) -> Path:
-    """Path of a buffer's own file; it must lie in the folder of the glTF file."""
+def inside(folder: Path, uri: str, where: str) -> Path:
+    """Path of a file of its own; it must lie in the folder of the glTF file, else Unreadable."""
     home = folder.resolve()
     try:
         path = (home / urllib.parse.unquote(uri)).resolve()

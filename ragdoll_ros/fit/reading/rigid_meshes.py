@@ -5,12 +5,14 @@ or its parent if that is there for this one mesh: a joint.
 """
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...model import errors
 from .gltf_file import GltfFile
 from .nodes import Nodes
-from .skins import Skins, primitive_points, primitives, triangles_of
+from .skins import Skins, look_of, primitive_points, primitives, triangles_of
 
 
 def add_rigid_meshes(file: GltfFile, nodes: Nodes, skins: Skins) -> None:
@@ -45,8 +47,10 @@ def _add(file: GltfFile, nodes: Nodes, skins: Skins, node: int, bone: int) -> bo
         triangles = triangles_of(file, primitive, len(points), where)
         # A mirrored part would be inside out, and its volume below zero.
         triangles = triangles[:, ::-1] if np.linalg.det(place[:3, :3]) < 0 else triangles
+        look = look_of(file, primitive, len(points), where)
         skins.add(points @ place[:3, :3].T + place[:3, 3], triangles,
-                  np.full((len(points), 1), bone, np.int32), np.ones((len(points), 1)))
+                  np.full((len(points), 1), bone, np.int32), np.ones((len(points), 1)),
+                  replace(look, normals=look.normals @ place[:3, :3].T))
     return True
 
 

@@ -7,9 +7,10 @@ the file's nodes show may be another pose, a step of a walk for one; B is then n
 """
 from __future__ import annotations
 
+import contextlib
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -25,6 +26,15 @@ LARGEST_SKIN = 500_000
 """Vertices of all meshes together."""
 
 
+@dataclass(frozen=True)
+class Look:
+    """Of a mesh of v vertices: ``normals`` (v, 3), ``uvs`` (v, 2), zero where it has none."""
+
+    normals: np.ndarray
+    uvs: np.ndarray
+    material: object
+
+
 @dataclass
 class Skins:
     """All skinned meshes in the bind pose, the file's axes and units.
@@ -38,10 +48,17 @@ class Skins:
     triangles: np.ndarray = field(default_factory=lambda: np.zeros((0, 3), np.int32))
     nodes: np.ndarray = field(default_factory=lambda: np.zeros((0, 4), np.int32))
     weights: np.ndarray = field(default_factory=lambda: np.zeros((0, 4)))
+    normals: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    """(v, 3), of any length; zero where the file has none."""
+    uvs: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    materials: list[object] = field(default_factory=list)
+    """What the file has as the material of each mesh."""
+    meshes: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
+    """(t,) of which mesh each triangle is."""
     notes: list[str] = field(default_factory=list)
 
     def add(self, vertices: np.ndarray, triangles: np.ndarray, nodes: np.ndarray,
-            weights: np.ndarray) -> None:
+            weights: np.ndarray, look: Look) -> None:
         """Append a mesh, its ``triangles`` by its own vertices; OutOfRange for too many."""
         base, width = len(self.vertices), max(nodes.shape[1], self.nodes.shape[1])
         if base + len(vertices) > LARGEST_SKIN:
@@ -51,6 +68,11 @@ class Skins:
         self.triangles = np.concatenate([self.triangles, triangles + base])
         self.nodes = np.concatenate([widened(self.nodes, width), widened(nodes, width)])
         self.weights = np.concatenate([widened(self.weights, width), widened(weights, width)])
+        self.normals = np.concatenate([self.normals, look.normals])
+        self.uvs = np.concatenate([self.uvs, look.uvs])
+        self.meshes = np.concatenate([self.meshes, np.full(len(triangles), len(self.materials),
+                                                           np.int32)])
+        self.materials.append(look.material)
 
 
 def read_skins(file: GltfFile, nodes: Nodes) -> Skins:
@@ -181,7 +203,24 @@ def _add_primitive(file: GltfFile, skins: Skins, primitive: dict, joints: np.nda
     weight = np.divide(weight, total, out=np.zeros_like(weight), where=total > 0)
     vertices = _skinned(points, used, weight, matrices)
     triangles = triangles_of(file, primitive, len(points), where)
-    skins.add(vertices, triangles, joints[used].astype(np.int32), weight)
+    look = look_of(file, primitive, len(points), where)
+    normals = _skinned(points + look.normals, used, weight, matrices) - vertices
+    skins.add(vertices, triangles, joints[used].astype(np.int32), weight,
+              replace(look, normals=normals))
+
+
+def look_of(file: GltfFile, primitive: dict, points: int, where: str) -> Look:
+    """What a primitive of so many vertices looks like; what is broken in that, it has not."""
+    found = []
+    for name, kind, width in (('NORMAL', 'VEC3', 3), ('TEXCOORD_0', 'VEC2', 2)):
+        values = np.zeros((points, width))
+        index = primitive['attributes'].get(name)
+        with contextlib.suppress(errors.ModelError):
+            read = values if index is None else read_floats(file, index, kind, f'{where}.{name}')
+            if read.shape == values.shape:
+                values = np.clip(read, -1e6, 1e6)
+        found.append(values)
+    return Look(*found, primitive.get('material'))
 
 
 def _skinned(points: np.ndarray, slots: np.ndarray, weights: np.ndarray,

@@ -12,6 +12,9 @@ from ...model.push import Push
 from ...model.ragdoll import Bone
 from ..sources.source import Frame
 
+WEIGHT_LENGTH, LONGEST = 1.0, 2.0
+"""m: line of a force that is the first doll's weight at 9.8 m/s^2; the longest line."""
+
 BROWN, RED, BLUE, YELLOW = (90, 50, 25), (230, 50, 25), (30, 110, 230), (245, 190, 0)
 ROD = 0.012
 """m: thickness of a swing's rods."""
@@ -35,7 +38,9 @@ class Marks:
             'pointers': lambda name, points: add.add_point_cloud(
                 name, points, BLUE, point_size=0.05, point_shape='circle'),
             'contacts': lambda name, points: add.add_point_cloud(
-                name, points, YELLOW, point_size=0.04, point_shape='circle')}
+                name, points, YELLOW, point_size=0.04, point_shape='circle'),
+            'forces': lambda name, points: add.add_line_segments(
+                name, points, YELLOW, thickness=4.0, thickness_units='screen')}
         self._handles: dict[str, viser.SceneNodeHandle] = {}
         self._pushes: tuple[Push, ...] = ()
         self._pushed = 0.0
@@ -57,6 +62,7 @@ class Marks:
         self._set('hands', lines)
         self._set('pointers', [hand.target for hand in frame.held])
         self._set('contacts', frame.contacts)
+        self._set('forces', force_lines(frame))
 
     def _set(self, kind: str, points: object) -> None:
         handle = self._handles.get(kind)
@@ -70,6 +76,16 @@ class Marks:
             return
         handle.points = points
         handle.visible = True
+
+
+def force_lines(frame: Frame) -> np.ndarray | None:
+    """Both ends (c, 2, 3) m of a line for each force at a contact; None where none is told."""
+    if frame.forces is None:
+        return None
+    lines = frame.forces * WEIGHT_LENGTH / (9.8 * frame.scene.dolls[0].doll.mass)
+    lengths = np.linalg.norm(lines, axis=1, keepdims=True)
+    lines = lines * np.minimum(1.0, LONGEST / np.maximum(lengths, 1e-9))
+    return np.stack([frame.contacts, frame.contacts + lines], axis=1)
 
 
 def arrow_before(bone: Bone, push: Push, position: np.ndarray,

@@ -9,6 +9,7 @@ from ...model import errors
 from ...model.scene import Scene
 from ...model.skin import Skin
 from ...model.state import State
+from ...recordings.gltf_skin import by_material, paint_bytes
 from .bodies import WXYZ
 
 MOST = 30
@@ -70,6 +71,9 @@ class Skins:
 
     def _add(self, server: viser.ViserServer, name: str, skin: Skin) -> None:
         self.handles.append(server.scene.add_mesh_skinned(
-            name, skin.vertices, skin.triangles, color=skin.color[:3], side='double',
+            name, skin.vertices, by_material(skin)[0], color=skin.color[:3], side='double',
             bone_wxyzs=skin.orientations[:, WXYZ], bone_positions=skin.positions,
             skin_weights=skin.weights))
+        if skin.paint is not None:
+            server.scene.add_glb(f'{name}/paint', paint_bytes(skin), visible=False,
+                                 cast_shadow=False)

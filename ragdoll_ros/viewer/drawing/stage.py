@@ -17,7 +17,8 @@ class Stage:
     def __init__(self, server: viser.ViserServer, frame: Frame) -> None:
         self.scene = frame.scene
         server.scene.remove_by_name('/scene')
-        show_ground(server, self.scene)
+        self._server, self._dark = server, False
+        show_ground(server, self.scene, dark=False)
         self.skins = Skins(server, self.scene)
         self.bodies = Bodies(server, self.scene, frame.state, self.skins.clad)
         self._marks = Marks(server)
@@ -29,6 +30,12 @@ class Stage:
         self.skins.show(frame.state)
         self._marks.show(frame)
         self._limits.show(frame.state, frame.angles)
+
+    def be_dark(self, wanted: bool) -> None:
+        """Draw the ground for a dark page, or for a light one."""
+        if wanted != self._dark:
+            self._dark = wanted
+            show_ground(self._server, self.scene, wanted)
 
     def be_visible(self, bones: bool, skins: bool) -> None:
         """Show bones and skins; bones at least where there is no skin."""

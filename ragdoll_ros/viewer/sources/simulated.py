@@ -185,13 +185,14 @@ class Simulated(Source):
 
     def _show(self) -> None:
         simulation, wanted = self._simulation, self._wanted
-        swings = simulation.swings
+        swings, touching = simulation.swings, simulation.contacts if wanted.contacts else None
         self._frame = Frame(
             simulation.scene, simulation.time / SECOND, simulation.state, simulation.pushes,
             held=tuple(self._held()),
             rods=None if swings is None else swings.rods,
-            contacts=simulation.contacts.positions if wanted.contacts else None,
-            angles=simulation.joint_angles if wanted.angles else None)
+            contacts=None if touching is None else touching.positions,
+            angles=simulation.joint_angles if wanted.angles else None,
+            forces=None if touching is None else touching.normals * touching.forces[:, None])
         if time.monotonic() >= self._next_measure:
             self._measure()
 

@@ -47,6 +47,8 @@ class Frame:
     """(c, 3) m: where something touches."""
     angles: np.ndarray | None = None
     """(k,) rad, in the order of Scene.angle_names."""
+    forces: np.ndarray | None = None
+    """(c, 3) N: what presses at each of the contacts, along its normal; a node does not tell it."""
 
 
 @dataclass(frozen=True)

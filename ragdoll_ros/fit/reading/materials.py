@@ -1,0 +1,156 @@
+"""Materials of a glTF file with their images: what a skin looks like, for whoever draws it.
+
+Taken over are the numbers and textures of section 5.19 of glTF 2.0, KHR_materials_unlit and
+KHR_texture_transform, with the first set of texture coordinates. What is not as the specification
+has it is left out: looks are no reason to refuse a character.
+"""
+from __future__ import annotations
+
+import math
+
+from ...model import errors
+from ...model.skin import Texture
+from .gltf_file import GltfFile, count, embedded, inside
+
+MOST_BYTES = 64_000_000
+"""Of all images of a character: each page that is open gets them once."""
+
+NUMBERS = {'baseColorFactor': 4, 'metallicFactor': 1, 'roughnessFactor': 1, 'emissiveFactor': 3,
+           'alphaCutoff': 1, 'scale': 1, 'strength': 1, 'offset': 2, 'rotation': 1}
+"""Keys of numbers, and how many each has."""
+
+TEXTURES = ('baseColorTexture', 'metallicRoughnessTexture', 'normalTexture', 'occlusionTexture',
+            'emissiveTexture')
+
+SIGNS = {b'\x89PNG': 'image/png', b'\xff\xd8\xff': 'image/jpeg', b'RIFF': 'image/webp'}
+"""How images begin, and what they are."""
+
+
+class Materials:
+    """Those of a file, each taken when it is first asked for; ``notes`` get what is left out."""
+
+    def __init__(self, file: GltfFile, notes: list[str]) -> None:
+        self._file, self._notes = file, notes
+        self._numbers: dict[int, int] = {}
+        self._textures: dict[int, int | None] = {}
+        self._bytes = 0
+        self.entries: list[dict] = []
+        self.textures: list[Texture] = []
+
+    def number(self, index: object) -> int:
+        """Which of ``entries`` is the material at an index of the file; -1 where there is none."""
+        given = self._list('materials')
+        if type(index) is not int or not 0 <= index < len(given):
+            return -1
+        if index not in self._numbers:
+            self._numbers[index] = len(self.entries)
+            self.entries.append(self._material(given[index]))
+        return self._numbers[index]
+
+    def _material(self, given: dict) -> dict:
+        taken = {**_numbers(given), **self._infos(given)}
+        surface = given.get('pbrMetallicRoughness')
+        if isinstance(surface, dict):
+            taken['pbrMetallicRoughness'] = {**_numbers(surface), **self._infos(surface)}
+        if given.get('alphaMode') in ('OPAQUE', 'MASK', 'BLEND'):
+            taken['alphaMode'] = given['alphaMode']
+        if isinstance(given.get('doubleSided'), bool):
+            taken['doubleSided'] = given['doubleSided']
+        extensions = given.get('extensions')
+        if isinstance(extensions, dict) and 'KHR_materials_unlit' in extensions:
+            taken['extensions'] = {'KHR_materials_unlit': {}}
+        return taken
+
+    def _infos(self, given: dict) -> dict:
+        """What of an object refers to textures."""
+        found = {}
+        for key in TEXTURES:
+            info = given.get(key)
+            if not isinstance(info, dict) or info.get('texCoord', 0) != 0:
+                continue
+            texture = self._texture(info.get('index'))
+            if texture is not None:
+                found[key] = {'index': texture, **_numbers(info)}
+                moved = info.get('extensions')
+                moved = moved.get('KHR_texture_transform') if isinstance(moved, dict) else None
+                if isinstance(moved, dict):
+                    numbers = _numbers({**moved, 'scale': None}) | _pair(moved, 'scale')
+                    found[key]['extensions'] = {'KHR_texture_transform': numbers}
+        return found
+
+    def _texture(self, index: object) -> int | None:
+        """Which of ``textures`` it is; None where it cannot be had."""
+        if type(index) is not int:
+            return None
+        if index not in self._textures:
+            self._textures[index] = None
+            try:
+                texture = self._read(self._entry('textures', index))
+            except (errors.ModelError, OSError) as error:
+                self._notes.append(f'textures[{index}] is left out: {error}')
+            else:
+                self._textures[index] = len(self.textures)
+                self.textures.append(texture)
+        return self._textures[index]
+
+    def _read(self, given: dict) -> Texture:
+        image = self._entry('images', given.get('source'))
+        uri, view = image.get('uri'), image.get('bufferView')
+        if view is not None:
+            entry = self._file.entry('bufferViews', view, 'images')
+            size = count(entry, 'byteLength', f'bufferViews[{view}]')
+            content = self._file.read(view, 0, min(size, MOST_BYTES), 'images')
+        elif isinstance(uri, str) and uri.startswith('data:'):
+            buffer = embedded(uri, 'images')
+            content = buffer.read(0, buffer.size, 'images')
+        elif isinstance(uri, str):
+            path = inside(self._file.path.parent, uri, 'images')
+            content = path.read_bytes() if path.stat().st_size <= MOST_BYTES else b''
+        else:
+            raise errors.WrongForm('images', uri, 'a uri or a bufferView')
+        kind = next((kind for sign, kind in SIGNS.items() if content.startswith(sign)), None)
+        self._bytes += len(content)
+        if kind is None or self._bytes > MOST_BYTES:
+            raise errors.WrongForm('images', f'{len(content)} bytes',
+                                   f'PNG, JPEG or WebP, at most {MOST_BYTES} bytes of all')
+        return Texture(content, kind, self._sampler(given.get('sampler')))
+
+    def _sampler(self, index: object) -> dict:
+        try:
+            given = self._entry('samplers', index)
+        except errors.ModelError:
+            return {}
+        return {key: given[key] for key in ('magFilter', 'minFilter', 'wrapS', 'wrapT')
+                if type(given.get(key)) is int}
+
+    def _entry(self, key: str, index: object) -> dict:
+        entries = self._list(key)
+        if type(index) is not int or not 0 <= index < len(entries):
+            raise errors.OutOfRange(key, index, f'an index from 0 to {len(entries) - 1}')
+        return entries[index]
+
+    def _list(self, key: str) -> list[dict]:
+        entries = self._file.json.get(key)
+        return entries if isinstance(entries, list) and all(
+            isinstance(entry, dict) for entry in entries) else []
+
+
+def _numbers(given: dict) -> dict:
+    """What of an object is under the keys of NUMBERS, and is numbers."""
+    found = {}
+    for key, width in NUMBERS.items():
+        value = given.get(key)
+        values = [value] if width == 1 else value
+        if isinstance(values, list) and len(values) == width and all(map(_is_number, values)):
+            found[key] = value
+    return found
+
+
+def _pair(given: dict, key: str) -> dict:
+    value = given.get(key)
+    is_pair = isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))
+    return {key: value} if is_pair else {}
+
+
+def _is_number(value: object) -> bool:
+    return type(value) in (int, float) and abs(value) < 1e9 and math.isfinite(value)
