@@ -75,6 +75,19 @@ class RecordedSimulation(Simulation):
         super().let_go(hand)
         self.tell('let_go', {'hand': hand})
 
+    def hold(self, angle: str, stiffness: float, damping: float = 0.0,
+             target: float | None = None) -> None:
+        """As Simulation's."""
+        super().hold(angle, stiffness, damping, target)
+        self.tell('hold', {'angle': angle, 'stiffness': float(stiffness),
+                           'damping': float(damping),
+                           'target': None if target is None else float(target)})
+
+    def go_limp(self, angles: Sequence[str] | None = None) -> None:
+        """As Simulation's."""
+        super().go_limp(angles)
+        self.tell('go_limp', {'angles': None if angles is None else list(angles)})
+
     def place(self, coordinates: GeneralizedState) -> State:
         """As Simulation's; the reset in it is a part of it."""
         tell, self.tell = self.tell, RecordedSimulation.tell
@@ -128,7 +141,7 @@ _ACTS: dict[str, Callable[..., object]] = {
     'push': lambda simulation, channel, **push: simulation.push(Push(**push), channel),
     'drive': lambda simulation, channel, **drive: simulation.push(Drive(**drive), channel),
     **{name: lambda simulation, name=name, **arguments: getattr(simulation, name)(**arguments)
-       for name in ('release', 'grab', 'drag', 'let_go')},
+       for name in ('release', 'grab', 'drag', 'let_go', 'hold', 'go_limp')},
     'step': lambda simulation, step: setattr(simulation, 'step', step),
     'accuracy': lambda simulation, **fields: setattr(simulation, 'accuracy', accuracy_from(fields)),
     'place': lambda simulation, q, v: simulation.place(GeneralizedState(np.array(q), np.array(v))),
