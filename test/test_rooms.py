@@ -19,7 +19,7 @@ ARROWS = {
     'ros': {'physics', 'files', 'model'},
     'viewer': {'physics', 'fit', 'files', 'model'},
     'replay': {'physics', 'files', 'model'},
-    'accuracy': {'physics', 'files', 'model'}}
+    'accuracy': {'physics', 'people', 'files', 'model'}}
 """What a room may import of others."""
 
 ONLY = {'pybullet': 'physics/engine/bullet.py', 'mujoco': 'physics/engine/mujoco.py',
