@@ -20,7 +20,7 @@ ARROWS = {
     'recordings': {'physics', 'files', 'model'},
     'viewer': {'physics', 'fit', 'recordings', 'files', 'model'},
     'replay': {'physics', 'fit', 'recordings', 'files', 'model'},
-    'accuracy': {'physics', 'files', 'model'},
+    'accuracy': {'physics', 'people', 'files', 'model'},
     'falls': {'physics', 'people', 'fit', 'recordings', 'files', 'model'}}
 """What a room may import of others."""
 

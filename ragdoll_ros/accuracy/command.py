@@ -17,6 +17,7 @@ from .parts import (
     drop,
     drops,
     estimate,
+    faints,
     hard,
     orders,
     pieces,
@@ -31,7 +32,7 @@ from .sections import markdown
 PARTS = {'precision': precision, 'orders': orders, 'restitution': restitution,
          'convergence': convergence, 'pieces': pieces, 'drop': drop, 'drops': drops,
          'classes': classes, 'collisions': collisions, 'hard': hard,
-         'costs': costs, 'estimate': estimate, 'swing': swing}
+         'costs': costs, 'estimate': estimate, 'swing': swing, 'faints': faints}
 """Modules by the names that --case takes: each says by jobs() what it has to run."""
 
 NEEDED = ('scipy', 'matplotlib', 'mujoco')

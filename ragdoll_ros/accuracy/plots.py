@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .faint_plots import draw_directions, draw_faints
 from .figures import Figures, Row, number, sound
 from .goals import EXCESS
 from .ground_plots import draw_convergence, draw_drops
@@ -44,7 +45,8 @@ def draw_all(figures: Figures, folder: Path) -> dict[str, str]:
     for name, draw in (('energy', draw_energy), ('precision', draw_precision),
                        ('pieces', draw_pieces), ('drop', draw_drop), ('classes', draw_classes),
                        ('orders', draw_orders), ('estimate', draw_estimate),
-                       ('convergence', draw_convergence), ('drops', draw_drops)):
+                       ('convergence', draw_convergence), ('drops', draw_drops),
+                       ('faints', draw_faints), ('faint_directions', draw_directions)):
         figure = draw(figures, plt)
         if figure is None:
             continue

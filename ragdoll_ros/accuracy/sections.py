@@ -5,6 +5,7 @@ from . import ground_sections
 from .figures import Row, number
 from .goals import ROUNDING, goals
 from .hard_cases import hard_cases
+from .parts.faints import faint_tables
 from .section import Section
 from .tables import table
 
@@ -117,7 +118,13 @@ SECTIONS = (
                 ('rate', 'frames a second', '{}'), ('spring_error', 'spring rad', '{:.1e}'),
                 ('pendulum_error', 'pendulum rad', '{:.1e}'), ('fall_error', 'throw m', '{:.1e}'),
                 ('spring_frame_s', 'frame µs', 'us'),
-                ('recipe_period_s', 'period by the recipe s', '{:.2f}'))))
+                ('recipe_period_s', 'period by the recipe s', '{:.2f}'))),
+    Section('faints', 'Faints beside real falls',
+            'People stand, lean by up to 5° in any direction, and go limp part by part in any '
+            'order: what comes of it without a muscle. Real people try to stay up and put their '
+            'hands out: [what that means](people.md#beside-real-falls).', body=faint_tables,
+            below=(('faints', 'Speeds at impact, and time to it'),
+                   ('faint_directions', 'Speeds at impact by direction'))))
 
 
 def markdown(data: dict, pictures: dict[str, str]) -> str:

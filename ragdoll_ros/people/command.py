@@ -73,3 +73,7 @@ def _table(doll: Ragdoll) -> str:
             moments = ' '.join(f'{moment:9.5f}' for moment in bone.moments)
             lines.append(f'{bone.name:16} {bone.mass:7.3f} {x:8.3f}{z:8.3f} {moments:>30}')
     return '\n'.join(lines)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
