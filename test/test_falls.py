@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from falls_recipes import BALL, DROP, recipe
+from falls_recipes import BALL, DROP, SHOVE, recipe
 
 from ragdoll_ros import Bone, Ground, Joint, Placement, Ragdoll, Scene, Simulation, Sphere, State
 from ragdoll_ros.falls import generate, load_recipe
@@ -184,7 +184,7 @@ def test_phases_are_as_defined():
 
 def test_a_fall_that_sleeps_is_as_if_it_had_been_watched():
     """Frames after a doll has come to rest are those of a simulation that goes on."""
-    made = load_recipe('shove')
+    made = recipe(SHOVE)
     fall = next(generate(made, [5]))
     start = start_of(made, 5)
     with Simulation(start.scene, accuracy='draft', engine='rigid') as simulation:
@@ -234,6 +234,36 @@ def test_what_cannot_be_drawn_is_refused(changes, path):
 def test_dolls_of_other_bones_do_not_share_a_recipe():
     _, found = build_recipe({**DROP, 'who': {'dolls': ['doll', BALL]}}, Path('recipe.yaml'))
     assert [error.path for error in found] == ['who.dolls[1]']
+
+
+PEOPLE = [{'sex': 'female', 'height': {'uniform': [1.5, 1.8]}, 'bmi': {'uniform': [18, 35]}},
+          {'sex': 'male', 'height': 1.9, 'bmi': 25}]
+
+
+def test_people_are_drawn_from_their_groups():
+    made = recipe(who={'people': PEOPLE}, duration=0.1)
+    starts = [start_of(made, number) for number in range(60)]
+    sexes = [start.drawn['who']['sex'] for start in starts]
+    # Of a fair coin 60 times: 30 +- 3.9; five deviations.
+    assert 10 < sexes.count('male') < 50
+    for start in starts:
+        who, doll = start.drawn['who'], start.scene.dolls[0].doll
+        assert doll.mass == pytest.approx(who['bmi'] * who['height'] ** 2, rel=1e-12)
+        assert who['height'] == 1.9 if who['sex'] == 'male' else 1.5 <= who['height'] <= 1.8
+    assert len({start.drawn['who']['height'] for start in starts}) == 1 + sexes.count('female')
+    fall = next(generate(made, [3]))
+    tallest = fall.states[0, fall.scene.bone_index('head'), 2]
+    assert 0.85 < tallest / (fall.drawn['who']['height'] + fall.drawn['start']['clearance']) < 1
+
+
+@pytest.mark.parametrize(('who', 'path'), [
+    ({'people': [{**PEOPLE[0], 'height': {'uniform': [0.5, 1.8]}}]}, 'who.people[0].height'),
+    ({'people': [PEOPLE[0], {**PEOPLE[1], 'bmi': 60}]}, 'who.people[1]'),
+    ({'people': [{**PEOPLE[1], 'sex': 'none'}]}, 'who.people[0].sex'),
+    ({'people': PEOPLE, 'dolls': ['doll']}, 'who')])
+def test_people_that_cannot_be_are_refused(who, path):
+    _, found = build_recipe({**DROP, 'who': who}, Path('recipe.yaml'))
+    assert [error.path for error in found] == [path]
 
 
 def test_a_recipe_that_is_none_is_refused(tmp_path):

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from falls_recipes import DROP, recipe
+from falls_recipes import DROP, SHOVE, recipe
 
 from ragdoll_ros.falls import generate, load_recipe
 from ragdoll_ros.falls.formats.registry import FORMATS
@@ -26,7 +26,7 @@ IMU = {'name': 'low_back', 'bone': 'torso', 'position': [-0.05, 0, -0.15]}
 @pytest.fixture(scope='module')
 def shoved():
     """A recipe of falls of the doll, and three of them."""
-    made = recipe({**load_recipe('shove').data, 'start': {'lean_deg': {'uniform': [0, 5]}},
+    made = recipe({**SHOVE, 'start': {'lean_deg': {'uniform': [0, 5]}},
                    'duration': 1.2, 'record': {'imus': [IMU], 'what': [
                        'poses', 'velocities', 'angles', 'rates', 'touching']}})
     return made, list(generate(made, range(COUNT)))
@@ -203,7 +203,7 @@ def test_amass_by_numpy(shoved, written):
 
 
 def test_settled_states_are_those_that_rest(tmp_path):
-    made = recipe({**load_recipe('shove').data, 'start': {'lean_deg': {'uniform': [0, 5]}}})
+    made = recipe({**SHOVE, 'start': {'lean_deg': {'uniform': [0, 5]}}})
     run(Order(made, 5, 'settled'), tmp_path,
         lambda order, shards: (make_shard(order, shard) for shard in shards))
     falls = [fall for fall in generate(made, range(5)) if fall.phases.rest is not None]

@@ -20,7 +20,7 @@ ARROWS = {
     'viewer': {'physics', 'fit', 'files', 'model'},
     'replay': {'physics', 'files', 'model'},
     'accuracy': {'physics', 'files', 'model'},
-    'falls': {'physics', 'fit', 'files', 'model'}}
+    'falls': {'physics', 'people', 'fit', 'files', 'model'}}
 """What a room may import of others."""
 
 ONLY = {'pybullet': 'physics/engine/bullet.py', 'mujoco': 'physics/engine/mujoco.py',

@@ -10,10 +10,12 @@ from ..model.errors import ModelError
 from ..model.ragdoll import Ragdoll
 from ..model.rotation import IDENTITY
 from ..model.vectors import finite, unit
+from ..people.person import HEIGHTS, MASSES
 from .distribution import choices, distribution_errors, support
 
 TURN = (-3600.0, 3600.0)
 RANGES = {
+    'who.people.height': HEIGHTS, 'who.people.bmi': (5, 100),
     'start.heading_deg': TURN, 'start.lean_deg': (0, 180), 'start.lean_towards_deg': TURN,
     'start.clearance': (0, 100), 'start.velocity': (-100, 100), 'start.spin': (-100, 100),
     'start.other_angles': (0, 1), 'pushes.force': (0, 1e5), 'pushes.towards_deg': TURN,
@@ -29,6 +31,7 @@ def value_errors(data: dict, dolls: list[Ragdoll], found: list[ModelError]) -> l
     more = [error for key, part in data.items() if not any_under(found, key)
             for error in distribution_errors(part, key)]
     more += list(_out_of_range(data, [*found, *more]))
+    more += list(_wrong_people(data, [*found, *more]))
     more += list(_wrong_imus(data, [*found, *more]))
     if dolls and not any(any_under([*found, *more], key)
                          for key in ('feet', 'start', 'pushes', 'record')):
@@ -73,6 +76,17 @@ def _values(data: object, key: str, path: str = '') -> Iterator[tuple[str, objec
         first, _, rest = key.partition('.')
         if first in data:
             yield from _values(data[first], rest, f'{path}.{first}' if path else first)
+
+
+def _wrong_people(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
+    """Groups of which some would weigh more or less than a person can."""
+    for path, group in _values(data, 'who.people'):
+        if not any_under(found, path) and isinstance(group, dict):
+            ends = [support(group['bmi'])[end] * support(group['height'])[end] ** 2
+                    for end in (0, 1)]
+            if not MASSES[0] <= ends[0] <= ends[1] <= MASSES[1]:
+                yield errors.OutOfRange(path, f'masses of {ends[0]:.3g} to {ends[1]:.3g} kg',
+                                        f'{MASSES[0]:g} to {MASSES[1]:g}')
 
 
 def _wrong_imus(data: dict, found: list[ModelError]) -> Iterator[ModelError]:

@@ -20,6 +20,7 @@ from ..files.schema import schema_errors
 from ..model import errors
 from ..model.errors import ModelError
 from ..model.ragdoll import Ragdoll
+from ..people import person, standard
 from .checks import mounted, names_of, ranges_of, value_errors
 from .distribution import draw
 
@@ -40,7 +41,8 @@ finely they are simulated and whatever of them is recorded."""
 
 @dataclass(frozen=True)
 class Recipe:
-    """What a file says, with its defaults filled in and its ``dolls`` read.
+    """What a file says, with its defaults filled in and its ``dolls`` read; of people, one of
+    middle size, of whose bones and joints they all are.
 
     ``data`` is plain, and names nothing outside itself.
     """
@@ -79,9 +81,16 @@ class Recipe:
         """What all draws depend on beside a fall's number: 128 bits of what is drawn from."""
         return int(_digest({key: self.data[key] for key in DRAWN})[:32], 16)
 
+    def doll(self, who: dict | int) -> Ragdoll:
+        """Who falls, as draw() tells."""
+        if isinstance(who, int):
+            return self.dolls[who]
+        return person(who['height'], who['bmi'] * who['height'] ** 2, who['sex'])
+
     def draw(self, number: int) -> dict:
         """All that is drawn for fall ``number``: the recipe's ``start``, ``pushes`` and ``ground``
-        with a value in the place of each distribution, and which ``doll`` it is.
+        with a value in the place of each distribution, and ``who`` falls: the number of a
+        doll, or a person's sex, height m and bmi kg/m^2.
 
         By Philox (Salmon et al., Parallel Random Numbers: As Easy as 1, 2, 3, 2011), whose key is
         the recipe's and whose counter begins at the fall's number times 2^192: no fall needs
@@ -91,7 +100,9 @@ class Recipe:
         philox = np.random.Philox(key=self._key, counter=[0, 0, 0, number])
         generator = np.random.Generator(philox)
         values = draw({key: self.data[key] for key in ('start', 'pushes', 'ground')}, generator)
-        values['doll'] = min(int(generator.random() * len(self.dolls)), len(self.dolls) - 1)
+        groups = self.data['who'].get('people') or self.dolls
+        chosen = min(int(generator.random() * len(groups)), len(groups) - 1)
+        values['who'] = draw(groups[chosen], generator) if 'people' in self.data['who'] else chosen
         if values['start']['tumbled']:
             values['start']['shares'] = generator.random(3).tolist()
         return values
@@ -105,7 +116,8 @@ def load_recipe(name: str | Path) -> Recipe:
 
 def recipe_of(data: dict) -> Recipe:
     """The recipe whose ``data`` this is."""
-    dolls = [raise_or_give(Path('recipe'), *build_doll(doll)) for doll in data['who']['dolls']]
+    dolls = [raise_or_give(Path('recipe'), *build_doll(doll))
+             for doll in data['who'].get('dolls', ())] or [person(*standard('female'), 'female')]
     return Recipe(data['name'], data, tuple(dolls))
 
 
@@ -119,7 +131,9 @@ def build_recipe(data: object, path: Path) -> tuple[Recipe | None, list[ModelErr
     found += value_errors(data, dolls, found)
     if found:
         return None, found
-    whole = {**DEFAULTS, **data, 'who': {'dolls': [doll_data(doll) for doll in dolls]}}
+    whole = {**DEFAULTS, **data}
+    if 'dolls' in data['who']:
+        whole['who'] = {'dolls': [doll_data(doll) for doll in dolls]}
     for key, defaults in (('start', START), ('ground', GROUND), ('record', RECORD),
                           ('phases', PHASES)):
         whole[key] = {**defaults, **whole[key]}
@@ -138,6 +152,8 @@ def _dolls(data: dict, path: Path) -> tuple[list[Ragdoll], list[ModelError]]:
     """The dolls that a recipe names, and what is wrong with them."""
     dolls, found = [], []
     who = data.get('who')
+    if isinstance(who, dict) and set(who) == {'people'}:
+        return [person(*standard('female'), 'female')], []
     entries = who.get('dolls') if isinstance(who, dict) else None
     for index, entry in enumerate(entries if isinstance(entries, list) else ()):
         where = f'who.dolls[{index}]'

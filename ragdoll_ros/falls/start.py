@@ -48,7 +48,7 @@ class Start:
 def start_of(recipe: Recipe, number: int) -> Start:
     """How fall ``number`` of a recipe begins, from the recipe and the number alone."""
     drawn = recipe.draw(number)
-    doll, start = recipe.dolls[drawn['doll']], drawn['start']
+    doll, start = recipe.doll(drawn['who']), drawn['start']
     heading = rotation.from_axis_angle((0, 0, 1), math.radians(start['heading_deg']))
     orientation = (_any_orientation(*start['shares']) if start['tumbled']
                    else rotation.multiply(heading, _lean(start)))
