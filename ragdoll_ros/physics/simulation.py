@@ -25,6 +25,9 @@ from .sleeping import SleepDetector
 from .swing.pose import SwingState
 from .swing.simulation import SwingSimulation
 
+MOST_PARTS = 200
+"""Of a tick: samples of a sensor of 1 kHz in the longest one."""
+
 MOST_WORKERS = 64
 """Threads: each has its own scratch."""
 
@@ -46,6 +49,7 @@ class Simulation:
         errors.check_range('workers', workers, 1, MOST_WORKERS)
         self.scene = scene
         self.step = scene.step if step is None else step
+        self._parts = 1
         self.starts = 0
         """How often it has begun, at first, by reset() or by place()."""
         choice = resolve_engine(engine)
@@ -96,6 +100,18 @@ class Simulation:
     @accuracy.setter
     def accuracy(self, accuracy: str | Accuracy) -> None:
         self._engine.accuracy = resolve_accuracy(accuracy)
+
+    @property
+    def parts(self) -> int:
+        """Equal parts that a tick is gone in, one after the other; ``trail`` has the states between
+        them. May be changed between ticks; other parts are other steps, and other last digits.
+        """
+        return self._parts
+
+    @parts.setter
+    def parts(self, parts: int) -> None:
+        errors.check_range('parts', parts, 1, MOST_PARTS)
+        self._parts = int(parts)
 
     @property
     def kinetic_energy(self) -> float:
@@ -197,10 +213,14 @@ class Simulation:
 
     def advance(self) -> State:
         """Go on by one tick; the state at its end. Raises Closed after close()."""
-        end = self.time + self.tick
-        while self.time < end:
-            change = self._pushes.next_change(self.time)
-            self._advance_until(end if change is None else min(end, change))
+        begin, trail = self.time, [self.state]
+        for part in range(1, self._parts + 1):
+            end = begin + self.tick * part // self._parts
+            while self.time < end:
+                change = self._pushes.next_change(self.time)
+                self._advance_until(end if change is None else min(end, change))
+            trail.append(self.state)
+        self.trail = tuple(trail)
         self._pushes.drop_ended(self.time)
         self._fall_asleep()
         if self._swings:
@@ -258,6 +278,8 @@ class Simulation:
         self._engine.restore(self._start)
         self.time = 0
         """Nanoseconds simulated since the start."""
+        self.trail: tuple[State, ...] = (self.state,)
+        """States of the last tick: at its start and at the end of each of its ``parts``."""
         self._pushes = PushQueue(self.scene)
         self._hands, self._holds = Hands(self.scene), Holds(self.scene)
         self._sleep_detector.disturb()
