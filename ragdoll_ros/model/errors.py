@@ -80,6 +80,10 @@ class NotPrincipal(ModelError):
     """Shapes of a bone whose principal axes of inertia are not the bone's."""
 
 
+class UnknownJoint(ModelError):
+    """A name that no joint angle has."""
+
+
 class UnknownBone(ModelError):
     """A name that no bone bears."""
 

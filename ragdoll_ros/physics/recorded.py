@@ -29,15 +29,21 @@ class RecordedSimulation(Simulation):
 
     @property
     def conditions(self) -> dict:
-        """By what it simulates: engine, accuracy and tick in s."""
+        """By what it simulates: engine, accuracy, tick in s, and its parts."""
         return {'engine': self.engine_name, 'accuracy': dataclasses.asdict(self.accuracy),
-                'step': self.step}
+                'step': self.step, 'parts': self.parts}
 
     @Simulation.step.setter
     def step(self, step: float) -> None:
         """As Simulation's."""
         Simulation.step.fset(self, step)
         self.tell('step', {'step': self.step})
+
+    @Simulation.parts.setter
+    def parts(self, parts: int) -> None:
+        """As Simulation's."""
+        Simulation.parts.fset(self, parts)
+        self.tell('parts', {'parts': self.parts})
 
     @Simulation.accuracy.setter
     def accuracy(self, accuracy: str | Accuracy) -> None:
@@ -74,6 +80,19 @@ class RecordedSimulation(Simulation):
         """As Simulation's."""
         super().let_go(hand)
         self.tell('let_go', {'hand': hand})
+
+    def hold(self, angle: str, stiffness: float, damping: float = 0.0,
+             target: float | None = None) -> None:
+        """As Simulation's."""
+        super().hold(angle, stiffness, damping, target)
+        self.tell('hold', {'angle': angle, 'stiffness': float(stiffness),
+                           'damping': float(damping),
+                           'target': None if target is None else float(target)})
+
+    def go_limp(self, angles: Sequence[str] | None = None) -> None:
+        """As Simulation's."""
+        super().go_limp(angles)
+        self.tell('go_limp', {'angles': None if angles is None else list(angles)})
 
     def place(self, coordinates: GeneralizedState) -> State:
         """As Simulation's; the reset in it is a part of it."""
@@ -128,8 +147,9 @@ _ACTS: dict[str, Callable[..., object]] = {
     'push': lambda simulation, channel, **push: simulation.push(Push(**push), channel),
     'drive': lambda simulation, channel, **drive: simulation.push(Drive(**drive), channel),
     **{name: lambda simulation, name=name, **arguments: getattr(simulation, name)(**arguments)
-       for name in ('release', 'grab', 'drag', 'let_go')},
+       for name in ('release', 'grab', 'drag', 'let_go', 'hold', 'go_limp')},
     'step': lambda simulation, step: setattr(simulation, 'step', step),
+    'parts': lambda simulation, parts: setattr(simulation, 'parts', parts),
     'accuracy': lambda simulation, **fields: setattr(simulation, 'accuracy', accuracy_from(fields)),
     'place': lambda simulation, q, v: simulation.place(GeneralizedState(np.array(q), np.array(v))),
     'go_back': lambda simulation: simulation.go_back(simulation.checkpoint()),

@@ -13,16 +13,20 @@ from ..model.drive import Drive
 from ..model.push import Push
 from ..model.scene import SECOND, STEP_RANGE, Scene
 from ..model.state import State
-from .engine.protocol import Contacts, Engine
+from .engine.protocol import Contacts, Engine, Springs
 from .engine.registry import resolve_engine
 from .grab import EVENLY, Grab, Hands
 from .ground_heights import GroundHeights
+from .hold import Hold, Holds
 from .joint_gap import JointGap
 from .push_queue import PushQueue
 from .settings import Accuracy, resolve_accuracy
 from .sleeping import SleepDetector
 from .swing.pose import SwingState
 from .swing.simulation import SwingSimulation
+
+MOST_PARTS = 200
+"""Of a tick: samples of a sensor of 1 kHz in the longest one."""
 
 MOST_WORKERS = 64
 """Threads: each has its own scratch."""
@@ -45,6 +49,7 @@ class Simulation:
         errors.check_range('workers', workers, 1, MOST_WORKERS)
         self.scene = scene
         self.step = scene.step if step is None else step
+        self._parts = 1
         self.starts = 0
         """How often it has begun, at first, by reset() or by place()."""
         choice = resolve_engine(engine)
@@ -97,6 +102,18 @@ class Simulation:
         self._engine.accuracy = resolve_accuracy(accuracy)
 
     @property
+    def parts(self) -> int:
+        """Equal parts that a tick is gone in, one after the other; ``trail`` has the states between
+        them. May be changed between ticks; other parts are other steps, and other last digits.
+        """
+        return self._parts
+
+    @parts.setter
+    def parts(self, parts: int) -> None:
+        errors.check_range('parts', parts, 1, MOST_PARTS)
+        self._parts = int(parts)
+
+    @property
     def kinetic_energy(self) -> float:
         """Of all dolls now, J."""
         return float(self._engine.motion.kinetic.sum())
@@ -120,6 +137,11 @@ class Simulation:
     def grabs(self) -> tuple[Grab, ...]:
         """What hands hold now."""
         return self._hands.grabs
+
+    @property
+    def holds(self) -> tuple[Hold, ...]:
+        """Joint angles that are held now."""
+        return self._holds.holds
 
     @property
     def contacts(self) -> Contacts:
@@ -173,12 +195,32 @@ class Simulation:
         """Open a hand; what it held keeps the speed that it has."""
         self._hands.let_go(hand)
 
+    def hold(self, angle: str, stiffness: float, damping: float = 0.0,
+             target: float | None = None) -> None:
+        """Let a spring hold a joint angle of Scene.angle_names: -stiffness (angle - target) -
+        damping rate, N m; ``target`` in rad, None: as it is now. What held it before ends.
+
+        Raises UnknownJoint; OutOfRange or NotFinite for numbers that can not be; WrongAxes for a
+        ball joint without limits, which has no angles; WrongForm where the engine is not rigid.
+        """
+        if not self._engine.holds:
+            raise errors.WrongForm('engine', self.engine_name, 'rigid, which holds joints')
+        self._holds.hold(angle, stiffness, damping, target, self.joint_angles)
+
+    def go_limp(self, angles: Sequence[str] | None = None) -> None:
+        """Let joint angles go that are held, None: all of them. Raises UnknownJoint."""
+        self._holds.go_limp(angles)
+
     def advance(self) -> State:
         """Go on by one tick; the state at its end. Raises Closed after close()."""
-        end = self.time + self.tick
-        while self.time < end:
-            change = self._pushes.next_change(self.time)
-            self._advance_until(end if change is None else min(end, change))
+        begin, trail = self.time, [self.state]
+        for part in range(1, self._parts + 1):
+            end = begin + self.tick * part // self._parts
+            while self.time < end:
+                change = self._pushes.next_change(self.time)
+                self._advance_until(end if change is None else min(end, change))
+            trail.append(self.state)
+        self.trail = tuple(trail)
         self._pushes.drop_ended(self.time)
         self._fall_asleep()
         if self._swings:
@@ -229,13 +271,17 @@ class Simulation:
         return self.state
 
     def reset(self) -> State:
-        """Go back to the start, to the bit; pushes that wait are dropped, and hands let go."""
+        """Go back to the start, to the bit; pushes that wait are dropped, hands let go, and no
+        joint is held.
+        """
         self.starts += 1
         self._engine.restore(self._start)
         self.time = 0
         """Nanoseconds simulated since the start."""
+        self.trail: tuple[State, ...] = (self.state,)
+        """States of the last tick: at its start and at the end of each of its ``parts``."""
         self._pushes = PushQueue(self.scene)
-        self._hands = Hands(self.scene)
+        self._hands, self._holds = Hands(self.scene), Holds(self.scene)
         self._sleep_detector.disturb()
         self.asleep = False
         """Whether all is at rest and the engine stands."""
@@ -261,7 +307,7 @@ class Simulation:
 
     def _advance_until(self, end: int) -> None:
         """Go on to an instant, ns, before which no push begins or ends."""
-        acting = (self._pushes.wrenches(self.time, self.state), self._hands.springs,
+        acting = (self._pushes.wrenches(self.time, self.state), self._springs,
                   self._pushes.drives(self.time))
         if any(acting):
             self.asleep = False
@@ -270,6 +316,11 @@ class Simulation:
             self._engine.advance(duration, *acting)
             self._hands.move(duration)
         self.time = end
+
+    @property
+    def _springs(self) -> Springs:
+        """Of hands and of held joints."""
+        return (*self._hands.springs, *self._holds.springs)
 
     def _fall_asleep(self) -> None:
         """Dolls sleep that have been still for a while, with all that they touch, where something
@@ -280,7 +331,7 @@ class Simulation:
             return
         ready = self._sleep_detector.update(self.state, engine.motion.kinetic, self.tick)
         pushed = self._pushes.bones(self.time)
-        for bone in (*pushed, *(spring.bone for spring in self._hands.springs)):
+        for bone in (*pushed, *(spring.bone for spring in self._springs)):
             doll = self.scene.doll_of_bone[bone]
             self._sleep_detector.disturb(doll)
             ready[doll] = False

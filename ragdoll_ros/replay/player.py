@@ -90,6 +90,7 @@ class Player:
                 scene, float(fields['step']),
                 self._accuracy or accuracy_from(fields['accuracy']),
                 self._engine or str(fields['engine']))
+            self.simulation.parts = int(fields.get('parts', 1))
         except errors.RagdollError:
             raise
         except (KeyError, TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""What acts on a cluster, as tables for compiled code: wrenches, hands' springs, drives."""
+"""What acts on a cluster, as tables for compiled code: wrenches, springs, drives."""
 from __future__ import annotations
 
 import math
@@ -6,8 +6,8 @@ import math
 import numpy as np
 
 from ...model.scene import Scene
-from ..kernels.system import HAND, MOVES, TURNS
-from .protocol import AppliedDrive, Drives, Spring, Springs, Wrenches
+from ..kernels.system import HAND, HOLDS, MOVES, TURNS
+from .protocol import AppliedDrive, AppliedHold, Drives, Spring, Springs, Wrenches
 
 NO_LOADS = np.zeros((0, 11))
 NO_SPRINGS = np.zeros((0, 20))
@@ -30,7 +30,11 @@ def spring_rows(springs: Springs, drives: Drives, scene: Scene, bones: list[int]
     most that it pulls with; whether it pulls with less and, if not, with what (scratch); what it
     is; a drive's mobility.
     """
-    rows = [_hand(records.index(bones.index(spring.bone)), spring) for spring in springs]
+    rows = []
+    for spring in springs:
+        record = records.index(bones.index(spring.bone))
+        rows.append(_hold(record, spring, scene) if isinstance(spring, AppliedHold)
+                    else _hand(record, spring))
     for drive in drives:
         rows += _drive(records.index(bones.index(drive.bone)), drive, scene)
     return np.array(rows) if rows else NO_SPRINGS
@@ -41,6 +45,16 @@ def _hand(record: int, spring: Spring) -> np.ndarray:
     speed = (spring.target - spring.position) / spring.left if spring.left > 0 else np.zeros(3)
     return np.concatenate([[record], spring.point, spring.position, speed, [
         spring.left, spring.stiffness, spring.damping, spring.most, 1.0, 0.0, 0.0, 0.0, HAND, 0.0]])
+
+
+def _hold(record: int, hold: AppliedHold, scene: Scene) -> np.ndarray:
+    """The mobility is that of the bone alone about its thinnest axis, the most that it can be."""
+    mobility = 1 / min(scene.bones[hold.bone].inertia)
+    row = np.zeros(20)
+    row[[0, 1, 4]] = record, hold.axis, hold.target
+    row[10:15] = math.inf, hold.stiffness, hold.damping, math.inf, 1.0
+    row[18:] = HOLDS, mobility
+    return row
 
 
 def _drive(record: int, drive: AppliedDrive, scene: Scene) -> list[np.ndarray]:

@@ -103,7 +103,22 @@ class Spring:
         return dataclasses.replace(self, position=self.position + way, left=self.left - duration)
 
 
-Springs = Sequence[Spring]
+@dataclass(frozen=True)
+class AppliedHold:
+    """A spring that holds an angle of the joint above a bone: -k (angle - target) - c rate, N m."""
+
+    bone: int
+    axis: int
+    """Which of the joint's axes, from 0 on."""
+    target: float
+    """rad"""
+    stiffness: float
+    """k, N m/rad."""
+    damping: float
+    """c, N m s/rad."""
+
+
+Springs = Sequence[Spring | AppliedHold]
 
 
 @dataclass(frozen=True)
@@ -137,6 +152,8 @@ class Engine(Protocol):
     energy_error: float
     """Share of the energy at hand that a tick may make from nothing; more is no error of the method
     but a bad state."""
+    holds: bool
+    """Whether joints can be held; for an engine where they can not, none are."""
     resting: np.ndarray
     """(d,) dolls that stand until something pushes, grabs or comes near them."""
 
@@ -169,7 +186,7 @@ class Engine(Protocol):
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
                 drives: Drives = ()) -> None:
         """Go on by ``duration`` s under wrenches and drives that neither begin nor end within it,
-        and springs of hands.
+        and springs of hands and of held joints.
         """
 
     def stop(self, dolls: np.ndarray) -> None:

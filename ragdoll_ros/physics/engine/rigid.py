@@ -36,6 +36,7 @@ class RigidEngine:
     """An Engine by the rigid core; see Engine."""
 
     energy_error = 1e-2
+    holds = True
 
     def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
         self.scene, self.accuracy = scene, accuracy

@@ -34,6 +34,8 @@ class SubsteppedEngine(ABC):
     them, however many ``workers`` there may be.
     """
 
+    holds = False
+
     lags = True
     """Whether a substep moves all by the velocity at its end (semi-implicit Euler)."""
 

@@ -96,7 +96,7 @@ joint in between is OUTSIDE its
 limits; the contacts ``known`` from the last step; all ``gaps``, m or rad; the ``reaction`` (nv,),
 accelerations that contacts gave in the last step, zero unless all of them lasted on. What comes of
 a stretch: bones' ``rows`` (n, 13) and the dolls' ``sums`` (d,). What acts in it: ``loads`` (m, 11),
-and ``springs`` (k, 20) of hands and drives; see engine/acting.py."""
+and ``springs`` (k, 20) of hands, drives and held joints; see engine/acting.py."""
 
 Room = collections.namedtuple(
     'Room', 'work own composite H contacts table at turn gaps later Y support W G p solver '
@@ -112,8 +112,9 @@ which contacts of large islands may err."""
 
 WITHIN, OUTSIDE = 1, 2
 
-HAND, MOVES, TURNS = 0, 1, 2
-"""What a spring is: a hand's, or of a drive what damps its bone's velocity or its turning."""
+HAND, MOVES, TURNS, HOLDS = 0, 1, 2, 3
+"""What a spring is: a hand's; of a drive what damps its bone's velocity or its turning; a hold of a
+joint's angle."""
 
 COMPLIANCE, OF_IMPACTS = 1e-8, 1e-10
 """Of contacts and limits, as a share of their own W, in steps and at impacts: what several of them

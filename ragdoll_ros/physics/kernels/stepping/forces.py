@@ -1,6 +1,7 @@
-"""What hands and drives do: springs, and how stiff a step is for them.
+"""What hands, drives and held joints do: springs, and how stiff a step is for them.
 
-A drive is two rows of ``springs`` that only damp: one its bone's velocity, one its turning.
+A drive is two rows of ``springs`` that only damp: one its bone's velocity, one its turning. A held
+angle is one row: [1] which of its joint's axes it is about, [4] rad where it is held.
 """
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ import numpy as np
 from ..compiling.decorators import compiled
 from ..dynamics.forward import Work
 from ..maths.quaternion import cross, times, turned
-from ..system import HAND, TURNS, Room, System
+from ..system import HAND, HOLDS, TURNS, Room, System
 
 
 @compiled
@@ -39,6 +40,8 @@ def resistance(spring: np.ndarray, h: float) -> float:
         return 0.0
     if spring[18] == HAND:
         return spring[11] * h / 4 + spring[12] / 2
+    if spring[18] == HOLDS:
+        return spring[11] * h / 4 + spring[12] * lag(h * spring[12] * spring[19])
     return spring[12] * lag(h * spring[12] * spring[19])
 
 
@@ -59,8 +62,12 @@ def stiffen(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, H: n
     velocities are of one branch, so that H keeps its pattern.
     """
     i = int(spring[0])
-    x, y, z = spring_point(tree[i], work, i, spring[1:4])
     share = h * resistance(spring, h)
+    if spring[18] == HOLDS:
+        a = tree[i].v + int(spring[1])
+        H[a, a] += share
+        return
+    x, y, z = spring_point(tree[i], work, i, spring[1:4])
     a = last[i]
     while a >= 0:
         ux, uy, uz = rate(work.axes[a], spring, x, y, z)
@@ -83,9 +90,16 @@ def spring_force(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work,
                  root: int, v: np.ndarray, spring: np.ndarray, time: float,
                  ) -> tuple[float, float, float, float, float, float]:
     """Force, N, of a spring on its point and the point's velocity, m/s, at q and v; of a drive's
-    turning torque, N m, and angular velocity, rad/s.
+    turning torque, N m, and angular velocity, rad/s; of a held angle the first of both alone.
     """
     i = int(spring[0])
+    if spring[18] == HOLDS:
+        d = int(spring[1])
+        speed = v[tree[i].v + d]
+        if spring[14] == 0.0:
+            return spring[15], 0.0, 0.0, speed, 0.0, 0.0
+        torque = -spring[11] * (q[tree[i].q + d] - spring[4]) - spring[12] * speed
+        return torque, 0.0, 0.0, speed, 0.0, 0.0
     x, y, z = spring_point(tree[i], work, i, spring[1:4])
     ux = uy = uz = 0.0
     j = last[i]
@@ -110,6 +124,9 @@ def pull(tree: np.ndarray, up: np.ndarray, last: np.ndarray, work: Work, q: np.n
     """Add a spring's generalised forces to ``out``."""
     fx, fy, fz, _, _, _ = spring_force(tree, up, last, work, q, root, v, spring, time)
     i = int(spring[0])
+    if spring[18] == HOLDS:
+        out[tree[i].v + int(spring[1])] += fx
+        return
     x, y, z = spring_point(tree[i], work, i, spring[1:4])
     j = last[i]
     while j >= 0:

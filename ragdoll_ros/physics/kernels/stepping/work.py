@@ -7,7 +7,7 @@ from ..compiling.decorators import compiled
 from ..dynamics.forward import Work, pose
 from ..dynamics.mass import root_axes
 from ..maths.quaternion import cross, times, turned
-from ..system import HAND, TURNS, Room, System
+from ..system import HAND, HOLDS, TURNS, Room, System
 from .forces import mean_force, root_q, spring_point
 from .momentum import give
 
@@ -33,10 +33,12 @@ def enter_work(s: System, r: Room, v: np.ndarray, end_v: np.ndarray, h: float,
             since + h / 2, h)
         done = h * (fx * ux + fy * uy + fz * uz)
         i = int(springs[k, 0])
-        if springs[k, 18] == HAND:
+        if springs[k, 18] == HAND or springs[k, 18] == HOLDS:
             r.tally[0].handed += done
         else:
             r.tally[0].pushed += done
+        if springs[k, 18] == HOLDS:
+            continue
         if springs[k, 18] == TURNS:
             moment = r.given[s.doll_of[i]].moment
             moment[0], moment[1], moment[2] = moment[0] + h * fx, moment[1] + h * fy, (
