@@ -169,16 +169,19 @@ def two_balls():
 
 def test_phases_are_as_defined():
     scene = two_balls()
-    # Sinks at frame 3, touches with its foot from the start, with its head at 6, rests from 8 on.
-    sinking = np.array([0, 0, 0.05, 0.2, 0, 0.5, 1, 0.2, 0.01, 0])
+    # Gives a little at frame 1, sinks from 3 on, hits with its head at 6, rests from 8 on.
+    sinking = np.array([0, 0.2, 0.05, 0.2, 0.3, 0.5, 1, 0.2, 0.01, 0])
     states = np.zeros((10, 2, 13))
     states[:, :, 9] = -sinking[:, None]
     touching = np.zeros((10, 2), bool)
     touching[:, 0], touching[6:, 1] = True, True
-    phases = find_phases(scene, states, touching, ['foot/ball'], 0.1, 0.05)
+    phases = find_phases(scene, states, touching, ['foot/ball'], 2, 0.1, 0.05)
     assert (phases.onset, phases.impact, phases.rest) == (3, 6, 8)
-    assert find_phases(scene, states[:8], touching[:8], ['foot/ball'], 0.1, 0.05).rest is None
-    never = find_phases(scene, states, touching, ['foot/ball', 'head/ball'], 0.1, 0.05)
+    # What sinks for less time than asked only falls where the impact cuts it short.
+    slow = find_phases(scene, states, touching, ['foot/ball'], 9, 0.1, 0.05)
+    assert slow.onset == 3
+    assert find_phases(scene, states[:8], touching[:8], ['foot/ball'], 2, 0.1, 0.05).rest is None
+    never = find_phases(scene, states, touching, ['foot/ball', 'head/ball'], 2, 0.1, 0.05)
     assert (never.onset, never.impact, never.rest) == (None, None, None)
 
 
@@ -254,6 +257,28 @@ def test_people_are_drawn_from_their_groups():
     fall = next(generate(made, [3]))
     tallest = fall.states[0, fall.scene.bone_index('head'), 2]
     assert 0.85 < tallest / (fall.drawn['who']['height'] + fall.drawn['start']['clearance']) < 1
+
+
+HELD = {'who': {'people': [{'sex': 'male', 'height': 1.75, 'bmi': 25}]}, 'duration': 1.0,
+        'start': {'angles_deg': {'l_knee': 5, 'r_knee': 5}}}
+
+
+def test_who_is_held_stands_until_the_knees_give():
+    stands = next(generate(recipe(HELD, limp=[{'at': 600}]), [0]))
+    falls = next(generate(recipe(HELD, limp=[{'at': 0.5, 'angles': ['l_knee', 'r_knee']}]), [0]))
+    knee = stands.scene.angle_names.index('l_knee')
+    # The springs give by some degrees; without them the pelvis would be on the floor in 1 s.
+    assert np.degrees(np.abs(stands.angles[:, knee]).max()) < 10
+    assert stands.states[-1, 0, 2] > 0.95 * stands.states[0, 0, 2]
+    np.testing.assert_array_equal(falls.states[:51], stands.states[:51])
+    assert np.degrees(falls.angles[-1, knee]) > 20
+
+
+def test_only_people_can_be_held():
+    _, found = build_recipe({**STAND, 'limp': [{'at': 1}]}, Path('recipe.yaml'))
+    assert [error.path for error in found] == ['limp']
+    _, found = build_recipe({**HELD, 'limp': [{'at': 1, 'angles': ['tail']}]}, Path('recipe.yaml'))
+    assert [error.path for error in found] == ['limp[0].angles[0]']
 
 
 @pytest.mark.parametrize(('who', 'path'), [

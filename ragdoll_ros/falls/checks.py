@@ -19,6 +19,7 @@ RANGES = {
     'start.heading_deg': TURN, 'start.lean_deg': (0, 180), 'start.lean_towards_deg': TURN,
     'start.clearance': (0, 100), 'start.velocity': (-100, 100), 'start.spin': (-100, 100),
     'start.other_angles': (0, 1), 'pushes.force': (0, 1e5), 'pushes.towards_deg': TURN,
+    'limp.at': (0, 600),
     'pushes.upwards_deg': (-90, 90), 'pushes.at': (0, 600), 'pushes.duration': (1e-3, 600),
     'ground.friction': (0, math.inf), 'ground.restitution': (0, 1), 'ground.slope_deg': (0, 45),
     'ground.downhill_deg': TURN, 'duration': (0.1, 600), 'record.rate': (5, 5000),
@@ -32,9 +33,10 @@ def value_errors(data: dict, dolls: list[Ragdoll], found: list[ModelError]) -> l
             for error in distribution_errors(part, key)]
     more += list(_out_of_range(data, [*found, *more]))
     more += list(_wrong_people(data, [*found, *more]))
+    more += list(_wrong_limp(data, [*found, *more]))
     more += list(_wrong_imus(data, [*found, *more]))
     if dolls and not any(any_under([*found, *more], key)
-                         for key in ('feet', 'start', 'pushes', 'record')):
+                         for key in ('feet', 'start', 'pushes', 'limp', 'record')):
         more += _unknown_names(data, dolls)
     return more
 
@@ -89,6 +91,13 @@ def _wrong_people(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
                                         f'{MASSES[0]:g} to {MASSES[1]:g}')
 
 
+def _wrong_limp(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
+    """Joints that are to go limp of dolls that nothing holds."""
+    who = data.get('who')
+    if data.get('limp') and isinstance(who, dict) and 'people' not in who:
+        yield errors.WrongForm('limp', 'dolls', 'people: of others nobody knows how to stand')
+
+
 def _wrong_imus(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
     """IMUs of one name, or whose place or orientation is none."""
     if any_under(found, 'record'):
@@ -116,10 +125,16 @@ def _unknown_names(data: dict, dolls: list[Ragdoll]) -> Iterator[ModelError]:
     for path, name in named:
         if name not in bones:
             yield errors.UnknownBone(path, name, errors.one_of(bones, name))
+    known = _angle_names(dolls[0])
+    for index, limp in enumerate(data.get('limp', ())):
+        for place, name in enumerate(limp.get('angles', ())):
+            if name not in known:
+                yield errors.UnknownJoint(f'limp[{index}].angles[{place}]', name,
+                                          errors.one_of(known, name))
     for name, value in data.get('start', {}).get('angles_deg', {}).items():
         path, ranges = f'start.angles_deg.{name}', [ranges_of(doll).get(name) for doll in dolls]
-        if name not in _angle_names(dolls[0]):
-            yield errors.WrongForm(path, name, errors.one_of(_angle_names(dolls[0]), name))
+        if name not in known:
+            yield errors.UnknownJoint(path, name, errors.one_of(known, name))
             continue
         low = max((pair[0] for pair in ranges if pair), default=-360.0)
         high = min((pair[1] for pair in ranges if pair), default=360.0)

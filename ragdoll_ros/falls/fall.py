@@ -15,8 +15,8 @@ class Phases:
     """Frames at which a fall begins, hits and ends; None where it does not."""
 
     onset: int | None = None
-    """First in which the centre of mass sinks faster than the recipe's onset_speed; the impact's
-    where none before it is."""
+    """First from which on the centre of mass sinks faster than the recipe's onset_speed for 0.1 s,
+    or until the impact; the impact's where none before it is."""
     impact: int | None = None
     """First in which a bone touches the ground that is none of the recipe's feet."""
     rest: int | None = None

@@ -25,7 +25,7 @@ from .checks import mounted, names_of, ranges_of, value_errors
 from .distribution import draw
 
 DEFAULTS = {
-    'seed': 0, 'feet': [], 'start': {}, 'pushes': [], 'ground': {}, 'accuracy': 'draft',
+    'seed': 0, 'feet': [], 'start': {}, 'pushes': [], 'limp': [], 'ground': {}, 'accuracy': 'draft',
     'record': {}, 'phases': {}}
 START = {
     'heading_deg': 0.0, 'lean_deg': 0.0, 'lean_towards_deg': 0.0, 'tumbled': False,
@@ -35,7 +35,7 @@ GROUND = {'friction': 0.7, 'restitution': 0.0, 'slope_deg': 0.0, 'downhill_deg':
 RECORD = {'rate': 100, 'what': ['poses', 'velocities', 'angles', 'touching'], 'imus': []}
 PHASES = {'onset_speed': 0.1, 'rest_speed': 0.05}
 
-DRAWN = ('seed', 'who', 'start', 'pushes', 'ground')
+DRAWN = ('seed', 'who', 'start', 'pushes', 'limp', 'ground')
 """What falls are drawn from. Recipes that differ in nothing of it have the same falls, however
 finely they are simulated and whatever of them is recorded."""
 
@@ -88,9 +88,9 @@ class Recipe:
         return person(who['height'], who['bmi'] * who['height'] ** 2, who['sex'])
 
     def draw(self, number: int) -> dict:
-        """All that is drawn for fall ``number``: the recipe's ``start``, ``pushes`` and ``ground``
-        with a value in the place of each distribution, and ``who`` falls: the number of a
-        doll, or a person's sex, height m and bmi kg/m^2.
+        """All that is drawn for fall ``number``: the recipe's ``start``, ``pushes``, ``limp`` and
+        ``ground`` with a value in the place of each distribution, and ``who`` falls: the number of
+        a doll, or a person's sex, height m and bmi kg/m^2.
 
         By Philox (Salmon et al., Parallel Random Numbers: As Easy as 1, 2, 3, 2011), whose key is
         the recipe's and whose counter begins at the fall's number times 2^192: no fall needs
@@ -99,7 +99,8 @@ class Recipe:
         errors.check_range('fall', number, 0, 2 ** 63)
         philox = np.random.Philox(key=self._key, counter=[0, 0, 0, number])
         generator = np.random.Generator(philox)
-        values = draw({key: self.data[key] for key in ('start', 'pushes', 'ground')}, generator)
+        values = draw({key: self.data[key] for key in ('start', 'pushes', 'limp', 'ground')},
+                      generator)
         groups = self.data['who'].get('people') or self.dolls
         chosen = min(int(generator.random() * len(groups)), len(groups) - 1)
         values['who'] = draw(groups[chosen], generator) if 'people' in self.data['who'] else chosen

@@ -7,12 +7,13 @@ import numpy as np
 
 from ..model.coordinates import DofLayout, GeneralizedState
 from ..model.errors import RagdollError
+from ..people import standing
 from ..physics.engine.protocol import GROUND
 from ..physics.ground_heights import GroundHeights
 from ..physics.guard import Guard
 from ..physics.simulation import Simulation
 from .fall import Fall, Phases
-from .phases import find_phases
+from .phases import LASTS, find_phases
 from .recipe import Recipe
 from .start import Start, start_of
 
@@ -33,18 +34,21 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
             failure = ''
         except RagdollError as error:
             failure = str(error)
-        guard = Guard(simulation)
+        guard, limp = Guard(simulation), list(start.limp)
         while frames.valid < recipe.frames and not failure:
             frames.add(simulation)
             if simulation.asleep and simulation.time > start.last_act:
                 frames.hold()
             elif frames.valid < recipe.frames:
+                while limp and limp[0].at <= simulation.time:
+                    simulation.go_limp(limp.pop(0).angles)
                 bad = guard.advance()
                 failure = bad.reason if bad else ''
         excess = simulation.energy_excess if frames.valid else np.nan
     states, touching = frames.states[:frames.valid], frames.touching[:frames.valid]
-    phases = find_phases(scene, states, touching, recipe.data['feet'],
-                         **recipe.data['phases']) if frames.valid else Phases()
+    phases = find_phases(
+        scene, states, touching, recipe.data['feet'], round(LASTS * recipe.rate),
+        **recipe.data['phases']) if frames.valid else Phases()
     return Fall(start.number, start.drawn, scene, np.arange(recipe.frames) / recipe.rate,
                 frames.states, *frames.joint_motion(), frames.touching, frames.valid, failure,
                 phases, excess)
@@ -83,7 +87,9 @@ class _Frames:
 
 
 def begin(simulation: Simulation, start: Start) -> None:
-    """Put the doll where it starts, its lowest point at its clearance, and queue the pushes."""
+    """Put the doll where it starts, its lowest point at its clearance, queue the pushes, hold the
+    joints that will go limp.
+    """
     scene = start.scene
     normal = np.array(scene.ground.normal)
     high = start.coordinates(_far_up(simulation, normal))
@@ -94,6 +100,9 @@ def begin(simulation: Simulation, start: Start) -> None:
     simulation.place(GeneralizedState(high.q + lift, high.v))
     for push in start.pushes:
         simulation.push(push)
+    if start.limp:
+        for angle, spring in standing(scene.dolls[0].doll).items():
+            simulation.hold(angle, *spring)
 
 
 def _far_up(simulation: Simulation, normal: np.ndarray) -> GeneralizedState:
