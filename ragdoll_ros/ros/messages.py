@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion, Transform, Twist, Vector3
-from sensor_msgs.msg import JointState, MultiDOFJointState
+from sensor_msgs.msg import Imu, JointState, MultiDOFJointState
 from std_msgs.msg import Header
 
 from ..model import rotation
@@ -20,6 +20,7 @@ from ..physics.swing.pose import SwingState
 
 if TYPE_CHECKING:  # else the page, which reads this file, would load an engine
     from ..physics.engine.protocol import Contacts
+    from ..physics.imu import Flaws
 
 
 def count_masses(scene: Scene) -> int:
@@ -112,6 +113,18 @@ def to_multi_dof(frame: str, names: tuple[str, ...], stamp: int, poses: np.ndarr
         header=to_header(stamp, frame), joint_names=list(names),
         transforms=[to_transform(row) for row in poses.tolist()],
         twist=[to_twist(row) for row in twists.tolist()])
+
+
+def to_imu(frame: str, flaws: Flaws, stamp: int, rate: np.ndarray, force: np.ndarray) -> Imu:
+    """Angular rate (3,) rad/s and specific force (3,) m/s^2 of a sensor, in its ``frame``: data_raw
+    of REP 145, which measures no orientation. Without noise the covariance is unknown.
+    """
+    message = Imu(header=to_header(stamp, frame), angular_velocity=to_vector(rate),
+                  linear_acceleration=to_vector(force))
+    message.orientation_covariance[0] = -1.0
+    message.angular_velocity_covariance[::4] = flaws.noise_rate ** 2
+    message.linear_acceleration_covariance[::4] = flaws.noise_acceleration ** 2
+    return message
 
 
 def to_joint_state(frame: str, names: tuple[str, ...], stamp: int, angles: np.ndarray,

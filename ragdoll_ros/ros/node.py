@@ -21,11 +21,12 @@ from ..model import errors
 from ..model.scene import Scene
 from ..physics.simulation import Simulation
 from .diagnostics import Diagnostics
+from .imus import Imus
 from .inputs import Inputs
 from .interactive import Interactive
 from .namesakes import Namesakes
 from .outputs import Outputs
-from .parameters import Parameters, Settings, make_simulation, step_of
+from .parameters import SPECS, Parameters, Settings, make_simulation, parts_of, step_of
 from .rescue import Rescue
 from .run_log import RunLog
 from .services import Services
@@ -40,6 +41,10 @@ InvalidROSArguments = rclpy_implementation.RCLInvalidROSArgsError
 
 LOOK_AROUND = 0.5
 """s on the wall between two looks at who is there, and two messages on /clock while paused."""
+
+IMU_SETTINGS = {'rate', 'real_time_factor', 'publish_clock',
+                *(name for name in SPECS if name.startswith('imu'))}
+"""What sensors are set up by."""
 
 EXAMPLE = """examples:
   ragdoll_node
@@ -69,7 +74,7 @@ class RagdollNode(Node):
         self._prepared: Simulation | None = None
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._stamps = Stamps(self._ros_time)
-        self._outputs = Outputs(self)
+        self._outputs, self._imus = Outputs(self), Imus(self)
         self._log = RunLog(self)
         self.inputs = Inputs(self, self.tally)
         self.interactive = Interactive(self, self.tally, time.monotonic_ns)
@@ -113,13 +118,17 @@ class RagdollNode(Node):
         ``due``: when, ns of the steady clock; now, if it is not said.
         """
         start = time.monotonic_ns()
-        if self.rescue.advance(self.settings.dump_directory):
+        stands = self.rescue.advance(self.settings.dump_directory)
+        if stands:
             self._log.count_tick()
         elif self.rescue.failed:
             self._replace(make_simulation(self._tuning.scene, self.settings))
         self._stamps.take(due)
         self._publish()
-        self._ticker.doze(self.simulation.asleep and not self._outputs.heard)
+        if stands:
+            self._imus.publish(self.simulation, self.stamp)
+        self._ticker.doze(self.simulation.asleep
+                          and not (self._outputs.heard or self._imus.heard))
         late = 0.0 if due is None else max(0.0, start - due)
         self._diagnostics.count(time.monotonic_ns() - start, late, self.simulation.tick)
 
@@ -205,6 +214,7 @@ class RagdollNode(Node):
         self.rescue.use(simulation)
         self._outputs.describe(simulation.scene, self.settings.frame_id,
                                self.settings.publish_tf)
+        self._imus.use(simulation.scene, self.settings)
         self.interactive.use(simulation, self.settings)
 
     def _tell_start(self) -> None:
@@ -238,6 +248,10 @@ class RagdollNode(Node):
                 self._publish()
         if 'accuracy' in changed:
             self.simulation.accuracy = settings.accuracy
+        if changed & IMU_SETTINGS:
+            self._imus.use(self.simulation.scene, settings)
+            if self.simulation.parts != parts_of(settings):
+                self.simulation.parts = parts_of(settings)
         if changed & {'scene', 'rate', 'real_time_factor'}:
             self.simulation.step = step_of(settings)
             self._go_on()

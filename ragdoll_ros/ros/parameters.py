@@ -22,10 +22,12 @@ from ..model.errors import RagdollError
 from ..model.ragdoll import WORLD
 from ..model.scene import STEP_RANGE, Scene
 from ..physics.engine.registry import ENGINES, check_engine
+from ..physics.imu import Flaws
 from ..physics.recorded import RecordedSimulation
 from ..physics.settings import ACCURACIES
 from ..physics.simulation import MOST_WORKERS
 from .transforms import TREES
+from .worn import check_worn
 from .written import as_numbers, unknown
 
 
@@ -79,6 +81,34 @@ class Settings:
     workers: int = _setting(
         1, 'Threads over which dolls are spread that do not touch, 0: as many as there are cores; '
         'another number starts anew', (0, MOST_WORKERS))
+    imus: tuple[str, ...] = _setting(
+        ('',), "Bones that wear an inertial sensor, each heard on ~/imu/<bone>/data_raw: 'bone', "
+        "'bone x y z' (m from its centre of mass along its axes) or 'bone x y z roll pitch yaw' "
+        '(rad)', constraints='bones of bone_names; an empty text is none')
+    imu_rate: float = _setting(
+        100.0, 'Samples of each inertial sensor in a second of simulated time, Hz', (1.0, 1000.0),
+        constraints='a multiple of rate, where there are imus')
+    imu_noise_acceleration: float = _setting(
+        0.0, "Standard deviation of a sample's specific force, m/s^2", (0.0, 1000.0))
+    imu_noise_rate: float = _setting(
+        0.0, "Standard deviation of a sample's angular rate, rad/s", (0.0, 1000.0))
+    imu_bias: tuple[float, ...] = _setting(
+        (0.0,) * 6, 'Added to each sample: x, y, z, m/s^2, and x, y, z, rad/s',
+        constraints='6 numbers')
+    imu_range: tuple[float, ...] = _setting(
+        (0.0, 0.0), 'Where samples are clipped: m/s^2 and rad/s; 0: nowhere',
+        constraints='2 numbers, zero or above')
+    imu_seed: int = _setting(
+        0, "Of the sensors' noise: the same seed, the same noise", (0, 2 ** 31 - 1))
+
+    @property
+    def imu_flaws(self) -> Flaws:
+        """What each sensor adds. Raises a ModelError for what can not be."""
+        try:
+            return Flaws(self.imu_noise_acceleration, self.imu_noise_rate, self.imu_bias,
+                         self.imu_range)
+        except errors.ModelError as error:
+            raise type(error)(f'imu_{error.path}', error.value, error.expected) from None
 
 
 SPECS = {field.name: field for field in fields(Settings)}
@@ -148,7 +178,7 @@ class Parameters:
             value = self._node.declare_parameter(name, value, _descriptor(spec)).value
         except (InvalidParameterTypeException, InvalidParameterValueException) as error:
             found.append(f'{name}: {error}')
-        self.settings = dataclasses.replace(self.settings, **{name: value})
+        self.settings = dataclasses.replace(self.settings, **{name: _plain(value)})
 
     def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
         given = _given(parameters)
@@ -216,6 +246,12 @@ def check(settings: Settings, scene: Scene) -> None:
         raise errors.OutOfRange('frame_id', frame, 'a name without a slash at its beginning')
     if frame in names:
         raise errors.DuplicateName('frame_id', frame, 'a name that no bone bears')
+    settings.imu_flaws  # noqa: B018 - raises for what can not be
+    check_worn(settings.imus, names)
+    parts = settings.imu_rate / settings.rate
+    if any(settings.imus) and (parts < 1 - 1e-9 or abs(parts / round(parts) - 1) > 1e-9):
+        raise errors.OutOfRange('imu_rate', settings.imu_rate,
+                                f'a multiple of rate, {settings.rate:g}')
 
 
 def step_of(settings: Settings) -> float:
@@ -223,15 +259,27 @@ def step_of(settings: Settings) -> float:
     return min(max(1 / settings.rate, STEP_RANGE[0]), STEP_RANGE[1])
 
 
+def parts_of(settings: Settings) -> int:
+    """Parts that a tick is gone in for the sensors' samples."""
+    return round(settings.imu_rate / settings.rate) if any(settings.imus) else 1
+
+
 def make_simulation(scene: Scene, settings: Settings) -> RecordedSimulation:
     """Build the simulation that the settings ask for."""
-    return RecordedSimulation(scene, step_of(settings), settings.accuracy, settings.engine,
-                              settings.workers or 'auto')
+    simulation = RecordedSimulation(scene, step_of(settings), settings.accuracy, settings.engine,
+                                    settings.workers or 'auto')
+    simulation.parts = parts_of(settings)
+    return simulation
 
 
 def _given(parameters: list[Parameter]) -> dict:
-    return {parameter.name: parameter.value for parameter in parameters
+    return {parameter.name: _plain(parameter.value) for parameter in parameters
             if parameter.name in SPECS}
+
+
+def _plain(value: object) -> object:
+    """A value as Settings have it: rclpy gives lists and arrays."""
+    return value if isinstance(value, (str, bool, int, float)) else tuple(value)
 
 
 def _descriptor(spec: dataclasses.Field) -> ParameterDescriptor:
