@@ -17,10 +17,9 @@ from ragdoll_ros.falls import Fall, Phases, Recipe, generate, load_recipe
 from ragdoll_ros.falls.recipe import recipe_of
 from ragdoll_ros.falls.simulate import begin
 from ragdoll_ros.falls.start import start_of
-from ragdoll_ros.falls.worn import imu_samples
+from ragdoll_ros.falls.worn import worn_samples
 from ragdoll_ros.physics.simulation import Simulation
 
-SENSOR, = load_recipe('faint').imus
 WINDOW, STRIDE, AFTER = 50, 10, 30
 """Frames of a window, from one to the next, and after an impact in which a fall is to be told."""
 
@@ -63,12 +62,13 @@ def let_down(recipe: Recipe, number: int) -> Fall:
     n = states.shape[1]
     return Fall(number, start.drawn, start.scene, np.arange(len(rows)) / recipe.rate, states,
                 np.zeros((len(rows), 0)), np.zeros((len(rows), 0)), np.zeros((len(rows), n), bool),
+                recipe.imus, 1, states[:, [start.scene.bone_index(recipe.imus[0]['bone'])]],
                 len(rows), '', Phases(), 0.0)
 
 
 def windows(fall: Fall) -> tuple[np.ndarray, np.ndarray]:
     """Features (w, 12) of all windows, and the frames (w,) after their last ones."""
-    samples = imu_samples(fall, SENSOR)
+    samples = worn_samples(fall, 0)
     sizes = np.stack([np.linalg.norm(samples[:, :3], axis=1),
                       np.linalg.norm(samples[:, 3:], axis=1), samples[:, 2]], axis=1)
     ends = np.arange(WINDOW, len(sizes) + 1, STRIDE)
@@ -105,7 +105,7 @@ def says(forest: RandomForestClassifier, fall: Fall) -> bool:
 
 def jolts(fall: Fall, limit: float = 3 * 9.8) -> bool:
     """The plain rule: more than 3 g."""
-    return bool((np.linalg.norm(imu_samples(fall, SENSOR)[:, :3], axis=1) > limit).any())
+    return bool((np.linalg.norm(worn_samples(fall, 0)[:, :3], axis=1) > limit).any())
 
 
 def main() -> None:

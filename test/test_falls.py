@@ -228,6 +228,7 @@ def test_five_errors_are_all_named():
     ({'ground': {'friction': {'normal': [0, 1], 'within': [50, 51]}}}, 'ground.friction.within'),
     ({'ground': {'friction': float('nan')}}, 'ground.friction'),
     ({'record': {'rate': 1}}, 'record.rate'),
+    ({'record': {'imu_rate': 250}}, 'record.imu_rate'),
     ({'seed': -1}, 'seed')])
 def test_what_cannot_be_drawn_is_refused(changes, path):
     _, found = build_recipe({**STAND, **changes}, Path('recipe.yaml'))

@@ -11,7 +11,11 @@ from ..model.ragdoll import Ragdoll
 from ..model.rotation import IDENTITY
 from ..model.vectors import finite, unit
 from ..people.person import HEIGHTS, MASSES
+from ..physics.simulation import MOST_PARTS
 from .distribution import choices, distribution_errors, support
+
+RATE = 100
+"""Frames in each s where a recipe does not say."""
 
 TURN = (-3600.0, 3600.0)
 RANGES = {
@@ -34,6 +38,7 @@ def value_errors(data: dict, dolls: list[Ragdoll], found: list[ModelError]) -> l
     more += list(_out_of_range(data, [*found, *more]))
     more += list(_wrong_people(data, [*found, *more]))
     more += list(_wrong_limp(data, [*found, *more]))
+    more += list(_wrong_rate(data, [*found, *more]))
     more += list(_wrong_imus(data, [*found, *more]))
     if dolls and not any(any_under([*found, *more], key)
                          for key in ('feet', 'start', 'pushes', 'limp', 'record')):
@@ -96,6 +101,16 @@ def _wrong_limp(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
     who = data.get('who')
     if data.get('limp') and isinstance(who, dict) and 'people' not in who:
         yield errors.WrongForm('limp', 'dolls', 'people: of others nobody knows how to stand')
+
+
+def _wrong_rate(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
+    """A rate of sensors that is no multiple of that of frames."""
+    record = data.get('record')
+    if not any_under(found, 'record') and isinstance(record, dict) and 'imu_rate' in record:
+        rate, fast = record.get('rate', RATE), record['imu_rate']
+        if fast % rate or not 1 <= fast // rate <= MOST_PARTS:
+            yield errors.OutOfRange('record.imu_rate', fast,
+                                    f'1 to {MOST_PARTS} times the rate, {rate}')
 
 
 def _wrong_imus(data: dict, found: list[ModelError]) -> Iterator[ModelError]:

@@ -46,6 +46,13 @@ class Fall:
     """(t, k) rad/s."""
     touching: np.ndarray
     """(t, n) whether each bone touches the ground."""
+    imus: list[dict]
+    """The recipe's w sensors."""
+    parts: int
+    """Their samples in each frame."""
+    worn: np.ndarray
+    """((t - 1) parts + 1, w, 13) as ``states``, of the bones that wear them, at the instants of
+    their samples."""
     valid: int
     """Frames before a failure; all of them if there was none."""
     failure: str

@@ -21,7 +21,7 @@ from ..model import errors
 from ..model.errors import ModelError
 from ..model.ragdoll import Ragdoll
 from ..people import person, standard
-from .checks import mounted, names_of, ranges_of, value_errors
+from .checks import RATE, mounted, names_of, ranges_of, value_errors
 from .distribution import draw
 
 DEFAULTS = {
@@ -32,7 +32,7 @@ START = {
     'clearance': 0.0, 'velocity': [0.0, 0.0, 0.0], 'spin': [0.0, 0.0, 0.0], 'angles_deg': {}}
 PUSH = {'towards_deg': 0.0, 'upwards_deg': 0.0, 'at': 0.0, 'duration': 0.1}
 GROUND = {'friction': 0.7, 'restitution': 0.0, 'slope_deg': 0.0, 'downhill_deg': 0.0}
-RECORD = {'rate': 100, 'what': ['poses', 'velocities', 'angles', 'touching'], 'imus': []}
+RECORD = {'rate': RATE, 'what': ['poses', 'velocities', 'angles', 'touching'], 'imus': []}
 PHASES = {'onset_speed': 0.1, 'rest_speed': 0.05}
 
 DRAWN = ('seed', 'who', 'start', 'pushes', 'limp', 'ground')
@@ -65,6 +65,11 @@ class Recipe:
     def what(self) -> list[str]:
         """What of each frame is recorded."""
         return self.data['record']['what']
+
+    @property
+    def parts(self) -> int:
+        """Samples of a sensor in each frame."""
+        return self.data['record'].get('imu_rate', self.rate) // self.rate
 
     @property
     def imus(self) -> list[dict]:

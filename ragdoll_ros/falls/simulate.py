@@ -26,7 +26,7 @@ def generate(recipe: Recipe, falls: Iterable[int]) -> Iterator[Fall]:
 
 def simulate(recipe: Recipe, start: Start) -> Fall:
     """The fall that begins as ``start`` says."""
-    scene, frames = start.scene, _Frames(start, recipe.frames)
+    scene, frames = start.scene, _Frames(recipe, start)
     # Not 'auto': what falls are is not to depend on what is installed.
     with Simulation(scene, accuracy=recipe.data['accuracy'], engine='rigid') as simulation:
         try:
@@ -34,6 +34,7 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
             failure = ''
         except RagdollError as error:
             failure = str(error)
+        simulation.parts = recipe.parts
         guard, limp = Guard(simulation), list(start.limp)
         while frames.valid < recipe.frames and not failure:
             frames.add(simulation)
@@ -50,14 +51,17 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
         scene, states, touching, recipe.data['feet'], round(LASTS * recipe.rate),
         **recipe.data['phases']) if frames.valid else Phases()
     return Fall(start.number, start.drawn, scene, np.arange(recipe.frames) / recipe.rate,
-                frames.states, *frames.joint_motion(), frames.touching, frames.valid, failure,
-                phases, excess)
+                frames.states, *frames.joint_motion(), frames.touching, recipe.imus, recipe.parts,
+                frames.worn, frames.valid, failure, phases, excess)
 
 
 class _Frames:
     """What is recorded, NaN where nothing is yet."""
 
-    def __init__(self, start: Start, count: int) -> None:
+    def __init__(self, recipe: Recipe, start: Start) -> None:
+        count, self._parts = recipe.frames, recipe.parts
+        self._wearers = [start.scene.bone_index(imu['bone']) for imu in recipe.imus]
+        self.worn = np.full(((count - 1) * self._parts + 1, len(self._wearers), 13), np.nan)
         self._layout = DofLayout([placement.doll for placement in start.scene.dolls])
         n, sizes = len(start.scene.bones), self._layout.sizes
         self.states, self.touching = np.full((count, n, 13), np.nan), np.zeros((count, n), bool)
@@ -70,6 +74,9 @@ class _Frames:
         self.states[at] = simulation.state.rows
         self.touching[at, contacts.a[contacts.b == GROUND]] = True
         self._q[at], self._v[at] = coordinates.q, coordinates.v
+        last = at * self._parts
+        for back, state in enumerate(simulation.trail[:0:-1] if at else simulation.trail):
+            self.worn[last - back] = state.rows[self._wearers]
         self.valid += 1
 
     def hold(self) -> None:
@@ -77,6 +84,7 @@ class _Frames:
         at = self.valid - 1
         for each in (self.states, self.touching, self._q, self._v):
             each[at:] = each[at]
+        self.worn[at * self._parts:] = self.worn[at * self._parts]
         self.valid = len(self.states)
 
     def joint_motion(self) -> tuple[np.ndarray, np.ndarray]:
