@@ -3,17 +3,22 @@ import io
 import json
 import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from falls_recipes import DROP, SHOVE, recipe
 
+from ragdoll_ros import load_doll
 from ragdoll_ros.falls import generate, load_recipe
+from ragdoll_ros.falls.command import main
 from ragdoll_ros.falls.formats.registry import FORMATS
 from ragdoll_ros.falls.formats.settled import ALIKE, different
 from ragdoll_ros.falls.run import run
 from ragdoll_ros.falls.shard import Order, make_shard
 from ragdoll_ros.falls.worn import by_frames, worn_samples
+from ragdoll_ros.files.urdf import to_urdf
+from ragdoll_ros.fit.command import main as fit
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.errors import OutOfRange, WrongForm
 
@@ -218,6 +223,22 @@ def test_settled_states_are_those_that_rest(tmp_path):
             assert np.abs(fall.states[-1, :, 7:10]).max() <= 0.05
         up = rotation.rotate(file['root_orientations'], file['gravity'])
         np.testing.assert_allclose(up, [[0, 0, -1]] * len(numbers), atol=1e-12)
+
+
+def test_a_robots_urdf_comes_to_rest(tmp_path, monkeypatch):
+    """By ragdoll_fit, as any that it takes."""
+    monkeypatch.chdir(tmp_path)
+    Path('robot.urdf').write_text(to_urdf(load_doll('doll')))
+    assert fit(['robot.urdf', '-o', 'limp.yaml']) == 0
+    Path('get_up.yaml').write_text("""
+who: {dolls: [limp.yaml]}
+start: {tumbled: true, clearance: 0.1, other_angles: {uniform: [0.3, 0.7]}}
+duration: 3
+""")
+    assert main(['get_up.yaml', '-o', 'states', '--count', '4', '--settled', '--workers', '1']) == 0
+    with np.load('states/settled.npz') as file:
+        assert len(file['fall']) >= 1 and file['joint_positions'].shape[1] == 14
+        assert set(file['bone_names']) == {bone.name for bone in load_doll('doll').bones}
 
 
 def test_states_that_are_alike_are_kept_once():
