@@ -170,6 +170,9 @@ def test_other_falls_are_not_mixed(order, tmp_path):
     with pytest.raises(Unreadable, match='recipe'):
         run(Order(recipe(seed=1), 1), tmp_path, here, resume=True)
     assert contents(tmp_path) == before
+    run(Order(recipe(), 2), tmp_path, here, resume=True)
+    with pytest.raises(Unreadable, match='2 or more'):
+        run(Order(recipe(), 1), tmp_path, here, resume=True)
 
 
 def test_a_worker_that_is_killed_costs_its_shards_time(order, whole, tmp_path):
