@@ -24,9 +24,9 @@ WINDOW, STRIDE, AFTER = 50, 10, 30
 """Frames of a window, from one to the next, and after an impact in which a fall is to be told."""
 
 
-def worn(name: str, seed: int) -> Recipe:
+def worn(name: str, seed: int, **changes: object) -> Recipe:
     """A recipe of config/, cut off after 2 s; other falls by each seed."""
-    return recipe_of({**load_recipe(name).data, 'seed': seed, 'duration': 2.0})
+    return recipe_of({**load_recipe(name).data, 'seed': seed, 'duration': 2.0, **changes})
 
 
 def let_down(recipe: Recipe, number: int) -> Fall:
@@ -114,7 +114,7 @@ def main() -> None:
     parser.add_argument('--falls', type=int, default=60, help='of each kind and each seed')
     count = parser.parse_args().falls
     sets = {seed: [list(generate(worn(name, seed), range(count))) for name in ('faint', 'shove')]
-            + [[let_down(worn('faint', seed), number) for number in range(count)]]
+            + [[let_down(worn('faint', seed, limp=[]), number) for number in range(count)]]
             for seed in (0, 1)}
     forest = train(sets[0][0] + sets[0][1], sets[0][2])
     print('| | told as falls by the forest | by more than 3 g |')

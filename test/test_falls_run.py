@@ -81,6 +81,12 @@ def lines(folder):
     return path.read_text().count('\n') if path.exists() else 0
 
 
+def told(errors):
+    """Lines on stderr but for how far it is, and that machine code is being loaded by another."""
+    return [line for line in errors.splitlines()
+            if 'falls, ' not in line and 'the dynamics' not in line]
+
+
 def test_the_same_bytes_in_reverse(order, whole, tmp_path):
     run(order, tmp_path, backwards)
     assert contents(tmp_path) == whole
@@ -132,7 +138,7 @@ def test_ctrl_c_ends_the_run_in_one_line(command, tmp_path):
     os.killpg(process.pid, signal.SIGINT)
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
-    line, = errors.splitlines()
+    line, = told(errors)
     assert '--resume goes on' in line and Manifest.read(folder).done >= SIZE
     _wait_until_no_process_of(process)
 
@@ -232,7 +238,7 @@ def test_a_full_disk_ends_the_run_in_one_line_and_it_goes_on_when_there_is_room(
     if process.returncode in (1, 77) and 'mount' in errors:
         pytest.skip('no file system can be mounted here')
     assert process.returncode == 0, errors
-    line, = errors.splitlines()
+    line, = told(errors)
     assert 'No space left on device' in line and '--resume goes on' in line
     assert contents(tmp_path / 'small.kept/falls') == whole
 
@@ -240,7 +246,7 @@ def test_a_full_disk_ends_the_run_in_one_line_and_it_goes_on_when_there_is_room(
 def test_the_command_says_what_it_made(command, tmp_path):
     process = command('-o', tmp_path / 'falls', '--workers', 1)
     out, errors = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 0 and errors == ''
+    assert process.returncode == 0 and told(errors) == []
     assert out.startswith(f'{COUNT} falls in {tmp_path}/falls, ')
     assert Manifest.read(tmp_path / 'falls').done == COUNT
 
