@@ -1,6 +1,6 @@
 """A small fall detector, trained on simulated falls: an example, not a product.
 
-python docs/falls_detector.py [--falls 60]
+python docs/falls_detector.py [--falls 40]
 
 A sensor at the low back, 100 Hz. Falls are those of config/faint.yaml and config/shove.yaml; what
 is no fall is the same people let down by two hands, at chest and pelvis, to sit or to lie. Windows
@@ -111,7 +111,7 @@ def jolts(fall: Fall, limit: float = 3 * 9.8) -> bool:
 def main() -> None:
     """Train with one seed, test with another, print the scores."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--falls', type=int, default=60, help='of each kind and each seed')
+    parser.add_argument('--falls', type=int, default=40, help='of each kind and each seed')
     count = parser.parse_args().falls
     sets = {seed: [list(generate(worn(name, seed), range(count))) for name in ('faint', 'shove')]
             + [[let_down(worn('faint', seed, limp=[]), number) for number in range(count)]]
