@@ -24,7 +24,7 @@ LONGEST = ('test_ros_viewer.py', 'test_ros_programs.py', 'test_viewer_command.py
            'test_references.py', 'test_contact.py', 'test_grab.py', 'test_swing.py',
            'test_pushes.py', 'test_dynamics.py', 'test_package.py', 'test_simulation.py',
            'test_viewer_network.py', 'test_ros_node.py', 'test_compiled_cache.py',
-           'test_ros_replay.py', 'test_replay.py')
+           'test_ros_replay.py', 'test_replay.py', 'test_falls_run.py', 'test_falls_formats.py')
 
 
 def pytest_configure(config):

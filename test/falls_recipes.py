@@ -1,4 +1,4 @@
-"""Recipes for tests: a ball that drops, which costs nothing, and what is written of it."""
+"""Recipes for tests: a ball that drops, which costs nothing, and the default doll, shoved."""
 import copy
 from pathlib import Path
 
@@ -9,6 +9,16 @@ BALL = {'name': 'ball', 'bones': [
 
 DROP = {'name': 'drops', 'who': {'dolls': [BALL]}, 'start': {'clearance': {'uniform': [0.1, 0.5]}},
         'duration': 0.6, 'record': {'rate': 50}}
+
+
+SHOVE = {
+    'name': 'shove', 'who': {'dolls': ['doll']}, 'feet': ['left_shin', 'right_shin'],
+    'start': {'heading_deg': {'uniform': [0, 360]}, 'lean_deg': {'uniform': [0, 3]},
+              'lean_towards_deg': {'uniform': [0, 360]}},
+    'pushes': [{'bone': 'torso', 'force': {'normal': [500, 150], 'within': [200, 1000]},
+                'towards_deg': {'uniform': [0, 360]}, 'at': {'uniform': [0.05, 0.3]},
+                'duration': {'uniform': [0.1, 0.3]}}],
+    'ground': {'friction': {'uniform': [0.4, 1.0]}}, 'duration': 3}
 
 
 def recipe(base=None, **changes):

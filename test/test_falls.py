@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from falls_recipes import BALL, DROP, recipe
+from falls_recipes import BALL, DROP, SHOVE, recipe
 
 from ragdoll_ros import Bone, Ground, Joint, Placement, Ragdoll, Scene, Simulation, Sphere, State
 from ragdoll_ros.falls import generate, load_recipe
@@ -169,22 +169,25 @@ def two_balls():
 
 def test_phases_are_as_defined():
     scene = two_balls()
-    # Sinks at frame 3, touches with its foot from the start, with its head at 6, rests from 8 on.
-    sinking = np.array([0, 0, 0.05, 0.2, 0, 0.5, 1, 0.2, 0.01, 0])
+    # Gives a little at frame 1, sinks from 3 on, hits with its head at 6, rests from 8 on.
+    sinking = np.array([0, 0.2, 0.05, 0.2, 0.3, 0.5, 1, 0.2, 0.01, 0])
     states = np.zeros((10, 2, 13))
     states[:, :, 9] = -sinking[:, None]
     touching = np.zeros((10, 2), bool)
     touching[:, 0], touching[6:, 1] = True, True
-    phases = find_phases(scene, states, touching, ['foot/ball'], 0.1, 0.05)
+    phases = find_phases(scene, states, touching, ['foot/ball'], 2, 0.1, 0.05)
     assert (phases.onset, phases.impact, phases.rest) == (3, 6, 8)
-    assert find_phases(scene, states[:8], touching[:8], ['foot/ball'], 0.1, 0.05).rest is None
-    never = find_phases(scene, states, touching, ['foot/ball', 'head/ball'], 0.1, 0.05)
+    # What sinks for less time than asked only falls where the impact cuts it short.
+    slow = find_phases(scene, states, touching, ['foot/ball'], 9, 0.1, 0.05)
+    assert slow.onset == 3
+    assert find_phases(scene, states[:8], touching[:8], ['foot/ball'], 2, 0.1, 0.05).rest is None
+    never = find_phases(scene, states, touching, ['foot/ball', 'head/ball'], 2, 0.1, 0.05)
     assert (never.onset, never.impact, never.rest) == (None, None, None)
 
 
 def test_a_fall_that_sleeps_is_as_if_it_had_been_watched():
     """Frames after a doll has come to rest are those of a simulation that goes on."""
-    made = load_recipe('shove')
+    made = recipe(SHOVE)
     fall = next(generate(made, [5]))
     start = start_of(made, 5)
     with Simulation(start.scene, accuracy='draft', engine='rigid') as simulation:
@@ -225,6 +228,7 @@ def test_five_errors_are_all_named():
     ({'ground': {'friction': {'normal': [0, 1], 'within': [50, 51]}}}, 'ground.friction.within'),
     ({'ground': {'friction': float('nan')}}, 'ground.friction'),
     ({'record': {'rate': 1}}, 'record.rate'),
+    ({'record': {'imu_rate': 250}}, 'record.imu_rate'),
     ({'seed': -1}, 'seed')])
 def test_what_cannot_be_drawn_is_refused(changes, path):
     _, found = build_recipe({**STAND, **changes}, Path('recipe.yaml'))
@@ -234,6 +238,58 @@ def test_what_cannot_be_drawn_is_refused(changes, path):
 def test_dolls_of_other_bones_do_not_share_a_recipe():
     _, found = build_recipe({**DROP, 'who': {'dolls': ['doll', BALL]}}, Path('recipe.yaml'))
     assert [error.path for error in found] == ['who.dolls[1]']
+
+
+PEOPLE = [{'sex': 'female', 'height': {'uniform': [1.5, 1.8]}, 'bmi': {'uniform': [18, 35]}},
+          {'sex': 'male', 'height': 1.9, 'bmi': 25}]
+
+
+def test_people_are_drawn_from_their_groups():
+    made = recipe(who={'people': PEOPLE}, duration=0.1)
+    starts = [start_of(made, number) for number in range(60)]
+    sexes = [start.drawn['who']['sex'] for start in starts]
+    # Of a fair coin 60 times: 30 +- 3.9; five deviations.
+    assert 10 < sexes.count('male') < 50
+    for start in starts:
+        who, doll = start.drawn['who'], start.scene.dolls[0].doll
+        assert doll.mass == pytest.approx(who['bmi'] * who['height'] ** 2, rel=1e-12)
+        assert who['height'] == 1.9 if who['sex'] == 'male' else 1.5 <= who['height'] <= 1.8
+    assert len({start.drawn['who']['height'] for start in starts}) == 1 + sexes.count('female')
+    fall = next(generate(made, [3]))
+    tallest = fall.states[0, fall.scene.bone_index('head'), 2]
+    assert 0.85 < tallest / (fall.drawn['who']['height'] + fall.drawn['start']['clearance']) < 1
+
+
+HELD = {'who': {'people': [{'sex': 'male', 'height': 1.75, 'bmi': 25}]}, 'duration': 1.0,
+        'start': {'angles_deg': {'l_knee': 5, 'r_knee': 5}}}
+
+
+def test_who_is_held_stands_until_the_knees_give():
+    stands = next(generate(recipe(HELD, limp=[{'at': 600}]), [0]))
+    falls = next(generate(recipe(HELD, limp=[{'at': 0.5, 'angles': ['l_knee', 'r_knee']}]), [0]))
+    knee = stands.scene.angle_names.index('l_knee')
+    # The springs give by some degrees; without them the pelvis would be on the floor in 1 s.
+    assert np.degrees(np.abs(stands.angles[:, knee]).max()) < 10
+    assert stands.states[-1, 0, 2] > 0.95 * stands.states[0, 0, 2]
+    np.testing.assert_array_equal(falls.states[:51], stands.states[:51])
+    assert np.degrees(falls.angles[-1, knee]) > 20
+
+
+def test_only_people_can_be_held():
+    _, found = build_recipe({**STAND, 'limp': [{'at': 1}]}, Path('recipe.yaml'))
+    assert [error.path for error in found] == ['limp']
+    _, found = build_recipe({**HELD, 'limp': [{'at': 1, 'angles': ['tail']}]}, Path('recipe.yaml'))
+    assert [error.path for error in found] == ['limp[0].angles[0]']
+
+
+@pytest.mark.parametrize(('who', 'path'), [
+    ({'people': [{**PEOPLE[0], 'height': {'uniform': [0.5, 1.8]}}]}, 'who.people[0].height'),
+    ({'people': [PEOPLE[0], {**PEOPLE[1], 'bmi': 60}]}, 'who.people[1]'),
+    ({'people': [{**PEOPLE[1], 'sex': 'none'}]}, 'who.people[0].sex'),
+    ({'people': PEOPLE, 'dolls': ['doll']}, 'who')])
+def test_people_that_cannot_be_are_refused(who, path):
+    _, found = build_recipe({**DROP, 'who': who}, Path('recipe.yaml'))
+    assert [error.path for error in found] == [path]
 
 
 def test_a_recipe_that_is_none_is_refused(tmp_path):

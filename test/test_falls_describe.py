@@ -4,13 +4,13 @@ import re
 
 import numpy as np
 import pytest
-from falls_recipes import recipe
+from falls_recipes import SHOVE, recipe
 
-from ragdoll_ros.falls import describe, generate, load_recipe
+from ragdoll_ros.falls import describe, generate
 from ragdoll_ros.falls.command import main
 from ragdoll_ros.falls.contents import read
+from ragdoll_ros.falls.parts import bones_of
 from ragdoll_ros.falls.pictures import hull
-from ragdoll_ros.falls.real_falls import bones_of
 from ragdoll_ros.falls.run import run
 from ragdoll_ros.falls.shard import Order, make_shard
 
@@ -23,7 +23,7 @@ COUNT = 12
 def thrown():
     """Falls that go where the doll faces."""
     start = {'heading_deg': {'uniform': [0, 360]}, 'clearance': 0.3, 'velocity': [2, 0, 0]}
-    return recipe({**load_recipe('shove').data, 'start': start, 'pushes': [], 'duration': 1.0})
+    return recipe({**SHOVE, 'start': start, 'pushes': [], 'duration': 1.0})
 
 
 @pytest.fixture(scope='module')

@@ -3,17 +3,22 @@ import io
 import json
 import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
-from falls_recipes import DROP, recipe
+from falls_recipes import DROP, SHOVE, recipe
 
+from ragdoll_ros import load_doll
 from ragdoll_ros.falls import generate, load_recipe
+from ragdoll_ros.falls.command import main
 from ragdoll_ros.falls.formats.registry import FORMATS
 from ragdoll_ros.falls.formats.settled import ALIKE, different
 from ragdoll_ros.falls.run import run
 from ragdoll_ros.falls.shard import Order, make_shard
-from ragdoll_ros.falls.worn import imu_samples
+from ragdoll_ros.falls.worn import by_frames, worn_samples
+from ragdoll_ros.files.urdf import to_urdf
+from ragdoll_ros.fit.command import main as fit
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.errors import OutOfRange, WrongForm
 
@@ -26,7 +31,7 @@ IMU = {'name': 'low_back', 'bone': 'torso', 'position': [-0.05, 0, -0.15]}
 @pytest.fixture(scope='module')
 def shoved():
     """A recipe of falls of the doll, and three of them."""
-    made = recipe({**load_recipe('shove').data, 'start': {'lean_deg': {'uniform': [0, 5]}},
+    made = recipe({**SHOVE, 'start': {'lean_deg': {'uniform': [0, 5]}},
                    'duration': 1.2, 'record': {'imus': [IMU], 'what': [
                        'poses', 'velocities', 'angles', 'rates', 'touching']}})
     return made, list(generate(made, range(COUNT)))
@@ -47,7 +52,7 @@ def frames_of(rows, name):
 
 
 def test_lerobot_by_pandas(shoved, written):
-    made, falls = shoved
+    _, falls = shoved
     folder = written('lerobot')
     info = json.loads((folder / 'meta/info.json').read_text())
     assert (info['codebase_version'], info['fps'], info['total_episodes'], info['total_frames']) \
@@ -63,7 +68,7 @@ def test_lerobot_by_pandas(shoved, written):
         for name, values in (('poses', fall.states[:, :, :7]),
                              ('velocities', fall.states[:, :, 7:]),
                              ('angles', fall.angles), ('rates', fall.rates),
-                             ('imu.low_back', imu_samples(fall, made.imus[0]))):
+                             ('imu.low_back', worn_samples(fall, 0))):
             np.testing.assert_allclose(frames_of(rows, name), values.reshape(120, -1), **close)
         np.testing.assert_array_equal(frames_of(rows, 'touching'), fall.touching)
         assert rows['observation.valid'].all()
@@ -103,7 +108,7 @@ def test_bytes_name_pyarrows_version_and_nothing_of_the_machine(written):
 
 
 def test_kfall_by_pandas(shoved, written):
-    made, falls = shoved
+    _, falls = shoved
     folder = written('kfall')
     labels = pandas.read_csv(folder / 'label_data/SA000000_label.csv')
     assert list(labels['Fall_onset_frame']) == [fall.phases.onset for fall in falls]
@@ -114,7 +119,7 @@ def test_kfall_by_pandas(shoved, written):
                                        'GyrX', 'GyrY', 'GyrZ', 'EulerX', 'EulerY', 'EulerZ']
         # Six digits behind the point.
         close = {'rtol': 0, 'atol': 0.6e-6}
-        samples = imu_samples(fall, made.imus[0])
+        samples = worn_samples(fall, 0)
         np.testing.assert_allclose(table['TimeStamp(s)'], fall.times, **close)
         np.testing.assert_allclose(table.iloc[:, 2:5], samples[:, :3] / 9.80665, **close)
         np.testing.assert_allclose(table.iloc[:, 5:8], np.degrees(samples[:, 3:]), **close)
@@ -132,7 +137,7 @@ def test_kfall_wants_a_sensor():
 
 def test_mcap_by_mcap_ros2_support(shoved, written):
     reader = pytest.importorskip('mcap_ros2.reader')
-    made, falls = shoved
+    _, falls = shoved
     folder = written('mcap')
     for fall in falls:
         messages = {}
@@ -152,7 +157,7 @@ def test_mcap_by_mcap_ros2_support(shoved, written):
         imus = [message.ros_msg for message in messages['/ragdoll/imu/low_back/data_raw']]
         force = [(m.linear_acceleration.x, m.linear_acceleration.y, m.linear_acceleration.z)
                  for m in imus]
-        np.testing.assert_array_equal(force, imu_samples(fall, made.imus[0])[:, :3])
+        np.testing.assert_array_equal(force, worn_samples(fall, 0)[:, :3])
         assert imus[0].orientation_covariance[0] == -1
         description, = messages['/ragdoll/robot_description']
         assert '<robot name="doll">' in description.ros_msg.data
@@ -203,7 +208,7 @@ def test_amass_by_numpy(shoved, written):
 
 
 def test_settled_states_are_those_that_rest(tmp_path):
-    made = recipe({**load_recipe('shove').data, 'start': {'lean_deg': {'uniform': [0, 5]}}})
+    made = recipe({**SHOVE, 'start': {'lean_deg': {'uniform': [0, 5]}}})
     run(Order(made, 5, 'settled'), tmp_path,
         lambda order, shards: (make_shard(order, shard) for shard in shards))
     falls = [fall for fall in generate(made, range(5)) if fall.phases.rest is not None]
@@ -218,6 +223,22 @@ def test_settled_states_are_those_that_rest(tmp_path):
             assert np.abs(fall.states[-1, :, 7:10]).max() <= 0.05
         up = rotation.rotate(file['root_orientations'], file['gravity'])
         np.testing.assert_allclose(up, [[0, 0, -1]] * len(numbers), atol=1e-12)
+
+
+def test_a_robots_urdf_comes_to_rest(tmp_path, monkeypatch):
+    """By ragdoll_fit, as any that it takes."""
+    monkeypatch.chdir(tmp_path)
+    Path('robot.urdf').write_text(to_urdf(load_doll('doll')))
+    assert fit(['robot.urdf', '-o', 'limp.yaml']) == 0
+    Path('get_up.yaml').write_text("""
+who: {dolls: [limp.yaml]}
+start: {tumbled: true, clearance: 0.1, other_angles: {uniform: [0.3, 0.7]}}
+duration: 3
+""")
+    assert main(['get_up.yaml', '-o', 'states', '--count', '4', '--settled', '--workers', '1']) == 0
+    with np.load('states/settled.npz') as file:
+        assert len(file['fall']) >= 1 and file['joint_positions'].shape[1] == 14
+        assert set(file['bone_names']) == {bone.name for bone in load_doll('doll').bones}
 
 
 def test_states_that_are_alike_are_kept_once():
@@ -240,7 +261,7 @@ def test_a_sensor_in_free_fall_reads_nothing_and_at_rest_gravity():
                                                  'orientation': [math.sqrt(0.5), 0, 0,
                                                                  math.sqrt(0.5)]}]})
     fall = next(generate(made, [0]))
-    samples = imu_samples(fall, made.imus[0])
+    samples = worn_samples(fall, 0)
     # The ball falls for 0.247 s; velocities of up to 3 m/s in float64 over 0.01 s.
     np.testing.assert_allclose(samples[:24], 0, atol=1e-11)
     # Turned by 90 degrees about x: the world's up is the sensor's y.
@@ -255,9 +276,33 @@ def test_a_turning_arm_feels_its_centripetal_acceleration():
                   record={'rate': 1000, 'imus': [{'name': 'a', 'bone': 'ball',
                                                   'position': [0.08, 0, 0]}]})
     fall = next(generate(made, [0]))
-    samples = imu_samples(fall, made.imus[0])
+    samples = worn_samples(fall, 0)
     # The mean over an angle a of 0.004 rad is sin(a / 2) / (a / 2) of it: 7e-7 less.
     np.testing.assert_allclose(samples, [[-4 ** 2 * 0.08, 0, 0, 0, 0, 4]] * 200, atol=2e-6)
+
+
+def test_a_fast_sensor_has_several_samples_a_frame(tmp_path):
+    """A ball that falls for 0.247 s, frames at 100 Hz, the sensor at 1 kHz."""
+    made = recipe({**DROP, 'duration': 0.6, 'start': {'clearance': 0.3}}, record={
+        'rate': 100, 'imu_rate': 1000, 'imus': [{'name': 'a', 'bone': 'ball'}]})
+    fall = next(generate(made, [0]))
+    samples = worn_samples(fall, 0)
+    assert samples.shape == (591, 6) and by_frames(fall, 0).shape == (60, 10, 6)
+    np.testing.assert_array_equal(by_frames(fall, 0)[1:].reshape(-1, 6), samples[1:])
+    # Velocities of up to 3 m/s in float64 over 0.001 s.
+    np.testing.assert_allclose(samples[:247], 0, atol=1e-10)
+    # The bounce is within one sample, and takes what the frame's velocity changes by.
+    assert np.flatnonzero(samples[:, 2] > 100).tolist() == [248]
+    velocity = np.cumsum(samples[1:, 2] - 9.8) / 1000
+    np.testing.assert_allclose(velocity[9::10], fall.states[1:, 0, 9], atol=1e-9)
+    files = make_shard(Order(made, 1, 'kfall'), 0).files
+    table = pandas.read_csv(io.BytesIO(files['sensor_data/SA000000/S000000T01R01.csv']))
+    labels = pandas.read_csv(io.BytesIO(files['label_data/SA000000_label.csv']))
+    assert len(table) == 591 and table['TimeStamp(s)'].iloc[-1] == 0.59
+    assert labels['Fall_impact_frame'][0] == 10 * fall.phases.impact == 250
+    run(Order(made, 1), tmp_path, lambda order, shards: (make_shard(order, k) for k in shards))
+    info = json.loads((tmp_path / 'meta/info.json').read_text())
+    assert info['features']['observation.imu.a']['shape'] == [60]
 
 
 def test_phases_of_a_hundred_falls_are_as_defined():
@@ -275,6 +320,7 @@ def test_phases_of_a_hundred_falls_are_as_defined():
             continue
         hits += 1
         down = [-(fall.masses @ fall.states[k, :, 9]) / fall.masses.sum() for k in range(impact)]
-        onset = next((k for k in range(impact) if down[k] > 0.1), impact)
+        onset = next((k for k in range(impact)
+                      if min(down[k:k + 10]) > 0.1), impact)
         assert fall.phases.onset == onset
     assert hits > 90

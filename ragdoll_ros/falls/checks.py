@@ -10,13 +10,20 @@ from ..model.errors import ModelError
 from ..model.ragdoll import Ragdoll
 from ..model.rotation import IDENTITY
 from ..model.vectors import finite, unit
+from ..people.person import HEIGHTS, MASSES
+from ..physics.simulation import MOST_PARTS
 from .distribution import choices, distribution_errors, support
+
+RATE = 100
+"""Frames in each s where a recipe does not say."""
 
 TURN = (-3600.0, 3600.0)
 RANGES = {
+    'who.people.height': HEIGHTS, 'who.people.bmi': (5, 100),
     'start.heading_deg': TURN, 'start.lean_deg': (0, 180), 'start.lean_towards_deg': TURN,
     'start.clearance': (0, 100), 'start.velocity': (-100, 100), 'start.spin': (-100, 100),
     'start.other_angles': (0, 1), 'pushes.force': (0, 1e5), 'pushes.towards_deg': TURN,
+    'limp.at': (0, 600),
     'pushes.upwards_deg': (-90, 90), 'pushes.at': (0, 600), 'pushes.duration': (1e-3, 600),
     'ground.friction': (0, math.inf), 'ground.restitution': (0, 1), 'ground.slope_deg': (0, 45),
     'ground.downhill_deg': TURN, 'duration': (0.1, 600), 'record.rate': (5, 5000),
@@ -29,9 +36,12 @@ def value_errors(data: dict, dolls: list[Ragdoll], found: list[ModelError]) -> l
     more = [error for key, part in data.items() if not any_under(found, key)
             for error in distribution_errors(part, key)]
     more += list(_out_of_range(data, [*found, *more]))
+    more += list(_wrong_people(data, [*found, *more]))
+    more += list(_wrong_limp(data, [*found, *more]))
+    more += list(_wrong_rate(data, [*found, *more]))
     more += list(_wrong_imus(data, [*found, *more]))
     if dolls and not any(any_under([*found, *more], key)
-                         for key in ('feet', 'start', 'pushes', 'record')):
+                         for key in ('feet', 'start', 'pushes', 'limp', 'record')):
         more += _unknown_names(data, dolls)
     return more
 
@@ -75,6 +85,34 @@ def _values(data: object, key: str, path: str = '') -> Iterator[tuple[str, objec
             yield from _values(data[first], rest, f'{path}.{first}' if path else first)
 
 
+def _wrong_people(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
+    """Groups of which some would weigh more or less than a person can."""
+    for path, group in _values(data, 'who.people'):
+        if not any_under(found, path) and isinstance(group, dict):
+            ends = [support(group['bmi'])[end] * support(group['height'])[end] ** 2
+                    for end in (0, 1)]
+            if not MASSES[0] <= ends[0] <= ends[1] <= MASSES[1]:
+                yield errors.OutOfRange(path, f'masses of {ends[0]:.3g} to {ends[1]:.3g} kg',
+                                        f'{MASSES[0]:g} to {MASSES[1]:g}')
+
+
+def _wrong_limp(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
+    """Joints that are to go limp of dolls that nothing holds."""
+    who = data.get('who')
+    if data.get('limp') and isinstance(who, dict) and 'people' not in who:
+        yield errors.WrongForm('limp', 'dolls', 'people: of others nobody knows how to stand')
+
+
+def _wrong_rate(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
+    """A rate of sensors that is no multiple of that of frames."""
+    record = data.get('record')
+    if not any_under(found, 'record') and isinstance(record, dict) and 'imu_rate' in record:
+        rate, fast = record.get('rate', RATE), record['imu_rate']
+        if fast % rate or not 1 <= fast // rate <= MOST_PARTS:
+            yield errors.OutOfRange('record.imu_rate', fast,
+                                    f'1 to {MOST_PARTS} times the rate, {rate}')
+
+
 def _wrong_imus(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
     """IMUs of one name, or whose place or orientation is none."""
     if any_under(found, 'record'):
@@ -102,10 +140,16 @@ def _unknown_names(data: dict, dolls: list[Ragdoll]) -> Iterator[ModelError]:
     for path, name in named:
         if name not in bones:
             yield errors.UnknownBone(path, name, errors.one_of(bones, name))
+    known = _angle_names(dolls[0])
+    for index, limp in enumerate(data.get('limp', ())):
+        for place, name in enumerate(limp.get('angles', ())):
+            if name not in known:
+                yield errors.UnknownJoint(f'limp[{index}].angles[{place}]', name,
+                                          errors.one_of(known, name))
     for name, value in data.get('start', {}).get('angles_deg', {}).items():
         path, ranges = f'start.angles_deg.{name}', [ranges_of(doll).get(name) for doll in dolls]
-        if name not in _angle_names(dolls[0]):
-            yield errors.WrongForm(path, name, errors.one_of(_angle_names(dolls[0]), name))
+        if name not in known:
+            yield errors.UnknownJoint(path, name, errors.one_of(known, name))
             continue
         low = max((pair[0] for pair in ranges if pair), default=-360.0)
         high = min((pair[1] for pair in ranges if pair), default=360.0)

@@ -74,6 +74,8 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument('--count', type=int, default=100, help='how many falls (%(default)s)')
     parser.add_argument('--format', choices=FORMATS, default='lerobot', help='; '.join(
         f'{name}: {about}' for name, about in FORMATS.items()) + ' (%(default)s)')
+    parser.add_argument('--settled', dest='format', action='store_const', const='settled',
+                        help='the same as --format settled')
     parser.add_argument('--workers', type=workers, default='auto',
                         help='processes, or auto: as many as there are cores (%(default)s)')
     parser.add_argument('--ray', nargs='?', const=cluster.HERE, metavar='ADDRESS',

@@ -9,7 +9,7 @@ import numpy as np
 from ..model.errors import WrongForm
 from .formats.registry import resolve_format
 from .manifest import Manifest
-from .real_falls import bones_of
+from .parts import bones_of
 from .recipe import Recipe, recipe_of
 
 DIRECTIONS = ('forwards', 'to the left', 'backwards', 'to the right')

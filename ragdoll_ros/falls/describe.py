@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ..people.real_falls import DESCENT, IMPACT_SPEEDS, SHARE_THAT_HITS
 from . import pictures
 from .contents import DIRECTIONS, Contents, read
-from .real_falls import DESCENT, IMPACT_SPEEDS, SHARE_THAT_HITS, bones_of
+from .parts import bones_of
 from .simulate import generate
 
 PAGE = 'README.md'

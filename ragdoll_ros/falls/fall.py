@@ -15,8 +15,8 @@ class Phases:
     """Frames at which a fall begins, hits and ends; None where it does not."""
 
     onset: int | None = None
-    """First in which the centre of mass sinks faster than the recipe's onset_speed; the impact's
-    where none before it is."""
+    """First from which on the centre of mass sinks faster than the recipe's onset_speed for 0.1 s,
+    or until the impact; the impact's where none before it is."""
     impact: int | None = None
     """First in which a bone touches the ground that is none of the recipe's feet."""
     rest: int | None = None
@@ -46,6 +46,13 @@ class Fall:
     """(t, k) rad/s."""
     touching: np.ndarray
     """(t, n) whether each bone touches the ground."""
+    imus: list[dict]
+    """The recipe's w sensors."""
+    parts: int
+    """Their samples in each frame."""
+    worn: np.ndarray
+    """((t - 1) parts + 1, w, 13) as ``states``, of the bones that wear them, at the instants of
+    their samples."""
     valid: int
     """Frames before a failure; all of them if there was none."""
     failure: str

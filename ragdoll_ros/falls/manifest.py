@@ -44,6 +44,8 @@ class Manifest:
         for key, value in wanted.items():
             if key != 'count' and header.get(key) != value:
                 raise Unreadable(key, header.get(key), f'{value!r}, as of what is asked for now')
+        if header['count'] > order.count:
+            raise Unreadable('count', order.count, f'{header["count"]} or more, which are there')
         os.truncate(folder / FILE, end)
         for left in folder.rglob('*' + PART):
             left.unlink()

@@ -7,9 +7,10 @@ import numpy as np
 
 from ..model import errors
 from ..model.state import State
+from ..people.real_falls import DESCENT, IMPACT_SPEEDS
 from .contents import Contents
 from .fall import Fall
-from .real_falls import DESCENT, IMPACT_SPEEDS, bones_of
+from .parts import bones_of
 
 BLUE, GREY = '#1f5fa8', '0.75'
 MOMENTS = 4

@@ -20,27 +20,29 @@ from ..files.schema import schema_errors
 from ..model import errors
 from ..model.errors import ModelError
 from ..model.ragdoll import Ragdoll
-from .checks import mounted, names_of, ranges_of, value_errors
+from ..people import person, standard
+from .checks import RATE, mounted, names_of, ranges_of, value_errors
 from .distribution import draw
 
 DEFAULTS = {
-    'seed': 0, 'feet': [], 'start': {}, 'pushes': [], 'ground': {}, 'accuracy': 'draft',
+    'seed': 0, 'feet': [], 'start': {}, 'pushes': [], 'limp': [], 'ground': {}, 'accuracy': 'draft',
     'record': {}, 'phases': {}}
 START = {
     'heading_deg': 0.0, 'lean_deg': 0.0, 'lean_towards_deg': 0.0, 'tumbled': False,
     'clearance': 0.0, 'velocity': [0.0, 0.0, 0.0], 'spin': [0.0, 0.0, 0.0], 'angles_deg': {}}
 PUSH = {'towards_deg': 0.0, 'upwards_deg': 0.0, 'at': 0.0, 'duration': 0.1}
 GROUND = {'friction': 0.7, 'restitution': 0.0, 'slope_deg': 0.0, 'downhill_deg': 0.0}
-RECORD = {'rate': 100, 'what': ['poses', 'velocities', 'angles', 'touching'], 'imus': []}
+RECORD = {'rate': RATE, 'what': ['poses', 'velocities', 'angles', 'touching'], 'imus': []}
 PHASES = {'onset_speed': 0.1, 'rest_speed': 0.05}
 
-DRAWN = ('seed', 'who', 'start', 'pushes', 'ground')
+DRAWN = ('seed', 'who', 'start', 'pushes', 'limp', 'ground')
 """What falls are drawn from. Recipes that differ in nothing of it have the same falls, however
 finely they are simulated and whatever of them is recorded."""
 
 @dataclass(frozen=True)
 class Recipe:
-    """What a file says, with its defaults filled in and its ``dolls`` read.
+    """What a file says, with its defaults filled in and its ``dolls`` read; of people, one of
+    middle size, of whose bones and joints they all are.
 
     ``data`` is plain, and names nothing outside itself.
     """
@@ -65,6 +67,11 @@ class Recipe:
         return self.data['record']['what']
 
     @property
+    def parts(self) -> int:
+        """Samples of a sensor in each frame."""
+        return self.data['record'].get('imu_rate', self.rate) // self.rate
+
+    @property
     def imus(self) -> list[dict]:
         """Sensors that are worn: name, bone, position m and orientation along the bone's axes."""
         return self.data['record']['imus']
@@ -79,9 +86,16 @@ class Recipe:
         """What all draws depend on beside a fall's number: 128 bits of what is drawn from."""
         return int(_digest({key: self.data[key] for key in DRAWN})[:32], 16)
 
+    def doll(self, who: dict | int) -> Ragdoll:
+        """Who falls, as draw() tells."""
+        if isinstance(who, int):
+            return self.dolls[who]
+        return person(who['height'], who['bmi'] * who['height'] ** 2, who['sex'])
+
     def draw(self, number: int) -> dict:
-        """All that is drawn for fall ``number``: the recipe's ``start``, ``pushes`` and ``ground``
-        with a value in the place of each distribution, and which ``doll`` it is.
+        """All that is drawn for fall ``number``: the recipe's ``start``, ``pushes``, ``limp`` and
+        ``ground`` with a value in the place of each distribution, and ``who`` falls: the number of
+        a doll, or a person's sex, height m and bmi kg/m^2.
 
         By Philox (Salmon et al., Parallel Random Numbers: As Easy as 1, 2, 3, 2011), whose key is
         the recipe's and whose counter begins at the fall's number times 2^192: no fall needs
@@ -90,8 +104,11 @@ class Recipe:
         errors.check_range('fall', number, 0, 2 ** 63)
         philox = np.random.Philox(key=self._key, counter=[0, 0, 0, number])
         generator = np.random.Generator(philox)
-        values = draw({key: self.data[key] for key in ('start', 'pushes', 'ground')}, generator)
-        values['doll'] = min(int(generator.random() * len(self.dolls)), len(self.dolls) - 1)
+        values = draw({key: self.data[key] for key in ('start', 'pushes', 'limp', 'ground')},
+                      generator)
+        groups = self.data['who'].get('people') or self.dolls
+        chosen = min(int(generator.random() * len(groups)), len(groups) - 1)
+        values['who'] = draw(groups[chosen], generator) if 'people' in self.data['who'] else chosen
         if values['start']['tumbled']:
             values['start']['shares'] = generator.random(3).tolist()
         return values
@@ -105,7 +122,8 @@ def load_recipe(name: str | Path) -> Recipe:
 
 def recipe_of(data: dict) -> Recipe:
     """The recipe whose ``data`` this is."""
-    dolls = [raise_or_give(Path('recipe'), *build_doll(doll)) for doll in data['who']['dolls']]
+    dolls = [raise_or_give(Path('recipe'), *build_doll(doll))
+             for doll in data['who'].get('dolls', ())] or [person(*standard('female'), 'female')]
     return Recipe(data['name'], data, tuple(dolls))
 
 
@@ -119,7 +137,9 @@ def build_recipe(data: object, path: Path) -> tuple[Recipe | None, list[ModelErr
     found += value_errors(data, dolls, found)
     if found:
         return None, found
-    whole = {**DEFAULTS, **data, 'who': {'dolls': [doll_data(doll) for doll in dolls]}}
+    whole = {**DEFAULTS, **data}
+    if 'dolls' in data['who']:
+        whole['who'] = {'dolls': [doll_data(doll) for doll in dolls]}
     for key, defaults in (('start', START), ('ground', GROUND), ('record', RECORD),
                           ('phases', PHASES)):
         whole[key] = {**defaults, **whole[key]}
@@ -138,6 +158,8 @@ def _dolls(data: dict, path: Path) -> tuple[list[Ragdoll], list[ModelError]]:
     """The dolls that a recipe names, and what is wrong with them."""
     dolls, found = [], []
     who = data.get('who')
+    if isinstance(who, dict) and set(who) == {'people'}:
+        return [person(*standard('female'), 'female')], []
     entries = who.get('dolls') if isinstance(who, dict) else None
     for index, entry in enumerate(entries if isinstance(entries, list) else ()):
         where = f'who.dolls[{index}]'

@@ -7,12 +7,13 @@ import numpy as np
 
 from ..model.coordinates import DofLayout, GeneralizedState
 from ..model.errors import RagdollError
+from ..people import standing
 from ..physics.engine.protocol import GROUND
 from ..physics.ground_heights import GroundHeights
 from ..physics.guard import Guard
 from ..physics.simulation import Simulation
 from .fall import Fall, Phases
-from .phases import find_phases
+from .phases import LASTS, find_phases
 from .recipe import Recipe
 from .start import Start, start_of
 
@@ -25,7 +26,7 @@ def generate(recipe: Recipe, falls: Iterable[int]) -> Iterator[Fall]:
 
 def simulate(recipe: Recipe, start: Start) -> Fall:
     """The fall that begins as ``start`` says."""
-    scene, frames = start.scene, _Frames(start, recipe.frames)
+    scene, frames = start.scene, _Frames(recipe, start)
     # Not 'auto': what falls are is not to depend on what is installed.
     with Simulation(scene, accuracy=recipe.data['accuracy'], engine='rigid') as simulation:
         try:
@@ -33,27 +34,34 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
             failure = ''
         except RagdollError as error:
             failure = str(error)
-        guard = Guard(simulation)
+        simulation.parts = recipe.parts
+        guard, limp = Guard(simulation), list(start.limp)
         while frames.valid < recipe.frames and not failure:
             frames.add(simulation)
             if simulation.asleep and simulation.time > start.last_act:
                 frames.hold()
             elif frames.valid < recipe.frames:
+                while limp and limp[0].at <= simulation.time:
+                    simulation.go_limp(limp.pop(0).angles)
                 bad = guard.advance()
                 failure = bad.reason if bad else ''
         excess = simulation.energy_excess if frames.valid else np.nan
     states, touching = frames.states[:frames.valid], frames.touching[:frames.valid]
-    phases = find_phases(scene, states, touching, recipe.data['feet'],
-                         **recipe.data['phases']) if frames.valid else Phases()
+    phases = find_phases(
+        scene, states, touching, recipe.data['feet'], round(LASTS * recipe.rate),
+        **recipe.data['phases']) if frames.valid else Phases()
     return Fall(start.number, start.drawn, scene, np.arange(recipe.frames) / recipe.rate,
-                frames.states, *frames.joint_motion(), frames.touching, frames.valid, failure,
-                phases, excess)
+                frames.states, *frames.joint_motion(), frames.touching, recipe.imus, recipe.parts,
+                frames.worn, frames.valid, failure, phases, excess)
 
 
 class _Frames:
     """What is recorded, NaN where nothing is yet."""
 
-    def __init__(self, start: Start, count: int) -> None:
+    def __init__(self, recipe: Recipe, start: Start) -> None:
+        count, self._parts = recipe.frames, recipe.parts
+        self._wearers = [start.scene.bone_index(imu['bone']) for imu in recipe.imus]
+        self.worn = np.full(((count - 1) * self._parts + 1, len(self._wearers), 13), np.nan)
         self._layout = DofLayout([placement.doll for placement in start.scene.dolls])
         n, sizes = len(start.scene.bones), self._layout.sizes
         self.states, self.touching = np.full((count, n, 13), np.nan), np.zeros((count, n), bool)
@@ -66,6 +74,9 @@ class _Frames:
         self.states[at] = simulation.state.rows
         self.touching[at, contacts.a[contacts.b == GROUND]] = True
         self._q[at], self._v[at] = coordinates.q, coordinates.v
+        last = at * self._parts
+        for back, state in enumerate(simulation.trail[:0:-1] if at else simulation.trail):
+            self.worn[last - back] = state.rows[self._wearers]
         self.valid += 1
 
     def hold(self) -> None:
@@ -73,6 +84,7 @@ class _Frames:
         at = self.valid - 1
         for each in (self.states, self.touching, self._q, self._v):
             each[at:] = each[at]
+        self.worn[at * self._parts:] = self.worn[at * self._parts]
         self.valid = len(self.states)
 
     def joint_motion(self) -> tuple[np.ndarray, np.ndarray]:
@@ -83,7 +95,9 @@ class _Frames:
 
 
 def begin(simulation: Simulation, start: Start) -> None:
-    """Put the doll where it starts, its lowest point at its clearance, and queue the pushes."""
+    """Put the doll where it starts, its lowest point at its clearance, queue the pushes, hold the
+    joints that will go limp.
+    """
     scene = start.scene
     normal = np.array(scene.ground.normal)
     high = start.coordinates(_far_up(simulation, normal))
@@ -94,6 +108,9 @@ def begin(simulation: Simulation, start: Start) -> None:
     simulation.place(GeneralizedState(high.q + lift, high.v))
     for push in start.pushes:
         simulation.push(push)
+    if start.limp:
+        for angle, spring in standing(scene.dolls[0].doll).items():
+            simulation.hold(angle, *spring)
 
 
 def _far_up(simulation: Simulation, normal: np.ndarray) -> GeneralizedState:

@@ -18,6 +18,14 @@ GRAVITY = (0.0, 0.0, -9.8)
 
 
 @dataclass(frozen=True)
+class Limp:
+    """Joint ``angles`` that are let go ``at`` ns, None: all that are still held."""
+
+    at: int
+    angles: list[str] | None
+
+
+@dataclass(frozen=True)
 class Start:
     """How fall ``number`` of a recipe begins; ``drawn`` is Recipe.draw's."""
 
@@ -29,12 +37,14 @@ class Start:
     angles: dict[str, float]
     """Joint angles, rad, by name, that are not zero."""
     pushes: tuple[Push, ...]
+    limp: tuple[Limp, ...]
+    """In the order of their instants; without any, nothing is held."""
 
     @property
     def last_act(self) -> int:
-        """When the last push ends, ns; 0 without any."""
-        return max((round((push.start + push.duration) * SECOND) for push in self.pushes),
-                   default=0)
+        """When the last push ends or the last joint goes limp, ns; 0 without any."""
+        ends = [round((push.start + push.duration) * SECOND) for push in self.pushes]
+        return max([0, *ends, *(limp.at for limp in self.limp)])
 
     def coordinates(self, bound: GeneralizedState) -> GeneralizedState:
         """Of the start at the height at which ``bound``, the scene's own, is."""
@@ -48,7 +58,7 @@ class Start:
 def start_of(recipe: Recipe, number: int) -> Start:
     """How fall ``number`` of a recipe begins, from the recipe and the number alone."""
     drawn = recipe.draw(number)
-    doll, start = recipe.dolls[drawn['doll']], drawn['start']
+    doll, start = recipe.doll(drawn['who']), drawn['start']
     heading = rotation.from_axis_angle((0, 0, 1), math.radians(start['heading_deg']))
     orientation = (_any_orientation(*start['shares']) if start['tumbled']
                    else rotation.multiply(heading, _lean(start)))
@@ -61,7 +71,9 @@ def start_of(recipe: Recipe, number: int) -> Start:
                   material=Material(ground['friction'], restitution=ground['restitution']),
                   step=1 / recipe.rate)
     return Start(number, drawn, scene, start['clearance'], _angles(doll, start),
-                 tuple(_push(push, heading) for push in drawn['pushes']))
+                 tuple(_push(push, heading) for push in drawn['pushes']),
+                 tuple(sorted((Limp(round(each['at'] * SECOND), each.get('angles'))
+                               for each in drawn['limp']), key=lambda limp: limp.at)))
 
 
 def _lean(start: dict) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..fall import Fall
 from ..recipe import Recipe
-from ..worn import NAMES, imu_samples
+from ..worn import NAMES, by_frames
 
 POSE = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
 VELOCITY = ('vx', 'vy', 'vz', 'wx', 'wy', 'wz')
@@ -33,9 +33,17 @@ def columns(recipe: Recipe, fall: Fall) -> list[Column]:
         'touching': (fall.touching, bones)}
     return [Column(what, made[what][0].reshape(frames, -1), tuple(made[what][1]))
             for what in recipe.what if made[what][1]] + [
-                Column(f'imu.{mount["name"]}', imu_samples(fall, mount), NAMES)
-                for mount in recipe.imus]
+                Column(f'imu.{mount["name"]}', by_frames(fall, imu).reshape(frames, -1),
+                       _samples(recipe))
+                for imu, mount in enumerate(recipe.imus)]
 
 
 def _each(bones: tuple[str, ...], parts: tuple[str, ...]) -> list[str]:
     return [f'{bone}.{part}' for bone in bones for part in parts]
+
+
+def _samples(recipe: Recipe) -> tuple[str, ...]:
+    """Names of a sensor's numbers in a frame, with their places where it has several samples."""
+    if recipe.parts == 1:
+        return NAMES
+    return tuple(f'{name}_{part}' for part in range(recipe.parts) for name in NAMES)

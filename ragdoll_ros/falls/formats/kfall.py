@@ -17,7 +17,7 @@ from ...model import rotation
 from ...model.errors import WrongForm
 from ..fall import Fall
 from ..recipe import Recipe
-from ..worn import imu_samples, sensor_orientations
+from ..worn import worn_orientations, worn_samples
 
 SENSOR = 'sensor_data/SA{shard:06d}/S{shard:06d}T01R{trial:02d}.csv'
 LABELS = 'label_data/SA{shard:06d}_label.csv'
@@ -50,17 +50,20 @@ def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
 
 
 def _rows(recipe: Recipe, fall: Fall) -> list[list[float]]:
-    mount = recipe.imus[0]
-    samples = imu_samples(fall, mount)[:fall.valid]
-    angles = [rotation.to_rpy(turn) for turn in sensor_orientations(fall, mount)[:fall.valid]]
+    count = (fall.valid - 1) * fall.parts + 1 if fall.valid else 0
+    samples = worn_samples(fall, 0)[:count]
+    angles = [rotation.to_rpy(turn) for turn in worn_orientations(fall, 0)[:count]]
+    times = np.arange(count) / (recipe.rate * fall.parts)
     table = np.concatenate([samples[:, :3] / G, np.degrees(samples[:, 3:]),
                             np.degrees(np.array(angles).reshape(-1, 3))], axis=1)
-    return [[f'{time:.6f}', frame, *(f'{number:.6f}' for number in row)]
-            for frame, (time, row) in enumerate(zip(fall.times, table.tolist(), strict=False))]
+    return [[f'{time:.6f}', place, *(f'{number:.6f}' for number in row)]
+            for place, (time, row) in enumerate(zip(times, table.tolist(), strict=True))]
 
 
 def _frames(fall: Fall) -> list[object]:
-    return ['' if frame is None else frame for frame in (fall.phases.onset, fall.phases.impact)]
+    """Onset and impact, counted in the sensor's samples."""
+    return ['' if frame is None else frame * fall.parts
+            for frame in (fall.phases.onset, fall.phases.impact)]
 
 
 def _table(header: tuple[str, ...], rows: list) -> bytes:

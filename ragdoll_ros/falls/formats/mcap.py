@@ -16,7 +16,7 @@ from mcap_ros2.writer import Writer
 from ...files.urdf import to_urdf
 from ..fall import Fall
 from ..recipe import Recipe
-from ..worn import imu_samples
+from ..worn import worn_samples
 from .definitions import DEFINITIONS
 
 NAME = 'mcap/fall_{number:07d}.mcap'
@@ -34,13 +34,13 @@ def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
 
 def _written(recipe: Recipe, fall: Fall) -> bytes:
     stream = io.BytesIO()
-    samples = {mount['name']: imu_samples(fall, mount).tolist() for mount in recipe.imus}
+    samples = [worn_samples(fall, imu).tolist() for imu in range(len(recipe.imus))]
     with Writer(stream) as writer:
         schemas = {kind: writer.register_msgdef(kind, text) for kind, text in DEFINITIONS.items()}
 
-        def write(topic: str, kind: str, frame: int, message: dict) -> None:
+        def write(topic: str, kind: str, frame: float, message: dict) -> None:
             writer.write_message(f'/ragdoll/{topic}', schemas[kind], message,
-                                 log_time=_nanoseconds(fall, frame), sequence=frame)
+                                 log_time=_nanoseconds(fall, frame), sequence=int(frame))
         writer.add_metadata('fall', {
             'number': str(fall.number), 'failure': fall.failure,
             'bone_names': json.dumps(fall.scene.bone_names),
@@ -51,18 +51,20 @@ def _written(recipe: Recipe, fall: Fall) -> bytes:
               {'data': to_urdf(fall.scene.dolls[0].doll)})
         for frame in range(fall.valid):
             write('poses', 'geometry_msgs/msg/PoseArray', frame, _poses(fall, frame))
-            for mount in recipe.imus:
-                write(f'imu/{mount["name"]}/data_raw', 'sensor_msgs/msg/Imu', frame,
-                      _imu(fall, frame, mount['name'], samples[mount['name']][frame]))
+            for mount, own in zip(recipe.imus, samples, strict=True):
+                for place in range(max(0, (frame - 1) * fall.parts + 1), frame * fall.parts + 1):
+                    write(f'imu/{mount["name"]}/data_raw', 'sensor_msgs/msg/Imu',
+                          place / fall.parts, _imu(fall, place / fall.parts, mount['name'],
+                                                   own[place]))
             write('joint_states', 'sensor_msgs/msg/JointState', frame, _joints(fall, frame))
     return stream.getvalue()
 
 
-def _nanoseconds(fall: Fall, frame: int) -> int:
-    return round(fall.times[frame] * 1e9)
+def _nanoseconds(fall: Fall, frame: float) -> int:
+    return round(frame * fall.times[1] * 1e9)
 
 
-def _header(fall: Fall, frame: int, frame_id: str) -> dict:
+def _header(fall: Fall, frame: float, frame_id: str) -> dict:
     seconds, rest = divmod(_nanoseconds(fall, frame), 10 ** 9)
     return {'stamp': {'sec': seconds, 'nanosec': rest}, 'frame_id': frame_id}
 
@@ -80,7 +82,7 @@ def _joints(fall: Fall, frame: int) -> dict:
             'effort': []}
 
 
-def _imu(fall: Fall, frame: int, name: str, sample: list[float]) -> dict:
+def _imu(fall: Fall, frame: float, name: str, sample: list[float]) -> dict:
     """By REP 145: no orientation is measured, covariances are unknown."""
     unknown, unmeasured = [0.0] * 9, [-1.0] + [0.0] * 8
     return {'header': _header(fall, frame, name), 'orientation': {'x': 0, 'y': 0, 'z': 0, 'w': 1},
