@@ -129,6 +129,14 @@ def test_no_node_is_said_and_heals_by_itself(no_node, nodes, remote):
     assert not remote.report.problem
 
 
+def test_two_nodes_of_one_name_are_told_with_what_to_do(node, remote):
+    remote.want(OPEN)
+    twin = start('node')
+    wait(lambda: 'namespace of its own' in remote.report.note)
+    end(twin, signal.SIGINT)
+    wait(lambda: not remote.report.note)
+
+
 def test_shows_what_the_node_publishes(node, remote, peer):
     """The poses are those of ~/poses, with their scene and their time since the start."""
     remote.want(OPEN)

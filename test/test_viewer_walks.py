@@ -88,7 +88,7 @@ def act(view, random):
         view.tab('Play')
         view.page.get_by_role('checkbox', name='Follow').click()
 
-    body = view.pixels(points(view)[:1])[0]
+    body = view.pixels(view.wait(lambda: points(view).tolist())[:1])[0]
     random.choice([
         hold, hold, zoom, choose, follow,
         lambda: drag(view, anywhere(), anywhere()), lambda: drag(view, body, anywhere()),

@@ -20,6 +20,9 @@ FIELD = 0.8
 FAR = 1000.0
 """m to which a camera sees at least."""
 
+FARTHEST = 4
+"""Times the distance of the home view from which one sees too little of what has changed."""
+
 STILL = 1e-3
 """m that a camera which stands at home may be off."""
 
@@ -126,12 +129,15 @@ class Cameras:
                 self.go_home(client)
 
     def _meet(self, client: viser.ClientHandle) -> None:
-        """Bring a page's camera home where it does not see all."""
+        """Bring a page's camera home where it does not see all, or sees it from FARTHEST away."""
         if self._frame is None:
             return
-        camera = client.camera
-        if not sees(camera.position, camera.look_at, camera.fov, _aspect(camera),
-                    *bounds(self._frame.scene, self._frame.state)):
+        camera, balls = client.camera, bounds(self._frame.scene, self._frame.state)
+        look_at = middle(*balls)
+        home = place(*balls, look_at, camera.fov, _aspect(camera))
+        is_far = (np.linalg.norm(camera.position - look_at)
+                  > FARTHEST * np.linalg.norm(home - look_at))
+        if is_far or not sees(camera.position, camera.look_at, camera.fov, _aspect(camera), *balls):
             self.go_home(client)
 
     def _move(self, client: viser.ClientHandle, position: np.ndarray, look_at: np.ndarray) -> None:

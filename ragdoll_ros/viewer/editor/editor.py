@@ -18,6 +18,7 @@ from .folder import Folder
 from .handles import Handles
 from .history import History
 from .panel import Panel
+from .words import in_words
 
 UNSEEN = 20
 """Scenes given to the page that it has not shown yet."""
@@ -61,15 +62,14 @@ class Editor:
         return self._history.scene
 
     def show(self, scene: Scene) -> None:
-        """Take note that the page shows another scene now: a step that can be undone."""
+        """Take note that the page shows another scene now."""
         with self._showing:
             if scene in self._given:
                 # One of ours; the page draws late, and may have left out some before it.
                 while self._given.popleft() != scene:
                     pass
             elif scene != self.scene:
-                self._history.push(scene, f'scene {scene.name}')
-                self._refresh()
+                self._enter(scene, f'scene {scene.name}')
 
     def select(self, bone: str | None) -> None:
         """Choose a bone by its name in the scene; one that is not there, or None: none."""
@@ -104,7 +104,8 @@ class Editor:
         """Apply what stands in the fields; where that is wrong, say so there and change nothing."""
         with self._telling():
             name, limb = self._chosen(), self.panel.limb.value
-            self._change(lambda: sheet.apply(self.scene, name, self.panel.values(), limb),
+            values, unread = self.panel.values()
+            self._change(lambda: sheet.apply(self.scene, name, values, limb, unread),
                          f'numbers of {name}')
 
     def undo(self) -> None:
@@ -116,12 +117,11 @@ class Editor:
         self._go(self._history.redo, self._history.undo)
 
     def take(self, scene: Scene, what: str) -> None:
-        """Go on with another scene, as a step; RagdollError if it cannot run."""
+        """Go on with a changed scene, or with another one; RagdollError if it cannot run."""
         with self._acting:
             self._run(scene, self.editing)
             with self._showing:
-                self._history.push(scene, what)
-                self._refresh()
+                self._enter(scene, what)
 
     def suggest(self, key: str, kind: str) -> None:
         """Fill in numbers that fit another kind of shape or joint, for the user to go on from."""
@@ -191,6 +191,14 @@ class Editor:
             self.show_handles()
             raise
 
+    def _enter(self, scene: Scene, what: str) -> None:
+        """Have a scene from now on: a step, but for one of another name, which has its own past."""
+        if scene.name == self.scene.name:
+            self._history.push(scene, what)
+        else:
+            self._history = History(scene)
+        self._refresh()
+
     def _go(self, there: Callable[[], Scene], back: Callable[[], Scene]) -> None:
         with self._telling():
             before = self.scene
@@ -257,4 +265,4 @@ class Editor:
             except errors.ModelError as error:
                 self.panel.tell([error])
             except errors.RagdollError as error:
-                self.panel.say(str(error))
+                self.panel.say(in_words(error))

@@ -11,6 +11,7 @@ from ...model import errors
 from ...model.scene import Scene
 from .folder import CHARACTERS, DOLLS, LARGEST_UPLOAD, Folder
 from .form import GREEN, RED, colored
+from .words import in_words
 
 MOST_TOLD = 3
 """Reasons of a verdict that the page tells."""
@@ -98,7 +99,7 @@ class Files:
         try:
             self._say(action(), GREEN)
         except errors.RagdollError as error:
-            self._say(str(error), RED)
+            self._say(in_words(error), RED)
         except OSError as error:
             self._say(f'{error.filename or "file"}: {error.strerror or error}', RED)
 

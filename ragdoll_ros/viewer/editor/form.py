@@ -4,6 +4,7 @@ from __future__ import annotations
 import html
 import threading
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from typing import Any
 
 import viser
@@ -11,22 +12,19 @@ import viser
 from ...model import errors
 from ...model.ragdoll import JOINT_KINDS
 from ...model.shapes import SHAPES
+from . import typed, words
 from .sheet import Field, Sheet, Value
+
+NUMBERS = ('number', 'vector')
+"""Widgets that hold one number and three; both are text, in which everything can be typed."""
 
 RED, GREEN = '#c92a2a', '#2b8a3e'
 
-STEPS = {'turn': 1.0, 'axis_1': 0.1, 'axis_2': 0.1, 'mass': 0.1}
-"""What an arrow key adds to a number, 0.01 where nothing is said."""
-
 ROOMY = """<style>
-  .mantine-Flex-root:has(> .mantine-NumberInput-root) {column-gap: 0.25em !important}
-  .mantine-Flex-root > .mantine-NumberInput-root .mantine-NumberInput-section {display: none}
-  .mantine-Flex-root > .mantine-NumberInput-root input {padding: 0 0.3em !important}
-  .mantine-Flex-root:has(> div > div > .mantine-Flex-root > .mantine-NumberInput-root)
-    > :first-child {width: 4.7em !important}
+  .mantine-Flex-root:has(> * .mantine-TextInput-root) > :first-child {width: 5em !important}
+  .mantine-TextInput-root input {padding: 0 0.3em !important}
 </style>"""
-"""Makes room for all digits in fields of three numbers, which viser cuts after four: without arrows
-to click on (the arrow keys still count up and down), and with room for a short label only."""
+"""Makes room for three numbers in a field, as a fitted doll has them."""
 
 
 class Quiet(threading.local):
@@ -46,7 +44,10 @@ class Form:
 
     def __init__(self, gui: viser.GuiApi, fields: Sequence[Field],
                  on_kind: Callable[[str, str], None]) -> None:
+        self._fields = {field.key: field for field in fields}
         self._widgets: dict[str, Any] = {}
+        self._filled: dict[str, tuple[str, Value]] = {}
+        """What a field of numbers was filled with, as text and exactly."""
         self.errors: dict[str, viser.GuiHtmlHandle] = {}
         """What is written under the fields, seen where something is wrong."""
         self._on_kind = on_kind
@@ -62,33 +63,76 @@ class Form:
         return self._widgets[key]
 
     def fill(self, sheet: Sheet) -> None:
-        """Show the fields that a sheet has and hide the others; forget what was wrong."""
+        """Show the fields that a sheet has and hide the others; forget what was wrong.
+
+        What was typed and is what the sheet has stays as it was typed.
+        """
         self.tell(())
         with self._filling:
             for key, widget in self._widgets.items():
                 widget.visible = key in sheet
                 if key in sheet:
-                    widget.value = sheet[key]
+                    self._fill(key, widget, sheet[key])
 
-    def values(self) -> Sheet:
-        """What stands in the fields that are shown."""
-        return {key: widget.value for key, widget in self._widgets.items() if widget.visible}
+    def values(self) -> tuple[Sheet, list[errors.ModelError]]:
+        """What stands in the fields that are shown, and what of it cannot be read."""
+        sheet: Sheet = {}
+        found = []
+        for key, widget in self._widgets.items():
+            if widget.visible:
+                try:
+                    sheet[key] = self._read(key, widget.value)
+                except errors.ModelError as error:
+                    found.append(error.at(key))
+        return sheet, found
 
     def tell(self, found: Iterable[errors.ModelError]) -> None:
         """Write each error under the field that its path names; take the others away."""
-        said = {error.path: text_of(error) for error in found}
-        for key, error in self.errors.items():
-            error.content = colored(said.get(key, ''), RED)
-            error.visible = key in said
+        said = {error.path: error for error in found}
+        for key, place in self.errors.items():
+            text = words.sentence(said[key], *_named(self._fields[key])) if key in said else ''
+            place.content = colored(text, RED)
+            place.visible = key in said
+
+    def _fill(self, key: str, widget: Any, value: Value) -> None:
+        if self._fields[key].widget not in NUMBERS:
+            widget.value = value
+            return
+        with suppress(errors.ModelError):
+            if self._read(key, widget.value) == value:
+                self._filled[key] = widget.value, value
+                return
+        text = typed.shown_all(value if isinstance(value, tuple) else (value,))
+        self._filled[key] = text, value
+        widget.value = text
+
+    def _read(self, key: str, given: Any) -> Value:
+        """What a widget's value means; parts of a text that nobody touched are what they were."""
+        field = self._fields[key]
+        if field.widget not in NUMBERS:
+            return given
+        text, value = self._filled.get(key, ('', 0.0))
+        if given == text:
+            return value
+        unit = _named(field)[1]
+        if field.widget == 'number':
+            return typed.number(given, unit)
+        new = typed.numbers(given, 3, unit)
+        with suppress(errors.ModelError):
+            old = zip(typed.parts(text, 3, unit), typed.parts(given, 3, unit), value, new,
+                      strict=True)
+            return tuple(exact if was == now else number for was, now, exact, number in old)
+        return new
 
     def _chosen(self, key: str) -> None:
         if not self._filling.now:
             self._on_kind(key, self._widgets[key].value)
 
 
-def text_of(error: errors.ModelError) -> str:
-    """What is wrong with a field: the value, and what would be right."""
-    return str(type(error)('', error.value, error.expected))
+def _named(field: Field) -> tuple[str, str]:
+    """Name and unit of a field, from its label."""
+    name, _, unit = field.label.partition(', ')
+    return name, unit
 
 
 def colored(text: str, color: str) -> str:
@@ -103,12 +147,6 @@ def _widget(gui: viser.GuiApi, field: Field) -> Any:
     if field.widget in ('shape', 'joint'):
         return gui.add_dropdown(field.label, tuple(SHAPES if field.widget == 'shape'
                                                    else JOINT_KINDS), hint=hint)
-    if field.widget == 'text':
-        return gui.add_text(field.label, '', hint=hint)
     if field.widget == 'color':
         return gui.add_rgb(field.label, (0, 0, 0), hint=hint)
-    start: Value = (0.0, 0.0, 0.0) if field.widget == 'vector' else 0.0
-    add = gui.add_vector3 if field.widget == 'vector' else gui.add_number
-    widget = add(field.label, start, step=STEPS.get(field.key, 0.01), hint=hint)
-    widget.precision = 4 if field.key == 'turn' else 6
-    return widget
+    return gui.add_text(field.label, '', hint=hint)

@@ -43,24 +43,30 @@ class Handles:
         self._on_pose, self._on_size = on_pose, on_size
         self.body: viser.TransformControlsHandle | None = None
         self.size: viser.TransformControlsHandle | None = None
+        self.room = ROOM
+        """Where in the scene tree all is that is shown now. Each time it has a name of its own:
+        viser leaves a node that comes again where it was, if it is to be at zero."""
+        self._count = 0
 
     def hide(self) -> None:
         """Take all handles away."""
         if self.body is not None:
-            self._server.scene.remove_by_name(ROOM)
+            self._server.scene.remove_by_name(self.room)
         self.body = self.size = None
 
     def show(self, scene: Scene, name: str, limb: bool) -> None:
         """Put handles on a bone; with ``limb`` it rotates about its joint, not its own centre."""
         self.hide()
+        self._count += 1
+        self.room = f'{ROOM}/{self._count}'
         (placement, bone), joint = find(scene, name), joint_of(scene, name)
         at = joint.anchor if limb and joint else bone.position
         with self._server.atomic():
             self._server.scene.add_frame(
-                ROOM, position=placement.position + _lift(scene, placement),
+                self.room, position=placement.position + _lift(scene, placement),
                 wxyz=_wxyz(placement.orientation), show_axes=False)
             self._own = self._server.scene.add_frame(
-                f'{ROOM}/own', position=bone.position, wxyz=_wxyz(bone.orientation),
+                f'{self.room}/own', position=bone.position, wxyz=_wxyz(bone.orientation),
                 show_axes=False)
             self._add_ghost(bone)
             if joint is not None:
@@ -73,26 +79,26 @@ class Handles:
         for number, part in enumerate(bone.shape.primitives):
             vertices, faces = MESHES[part.kind]
             self._server.scene.add_mesh_simple(
-                f'{ROOM}/own/ghost_{number}', vertices * part.size * GROWN, faces, color=YELLOW,
-                wireframe=True, cast_shadow=False, receive_shadow=False,
+                f'{self.room}/own/ghost_{number}', vertices * part.size * GROWN, faces,
+                color=YELLOW, wireframe=True, cast_shadow=False, receive_shadow=False,
                 position=part.position, wxyz=_wxyz(part.orientation))
 
     def _add_pivot(self, joint: Joint, bone: Bone) -> None:
         """Draw the joint: a ball where it is, a line along each axis, the first in blue."""
         length = 1.5 * max(bone.shape.half_extents)
-        self._server.scene.add_icosphere(f'{ROOM}/pivot', radius=0.08 * length, color=BLUE,
+        self._server.scene.add_icosphere(f'{self.room}/pivot', radius=0.08 * length, color=BLUE,
                                          position=joint.anchor, cast_shadow=False)
         if joint.axes:
             ends = np.array([[np.subtract(joint.anchor, np.multiply(axis, length)),
                               np.add(joint.anchor, np.multiply(axis, length))]
                              for axis in joint.axes])
             colors = np.array([[color, color] for color in (BLUE, RED)[:len(ends)]], np.uint8)
-            self._server.scene.add_line_segments(f'{ROOM}/axes', ends, colors,
+            self._server.scene.add_line_segments(f'{self.room}/axes', ends, colors,
                                                  thickness=0.03 * length)
 
     def _add_body(self, bone: Bone, at: Sequence[float]) -> None:
         self.body = self._server.scene.add_transform_controls(
-            f'{ROOM}/body', scale=2.5 * max(bone.shape.half_extents), depth_test=False,
+            f'{self.room}/body', scale=2.5 * max(bone.shape.half_extents), depth_test=False,
             opacity=0.8, position=at, wxyz=_wxyz(bone.orientation))
         # The body as the handle sees it: both move as one.
         back = rotation.inverse(bone.orientation)
@@ -114,7 +120,7 @@ class Handles:
         active = (True, bone.shape.kind == 'box', bone.shape.kind != 'sphere')
         half = np.array(bone.shape.half_extents)
         self.size = size = self._server.scene.add_transform_controls(
-            f'{ROOM}/own/size', scale=0.8 * float(half.max()), active_axes=active,
+            f'{self.room}/own/size', scale=0.8 * float(half.max()), active_axes=active,
             disable_rotations=True, disable_sliders=True, depth_test=False,
             position=np.where(active, half, 0.0))
 

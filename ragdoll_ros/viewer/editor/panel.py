@@ -10,6 +10,7 @@ from ...model.scene import Scene
 from .form import RED, ROOMY, Form, Quiet, colored
 from .history import History
 from .sheet import BODY, JOINT, Sheet
+from .words import in_words
 
 NONE = '(no bone)'
 
@@ -74,9 +75,10 @@ class Panel:
         self.body.fill(sheet or {})
         self.joint.fill(sheet or {})
 
-    def values(self) -> Sheet:
-        """What stands in the fields."""
-        return {**self.body.values(), **self.joint.values()}
+    def values(self) -> tuple[Sheet, list[errors.ModelError]]:
+        """What stands in the fields, and what of it cannot be read."""
+        (body, in_body), (joint, in_joint) = self.body.values(), self.joint.values()
+        return {**body, **joint}, in_body + in_joint
 
     def tell(self, found: Iterable[errors.ModelError]) -> None:
         """Write each error under its field; what belongs to none, under the Update button."""
@@ -84,7 +86,7 @@ class Panel:
         self.body.tell(found)
         self.joint.tell(found)
         keys = {field.key for field in (*BODY, *JOINT)}
-        self.say('\n'.join(str(error) for error in found if error.path not in keys))
+        self.say('\n'.join(in_words(error) for error in found if error.path not in keys))
 
     def say(self, text: str) -> None:
         """Write under the Update button why something was refused; nothing: take that away."""

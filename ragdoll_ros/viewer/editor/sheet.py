@@ -1,13 +1,13 @@
 """A bone and its joint as the fields of a form, and back: with units, texts and all errors.
 
 Lengths in m, masses in kg, angles in degrees. A field that still holds what ``read`` gave leaves
-the scene as it is, to the bit: what a form shows is rounded.
+the scene as it is, to the bit.
 """
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,16 +16,20 @@ from ...model import errors, rotation
 from ...model.ragdoll import DEFAULT_COLOR, JOINT_KINDS, Joint
 from ...model.scene import Scene
 from ...model.shapes import SHAPES, SIZES, Shape
-from ...model.vectors import floats, unit
-from . import changes
+from ...model.vectors import unit
+from . import changes, typed
 
 Value = str | float | tuple[float, ...]
 Sheet = dict[str, Value]
 
 SURFACE = ('friction', 'rolling_friction', 'restitution')
 
-DECIMALS = {'color': 0, 'turn': 4}
-"""Decimals that the form keeps of a number, 6 where nothing is said."""
+LARGEST = {'mass': 1e6, 'size': 1e3, 'radius': 1e3, 'length': 1e3, 'position': 1e3, 'anchor': 1e3,
+           'damping': 1e4}
+"""Beside usual neighbours, bodies of a larger mass or further away stop the simulation for minutes;
+units are those of the fields."""
+
+SMALLEST = {'mass': 1e-4, 'size': 1e-4, 'radius': 1e-4, 'length': 1e-4}
 
 
 @dataclass(frozen=True)
@@ -84,18 +88,22 @@ def read(scene: Scene, name: str) -> Sheet:
     return sheet if joint is None else {**sheet, **_read_joint(joint)}
 
 
-def apply(scene: Scene, name: str, sheet: Mapping[str, Value], limb: bool = False) -> Scene:
+def apply(scene: Scene, name: str, sheet: Mapping[str, Value], limb: bool = False,
+          unread: Sequence[errors.ModelError] = ()) -> Scene:
     """The scene with a bone and its joint as the sheet has them.
 
-    Raises ModelErrors with all that is wrong, the path of each the key of its field. ``limb``: see
-    changes.py; the joint's own fields are set after the move.
+    ``unread``: what was found wrong already. Raises ModelErrors with all that is wrong, the path of
+    each the key of its field. ``limb``: see changes.py; the joint's own fields are set after the
+    move.
     """
-    shown, found = read(scene, name), []
+    shown, found = read(scene, name), list(unread)
     new = {**shown, **sheet}
     steps = _body_steps(name, limb) + (_joint_steps(name, shown) if 'kind' in shown else [])
     for keys, step in steps:
-        if any(not _same(key, new.get(key), shown.get(key)) for key in keys):
+        if any(new.get(key) != shown.get(key) for key in keys):
             try:
+                for key in keys:
+                    _check_range(key, new.get(key))
                 scene = step(scene, new)
             except errors.ModelError as error:
                 found.append(_at_field(error, keys))
@@ -110,8 +118,7 @@ Step = tuple[tuple[str, ...], Callable[[Scene, Sheet], Scene]]
 
 def _body_steps(name: str, limb: bool) -> list[Step]:
     def place(scene: Scene, new: Sheet) -> Scene:
-        _, bone = changes.find(scene, name)
-        return changes.set_pose(scene, name, _near(new['position'], bone.position), limb=limb)
+        return changes.set_pose(scene, name, new['position'], limb=limb)
 
     def orientation(scene: Scene, new: Sheet) -> Scene:
         return changes.set_pose(scene, name, orientation=_quaternion(new['turn']), limb=limb)
@@ -137,8 +144,7 @@ def _body_steps(name: str, limb: bool) -> list[Step]:
 
 def _joint_steps(name: str, shown: Sheet) -> list[Step]:
     def anchor(scene: Scene, new: Sheet) -> Scene:
-        old = changes.joint_of(scene, name).anchor
-        return changes.change_joint(scene, name, anchor=_near(new['anchor'], old))
+        return changes.change_joint(scene, name, anchor=new['anchor'])
 
     return [(('kind', 'axis_1', 'axis_2', 'limits_1', 'limits_2', 'limits_3'),
              lambda scene, new: _set_axes_and_limits(scene, name, new, shown)),
@@ -166,7 +172,7 @@ def _set_axes_and_limits(scene: Scene, name: str, new: Sheet, shown: Sheet) -> S
     for index in range(kind.axes):
         key = f'axis_{index + 1}'
         # A limb that was rotated has rotated its axes already.
-        kept = kind.name == joint.kind and _same(key, new[key], shown[key])
+        kept = kind.name == joint.kind and new[key] == shown[key]
         axes.append(joint.axes[index] if kept else unit(key, new[key]))
     if kind.axes == 2:
         axes[1] = _straightened(*axes)
@@ -197,8 +203,8 @@ def _pair(key: str, text: str, symmetric: bool) -> tuple[float, float] | None:
         return None
     parts = text.replace(',', ' ').split()
     try:
-        numbers = [float(part) for part in parts]
-    except ValueError:
+        numbers = [typed.number(part, '°') for part in parts]
+    except errors.WrongForm:
         numbers = []
     if symmetric and len(numbers) == 1:
         numbers = [-numbers[0], numbers[0]]
@@ -211,16 +217,17 @@ def _moments(text: str) -> tuple[float, ...] | None:
     if not text.strip():
         return None
     try:
-        return floats(text.replace(',', ' ').split())
-    except ValueError:
-        raise errors.WrongForm('inertia', text, 'three numbers, or nothing') from None
+        return typed.numbers(text, 3)
+    except errors.WrongForm as error:
+        raise error.at('inertia') from None
 
 
 def _number_or_none(key: str, text: str) -> float | None:
+    unit = 'm' if key == 'rolling_friction' else ''
     try:
-        return float(text) if text.strip() else None
-    except ValueError:
-        raise errors.WrongForm(key, text, "a number, or nothing for the scene's") from None
+        return typed.number(text, unit, infinite=key == 'friction') if text.strip() else None
+    except errors.WrongForm as error:
+        raise error.at(key) from None
 
 
 def _shape(new: Sheet) -> Shape:
@@ -239,19 +246,14 @@ def _quaternion(degrees: tuple[float, ...]) -> np.ndarray:
     return rotation.from_rpy(*(math.radians(angle) for angle in degrees))
 
 
-def _near(values: tuple[float, ...], old: tuple[float, ...]) -> tuple[float, ...]:
-    """Keep the exact number wherever the form shows the same rounded one."""
-    return tuple(before if abs(value - before) <= 0.5e-6 else value
-                 for value, before in zip(values, old, strict=True))
-
-
-def _same(key: str, new: Value | None, shown: Value | None) -> bool:
-    if isinstance(new, str) or new is None or shown is None:
-        return new == shown
-    tolerance = 0.5 * 10.0 ** -DECIMALS.get(key, 6)
-    if isinstance(new, tuple):
-        return all(abs(a - b) <= tolerance for a, b in zip(new, shown, strict=True))
-    return abs(new - shown) <= tolerance
+def _check_range(key: str, value: Value | None) -> None:
+    """Refuse what the model takes and no engine gets on with; what is not finite it refuses."""
+    for number in value if isinstance(value, tuple) else (value,):
+        if key in LARGEST and isinstance(number, float) and math.isfinite(number):
+            if abs(number) > LARGEST[key]:
+                raise errors.OutOfRange(key, value, f'at most {LARGEST[key]:g}')
+            if 0 < number < SMALLEST.get(key, 0):
+                raise errors.OutOfRange(key, value, f'at least {SMALLEST[key]:g}')
 
 
 def _at_field(error: errors.ModelError, keys: tuple[str, ...]) -> errors.ModelError:

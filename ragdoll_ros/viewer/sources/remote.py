@@ -43,6 +43,9 @@ MISSING = ('no node `{}` yet: start it with `ros2 run ragdoll_ros ragdoll_node` 
            'ROS_DOMAIN_ID); this page goes on by itself')
 SILENT = 'the node `{}` has been silent for {:.0f} s; this page goes on by itself'
 
+TWINS = ('Several nodes are called `{}`, and the page shows now one, now another: end all but one, '
+         'or start each in a namespace of its own.')
+
 SILENCE = 3.0
 """s without a word after which a node counts as gone: it reports once a second."""
 
@@ -101,7 +104,8 @@ class Remote(Source):
             problem = MISSING.format(self._full) if silence > 1.0 else ''
         elif silence > SILENCE:
             problem = SILENT.format(self._full, silence)
-        return dataclasses.replace(self._told, problem=problem, note=self._known.note,
+        note = ' '.join(filter(None, (self._told.note, self._known.note)))
+        return dataclasses.replace(self._told, problem=problem, note=note,
                                    engine=self._known.settings.engine)
 
     def want(self, wanted: Wanted) -> None:
@@ -215,8 +219,10 @@ class Remote(Source):
                 values = {pair.key: pair.value for pair in status.values}
                 # What cannot be read stays as it was.
                 with contextlib.suppress(KeyError, ValueError):
+                    is_alone = values.get('namesakes', '0') == '0'
                     self._told = dataclasses.replace(
                         self._told, paused=values['paused'] == 'true',
+                        note='' if is_alone else TWINS.format(self._full),
                         pace=float(values['real_time_factor']),
                         measures={key: float(values[key]) for key in KEYS if key in values})
                 with contextlib.suppress(KeyError, ValueError):
