@@ -56,6 +56,8 @@ def view(browser, listener, heard):
     """
     with serving(module='ragdoll_ros.ros.run') as url, opened(browser, url, SCENE) as view:
         view.wait(lambda: all(topic.get_publisher_count() for topic in listener.subscriptions))
+        # The first fall begins once the page has drawn its start, which may take a while.
+        view.button('Pause').wait_for()
         yield view
 
 

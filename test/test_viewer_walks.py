@@ -41,7 +41,10 @@ def points(view):
 
 def in_sight(view):
     """Whether every body's middle is in the picture, with nothing above it."""
-    drawn = view.pixels(points(view))
+    places = points(view)
+    if not len(places):  # one scene has gone, the next is to come
+        return False
+    drawn = view.pixels(places)
     frame = view.page.locator('canvas').first.bounding_box()
     share = (drawn - (frame['x'], frame['y'])) / (frame['width'], frame['height'])
     inside = ((share > 0) & (share < 1)).all()
