@@ -77,6 +77,7 @@ def test_what_make_run_starts_shows_ten_bodies_that_fall(view):
     view.wait(lambda: falls(view))
 
 
+@pytest.mark.slow
 def test_a_dragged_body_follows_within_200_ms(view, heard):
     """From when the node hears of it until the bone has gone half of a third of a metre.
 
