@@ -1,6 +1,7 @@
 """The other side of a running node: listens, sends, calls and waits for conditions."""
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import os
 import pty
@@ -10,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import termios
+import threading
 import time
 from pathlib import Path
 
@@ -98,6 +100,18 @@ class Peer(Node):
         future = self._callers[name].call_async(request)
         self.wait(future.done)
         return future.result()
+
+
+@contextlib.contextmanager
+def listening():
+    """A peer that spins in a thread of its own: what it notes is when a message came."""
+    peer = Peer()
+    thread = threading.Thread(target=peer.executor_.spin, daemon=True)
+    thread.start()
+    yield peer
+    peer.executor_.shutdown()
+    thread.join()
+    peer.destroy_node()
 
 
 def start(module, *arguments, terminal=None, compiled=False):

@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 import signal
-import threading
 import time
 import urllib.parse
 
@@ -11,7 +10,7 @@ import pytest
 from browser import chromium, opened, serving
 from geometry_msgs.msg import PoseArray
 from network import Network
-from peer import Peer, end, kill, start
+from peer import end, kill, listening, start
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
 from ragdoll_ros.files.scene import load_scene
@@ -26,13 +25,8 @@ LIFT = np.array((0, 0, 0.1))
 @pytest.fixture(scope='module')
 def listener(ros):
     """A peer that listens in a thread of its own: what it notes is when a message came."""
-    peer = Peer()
-    thread = threading.Thread(target=peer.executor_.spin, daemon=True)
-    thread.start()
-    yield peer
-    peer.executor_.shutdown()
-    thread.join()
-    peer.destroy_node()
+    with listening() as peer:
+        yield peer
 
 
 @pytest.fixture(scope='module')

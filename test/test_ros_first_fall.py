@@ -2,14 +2,13 @@
 from __future__ import annotations
 
 import contextlib
-import threading
 import time
 
 import numpy as np
 import pytest
 from browser import chromium, opened, serving
 from geometry_msgs.msg import PoseArray, Wrench
-from peer import Peer
+from peer import listening
 
 from ragdoll_ros.files.scene import load_scene
 
@@ -54,13 +53,8 @@ def test_the_first_fall_waits_for_the_first_page(browser, size):
 @pytest.fixture(scope='module')
 def peer(ros):
     """A peer that listens in a thread of its own, so that what came last is new."""
-    peer = Peer()
-    thread = threading.Thread(target=peer.executor_.spin, daemon=True)
-    thread.start()
-    yield peer
-    peer.executor_.shutdown()
-    thread.join()
-    peer.destroy_node()
+    with listening() as peer:
+        yield peer
 
 
 @pytest.fixture(scope='module')
