@@ -102,10 +102,9 @@ def pushed(view, heard):
 @pytest.mark.parametrize('act', [lambda view: view.press('↓'),
                                  lambda view: view.key('ArrowDown')], ids=['button', 'key'])
 def test_a_press_is_a_shove(view, heard, act):
-    """25 ms of 2000 N give 55 kg 0.9 m/s: two ticks' push or three.
+    """25 ms of 2000 N give 55 kg 0.9 m/s: two ticks' push or three, of five presses the middle one.
 
-    The page times it on the wall, and a busy machine wakes it late, seldom early: of five presses
-    one at least is what was meant.
+    The page times it on the wall: where the machine is busy, now and then a tick more or less.
     """
     gains = []
     for _ in range(5):
@@ -114,7 +113,7 @@ def test_a_press_is_a_shove(view, heard, act):
         forces, gained = result
         assert set(forces) == {2000.0, 0.0} and abs(gained[1]) < 1e-6
         gains.append(gained[0])
-    assert any(0.5 < gain < 1.2 for gain in gains), gains
+    assert 0.5 < np.median(gains) < 1.2, gains
 
 
 def test_a_key_that_is_held_pushes_as_long_as_it_is(view, heard):
