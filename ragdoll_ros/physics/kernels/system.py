@@ -174,7 +174,7 @@ def make_room(system: System, course: Course) -> Room:
         given=np.zeros(dolls, GIVEN), before=np.zeros(dolls, DOLL), after=np.zeros(dolls, DOLL),
         begun=np.zeros(contacts, CONTACT), count=np.zeros(1, np.int64), lift=np.zeros(2),
         tally=course.tally, within=course.within, armed=np.zeros(gaps), met=np.zeros(gaps),
-        above=np.zeros(gaps), below=np.zeros(gaps), bracket=np.zeros(3),
+        above=np.zeros(gaps), below=np.zeros(gaps), bracket=np.zeros(5),
         stages=np.zeros((16, nq + nv)), row=np.zeros(nq + nv),
         place=np.zeros(nv, np.int64), blocks=np.zeros((contacts, 25)),
         unsought=np.zeros(1), left=np.zeros(1))

@@ -12,7 +12,7 @@ from .step import DEEP, STEP_TOLERANCE, begin_step, contact_step, settle
 from .touch import SUNK, between, narrow, open_bracket, touched
 from .warm_start import jammed
 
-TRIES = 16
+TRIES = 20
 """At a step that is to end at a touch, and is to make no energy."""
 
 FINEST = 0.01

@@ -1,7 +1,8 @@
 """The instant of a touch within a step: lengths of the step are tried until one ends there.
 
 What is apart when a step begins may meet before it ends; a length at which nothing has met and one
-at which something has are drawn together by chords, those of Anderson and Bjoerck (BIT 13, 1973).
+at which something has are drawn together by chords, those of Anderson and Bjoerck (BIT 13, 1973),
+and where these lag, as between two gaps of which one is not straight, by halves.
 """
 from __future__ import annotations
 
@@ -17,6 +18,9 @@ SUNK = -1e-7
 
 SHORTEST = 1e-9
 """s: no step is made shorter to find a touch."""
+
+CHORDS = 2
+"""Chords that may leave the bracket wider than half, before it is halved."""
 
 
 @compiled
@@ -46,6 +50,7 @@ def touched(s: System, r: Room, h: float) -> tuple[bool, bool, bool]:
 def open_bracket(r: Room) -> None:
     """Begin to seek the instant of a touch: all that is known is that it is after the start."""
     r.bracket[0], r.bracket[1], r.bracket[2] = 0.0, math.inf, 0.0
+    r.bracket[3], r.bracket[4] = math.inf, 0.0
     for j in range(len(r.gaps)):
         r.above[j], r.below[j] = r.gaps[j], NEVER
 
@@ -56,7 +61,8 @@ def narrow(s: System, r: Room, h: float, sunk: bool, landed: bool) -> bool:
     r.bracket; whether the instant of the touch is to be sought between its ends.
 
     The bracket: lengths, s, at which nothing is sunk, with the gaps r.above, and at which something
-    is, r.below; which of them moved last. The gaps of the one that stays twice count less: bent().
+    is, r.below; which of them moved last; the width, s, when it was last halved, and the chords
+    since. The gaps of the end that stays twice count less: bent().
     """
     ends = r.bracket
     if sunk:
@@ -91,10 +97,16 @@ def bent(before: float, now: float) -> float:
 @compiled
 def between(r: Room) -> float:
     """Length of a step, s, at the end of which the first of those meets that r.bracket parts."""
-    share = 1.0
+    ends, share = r.bracket, 1.0
+    low, width = ends[0], ends[1] - ends[0]
+    ends[4] += 1
+    late = ends[4] > CHORDS
+    if late or width <= ends[3] / 2:
+        ends[3], ends[4] = width, 0.0
+    if late:
+        return low + width / 2
     for j in range(len(r.gaps)):
         if r.below[j] < 0:
             above = max(0.0, r.above[j])
             share = min(share, above / (above - r.below[j]))
-    low, high = r.bracket[0], r.bracket[1]
-    return max(SHORTEST, low + share * (high - low))
+    return max(SHORTEST, low + share * width)
