@@ -167,7 +167,7 @@ def make_room(system: System, course: Course) -> Room:
         later=np.zeros(gaps), Y=np.zeros((rows, wide)), YT=np.zeros((nv, few)),
         support=np.zeros((contacts, wide), np.int64), W=np.zeros(few * few),
         G=np.zeros(few * few), p=np.zeros((6, rows)),
-        solver=np.zeros((9, 2 * max(rows, 8))), kinds=np.zeros(contacts, np.int64),
+        solver=np.zeros((8, 2 * max(rows, 8))), kinds=np.zeros(contacts, np.int64),
         rows=np.zeros(contacts, np.int64), mu=np.zeros(contacts), roll=np.zeros(contacts),
         need=np.zeros((4, contacts)), label=np.zeros(dolls, np.int64),
         vectors=np.zeros((VECTORS, nv)), states=np.zeros((STATES, nq)),

@@ -1,6 +1,9 @@
 """Newton's method on all rows of an island at once, semi-smooth.
 
-The function is that of Alart and Curnier (CMAME 92, 1991).
+The function is that of Alart and Curnier (CMAME 92, 1991). What several contacts of one face bear
+together is nearly free, and a full step along it leaves every cone. So each step is one of the
+proximal point method (Rockafellar, SIAM Journal on Control and Optimization 14, 1976): a change of
+an impulse is resisted by a share of its own W, which does not move the solution.
 """
 from __future__ import annotations
 
@@ -17,8 +20,8 @@ NEWTON_STEPS = 40
 """At the most; from the sweeps' end some three are. All are taken in full: on the way the residual
 may grow, as contacts change sides. The best is kept."""
 
-PATIENCE = 3
-"""Steps in which all rows change sides that are on the wrong one, though no fewer come to be."""
+PATIENCE = 8
+"""Steps that do not halve the residual, after which it goes in circles."""
 
 
 @compiled
@@ -48,19 +51,22 @@ def residual(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarr
 
 
 @compiled
-def newton_matrix(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
-                  n: int, W: np.ndarray, p: np.ndarray, u: np.ndarray, sides: np.ndarray,
-                  G: np.ndarray) -> None:
-    """Jacobian of residual(), flat (n * n), where the rows stand on their ``sides`` (n,)."""
+def linearize(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int, n: int,
+              W: np.ndarray, p: np.ndarray, u: np.ndarray, phi: np.ndarray, resist: float,
+              G: np.ndarray, way: np.ndarray) -> None:
+    """Jacobian of residual(), flat (n * n), with the share ``resist`` of W's diagonal added to W,
+    and the right-hand side ``way`` (n,) of the equations of a step.
+    """
+    for i in range(n):
+        way[i] = -phi[i]
     for c in range(m):
         a = rows[c]
         own = W[a * n + a]
         push = p[a] - u[a] / own
-        active = sides[a] > 0
-        for j in range(n):
-            G[a * n + j] = W[a * n + j] if active else 0.0
+        active = push > 0
+        follow(W, G, n, a, active, resist)
         if not active:
-            G[a * n + a] = own
+            way[a] = -p[a]
         for k in range(1, kinds[c], 2):
             i = a + k
             own_t = max(W[i * n + i], W[(i + 1) * n + i + 1])
@@ -68,28 +74,34 @@ def newton_matrix(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.
             y, z = p[i] - u[i] / own_t, p[i + 1] - u[i + 1] / own_t
             size, most = math.sqrt(y * y + z * z), law * max(0.0, push)
             sticks = k == 1 and law >= STICKS
+            if sticks or not active or size <= most:
+                for e in range(i, i + 2):
+                    follow(W, G, n, e, active or sticks, resist)
+                    if not active and not sticks:
+                        way[e] = -p[e]
+                continue
+            y1, z1, share = y / size, z / size, most / size
             for e in range(2):
-                at = (i + e) * n
-                if not active and not sticks:
-                    for j in range(n):
-                        G[at + j] = 0.0
-                    G[at + i + e] = own_t
-                elif size <= most or sticks:
-                    for j in range(n):
-                        G[at + j] = W[at + j]
-                else:
-                    y1, z1 = y / size, z / size
-                    d = y1 if e == 0 else z1
-                    share = most / size
-                    ky = share * ((1.0 if e == 0 else 0.0) - d * y1)
-                    kz = share * ((1.0 if e == 1 else 0.0) - d * z1)
-                    for j in range(n):
-                        G[at + j] = own_t * (law * d / own * W[a * n + j]) + (
-                            ky * W[i * n + j] + kz * W[(i + 1) * n + j])
-                    G[at + a] -= own_t * law * d
-                    G[at + i + e] += own_t
-                    G[at + i] -= own_t * ky
-                    G[at + i + 1] -= own_t * kz
+                at, d = (i + e) * n, y1 if e == 0 else z1
+                ky = share * ((1.0 if e == 0 else 0.0) - d * y1)
+                kz = share * ((1.0 if e == 1 else 0.0) - d * z1)
+                normal = own_t * law * d / own
+                for j in range(n):
+                    G[at + j] = normal * W[a * n + j] + (
+                        ky * W[i * n + j] + kz * W[(i + 1) * n + j])
+                G[at + a] += resist * normal * own - own_t * law * d
+                G[at + i + e] += own_t
+                G[at + i] += (resist * W[i * n + i] - own_t) * ky
+                G[at + i + 1] += (resist * W[(i + 1) * n + i + 1] - own_t) * kz
+
+
+@compiled
+def follow(W: np.ndarray, G: np.ndarray, n: int, i: int, active: bool, resist: float) -> None:
+    """Let the step bring row i's velocity to nothing, or, if it is not ``active``, its impulse."""
+    at = i * n
+    for j in range(n):
+        G[at + j] = W[at + j] if active else 0.0
+    G[at + i] = (1 + resist) * W[at + i] if active else 1.0
 
 
 @compiled
@@ -106,12 +118,12 @@ def gauss(G: np.ndarray, n: int, x: np.ndarray) -> bool:
             for j in range(k, n):
                 G[k * n + j], G[best * n + j] = G[best * n + j], G[k * n + j]
             x[k], x[best] = x[best], x[k]
-        inverse = 1 / G[k * n + k]
+        inverse, pivot = 1 / G[k * n + k], G[k * n + k + 1:k * n + n]
         for i in range(k + 1, n):
-            f = G[i * n + k] * inverse
+            f, row = G[i * n + k] * inverse, G[i * n + k + 1:i * n + n]
             if f != 0.0:
-                for j in range(k + 1, n):
-                    G[i * n + j] -= f * G[k * n + j]
+                for j in range(n - k - 1):
+                    row[j] -= f * pivot[j]
                 x[i] -= f * x[k]
     for i in range(n - 1, -1, -1):
         s = x[i]
@@ -161,47 +173,24 @@ def solve_active(G: np.ndarray, n: int, x: np.ndarray, places: np.ndarray) -> bo
 
 
 @compiled
-def change_sides(rows: np.ndarray, m: int, n: int, W: np.ndarray, p: np.ndarray, u: np.ndarray,
-                 sides: np.ndarray, all_: bool) -> int:
-    """Let each normal row that is on the wrong side, pressing (1) or open (0), change it, or only
-    the last of them; how many are.
-    """
-    wrong, last = 0, -1
-    for c in range(m):
-        a = rows[c]
-        if (p[a] - u[a] / W[a * n + a] > 0) != (sides[a] > 0):
-            wrong, last = wrong + 1, a
-            if all_:
-                sides[a] = 1 - sides[a]
-    if wrong and not all_:
-        sides[last] = 1 - sides[last]
-    return wrong
-
-
-@compiled
 def newton(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int, n: int,
-           W: np.ndarray, b: np.ndarray, p: np.ndarray, tolerance: float, room: np.ndarray,
-           G: np.ndarray) -> float:
-    """Newton's method from p on; p becomes the best found, the largest residual, m/s, is given.
-
-    Where it turns in circles, one row at a time changes sides until fewer stand wrong, which ends
-    (block principal pivoting: Judice and Pires, Computers and Operations Research 21, 1994).
+           W: np.ndarray, b: np.ndarray, p: np.ndarray, tolerance: float, resist: float,
+           room: np.ndarray, G: np.ndarray) -> float:
+    """Newton's method from p on, against ``resist``; p becomes the best found, the largest
+    residual, m/s, is given.
     """
-    u, phi, way, keep, sides, places = room[0], room[1], room[2], room[3], room[8], room[7]
-    worst = residual(kinds, rows, mu, roll, m, n, W, b, p, u, phi)
-    best, least, patience = worst, m + 1, PATIENCE
-    for i in range(n):
-        keep[i], sides[i] = p[i], 0.0
-    change_sides(rows, m, n, W, p, u, sides, True)
-    for _ in range(NEWTON_STEPS):
-        if worst <= tolerance:
+    u, phi, way, keep, places = room[0], room[1], room[2], room[3], room[7]
+    best, late = math.inf, 0
+    for turn in range(NEWTON_STEPS + 1):
+        worst = residual(kinds, rows, mu, roll, m, n, W, b, p, u, phi)
+        late = 0 if worst < best / 2 else late + 1
+        if worst < best:
+            best = worst
+            for i in range(n):
+                keep[i] = p[i]
+        if best <= tolerance or late > PATIENCE or turn == NEWTON_STEPS:
             break
-        newton_matrix(kinds, rows, mu, roll, m, n, W, p, u, sides, G)
-        for i in range(n):
-            way[i] = -phi[i]
-        for c in range(m):
-            a = rows[c]
-            way[a] = -u[a] if sides[a] > 0 else -p[a] * W[a * n + a]
+        linearize(kinds, rows, mu, roll, m, n, W, p, u, phi, resist, G, way)
         if not solve_active(G, n, way, places):
             break
         total = 0.0
@@ -211,19 +200,7 @@ def newton(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray
             break
         for i in range(n):
             p[i] += way[i]
-        for c in range(m):
-            if sides[rows[c]] == 0.0:
-                p[rows[c]] = 0.0
-        worst = residual(kinds, rows, mu, roll, m, n, W, b, p, u, phi)
-        if worst < best:
-            best = worst
-            for i in range(n):
-                keep[i] = p[i]
-        wrong = change_sides(rows, m, n, W, p, u, sides, patience > 0)
-        if wrong < least:
-            least, patience = wrong, PATIENCE
-        else:
-            patience -= 1
-    for i in range(n):
-        p[i] = keep[i]
+    if best < math.inf:
+        for i in range(n):
+            p[i] = keep[i]
     return best

@@ -4,7 +4,8 @@ Unknown are the impulses p, rows of 1 (a limit), 3 (a contact: normal, two along
 (the same and two of rolling). The velocities after are u = W p + b. Wanted:
 u_n >= 0, p_n >= 0, u_n p_n = 0; |p_t| <= mu p_n, and where u_t is not zero p_t = -mu p_n u_t/|u_t|.
 
-Sweeps come near; where they stall, as with mass ratios of 1:1000, Newton's method ends it.
+Without friction, or where it has no limit, an active set solves it. Else sweeps come near; where
+they stall, as with mass ratios of 1:1000, Newton's method ends it.
 """
 from __future__ import annotations
 
@@ -19,8 +20,13 @@ from .newton import newton
 from .one_contact import on_disc
 from .sweep import LIMIT, sweep
 
-ROUNDS = 3
-"""Of sweeps, four times as many as in the round before, and of Newton's method."""
+ROUNDS, LOOSER = 6, 2
+"""Of sweeps, twice as many as in the round before, and of Newton's method, against ten times as
+much; the first LOOSER that come to no end make do with ten times the tolerance."""
+
+RESIST = 1e-5
+"""Share of its own W by which an impulse resists the first round's steps: enough for what is known
+to 1e-8 of W, the compliance, and far less than what decides what bodies do."""
 
 OPENING = 1e-4
 """m/s from which a contact without friction's limit is let go as open."""
@@ -44,31 +50,27 @@ def admissible(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.nda
 def solve_cones(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
                 n: int, W: np.ndarray, b: np.ndarray, p: np.ndarray, tolerance: float,
                 sweeps: int, room: np.ndarray, G: np.ndarray) -> tuple[float, int]:
-    """Solve for p (n,), from where it stands; the largest residual left, m/s, and the sweeps.
-
-    Each round that Newton's method ends without a solution makes do with ten times as much.
-    """
-    done, worst = 0, math.inf
+    """Solve for p (n,), from where it stands; the largest residual left, m/s, and the sweeps."""
+    done, left, resist = 0, math.inf, RESIST
     convex = is_convex(kinds, mu, roll, m)
     if convex:
         sweeps = 1
-    for _ in range(ROUNDS):
-        tolerance *= 10
-        for _ in range(min(sweeps, 100)):
+    for turn in range(ROUNDS):
+        for _ in range(sweeps):
             done += 1
             worst = sweep(kinds, rows, mu, roll, m, n, W, b, p, room[0])
-            if worst <= tolerance / 10:
+            if worst <= tolerance:
                 return worst, done
-        if convex and solve_active_set(
-                kinds, rows, mu, m, n, W, b, p, tolerance / 10, room, G):
-            return tolerance / 10, done
-        left = newton(kinds, rows, mu, roll, m, n, W, b, p, tolerance / 10, room, G)
+        if convex and solve_active_set(kinds, rows, mu, m, n, W, b, p, tolerance, room, G):
+            return tolerance, done
+        left = newton(kinds, rows, mu, roll, m, n, W, b, p, tolerance, resist, room, G)
         admissible(kinds, rows, mu, roll, m, p)
+        if turn < LOOSER:
+            tolerance *= 10
         if left <= tolerance:
             return left, done
-        worst = min(worst, left)
-        sweeps *= 4
-    return worst, done
+        sweeps, resist = 2 * sweeps, 10 * resist
+    return left, done
 
 
 @compiled
