@@ -31,8 +31,9 @@ FASTEST_BACK = 1.0
 PARTING = 1e-3
 """m/s or rad/s: what comes apart faster as a step begins is not held sideways in it."""
 
-SLACK = 1e-9
-"""m or rad that nobody gives back."""
+SLACK = 1e-8
+"""m or rad that nobody gives back, nor closes: the points of a face that rests differ by as much,
+and impulses that were to level them would be decided by nothing else."""
 
 
 @compiled
@@ -125,8 +126,7 @@ def ask(s: System, r: Room, count: int, n: int, h: float) -> tuple[bool, bool]:
             r.need[3, k] = 1.0 if c.start[0] > PARTING else 0.0
             for e in range(c.kind):
                 curve[c.row + e] = was[c.row + e] - c.start[e]
-            if c.gap > 0:
-                b[c.row] += c.gap / h
+            b[c.row] += max(0.0, c.gap - SLACK) / h
         elif r.unsought[0] and c.restitution > 0 and c.before < -s.bounce_speed[0]:
             b[c.row] += c.restitution * c.before
         elif c.gap > 0:

@@ -10,7 +10,7 @@ from ..maths.cholesky import factor_row, substitute
 from ..system import COMPLIANCE, OF_IMPACTS, Room
 from .solver import solve_impulses, solve_normals, weaken_by
 
-SWEEPS = 4
+SWEEPS = 8
 """Sweeps before Newton's method is asked for the first time."""
 
 UNSOLVED = 1e-5

@@ -20,7 +20,7 @@ from .newton import newton
 from .one_contact import on_disc
 from .sweep import LIMIT, sweep
 
-ROUNDS, LOOSER = 6, 2
+ROUNDS, LOOSER = 6, 3
 """Of sweeps, twice as many as in the round before, and of Newton's method, against ten times as
 much; the first LOOSER that come to no end make do with ten times the tolerance."""
 
