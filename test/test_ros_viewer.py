@@ -24,6 +24,7 @@ from visualization_msgs.msg import InteractiveMarkerFeedback
 
 from ragdoll_ros.files.scene import load_scene, save_scene
 from ragdoll_ros.files.urdf import scene_to_urdf
+from ragdoll_ros.model.errors import RagdollError
 from ragdoll_ros.model.shapes import Sphere
 from ragdoll_ros.ros.messages import to_pose_array
 from ragdoll_ros.ros.packed import poses_in
@@ -211,6 +212,20 @@ def test_steers_the_node(node, remote):
     late = remote.frame.time
     remote.reset()
     wait(lambda: remote.frame.time < late)
+
+
+def test_another_accuracy_and_what_its_ticks_cost(node, remote):
+    """Once a second the node tells its pace and the cost of a tick; a page shows both."""
+    remote.want(OPEN)
+    wait(lambda: remote.report.accuracy == 'normal' and remote.report.tick_cost > 0)
+    wait(lambda: remote.report.reached == pytest.approx(1, abs=0.5))
+    try:
+        remote.take_accuracy('draft')
+        wait(lambda: remote.report.accuracy == 'draft')
+        with pytest.raises(RagdollError, match='accuracy'):
+            remote.take_accuracy('perfect')
+    finally:
+        remote.take_accuracy('normal')
 
 
 def test_pushes_of_others_are_shown(node, remote, peer):

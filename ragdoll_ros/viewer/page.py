@@ -24,6 +24,7 @@ from .panel import FREE
 from .pointer import Pointer
 from .recording_panel import RecordingPanel
 from .rest import Rest
+from .settings import Settings
 from .sources.source import Frame, Report, Source, Wanted
 from .timeline.timeline import Timeline
 
@@ -66,6 +67,7 @@ class Page:
         with self.tabs.add_tab('Play'):
             self.controls = Controls(server, source)
             self.view = View(server)
+            self.settings = Settings(server, source)
             self.view.on_home(lambda client: self.cameras.go_home(client))
             self.timeline = Timeline(server, source)
             self._recording = RecordingPanel(server)
@@ -121,6 +123,7 @@ class Page:
                 self.cameras.show(frame)
         self.cameras.follow(frame, now, self.view.follow.value)
         self.controls.show_rest(self._rest.lies(live, report.paused, now))
+        self.settings.show(report, live.scene)
 
     def _at_hand(self) -> Frame | None:
         """What a pointer may take hold of: nothing of what is over."""

@@ -106,7 +106,8 @@ class Remote(Source):
             problem = SILENT.format(self._full, silence)
         note = ' '.join(filter(None, (self._told.note, self._known.note)))
         return dataclasses.replace(self._told, problem=problem, note=note,
-                                   engine=self._known.settings.engine)
+                                   engine=self._known.settings.engine,
+                                   accuracy=self._known.settings.accuracy)
 
     def want(self, wanted: Wanted) -> None:
         if wanted != self._wanted:
@@ -135,6 +136,10 @@ class Remote(Source):
     def take_engine(self, name: str) -> None:
         """Set the parameter `engine`; Refused if the node will not take it."""
         self._ask.set_and_wait('engine', name)
+
+    def take_accuracy(self, name: str) -> None:
+        """Set the parameter `accuracy`; Refused if the node will not take it."""
+        self._ask.set_and_wait('accuracy', name)
 
     def use(self, scene: Scene) -> None:
         """Write a scene to a file and have the node take that, if it can read it."""
@@ -224,6 +229,8 @@ class Remote(Source):
                         self._told, paused=values['paused'] == 'true',
                         note='' if is_alone else TWINS.format(self._full),
                         pace=float(values['real_time_factor']),
+                        reached=float(values['pace']),
+                        tick_cost=float(values['tick_cost_ms']) / 1e3,
                         measures={key: float(values[key]) for key in KEYS if key in values})
                 with contextlib.suppress(KeyError, ValueError):
                     zero = int(values['stamp_of_zero']), float(values['stamp_pace'])

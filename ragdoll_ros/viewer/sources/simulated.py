@@ -19,12 +19,16 @@ from ...physics.grab import EVENLY
 from ...physics.pacing import Pacer
 from ...physics.simulation import Simulation
 from .source import PACES, Frame, Held, Report, Source, Wanted
+from .tempo import Tempo
 
 MEASURE_PERIOD = 0.1
 """s on the wall between two looks at what went wrong so far, at the least."""
 
 MEASURE_SHARE = 0.05
 """Share of the simulation's thread that they may take: one look at a thousand dolls takes 0.2 s."""
+
+ACCURACY = 'normal'
+"""That a page begins with."""
 
 ENDING = 1.0
 """s that the thread may take to end."""
@@ -43,7 +47,8 @@ class Simulated(Source):
         self._commands: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         self._wanted = Wanted()
         self._frame: Frame | None = None
-        self._report = Report(pace=_pace_of(scene), engine=engine)
+        self._report = Report(pace=_pace_of(scene), engine=engine, accuracy=ACCURACY)
+        self._tempo = Tempo()
         self._simulation = Simulation(scene, engine=engine, workers='auto')
         self._pacer = Pacer(1.0, 0)
         self._next_measure = 0.0
@@ -86,6 +91,9 @@ class Simulated(Source):
 
     def take_engine(self, name: str) -> None:
         self._wait_for(lambda: self._replace(self._simulation.scene, name))
+
+    def take_accuracy(self, name: str) -> None:
+        self._wait_for(lambda: self._take_accuracy(name))
 
     def use(self, scene: Scene) -> None:
         self._wait_for(lambda: self._replace(scene, self._report.engine))
@@ -154,6 +162,7 @@ class Simulated(Source):
 
     def _restart(self) -> None:
         """Start the clock anew from here; nothing is caught up."""
+        self._tempo.forget()
         self._pacer.period = self._simulation.tick / self._report.pace
         self._pacer.start(time.monotonic_ns())
 
@@ -163,8 +172,13 @@ class Simulated(Source):
         bone = scene.qualified(doll, doll.doll.root.name)
         self._simulation.push(Push(bone, force, duration=duration), 'page')
 
+    def _take_accuracy(self, name: str) -> None:
+        self._simulation.accuracy = name
+        self._tell(accuracy=name)
+
     def _replace(self, scene: Scene, engine: str) -> None:
-        simulation = Simulation(scene, engine=engine, workers='auto')
+        simulation = Simulation(scene, accuracy=self._report.accuracy, engine=engine,
+                                workers='auto')
         pace = self._report.pace if scene is self._simulation.scene else _pace_of(scene)
         self._simulation.close()
         self._simulation = simulation
@@ -173,11 +187,13 @@ class Simulated(Source):
 
     def _tick(self) -> None:
         """Go on by one tick; a state that is not finite is never shown."""
+        begin = time.monotonic()
         try:
             state = self._simulation.advance()
             finite = math.isfinite(float(state.rows.sum()))
         except (ArithmeticError, ValueError):
             finite = False
+        self._tempo.tick(begin, time.monotonic(), self._simulation.step)
         if not finite:
             self._replace(self._simulation.scene, self._report.engine)
             self._tell(problem='the numbers ran away; the scene was started anew')
@@ -198,7 +214,8 @@ class Simulated(Source):
 
     def _measure(self) -> None:
         begin = time.monotonic()
-        self._report = Report(**{**vars(self._report), 'measures': self._simulation.measures()})
+        self._report = Report(**{**vars(self._report), 'measures': self._simulation.measures(),
+                                 'reached': self._tempo.pace, 'tick_cost': self._tempo.cost})
         took = time.monotonic() - begin
         self._next_measure = begin + max(MEASURE_PERIOD, took / MEASURE_SHARE)
 

@@ -5,6 +5,7 @@ when it draws; what the page asks for is queued and never blocks, but for `use`.
 """
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -64,6 +65,12 @@ class Report:
     """s simulated for each s on the wall that are asked for."""
     engine: str = ''
     """The engine that was asked for, by its name; empty where there is none."""
+    accuracy: str = ''
+    """The accuracy that it computes with, by its name; empty where there is none."""
+    reached: float = math.nan
+    """s simulated for each s on the wall, over the last second; NaN: not known."""
+    tick_cost: float = math.nan
+    """Mean s on the wall that a tick takes to compute, over the last second; NaN: not known."""
     measures: dict[str, float] = field(default_factory=dict)
     """As Simulation.measures() has them, no older than a second, or some more in a crowd."""
 
@@ -126,6 +133,9 @@ class Source(Protocol):
 
     def take_engine(self, name: str) -> None:
         """Start anew with another engine, by its name; waits; RagdollError if not."""
+
+    def take_accuracy(self, name: str) -> None:
+        """Go on with another accuracy, by its name; waits; RagdollError if not."""
 
     def use(self, scene: Scene) -> None:
         """Start anew with a scene; waits until it is so; RagdollError with the reason if not."""

@@ -1,0 +1,119 @@
+"""Settings of the scene at hand: accuracy with its price, gravity, ground, friction; its health."""
+from __future__ import annotations
+
+import asyncio
+import dataclasses
+import math
+from collections.abc import Callable
+
+import viser
+
+from ..model import errors
+from ..model.scene import Ground, Scene
+from ..physics.settings import ACCURACIES
+from .editor import typed
+from .editor.form import GREEN, RED, Form, colored
+from .editor.sheet import Field
+from .editor.words import sentence
+from .health import health
+from .sources.source import Report, Source
+
+AMBER = '#e67700'
+
+ERRORS_MM = {'draft': 0.55, 'normal': 0.32, 'exact': 0.03}
+"""By how much bones of the default doll are off after 0.1 s of contacts, median of 60 pieces:
+docs/accuracy.md, 'pieces'."""
+
+FIELDS = (
+    Field('gravity', 'gravity, m/s²', 'vector', 'along x, y, z; z is up'),
+    Field('friction', 'scene friction', 'text', 'of what has none of its own; inf: no slip'),
+    Field('restitution', 'bounce', 'number', 'restitution: 0 none, 1 all of it'))
+
+
+class Settings:
+    """A folder of the panel, and a line above it that tells how the simulation does."""
+
+    def __init__(self, server: viser.ViserServer, source: Source) -> None:
+        self.source = source
+        self._loop = server.get_event_loop()
+        self._scene: Scene | None = None
+        self._shown = ''
+        gui = server.gui
+        self.health = gui.add_html('')
+        with gui.add_folder('Settings', expand_by_default=False):
+            self.accuracy = gui.add_dropdown('Accuracy', tuple(ACCURACIES), visible=False,
+                                             hint='how finely it steps; goes on from where it is')
+            self.price = gui.add_html('')
+            self.form = Form(gui, FIELDS, lambda key, kind: None)
+            self.ground = gui.add_checkbox('Ground', True)
+            self.use = gui.add_button('Start with these', icon='check', color='green',
+                                      hint='start the scene anew with these')
+            self.said = gui.add_html('')
+        self.accuracy.on_update(self._choose)
+        self.use.on_click(lambda _: self._use())
+
+    def show(self, report: Report, scene: Scene) -> None:
+        """Show how the source does, and the settings of its scene if that is another one."""
+        if scene is not self._scene:
+            self._scene = scene
+            self.form.fill({'gravity': scene.gravity, 'restitution': scene.material.restitution,
+                            'friction': typed.shown(scene.material.friction)})
+            self.ground.value = scene.ground is not None
+        line, warns = health(report, scene)
+        _write(self.health, colored(line, AMBER if warns else GREEN))
+        self.accuracy.visible = report.accuracy in ACCURACIES
+        if report.accuracy != self._shown and report.accuracy in ACCURACIES:
+            self._shown = self.accuracy.value = report.accuracy
+        _write(self.price, colored(self._price(report), GREEN))
+
+    @staticmethod
+    def _price(report: Report) -> str:
+        """What the accuracy costs here, and how far bones are off with it."""
+        if report.accuracy not in ACCURACIES or math.isnan(report.tick_cost):
+            return ''
+        return (f'{1e3 * report.tick_cost:.2f} ms a tick here; by the report the default doll is '
+                f'{ERRORS_MM[report.accuracy]:g} mm off after 0.1 s of contacts (median)')
+
+    async def _choose(self, event: viser.GuiEvent) -> None:
+        """Take the chosen accuracy; it may wait for a node's answer."""
+        if event.client is not None:
+            asyncio.get_running_loop().run_in_executor(
+                None, self._ask, lambda name=event.target.value: self.source.take_accuracy(name))
+
+    def _use(self) -> None:
+        """Start anew with what stands in the fields; what is wrong is said beside it."""
+        sheet, found = self.form.values()
+        try:
+            friction = typed.number(sheet['friction'], infinite=True)
+        except errors.ModelError as error:
+            found.append(error.at('friction'))
+        self.form.tell(found)
+        if found or self._scene is None:
+            return
+        self._ask(lambda: self.source.use(self._changed(sheet, friction)))
+
+    def _changed(self, sheet: dict, friction: float) -> Scene:
+        scene = self._scene
+        material = dataclasses.replace(scene.material, friction=friction,
+                                       restitution=sheet['restitution'])
+        ground = (scene.ground or Ground()) if self.ground.value else None
+        return dataclasses.replace(scene, gravity=sheet['gravity'], material=material,
+                                   ground=ground)
+
+    def _ask(self, change: Callable[[], None]) -> None:
+        """Ask for a change; say why where it is refused."""
+        try:
+            change()
+            self.said.content = ''
+        except errors.ModelError as error:
+            self.said.content = colored(sentence(error, error.path or 'this'), RED)
+            self._shown = ''
+        except errors.RagdollError as error:
+            self.said.content = colored(str(error), RED)
+            self._shown = ''
+
+
+def _write(place: viser.GuiHtmlHandle, text: str) -> None:
+    """Write it there if it is not there yet: each writing is sent to all pages."""
+    if place.content != text:
+        place.content = text

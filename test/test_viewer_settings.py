@@ -1,0 +1,115 @@
+"""Settings and health on the page: what is chosen is what is simulated, what is wrong is said."""
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('viser')
+from page_client import served, wait
+
+from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.physics.settings import ACCURACIES
+from ragdoll_ros.viewer.health import health
+from ragdoll_ros.viewer.settings import ERRORS_MM
+from ragdoll_ros.viewer.sources.simulated import Simulated
+from ragdoll_ros.viewer.sources.source import Report
+from ragdoll_ros.viewer.sources.tempo import Tempo
+
+DROP = load_scene('drop')
+WEIGHT = 9.8 * sum(bone.mass for bone in DROP.bones)
+
+
+@pytest.fixture
+def page():
+    with served(Simulated(DROP)) as page:
+        page.client = page.open()
+        wait(lambda: page.stage and page.frame and page.frame.time > 0.1)
+        yield page
+
+
+def test_the_tempo_of_ticks():
+    """Ticks of 10 ms every 20 ms that take 5 ms each: half the pace; what is older is forgotten."""
+    tempo = Tempo()
+    assert math.isnan(tempo.pace) and math.isnan(tempo.cost)
+    for k in range(200):
+        tempo.tick(0.02 * k, 0.02 * k + (0.5 if k < 100 else 0.005), 0.01)
+    assert tempo.pace == pytest.approx(0.5) and tempo.cost == pytest.approx(0.005)
+
+
+@pytest.mark.parametrize(('changes', 'reason'), [
+    ({}, ''),
+    ({'paused': True, 'reached': 0.1}, ''),
+    ({'reached': 0.6, 'tick_cost': 0.016}, 'take draft'),
+    ({'reached': 0.6}, 'busy elsewhere'),
+    ({'measures': {'energy_excess_J': 0.0011 * WEIGHT}}, 'from nothing: take exact'),
+    ({'measures': {'energy_excess_J': 0.0011 * WEIGHT, 'work_of_pushes_J': WEIGHT}}, ''),
+    ({'measures': {'energy_excess_J': -300.0}}, '')])
+def test_health_warns_with_a_reason(changes, reason):
+    report = dataclasses.replace(Report(reached=0.99, tick_cost=2e-4), **changes)
+    line, warns = health(report, DROP)
+    assert warns == bool(reason) and reason in line
+    assert ('pace' in line) != report.paused
+
+
+def test_nothing_is_said_of_a_source_that_does_not_compute():
+    assert health(Report(), DROP) == ('', False)
+
+
+def test_errors_are_those_of_the_report():
+    """Rounded to 0.01 mm as they are shown."""
+    rows = json.loads((Path(__file__).parents[1] / 'docs/accuracy.json').read_text())
+    pieces = {row['method']: row for row in rows['figures']['pieces'] }
+    for name in ACCURACIES:
+        assert round(1e3 * pieces[f'ours-{name}']['position_median_m'], 2) == ERRORS_MM[name]
+
+
+def test_the_accuracy_by_the_dropdown_and_its_price(page):
+    wait(lambda: 'ms a tick here' in page.settings.price.content)
+    assert '0.32 mm' in page.settings.price.content
+    assert 'pace' in page.settings.health.content or 'tick' in page.settings.health.content
+    page.client.update(page.settings.accuracy, 'exact')
+    wait(lambda: page.source.report.accuracy == 'exact')
+    wait(lambda: '0.03 mm' in page.settings.price.content)
+    assert page.frame.scene is DROP, 'it goes on'
+    page.source.load('flight')
+    assert page.source.report.accuracy == 'exact'
+
+
+def test_gravity_and_ground_as_typed(page):
+    form = page.settings.form
+    page.client.update(form['gravity'], '0; 0; -1,62')
+    page.client.update(form['friction'], '0.5')
+    page.client.update(page.settings.ground, False)
+    wait(lambda: form['gravity'].value == '0; 0; -1,62' and not page.settings.ground.value)
+    page.client.update(page.settings.use, True)
+    wait(lambda: page.frame.scene is not DROP)
+    scene = page.frame.scene
+    assert scene.gravity == (0.0, 0.0, -1.62) and scene.material.friction == 0.5
+    assert scene.ground is None and scene.dolls == DROP.dolls
+
+
+@pytest.mark.parametrize(('key', 'text', 'word'), [
+    ('gravity', 'abc', '3 numbers'), ('friction', 'x', 'a number'),
+    ('restitution', '', 'a number')])
+def test_what_cannot_be_read_is_said_beside_the_field(page, key, text, word):
+    form = page.settings.form
+    page.client.update(form[key], text)
+    wait(lambda: form[key].value == text)
+    page.client.update(page.settings.use, True)
+    wait(lambda: word in form.errors[key].content)
+    assert page.source.frame.scene is DROP
+
+
+@pytest.mark.parametrize(('key', 'text', 'word'), [
+    ('friction', '-1', 'friction must be'), ('restitution', '1.5', 'restitution must be')])
+def test_what_cannot_be_is_said_in_words(page, key, text, word):
+    form = page.settings.form
+    page.client.update(form[key], text)
+    wait(lambda: form[key].value == text)
+    page.client.update(page.settings.use, True)
+    wait(lambda: word in page.settings.said.content)
+    assert page.source.frame.scene is DROP and text in page.settings.said.content
