@@ -1,6 +1,8 @@
 """The table of robots in docs/robots.md: what `ragdoll_fit` makes of every URDF of some packages.
 
 python docs/robots.py pybullet_data=FOLDER example-robot-data=FOLDER ... > docs/robots.md
+
+Standard error tells of each robot that is still awake which body moves, and how fast.
 """
 from __future__ import annotations
 
@@ -12,7 +14,10 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from ragdoll_ros.fit.judging.doubts import find_doubts
+from ragdoll_ros.fit.judging.verdict import judge
 from ragdoll_ros.fit.robots.robot import read_urdf
 from ragdoll_ros.model.errors import RagdollError
 from ragdoll_ros.model.ragdoll import Ragdoll
@@ -28,9 +33,10 @@ MANY = 500
 HEAD = """# Robots that were fitted
 
 What [`ragdoll_fit`](fit.md#a-robots-urdf) makes of every URDF of some packages on PyPI: the root,
-how many bodies, mass, how many warnings the report has; then, dropped from 0.4 m by the engine
-`rigid`, the processor time of a tick in the first second, and after how long it sleeps. For what is
-refused, the sentence, and whether PyBullet loads it. Written by `docs/robots.py`.
+how many bodies, mass, how many warnings the report has, and its [verdict](fit.md#the-verdict);
+then, dropped from 0.4 m by the engine `rigid`, the processor time of a tick in the first second,
+and after how long it sleeps. For what is refused, the sentence, and whether PyBullet loads it.
+Written by `docs/robots.py`.
 """
 
 LOADS = 'import pybullet as p, sys; p.connect(p.DIRECT); p.loadURDF(sys.argv[1])'
@@ -42,8 +48,8 @@ def main(arguments: list[str]) -> None:
     for argument in arguments:
         name, _, folder = argument.partition('=')
         paths = sorted(Path(folder).rglob('*.urdf'))
-        print(f'## {name}\n\n| file | root | bodies | kg | warnings | ms a tick | asleep after |\n'
-              '| --- | --- | --- | --- | --- | --- | --- |')
+        print(f'## {name}\n\n| file | root | bodies | kg | warnings | verdict | ms a tick '
+              '| asleep after |\n| --- | --- | --- | --- | --- | --- | --- | --- |')
         for _, each in itertools.groupby(paths, lambda path: path.parent.parent):
             for line in lines(list(each), Path(folder)):
                 print(line, flush=True)
@@ -64,7 +70,8 @@ def lines(paths: list[Path], folder: Path) -> Iterator[str]:
     masses = sorted(doll.mass for doll, _ in dolls)
     warned = sum(bool(notes) for _, notes in dolls)
     yield (f'| {len(dolls)} of {len(paths)} files like {paths[0].relative_to(folder)} | | '
-           f'{counts[0]} to {counts[-1]} | {masses[0]:.3g} to {masses[-1]:.3g} | in {warned} | | |')
+           f'{counts[0]} to {counts[-1]} | {masses[0]:.3g} to {masses[-1]:.3g} | '
+           f'in {warned} | | | |')
 
 
 def row(path: Path) -> str:
@@ -76,10 +83,10 @@ def row(path: Path) -> str:
                               check=False, timeout=100)
         loads = 'PyBullet loads it' if done.returncode == 0 else 'PyBullet does not load it'
         said = str(getattr(error, 'errors', [error])[0]).replace('|', '/')
-        return f'refused: {said} ({loads}) | | | | |'
+        return f'refused: {said} ({loads}) | | | | | |'
     warnings = len(notes) + len(find_doubts(doll))
     return (f'{doll.root.name} | {len(doll.bones)} | {doll.mass:.4g} | {warnings or ""} | '
-            f'{fall(doll)}')
+            f'{judge(doll, measured=True).word} | {fall(doll)}')
 
 
 def fall(doll: Ragdoll) -> str:
@@ -87,11 +94,17 @@ def fall(doll: Ragdoll) -> str:
     spent = 0.0
     try:
         with contextlib.closing(Simulation(above_ground(doll))) as simulation:
-            simulation.advance()
+            state = simulation.advance()
             while simulation.time < LONGEST * 1e9 and not simulation.asleep:
                 before = time.process_time()
-                simulation.advance()
+                state = simulation.advance()
                 spent += (time.process_time() - before) * (simulation.time <= 1_000_000_000)
+            if not simulation.asleep:
+                speeds = np.linalg.norm(state.linear_velocities, axis=1)
+                spins = np.linalg.norm(state.angular_velocities, axis=1)
+                print(f'{doll.name}: {doll.bones[speeds.argmax()].name} {speeds.max():.3g} m/s, '
+                      f'{doll.bones[spins.argmax()].name} {spins.max():.3g} rad/s',
+                      file=sys.stderr, flush=True)
             asleep = f'{simulation.time / 1e9:.1f} s' if simulation.asleep else 'no'
             return f'{10 * spent:.2f} | {asleep}'
     except RagdollError as error:

@@ -7,6 +7,7 @@ import pytest
 import wild_rigs
 from fit_rigs import Rig, limb
 
+from ragdoll_ros.fit.judging.verdict import judge
 from ragdoll_ros.fit.pipeline import Options, fit_character
 from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.model import errors
@@ -74,13 +75,16 @@ def test_what_would_not_run_is_refused(tmp_path):
         fit(hairy('strand'), tmp_path, Options(smallest=0.001))
 
 
+@pytest.mark.parametrize('beside', [(0, 1.2), (2.6, 0)], ids=['ahead', 'side by side'])
 @pytest.mark.parametrize('skin', wild_rigs.SKINS)
-def test_two_characters_in_one_skin_are_one_doll_and_told(tmp_path, skin):
+def test_two_characters_in_one_skin_are_one_doll_and_told(tmp_path, skin, beside):
+    """Side by side each is the other's mirror image, whose hips are no halves of one pelvis."""
+    x, z = beside
     person = wild_rigs.person()
     other = [replace(bone, name=f'other {bone.name}',
                      parent=bone.parent + len(person) if bone.parent >= 0 else -1,
-                     head=(bone.head[0], bone.head[1] * .9, bone.head[2] + 1.2),
-                     tail=(bone.tail[0], bone.tail[1] * .9, bone.tail[2] + 1.2))
+                     head=(bone.head[0] + x, bone.head[1] * .9, bone.head[2] + z),
+                     tail=(bone.tail[0] + x, bone.tail[1] * .9, bone.tail[2] + z))
              for bone in person]
     wild = wild_rigs.Wild(Rig('two', [*person, *other]), skin, {}, ())
     made = fit_character(read_character(wild_rigs.write(wild, tmp_path)))
@@ -92,3 +96,6 @@ def test_two_characters_in_one_skin_are_one_doll_and_told(tmp_path, skin):
     assert [(j.parent, j.child) for j in made.doll.joints] == [
         (j.parent, j.child) for j in one.doll.joints]
     assert len(made.doll.riders) == 44
+    # The other's skin and size count for nothing.
+    assert judge(made.doll, made, falls=False).word == judge(one.doll, one, falls=False).word
+    assert made.doll.mass == pytest.approx(one.doll.mass, rel=1e-9)

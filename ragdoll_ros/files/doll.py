@@ -17,6 +17,7 @@ from ..model.ragdoll import (
     SkeletonFrame,
     angle_errors,
     carried_errors,
+    mass_errors,
     pair_errors,
     tree_errors,
 )
@@ -58,7 +59,8 @@ def build_doll(data: object, path: Path = Path('doll')) -> tuple[Ragdoll | None,
             if all(isinstance(text, str) for text in sum(carried, ())):
                 found += carried_errors(key, names, carried)
         if not found:
-            found += pair_errors(names, data.get('no_collision', ())) + angle_errors(joints)
+            found += pair_errors(names, data.get('no_collision', ()))
+            found += angle_errors(joints) + mass_errors(bones)
     if found:
         return None, found
     model = str(path.parent / data['model']) if 'model' in data else None

@@ -24,6 +24,7 @@ from .roles.names import roles_of
 from .shapes.axes import Axes, fit_axes
 from .shapes.shapes import DECIMALS, TOLERANCE, Fitted, fit_best, fit_shape
 from .skeleton.anchors import place_anchors
+from .skeleton.apart import largest_alone
 from .skeleton.groups import Group, group_bones, partner, vertices_by_bone
 from .skeleton.skin_tree import SkinTree, find_skin_tree
 from .skeleton.soft_chains import soft_chains, thinned
@@ -83,9 +84,9 @@ class Fit:
 def fit_character(character: Character, options: Options | None = None) -> Fit:
     """Doll of a character, in its bind pose; ModelError where an option is out of range."""
     options = options or Options()
-    given, character = character, refined(character)
-    character, groups, notes = _grouped(character, options)
-    notes = [*notes, *_unmoved(character, len(given.vertices), groups)]
+    given, others = largest_alone(character)
+    character, groups, notes = _grouped(refined(given), options)
+    notes = [*notes, *others, *_unmoved(character, len(given.vertices), groups)]
     directions = [_direction(character, groups, index) for index in range(len(groups))]
     areas = character.vertex_areas()
     axes = [fit_axes(character.vertices[group.vertices], areas[group.vertices], direction,
@@ -121,14 +122,9 @@ def _grouped(character: Character,
     tree = find_skin_tree(character, clusters, roles_of(character.bone_names, character.parents))
     roles = _roles_along(tree, character.bone_names)
     springs = soft_chains(character, tree, roles, clusters)
-    swinging |= {bone for spring in springs for bone in spring.bones} | tree.strangers
+    swinging |= {bone for spring in springs for bone in spring.bones}
     groups = group_bones(character, roles, clusters, tree, options.smallest, swinging)
     notes = list(character.notes)
-    if tree.strangers:
-        first = character.bone_names[min(tree.strangers)]
-        notes.append(f'another character, of {len(tree.strangers)} bones from {first} on, is apart '
-                     'from this one: it gets no bodies and goes along with the root; export each '
-                     'by itself')
     if options.smallest is None:
         before = len(groups)
         groups, thin = thinned(character, groups)

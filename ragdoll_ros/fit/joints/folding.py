@@ -14,7 +14,7 @@ import numpy as np
 from ...model.ragdoll import Joint
 from ..reading.character import Character
 from ..skeleton.groups import Group, partner
-from .anatomy import FORWARD, UP
+from .neutral import FORWARD, UP
 
 STRAIGHT, PAST, FOLDED, FLAT = (math.radians(angle) for angle in (12, 35, 145, 70))
 """A joint bent less than STRAIGHT in the bind pose tells nothing, one bent up to PAST against what

@@ -13,8 +13,9 @@ from ..roles.names import side_of
 from ..roles.person import is_person
 from ..shapes.shapes import DECIMALS
 from ..skeleton.groups import Group
-from .anatomy import ELBOW, FORWARD, KNEE, LEFT, RANGES, UP, persons_joint
+from .anatomy import ELBOW, KNEE, RANGES, persons_joint
 from .folding import FOLDED, STRAIGHT, above_of, animal_fold
+from .neutral import FORWARD, HEADS, LEFT, UP, neutral
 
 BALLS = {'neck': (35, 40), 'head': (45, 55), 'spine': (25, 25), 'hips': (25, 25),
          'clavicle': (15, 10), 'upper_arm': (80, 50), 'thigh': (60, 30), 'tail': (45, 20),
@@ -43,8 +44,10 @@ def make_joint(character: Character, groups: list[Group], index: int, along: np.
     side = side_of(group.name) or int(np.sign(anchor[1]))
     if is_person([each.role for each in groups],
                  character.positions[[each.bone for each in groups]]):
-        joint = persons_joint(parent.name, group.name, group.role, side, anchor,
-                              along) if group.role in RANGES else None
+        rest = group.role in RANGES and neutral(character, groups, index, side, above, along)
+        heads = sum(each.role in HEADS for each in groups) if group.role in HEADS else 1
+        joint = persons_joint(parent.name, group.name, group.role, side, anchor, rest,
+                              1 / heads) if rest else None
     else:
         fold = animal_fold(character, groups, index, along)
         joint = fold.joint(parent.name, group.name, anchor) if fold else None

@@ -25,7 +25,8 @@ LARGEST_STRUCTURE = 500_000
 """Commas and brackets in the JSON: what becomes Python objects, 64 bytes each and more."""
 
 UNREADABLE_EXTENSIONS = ('EXT_meshopt_compression', 'KHR_meshopt_compression')
-"""What is on PyPI for them has no wheels."""
+"""Of what is on PyPI for them only meshopt (first released in October 2026) has wheels, from
+Python 3.11 on."""
 
 LARGEST_WHOLE = 2 ** 53
 """Whole numbers of the JSON stay below (section 2.7 of the specification)."""

@@ -21,9 +21,6 @@ NOISE = 0.003
 TOUCHING = 0.03
 """Skins this near to each other, of the whole character, may be jointed."""
 
-APART = 0.1
-"""Large islands that are further apart than this, of the whole, are different characters."""
-
 LARGE = 0.3
 """An island of more than this share of the skin is no limb that the file forgot to join."""
 
@@ -38,7 +35,7 @@ class SkinForest:
     """The bones with skin of a character; ``edges`` join them until they are one tree.
 
     ``halves`` and ``tied`` are edges between bones that are one body, and between those that
-    nothing joins; ``strangers`` are bones of other characters. All by the bones' indices.
+    nothing joins. All by the bones' indices.
     """
 
     def __init__(self, character: Character, clusters: list[np.ndarray],
@@ -58,7 +55,6 @@ class SkinForest:
         self.edges: list[tuple[int, int]] = []
         self.halves: list[tuple[int, int]] = []
         self.tied: list[tuple[int, int]] = []
-        self.strangers: list[int] = []
         self._tree_of = np.arange(len(clusters))
 
     def join_halves(self) -> None:
@@ -114,9 +110,6 @@ class SkinForest:
             if kept and (gaps[kept] <= gap + near or gap > near):
                 edge = kept
             large = self.areas[inner].sum() > LARGE * self.areas.sum()
-            if not kept and large and gap > APART * self.character.extent:
-                self._leave_out(inner)
-                continue
             strange = not kept and self._file_root(edge[0]) != self._file_root(edge[1])
             if strange and (large or gap > near):
                 # By its own root, as nothing is known of where it might turn.
@@ -129,14 +122,6 @@ class SkinForest:
         if self._tree_of[a] != self._tree_of[b]:
             self.edges.append((a, b))
             self._tree_of[self._tree_of == self._tree_of[b]] = self._tree_of[a]
-
-    def _leave_out(self, bones: np.ndarray) -> None:
-        """Take the bones of another character for bones without skin."""
-        self.strangers += bones.tolist()
-        self.skinned = [bone for bone in self.skinned if bone not in self.strangers]
-        for bone in bones:
-            self.areas[bone] = 0.0
-            self.clusters[bone] = self.clusters[bone][:0]
 
     def _trees(self) -> list[int]:
         return sorted({int(self._tree_of[bone]) for bone in self.skinned})

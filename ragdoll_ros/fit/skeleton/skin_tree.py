@@ -30,8 +30,6 @@ class SkinTree:
     """Bones that are one body with their parent, the other half."""
     tied: frozenset[int]
     """Bones that neither the file nor the skin joins to their parent."""
-    strangers: frozenset[int] = frozenset()
-    """Bones with skin of other characters: their parent is the root."""
 
     @property
     def order(self) -> list[int]:
@@ -61,8 +59,7 @@ def find_skin_tree(character: Character, clusters: list[np.ndarray],
         parents[bone] = _carrier(forest, bone, root)
     return SkinTree(tuple(parents), anchors,
                     frozenset(bone for bone, edge in edges.items() if edge in halves),
-                    frozenset(bone for bone, edge in edges.items() if edge in tied),
-                    frozenset(forest.strangers))
+                    frozenset(bone for bone, edge in edges.items() if edge in tied))
 
 
 def _find_root(forest: SkinForest) -> int:
@@ -117,8 +114,6 @@ def _parents_from(forest: SkinForest, root: int) -> tuple[list[int], list[int]]:
 
 def _carrier(forest: SkinForest, bone: int, root: int) -> int:
     """The bone with skin that a bone without follows: the next above, else below."""
-    if bone in forest.strangers:
-        return root
     if forest.above[bone] >= 0:
         return forest.above[bone]
     level = [bone]
