@@ -1,8 +1,10 @@
 """The editor on a real viser server: what is set in its widgets is done, or refused in words."""
 import dataclasses
 import html
+import os
 import threading
 import time
+from datetime import datetime
 
 import fit_rigs
 import numpy as np
@@ -467,6 +469,36 @@ def test_what_is_saved_is_called_a_scene(desk):
     assert load_scene(str(desk.path / 'scene.yaml')) == DROP
     with pytest.raises(errors.ModelErrors):
         load_doll(str(desk.path / 'scene.yaml'))
+
+
+def test_another_file_is_written_over_at_the_second_asking(desk):
+    """What this page saved or loaded last is written over without a word."""
+    path = desk.path / 'mine.yaml'
+    path.write_text("somebody else's")
+    os.utime(path, (0, datetime(2025, 3, 4, 5, 6).timestamp()))
+    desk.files.name.value = 'mine'
+    desk.files.save()
+    assert 'mine.yaml of 2025-03-04 05:06 is there already' in desk.said()
+    assert path.read_text() == "somebody else's"
+    desk.files.save()
+    assert load_scene(str(path)) == DROP
+    desk.files.save()
+    assert 'saved mine.yaml' in desk.said()
+
+
+def test_files_are_listed_with_their_dates_and_loaded_from_there(desk):
+    for day, name in enumerate(('old', 'new'), 1):
+        save_scene(load_scene('crowd'), desk.path / f'{name}.yaml')
+        os.utime(desk.path / f'{name}.yaml', (0, datetime(2025, 1, day, 12).timestamp()))
+    (desk.path / 'notes.txt').write_text('no scene')
+    desk.files.name.value = 'newest'
+    desk.files.save()
+    first, newest, new, old = desk.files.saved.options
+    assert newest.startswith('newest.yaml · 20') and first == desk.files.saved.value
+    assert (new, old) == ('new.yaml · 2025-01-02 12:00', 'old.yaml · 2025-01-01 12:00')
+    desk.files._choose(old)
+    assert desk.editor.scene == load_scene('crowd') and desk.files.name.value == 'old.yaml'
+    assert str(desk.path) in desk.files.place.content
 
 
 def test_what_cannot_be_written_is_told(desk):

@@ -17,7 +17,7 @@ pytest.importorskip('viser')
 from conftest import ROOT, light
 from page_client import PageClient
 
-from ragdoll_ros.viewer.command import main
+from ragdoll_ros.viewer.command import folder_for_files, is_open, main
 
 COMMAND = [sys.executable, '-m', 'ragdoll_ros.viewer.command']
 
@@ -97,6 +97,25 @@ def test_refuses_with_exit_code_two(arguments, words, signals, capsys):
         code = error.code
     said = capsys.readouterr().err
     assert code == 2 and all(word in said for word in words), said
+
+
+def test_files_go_to_a_folder_of_their_own(tmp_path, monkeypatch, capsys):
+    """In the home, made when it is first needed; where that cannot be, one for this run, said."""
+    monkeypatch.setenv('HOME', str(tmp_path))
+    assert folder_for_files(None) == tmp_path / 'ragdolls' and (tmp_path / 'ragdolls').is_dir()
+    assert folder_for_files(str(tmp_path)) == tmp_path and not capsys.readouterr().err
+    monkeypatch.setenv('HOME', '/dev/null')
+    folder = folder_for_files(None)
+    try:
+        assert str(folder) in capsys.readouterr().err and folder.is_dir()
+    finally:
+        folder.rmdir()
+
+
+@pytest.mark.parametrize(('host', 'others'), [
+    ('127.0.0.1', False), ('localhost', False), ('::1', False), ('0.0.0.0', True), ('::', True)])
+def test_a_page_that_others_reach_says_so(host, others):
+    assert is_open(host) == others
 
 
 def test_a_wrong_option_ends_the_process_with_two():

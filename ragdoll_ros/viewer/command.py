@@ -4,10 +4,12 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
+import ipaddress
 import os
 import signal
 import socket
 import sys
+import tempfile
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,6 +26,12 @@ if TYPE_CHECKING:
 PORT = 8080
 LAST_PORT = 65535
 HOST = '127.0.0.1'
+
+OPEN_TO_ALL = ('Whoever reaches this machine at port {} may steer the dolls and write into {}; '
+               '--host 127.0.0.1 serves this machine alone')
+
+OWN_FOLDER = 'ragdolls'
+"""Of the user's home: where the page keeps files unless --folder names another."""
 
 ENDING = 0.5
 """s that viser may take to say goodbye to its pages."""
@@ -89,9 +97,9 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument('--start-after', type=float, metavar='S', help='the node waits, started '
                         'with start_paused: let it go once a page shows it, or after so many s '
                         'without one')
-    parser.add_argument('--folder', default='.', help='where the page saves and loads scenes, and '
-                        'keeps the characters it is sent (default: the current one); pages '
-                        'can write nowhere else')
+    parser.add_argument('--folder', help='where the page saves and loads scenes, and keeps the '
+                        f'characters it is sent (~/{OWN_FOLDER}, made if missing); pages can write '
+                        'nowhere else')
     return parser
 
 
@@ -104,19 +112,37 @@ def port(text: str) -> int:
 
 def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event) -> None:
     """Serve the page until told to stop; RagdollError if it cannot be."""
-    if not os.access(options.folder, os.W_OK | os.X_OK) or not os.path.isdir(options.folder):
-        raise CannotServe(f'--folder {options.folder}: expected a folder that can be written to')
+    folder = folder_for_files(options.folder)
     number = free_port(options.host, options.port)
     source = make_source(options, for_ros)
     try:
         Page = page_class()
         with server_at(options.host, number) as server:
-            page = Page(server, source, options.folder)
+            page = Page(server, source, folder)
             page.opening = opening(options, source)
             print(f'The page is at http://{shown(options.host)}:{server.get_port()}', flush=True)
+            if is_open(options.host):
+                print(OPEN_TO_ALL.format(server.get_port(), folder), file=sys.stderr, flush=True)
             page.run(stop)
     finally:
         source.close()
+
+
+def folder_for_files(wanted: str | None) -> Path:
+    """Where the page keeps files: the ``wanted`` folder, or OWN_FOLDER, made if it is missing, or,
+    where that cannot be, one for this run alone; CannotServe if the wanted one cannot be written.
+    """
+    folder = Path(wanted) if wanted is not None else Path.home() / OWN_FOLDER
+    if wanted is None:
+        try:
+            folder.mkdir(exist_ok=True)
+        except OSError as error:
+            folder = Path(tempfile.mkdtemp(prefix='ragdolls_'))
+            print(f'{error.filename}: {error.strerror}; what the page saves goes to {folder}, '
+                  'unless --folder names another', file=sys.stderr)
+    if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
+        raise CannotServe(f'--folder {folder}: expected a folder that can be written to')
+    return folder
 
 
 def write_static(options: argparse.Namespace, for_ros: list[str]) -> None:
@@ -210,6 +236,12 @@ def server_at(host: str, port: int) -> Iterator[object]:
             ending = threading.Thread(target=server.stop, daemon=True)
             ending.start()
             ending.join(ENDING)
+
+
+def is_open(host: str) -> bool:
+    """Whether other machines reach what is served at a host."""
+    address = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)[0][4][0]
+    return not ipaddress.ip_address(address.partition('%')[0]).is_loopback
 
 
 def shown(host: str) -> str:

@@ -17,7 +17,7 @@ from .drawing.skin import KEEP_PAGE
 from .drawing.stage import Stage
 from .drawing.view import View, theme
 from .editor.editor import Editor
-from .editor.form import RED, colored
+from .editor.form import GREY, RED, colored
 from .hint import HINT
 from .opening import Opening
 from .panel import FREE
@@ -30,8 +30,6 @@ from .timeline.timeline import Timeline
 
 PERIOD = 1 / 60
 """s between two drawings at the least."""
-
-GREY = '#495057'
 
 IDLE = 0.1
 """s between two looks for a page that is open."""

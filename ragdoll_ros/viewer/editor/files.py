@@ -10,8 +10,12 @@ import viser
 from ...model import errors
 from ...model.scene import Scene
 from .folder import CHARACTERS, DOLLS, LARGEST_UPLOAD, Folder
-from .form import GREEN, RED, colored
+from .form import GREEN, GREY, RED, colored
 from .words import in_words
+
+NONE = '(choose one)'
+
+TIME = '%Y-%m-%d %H:%M'
 
 MOST_TOLD = 3
 """Reasons of a verdict that the page tells."""
@@ -28,7 +32,13 @@ class Files:
                  take: Callable[[Scene, str], None], folder: Folder) -> None:
         self._server, self._scene, self._go_on_with, self._folder = server, scene, take, folder
         self._fitting = threading.Lock()
+        self._at_hand = ''
+        """Name of the file that was saved or loaded last: Save writes over it without a word."""
+        self._asked = ''
+        """Name of the file of which Save has asked whether to write over it."""
         gui = server.gui
+        self.place = gui.add_html(colored(f'Files are kept in {folder.path}', GREY))
+        self.saved = gui.add_dropdown('saved', (NONE,), hint='newest first; loads it')
         self.name = gui.add_text('file', 'scene.yaml', hint=f'in {folder.path}')
         self.save_button = gui.add_button('Save', icon='device-floppy',
                                           hint='the whole scene, its dolls in it')
@@ -42,6 +52,8 @@ class Files:
             hint=f'a skinned .glb, .gltf or .vrm, or a .urdf; up to {LARGEST_UPLOAD // 10**6} MB')
         self.progress = gui.add_progress_bar(0.0, animated=True, visible=False)
         self.said = gui.add_html('')
+        self.saved.on_update(lambda event: event.client and self._choose(event.target.value))
+        self._list()
         self.save_button.on_click(lambda _: self.save())
         self.load_button.on_click(lambda _: self.load())
         self.download_button.on_click(lambda event: self.download(event.client))
@@ -49,13 +61,13 @@ class Files:
         self.fit_button.on_upload(lambda event: self._received(event.target, self.fit))
 
     def save(self) -> None:
-        """Write the scene to the file that is typed."""
-        self._try(lambda: f'saved {self._folder.save(self._scene(), self.name.value).name}')
+        """Write the scene to the file that is typed; over another one at the second asking."""
+        self._try(self._save)
+        self._list()
 
     def load(self) -> None:
         """Take the scene of the file that is typed."""
-        self._try(lambda: self._take(self._folder.load(self.name.value), 'load',
-                                     self.name.value.strip()))
+        self._try(self._load)
 
     def download(self, client: viser.ClientHandle | None) -> None:
         """Send the scene's file to the page that asked for it, or to all."""
@@ -78,6 +90,33 @@ class Files:
         finally:
             self.progress.visible = False
             self._fitting.release()
+
+    def _save(self) -> str:
+        name = self._folder.find(self.name.value).name
+        there = dict(self._folder.saved()).get(name)
+        if there is not None and name not in (self._at_hand, self._asked):
+            self._asked = name
+            return f'{name} of {there:{TIME}} is there already: press Save again to write over it'
+        name = self._at_hand = self._folder.save(self._scene(), self.name.value).name
+        self._asked = ''
+        return f'saved {name}'
+
+    def _load(self) -> str:
+        said = self._take(self._folder.load(self.name.value), 'load', self.name.value.strip())
+        self._at_hand, self._asked = self._folder.find(self.name.value).name, ''
+        return said
+
+    def _choose(self, shown: str) -> None:
+        """Load a file of the list."""
+        if shown != NONE:
+            self.name.value = shown.split(' · ')[0]
+            self.load()
+
+    def _list(self) -> None:
+        """Offer the files that are there now."""
+        found = [f'{name} · {changed:{TIME}}' for name, changed in self._folder.saved()]
+        self.saved.options = (NONE, *found)
+        self.saved.value = NONE
 
     def _fitted(self, name: str, content: bytes) -> str:
         scene, verdict = self._folder.fit(name, content, self._show_progress)

@@ -7,6 +7,8 @@ from __future__ import annotations
 import dataclasses
 import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -54,6 +56,15 @@ class Folder:
         path = self.find(text)
         save_scene(scene, path)
         return path
+
+    def saved(self) -> list[tuple[str, datetime]]:
+        """Names of the YAML files here with the local times of their last change, newest first."""
+        found = []
+        for path in self.path.iterdir() if self.path.is_dir() else ():
+            with suppress(OSError):
+                if path.suffix.lower() in DOLLS and path.is_file():
+                    found.append((path.name, datetime.fromtimestamp(path.stat().st_mtime)))
+        return sorted(found, key=lambda file: (file[1], file[0]), reverse=True)
 
     def load(self, text: str) -> Scene:
         """Read a scene of this folder, or of config/ by its name alone."""

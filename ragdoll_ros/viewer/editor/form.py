@@ -18,7 +18,7 @@ from .sheet import Field, Sheet, Value
 NUMBERS = ('number', 'vector')
 """Widgets that hold one number and three; both are text, in which everything can be typed."""
 
-RED, GREEN = '#c92a2a', '#2b8a3e'
+RED, GREEN, GREY = '#c92a2a', '#2b8a3e', '#495057'
 
 ROOMY = """<style>
   .mantine-Flex-root:has(> * .mantine-TextInput-root) > :first-child {width: 5em !important}
