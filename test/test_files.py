@@ -103,6 +103,24 @@ def test_a_bone_may_not_be_called_as_the_world(tmp_path):
         load_scene(str(path))
 
 
+def test_bones_of_masses_far_apart_are_refused(tmp_path):
+    """At 1e8 they run; beyond it the error names the bone, its mass and the lightest. Who builds a
+    doll in Python may do otherwise, and waits.
+    """
+    path = tmp_path / 'doll.yaml'
+    for mass, fits in ((5e8, True), (1e9, False)):
+        bones = (Bone('light', Sphere(0.1), 5.0, (0, 0, 0)),
+                 Bone('heavy', Sphere(0.1), mass, (1, 0, 0)))
+        joints = (Joint('light', 'heavy', 'ball', (0.5, 0, 0), ((1, 0, 0),)),)
+        save_doll(Ragdoll('doll', bones, joints), path)
+        if fits:
+            assert load_doll(str(path)).mass == 5e8 + 5
+            continue
+        with pytest.raises(errors.ModelErrors,
+                           match=r'bones\[1\].mass.*1000000000.0.*light with 5 kg'):
+            load_doll(str(path))
+
+
 def test_all_errors_come_at_once_with_their_places(tmp_path):
     path = tmp_path / 'five.yaml'
     path.write_text(FIVE)
