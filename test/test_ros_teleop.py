@@ -122,8 +122,8 @@ def test_of_several_nodes_a_user_says_which(peer):
     sent = peer.collect(Wrench, '/two/other/force')
     peer.wait(lambda: all(peer.count_publishers(f'/two/{name}/poses') for name in ('one', 'other')))
     followed = Followed(peer, '')
-    assert not followed.look() and not followed.look()
-    assert '/two/one, /two/other' in followed.problem
+    # Of a busy machine's nodes some are found later than others.
+    peer.wait(lambda: not followed.look() and '/two/one, /two/other' in followed.problem)
     _, terminal = start_on_terminal('teleop', 'two/other')
     screen = Screen(terminal)
 
