@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from ragdoll_ros import Bone, Ground, Placement, Ragdoll, Scene, Simulation
+from ragdoll_ros import Bone, Ground, Placement, Ragdoll, Scene, Simulation, load_scene
 from ragdoll_ros.model.scene import Material
 from ragdoll_ros.model.shapes import Box, Sphere
 from ragdoll_ros.physics.engine.protocol import GROUND
@@ -28,6 +28,7 @@ def test_a_stack_and_a_ball_beside_it_bear_their_weights(engine):
         for _ in range(28):  # and before they sleep
             simulation.advance()
         found = simulation.contacts
+        assert simulation.bones_on_ground.tolist() == [True, False, False, True]
     borne = {}
     for pair in {*zip(found.a.tolist(), found.b.tolist(), strict=True)}:
         own = (found.a == pair[0]) & (found.b == pair[1])
@@ -60,6 +61,20 @@ def test_what_sleeps_on_each_other_goes_on_touching_while_others_move():
                 pairs = set(zip(found.a.tolist(), found.b.tolist(), strict=True))
                 assert (1, 0) in pairs or (0, 1) in pairs
         assert engine.resting[:2].all() and not engine.resting[3]
+
+
+@pytest.mark.parametrize('engine', ['rigid', 'bullet'])
+def test_bones_of_one_doll_on_the_ground_are_those_of_contacts(engine):
+    """In the air, as it lands, and as it lies; a joint at its limit is no contact."""
+    pytest.importorskip({'rigid': 'numba', 'bullet': 'pybullet'}[engine])
+    seen = set()
+    with Simulation(load_scene('drop'), engine=engine, accuracy='draft') as simulation:
+        for _ in range(150):
+            simulation.advance()
+            found, on = simulation.contacts, simulation.bones_on_ground
+            assert set(np.flatnonzero(on)) == set(found.a[found.b == GROUND])
+            seen.add(int(on.sum()))
+    assert 0 in seen and max(seen) >= 4
 
 
 def test_without_a_touch_all_arrays_are_empty():

@@ -5,10 +5,9 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from ..model.coordinates import DofLayout, GeneralizedState
+from ..model.coordinates import GeneralizedState
 from ..model.errors import RagdollError
 from ..people import standing
-from ..physics.engine.protocol import GROUND
 from ..physics.ground_heights import GroundHeights
 from ..physics.guard import Guard
 from ..physics.simulation import Simulation
@@ -51,8 +50,8 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
         scene, states, touching, recipe.data['feet'], round(LASTS * recipe.rate),
         **recipe.data['phases']) if frames.valid else Phases()
     return Fall(start.number, start.drawn, scene, np.arange(recipe.frames) / recipe.rate,
-                frames.states, *frames.joint_motion(), frames.touching, recipe.imus, recipe.parts,
-                frames.worn, frames.valid, failure, phases, excess)
+                frames.states, frames.angles, frames.rates, frames.touching, recipe.imus,
+                recipe.parts, frames.worn, frames.valid, failure, phases, excess)
 
 
 class _Frames:
@@ -62,36 +61,30 @@ class _Frames:
         count, self._parts = recipe.frames, recipe.parts
         self._wearers = [start.scene.bone_index(imu['bone']) for imu in recipe.imus]
         self.worn = np.full(((count - 1) * self._parts + 1, len(self._wearers), 13), np.nan)
-        self._layout = DofLayout([placement.doll for placement in start.scene.dolls])
-        n, sizes = len(start.scene.bones), self._layout.sizes
+        n, k = len(start.scene.bones), len(start.scene.angle_names)
         self.states, self.touching = np.full((count, n, 13), np.nan), np.zeros((count, n), bool)
-        self._q, self._v = (np.full((count, size), np.nan) for size in sizes)
+        self.angles, self.rates = np.full((2, count, k), np.nan)
         self.valid = 0
 
     def add(self, simulation: Simulation) -> None:
         """Record what is now."""
-        at, contacts, coordinates = self.valid, simulation.contacts, simulation.coordinates
+        at = self.valid
         self.states[at] = simulation.state.rows
-        self.touching[at, contacts.a[contacts.b == GROUND]] = True
-        self._q[at], self._v[at] = coordinates.q, coordinates.v
-        last = at * self._parts
-        for back, state in enumerate(simulation.trail[:0:-1] if at else simulation.trail):
-            self.worn[last - back] = state.rows[self._wearers]
+        self.touching[at] = simulation.bones_on_ground
+        self.angles[at], self.rates[at] = simulation.joint_angles, simulation.joint_rates
+        if self._wearers:
+            last = at * self._parts
+            for back, state in enumerate(simulation.trail[:0:-1] if at else simulation.trail):
+                self.worn[last - back] = state.rows[self._wearers]
         self.valid += 1
 
     def hold(self) -> None:
         """Nothing changes any more."""
         at = self.valid - 1
-        for each in (self.states, self.touching, self._q, self._v):
+        for each in (self.states, self.touching, self.angles, self.rates):
             each[at:] = each[at]
         self.worn[at * self._parts:] = self.worn[at * self._parts]
         self.valid = len(self.states)
-
-    def joint_motion(self) -> tuple[np.ndarray, np.ndarray]:
-        """Joint angles (t, k) rad and rates (t, k) rad/s."""
-        motion = [GeneralizedState(q, v) for q, v in zip(self._q, self._v, strict=True)]
-        return (np.array([self._layout.joint_angles(each.q) for each in motion]),
-                np.array([self._layout.joint_rates(each) for each in motion]))
 
 
 def begin(simulation: Simulation, start: Start) -> None:

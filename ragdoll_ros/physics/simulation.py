@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -59,7 +59,6 @@ class Simulation:
         self._engine: Engine = self._make(resolve_accuracy(accuracy))
         self._placed: GeneralizedState | None = None
         self._start = self._engine.save()
-        self._gap, self._heights = JointGap(scene), GroundHeights(scene)
         self._sleep_detector = SleepDetector(scene)
         self._swings = SwingSimulation(scene) if any(
             placement.doll.swings for placement in scene.dolls) else None
@@ -149,6 +148,11 @@ class Simulation:
         return self._engine.contacts()
 
     @property
+    def bones_on_ground(self) -> np.ndarray:
+        """Which bones (n,) touch the ground now: those of contacts, but sooner told."""
+        return self._engine.bones_on_ground()
+
+    @property
     def coordinates(self) -> GeneralizedState:
         """Generalised coordinates and velocities of all dolls now."""
         return self._engine.coordinates
@@ -156,12 +160,12 @@ class Simulation:
     @property
     def joint_angles(self) -> np.ndarray:
         """All joint angles, rad, in the order of Scene.angle_names."""
-        return self._engine.layout.joint_angles(self.coordinates.q)
+        return self._engine.joint_angles
 
     @property
     def joint_rates(self) -> np.ndarray:
         """What the joint angles change by, rad/s."""
-        return self._engine.layout.joint_rates(self.coordinates)
+        return self._engine.joint_rates
 
     def push(self, push: Push | Drive, channel: str | None = None) -> None:
         """Let a push act from its start on; on a ``channel`` it takes the place of the last.
@@ -318,6 +322,14 @@ class Simulation:
             self._engine.advance(duration, *acting)
             self._hands.move(duration)
         self.time = end
+
+    @cached_property
+    def _gap(self) -> JointGap:
+        return JointGap(self.scene)
+
+    @cached_property
+    def _heights(self) -> GroundHeights:
+        return GroundHeights(self.scene)
 
     @property
     def _springs(self) -> Springs:

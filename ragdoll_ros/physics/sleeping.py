@@ -35,6 +35,9 @@ class SleepDetector:
 
     def __init__(self, scene: Scene) -> None:
         self._sizes = np.array([max(bone.shape.half_extents) for bone in scene.bones])
+        self._lever = np.ones((len(scene.bones), 6))
+        self._lever[:, 3:] = self._sizes[:, None]
+        """(n, 6): what makes speeds, m/s, of velocities and spins."""
         self._first = np.array([own.start for own in scene.bone_slices])
         self._doll = scene.doll_of_bone
         size = min(placement.doll.extent for placement in scene.dolls) / HUMAN
@@ -66,9 +69,7 @@ class SleepDetector:
         if not self._pulled or not np.count_nonzero(slow):
             self.disturb()
             return np.zeros(len(slow), bool)
-        speeds = np.maximum(
-            np.abs(state.linear_velocities).max(axis=1),
-            np.abs(state.angular_velocities).max(axis=1) * self._sizes)
+        speeds = np.abs(state.rows[:, 7:] * self._lever).max(axis=1)
         slow &= np.maximum.reduceat(speeds, self._first) <= self._speed
         begun = (slow & (self._still == 0))[self._doll]
         self._since[begun] = state.rows[begun, :7]

@@ -218,10 +218,27 @@ class Clusters:
 
     def _touching_of_one(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The same of a scene of one doll, three times as quick."""
+        known, lasted = self._known_of_one(), self._alone[0].course.tally['lasted'][0]
+        return _touching(known, self._records, np.zeros(len(known), np.int64),
+                         np.full(len(known), lasted))
+
+    def on_ground(self) -> np.ndarray:
+        """Which bones (n,) of the scene touch the ground; of one doll a tenth of the work that
+        touching() is.
+        """
+        on = np.zeros(len(self._records), bool)
+        if len(self._alone) == 1:
+            known = self._known_of_one()
+            on[self._records[known['a'][(known['kind'] > 1) & (known['b'] < 0)]]] = True
+        else:
+            _, bones, _ = self.touching()
+            on[bones[bones[:, 1] == GROUND, 0]] = True
+        return on
+
+    def _known_of_one(self) -> np.ndarray:
+        """Contacts, and joints at their limits, of the last step of a scene of one doll."""
         course = self._alone[0].course
-        count = 0 if course.path['valid'][0] else int(course.tally['contacts'][0])
-        return _touching(course.known[:count], self._records, np.zeros(count, np.int64),
-                         np.full(count, course.tally['lasted'][0]))
+        return course.known[:0 if course.path['valid'][0] else int(course.tally['contacts'][0])]
 
     def save(self) -> object:
         """A snapshot that restore() brings back to the bit."""
@@ -361,8 +378,9 @@ def _touching(known: np.ndarray, records: np.ndarray, first: np.ndarray,
 
     Their records count from the ``first`` (c,) of ``records``, which hold the scene's bones.
     """
-    touch = known['kind'] > 1
-    known, first, lasted = known[touch], first[touch], lasted[touch]
+    touch = np.flatnonzero(known['kind'] > 1)
+    # take: an index in brackets goes through such wide records field by field
+    known, first, lasted = known.take(touch), first[touch], lasted[touch]
     bones = np.empty((len(known), 2), np.int64)
     bones[:, 0] = records[first + known['a']]
     bones[:, 1] = np.where(known['b'] < 0, GROUND, records[first + known['b']])

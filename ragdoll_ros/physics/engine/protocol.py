@@ -169,6 +169,14 @@ class Engine(Protocol):
         """Generalised coordinates and velocities of all dolls now."""
 
     @property
+    def joint_angles(self) -> np.ndarray:
+        """Joint angles (k,) rad of these coordinates, in the order of Scene.angle_names."""
+
+    @property
+    def joint_rates(self) -> np.ndarray:
+        """What they change by (k,), rad/s."""
+
+    @property
     def motion(self) -> Motion:
         """Sums over each doll now."""
 
@@ -199,6 +207,9 @@ class Engine(Protocol):
 
     def contacts(self) -> Contacts:
         """What touches now."""
+
+    def bones_on_ground(self) -> np.ndarray:
+        """Which bones (n,), true or false, have contacts with the ground now."""
 
     @property
     def energy_excess(self) -> float:

@@ -64,6 +64,17 @@ class RigidEngine:
         return GeneralizedState(q, v)
 
     @property
+    def joint_angles(self) -> np.ndarray:
+        """Joint angles (k,) rad now."""
+        return self.layout.joint_angles(self._clusters.q)
+
+    @property
+    def joint_rates(self) -> np.ndarray:
+        """What they change by (k,), rad/s."""
+        # The roots' spins, which v has along the roots' own axes, are none of the joints'.
+        return self.layout.joint_rates(GeneralizedState(self._clusters.q, self._clusters.v))
+
+    @property
     def motion(self) -> Motion:
         """Sums over each doll now."""
         return self._motion
@@ -120,6 +131,10 @@ class RigidEngine:
         known, bones, lasted = self._clusters.touching()
         return Contacts(bones[:, 0], bones[:, 1], known['point'], known['normal'], -known['gap'],
                         known['impulse'][:, 0] / lasted)
+
+    def bones_on_ground(self) -> np.ndarray:
+        """Which bones (n,) touch the ground now."""
+        return self._clusters.on_ground()
 
     @property
     def energy_excess(self) -> float:

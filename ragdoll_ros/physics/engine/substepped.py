@@ -66,6 +66,16 @@ class SubsteppedEngine(ABC):
         return self._coordinates
 
     @property
+    def joint_angles(self) -> np.ndarray:
+        """Joint angles (k,) rad now."""
+        return self.layout.joint_angles(self.coordinates.q)
+
+    @property
+    def joint_rates(self) -> np.ndarray:
+        """What they change by (k,), rad/s."""
+        return self.layout.joint_rates(self.coordinates)
+
+    @property
     def motion(self) -> Motion:
         """Sums over each doll now."""
         if self._motion is None:
@@ -111,6 +121,12 @@ class SubsteppedEngine(ABC):
     def grounded(self) -> np.ndarray:
         """Whether anything touches the ground, for all dolls (d,) the same."""
         return np.full(len(self.resting), any(GROUND in pair for pair in self._touched()))
+
+    def bones_on_ground(self) -> np.ndarray:
+        """Which bones (n,) touch the ground now."""
+        contacts, on = self.contacts(), np.zeros(len(self.scene.bones), bool)
+        on[contacts.a[contacts.b == GROUND]] = True
+        return on
 
     @property
     def energy_excess(self) -> float:
