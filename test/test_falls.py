@@ -229,6 +229,9 @@ def test_five_errors_are_all_named():
     ({'ground': {'friction': float('nan')}}, 'ground.friction'),
     ({'record': {'rate': 1}}, 'record.rate'),
     ({'record': {'imu_rate': 250}}, 'record.imu_rate'),
+    *[({'record': {'imus': [{'name': 'a', 'bone': 'torso', key: value}]}}, f'record.imus[0].{path}')
+      for key, value, path in (('noise_rate', -1, 'noise_rate'), ('range', [-1, 0], 'range'),
+                               ('noise_acceleration', float('nan'), 'noise_acceleration'))],
     ({'seed': -1}, 'seed')])
 def test_what_cannot_be_drawn_is_refused(changes, path):
     _, found = build_recipe({**STAND, **changes}, Path('recipe.yaml'))

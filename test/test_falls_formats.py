@@ -21,6 +21,7 @@ from ragdoll_ros.files.urdf import to_urdf
 from ragdoll_ros.fit.command import main as fit
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.errors import OutOfRange, WrongForm
+from ragdoll_ros.physics.imu import Mount, imu_samples
 
 parquet = pytest.importorskip('pyarrow.parquet')
 pandas = pytest.importorskip('pandas')
@@ -279,6 +280,51 @@ def test_a_turning_arm_feels_its_centripetal_acceleration():
     samples = worn_samples(fall, 0)
     # The mean over an angle a of 0.004 rad is sin(a / 2) / (a / 2) of it: 7e-7 less.
     np.testing.assert_allclose(samples, [[-4 ** 2 * 0.08, 0, 0, 0, 0, 4]] * 200, atol=2e-6)
+
+
+def test_a_sensors_flaws_are_added_to_what_it_should_read():
+    """At 1 kHz on a ball that falls, rests and sleeps: white, of the recipe, the fall's number and
+    the sensor's place alone, and not there unless asked for.
+    """
+    flawed = {'noise_acceleration': 0.2, 'noise_rate': 0.03, 'bias': [1, 0, 0, 0, 0, 0.5]}
+
+    def noise_of(number, sensors, seconds=2.0, **changes):
+        fall = next(generate(recipe({**DROP, 'duration': seconds, **changes}, record={
+            'rate': 100, 'imu_rate': 1000, 'imus': [
+                {'name': f'a{k}', 'bone': 'ball', **own} for k, own in enumerate(sensors)]}),
+            [number]))
+        read = [worn_samples(fall, k)[1:] for k in range(len(sensors))]
+        true = imu_samples(fall.worn[:, 0], Mount('ball'), 0.001, fall.scene.gravity)
+        return [samples - true for samples in read]
+
+    many = np.concatenate([noise_of(k, [flawed])[0] for k in range(25)]) - flawed['bias']
+    # 49 750 samples of three axes each: a variance is known to 0.37 %.
+    assert many[:, :3].var() == pytest.approx(0.2 ** 2, rel=0.02)
+    assert many[:, 3:].var() == pytest.approx(0.03 ** 2, rel=0.02)
+    one, other = noise_of(3, [flawed, flawed])
+    again, = noise_of(3, [flawed])
+    np.testing.assert_array_equal(one, again)
+    np.testing.assert_array_equal(noise_of(3, [flawed], seconds=1.0)[0], one[:990])
+    for another in (other, noise_of(4, [flawed])[0], noise_of(3, [flawed], seed=1)[0]):
+        # Of 1990 pairs of white numbers a correlation is 0 +- 0.022.
+        assert abs(np.corrcoef(one[:, 0], another[:, 0])[0, 1]) < 0.1
+    clean, = noise_of(3, [{}])
+    assert not clean.any()
+    clipped = recipe({**DROP, 'duration': 0.6}, record={
+        'imus': [{'name': 'a', 'bone': 'ball', 'range': [5, 0]}]})
+    assert worn_samples(next(generate(clipped, [0])), 0)[-1].tolist() == [0, 0, 5, 0, 0, 0]
+
+
+def test_mcap_tells_a_sensors_noise(tmp_path):
+    reader = pytest.importorskip('mcap_ros2.reader')
+    made = recipe(DROP, record={'imus': [{'name': 'a', 'bone': 'ball', 'noise_rate': 0.03}]})
+    run(Order(made, 1, 'mcap'), tmp_path,
+        lambda order, shards: (make_shard(order, shard) for shard in shards))
+    message = next(iter(reader.read_ros2_messages(
+        tmp_path / 'mcap/fall_0000000.mcap', topics=['/ragdoll/imu/a/data_raw']))).ros_msg
+    assert list(message.angular_velocity_covariance) == pytest.approx(
+        (0.03 ** 2 * np.eye(3)).ravel().tolist())
+    assert not any(message.linear_acceleration_covariance)
 
 
 def test_a_fast_sensor_has_several_samples_a_frame(tmp_path):

@@ -13,6 +13,7 @@ from ..model.vectors import finite, unit
 from ..people.person import HEIGHTS, MASSES
 from ..physics.simulation import MOST_PARTS
 from .distribution import choices, distribution_errors, support
+from .worn import flaws_of
 
 RATE = 100
 """Frames in each s where a recipe does not say."""
@@ -114,7 +115,7 @@ def _wrong_rate(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
 
 
 def _wrong_imus(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
-    """IMUs of one name, or whose place or orientation is none."""
+    """IMUs of one name, or whose place, orientation or flaws are none."""
     if any_under(found, 'record'):
         return
     names = []
@@ -122,6 +123,7 @@ def _wrong_imus(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
         where = f'record.imus[{index}]'
         try:
             mounted(mount)
+            flaws_of(mount)
         except ModelError as error:
             yield error.at(where)
         if mount['name'] in names:

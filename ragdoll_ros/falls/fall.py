@@ -59,6 +59,8 @@ class Fall:
     phases: Phases
     energy_excess: float
     """J that nothing put in, at the last valid frame; losses make it negative."""
+    noise_key: int = 0
+    """Philox's, for what sensors add: the recipe's, 128 bits."""
 
     @property
     def masses(self) -> np.ndarray:

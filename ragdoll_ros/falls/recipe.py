@@ -73,7 +73,9 @@ class Recipe:
 
     @property
     def imus(self) -> list[dict]:
-        """Sensors that are worn: name, bone, position m and orientation along the bone's axes."""
+        """Sensors that are worn: name, bone, position m and orientation along the bone's axes, and
+        of Flaws what is given.
+        """
         return self.data['record']['imus']
 
     @cached_property
@@ -82,7 +84,7 @@ class Recipe:
         return _digest(self.data)
 
     @cached_property
-    def _key(self) -> int:
+    def key(self) -> int:
         """What all draws depend on beside a fall's number: 128 bits of what is drawn from."""
         return int(_digest({key: self.data[key] for key in DRAWN})[:32], 16)
 
@@ -102,7 +104,7 @@ class Recipe:
         another's.
         """
         errors.check_range('fall', number, 0, 2 ** 63)
-        philox = np.random.Philox(key=self._key, counter=[0, 0, 0, number])
+        philox = np.random.Philox(key=self.key, counter=[0, 0, 0, number])
         generator = np.random.Generator(philox)
         values = draw({key: self.data[key] for key in ('start', 'pushes', 'limp', 'ground')},
                       generator)

@@ -51,7 +51,7 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
         **recipe.data['phases']) if frames.valid else Phases()
     return Fall(start.number, start.drawn, scene, np.arange(recipe.frames) / recipe.rate,
                 frames.states, frames.angles, frames.rates, frames.touching, recipe.imus,
-                recipe.parts, frames.worn, frames.valid, failure, phases, excess)
+                recipe.parts, frames.worn, frames.valid, failure, phases, excess, recipe.key)
 
 
 class _Frames:

@@ -11,12 +11,13 @@ import io
 import json
 from pathlib import Path
 
+import numpy as np
 from mcap_ros2.writer import Writer
 
 from ...files.urdf import to_urdf
 from ..fall import Fall
 from ..recipe import Recipe
-from ..worn import worn_samples
+from ..worn import flaws_of, worn_samples
 from .definitions import DEFINITIONS
 
 NAME = 'mcap/fall_{number:07d}.mcap'
@@ -54,8 +55,7 @@ def _written(recipe: Recipe, fall: Fall) -> bytes:
             for mount, own in zip(recipe.imus, samples, strict=True):
                 for place in range(max(0, (frame - 1) * fall.parts + 1), frame * fall.parts + 1):
                     write(f'imu/{mount["name"]}/data_raw', 'sensor_msgs/msg/Imu',
-                          place / fall.parts, _imu(fall, place / fall.parts, mount['name'],
-                                                   own[place]))
+                          place / fall.parts, _imu(fall, place / fall.parts, mount, own[place]))
             write('joint_states', 'sensor_msgs/msg/JointState', frame, _joints(fall, frame))
     return stream.getvalue()
 
@@ -82,12 +82,17 @@ def _joints(fall: Fall, frame: int) -> dict:
             'effort': []}
 
 
-def _imu(fall: Fall, frame: float, name: str, sample: list[float]) -> dict:
-    """By REP 145: no orientation is measured, covariances are unknown."""
-    unknown, unmeasured = [0.0] * 9, [-1.0] + [0.0] * 8
-    return {'header': _header(fall, frame, name), 'orientation': {'x': 0, 'y': 0, 'z': 0, 'w': 1},
+def _imu(fall: Fall, frame: float, sensor: dict, sample: list[float]) -> dict:
+    """By REP 145: no orientation is measured; without noise a covariance is unknown."""
+    flaws, unmeasured = flaws_of(sensor), [-1.0] + [0.0] * 8
+    return {'header': _header(fall, frame, sensor['name']),
+            'orientation': {'x': 0, 'y': 0, 'z': 0, 'w': 1},
             'orientation_covariance': unmeasured,
             'angular_velocity': dict(zip('xyz', sample[3:], strict=True)),
-            'angular_velocity_covariance': unknown,
+            'angular_velocity_covariance': _covariance(flaws.noise_rate),
             'linear_acceleration': dict(zip('xyz', sample[:3], strict=True)),
-            'linear_acceleration_covariance': unknown}
+            'linear_acceleration_covariance': _covariance(flaws.noise_acceleration)}
+
+
+def _covariance(deviation: float) -> list[float]:
+    return (deviation ** 2 * np.eye(3)).ravel().tolist()
