@@ -21,7 +21,7 @@ ARROWS = {
     'viewer': {'physics', 'fit', 'recordings', 'files', 'model'},
     'replay': {'physics', 'fit', 'recordings', 'files', 'model'},
     'accuracy': {'physics', 'people', 'files', 'model'},
-    'falls': {'physics', 'people', 'fit', 'recordings', 'files', 'model'}}
+    'falls': {'physics', 'people', 'files', 'model'}}
 """What a room may import of others."""
 
 ONLY = {'pybullet': 'physics/engine/bullet.py', 'mujoco': 'physics/engine/mujoco.py',
