@@ -1,6 +1,9 @@
 """What is put into an engine from outside, and what a guard makes of it."""
 from __future__ import annotations
 
+import dataclasses
+import time
+
 import numpy as np
 import pytest
 from poison import POISONS, poison
@@ -122,3 +125,22 @@ def test_a_guard_leaves_the_simulation_its_bits():
 def test_every_engine_says_what_error_of_energy_is_its_own():
     for name in ('rigid', 'bullet'):
         assert 0 < resolve_engine(name).make.energy_error < 1
+
+
+def test_no_other_thread_works_on_after_a_look_at_a_crowd():
+    """OpenBLAS's spin for 0.1 s after each sum of more than 10 000 numbers: a core, at 100 Hz."""
+    scene = load_scene('crowd')
+    scene = dataclasses.replace(scene, dolls=tuple(
+        dataclasses.replace(scene.dolls[0], name=f'doll_{k}', position=(2.5 * k, 0.0, 1.0))
+        for k in range(100)))
+    with Simulation(scene) as simulation:
+        guard, others = Guard(simulation), -thread_times()
+        for _ in range(30):
+            assert guard.advance() is None
+            time.sleep(0.005)  # what does nothing takes none of a processor's time
+        assert others + thread_times() < 0.03, 's, of 0.15'
+
+
+def thread_times():
+    """Time, s, that this process's other threads had of processors."""
+    return time.process_time() - time.thread_time()

@@ -73,7 +73,7 @@ class Guard:
         for name, numbers in (('the state', state.rows),
                               ('a swing', None if swings is None else swings.positions)):
             # not <=: NaN is no number
-            if numbers is not None and not np.vdot(numbers, numbers) <= BOUND ** 2:
+            if numbers is not None and not sum_of_squares(numbers) <= BOUND ** 2:
                 finite = np.isfinite(numbers).all()
                 return f'{name} is ' + (f'farther than {BOUND:g}' if finite else 'not finite')
         if state is before:
@@ -86,6 +86,12 @@ class Guard:
             return f'energy rose by {gained:.4g} J that nothing put in'
         self._excess = excess
         return ''
+
+
+def sum_of_squares(numbers: np.ndarray) -> float:
+    """Of all numbers; not by BLAS, whose threads spin on for 0.1 s after each sum of a crowd's."""
+    flat = numbers.ravel()
+    return float(np.einsum('i,i', flat, flat))
 
 
 def _energy_at_hand(scene: Scene) -> float:
