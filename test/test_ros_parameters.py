@@ -114,7 +114,8 @@ def test_two_nodes_of_one_name_are_told_of(make_node, peer):
     said = rosout(peer, nodes[0])
     reports = peer.collect(DiagnosticArray, '/diagnostics')
     peer.executor_.add_node(nodes[1])
-    peer.wait(lambda: any('2 nodes are called /ragdoll' in line for line in said()))
+    peer.wait(lambda: any('2 nodes are called /ragdoll' in line and 'end all but one' in line
+                          for line in said()))
     peer.wait(lambda: any('2 nodes have this name' in report.status[0].message
                           for _, report in reports))
     peer.executor_.remove_node(nodes[1])

@@ -433,7 +433,7 @@ def test_an_open_page_follows_a_node_that_comes_back_with_another_scene(
     page.source.grab('page 0', 'head', (0.0, 0.0, 0.0), (0.0, 0.0, 2.0))
     wait(lambda: page.frame.held)
     kill(node)
-    wait(lambda: 'silent' in page.problem.content)
+    wait(lambda: 'silent' in page.problem.content and 'start it again' in page.problem.content)
     start('node', '--ros-args', '-p', 'scene:=crowd')
     wait(lambda: page.stage.scene == load_scene('crowd'))
     wait(lambda: not page.problem.content)

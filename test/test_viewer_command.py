@@ -68,7 +68,21 @@ def test_a_port_that_was_asked_for_and_is_taken_is_an_error(signals, capsys):
         port = taken.getsockname()[1]
         assert main(['--scene', 'drop', '--port', str(port)]) == 2
     said = capsys.readouterr().err
-    assert str(port) in said and 'in use' in said
+    assert str(port) in said and 'in use' in said and 'without --port' in said
+
+
+def test_a_port_of_the_system_is_for_root_alone():
+    lowest = Path('/proc/sys/net/ipv4/ip_unprivileged_port_start')
+    if not lowest.exists() or int(lowest.read_text()) <= 80:
+        pytest.skip('this system gives port 80 to everybody')
+    done = subprocess.run(
+        [sys.executable, '-c', 'from ragdoll_ros.viewer.command import free_port\n'
+         # Who is nobody may not read the library from which this codec comes.
+         'import os\n"".encode("idna")\n'
+         'if os.getuid() == 0: os.setuid(65534)\nfree_port("127.0.0.1", 80)'],
+        cwd=ROOT, capture_output=True, text=True, timeout=30)
+    said = done.stderr.splitlines()[-1]
+    assert '--port 80' in said and 'root' in said and '1024' in said
 
 
 @pytest.fixture
@@ -85,7 +99,8 @@ def signals():
     (('--scene', 'drop', '--host', '203.0.113.1'), ['203.0.113.1', 'address']),
     (('--scene', 'drop', '--host', 'no such host'), ['no such host']),
     (('--scene', 'drop', '--port', '99999'), ['99999', '65535']),
-    (('--scene', 'drop', '--port', 'x'), ['--port', "'x'"]),
+    (('--scene', 'drop', '--host', '..'), ['..', '127.0.0.1']),
+    (('--scene', 'drop', '--port', 'x'), ['--port', 'x', '65535']),
     (('--scene', 'drop', '--engine', 'steam'), ['steam', 'rigid', 'bullet']),
     (('--engine', 'bullet'), ['--engine', '--scene']),
     (('--scene', 'drop', '--ros-args', '-r', '__ns:=/a'), ['--ros-args', '--scene']),
@@ -116,6 +131,14 @@ def test_files_go_to_a_folder_of_their_own(tmp_path, monkeypatch, capsys):
     ('127.0.0.1', False), ('localhost', False), ('::1', False), ('0.0.0.0', True), ('::', True)])
 def test_a_page_that_others_reach_says_so(host, others):
     assert is_open(host) == others
+
+
+def test_an_open_host_is_told_with_what_to_do():
+    process, port = start('--scene', 'drop', '--host', '0.0.0.0', '--port', '0')
+    process.send_signal(signal.SIGTERM)
+    _, error = process.communicate(timeout=10)
+    said, = error.splitlines()
+    assert f'at port {port} may steer' in said and '--host 127.0.0.1' in said
 
 
 def test_a_wrong_option_ends_the_process_with_two():

@@ -20,4 +20,5 @@ class Namesakes:
         if self.count > before:
             node.get_logger().warning(
                 f'{self.count + 1} nodes are called {node.get_fully_qualified_name()}: their '
-                'messages mix; give one a namespace, --ros-args -r __ns:=/other')
+                'messages mix; end all but one, or start each in a namespace of its own: '
+                '--ros-args -r __ns:=/other')

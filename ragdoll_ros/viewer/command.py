@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import errno
 import io
 import ipaddress
 import os
@@ -32,6 +33,11 @@ OPEN_TO_ALL = ('Whoever reaches this machine at port {} may steer the dolls and 
 
 OWN_FOLDER = 'ragdolls'
 """Of the user's home: where the page keeps files unless --folder names another."""
+
+REMEDIES = {
+    errno.EADDRINUSE: f'without --port, the next free one from {PORT} on is taken',
+    errno.EACCES: f'ports below 1024 are for root alone: expected one from 1024 to {LAST_PORT}'}
+"""What to do about a port that cannot be had."""
 
 ENDING = 0.5
 """s that viser may take to say goodbye to its pages."""
@@ -105,9 +111,11 @@ def parser() -> argparse.ArgumentParser:
 
 def port(text: str) -> int:
     """Read a port's number; 0 stands for any free one."""
-    if not 0 <= int(text) <= LAST_PORT:
-        raise argparse.ArgumentTypeError(f'{text}: expected 0, any free one, to {LAST_PORT}')
-    return int(text)
+    number = int(text) if text.isdecimal() else -1
+    if not 0 <= number <= LAST_PORT:
+        raise argparse.ArgumentTypeError(
+            f'{text}: expected a whole number from 1024 to {LAST_PORT}, or 0 for any free port')
+    return number
 
 
 def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event) -> None:
@@ -205,7 +213,6 @@ def opening(options: argparse.Namespace, source: Source) -> Opening | None:
 
 def free_port(host: str, wanted: int | None) -> int:
     """The wanted port, or the first free one from PORT on; CannotServe if there is none."""
-    reason = ''
     for port in (wanted,) if wanted is not None else range(PORT, PORT + 100):
         try:
             family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
@@ -213,10 +220,12 @@ def free_port(host: str, wanted: int | None) -> int:
                 probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
                 probe.bind(address)
                 return port
-        except OSError as error:
-            reason = error.strerror or str(error)
-    raise CannotServe(f'--host {host} --port {wanted or PORT}: {reason}; expected an address of '
-                      'this machine and a free port from 1024 to 65535')
+        except (OSError, UnicodeError) as error:
+            refused = error
+    remedy = REMEDIES.get(getattr(refused, 'errno', None),
+                          f'expected an address of this machine, as {HOST}')
+    reason = getattr(refused, 'strerror', None) or refused
+    raise CannotServe(f'--host {host} --port {wanted or PORT}: {reason}; {remedy}')
 
 
 @contextlib.contextmanager

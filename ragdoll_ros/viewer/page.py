@@ -9,7 +9,9 @@ import viser
 
 from ..model.scene import Scene
 from .controls import Controls
+from .docking import FREE
 from .drawing.camera import Cameras
+from .drawing.drag_arrow import NO_ARROW
 from .drawing.ground import light
 from .drawing.paint import PAINT
 from .drawing.plots import Plots
@@ -19,8 +21,8 @@ from .drawing.view import View, theme
 from .editor.editor import Editor
 from .editor.form import GREY, RED, colored
 from .hint import HINT
+from .lost import LOST
 from .opening import Opening
-from .panel import FREE
 from .pointer import Pointer
 from .recording_panel import RecordingPanel
 from .rest import Rest
@@ -56,10 +58,8 @@ class Page:
         light(server)
         theme(server, dark=False)
         server.gui.main_panel.dock_right()
-        server.gui.add_html(FREE)
-        server.gui.add_html(HINT)
-        server.gui.add_html(KEEP_PAGE)
-        server.gui.add_html(PAINT)
+        for html in (FREE, HINT, LOST, KEEP_PAGE, PAINT, NO_ARROW):
+            server.gui.add_html(html)
         self.problem = server.gui.add_html('')
         self.tabs = server.gui.add_tab_group()
         with self.tabs.add_tab('Play'):

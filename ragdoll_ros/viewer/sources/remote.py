@@ -41,7 +41,8 @@ NAME = 'ragdoll'
 
 MISSING = ('no node `{}` yet: start it with `ros2 run ragdoll_ros ragdoll_node` (same '
            'ROS_DOMAIN_ID); this page goes on by itself')
-SILENT = 'the node `{}` has been silent for {:.0f} s; this page goes on by itself'
+SILENT = ('the node `{}` has been silent for {:.0f} s: if it has ended, start it again; this page '
+          'goes on by itself')
 
 TWINS = ('Several nodes are called `{}`, and the page shows now one, now another: end all but one, '
          'or start each in a namespace of its own.')
