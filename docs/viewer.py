@@ -22,30 +22,34 @@ from ragdoll_ros.fit import command as fit  # noqa: E402
 
 SIZE = {'width': 1000, 'height': 600}
 
-BESIDE_PANEL = {'x': 0, 'y': 80, 'width': 660, 'height': 400}
+LOOK = """([eye, at]) => {
+  const {camera, cameraControl, nodeRefFromName: nodes} = window.__viserMutable;
+  const [from, to] = [eye, at].map(
+    point => camera.position.clone().set(...point).applyMatrix4(nodes[''].matrixWorld));
+  cameraControl.setLookAt(...from, ...to, false);
+}"""
+"""Places a page's camera, m, z up."""
 
-ASIDE = 0.31
-"""m to the doll's left for each m away at which the camera looks: the doll is beside the panel."""
 
-
-def camera(away: float, high: float, at: float, azimuth: float = -0.2) -> str:
-    """Part of an address that places a camera before the doll.
+def look(view: browser.View, away: float, high: float, at: float, azimuth: float = -0.2) -> None:
+    """Place the camera before the doll.
 
     It stands ``away`` m from the doll and ``high`` m above the ground, ``azimuth`` rad to the
     doll's left, and looks at the height ``at``, m.
     """
-    cos, sin = np.cos(azimuth), np.sin(azimuth)
-    eye, look = away * np.array((cos, sin)), ASIDE * away * np.array((-sin, cos))
-    return (f'?initialCameraPosition={eye[0]:.3f},{eye[1]:.3f},{high}'
-            f'&initialCameraLookAt={look[0]:.3f},{look[1]:.3f},{at}')
+    eye = (away * np.cos(azimuth), away * np.sin(azimuth), high)
+    view.page.evaluate(LOOK, [eye, (0.0, 0.0, at)])
+    shot(view)
 
 
 @contextlib.contextmanager
-def page(context: browser.BrowserContext, scene: str, seen_from: str) -> Iterator[browser.View]:
+def page(context: browser.BrowserContext, scene: str) -> Iterator[browser.View]:
     """Open a page on a scene, paused at its start, without viser's word on slow drawing."""
     with browser.serving('--port', '0', '--scene', scene, '--folder', tempfile.gettempdir()) as url:
-        view = browser.View(context, url + seen_from)
+        view = browser.View(context, url)
         view.page.locator('.mantine-Notification-closeButton').click()
+        # The first fall begins once the page has drawn its start.
+        view.button('Pause').wait_for()
         view.key(' ')
         view.button('Go on').wait_for()
         view.key('r')
@@ -71,18 +75,21 @@ def step(view: browser.View, ticks: int) -> None:
 
 def fall(context: browser.BrowserContext, folder: Path) -> None:
     """The default doll, pushed aside after its feet have touched the ground."""
-    with page(context, 'drop', camera(2.7, 1.2, 0.65)) as view:
+    with page(context, 'drop') as view:
+        look(view, 2.7, 1.2, 0.65)
         step(view, 24)
-        view.key('ArrowRight')
+        view.page.keyboard.down('ArrowRight')
         step(view, 12)
         (folder / 'viewer_fall.png').write_bytes(shot(view))
+        view.page.keyboard.up('ArrowRight')
 
 
 def grab(context: browser.BrowserContext, folder: Path) -> None:
     """The doll hangs by a forearm from the pointer, which pulls it aside."""
     scene = load_scene('drop')
     at = np.array(scene.bones[scene.bone_index('left_forearm')].position)
-    with page(context, 'drop', camera(3.2, 1.2, 0.95)) as view:
+    with page(context, 'drop') as view:
+        look(view, 3.2, 1.2, 0.95)
         mouse = view.page.mouse
         mouse.move(*view.pixels([at])[0])
         mouse.down()
@@ -100,7 +107,8 @@ def grab(context: browser.BrowserContext, folder: Path) -> None:
 
 def edit(context: browser.BrowserContext, folder: Path) -> None:
     """The editor with a chosen thigh in its bind pose."""
-    with page(context, 'drop', camera(2.2, 1.3, 0.85, azimuth=0.5)) as view:
+    with page(context, 'drop') as view:
+        look(view, 2.2, 1.3, 0.85, azimuth=0.5)
         view.tab('Edit')
         view.press('Edit')
         view.button('Drop it').wait_for()
@@ -117,21 +125,25 @@ def skin(context: browser.BrowserContext, folder: Path) -> None:
         rig.write_bytes(fit_rigs.mannequin().glb())
         with contextlib.redirect_stdout(None):
             fit.main([str(rig), '-o', str(doll)])
-        with page(context, str(doll), camera(3.1, 1.2, 0.75)) as view:
+        with page(context, str(doll)) as view:
+            look(view, 3.1, 1.2, 0.75)
             view.page.get_by_label('Bones').check()
             view.page.mouse.move(10, 10)
             step(view, 30)
-            view.key('ArrowRight')
+            view.page.keyboard.down('ArrowRight')
             step(view, 12)
             (folder / 'viewer_skin.png').write_bytes(shot(view))
+            view.page.keyboard.up('ArrowRight')
 
 
 def field(context: browser.BrowserContext, folder: Path) -> None:
     """A thousand dolls, without the panel."""
-    with page(context, 'field', camera(11.0, 5.0, 1.0)) as view:
+    with page(context, 'field') as view:
+        look(view, 11.0, 5.0, 1.0)
         step(view, 60)
         shot(view)
-        (folder / 'viewer_field.png').write_bytes(view.page.screenshot(clip=BESIDE_PANEL))
+        picture = view.page.locator('canvas').first.bounding_box()
+        (folder / 'viewer_field.png').write_bytes(view.page.screenshot(clip=picture))
 
 
 def main(folder: Path) -> None:

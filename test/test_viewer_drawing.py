@@ -26,7 +26,9 @@ from ragdoll_ros.model.skeleton import Riders
 from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.rods import Rods
+from ragdoll_ros.viewer.drawing import framing
 from ragdoll_ros.viewer.drawing.bodies import Bodies
+from ragdoll_ros.viewer.drawing.ground import CELL, FADE, grid
 from ragdoll_ros.viewer.drawing.joint_limits import PIECES, RIM, SPOKES, Limits
 from ragdoll_ros.viewer.drawing.marks import arrow_before
 from ragdoll_ros.viewer.drawing.meshes import COARSE, MESHES, ROUND
@@ -303,3 +305,21 @@ def test_a_character_that_cannot_be_opened_is_told_and_the_doll_shown_without():
     assert [note.split(':')[0] for note in skins.notes] == ['no skin for long',
                                                             'no skin for through']
     assert all('expected a' in note for note in skins.notes) and not skins.handles
+
+
+@pytest.mark.parametrize('name', ['drop', 'crowd', 'field'])
+def test_the_ground_is_below_all_dolls_seen_from_home(name):
+    """The grid fades with the distance, to nothing at its reach; its lines stay apart.
+
+    A line of the grid nearer than half the reach is 1.5 of 600 pixels or more from the next.
+    """
+    scene = load_scene(name)
+    with Simulation(scene) as simulation:
+        balls = framing.bounds(scene, simulation.state)
+    look_at = framing.middle(*balls)
+    eye = framing.place(*balls, look_at, fov=0.8, aspect=1.2)
+    cell, reach = grid(scene)
+    assert np.linalg.norm(balls[0] - eye, axis=1).max() < 0.9 * reach
+    apart = 300 / np.tan(0.4) * eye[2] * cell / (reach / 2) ** 2
+    assert apart > 1.5
+    assert (cell, reach) == (CELL, FADE) or name != 'drop'
