@@ -346,6 +346,37 @@ def document(rig, mesh=None):
     return made
 
 
+def beside(first, second):
+    """One document of two: each keeps its nodes, its mesh and its skin."""
+    made, own = Document(), second.data
+    start = len(first.blob) + -len(first.blob) % 4
+    made.blob = first.blob.ljust(start, b'\0') + second.blob
+    made.data = {**first.data}
+    counts = {key: len(first.data[key]) for key in ('nodes', 'meshes', 'skins', 'accessors',
+                                                    'bufferViews')}
+
+    def later(entry, **kinds):
+        return {**entry, **{key: entry[key] + counts[kind] if isinstance(entry[key], int)
+                            else [one + counts[kind] for one in entry[key]]
+                            for key, kind in kinds.items() if key in entry}}
+
+    more = {'nodes': [later(each, children='nodes', mesh='meshes', skin='skins')
+                      for each in own['nodes']],
+            'skins': [later(each, joints='nodes', inverseBindMatrices='accessors')
+                      for each in own['skins']],
+            'accessors': [later(each, bufferView='bufferViews') for each in own['accessors']],
+            'bufferViews': [{**each, 'byteOffset': each['byteOffset'] + start}
+                            for each in own['bufferViews']],
+            'meshes': [{'primitives': [
+                {**later(part, indices='accessors'), 'attributes': later(
+                    part['attributes'], **dict.fromkeys(part['attributes'], 'accessors'))}
+                for part in each['primitives']]} for each in own['meshes']]}
+    for key, entries in more.items():
+        made.data[key] = [*first.data[key], *entries]
+    made.data['scenes'] = [{'nodes': [0, counts['nodes']]}]
+    return made
+
+
 def write(rig, folder):
     path = folder / f'{rig.name}.glb'
     path.write_bytes(document(rig).glb())

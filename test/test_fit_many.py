@@ -1,13 +1,11 @@
-"""Many bones: hair becomes swings, fingers stay where they are wanted, one of two characters."""
+"""Many bones: hair becomes swings, fingers stay where they are wanted."""
 from dataclasses import replace
 
 import fit_rigs
 import numpy as np
 import pytest
-import wild_rigs
 from fit_rigs import Rig, limb
 
-from ragdoll_ros.fit.judging.verdict import judge
 from ragdoll_ros.fit.pipeline import Options, fit_character
 from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.model import errors
@@ -70,32 +68,51 @@ def test_fingers_stay_with_smallest_0():
     assert not any(body.role == 'finger' for body in fit_rigs.fitted('unreal').bodies)
 
 
+@pytest.mark.parametrize(('keep', 'fingers'), [
+    (('index_01_l',), {'index_01_l'}), (('thumb_0[12]_?',), {
+        'thumb_01_l', 'thumb_02_l', 'thumb_01_r', 'thumb_02_r'}),
+    (('*_0?_l', 'pinky_03_r'), {f'{finger.lower()}_0{n}_l' for finger in fit_rigs.FINGERS
+                             for n in (1, 2, 3)} | {'pinky_03_r'})])
+def test_bones_that_are_named_are_bodies(keep, fingers):
+    """By their names and by patterns; all others are as without."""
+    plain = fit_rigs.fitted('unreal')
+    made = fit_character(plain.character, Options(keep=keep))
+    own = {bone.name for bone in plain.doll.bones}
+    assert {bone.name for bone in made.doll.bones} == own | fingers
+    assert made.doll.mass == pytest.approx(plain.doll.mass, rel=1e-9)
+    # A finger hangs on the piece before it where that is kept, else on the hand.
+    for joint in made.doll.joints:
+        if joint.child in fingers:
+            finger, piece, side = joint.child.split('_')
+            before = f'{finger}_0{int(piece) - 1}_{side}'
+            assert joint.parent == (before if before in fingers else f'hand_{side}')
+
+
+@pytest.mark.parametrize('name', ['hair', 'strand'])
+def test_a_strand_that_is_named_is_bodies_and_no_swing(tmp_path, name):
+    made = fit(hairy(name), tmp_path, Options(keep=(f'{name}7_*',)))
+    own = [bone.name for bone in made.doll.bones if bone.name.startswith(name)]
+    assert sorted(own) == [f'{name}7_{k}' for k in range(5)]
+    assert len(made.doll.swings) == 39
+    assert not any(swing.name.startswith(f'{name}7_') for swing in made.doll.swings)
+
+
+@pytest.mark.parametrize(('keep', 'kind', 'words'), [
+    ('index_1_l', errors.UnknownBone, 'keep.*index_1_l.*index_01_l'),
+    ('*Thumbs*', errors.UnknownBone, r'keep.*Thumbs.*thumb_0'),
+    ('pole', errors.WrongForm, 'keep.*pole.*moves 4 vertices or more')])
+def test_what_cannot_be_kept_is_refused(tmp_path, keep, kind, words):
+    character = fit_rigs.fitted('unreal').character
+    with_pole = replace(
+        character, bone_names=(*character.bone_names, 'pole'), parents=(*character.parents, 0),
+        positions=np.vstack([character.positions, (1, 0, 0)]),
+        orientations=np.vstack([character.orientations, (0, 0, 0, 1)]))
+    with pytest.raises(kind, match=words):
+        fit_character(with_pole, Options(keep=(keep,)))
+
+
 def test_what_would_not_run_is_refused(tmp_path):
     with pytest.raises(errors.OutOfRange, match=r'smallest.*222 bodies are more than 200'):
         fit(hairy('strand'), tmp_path, Options(smallest=0.001))
-
-
-@pytest.mark.parametrize('beside', [(0, 1.2), (2.6, 0)], ids=['ahead', 'side by side'])
-@pytest.mark.parametrize('skin', wild_rigs.SKINS)
-def test_two_characters_in_one_skin_are_one_doll_and_told(tmp_path, skin, beside):
-    """Side by side each is the other's mirror image, whose hips are no halves of one pelvis."""
-    x, z = beside
-    person = wild_rigs.person()
-    other = [replace(bone, name=f'other {bone.name}',
-                     parent=bone.parent + len(person) if bone.parent >= 0 else -1,
-                     head=(bone.head[0] + x, bone.head[1] * .9, bone.head[2] + z),
-                     tail=(bone.tail[0] + x, bone.tail[1] * .9, bone.tail[2] + z))
-             for bone in person]
-    wild = wild_rigs.Wild(Rig('two', [*person, *other]), skin, {}, ())
-    made = fit_character(read_character(wild_rigs.write(wild, tmp_path)))
-    [note] = [note for note in made.notes if 'another character, of 2' in note]
-    assert 'other' in note
-    alone = wild_rigs.Wild(Rig('one', person), skin, {}, ())
-    one = fit_character(read_character(wild_rigs.write(alone, tmp_path)))
-    assert [bone.name for bone in made.doll.bones] == [bone.name for bone in one.doll.bones]
-    assert [(j.parent, j.child) for j in made.doll.joints] == [
-        (j.parent, j.child) for j in one.doll.joints]
-    assert len(made.doll.riders) == 44
-    # The other's skin and size count for nothing.
-    assert judge(made.doll, made, falls=False).word == judge(one.doll, one, falls=False).word
-    assert made.doll.mass == pytest.approx(one.doll.mass, rel=1e-9)
+    with pytest.raises(errors.OutOfRange, match=r'keep.*fewer, for 220 bodies are more than 200'):
+        fit(hairy('strand'), tmp_path, Options(keep=('strand*',)))

@@ -117,6 +117,16 @@ def test_joint_kinds(tmp_path, kind, expected, limits):
     assert doll.joints[0].anchor == (0, 0, 1)
 
 
+def test_dry_friction_is_named_and_left_out(tmp_path):
+    resists = '<dynamics damping="0.5" friction="2"/>'
+    doll, notes = read(tmp_path, link('a'), link('b'), link('c'), link('d'),
+                       joint('b', inside=resists), joint('c', inside=resists),
+                       joint('d', inside='<dynamics damping="0.5" friction="0"/>'))
+    [note] = notes
+    assert note.startswith('to_b, to_c: dry friction') and 'left out' in note
+    assert [each.damping for each in doll.joints] == [0.5] * 3
+
+
 def test_a_link_without_a_shape_rides_and_gives_its_mass(tmp_path):
     doll, _ = read(tmp_path, link('a'), link('sensor', shape='', mass=0.5), link('tip', '', 0),
                    joint('sensor', kind='fixed', xyz='0 0 0.3'),

@@ -59,6 +59,8 @@ class UrdfJoint:
     axis: np.ndarray
     limits: tuple[float, float] | None
     damping: float
+    friction: float = 0.0
+    """N m (N where it slides), whatever the speed."""
     mimics: str | None = None
     """Name of the joint that a gear or a tendon couples it to."""
 
@@ -179,11 +181,12 @@ def _joint(element: ElementTree.Element) -> UrdfJoint:
         if limits[0] > limits[1]:
             raise errors.LimitsReversed(f'{where}.limit', limits, 'lower <= upper')
     found = element.find('dynamics')
-    damping = 0.0 if found is None else _number(found, 'damping', where, 0.0)
+    damping, friction = (0.0 if found is None else _number(found, key, where, 0.0)
+                         for key in ('damping', 'friction'))
     found = element.find('mimic')
     mimics = None if found is None else found.get('joint', '')
     return UrdfJoint(name, kind, *ends, _pose(element, where), axis / np.linalg.norm(axis), limits,
-                     max(damping, 0.0), mimics)
+                     max(damping, 0.0), friction, mimics)
 
 
 def _inertia(element: ElementTree.Element | None, where: str) -> np.ndarray | None:

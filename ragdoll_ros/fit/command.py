@@ -2,16 +2,17 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import math
 import sys
 from pathlib import Path
 
 from ..files.doll import load_doll, save_doll
+from ..files.scene import save_scene
 from ..files.urdf import to_urdf
 from ..model import errors
+from ..model.scene import Placement, all_above_ground
 from .judging.verdict import Verdict, judge
-from .pipeline import Options, fit_character
+from .pipeline import Fit, Options, fit_characters
 from .reading.character import read_character
 from .report import doll_report, fit_report
 from .robots.robot import read_urdf
@@ -22,6 +23,8 @@ example:
   ros2 run ragdoll_ros ragdoll_node --ros-args -p scene:=doll.yaml
 
 A .urdf becomes a doll too: a robot that goes limp. A doll's own .yaml is checked and reported.
+Of several characters in one file each becomes a doll: DOLL.yaml is a scene of all, where they
+stood; a DOLL.urdf and an OUT.png have _1, _2 and so on before their suffix.
 The report ends with a verdict on the doll: good, doubtful or wrong.
 Exit code 0: done; 2: a file or an option is wrong; 3: --strict, and the doll is not good."""
 
@@ -30,7 +33,7 @@ PICTURES = ('.png', '.jpg', '.svg', '.pdf')
 DOLLS, ROBOTS = ('.yaml', '.yml'), ('.urdf', '.xml')
 """Files that hold bodies already; every other one is a character, for which they are made."""
 
-FITTING = ('mass', 'masses', 'scale', 'shape', 'orientation', 'weight', 'smallest')
+FITTING = ('mass', 'masses', 'scale', 'shape', 'orientation', 'weight', 'smallest', 'keep')
 """Options that say how bodies are made."""
 
 
@@ -40,14 +43,14 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         _check(options, parser)
-        verdict = _run(options)
+        verdicts = _run(options)
     except errors.RagdollError as error:
         print(f'ragdoll_fit: {_one_line(error)}', file=sys.stderr)
         return 2
     except OSError as error:
         print(f'ragdoll_fit: {error.filename}: {error.strerror}', file=sys.stderr)
         return 2
-    return 3 if options.strict and verdict.word != 'good' else 0
+    return 3 if options.strict and any(each.word != 'good' for each in verdicts) else 0
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -63,7 +66,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--picture', metavar='OUT.png',
                         help='draw skin, bodies, joints and their ranges side by side')
     parser.add_argument('--mass', type=float, metavar='KG',
-                        help='of the whole doll (default: as much water as the skin holds)')
+                        help='of each whole doll (default: as much water as the skin holds)')
     parser.add_argument('--masses', choices=('best', 'volume', 'proportions'), default='best',
                         help="share the mass by the skin's volume, by a person's proportions, or "
                         'by volume and for a person half way between (default)')
@@ -80,36 +83,59 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--smallest', type=float, metavar='M',
                         help='bones with less skin than this are merged into their parents '
                         '(default: 0.055 of the character; 0: none, fingers stay too)')
+    parser.add_argument('--keep', nargs='+', action='extend', default=[], metavar='BONE',
+                        help="bones that become bodies whatever their size: names as in the "
+                        "report, or patterns such as '*Thumb*'")
     parser.add_argument('--strict', action='store_true',
                         help='exit with 3 where the verdict is not good')
     return parser
 
 
-def _run(options: argparse.Namespace) -> Verdict:
+def _run(options: argparse.Namespace) -> list[Verdict]:
     path = Path(options.input)
-    fit = None
+    made = _made(options, path)
+    verdicts = [judge(each.doll, fit, measured=path.suffix.lower() in ROBOTS)
+                for each, fit, _ in made]
+    report = '\n\n'.join(f'{text}\n{verdict}'
+                         for (_, _, text), verdict in zip(made, verdicts, strict=True))
+    print(report)
+    head = f'Fitted to {path.name}\n\n{report}'
+    if options.output and len(made) == 1:
+        save_doll(made[0][0].doll, options.output, head)
+    elif options.output:
+        scene = all_above_ground(Path(options.output).stem, [placement for placement, _, _ in made])
+        save_scene(scene, options.output, head)
+    for number, (placement, fit, _) in enumerate(made, 1):
+        ending = f'_{number}' if len(made) > 1 else ''
+        if options.urdf:
+            _ended(options.urdf, ending).write_text(to_urdf(placement.doll, options.dialect),
+                                                    encoding='utf-8')
+        if options.picture:
+            from .picture import draw
+            draw(placement.doll, fit.character if fit else None, _ended(options.picture, ending))
+    return verdicts
+
+
+def _made(options: argparse.Namespace, path: Path) -> list[tuple[Placement, Fit | None, str]]:
+    """Each doll in its place, how it was fitted where it was, and the report on it."""
     if path.suffix.lower() in DOLLS:
         doll = load_doll(options.input)
-        report = doll_report(doll)
-    elif path.suffix.lower() in ROBOTS:
+        return [(Placement(doll), None, doll_report(doll))]
+    if path.suffix.lower() in ROBOTS:
         doll, notes = read_urdf(path)
-        report = doll_report(doll, notes)
-    else:
-        fit = fit_character(read_character(path, options.scale), Options(
-            options.shape, options.orientation, options.weight, options.smallest, options.mass,
-            options.masses))
-        doll, report = dataclasses.replace(fit.doll, model=str(path)), fit_report(fit)
-    verdict = judge(doll, fit, measured=path.suffix.lower() in ROBOTS)
-    report = f'{report}\n{verdict}'
-    print(report)
-    if options.output:
-        save_doll(doll, options.output, f'Fitted to {path.name}\n\n{report}')
-    if options.urdf:
-        Path(options.urdf).write_text(to_urdf(doll, options.dialect), encoding='utf-8')
-    if options.picture:
-        from .picture import draw
-        draw(doll, fit.character if fit else None, options.picture)
-    return verdict
+        return [(Placement(doll), None, doll_report(doll, notes))]
+    fits = fit_characters(read_character(path, options.scale), Options(
+        options.shape, options.orientation, options.weight, options.smallest, options.mass,
+        options.masses, tuple(options.keep)))
+    heads = [f'{fit.doll.name}, character {number} of {len(fits)}:\n' if len(fits) > 1 else ''
+             for number, fit in enumerate(fits, 1)]
+    return [(fit.placed(model=str(path)), fit, head + fit_report(fit))
+            for fit, head in zip(fits, heads, strict=True)]
+
+
+def _ended(path: str, ending: str) -> Path:
+    """The path with an ending before its suffix."""
+    return Path(path).with_stem(Path(path).stem + ending)
 
 
 def _check(options: argparse.Namespace, parser: argparse.ArgumentParser) -> None:

@@ -4,12 +4,16 @@ Everything is in the bind pose and the doll's frame, which is the character's.
 """
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import glob
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..model import errors, rotation
+from ..model.pose import Pose
 from ..model.ragdoll import Bone, Ragdoll
+from ..model.scene import Placement
 from ..model.shapes import Shape
 from . import carried
 from .bodies.masses import share_mass
@@ -19,13 +23,14 @@ from .bodies.trim import trimmed
 from .joints.folding import guesses
 from .joints.joints import damped, make_joint
 from .reading.character import Character
-from .reading.spring_bones import without_short_rods
+from .reading.spring_bones import Spring, without_short_rods
 from .roles.names import roles_of
 from .shapes.axes import Axes, fit_axes
 from .shapes.shapes import DECIMALS, TOLERANCE, Fitted, fit_best, fit_shape
 from .skeleton.anchors import place_anchors
-from .skeleton.apart import largest_alone
+from .skeleton.apart import find_characters
 from .skeleton.groups import Group, group_bones, partner, vertices_by_bone
+from .skeleton.kept import find_kept
 from .skeleton.skin_tree import SkinTree, find_skin_tree
 from .skeleton.soft_chains import soft_chains, thinned
 
@@ -53,6 +58,8 @@ class Options:
     """kg, of the whole doll; None: as much water as the skin holds."""
     masses: str = 'best'
     """Mass shared by the skin's 'volume', by a person's 'proportions', or 'best'; see masses.py."""
+    keep: tuple[str, ...] = ()
+    """Names of bones, or patterns of them, that become bodies whatever their size."""
 
 
 @dataclass(frozen=True)
@@ -79,14 +86,33 @@ class Fit:
     bodies: tuple[BodyFit, ...]
     notes: tuple[str, ...]
     """A sentence for each thing that could not be taken over as it is."""
+    frame: Pose = field(default_factory=Pose)
+    """Where the doll's frame stands in its file's."""
+
+    def placed(self, model: str | None = None) -> Placement:
+        """The doll where it stands in its file, whose path it names as its ``model``."""
+        return Placement(replace(self.doll, model=model), position=self.frame.position,
+                         orientation=self.frame.orientation)
+
+
+def fit_characters(character: Character, options: Options | None = None) -> list[Fit]:
+    """A doll of each character of a file, see apart.py, as fit_character makes it."""
+    options = options or Options()
+    names = character.bone_names
+    kept = {names[bone] for bone in find_kept(character, options.keep, options.share)}
+    fits = []
+    for each, frame in find_characters(character):
+        own = tuple(glob.escape(name) for name in each.bone_names if name in kept)
+        fits.append(replace(fit_character(each, replace(options, keep=own)), frame=frame))
+    return fits
 
 
 def fit_character(character: Character, options: Options | None = None) -> Fit:
-    """Doll of a character, in its bind pose; ModelError where an option is out of range."""
+    """Doll of one character, in its bind pose; ModelError where an option is out of range."""
     options = options or Options()
-    given, others = largest_alone(character)
+    given = character
     character, groups, notes = _grouped(refined(given), options)
-    notes = [*notes, *others, *_unmoved(character, len(given.vertices), groups)]
+    notes += _unmoved(character, len(given.vertices), groups)
     directions = [_direction(character, groups, index) for index in range(len(groups))]
     areas = character.vertex_areas()
     axes = [fit_axes(character.vertices[group.vertices], areas[group.vertices], direction,
@@ -117,27 +143,36 @@ def fit_character(character: Character, options: Options | None = None) -> Fit:
 def _grouped(character: Character,
              options: Options) -> tuple[Character, list[Group], list[str]]:
     """The character with all its springs, the groups of its bones, and what is to be told."""
+    kept = find_kept(character, options.keep, options.share)
+    character = replace(character, springs=tuple(_without_kept(character.springs, kept)))
     swinging = frozenset(bone for spring in character.springs for bone in spring.bones)
     clusters = vertices_by_bone(character, options.share, swinging)
     tree = find_skin_tree(character, clusters, roles_of(character.bone_names, character.parents))
     roles = _roles_along(tree, character.bone_names)
-    springs = soft_chains(character, tree, roles, clusters)
+    springs = _without_kept(soft_chains(character, tree, roles, clusters), kept)
     swinging |= {bone for spring in springs for bone in spring.bones}
-    groups = group_bones(character, roles, clusters, tree, options.smallest, swinging)
+    groups = group_bones(character, roles, clusters, tree, options.smallest, swinging, kept)
     notes = list(character.notes)
     if options.smallest is None:
         before = len(groups)
-        groups, thin = thinned(character, groups)
+        groups, thin = thinned(character, groups, kept)
         springs += thin
         if thin:
             notes.append(f'{before} bodies are too many: the {len(thin)} thinnest branches became '
                          'swings, which collide with nothing')
-    elif len(groups) > MOST_ASKED_FOR:
-        raise errors.OutOfRange('smallest', options.smallest, f'a larger one, for {len(groups)} '
-                                f'bodies are more than {MOST_ASKED_FOR}')
+    if len(groups) > MOST_ASKED_FOR:
+        key, value, better = ('keep', options.keep, 'fewer') if options.smallest is None else (
+            'smallest', options.smallest, 'a larger one')
+        raise errors.OutOfRange(key, value, f'{better}, for {len(groups)} bodies are more than '
+                                f'{MOST_ASKED_FOR}')
     springs = [without_short_rods(spring, notes) for spring in springs]
     springs = [spring for spring in springs if spring.rods]
     return replace(character, springs=(*character.springs, *springs)), groups, notes
+
+
+def _without_kept(springs: Iterable[Spring], kept: frozenset[int]) -> list[Spring]:
+    """The springs none of whose bones is to be a body."""
+    return [spring for spring in springs if not kept & set(spring.bones)]
 
 
 def _roles_along(tree: SkinTree, names: tuple[str, ...]) -> tuple[str | None, ...]:

@@ -20,6 +20,7 @@ from ..model.skeleton import Riders
 from ..model.skin import Skin
 from ..model.state import State
 from .reading.character import Character, read_character
+from .reading.part import part_of
 
 SCALE = 1e-3
 """Share by which a skin's size may miss the doll's before it is read again in the doll's."""
@@ -33,11 +34,9 @@ def skin_of(doll: Ragdoll) -> Skin | None:
     size = _size(doll, character)
     if abs(size - 1) > SCALE:
         character = _read(doll.model, character.scale * size)
+    character = _worn(doll, character)
     index = {bone.name: k for k, bone in enumerate(doll.bones)}
     carrier = {rider.name: index[rider.bone] for rider in doll.riders}
-    missing = [name for name in character.bone_names if name not in carrier]
-    if missing:
-        raise errors.UnknownBone('riders', missing[0], f'a doll that was fitted to {doll.model}')
     carriers = np.array([carrier[name] for name in character.bone_names])
     bones, slots = np.unique(carriers, return_inverse=True)
     weights = np.zeros((len(character.vertices), len(bones)))
@@ -75,6 +74,25 @@ def _read(path: str, scale: float | None = None) -> Character:
 @functools.lru_cache(maxsize=4)
 def _read_once(path: str, scale: float | None, _: tuple[int, int]) -> Character:
     return read_character(path, scale)
+
+
+def _worn(doll: Ragdoll, character: Character) -> Character:
+    """Of a file's characters the doll's own: that whose bones are the doll's riders.
+
+    UnknownBone where other bones move its skin too, or where it has none.
+    """
+    riders = {rider.name for rider in doll.riders}
+    own = np.array([name in riders for name in character.bone_names])
+    if own.all():
+        return character
+    moved = character.weights > 0
+    theirs = moved & own[character.bones]
+    foreign = moved & ~own[character.bones] & theirs.any(axis=1, keepdims=True)
+    if foreign.any() or not theirs.any():
+        missing = character.bones[foreign] if foreign.any() else np.flatnonzero(~own)
+        raise errors.UnknownBone('riders', character.bone_names[missing[0]],
+                                 f'a doll that was fitted to {doll.model}')
+    return part_of(character, own)
 
 
 def _bound(doll: Ragdoll, character: Character, bones: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

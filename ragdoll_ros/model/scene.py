@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -189,11 +190,20 @@ def height(bone: Bone, position: np.ndarray, orientation: np.ndarray, ground: Gr
 
 def above_ground(doll: Ragdoll, clearance: float = 0.4) -> Scene:
     """A scene of one doll over level ground, its lowest point ``clearance`` m above it."""
+    return all_above_ground(doll.name, (Placement(doll),), clearance)
+
+
+def all_above_ground(name: str, placements: Sequence[Placement], clearance: float = 0.4) -> Scene:
+    """A scene of dolls as they are placed, over level ground, all lifted or lowered by the same.
+
+    The lowest point of all is ``clearance`` m above the ground.
+    """
     ground = Ground()
-    placement = Placement(doll)
-    lowest = min(height(bone, *placement.bone_pose(bone), ground) for bone in doll.bones)
-    lift = round(clearance - lowest, 12)
-    return Scene(doll.name, (Placement(doll, position=(0.0, 0.0, lift)),), ground)
+    lowest = min(height(bone, *placement.bone_pose(bone), ground)
+                 for placement in placements for bone in placement.doll.bones)
+    return Scene(name, tuple(replace(placement, position=(
+        *placement.position[:2], round(placement.position[2] + clearance - lowest, 12)))
+        for placement in placements), ground)
 
 
 def grip(friction: float) -> float:

@@ -120,7 +120,7 @@ def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) 
     positions, vertices = rests[:, :3, 3] @ axes.T, skins.vertices @ axes.T
     # A bone keeps the axes that the file gives it, so that its inverse bind matrix fits on.
     linear = axes @ rests[:, :3, :3]
-    yaw = _yaw_to_front(names, positions)
+    yaw = yaw_to_front(names, positions)
     if yaw:
         notes.append(f'its left limbs say that it does not face +Z: turned by {yaw} degrees')
         upright = np.round(rotation.matrix(rotation.from_axis_angle((0, 0, 1), np.radians(yaw))))
@@ -191,8 +191,8 @@ def _bone_names(given: list[object]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _yaw_to_front(names: tuple[str, ...], positions: np.ndarray) -> int:
-    """Rotation about the vertical, degrees, that brings the bones named left to +y."""
+def yaw_to_front(names: tuple[str, ...], positions: np.ndarray) -> int:
+    """Rotation about the vertical, degrees, that brings the bones named left to +y: 0, 90, ..."""
     sides = np.array([side_of(name) for name in names])
     if not (sides > 0).any() or not (sides < 0).any():
         return 0

@@ -22,6 +22,9 @@ from ..roles.names import plain_name
 from .link_bodies import link_shapes, make_bone
 from .link_meshes import LinkMeshes
 
+TURNING = ('revolute', 'continuous', 'floating', 'spherical')
+"""Kinds of joints that a doll's joint can be."""
+
 SAME_PLACE = 1e-6
 """m; axes in a row that meet this nearly are one joint."""
 
@@ -83,6 +86,7 @@ def _doll(tree: UrdfTree, folder: Path | None = None) -> tuple[Ragdoll, list[str
         joint, above = tree.joints[above], tree.joints[above].parent
         if joint.kind not in ('fixed', 'floating'):
             notes.append(f'{joint.name}: nothing with a shape above it: left out')
+    notes += _resisted(tree)
     frames = _frames(poses, carriers, names, bones)
     return Ragdoll(plain_name(tree.name, 'link'), tuple(bones), tuple(joints), riders=frames), notes
 
@@ -133,6 +137,14 @@ def _joint(tree: UrdfTree, name: str, carriers: dict[str, str], names: dict[str,
         return Joint(parent, child, 'ball', anchor, (axis,), damping=ball.damping)
     turning = [joint for joint in row if joint.kind in ('revolute', 'continuous')]
     return _turning(parent, child, anchor, turning, poses, angles, notes)
+
+
+def _resisted(tree: UrdfTree) -> list[str]:
+    """Note on joints that turn against dry friction, which no joint of a doll has."""
+    names = [joint.name for joint in tree.joints.values()
+             if joint.friction > 0 and joint.kind in TURNING]
+    return [f'{", ".join(names)}: dry friction (<dynamics friction>) is left out: joints of a doll '
+            'have damping alone'] if names else []
 
 
 def _turning(parent: str, child: str, anchor: np.ndarray, row: list[UrdfJoint],

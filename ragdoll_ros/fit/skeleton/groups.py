@@ -84,13 +84,14 @@ def _clusters(character: Character, share: float | None) -> list[np.ndarray]:
 
 def group_bones(character: Character, roles: tuple[str | None, ...], clusters: list[np.ndarray],
                 tree: SkinTree, smallest: float | None = None,
-                swinging: frozenset[int] = frozenset()) -> list[Group]:
+                swinging: frozenset[int] = frozenset(),
+                kept: frozenset[int] = frozenset()) -> list[Group]:
     """Groups of a character's bones, parents first.
 
     ``roles`` and ``clusters`` are each bone's, and parents are those of ``tree``. A bone whose
     cluster is shorter than ``smallest`` m (None: SMALLEST of the character) goes into its parent's
     group; so do a further piece of a limb or of the pelvis, a finger (unless ``smallest`` is 0),
-    and a bone that is ``swinging``, which does so without its cluster.
+    and a bone that is ``swinging``, which does so without its cluster. None that is ``kept`` does.
     """
     clusters = without(clusters, swinging)
     fingers = smallest == 0
@@ -100,7 +101,7 @@ def group_bones(character: Character, roles: tuple[str | None, ...], clusters: l
     for depth in range(max(depths), 1, -1):
         level = [bone for bone, own in enumerate(depths) if own == depth]
         sizes = {bone: merging.size(bone) for bone in level}
-        for bone in level:
+        for bone in (bone for bone in level if bone not in kept):
             parent = tree.parents[bone]
             paired = max(sizes[bone], sizes[_partner(character, bone, level)])
             if (bone in swinging or bone in tree.halves or paired == 0 or paired < smallest

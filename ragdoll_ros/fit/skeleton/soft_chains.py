@@ -50,14 +50,17 @@ def soft_chains(character: Character, tree: SkinTree, roles: tuple[str | None, .
     return springs
 
 
-def thinned(character: Character, groups: list[Group]) -> tuple[list[Group], list[Spring]]:
+def thinned(character: Character, groups: list[Group],
+            kept: frozenset[int] = frozenset()) -> tuple[list[Group], list[Spring]]:
     """At most MOST_BODIES of the groups; above that the thinnest branches become springs.
 
-    With each go those that hang on the same body and are about as thin: all hair, or none.
+    With each go those that hang on the same body and are about as thin: all hair, or none. Groups
+    with a bone that is ``kept`` stay, and do not count.
     """
     springs: list[Spring] = []
     areas = character.vertex_areas()
-    while len(groups) > MOST_BODIES and (branches := _branches(groups)):
+    most = MOST_BODIES + sum(bool(kept & set(group.bones)) for group in groups)
+    while len(groups) > most and (branches := _branches(groups, kept)):
         sizes = [np.mean([areas[groups[k].vertices].sum() for k in branch]) for branch in branches]
         carrier = groups[branches[int(np.argmin(sizes))][0]].parent
         family = [branch for branch, size in zip(branches, sizes, strict=True)
@@ -72,8 +75,11 @@ def thinned(character: Character, groups: list[Group]) -> tuple[list[Group], lis
     return groups, springs
 
 
-def _branches(groups: list[Group]) -> list[list[int]]:
-    """Chains of groups without a branch, from what hangs on a branching body to the end."""
+def _branches(groups: list[Group], kept: frozenset[int]) -> list[list[int]]:
+    """Chains of groups without a branch, from what hangs on a branching body to the end.
+
+    But those with a bone that is ``kept``.
+    """
     children = [[k for k, group in enumerate(groups) if group.parent == index]
                 for index in range(len(groups))]
     branches = []
@@ -81,7 +87,7 @@ def _branches(groups: list[Group]) -> list[list[int]]:
         chain = [end]
         while (above := groups[chain[0]].parent) >= 0 and len(children[above]) == 1:
             chain.insert(0, above)
-        if above >= 0:
+        if above >= 0 and not any(kept & set(groups[k].bones) for k in chain):
             branches.append(chain)
     return branches
 

@@ -18,7 +18,7 @@ NONE = '(choose one)'
 TIME = '%Y-%m-%d %H:%M'
 
 MOST_TOLD = 3
-"""Reasons of a verdict that the page tells."""
+"""Reasons of each verdict that the page tells."""
 
 
 class Files:
@@ -119,11 +119,15 @@ class Files:
         self.saved.value = NONE
 
     def _fitted(self, name: str, content: bytes) -> str:
-        scene, verdict = self._folder.fit(name, content, self._show_progress)
-        told = [finding.sentence for finding in verdict.findings]
-        told = [*told[:MOST_TOLD], *([f'{len(told) - MOST_TOLD} more, which ragdoll_fit lists']
-                                     if len(told) > MOST_TOLD else [])]
-        return '; '.join([self._take(scene, 'fit', name), f'verdict: {verdict.word}', *told])
+        scene, verdicts = self._folder.fit(name, content, self._show_progress)
+        told = [self._take(scene, 'fit', name)]
+        for placement, verdict in zip(scene.dolls, verdicts, strict=True):
+            whose = f'{placement.name}: ' if len(verdicts) > 1 else ''
+            told.append(f'{whose}verdict: {verdict.word}')
+            told += [finding.sentence for finding in verdict.findings[:MOST_TOLD]]
+            if len(verdict.findings) > MOST_TOLD:
+                told.append(f'{len(verdict.findings) - MOST_TOLD} more, which ragdoll_fit lists')
+        return '; '.join(told)
 
     def _take(self, scene: Scene, what: str, name: str) -> str:
         self._go_on_with(scene, f'{what} {name}')

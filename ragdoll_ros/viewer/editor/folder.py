@@ -16,8 +16,7 @@ from ...files import yaml_text
 from ...files.config import scene_names
 from ...files.scene import load_scene, save_scene, scene_from, scene_text
 from ...model import errors
-from ...model.ragdoll import Ragdoll
-from ...model.scene import Scene, above_ground
+from ...model.scene import Placement, Scene, all_above_ground
 
 if TYPE_CHECKING:
     from ...fit.judging.verdict import Verdict
@@ -92,11 +91,11 @@ class Folder:
         except errors.ModelErrors as error:
             raise errors.ModelErrors(name, error.errors) from None
 
-    def fit(self, name: str, content: bytes, progress: Progress) -> tuple[Scene, Verdict]:
-        """Scene of a doll that is fitted, as ragdoll_fit does, to a character that was sent.
+    def fit(self, name: str, content: bytes, progress: Progress) -> tuple[Scene, list[Verdict]]:
+        """Scene of a doll that is fitted, as ragdoll_fit does, to each character that was sent.
 
-        The doll hangs above level ground; its character stays here, and it names that. And what
-        ragdoll_fit thinks of it.
+        They hang above level ground; their file stays here, and they name that. And what
+        ragdoll_fit thinks of each.
         """
         name = plain(name)
         suffix = Path(name).suffix.lower()
@@ -107,15 +106,18 @@ class Folder:
             with tempfile.TemporaryDirectory() as inbox:
                 path = Path(inbox, name)
                 path.write_bytes(content)
-                doll, verdict = _fitted(path, progress)
+                placements, verdicts = _fitted(path, progress)
         except errors.ModelError as error:
             raise errors.ModelErrors(name, [error]) from None
         except errors.ModelErrors as error:
             raise errors.ModelErrors(name, [_alone(error) for error in error.errors]) from None
         if suffix != '.urdf':
             progress(0.9, 'keeping the character')
-            doll = dataclasses.replace(doll, model=str(self._keep(name, content)))
-        return above_ground(doll), verdict
+            model = str(self._keep(name, content))
+            placements = [dataclasses.replace(placement, doll=dataclasses.replace(
+                placement.doll, model=model)) for placement in placements]
+        scene = placements[0].name if len(placements) == 1 else Path(name).stem
+        return all_above_ground(scene, placements), verdicts
 
     def _check_dolls(self, data: object) -> None:
         """Refuse dolls that lie neither here nor in config/: no other file is read."""
@@ -178,21 +180,21 @@ def _check_size(content: bytes) -> None:
         raise errors.Unreadable('', f'{len(content)} bytes', f'at most {LARGEST_UPLOAD}')
 
 
-def _fitted(path: Path, progress: Progress) -> tuple[Ragdoll, Verdict]:
+def _fitted(path: Path, progress: Progress) -> tuple[list[Placement], list[Verdict]]:
     # Here, as matters of files that few pages need.
     from ...fit.judging.verdict import judge
-    from ...fit.pipeline import fit_character
+    from ...fit.pipeline import fit_characters
     from ...fit.reading.character import read_character
     progress(0.1, 'reading')
     if path.suffix.lower() == '.urdf':
         from ...fit.robots.robot import read_urdf
         doll = read_urdf(path)[0]
-        return doll, judge(doll, measured=True)
+        return [Placement(doll)], [judge(doll, measured=True)]
     character = read_character(path)
     progress(0.4, f'fitting {len(character.bone_names)} bones, {len(character.vertices)} vertices')
-    fit = fit_character(character)
+    fits = fit_characters(character)
     progress(0.7, 'letting it fall')
-    return fit.doll, judge(fit.doll, fit)
+    return [fit.placed() for fit in fits], [judge(fit.doll, fit) for fit in fits]
 
 
 def _alone(error: errors.ModelError) -> errors.ModelError:
