@@ -13,12 +13,13 @@ from ragdoll_ros.fit.command import main
 from ragdoll_ros.fit.judging.verdict import judge
 from ragdoll_ros.fit.pipeline import Options, fit_character, fit_characters
 from ragdoll_ros.fit.reading.character import read_character
-from ragdoll_ros.fit.skin import skin_of
+from ragdoll_ros.fit.skin import skin_of, skins_of
 from ragdoll_ros.model import errors
 from ragdoll_ros.model.ragdoll import SkeletonFrame
 from ragdoll_ros.model.scene import all_above_ground, height
 from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.viewer.editor.folder import Folder
 
 SMALL = 0.8
 """Size of the second person, of the first."""
@@ -149,6 +150,15 @@ def test_each_wears_its_own_skin_and_no_other(tmp_path, skins):
         low, high = skin.vertices[:, 1].min(), skin.vertices[:, 1].max()
         assert (low + high) / 2 == pytest.approx(middle, abs=1e-5)
         assert high - low < 2
+
+
+def test_the_page_takes_both_and_judges_each(tmp_path):
+    glb = write_two(tmp_path, person(), person('', SMALL, x=2), 1)
+    (tmp_path / 'kept').mkdir()
+    scene, verdicts = Folder(tmp_path / 'kept').fit('two.glb', glb.read_bytes(), lambda *_: None)
+    assert [placement.name for placement in scene.dolls] == ['two_1', 'two_2']
+    assert [verdict.word for verdict in verdicts] == ['good', 'good']
+    assert sorted(skins_of(scene, pytest.fail)) == [0, 1]
 
 
 def test_what_is_bound_to_another_doll_is_refused(tmp_path):
