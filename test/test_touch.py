@@ -1,4 +1,4 @@
-"""The instant of a touch within a step, where several gaps close that are not straight."""
+"""The instant of a touch within a step, where gaps close that are not straight."""
 from __future__ import annotations
 
 import collections
@@ -10,42 +10,69 @@ numba = pytest.importorskip('numba')
 
 from ragdoll_ros.physics.kernels.contact.gaps import TOUCHING  # noqa: E402
 from ragdoll_ros.physics.kernels.stepping.control import TRIES  # noqa: E402
+from ragdoll_ros.physics.kernels.stepping.give_back import keep_limits  # noqa: E402
 from ragdoll_ros.physics.kernels.stepping.touch import (  # noqa: E402
     SUNK,
     between,
     narrow,
     open_bracket,
     touched,
+    until_limit,
 )
 
-Scene = collections.namedtuple('Scene', 'pairs bounds')
+Scene = collections.namedtuple('Scene', 'pairs bounds doll_of bone_of')
 Gaps = collections.namedtuple('Gaps', 'gaps later above below bracket')
-NONE = np.zeros(0)
+BOUND = [('q', int), ('v', int), ('lower', float), ('upper', float)]
+
+
+def scene(*bounds):
+    """What of a scene limits are: none, or those of coordinates 0, 1, ... of one doll, rad."""
+    rows = [(k, k, lower, upper) for k, (lower, upper) in enumerate(bounds)]
+    return Scene(np.zeros(0), np.array(rows, BOUND), np.zeros(len(rows), int),
+                 np.arange(len(rows)))
+
+
+def gaps(count):
+    return Gaps(*(np.zeros(count) for _ in range(4)), np.zeros(5))
 
 
 @numba.njit
-def _tries(scene, r, step, starts, falls, powers):
-    """Lengths of a step of ``step`` s tried until one ends at the touch, and its gaps at the end:
-    gap k is starts[k] - falls[k] (h / step) ** powers[k].
+def _tries(scene, r, v, length, step, starts, falls, powers):
+    """Lengths of a step of ``step`` s tried, this one first, until one ends at the touch. Gap k at
+    the end of h s is starts[k] - falls[k] (h / step) ** powers[k], and coordinate k moves by v[k] h
+    from its lower limit's gap to its upper one's.
     """
     open_bracket(r)
-    r.gaps[:] = starts
-    length, tries = step, 0
+    tries = 0
     while tries < 100:
         tries += 1
         r.later[:] = starts - falls * (length / step) ** powers
+        for k in range(len(v)):
+            r.later[2 * k] += v[k] * length
+            r.later[2 * k + 1] -= v[k] * length
         sunk, landed, _ = touched(scene, r, length)
         if not narrow(scene, r, length, sunk, landed):
             break
-        length = between(r)
+        length = between(scene, r, v)
     return tries
+
+
+@numba.njit
+def _until_limit(scene, r, v, step):
+    return until_limit(scene, r, v, step)
+
+
+@numba.njit
+def _keep_limits(scene, r, q, shift):
+    keep_limits(scene, r, q, shift)
 
 
 def tries(starts, falls, powers, step=2e-3):
     """As many tries as are made, and the least gap at the end."""
-    count = len(starts)
-    r = Gaps(*(np.zeros(count) for _ in range(4)), np.zeros(5))
-    made = _tries(Scene(NONE, NONE), r, step, np.array(starts), np.array(falls), np.array(powers))
+    r, still = gaps(len(starts)), np.zeros(0)
+    r.gaps[:] = starts
+    made = _tries(scene(), r, still, step, step, np.array(starts), np.array(falls),
+                  np.array(powers))
     return made, r.later.min()
 
 
@@ -74,3 +101,38 @@ def test_the_first_touch_of_several_gaps_is_met(seed):
         assert SUNK <= least <= TOUCHING, (starts, falls, powers)
         worst = max(worst, made)
     assert worst <= TRIES
+
+
+def test_a_joint_is_taken_to_its_limit_by_its_rate():
+    """What bends its way is past it then, or just before it: two tries, as the way is known to the
+    second order where it starts.
+    """
+    limits, rate = scene((-1.0, 0.01), (-1.0, 1.0)), np.array([4.0, 0.05])
+    for bend in (3e-4, -3e-4):  # rad in a step of 2 ms: by 150 rad/s^2
+        r = gaps(4)
+        r.gaps[:] = starts = np.array([1.0, 0.006, 1.0, 1e-5])  # too slow: the second
+        step = _until_limit(limits, r, rate, 2e-3)
+        assert step == pytest.approx(0.006 / 4)
+        made = _tries(limits, r, rate, step, 2e-3, starts, np.array([0.0, bend, 0.0, 0.0]),
+                      np.full(4, 2.0))
+        if bend > 0:
+            assert made == 2
+            assert SUNK <= r.later[1] <= TOUCHING
+        else:  # a step like others; the next one begins from there
+            assert made == 1
+            assert 0 < r.later[1] < 2e-4
+
+
+@pytest.mark.parametrize('gap', [1e-5, 0.0])
+def test_what_is_given_back_takes_no_joint_past_a_limit(gap):
+    """Before it as far as it has come: where a limit is met does not depend on it. A joint that
+    touched its limit as the step began has been seen to by what solves for the shift.
+    """
+    limits, shift = scene((-1.0, 1.0), (-1.0, 1.0)), np.array([1e-3, 1e-3])
+    r = gaps(4)
+    r.gaps[:] = 1.0
+    r.gaps[1] = gap
+    for at, left in ((1.0 - 2e-4, 0.2), (1.0 - 2e-9, 2e-6), (1.0 + 2e-9, 0.0)):
+        moved = shift.copy()
+        _keep_limits(limits, r, np.array([at, 0.0]), moved)
+        np.testing.assert_allclose(moved, shift * (left if gap else 1.0), atol=1e-12)

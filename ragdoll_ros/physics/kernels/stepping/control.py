@@ -9,7 +9,7 @@ from ..system import Course, Room, System
 from .give_back import PAID
 from .momentum import SMALL, inner_energy, take_out, total_energy
 from .step import DEEP, STEP_TOLERANCE, begin_step, contact_step, settle
-from .touch import SUNK, between, narrow, open_bracket, touched
+from .touch import SUNK, between, narrow, open_bracket, touched, until_limit
 from .warm_start import jammed
 
 TRIES = 20
@@ -50,6 +50,8 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
     end_q, end_v, tally = r.states[2], r.vectors[4], r.tally[0]
     length, hit, m = min(h, tally.next) if tally.next > 0 else h, False, 0
     tally.next = 2 * length if 2 * length < step else 0.0
+    if seek:
+        length = until_limit(s, r, course.v, length)
     begin_step(s, r, course, loads)
     take_over(r.met, r.gaps)
     open_bracket(r)
@@ -78,7 +80,7 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
         sunk, landed, fast = touched(s, r, length)
         hit = seek and fast
         if seek and turn < TRIES - 1 and narrow(s, r, length, sunk, landed):
-            length = between(r)
+            length = between(s, r, course.v)
             continue
         gained -= tally.lifted - lifted
         if not gained <= much:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..compiling.decorators import compiled
 from ..contact.gaps import NEVER, TOUCHING, of_limit
 from ..system import Room, System
@@ -95,10 +97,13 @@ def bent(before: float, now: float) -> float:
 
 
 @compiled
-def between(r: Room) -> float:
-    """Length of a step, s, at the end of which the first of those meets that r.bracket parts."""
+def between(s: System, r: Room, v: np.ndarray) -> float:
+    """Length of a step, s, at the end of which the first of those meets that r.bracket parts; ``v``
+    are the velocities at its start.
+    """
     ends, share = r.bracket, 1.0
     low, width = ends[0], ends[1] - ends[0]
+    straight = ends[3] < math.inf
     ends[4] += 1
     late = ends[4] > CHORDS
     if late or width <= ends[3] / 2:
@@ -108,5 +113,38 @@ def between(r: Room) -> float:
     for j in range(len(r.gaps)):
         if r.below[j] < 0:
             above = max(0.0, r.above[j])
-            share = min(share, above / (above - r.below[j]))
+            if straight or not of_limit(s, r.gaps, j):
+                share = min(share, above / (above - r.below[j]))
+            else:
+                share = min(share, parabola(above, limit_rate(s, r, v, j) * width, r.below[j]))
     return max(SHORTEST, low + share * width)
+
+
+@compiled
+def parabola(above: float, slope: float, below: float) -> float:
+    """Where in 0 to 1 a parabola is zero that is ``above`` > 0 at 0, with this slope there, and
+    ``below`` < 0 at 1.
+    """
+    bend = below - above - slope
+    return 2 * above / (math.sqrt(slope * slope - 4 * bend * above) - slope)
+
+
+@compiled
+def limit_rate(s: System, r: Room, v: np.ndarray, j: int) -> float:
+    """Rate, rad/s, at which gap j, a joint's from a limit, opens."""
+    k = j - (len(r.gaps) - len(s.pairs) - 2 * len(s.bounds))
+    rate = v[s.bounds[k // 2].v]
+    return -rate if k % 2 else rate
+
+
+@compiled
+def until_limit(s: System, r: Room, v: np.ndarray, h: float) -> float:
+    """Length of a step, at most h s, at the end of which the first joint is at a limit that it
+    nears fast, if it goes on at its rate of now.
+    """
+    first = len(r.gaps) - len(s.pairs) - 2 * len(s.bounds)
+    for j in range(first, first + 2 * len(s.bounds)):
+        rate = -limit_rate(s, r, v, j)
+        if rate > SLOW_TURN and r.gaps[j] > TOUCHING and r.gaps[j] < h * rate:
+            h = max(SHORTEST, r.gaps[j] / rate)
+    return h
