@@ -9,7 +9,7 @@ from ..system import Course, Room, System
 from .give_back import PAID
 from .momentum import SMALL, inner_energy, take_out, total_energy
 from .step import DEEP, STEP_TOLERANCE, begin_step, contact_step, settle
-from .touch import SUNK, between, narrow, open_bracket, touched, until_limit
+from .touch import SUNK, between, met_fast, narrow, open_bracket, touched, until_limit
 from .warm_start import jammed
 
 TRIES = 20
@@ -75,7 +75,7 @@ def step_or_touch(s: System, r: Room, course: Course, h: float, loads: np.ndarra
             open_bracket(r)
             forget_reaction(course)
             continue
-        if not seek and turn < TRIES - 1 and meet(r):
+        if not seek and turn < TRIES - 1 and meet(s, r, length):
             continue
         sunk, landed, fast = touched(s, r, length)
         hit = seek and fast
@@ -117,11 +117,12 @@ def meets_deep(s: System, r: Room) -> bool:
 
 
 @compiled
-def meet(r: Room) -> bool:
-    """Let what met in the step just gone be of those that touch in it; whether there is any."""
+def meet(s: System, r: Room, h: float) -> bool:
+    """Let what met in the step of h s just gone be of those that touch in it; whether there is any.
+    """
     some = False
     for j in range(len(r.met)):
-        if r.met[j] > TOUCHING and r.later[j] < SUNK:
+        if r.met[j] > TOUCHING and (r.later[j] < SUNK or met_fast(s, r, j, h)):
             r.met[j] = r.later[j]
             some = True
     return some

@@ -69,21 +69,17 @@ def enter_shift(s: System, r: Room, q: np.ndarray, shift: np.ndarray) -> None:
 
 
 @compiled
-def keep_limits(s: System, r: Room, q: np.ndarray, shift: np.ndarray) -> None:
-    """Shorten a ``shift`` (nv,) of a doll that would take a joint past a limit that it did not
-    touch as the step began: where it meets one in the step does not depend on what is given back.
-    """
+def keep_limits(s: System, q: np.ndarray, shift: np.ndarray) -> None:
+    """Shorten a ``shift`` (nv,) of a doll that would take a joint past a limit not met yet."""
     share, doll = 1.0, -1
-    first = len(r.gaps) - len(s.pairs) - 2 * len(s.bounds)
     for k in range(len(s.bounds)):
         bound = s.bounds[k]
         if s.doll_of[s.bone_of[bound.v]] != doll:
             shorten(s, doll, share, shift)
             share, doll = 1.0, s.doll_of[s.bone_of[bound.v]]
         way = shift[bound.v]
-        upper = way > 0
-        room = max(0.0, bound.upper - q[bound.q] if upper else q[bound.q] - bound.lower)
-        if abs(way) > room and r.gaps[first + 2 * k + upper] > TOUCHING:
+        room = q[bound.q] - bound.lower if way < 0 else bound.upper - q[bound.q]
+        if room > 0 and abs(way) > room:
             share = min(share, room / abs(way))
     shorten(s, doll, share, shift)
 

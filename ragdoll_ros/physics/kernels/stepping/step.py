@@ -89,7 +89,7 @@ def contact_step(s: System, r: Room, course: Course, h: float, loads: np.ndarray
     for j in range(len(v)):
         course.reaction[j] = change[j] / h if lasts else 0.0
     integrate(s.tree, middle, end_v, h / 2, end_q)
-    keep_limits(s, r, end_q, shift)
+    keep_limits(s, end_q, shift)
     r.lift[0] = lifted(s, r, shift) if m else 0.0
     r.tally[0].steps += 1
     return m
