@@ -133,10 +133,10 @@ def test_all_topics_tell_of_the_same_doll(heard, peer):
 
 
 def test_diagnostics_come_each_second_and_add_up(heard, peer):
-    peer.wait(lambda: len(heard['diagnostics']) > 3)
+    # Others may take the machine's time away for a while: of six in a row, most come in time.
+    peer.wait(lambda: len(heard['diagnostics']) > 5 and np.median(np.diff(
+        [arrival for arrival, _ in heard['diagnostics'][-6:]])) == pytest.approx(1.0, abs=0.1))
     values, status = last_report(heard)
-    times = [arrival for arrival, _ in heard['diagnostics']][-6:]
-    assert np.median(np.diff(times)) == pytest.approx(1.0, abs=0.1)
     assert status.name == 'ragdoll: simulation'
     # A busy machine may hold the node up: then it says so.
     behind = float(values['pace']) < BEHIND * PACE

@@ -15,9 +15,9 @@ import pytest
 
 pytest.importorskip('viser')
 from conftest import ROOT, light
-from page_client import PageClient
+from page_client import PATIENCE, PageClient
 
-from ragdoll_ros.viewer.command import folder_for_files, is_open, main
+from ragdoll_ros.viewer.command import folder_for_files, is_open, main, stopped_by_signals
 
 COMMAND = [sys.executable, '-m', 'ragdoll_ros.viewer.command']
 
@@ -136,9 +136,23 @@ def test_a_page_that_others_reach_says_so(host, others):
 def test_an_open_host_is_told_with_what_to_do():
     process, port = start('--scene', 'drop', '--host', '0.0.0.0', '--port', '0')
     process.send_signal(signal.SIGTERM)
-    _, error = process.communicate(timeout=10)
+    _, error = process.communicate(timeout=PATIENCE)
     said, = error.splitlines()
     assert f'at port {port} may steer' in said and '--host 127.0.0.1' in said
+
+
+def test_a_signal_is_heard_within_a_wait_for_it():
+    """The main thread holds the event's lock then, in one of 40 ends on a busy machine."""
+    before = {sign: signal.getsignal(sign) for sign in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        stop = stopped_by_signals()
+        with stop._cond:
+            signal.raise_signal(signal.SIGTERM)
+            signal.raise_signal(signal.SIGTERM)
+        assert stop.wait(PATIENCE)
+    finally:
+        for sign, handler in before.items():
+            signal.signal(sign, handler)
 
 
 def test_a_wrong_option_ends_the_process_with_two():

@@ -7,6 +7,7 @@ import errno
 import io
 import ipaddress
 import os
+import queue
 import signal
 import socket
 import sys
@@ -67,9 +68,7 @@ def main(arguments: list[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     at = arguments.index('--ros-args') if '--ros-args' in arguments else len(arguments)
     options, for_ros = parser().parse_args(arguments[:at]), arguments[at:]
-    stop = threading.Event()
-    for sign in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(sign, lambda *_: stop.set())
+    stop = stopped_by_signals()
     try:
         if options.static is not None:
             write_static(options, for_ros)
@@ -79,6 +78,24 @@ def main(arguments: list[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return 2
     return 0
+
+
+def stopped_by_signals() -> threading.Event:
+    """What SIGINT and SIGTERM set.
+
+    A handler runs within whatever the main thread does, a wait for the event too, which holds its
+    lock: it hands on to a thread, through a queue that may be put into within itself.
+    """
+    stop, signals = threading.Event(), queue.SimpleQueue()
+
+    def take() -> None:
+        signals.get()
+        stop.set()
+
+    for sign in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(sign, lambda *_: signals.put(None))
+    threading.Thread(target=take, name='signals', daemon=True).start()
+    return stop
 
 
 def parser() -> argparse.ArgumentParser:

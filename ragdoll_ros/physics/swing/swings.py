@@ -198,8 +198,9 @@ def _rods(mount: Mount) -> np.ndarray:
 def _parts(forces: tuple[np.ndarray, np.ndarray], h: float) -> int:
     """How many steps a force that strong needs in place of one."""
     most = (SHARPEST / h) ** 4
-    # The sum of all is quick to tell, and seldom more than one alone may have.
-    if all(np.vdot(force, force) <= most for force in forces):
+    # The sum of all is quick to tell, and seldom more than one alone may have. Not by BLAS, whose
+    # threads spin on after each sum of a crowd's.
+    if all(np.einsum('in,in', force, force) <= most for force in forces):
         return 1
     sharpest = max(float(np.max(dot(force, force))) for force in forces)
     return min(max(math.ceil((sharpest / most) ** 0.25), 1), MOST_PARTS)
