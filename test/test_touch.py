@@ -9,7 +9,7 @@ import pytest
 numba = pytest.importorskip('numba')
 
 from ragdoll_ros.physics.kernels.contact.gaps import TOUCHING  # noqa: E402
-from ragdoll_ros.physics.kernels.stepping.control import TRIES  # noqa: E402
+from ragdoll_ros.physics.kernels.stepping.control import TRIES, meet  # noqa: E402
 from ragdoll_ros.physics.kernels.stepping.give_back import keep_limits  # noqa: E402
 from ragdoll_ros.physics.kernels.stepping.touch import (  # noqa: E402
     SUNK,
@@ -21,6 +21,7 @@ from ragdoll_ros.physics.kernels.stepping.touch import (  # noqa: E402
 )
 
 Scene = collections.namedtuple('Scene', 'pairs bounds doll_of bone_of')
+Met = collections.namedtuple('Met', 'gaps later met')
 Gaps = collections.namedtuple('Gaps', 'gaps later above below bracket')
 BOUND = [('q', int), ('v', int), ('lower', float), ('upper', float)]
 
@@ -63,8 +64,13 @@ def _until_limit(scene, r, v, step):
 
 
 @numba.njit
-def _keep_limits(scene, r, q, shift):
-    keep_limits(scene, r, q, shift)
+def _meet(scene, r, h):
+    return meet(scene, r, h)
+
+
+@numba.njit
+def _keep_limits(scene, q, shift):
+    keep_limits(scene, q, shift)
 
 
 def tries(starts, falls, powers, step=2e-3):
@@ -123,16 +129,24 @@ def test_a_joint_is_taken_to_its_limit_by_its_rate():
             assert 0 < r.later[1] < 2e-4
 
 
-@pytest.mark.parametrize('gap', [1e-5, 0.0])
-def test_what_is_given_back_takes_no_joint_past_a_limit(gap):
-    """Before it as far as it has come: where a limit is met does not depend on it. A joint that
-    touched its limit as the step began has been seen to by what solves for the shift.
+def test_what_is_given_back_takes_a_joint_to_its_limit_at_most():
+    """So that the step ends there, whichever of its lengths is tried. A step that took the joint
+    past it by itself is too long, or began there: that its limit is kept solving sees to.
     """
     limits, shift = scene((-1.0, 1.0), (-1.0, 1.0)), np.array([1e-3, 1e-3])
-    r = gaps(4)
-    r.gaps[:] = 1.0
-    r.gaps[1] = gap
-    for at, left in ((1.0 - 2e-4, 0.2), (1.0 - 2e-9, 2e-6), (1.0 + 2e-9, 0.0)):
+    for at, left in ((1.0 - 2e-4, 0.2), (1.0 - 2e-9, 2e-6), (1.0 + 2e-9, 1.0)):
         moved = shift.copy()
-        _keep_limits(limits, r, np.array([at, 0.0]), moved)
-        np.testing.assert_allclose(moved, shift * (left if gap else 1.0), atol=1e-12)
+        _keep_limits(limits, np.array([at, 0.0]), moved)
+        np.testing.assert_allclose(moved, shift * left, atol=1e-12)
+        assert at > 1 or at + moved[0] <= 1 + 1e-15
+
+
+def test_what_lands_fast_has_met_where_touches_are_not_sought():
+    """At its limit as the step ends, on the dot: the step is gone again with the limit, else the
+    joint would go on into it. What lands slowly is left to the next step.
+    """
+    limits, h = scene((-1.0, 1.0)), 2e-3
+    for before, met in ((0.01, True), (1e-5, False)):
+        r = Met(np.array([1.0, before]), np.array([1.0, 0.0]), np.array([1.0, before]))
+        assert _meet(limits, r, h) == met
+        assert (r.met[1] == 0.0) == met

@@ -118,8 +118,7 @@ def meets_deep(s: System, r: Room) -> bool:
 
 @compiled
 def meet(s: System, r: Room, h: float) -> bool:
-    """Let what met in the step of h s just gone be of those that touch in it; whether there is any.
-    """
+    """Let what met in the step of h s just gone, deep or fast, touch in it; whether any did."""
     some = False
     for j in range(len(r.met)):
         if r.met[j] > TOUCHING and (r.later[j] < SUNK or met_fast(s, r, j, h)):

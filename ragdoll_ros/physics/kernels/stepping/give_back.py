@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..contact.gaps import BEYOND, BURIED, TOUCHING, bone_velocity
+from ..contact.gaps import BEYOND, BURIED, bone_velocity
 from ..dynamics.bias import update_moves
 from ..maths.quaternion import cross
 from ..system import Room, System
