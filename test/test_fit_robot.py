@@ -127,6 +127,13 @@ def test_dry_friction_is_named_and_left_out(tmp_path):
     assert [each.damping for each in doll.joints] == [0.5] * 3
 
 
+def test_how_links_touch_in_pybullet_is_named_and_left_out(tmp_path):
+    rubber = '<contact><lateral_friction value="2"/></contact></link>'
+    soles = [link(name).replace('</link>', rubber) for name in 'ac']
+    _, [note] = read(tmp_path, soles[0], link('b'), soles[1], joint('b'), joint('c'))
+    assert note.startswith('a, c: ') and '<contact>' in note and 'left out' in note
+
+
 def test_a_link_without_a_shape_rides_and_gives_its_mass(tmp_path):
     doll, _ = read(tmp_path, link('a'), link('sensor', shape='', mass=0.5), link('tip', '', 0),
                    joint('sensor', kind='fixed', xyz='0 0 0.3'),

@@ -45,6 +45,8 @@ class UrdfLink:
     """What else it is described by, which no doll has: the tags."""
     collides: bool = False
     """Whether its shapes and meshes are those of <collision>; else they are what is seen."""
+    has_contact: bool = False
+    """Whether PyBullet's <contact> says how it touches: its friction, its restitution."""
 
 
 @dataclass
@@ -127,6 +129,7 @@ def _link(element: ElementTree.Element) -> UrdfLink:
         errors.check_range(f'{where}.mass', link.mass, 0, math.inf)
         link.centre = _pose(inertial, where)
         link.inertia = _inertia(inertial.find('inertia'), where)
+    link.has_contact = element.find('contact') is not None
     collisions = element.findall('collision')
     link.collides = bool(collisions)
     # Some describe only what is seen.

@@ -86,7 +86,7 @@ def _doll(tree: UrdfTree, folder: Path | None = None) -> tuple[Ragdoll, list[str
         joint, above = tree.joints[above], tree.joints[above].parent
         if joint.kind not in ('fixed', 'floating'):
             notes.append(f'{joint.name}: nothing with a shape above it: left out')
-    notes += _resisted(tree)
+    notes += _without_friction(tree)
     frames = _frames(poses, carriers, names, bones)
     return Ragdoll(plain_name(tree.name, 'link'), tuple(bones), tuple(joints), riders=frames), notes
 
@@ -139,12 +139,16 @@ def _joint(tree: UrdfTree, name: str, carriers: dict[str, str], names: dict[str,
     return _turning(parent, child, anchor, turning, poses, angles, notes)
 
 
-def _resisted(tree: UrdfTree) -> list[str]:
-    """Note on joints that turn against dry friction, which no joint of a doll has."""
-    names = [joint.name for joint in tree.joints.values()
-             if joint.friction > 0 and joint.kind in TURNING]
-    return [f'{", ".join(names)}: dry friction (<dynamics friction>) is left out: joints of a doll '
-            'have damping alone'] if names else []
+def _without_friction(tree: UrdfTree) -> list[str]:
+    """Notes on friction and restitution of joints and links, which none of a doll has."""
+    joints = [joint.name for joint in tree.joints.values()
+              if joint.friction > 0 and joint.kind in TURNING]
+    links = [link.name for link in tree.links.values() if link.has_contact]
+    return [f'{", ".join(names)}: {what}' for names, what in (
+        (joints, 'dry friction (<dynamics friction>) is left out: joints of a doll have damping '
+         'alone'),
+        (links, 'how it touches (<contact>) is left out: friction and restitution are those of '
+         'the scene')) if names]
 
 
 def _turning(parent: str, child: str, anchor: np.ndarray, row: list[UrdfJoint],
