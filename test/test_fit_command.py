@@ -1,4 +1,5 @@
 """ragdoll_fit as a user calls it."""
+import dataclasses
 import subprocess
 import sys
 import time
@@ -10,8 +11,9 @@ import pytest
 from fit_rigs import RIGS
 
 from ragdoll_ros.files.doll import load_doll
-from ragdoll_ros.files.scene import load_scene
+from ragdoll_ros.files.scene import load_scene, save_scene
 from ragdoll_ros.fit.command import main
+from ragdoll_ros.model.scene import Placement
 
 BOTH = {'link0', 'link1', 'link1/1', 'link1/2'}
 """Links of two bones with a ball joint between them."""
@@ -90,6 +92,17 @@ def test_strict_ends_with_3_where_the_doll_is_not_good(glb, capsys):
     assert capsys.readouterr().out.splitlines()[-1] == 'verdict: good'
     assert main(['article_doll.yaml', '--strict']) == 3
     assert capsys.readouterr().out.splitlines()[-1] == 'verdict: doubtful'
+
+
+def test_each_doll_of_a_scene_is_checked_once(tmp_path, capsys):
+    scene = dataclasses.replace(load_scene('crowd'), dolls=(
+        *load_scene('crowd').dolls[:2], Placement(load_doll('article_doll'), 'third', (5, 0, 2))))
+    save_scene(scene, str(tmp_path / 'three.yaml'))
+    assert main([str(tmp_path / 'three.yaml'), '--strict']) == 3
+    said = capsys.readouterr().out
+    assert 'doll 1 of 2:' in said and 'doll 2 of 2:' in said and said.count('verdict: ') == 2
+    assert main([str(tmp_path / 'three.yaml'), '-o', str(tmp_path / 'one.yaml')]) == 2
+    assert 'holds 2' in capsys.readouterr().err
 
 
 def test_a_doll_is_checked(capsys):

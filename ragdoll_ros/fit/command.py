@@ -4,12 +4,14 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
-from ..files.doll import load_doll, save_doll
-from ..files.scene import save_scene
+from ..files.doll import save_doll
+from ..files.scene import load_scene, save_scene
 from ..files.urdf import to_urdf
 from ..model import errors
+from ..model.ragdoll import Ragdoll
 from ..model.scene import Placement, all_above_ground
 from .judging.verdict import Verdict, judge
 from .pipeline import Fit, Options, fit_characters
@@ -22,7 +24,8 @@ example:
   ragdoll_fit character.glb -o doll.yaml --picture doll.png
   ros2 run ragdoll_ros ragdoll_node --ros-args -p scene:=doll.yaml
 
-A .urdf becomes a doll too: a robot that goes limp. A doll's own .yaml is checked and reported.
+A .urdf becomes a doll too: a robot that goes limp. A .yaml of a doll, or
+of a scene, is checked and reported.
 Of several characters in one file each becomes a doll: DOLL.yaml is a scene of all, where they
 stood; a DOLL.urdf and an OUT.png have _1, _2 and so on before their suffix.
 The report ends with a verdict on the doll: good, doubtful or wrong.
@@ -119,18 +122,33 @@ def _run(options: argparse.Namespace) -> list[Verdict]:
 def _made(options: argparse.Namespace, path: Path) -> list[tuple[Placement, Fit | None, str]]:
     """Each doll in its place, how it was fitted where it was, and the report on it."""
     if path.suffix.lower() in DOLLS:
-        doll = load_doll(options.input)
-        return [(Placement(doll), None, doll_report(doll))]
+        return _loaded(options)
     if path.suffix.lower() in ROBOTS:
         doll, notes = read_urdf(path)
         return [(Placement(doll), None, doll_report(doll, notes))]
     fits = fit_characters(read_character(path, options.scale), Options(
         options.shape, options.orientation, options.weight, options.smallest, options.mass,
         options.masses, tuple(options.keep)))
-    heads = [f'{fit.doll.name}, character {number} of {len(fits)}:\n' if len(fits) > 1 else ''
-             for number, fit in enumerate(fits, 1)]
+    heads = _heads([fit.doll for fit in fits], 'character')
     return [(fit.placed(model=str(path)), fit, head + fit_report(fit))
             for fit, head in zip(fits, heads, strict=True)]
+
+
+def _loaded(options: argparse.Namespace) -> list[tuple[Placement, None, str]]:
+    """The doll in a YAML file, or each that differs of a scene, as _made gives them."""
+    dolls = list({id(each.doll): each.doll for each in load_scene(options.input).dolls}.values())
+    if options.output and len(dolls) > 1:
+        raise errors.WrongForm('--output', options.output,
+                               f'one doll to write, and {options.input} holds {len(dolls)}')
+    heads = _heads(dolls, 'doll')
+    return [(Placement(doll), None, head + doll_report(doll))
+            for doll, head in zip(dolls, heads, strict=True)]
+
+
+def _heads(dolls: Sequence[Ragdoll], kind: str) -> list[str]:
+    """Heads of their reports, where there is more than one."""
+    return [f'{doll.name}, {kind} {number} of {len(dolls)}:\n' if len(dolls) > 1 else ''
+            for number, doll in enumerate(dolls, 1)]
 
 
 def _ended(path: str, ending: str) -> Path:
