@@ -77,10 +77,19 @@ def form_matrix(r: Room, count: int, n: int, compliance: float) -> None:
             own = W[e * n:e * n + e + 1]
             for f in range(e + 1):
                 own[f] = 0.0
-            for x in range(r.contacts[i].support):
-                share, row = Y[e, x], YT[r.support[i, x]]
+            support, x = r.contacts[i].support, 0
+            while x + 4 <= support:
+                at = r.support[i]
+                a, b, c, d = YT[at[x]], YT[at[x + 1]], YT[at[x + 2]], YT[at[x + 3]]
+                p, q, s, t = Y[e, x], Y[e, x + 1], Y[e, x + 2], Y[e, x + 3]
                 for f in range(e + 1):
-                    own[f] += share * row[f]
+                    own[f] = own[f] + p * a[f] + q * b[f] + s * c[f] + t * d[f]
+                x += 4
+            while x < support:
+                p, a = Y[e, x], YT[r.support[i, x]]
+                for f in range(e + 1):
+                    own[f] += p * a[f]
+                x += 1
             for f in range(e):
                 W[f * n + e] = own[f]
             own[e] *= 1 + compliance

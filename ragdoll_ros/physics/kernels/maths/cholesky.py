@@ -33,18 +33,30 @@ def solve(a: np.ndarray, b: np.ndarray) -> None:
 @compiled
 def factor_row(U: np.ndarray, n: int, i: int, count: int) -> bool:
     """Make row i of a symmetric matrix, flat, n a row, that of its factor U^T U, up to column
-    ``count``, from those above it; whether it has one. A processor does several columns at once.
+    ``count``, from those above it; whether it has one. A processor does several columns at once,
+    and of four rows while it has them at hand, each in its turn.
     """
-    own = U[i * n:i * n + count]
-    for k in range(i):
-        above, share = U[k * n:k * n + count], U[k * n + i]
-        if share != 0.0:
-            for j in range(i, count):
-                own[j] -= share * above[j]
-    if not own[i] > 0:
+    own, width, k = U[i * n + i:i * n + count], count - i, 0
+    while k + 4 <= i:
+        at = k * n + i
+        a, b = U[at:at + width], U[at + n:at + n + width]
+        c, d = U[at + 2 * n:at + 2 * n + width], U[at + 3 * n:at + 3 * n + width]
+        x, y, z, w = a[0], b[0], c[0], d[0]
+        if x != 0.0 or y != 0.0 or z != 0.0 or w != 0.0:
+            for j in range(width):
+                own[j] = own[j] - x * a[j] - y * b[j] - z * c[j] - w * d[j]
+        k += 4
+    while k < i:
+        a = U[k * n + i:k * n + count]
+        x = a[0]
+        if x != 0.0:
+            for j in range(width):
+                own[j] -= x * a[j]
+        k += 1
+    if not own[0] > 0:
         return False
-    scale = 1 / math.sqrt(own[i])
-    for j in range(i, count):
+    scale = 1 / math.sqrt(own[0])
+    for j in range(width):
         own[j] *= scale
     return True
 
