@@ -2,7 +2,9 @@
 
 What is apart when a step begins may meet before it ends; a length at which nothing has met and one
 at which something has are drawn together by chords, those of Anderson and Bjoerck (BIT 13, 1973),
-and where these lag, as between two gaps of which one is not straight, by halves.
+and where these lag, as between two gaps of which one is not straight, by halves. A joint's rate is
+known: the first length is one after which it is at its limit at that rate, the next is along a
+parabola that begins with it.
 """
 from __future__ import annotations
 
