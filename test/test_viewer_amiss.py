@@ -37,6 +37,8 @@ def test_software_rendering_a_grab_and_a_lost_viewer():
         with serving('--port', '0', '--scene', 'drop') as url:
             view = View(context, url)
             view.wait(lambda: np.isfinite(view.bodies(SCENE)).all())
+            before = view.bodies(SCENE)  # it falls once it is seen
+            view.wait(lambda: abs(view.bodies(SCENE) - before).max() > 0.01)
             note = view.page.get_by_text('WebGL is running in software mode')
             assert 'check that hardware acceleration is enabled' in note.text_content()
             check_grab(view)
