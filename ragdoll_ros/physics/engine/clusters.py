@@ -23,6 +23,7 @@ from ..kernels.system import (
 from ..settings import Accuracy
 from ..system import joined, pairs_between, system_of
 from .courses import KEPT, Courses, room_for_contacts
+from .neighbours import NO_COUPLES
 from .protocol import GROUND
 
 COUNTS = ('flights', 'steps', 'impacts', 'sweeps', 'unsolved', 'left_out', 'stalls', 'softened',
@@ -34,8 +35,6 @@ UNSEEN = ('q', 'v', 'within', 'tally')
 
 SHARES = 4
 """Parts of the work for each thread: who is done early takes one more."""
-
-NO_COUPLES = np.zeros((0, 2), np.int64)
 
 
 @dataclass

@@ -16,6 +16,9 @@ SUDDEN = 2.0
 """Times its speed that an impact may leave a bone with."""
 
 
+NO_COUPLES = np.zeros((0, 2), np.int64)
+
+
 class Neighbours:
     """Balls about the dolls of a scene, a sweep along x over them, and balls about their bones."""
 
@@ -40,6 +43,8 @@ class Neighbours:
         thrown = self._near_ground(rows, balls[1], groups)
         a, b = _sweep(centres, _enough(wide, ahead * drifts, thrown))
         near = moving[a] | moving[b]
+        if not near.any():
+            return NO_COUPLES
         a, b = a[near], b[near]
         seen = (thrown[a] | thrown[b]).astype(int)
         """(k,) against what the speeds of two dolls count: 0 each other, 1 the ground."""
