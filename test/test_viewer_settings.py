@@ -69,11 +69,11 @@ def test_errors_are_those_of_the_report():
 
 def test_the_accuracy_by_the_dropdown_and_its_price(page):
     wait(lambda: 'ms a tick here' in page.settings.price.content)
-    assert '0.37 mm' in page.settings.price.content
+    assert '0.2 mm' in page.settings.price.content
     assert 'pace' in page.settings.health.content or 'tick' in page.settings.health.content
     page.client.update(page.settings.accuracy, 'exact')
     wait(lambda: page.source.report.accuracy == 'exact')
-    wait(lambda: '0.03 mm' in page.settings.price.content)
+    wait(lambda: '0.02 mm' in page.settings.price.content)
     assert page.frame.scene is DROP, 'it goes on'
     page.source.load('flight')
     assert page.source.report.accuracy == 'exact'

@@ -20,7 +20,7 @@ from .sources.source import Report, Source
 
 AMBER = '#e67700'
 
-ERRORS_MM = {'draft': 0.52, 'normal': 0.37, 'exact': 0.03}
+ERRORS_MM = {'draft': 0.37, 'normal': 0.2, 'exact': 0.02}
 """By how much bones of the default doll are off after 0.1 s of contacts, median of 60 pieces:
 docs/accuracy.md, 'pieces'."""
 
