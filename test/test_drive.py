@@ -165,8 +165,9 @@ def test_lying_dolls_are_turned(friction, sign):
             flattest = np.argmin(np.abs(before.rotation_matrices[0][2]))
             heading = np.cross(before.rotation_matrices[0], after.rotation_matrices[0], axis=0)[2]
             ways.append(sign * heading[flattest])
-    assert len(ways) >= (6 if friction < math.inf else 2)
-    assert min(ways) > (math.sin(math.radians(5)) if friction < math.inf else 0)
+    turned_so = sum(way > math.sin(math.radians(5)) for way in ways)
+    assert turned_so >= (6 if friction < math.inf else 2)
+    assert min(ways) > 0, 'none the other way'
 
 
 def test_what_lies_on_a_face_and_does_not_slip_is_not_turned():

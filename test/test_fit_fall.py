@@ -61,11 +61,8 @@ def falls_in_one_piece(doll):
 
 def falls_and_settles(doll):
     state = falls_in_one_piece(doll)
-    # Settled: at a slow roll on the whole. A head that hangs free may swing on, which its joint's
-    # damping alone brakes.
-    masses = np.array([bone.mass for bone in doll.bones])
-    squares = (state.linear_velocities ** 2).sum(axis=1)
-    assert np.sqrt(masses @ squares / masses.sum()) < 0.05
+    # Settled: nothing moves faster than a slow roll.
+    assert np.abs(state.linear_velocities).max() < 0.1
     assert state.positions[:, 2].max() < max(bone.position[2] for bone in doll.bones) + 0.4
 
 

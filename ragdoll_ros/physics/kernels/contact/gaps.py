@@ -245,8 +245,14 @@ def pair_gap(a: np.record, b: np.record, pa: np.ndarray, ra: np.ndarray, pb: np.
 @compiled
 def of_limit(s: System, gaps: np.ndarray, j: int) -> bool:
     """Whether gap j of all is a joint's from a limit, in rad."""
-    first = len(gaps) - len(s.pairs) - 2 * len(s.bounds)
+    first = first_limit(s, gaps)
     return first <= j < first + 2 * len(s.bounds)
+
+
+@compiled
+def first_limit(s: System, gaps: np.ndarray) -> int:
+    """The first of all gaps that is a joint's from a limit."""
+    return len(gaps) - len(s.pairs) - 2 * len(s.bounds)
 
 
 @compiled

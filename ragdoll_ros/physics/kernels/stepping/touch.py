@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..contact.gaps import NEVER, TOUCHING, of_limit
+from ..contact.gaps import NEVER, TOUCHING, first_limit, of_limit
 from ..system import Room, System
 from .step import SLOW, SLOW_TURN
 
@@ -134,7 +134,7 @@ def parabola(above: float, slope: float, below: float) -> float:
 @compiled
 def limit_rate(s: System, r: Room, v: np.ndarray, j: int) -> float:
     """Rate, rad/s, at which gap j, a joint's from a limit, opens."""
-    k = j - (len(r.gaps) - len(s.pairs) - 2 * len(s.bounds))
+    k = j - first_limit(s, r.gaps)
     rate = v[s.bounds[k // 2].v]
     return -rate if k % 2 else rate
 
@@ -144,7 +144,7 @@ def until_limit(s: System, r: Room, v: np.ndarray, h: float) -> float:
     """Length of a step, at most h s, at the end of which the first joint is at a limit that it
     nears fast, if it goes on at its rate of now.
     """
-    first = len(r.gaps) - len(s.pairs) - 2 * len(s.bounds)
+    first = first_limit(s, r.gaps)
     for j in range(first, first + 2 * len(s.bounds)):
         rate = -limit_rate(s, r, v, j)
         if rate > SLOW_TURN and r.gaps[j] > TOUCHING and r.gaps[j] < h * rate:
