@@ -360,6 +360,14 @@ def test_a_faulty_joint_is_told_at_its_field(wrong, field, words):
     assert [error.path for error in caught.value.errors] == [field]
 
 
+@pytest.mark.parametrize('text', ['-90, 4.5', '-90 4.5', '-90,4.5', '-90; 4,5', '-90;4.5',
+                                  '-90° 4.5°', '-90; 4,5°', '-90, 4.5 deg', '(-90, 4.5)'])
+def test_a_pair_of_limits_is_typed_as_any_numbers_are(text):
+    scene = sheet.apply(DROP, 'left_shin', {'limits_1': text})
+    assert changes.joint_of(scene, 'left_shin').limits == (
+        (math.radians(-90), math.radians(4.5)),)
+
+
 def test_a_balls_limits_may_be_typed_as_one_number():
     scene = changes.set_joint_kind(DROP, 'left_thigh', 'ball')
     scene = sheet.apply(scene, 'left_thigh', {'limits_1': '40', 'limits_2': '-20 20'})

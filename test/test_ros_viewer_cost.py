@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip('viser')
 
 from page_client import served, wait
-from page_cost import bench, many_dolls, one_doll, row
+from page_cost import bench, many_dolls, middle, one_doll, row
 
 from ragdoll_ros.viewer.sources.remote import Remote
 
@@ -67,7 +67,7 @@ def test_a_minute_of_scrubbing_costs_the_node_nothing(ros):
     with bench(1, twin=True) as node, served(Remote([])) as page:
         client = page.open()
         wait(lambda: page.timeline.cut is not None and page.timeline.cut.duration > 5)
-        live = node.measure()
+        live = [node.measure() for _ in range(3)]
         stop = threading.Event()
 
         def scrub():
@@ -84,8 +84,9 @@ def test_a_minute_of_scrubbing_costs_the_node_nothing(ros):
         share = (time.process_time() - used) / (time.monotonic() - begin)
         stop.set()
         hand.join()
-    print(row('live', live), *(row('scrubbed', cost) for cost in costs), share, sep='\n')
+    print(*(row('live', cost) for cost in live), *(row('scrubbed', cost) for cost in costs), share,
+          sep='\n')
     assert not page.timeline.is_live and share < 0.25
     assert sum(cost.rate for cost in costs) / 6 == pytest.approx(100, rel=0.01)
-    ratios = sorted(cost.node / cost.twin for cost in costs)
-    assert ratios[2] < live.node / live.twin * (1 + NOISE)
+    scrubbed, live = middle(costs), middle(live)
+    assert scrubbed.node / scrubbed.twin < live.node / live.twin * (1 + NOISE)

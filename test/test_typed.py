@@ -53,13 +53,14 @@ def test_infinity_is_a_number_where_it_means_something():
     ('1, 2, 3', (1, 2, 3)), ('1 2 3', (1, 2, 3)), ('1,2,3', (1, 2, 3)), ('(1, 2, 3)', (1, 2, 3)),
     ('[.1 -.2 3e-1]', (0.1, -0.2, 0.3)), ('1,5; 2; -0,5', (1.5, 2, -0.5)), ('1;2;3', (1, 2, 3)),
     ('10 20 30 cm', (0.1, 0.2, 0.3)), ('10 cm; 2; 3 mm', (0.1, 2, 0.003)),
-    ('７ ８ ９', (7, 8, 9))])
+    ('7cm 8cm 9cm', (0.07, 0.08, 0.09)), ('1m, 2, 3m', (1, 2, 3)), ('７ ８ ９', (7, 8, 9))])
 def test_three_numbers(text, values):
     assert numbers(text, 3, 'm') == values
 
 
 @pytest.mark.parametrize('text', ['', '1', '1 2', '1 2 3 4', '1,5 2,5 3,5', '1,,2', '1, 2, x',
-                                  '1; 2', '1; 2; 1,000', '1 2 inf', 'a b c', '1, 2,'])
+                                  '1; 2', '1; 2; 1,000', '1 2 inf', 'a b c', '1, 2,',
+                                  '1cm 2 3', '1 2cm 3m'])
 def test_what_is_not_three_numbers_is_refused(text):
     with pytest.raises(errors.WrongForm):
         numbers(text, 3, 'm')

@@ -42,7 +42,7 @@ FIELDS = {
 OF_THREE = ('size, m', 'place, m', 'pivot, m', 'inertia, kg m²')
 """Fields of three numbers; each is typed with a semicolon between them."""
 
-OPTIONAL = ('friction', 'rolling, m', 'restitution', 'inertia, kg m²', 'limits 1, °')
+OPTIONAL = ('friction', 'rolling, m', 'restitution', 'inertia, kg m²')
 """Fields in which nothing means something."""
 
 
@@ -74,6 +74,23 @@ def view(tmp_path_factory):
         yield view
 
 
+def written(label, text):
+    """What stands in a field that is to hold a number: alone, three times, or below itself."""
+    if label == 'limits 1, °':
+        return f'-90; {text}'
+    return ';'.join([text] * 3) if label in OF_THREE else text
+
+
+def meant(label, number):
+    """And what the scene has then."""
+    if number is None:
+        return None
+    if label == 'limits 1, °':
+        # As precise as a conversion from degrees is.
+        return pytest.approx(np.radians((-90, number)), rel=1e-15)
+    return (number,) * 3 if label in OF_THREE else number
+
+
 def said(view):
     """What is written in red."""
     return view.page.evaluate("""() => [...document.querySelectorAll('div')].filter(
@@ -97,11 +114,10 @@ def test_what_is_typed_is_used_to_the_digit_or_refused_in_words(view, label, eve
     field, first, taken = view.field(label), view.field(label).input_value(), 0
     before = used(view, label)
     for text, number in list(TYPED.items())[::every]:
-        typed = ';'.join([text] * 3) if label in OF_THREE else text
-        meant = (number,) * 3 if label in OF_THREE and number is not None else number
+        typed, expected = written(label, text), meant(label, number)
         field.fill(typed)
         view.press('Update')
-        view.wait(lambda meant=meant: said(view) or used(view, label) == meant)
+        view.wait(lambda expected=expected: said(view) or used(view, label) == expected)
         words = said(view)
         if words:
             name = label.partition(',')[0]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -201,16 +202,12 @@ def _pair(key: str, text: str, symmetric: bool) -> tuple[float, float] | None:
     """Read a pair of angles, degrees; one number is enough where they are symmetric."""
     if not text.strip():
         return None
-    parts = text.replace(',', ' ').split()
-    try:
-        numbers = [typed.number(part, '°') for part in parts]
-    except errors.WrongForm:
-        numbers = []
-    if symmetric and len(numbers) == 1:
-        numbers = [-numbers[0], numbers[0]]
-    if len(numbers) != 2:
-        raise errors.WrongForm(key, text, 'two angles in degrees, lower and upper, or nothing')
-    return numbers[0], numbers[1]
+    for count in (2, 1) if symmetric else (2,):
+        with suppress(errors.WrongForm):
+            numbers = typed.numbers(text, count, '°')
+            return (numbers[0] if count == 2 else -numbers[0]), numbers[-1]
+    raise errors.WrongForm(
+        key, text, 'two angles in degrees, lower and upper, such as -90; 45.5, or nothing')
 
 
 def _moments(text: str) -> tuple[float, ...] | None:

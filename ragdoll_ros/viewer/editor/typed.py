@@ -46,7 +46,10 @@ def number(text: str, unit: str = '', infinite: bool = False) -> float:
 
 
 def numbers(text: str, count: int, unit: str = '') -> tuple[float, ...]:
-    """So many numbers, with commas or spaces between them, or semicolons: 1,5; 2; 0,5."""
+    """So many numbers, with commas or spaces between them, or semicolons: 1,5; 2; 0,5.
+
+    The unit stands behind each or behind all; errors are those of ``number``.
+    """
     return tuple(number(part, unit) if ';' in text else _read(part, power, text, unit)
                  for part, power in parts(text, count, unit))
 
@@ -61,6 +64,8 @@ def parts(text: str, count: int, unit: str = '') -> list[tuple[str, int]]:
     else:
         plain, power = _without_unit(plain, unit)
         found = [part for part in re.split(r'\s*,\s*|\s+', plain) if part or ',' in plain]
+        found = [own[0] if (own := _without_unit(part, unit))[1] == power else part
+                 for part in found]
     if len(found) != count or not plain:
         example = ', '.join(('0.1', '0.2', '0.3')[:count])
         raise errors.WrongForm('', text, f'{count} numbers, such as {example}')
