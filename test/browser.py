@@ -147,9 +147,9 @@ class View:
         """Where points (n, 3) m of the world are on the page: (n, 2), as the mouse counts."""
         return np.array(self.page.evaluate(TO_PIXELS, np.asarray(points).tolist()))
 
-    def wait(self, condition):
-        """Wait until a condition holds, and give what it said; the page goes on meanwhile."""
-        end = time.monotonic() + PATIENCE
+    def wait(self, condition, patience=PATIENCE):
+        """Wait until a condition holds, s at the most; what it said. The page goes on meanwhile."""
+        end = time.monotonic() + patience
         while not (said := condition()):
             assert time.monotonic() < end, 'not in time'
             self.page.wait_for_timeout(20)
