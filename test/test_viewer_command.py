@@ -178,6 +178,17 @@ def test_says_what_to_install(tmp_path, missing, word, arguments):
     assert done.returncode == 2 and word in done.stderr and 'Traceback' not in done.stderr
 
 
+def test_what_to_install_is_said_before_machine_code_is_made():
+    """By a process to which viser is not there: numba is not even imported."""
+    done = subprocess.run([sys.executable, '-c', 'import sys\n'
+                           'sys.modules["viser"] = None\n'
+                           'from ragdoll_ros.viewer.command import main\n'
+                           'assert main(["--scene", "drop"]) == 2\n'
+                           'sys.exit("numba" in sys.modules)'],
+                          capture_output=True, text=True, cwd=ROOT, timeout=60)
+    assert done.returncode == 0 and 'ragdoll_ros[viewer]' in done.stderr, done.stderr
+
+
 def test_help_has_examples():
     done = run('--help')
     assert done.returncode == 0 and 'ragdoll_viewer --scene doll.yaml' in done.stdout

@@ -4,6 +4,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import errno
+import importlib.util
 import io
 import ipaddress
 import os
@@ -70,6 +71,9 @@ def main(arguments: list[str] | None = None) -> int:
     options, for_ros = parser().parse_args(arguments[:at]), arguments[at:]
     stop = stopped_by_signals()
     try:
+        if importlib.util.find_spec('viser') is None:
+            # Said before machine code is made, which takes half a minute.
+            raise CannotServe(NO_VISER)
         if options.static is not None:
             write_static(options, for_ros)
         else:
@@ -188,11 +192,11 @@ def write_static(options: argparse.Namespace, for_ros: list[str]) -> None:
 
 
 def page_class() -> type:
-    """Import what takes longest, only once all else is as it should be; CannotServe without it."""
+    """Import what takes longest, only once all else is as it should be; CannotServe if it fails."""
     try:
         import viser  # noqa: F401
-    except ImportError:
-        raise CannotServe(NO_VISER) from None
+    except ImportError as error:
+        raise CannotServe(f'{error}: {NO_VISER}') from None
     from .page import Page
     return Page
 
