@@ -20,9 +20,11 @@ from .sources.source import Report, Source
 
 AMBER = '#e67700'
 
-ERRORS_MM = {'draft': 0.37, 'normal': 0.2, 'exact': 0.02}
-"""By how much bones of the default doll are off after 0.1 s of contacts, median of 60 pieces:
-docs/accuracy.md, 'pieces'."""
+ERRORS_MM = {'rigid': {'draft': 0.37, 'normal': 0.2, 'exact': 0.02},
+             'bullet': {'draft': 14, 'normal': 13, 'exact': 15},
+             'mujoco': {'draft': 18, 'normal': 18, 'exact': 16}}
+"""By how much bones of the default doll are off after 0.1 s of contacts, median of 60 pieces, for
+each engine: docs/accuracy.md, 'pieces'. The finest of PyBullet and MuJoCo there has 32 substeps."""
 
 FIELDS = (
     Field('gravity', 'gravity, m/s²', 'vector', 'along x, y, z; z is up'),
@@ -69,10 +71,11 @@ class Settings:
     @staticmethod
     def _price(report: Report) -> str:
         """What the accuracy costs here, and how far bones are off with it."""
-        if report.accuracy not in ACCURACIES or math.isnan(report.tick_cost):
+        off = ERRORS_MM.get(report.engine_name, {}).get(report.accuracy)
+        if off is None or math.isnan(report.tick_cost):
             return ''
         return (f'{1e3 * report.tick_cost:.2f} ms a tick here; by the report the default doll is '
-                f'{ERRORS_MM[report.accuracy]:g} mm off after 0.1 s of contacts (median)')
+                f'{off:g} mm off after 0.1 s of contacts (median)')
 
     async def _choose(self, event: viser.GuiEvent) -> None:
         """Take the chosen accuracy; it may wait for a node's answer."""

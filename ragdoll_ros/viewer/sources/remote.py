@@ -230,7 +230,7 @@ class Remote(Source):
                         self._told, paused=values['paused'] == 'true',
                         note='' if is_alone else TWINS.format(self._full),
                         pace=float(values['real_time_factor']),
-                        reached=float(values['pace']),
+                        engine_name=values['engine'], reached=float(values['pace']),
                         tick_cost=float(values['tick_cost_ms']) / 1e3,
                         measures={key: float(values[key]) for key in KEYS if key in values})
                 with contextlib.suppress(KeyError, ValueError):

@@ -21,11 +21,12 @@ from ...physics.simulation import Simulation
 from .source import PACES, Frame, Held, Report, Source, Wanted
 from .tempo import Tempo
 
-MEASURE_PERIOD = 0.1
-"""s on the wall between two looks at what went wrong so far, at the least."""
+REPORT_PERIOD = 0.1
+"""s on the wall between two reports."""
 
 MEASURE_SHARE = 0.05
-"""Share of the simulation's thread that they may take: one look at a thousand dolls takes 0.2 s."""
+"""Share of the simulation's thread that looks at what went wrong so far may take: one look at a
+thousand dolls takes 0.2 s."""
 
 ACCURACY = 'normal'
 """That a page begins with."""
@@ -47,11 +48,12 @@ class Simulated(Source):
         self._commands: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         self._wanted = Wanted()
         self._frame: Frame | None = None
-        self._report = Report(pace=_pace_of(scene), engine=engine, accuracy=ACCURACY)
         self._tempo = Tempo()
         self._simulation = Simulation(scene, engine=engine, workers='auto')
+        self._report = Report(pace=_pace_of(scene), engine=engine, accuracy=ACCURACY,
+                              engine_name=self._simulation.engine_name)
         self._pacer = Pacer(1.0, 0)
-        self._next_measure = 0.0
+        self._next_report = self._next_measure = 0.0
         self._show()
         self._restart()
         self._thread = threading.Thread(target=self._run, name='simulation', daemon=True)
@@ -80,7 +82,7 @@ class Simulated(Source):
         self._commands.put(lambda: self._report.paused and self._tick())
 
     def reset(self) -> None:
-        self._commands.put(lambda: self._simulation.reset())
+        self._commands.put(self._reset)
 
     def set_pace(self, pace: float) -> None:
         errors.check_range('pace', pace, *PACES)
@@ -176,13 +178,19 @@ class Simulated(Source):
         self._simulation.accuracy = name
         self._tell(accuracy=name)
 
+    def _reset(self) -> None:
+        self._simulation.reset()
+        self._next_report = self._next_measure = 0.0
+
     def _replace(self, scene: Scene, engine: str) -> None:
         simulation = Simulation(scene, accuracy=self._report.accuracy, engine=engine,
                                 workers='auto')
         pace = self._report.pace if scene is self._simulation.scene else _pace_of(scene)
         self._simulation.close()
         self._simulation = simulation
-        self._tell(pace=pace, problem='', engine=engine)
+        # What the last one measured says nothing of this one.
+        self._next_report = self._next_measure = 0.0
+        self._tell(pace=pace, problem='', engine=engine, engine_name=simulation.engine_name)
         self._show()
 
     def _tick(self) -> None:
@@ -209,15 +217,19 @@ class Simulated(Source):
             contacts=None if touching is None else touching.positions,
             angles=simulation.joint_angles if wanted.angles else None,
             forces=None if touching is None else touching.normals * touching.forces[:, None])
-        if time.monotonic() >= self._next_measure:
-            self._measure()
+        if time.monotonic() >= self._next_report:
+            self._next_report = time.monotonic() + REPORT_PERIOD
+            self._report = Report(**{**vars(self._report), 'measures': self._measures(),
+                                     'reached': self._tempo.pace, 'tick_cost': self._tempo.cost})
 
-    def _measure(self) -> None:
+    def _measures(self) -> dict[str, float]:
+        """What went wrong so far, of now or, where that takes long, of a while ago."""
         begin = time.monotonic()
-        self._report = Report(**{**vars(self._report), 'measures': self._simulation.measures(),
-                                 'reached': self._tempo.pace, 'tick_cost': self._tempo.cost})
-        took = time.monotonic() - begin
-        self._next_measure = begin + max(MEASURE_PERIOD, took / MEASURE_SHARE)
+        if begin < self._next_measure:
+            return self._report.measures
+        measures = self._simulation.measures()
+        self._next_measure = begin + (time.monotonic() - begin) / MEASURE_SHARE
+        return measures
 
     def _held(self) -> Iterator[Held]:
         state = self._simulation.state

@@ -65,6 +65,8 @@ class Report:
     """s simulated for each s on the wall that are asked for."""
     engine: str = ''
     """The engine that was asked for, by its name; empty where there is none."""
+    engine_name: str = ''
+    """The engine that simulates; empty where that is not known."""
     accuracy: str = ''
     """The accuracy that it computes with, by its name; empty where there is none."""
     reached: float = math.nan
