@@ -428,6 +428,28 @@ def test_the_camera_is_told_on_demand_what_to_follow(page):
     wait(lambda: followed() is None)
 
 
+def test_another_scene_is_framed_while_the_camera_follows(page):
+    """By where its own first doll is: as near as if nothing had been followed before."""
+    client = page.open()
+    wait(lambda: page.frame)
+    client.update(page.view.follow, True)
+    wait(lambda: page.server.scene.get_handle_by_name('/followed'))
+    distances = []
+    for name in ('flight', 'crowd', 'flight'):
+        page.source.load(name)
+        wait(lambda name=name: page.frame.scene.name == name)
+        first = page.frame.scene.bone_slices[0]
+        centre = np.average(page.frame.state.positions[first], axis=0,
+                            weights=[bone.mass for bone in page.frame.scene.bones[first]])
+        camera, = (each.camera for each in page.server.get_clients().values())
+        # It falls meanwhile: straight down.
+        wait(lambda camera=camera, centre=centre: np.abs(
+            (camera.look_at - centre)[:2]).max() < 0.1)
+        distances.append(np.linalg.norm(camera.position - camera.look_at))
+    assert distances[0] == pytest.approx(distances[2], rel=0.05)
+    assert distances[1] > 2 * distances[0]
+
+
 def test_plots_tell_energy_gap_and_pace(page):
     client = page.open()
     wait(lambda: page.frame)

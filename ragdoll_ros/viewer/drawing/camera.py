@@ -87,7 +87,9 @@ class Cameras:
             return
         balls = bounds(self._frame.scene, self._frame.state)
         camera = client.camera
-        look_at = middle(*balls) if self._node is None else np.array(self._node.position)
+        look_at = middle(*balls)
+        if self._node is not None:  # where it was set may be of the scene before
+            self._node.position = look_at = _centre(self._frame)
         position = place(*balls, look_at, camera.fov, _aspect(camera))
         self._homes[client.client_id] = position, _aspect(camera)
         camera.up_direction = (0.0, 0.0, 1.0)
@@ -104,14 +106,11 @@ class Cameras:
                     self._move(client, *self._left.pop(client_id))
         elif wanted and now >= self._next and not frame.held:
             self._next = now + PERIOD
-            part = frame.scene.bone_slices[0]
-            centre = np.average(frame.state.positions[part], axis=0,
-                                weights=[bone.mass for bone in frame.scene.bones[part]])
             if self._node is None:
                 self._left = {client_id: (client.camera.position, client.camera.look_at)
                               for client_id, client in self._server.get_clients().items()}
                 self._node = self._server.scene.add_frame(NODE, show_axes=False)
-            self._node.position = centre
+            self._node.position = _centre(frame)
 
     def _welcome(self, client: viser.ClientHandle) -> None:
         """Bring a new page home, and again when its window changes while it is there.
@@ -144,6 +143,13 @@ class Cameras:
         with client.atomic():
             client.camera.position = position
             client.camera.look_at = look_at
+
+
+def _centre(frame: Frame) -> np.ndarray:
+    """Centre of mass (3,) m of the first doll."""
+    part = frame.scene.bone_slices[0]
+    return np.average(frame.state.positions[part], axis=0,
+                      weights=[bone.mass for bone in frame.scene.bones[part]])
 
 
 def _kind(frame: Frame) -> tuple[str, int]:
