@@ -165,8 +165,10 @@ class RagdollNode(Node):
     def end(self) -> None:
         """Give all back and say how far it came: ROS may be gone already, the log is not."""
         line = end_line(self.simulation, self.tally.refused.total(), self._ticker.dropped)
-        self.destroy_node()
-        self.get_logger().info(line)
+        try:
+            self.destroy_node()
+        finally:  # which may fail where a thread that took the signal shuts ROS down meanwhile
+            self.get_logger().info(line)
 
     def destroy_node(self) -> None:
         """Give the engine back as well."""
