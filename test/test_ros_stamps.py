@@ -104,8 +104,7 @@ def test_stamps_are_those_of_a_clock_that_another_tells(make_node, peer):
     assert min(np.diff(stamps)) > 0
     arrivals = 504 * SECOND + np.array([int(arrival * 1e9) for arrival, _ in got]) - begun
     late = arrivals[-len(stamps):] - stamps
-    # A busy machine may bring most of them late; a wrong stamp would be wrong in all.
-    assert -3 * TICK < min(late) < 3 * TICK
+    assert abs(np.median(late)) < 3 * TICK
     reports = peer.collect(DiagnosticArray, '/diagnostics')
     peer.wait(lambda: reports)
     assert 504 * SECOND <= stamp_of(reports[0][1]) <= told()
