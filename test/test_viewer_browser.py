@@ -342,6 +342,28 @@ def test_numbers_beside_a_plot_are_seen_whole(view):
     assert any(inked[:40]) and not any(inked[:2])
 
 
+ENDS = """() => Object.values(window.__viserTestpoints?.uplots ?? {})
+  .filter(({chart}) => chart.ctx.canvas.isConnected)
+  .map(({chart}) => chart.scales.x.max === chart.data[0].at(-1) ? chart.scales.x.max : 0)"""
+"""Where each plot that is seen ends, s; 0 if that is not where its last point is."""
+
+
+def test_plots_are_drawn_of_another_scene(view):
+    """What is younger than what was plotted before is plotted at once, on a scale of its own."""
+    view.tab('Play')
+    view.hold_at(SCENE, START)
+    go_on(view)
+    view.tab('Plots')
+    view.wait(lambda: min(view.page.evaluate(ENDS), default=0) > 2)
+    for scene in ('flight', 'drop'):
+        view.tab('Play')
+        view.row('Scene').locator('input').first.click()
+        view.page.get_by_role('option', name=scene, exact=True).click()
+        view.tab('Plots')
+        view.wait(lambda: len(ends := view.page.evaluate(ENDS)) == 3 and 0.5 < min(ends)
+                  and max(ends) < 2)
+
+
 def upload(view, button, name, content):
     with view.page.expect_file_chooser() as chooser:
         view.press(button)

@@ -206,6 +206,30 @@ def test_plots_follow_the_timeline():
         wait(lambda: len(page.plots.gap.handle.data[0]) < 4 and page.frame.time < 1.0)
 
 
+def test_plots_begin_anew_with_another_scene():
+    """A run that is younger than the one before is plotted from its first moment, and alone."""
+    with served(Simulated(DROP)) as page:
+        client = page.open()
+        handles = [plot.handle for plot in (page.plots.energy, page.plots.gap, page.plots.pace)]
+        wait(lambda: min(handle.data[0][-1:].sum() for handle in handles) > 2)
+        client.update(page.controls.scene, 'flight')
+        wait(lambda: page.frame.scene.name == 'flight' and page.frame.time > 1)
+        assert all(handle.visible for handle in handles)
+        assert max(handle.data[0][-1] for handle in handles) <= page.frame.time
+        client.update(page.timeline.slider, 0.01)
+        wait(lambda: not page.timeline.is_live)
+        wait(lambda: all(handle.data[0][-1] < 0.5 or not handle.visible for handle in handles))
+
+
+def test_plots_begin_anew_with_a_recording(states):
+    """Played a second time, it is plotted as the first."""
+    with served(Playback(recording(states))) as page:
+        client, gap = page.open(), page.plots.gap.handle
+        wait(lambda: gap.data[0][-1:].sum() > 0.9)
+        client.press(page, 'Reset')
+        wait(lambda: 0 < gap.data[0][-1] < 0.9)
+
+
 def recording(states):
     recorder = Recorder(DROP)
     with Simulation(DROP) as simulation:

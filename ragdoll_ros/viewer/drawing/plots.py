@@ -39,21 +39,24 @@ class Plots:
         self._scene: object = None
         self._next = 0.0
         self._last = (0.0, 0.0)
+        self._instant = 0.0
         self._measured: object = None
 
     def take(self, frame: Frame, instant: float, report: Report, now: float) -> None:
         """Take a frame at an ``instant`` of the timeline, s, and a report, at a modest rate.
 
-        ``now`` is s of a steady clock. With a reset, or another scene, all begins anew.
+        ``now`` is s of a steady clock. With a reset a run begins; with another scene, or a
+        recording from its start, the timeline itself, and what was on it is forgotten.
         """
-        if now < self._next:
+        begins = frame.scene is not self._scene or frame.time < self._last[0]
+        if now < self._next and not begins:
             return
-        if frame.scene is not self._scene or frame.time < self._last[0]:
-            self._begin(frame)
+        if begins:
+            self._begin(frame, instant)
         elif now - self._last[1] < 2 * PERIOD:
             pace = (frame.time - self._last[0]) / (now - self._last[1])
             self.pace.add(instant, frame.time, pace, 0.0 if report.paused else report.pace)
-        self._next, self._last = now + PERIOD, (frame.time, now)
+        self._next, self._last, self._instant = now + PERIOD, (frame.time, now), instant
         # Without what is less than a nanometre: rounding, which would fill the plot.
         gap = 1e6 * self._gaps.gaps(frame.state).max(initial=0.0)
         self.gap.add(instant, frame.time, round(float(gap), 3))
@@ -68,12 +71,13 @@ class Plots:
         for plot in (self.energy, self.gap, self.pace):
             plot.show(instant)
 
-    def _begin(self, frame: Frame) -> None:
+    def _begin(self, frame: Frame, instant: float) -> None:
+        anew = frame.scene is not self._scene or instant < self._instant
         if frame.scene is not self._scene:
             self._scene = frame.scene
             self._gaps = JointGap(frame.scene)
         for plot in (self.energy, self.gap, self.pace):
-            plot.begin()
+            plot.begin(anew)
 
 
 class _Plot:
@@ -89,7 +93,7 @@ class _Plot:
         series = (uplot.Series(label='s'), *(
             uplot.Series(label=label, stroke=color, width=2) for label, color in lines))
         self.handle = server.gui.add_uplot(
-            self._data(()), series, title=title, height=HEIGHT, padding=PADDING,
+            self._data(()), series, title=title, height=HEIGHT, padding=PADDING, visible=False,
             scales={'x': uplot.Scale(time=False)})
 
     def add(self, instant: float, *row: float) -> None:
@@ -98,9 +102,11 @@ class _Plot:
             return
         self._rows.append((instant, self._run, *row))
 
-    def begin(self) -> None:
-        """Begin a run."""
+    def begin(self, anew: bool) -> None:
+        """Begin a run; ``anew``: on a timeline that begins with it."""
         self._run += 1
+        if anew:
+            self._rows.clear()
 
     def show(self, instant: float | None) -> None:
         """Draw the last SPAN s of the run at an instant; at None, of the newest."""
@@ -110,7 +116,10 @@ class _Plot:
         shown = rows and (rows[0], rows[-1], len(rows))
         if shown != self._shown:
             self._shown = shown
-            self.handle.data = self._data(rows)
+            # Hidden while empty: uPlot, once shown nothing, has no scale for what comes later.
+            self.handle.visible = bool(rows)
+            if rows:
+                self.handle.data = self._data(rows)
 
     def _data(self, rows: Sequence[tuple[float, ...]]) -> tuple[np.ndarray, ...]:
         table = np.array(rows, float).reshape(-1, self._width)
