@@ -472,7 +472,7 @@ def test_what_is_saved_is_called_a_scene(desk):
 
 
 def test_another_file_is_written_over_at_the_second_asking(desk):
-    """What this page saved or loaded last is written over without a word."""
+    """What the scene at hand was saved in or loaded from is written over without a word."""
     path = desk.path / 'mine.yaml'
     path.write_text("somebody else's")
     os.utime(path, (0, datetime(2025, 3, 4, 5, 6).timestamp()))
@@ -482,6 +482,26 @@ def test_another_file_is_written_over_at_the_second_asking(desk):
     assert path.read_text() == "somebody else's"
     desk.files.save()
     assert load_scene(str(path)) == DROP
+    desk.files.save()
+    assert 'saved mine.yaml' in desk.said()
+
+
+@pytest.mark.parametrize('other', ['from elsewhere', 'uploaded', 'fitted'])
+def test_a_file_is_not_written_over_with_another_scene_unasked(desk, other):
+    desk.files.name.value = 'mine'
+    desk.files.save()
+    if other == 'from elsewhere':
+        desk.editor.show(load_scene('flight'))
+    elif other == 'uploaded':
+        desk.files.upload('drop.yaml', desk.files._folder.text(dataclasses.replace(
+            DROP, gravity=(0.0, 0.0, -1.0))))
+    else:
+        desk.files.fit('bird.glb', fit_rigs.document(fit_rigs.RIGS['bird']).glb())
+    assert desk.editor.scene != DROP
+    desk.files.save()
+    assert 'is there already' in desk.said()
+    assert load_scene(str(desk.path / 'mine.yaml')) == DROP
+    desk.files.load()
     desk.files.save()
     assert 'saved mine.yaml' in desk.said()
 

@@ -197,6 +197,7 @@ class Editor:
             self._history.push(scene, what)
         else:
             self._history = History(scene)
+            self.files.forget()
         self._refresh()
 
     def _go(self, there: Callable[[], Scene], back: Callable[[], Scene]) -> None:

@@ -33,7 +33,8 @@ class Files:
         self._server, self._scene, self._go_on_with, self._folder = server, scene, take, folder
         self._fitting = threading.Lock()
         self._at_hand = ''
-        """Name of the file that was saved or loaded last: Save writes over it without a word."""
+        """Name of the file that the scene was saved in or loaded from: Save writes over it without a
+        word."""
         self._asked = ''
         """Name of the file of which Save has asked whether to write over it."""
         gui = server.gui
@@ -59,6 +60,10 @@ class Files:
         self.download_button.on_click(lambda event: self.download(event.client))
         self.upload_button.on_upload(lambda event: self._received(event.target, self.upload))
         self.fit_button.on_upload(lambda event: self._received(event.target, self.fit))
+
+    def forget(self) -> None:
+        """Take note that another scene is at hand, which is none of the files here."""
+        self._at_hand = self._asked = ''
 
     def save(self) -> None:
         """Write the scene to the file that is typed; over another one at the second asking."""
@@ -103,7 +108,7 @@ class Files:
 
     def _load(self) -> str:
         said = self._take(self._folder.load(self.name.value), 'load', self.name.value.strip())
-        self._at_hand, self._asked = self._folder.find(self.name.value).name, ''
+        self._at_hand = self._folder.find(self.name.value).name
         return said
 
     def _choose(self, shown: str) -> None:
@@ -131,6 +136,7 @@ class Files:
 
     def _take(self, scene: Scene, what: str, name: str) -> str:
         self._go_on_with(scene, f'{what} {name}')
+        self.forget()
         return f'{"fitted" if what == "fit" else "loaded"} {name}: {len(scene.bones)} bones'
 
     def _show_progress(self, part: float, what: str) -> None:
