@@ -287,15 +287,23 @@ def test_what_is_edited_falls(view):
     view.wait(lambda: index_of(view.bodies(SCENE), states) > 35)
 
 
-def test_a_body_is_dragged_by_its_handle(view):
-    """By the arrow out of its top, by 0.2 m, as far as whole pixels and ten steps go."""
+HAS_HANDLES = """() => Object.keys(window.__viserMutable.nodeRefFromName)
+  .some(name => /^.editor.[0-9]+.body$/.test(name))"""
+
+
+@pytest.mark.parametrize('height', [0.2, 0.06])
+def test_a_body_is_dragged_by_its_handle(view, height):
+    """By the arrow out of its top, by 0.2 m, as far as whole pixels and ten steps go; above the
+    head, and where the head itself is before the arrow.
+    """
     view.hold_at(SCENE, START)
     view.tab('Edit')
     choose(view, 'head')
-    view.press('Edit')
-    view.wait(lambda: view.has('/editor/1/body'))
+    if view.button('Edit').count():
+        view.press('Edit')
+    view.wait(lambda: view.page.evaluate(HAS_HANDLES))
     head = SCENE.bone_index('head')
-    (x0, y0), (x1, y1) = view.pixels(START[head] + np.outer((0.2, 0.4), (0, 0, 1)))
+    (x0, y0), (x1, y1) = view.pixels(START[head] + np.outer((height, height + 0.2), (0, 0, 1)))
     view.page.mouse.move(x0, y0)
     view.page.mouse.down()
     view.page.mouse.move(x1, y1, steps=10)

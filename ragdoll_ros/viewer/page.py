@@ -20,6 +20,7 @@ from .drawing.stage import Stage
 from .drawing.view import View, theme
 from .editor.editor import Editor
 from .editor.form import GREY, RED, colored
+from .editor.on_top import ON_TOP
 from .hint import HINT
 from .lost import LOST
 from .opening import Opening
@@ -58,7 +59,7 @@ class Page:
         light(server)
         theme(server, dark=False)
         server.gui.main_panel.dock_right()
-        for html in (FREE, HINT, LOST, KEEP_PAGE, PAINT, NO_ARROW):
+        for html in (FREE, HINT, LOST, KEEP_PAGE, PAINT, NO_ARROW, ON_TOP):
             server.gui.add_html(html)
         self.problem = server.gui.add_html('')
         self.tabs = server.gui.add_tab_group()
