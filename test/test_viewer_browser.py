@@ -9,7 +9,8 @@ import fit_rigs
 import imageio.v3 as iio
 import numpy as np
 import pytest
-from browser import SHARPNESS, SIZE, chromium, opened, serving
+from browser import SHARPNESS, SIZE, View, chromium, opened, serving
+from conftest import ROOT
 from test_fit_broken import BROKEN
 
 from ragdoll_ros.files.scene import load_scene
@@ -376,6 +377,23 @@ def upload(view, button, name, content):
     with view.page.expect_file_chooser() as chooser:
         view.press(button)
     chooser.value.set_files({'name': name, 'mimeType': '', 'buffer': content})
+
+
+NOTES = """() => [...document.querySelectorAll('.mantine-Notification-root')]
+  .filter(note => note.textContent.startsWith('Uploading'))
+  .map(note => [note.textContent.split(' ')[1], note.style.display])"""
+"""Of uploads: each with its file's name, and how it is displayed."""
+
+
+def test_a_page_tells_of_its_own_uploads_alone(browser, url, view):
+    view.tab('Edit')
+    upload(view, 'Upload a scene or doll', 'doll.yaml',
+           (ROOT / 'config' / 'doll.yaml').read_bytes())
+    view.wait(lambda: view.page.evaluate(NOTES) == [['doll.yaml', '']])
+    other = View(browser, url)
+    other.tab('Edit')
+    other.wait(lambda: other.page.evaluate(NOTES) == [['undefined', 'none']])
+    other.close()
 
 
 @pytest.mark.slow  # test_editor_wire.py uploads both without a browser

@@ -21,6 +21,7 @@ from .drawing.view import View, theme
 from .editor.editor import Editor
 from .editor.form import GREY, RED, colored
 from .editor.on_top import ON_TOP
+from .editor.own_uploads import OWN_UPLOADS
 from .hint import HINT
 from .lost import LOST
 from .opening import Opening
@@ -59,7 +60,7 @@ class Page:
         light(server)
         theme(server, dark=False)
         server.gui.main_panel.dock_right()
-        for html in (FREE, HINT, LOST, KEEP_PAGE, PAINT, NO_ARROW, ON_TOP):
+        for html in (FREE, HINT, LOST, KEEP_PAGE, PAINT, NO_ARROW, ON_TOP, OWN_UPLOADS):
             server.gui.add_html(html)
         self.problem = server.gui.add_html('')
         self.tabs = server.gui.add_tab_group()
