@@ -195,6 +195,28 @@ def test_all_of_the_timeline_is_saved(view, states, tmp_path):
     assert len(recording) > 5 and all((table == each).all(axis=(1, 2)).any() for each in last)
 
 
+def test_a_time_is_typed(view, states):
+    """As people do, who take a while between the click and each key."""
+    view.tab('Play')
+    view.hold_at(SCENE, START)
+    go_on(view)
+    field = view.field('Time')
+    for text in ('0.5', '0.25'):
+        view.press('Live')
+        view.wait(lambda: float(field.input_value()) > 1)
+        field.click()
+        view.key('Control+a')
+        view.page.wait_for_timeout(1000)
+        for key in text:
+            view.key(key)
+            view.page.wait_for_timeout(300)
+        assert field.input_value() == text
+        view.wait(lambda: (index := index_of(view.bodies(SCENE), states))
+                  and index == pytest.approx(100 * float(text), abs=5))
+        view.page.mouse.click(20, 20)
+    view.press('Live')
+
+
 @pytest.mark.slow  # test_viewer_playback.py plays without a browser
 def test_a_run_is_played_back(browser, states, tmp_path):
     """To its last pose, where it stays."""

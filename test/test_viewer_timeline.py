@@ -2,6 +2,8 @@
 from __future__ import annotations
 
 import io
+import threading
+import time
 import tracemalloc
 import zipfile
 
@@ -21,6 +23,7 @@ from ragdoll_ros.recordings.save import FORMATS
 from ragdoll_ros.viewer.sources.playback import Playback
 from ragdoll_ros.viewer.sources.simulated import Simulated
 from ragdoll_ros.viewer.sources.source import Frame
+from ragdoll_ros.viewer.timeline import timeline
 from ragdoll_ros.viewer.timeline.history import MOST_NUMBERS, SPAN, History
 from ragdoll_ros.viewer.timeline.look import Look
 from ragdoll_ros.viewer.timeline.package import zipped
@@ -178,6 +181,50 @@ def test_what_was_is_drawn_while_the_doll_goes_on(states):
         assert not page.timeline.is_live
         client.update(page.timeline.buttons, 'Live')
         wait(lambda: page.timeline.is_live and page.frame is page.source.frame)
+
+
+def test_what_a_slider_is_put_to_is_looked_at():
+    """Though viser's threads are busy meanwhile, and the page moves the slider along; and it is
+    sent back, as the page may show where it was moved to.
+    """
+    with served(Simulated(DROP)) as page:
+        client, slider = page.open(), page.timeline.slider
+        wait(lambda: slider.value > 0.8)
+        free = threading.Event()
+        for _ in range(100):
+            page.server.gui._thread_executor.submit(free.wait, 60)
+        try:
+            client.update(slider, 0.3)
+            wait(lambda: slider.value == 0.3)
+            before = page.source.frame.time
+            wait(lambda: page.source.frame.time > before + 2 * timeline.PERIOD)
+        finally:
+            free.set()
+        wait(lambda: not page.timeline.is_live)
+        assert page.timeline.looked_at(time.monotonic()) == slider.value == 0.3
+
+
+def test_time_stands_while_one_types_it():
+    """From the click into the field on; and goes on if nothing was typed."""
+    with served(Simulated(DROP)) as page:
+        client, slider = page.open(), page.timeline.slider
+        wait(lambda: slider.value > 0.8)
+        told, = (handle for handle in page.server.gui._gui_input_handle_from_uuid.values()
+                 if getattr(handle, 'label', '') == 'typing')
+        client.update(told, '0 hold')
+        wait(lambda: not page.timeline.is_live)
+        shown, before = slider.value, page.source.frame.time
+        wait(lambda: page.source.frame.time > before + 2 * timeline.PERIOD)
+        assert slider.value == shown == page.timeline.looked_at(time.monotonic())
+        client.update(told, '1 free')
+        wait(lambda: page.timeline.is_live and slider.value > shown)
+        client.update(told, '2 hold')
+        wait(lambda: not page.timeline.is_live)
+        client.update(slider, 0.5)
+        client.update(told, '3 free')
+        before = page.source.frame.time
+        wait(lambda: page.source.frame.time > before + 2 * timeline.PERIOD)
+        assert page.timeline.looked_at(time.monotonic()) == 0.5
 
 
 def test_nothing_is_taken_hold_of_in_the_past_and_a_reset_leads_back():

@@ -12,6 +12,7 @@ from .history import Cut, History, cut_of
 from .look import Look
 from .package import zipped
 from .strip import strip
+from .time_field import HOLD, tell
 
 PERIOD = 0.5
 """s between two updates of the panel while frames come."""
@@ -38,8 +39,13 @@ class Timeline:
         self._history = History()
         self._look: Look | None = None
         self._whole: Cut | None = None
+        self._held: Look | None = None
+        """The look back that began with a click into the field of the time, until one goes on."""
         self._next = 0.0
+        self._again = False
+        """Whether the slider is to be sent though it seems to be where it should."""
         self._lock = threading.RLock()
+        self._loop = server.get_event_loop()
         if source.recording is not None:
             self._whole = cut_of(source.recording, source.frame_at)
         gui = server.gui
@@ -47,13 +53,16 @@ class Timeline:
             self.slider = gui.add_slider('Time', 0.0, 1.0, STEP, 0.0, hint='s; drag to look back: '
                                          'what goes on goes on')
             self.strip = gui.add_html('')
+            told = gui.add_text('typing', '', visible=False)
+            gui.add_html(tell(self.slider._impl.uuid, told._impl.uuid))
             self.buttons = gui.add_button_group(
                 'Look', (BACK, PLAY, FORTH, LIVE),
                 hint='J, K, L: a frame back, play or stand, a frame on; Live: what goes on')
             self.speed = gui.add_dropdown('Speed', tuple(SPEEDS), initial_value='1')
             self.save = gui.add_button('Save this', icon=viser.Icon.DOWNLOAD,
                                        hint='All of the timeline as run.zip: MCAP, glTF, BVH, CSV')
-        self.slider.on_update(lambda event: event.client and self.go_to(self.slider.value))
+        self.slider.on_update(self._slid)
+        told.on_update(self._typing)
         self.buttons.on_click(lambda event: self._press(event.target.value))
         self.speed.on_update(lambda _: self._set_speed())
         self.save.on_click(self._send)
@@ -108,16 +117,38 @@ class Timeline:
     def go_to(self, instant: float) -> None:
         """Look at ``instant`` s of the timeline, as the slider has it."""
         with self._lock:
+            now = time.monotonic()
+            if self._look is None:
+                # Where it was meanwhile on its way to the page, the page shows another place.
+                self._again, self._next = True, now + PERIOD
             look = self._begin()
             if look is not None:
-                look.go_to(instant, time.monotonic())
+                look.go_to(instant, now)
+
+    async def _slid(self, event: viser.GuiEvent) -> None:
+        """Go where the slider was put, or what was typed: in viser's thread, where `_move` acts."""
+        if event.client is not None:
+            self.go_to(event.target.value)
+
+    async def _typing(self, event: viser.GuiEvent) -> None:
+        """Stand while one types a time; go on with what goes on if nothing came of it."""
+        with self._lock:
+            if event.target.value.endswith(HOLD):
+                was_live = self._look is None
+                self.go_to(self.slider.value)
+                if self._look is not None:
+                    self._look.plays = False
+                self._held = self._look if was_live else None
+                self._again = False
+            elif self._held is not None and self._held is self._look:
+                self._look = None
 
     def _begin(self) -> Look | None:
         """The look back, begun at the end of what there is if there is none yet."""
         cut = self.cut
         if self._look is None and cut is not None:
             self._look = Look(cut, cut.duration, SPEEDS[self.speed.value])
-            self._next = 0.0
+        self._held = None
         return self._look
 
     def _press(self, button: str) -> None:
@@ -150,9 +181,22 @@ class Timeline:
                                        (self.strip, 'content', strip(cut))):
                 if getattr(handle, key) != value:
                     setattr(handle, key, value)
+        self._loop.call_soon_threadsafe(self._move, round(min(at, longest), 3), look, self._again)
+        self._again = False
+
+    def _move(self, at: float, look: Look | None, again: bool) -> None:
+        """Put the slider at ``at`` s, unless it has been put elsewhere meanwhile.
+
+        In viser's thread: written from another one, it could come between what a page sends and
+        its reading, and win.
+        """
         # A slider that is being dragged is where the look is, but for its step.
-        if abs(self.slider.value - at) > STEP:
-            self.slider.value = round(min(at, longest), 3)
+        if look is not self._look or (abs(self.slider.value - at) <= STEP and not again):
+            return
+        if again:
+            # Viser sends nothing that it holds to be there already.
+            self.slider.value = at + STEP
+        self.slider.value = at
 
     def _send(self, event: viser.GuiEvent) -> None:
         """Send all of the timeline to the page that asked."""
