@@ -2,6 +2,7 @@
 import dataclasses
 import html
 import os
+import re
 import threading
 import time
 from datetime import datetime
@@ -123,6 +124,38 @@ def test_a_faulty_value_is_refused_where_it_stands_and_stays(desk):
     assert errors_in(desk.panel) == {}
     assert desk.bone('left_shin').mass == 3
     assert changes.joint_of(desk.editor.scene, 'left_shin').anchor == (0, 0.1, 0.6)
+
+
+@pytest.mark.parametrize(('key', 'text', 'words'), [
+    ('turn', '0 0 x', 'turn must be 3 numbers, such as 0.1, 0.2, 0.3, not 0 0 x'),
+    ('axis_1', '1 1 0', 'axis 1 must be perpendicular to axis 2, which is 1, 0, 0, not 1, 1, 0'),
+    ('axis_2', '1 1 0', 'axis 2 must be perpendicular to axis 1, which is 0, 1, 0, not 1, 1, 0')])
+def test_what_is_refused_is_told_in_words_at_the_field_that_was_changed(desk, key, text, words):
+    desk.editor.select('left_thigh')
+    form = desk.panel.joint if key.startswith('axis') else desk.panel.body
+    form[key].value = text
+    desk.editor.update()
+    assert {key: re.sub('<.*?>', '', said) for key, said in errors_in(desk.panel).items()} == {
+        key: words}
+
+
+def test_a_bone_without_a_partner_is_told_as_such(desk):
+    desk.editor.select('head')
+    desk.panel.both.value = True
+    desk.panel.body['mass'].value = 4.0
+    desk.editor.update()
+    assert 'both sides: expected a bone with a partner on the other side, not head' \
+        in desk.panel.said.content
+
+
+@pytest.mark.parametrize(('name', 'content', 'words'), [
+    ('x.yaml', b'bones: 3', 'bones: expected a list ('),
+    ('x.yaml', b'a: 1\nb: [1, 2\nc: 3\n',
+     "expected YAML (did not find expected ',' or ']'), not c: 3"),
+    ('x.glb', b'abc', 'byte 0: expected glTF, as a .glb begins, not abc')])
+def test_what_is_no_file_of_its_kind_is_told_in_words(desk, name, content, words):
+    (desk.files.fit if name.endswith('glb') else desk.files.upload)(name, content)
+    assert words in desk.said()
 
 
 def test_a_number_that_is_shown_rounded_stays_as_it_is(server, tmp_path):

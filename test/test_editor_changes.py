@@ -83,7 +83,7 @@ def test_only_what_is_asked_for_changes():
     (lambda: growth.add_bone(DROP, 'head', 'torso'), 'name', errors.DuplicateName),
     (lambda: growth.add_bone(DROP, 'head', 'a/b'), 'name', errors.WrongForm),
     (lambda: growth.remove_limb(DROP, 'torso'), 'torso', errors.Detached),
-    (lambda: mirror.mirrored(DROP, 'head'), 'head.both sides', errors.UnknownBone)])
+    (lambda: mirror.mirrored(DROP, 'head'), 'both sides', errors.UnknownBone)])
 def test_what_is_wrong_is_refused_with_its_place(change, path, kind):
     with pytest.raises(kind) as caught:
         change()

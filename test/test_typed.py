@@ -53,17 +53,26 @@ def test_infinity_is_a_number_where_it_means_something():
     ('1, 2, 3', (1, 2, 3)), ('1 2 3', (1, 2, 3)), ('1,2,3', (1, 2, 3)), ('(1, 2, 3)', (1, 2, 3)),
     ('[.1 -.2 3e-1]', (0.1, -0.2, 0.3)), ('1,5; 2; -0,5', (1.5, 2, -0.5)), ('1;2;3', (1, 2, 3)),
     ('10 20 30 cm', (0.1, 0.2, 0.3)), ('10 cm; 2; 3 mm', (0.1, 2, 0.003)),
-    ('7cm 8cm 9cm', (0.07, 0.08, 0.09)), ('1m, 2, 3m', (1, 2, 3)), ('７ ８ ９', (7, 8, 9))])
+    ('7cm 8cm 9cm', (0.07, 0.08, 0.09)), ('10 cm, 20 cm, 30 cm', (0.1, 0.2, 0.3)),
+    ('1 m 2 m -.3 m', (1, 2, -0.3)),
+    ('1,5 m； 2 m； 3 m', (1.5, 2, 3)), ('1m, 2, 3m', (1, 2, 3)), ('７ ８ ９', (7, 8, 9))])
 def test_three_numbers(text, values):
     assert numbers(text, 3, 'm') == values
 
 
 @pytest.mark.parametrize('text', ['', '1', '1 2', '1 2 3 4', '1,5 2,5 3,5', '1,,2', '1, 2, x',
                                   '1; 2', '1; 2; 1,000', '1 2 inf', 'a b c', '1, 2,',
-                                  '1cm 2 3', '1 2cm 3m'])
+                                  '1cm 2 3', '1 2cm 3m', '1 cm, 2 m, 3 m', '1; x; 3'])
 def test_what_is_not_three_numbers_is_refused(text):
-    with pytest.raises(errors.WrongForm):
+    """As such, or as what may be two numbers."""
+    with pytest.raises(errors.WrongForm) as caught:
         numbers(text, 3, 'm')
+    assert ('3 numbers' if '1,000' not in text else 'clear') in caught.value.expected
+
+
+def test_an_acceleration_has_its_unit():
+    assert numbers('0 0 -9.8 m/s²', 3, 'm/s²') == (0, 0, -9.8)
+    assert numbers('0 m/s2, 0 m/s^2, -9.8m/s²', 3, 'm/s²') == (0, 0, -9.8)
 
 
 def test_what_is_shown_is_read_as_what_is_shown():

@@ -195,8 +195,8 @@ def test_all_of_the_timeline_is_saved(view, states, tmp_path):
     assert len(recording) > 5 and all((table == each).all(axis=(1, 2)).any() for each in last)
 
 
-def test_a_time_is_typed(view, states):
-    """As people do, who take a while between the click and each key."""
+def test_a_time_is_typed(view):
+    """As people do, who take a while between the click and each key; and time stands there."""
     view.tab('Play')
     view.hold_at(SCENE, START)
     go_on(view)
@@ -211,8 +211,9 @@ def test_a_time_is_typed(view, states):
             view.key(key)
             view.page.wait_for_timeout(300)
         assert field.input_value() == text
-        view.wait(lambda: (index := index_of(view.bodies(SCENE), states))
-                  and index == pytest.approx(100 * float(text), abs=5))
+        seen = view.bodies(SCENE)
+        view.page.wait_for_timeout(1000)
+        assert field.input_value() == text and (view.bodies(SCENE) == seen).all()
         view.page.mouse.click(20, 20)
     view.press('Live')
 
@@ -391,7 +392,7 @@ def test_plots_are_drawn_of_another_scene(view):
         view.row('Scene').locator('input').first.click()
         view.page.get_by_role('option', name=scene, exact=True).click()
         view.tab('Plots')
-        view.wait(lambda: len(ends := view.page.evaluate(ENDS)) == 3 and 0.5 < min(ends)
+        view.wait(lambda: len(ends := view.page.evaluate(ENDS)) == 3 and min(ends) > 0.5
                   and max(ends) < 2)
 
 

@@ -38,6 +38,11 @@ def _wrong(error: jsonschema.ValidationError) -> object:
     return ', '.join(str(key) for key in error.instance if key not in error.schema['properties'])
 
 
+KINDS = {'array': 'a list', 'object': 'a mapping', 'string': 'a text', 'number': 'a number',
+         'integer': 'a whole number', 'boolean': 'true or false', 'null': 'nothing'}
+"""JSON Schema's types in the words of YAML."""
+
+
 def _expected(error: jsonschema.ValidationError) -> str:
     """Say in words what the schema asks for at the place of an error."""
     about = error.schema.get('description', '')
@@ -49,12 +54,15 @@ def _expected(error: jsonschema.ValidationError) -> str:
         return 'exactly one of ' + ', '.join(choices)
     if error.validator == 'additionalProperties':
         return 'only ' + ', '.join(error.schema['properties'])
-    rule = {'enum': 'one of {}', 'type': 'a {}', 'minItems': 'at least {} items',
+    rule = {'enum': 'one of {}', 'type': '{}', 'minItems': 'at least {} items',
             'maxItems': 'at most {} items', 'exclusiveMinimum': 'above {}',
             'minimum': '{} or more', 'maximum': '{} or less',
             'minProperties': 'at least {} key', 'maxProperties': 'at most {} key'}
     value = error.validator_value
-    value = ' or '.join(map(str, value)) if isinstance(value, list) else value
+    values = value if isinstance(value, list) else [value]
+    if error.validator == 'type':
+        values = [KINDS[each] for each in values]
+    value = ' or '.join(map(str, values))
     return (rule.get(error.validator, '') .format(value) + (about and f' ({about})')).strip()
 
 

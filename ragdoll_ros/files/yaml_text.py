@@ -60,14 +60,17 @@ def parse(content: bytes) -> object:
     if len(content) > LARGEST_FILE:
         raise errors.Unreadable('', f'{len(content)} bytes', f'at most {LARGEST_FILE}')
     try:
-        return _construct(content.decode('utf-8'))
+        text = content.decode('utf-8')
+        return _construct(text)
     except ModelError:
         raise
     except yaml.YAMLError as error:
         mark = getattr(error, 'problem_mark', None)
         where = f'line {mark.line + 1}, column {mark.column + 1}' if mark else ''
-        problem = getattr(error, 'problem', None) or 'no YAML'
-        raise errors.Unreadable(where, problem, 'a YAML file') from None
+        line = text.splitlines()[mark.line:][:1] if mark else []
+        problem = getattr(error, 'problem', None) or getattr(error, 'reason', None)
+        raise errors.Unreadable(where, ''.join(line).strip(),
+                                'YAML' + (f' ({problem})' if problem else '')) from None
     except (ValueError, RecursionError) as error:
         raise errors.Unreadable('', str(error), 'a YAML file in UTF-8') from None
 

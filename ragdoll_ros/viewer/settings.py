@@ -14,7 +14,7 @@ from ..physics.settings import ACCURACIES
 from .editor import typed
 from .editor.form import GREEN, RED, Form, colored
 from .editor.sheet import Field
-from .editor.words import sentence
+from .editor.words import in_words
 from .health import health
 from .sources.source import Report, Source
 
@@ -86,22 +86,26 @@ class Settings:
     def _use(self) -> None:
         """Start anew with what stands in the fields; what is wrong is said beside it."""
         sheet, found = self.form.values()
-        try:
-            friction = typed.number(sheet['friction'], infinite=True)
-        except errors.ModelError as error:
-            found.append(error.at('friction'))
-        self.form.tell(found)
-        if found or self._scene is None:
-            return
-        self._ask(lambda: self.source.use(self._changed(sheet, friction)))
-
-    def _changed(self, sheet: dict, friction: float) -> Scene:
         scene = self._scene
-        material = dataclasses.replace(scene.material, friction=friction,
-                                       restitution=sheet['restitution'])
+        if scene is None:
+            return
+        try:
+            sheet['friction'] = typed.number(sheet['friction'], infinite=True)
+        except errors.ModelError as error:
+            del sheet['friction']
+            found.append(error.at('friction'))
+        material = scene.material
+        for key in sheet.keys() & {'friction', 'restitution'}:
+            try:
+                material = dataclasses.replace(material, **{key: sheet[key]})
+            except errors.ModelError as error:
+                found.append(type(error)(key, error.value, error.expected))
+        self.form.tell(found)
+        if found:
+            return
         ground = (scene.ground or Ground()) if self.ground.value else None
-        return dataclasses.replace(scene, gravity=sheet['gravity'], material=material,
-                                   ground=ground)
+        new = dataclasses.replace(scene, gravity=sheet['gravity'], material=material, ground=ground)
+        self._ask(lambda: self.source.use(new))
 
     def _ask(self, change: Callable[[], None]) -> None:
         """Ask for a change; say why where it is refused."""
@@ -109,7 +113,7 @@ class Settings:
             change()
             self.said.content = ''
         except errors.ModelError as error:
-            self.said.content = colored(sentence(error, error.path or 'this'), RED)
+            self.said.content = colored(in_words(error), RED)
             self._shown = ''
         except errors.RagdollError as error:
             self.said.content = colored(str(error), RED)

@@ -68,9 +68,11 @@ class GltfFile:
             raise errors.Unreadable('', str(path), 'a .glb or .gltf file')
         self.size = os.stat(self.path).st_size
         with self.path.open('rb') as file:
-            binary = file.read(4) == b'glTF'
+            head = file.read(4)
+        binary = head == b'glTF'
         if not binary and self.path.suffix.lower() == '.glb':
-            raise errors.Unreadable('byte 0', 'no glTF in front', 'a file that begins with glTF')
+            raise errors.Unreadable('byte 0', head.decode('ascii', 'backslashreplace'),
+                                    'glTF, as a .glb begins')
         text, self._chunk = self._read_chunks() if binary else (self._read_text(), None)
         self.json = _parse(text)
         self._buffers: dict[int, Buffer] = {}

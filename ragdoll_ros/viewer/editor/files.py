@@ -33,8 +33,7 @@ class Files:
         self._server, self._scene, self._go_on_with, self._folder = server, scene, take, folder
         self._fitting = threading.Lock()
         self._at_hand = ''
-        """Name of the file that the scene was saved in or loaded from: Save writes over it without a
-        word."""
+        """Name of the file that the scene was saved in or loaded from: Save writes over it."""
         self._asked = ''
         """Name of the file of which Save has asked whether to write over it."""
         gui = server.gui

@@ -33,8 +33,7 @@ def partner(scene: Scene, name: str) -> str:
     if swapped == bone.name or swapped not in names:
         swapped = _at_mirrored_place(doll, bone)
     if swapped is None:
-        raise errors.UnknownBone(f'{name}.both sides', name,
-                                 'a bone with a partner on the other side')
+        raise errors.UnknownBone('both sides', name, 'a bone with a partner on the other side')
     return scene.qualified(placement, swapped)
 
 

@@ -56,7 +56,7 @@ BODY = (
     Field('friction', 'friction', 'text', "coefficient, inf for no slip; empty: the scene's"),
     Field('rolling_friction', 'rolling, m', 'text', "lever arm; empty: the scene's"),
     Field('restitution', 'restitution', 'text', "0 to 1; empty: the scene's"),
-    Field('color', 'colour', 'color', ''))
+    Field('color', 'colour', 'color', 'by a click, or typed: #1e90ff'))
 
 JOINT = (
     Field('kind', 'joint', 'joint', 'to the parent'),
@@ -184,6 +184,8 @@ def _set_axes_and_limits(scene: Scene, name: str, new: Sheet, shown: Sheet) -> S
     try:
         return changes.change_joint(scene, name, kind=kind.name, axes=tuple(axes), limits=limits)
     except errors.ModelError as error:
+        if error.path.endswith('axes'):
+            raise _not_across(new, shown) from None
         for number, pair in enumerate(pairs, 1):
             if error.path.endswith(f'limits[{number - 1}]'):
                 raise type(error)(f'limits_{number}', pair, error.expected) from None
@@ -196,6 +198,15 @@ def _straightened(first: tuple[float, ...], second: tuple[float, ...]) -> tuple[
     if not 1e-7 < abs(lean) < 1e-4:
         return second
     return tuple(np.subtract(second, lean * np.array(first)))
+
+
+def _not_across(new: Sheet, shown: Sheet) -> errors.WrongAxes:
+    """What is wrong with two axes that are not perpendicular, told of the one that was changed."""
+    key, other = 'axis_2', 'axis_1'
+    if new[key] == shown.get(key):
+        key, other = other, key
+    return errors.WrongAxes(key, new[key], f'perpendicular to {other.replace("_", " ")}, which is '
+                            + typed.shown_all(new[other]))
 
 
 def _pair(key: str, text: str, symmetric: bool) -> tuple[float, float] | None:
@@ -256,7 +267,5 @@ def _check_range(key: str, value: Value | None) -> None:
 def _at_field(error: errors.ModelError, keys: tuple[str, ...]) -> errors.ModelError:
     """The error with the key of the field that it belongs to as its path."""
     said = error.path.rsplit('.', 1)[-1].split('[')[0]
-    # Of its axes only that they are not perpendicular is left to the joint to find.
-    said = 'axis_2' if said == 'axes' else said
     key = said if said in keys else keys[0]
     return type(error)(key, error.value, error.expected)

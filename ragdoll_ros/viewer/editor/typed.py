@@ -13,7 +13,8 @@ from collections.abc import Sequence
 from ...model import errors
 
 UNITS = {'m': {'m': 0, 'cm': -2, 'mm': -3, 'km': 3}, 'kg': {'kg': 0, 'g': -3, 't': 3},
-         '°': {'°': 0, 'deg': 0}, 'N': {'N': 0, 'kN': 3}, 's': {'s': 0, 'ms': -3}}
+         '°': {'°': 0, 'deg': 0}, 'N': {'N': 0, 'kN': 3}, 's': {'s': 0, 'ms': -3},
+         'm/s²': {'m/s²': 0, 'm/s2': 0, 'm/s^2': 0}}
 """For each unit of a field those in which one may type, with their power of ten."""
 
 SIGNS = str.maketrans({'−': '-', '，': ',', '．': '.', '；': ';', '\u00a0': ' ', '\u2009': ' ',  # noqa: RUF001
@@ -24,7 +25,14 @@ _PLAIN = re.compile(r'([+-]?)(\d+\.?\d*|\.\d+)(?:e([+-]?\d{1,6}))?', re.IGNORECA
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:([ ',.])\d{3})(?:\1\d{3})*(?:[.,]\d*)?")
 _UNSURE = re.compile(r'[+-]?[1-9]\d{0,2},\d{3}')
 _INFINITE = re.compile(r'([+-]?)(?:inf|infinity|∞)', re.IGNORECASE)
-_UNIT = re.compile(r'[a-zA-Z°]+$')
+_UNIT = re.compile(r'[a-zA-Z°][a-zA-Z/^²2]*$')
+_APART = {unit: re.compile(rf'(?<=[\d.])\s+(?=({"|".join(map(re.escape, powers))})(?![a-zA-Z]))')
+          for unit, powers in UNITS.items()}
+"""Blanks between a number and its unit."""
+
+
+class NoNumber(errors.WrongForm):
+    """A text that is no number in any usual form."""
 
 
 def number(text: str, unit: str = '', infinite: bool = False) -> float:
@@ -50,8 +58,12 @@ def numbers(text: str, count: int, unit: str = '') -> tuple[float, ...]:
 
     The unit stands behind each or behind all; errors are those of ``number``.
     """
-    return tuple(number(part, unit) if ';' in text else _read(part, power, text, unit)
-                 for part, power in parts(text, count, unit))
+    found = parts(text, count, unit)
+    try:
+        return tuple(number(part, unit) if ';' in _plain(text) else _read(part, power, text, unit)
+                     for part, power in found)
+    except NoNumber:
+        raise _not_so_many(text, count) from None
 
 
 def parts(text: str, count: int, unit: str = '') -> list[tuple[str, int]]:
@@ -62,13 +74,13 @@ def parts(text: str, count: int, unit: str = '') -> list[tuple[str, int]]:
     if ';' in plain:
         found, power = [part.strip() for part in plain.split(';')], 0
     else:
-        plain, power = _without_unit(plain, unit)
+        plain, power = _without_unit(_APART[unit].sub('', plain) if unit in _APART else plain,
+                                     unit)
         found = [part for part in re.split(r'\s*,\s*|\s+', plain) if part or ',' in plain]
         found = [own[0] if (own := _without_unit(part, unit))[1] == power else part
                  for part in found]
     if len(found) != count or not plain:
-        example = ', '.join(('0.1', '0.2', '0.3')[:count])
-        raise errors.WrongForm('', text, f'{count} numbers, such as {example}')
+        raise _not_so_many(text, count)
     return [(part, power) for part in found]
 
 
@@ -82,6 +94,11 @@ def shown(value: float) -> str:
 def shown_all(values: Sequence[float]) -> str:
     """Numbers as one field shows them."""
     return ', '.join(shown(value) for value in values)
+
+
+def _not_so_many(text: str, count: int) -> errors.WrongForm:
+    example = ', '.join(('0.1', '0.2', '0.3')[:count])
+    return errors.WrongForm('', text, f'{count} numbers, such as {example}')
 
 
 def _plain(text: str) -> str:
@@ -112,7 +129,7 @@ def _read(digits: str, power: int, text: str, unit: str) -> float:
     match = _PLAIN.fullmatch(digits)
     if match is None:
         example = f'70{" " * (unit != "°") + unit if unit else ""}'
-        raise errors.WrongForm('', text, f'a number, such as {example}')
+        raise NoNumber('', text, f'a number, such as {example}')
     value = float(f'{match[1]}{match[2]}e{int(match[3] or 0) + power}')
     if math.isinf(value):
         raise errors.WrongForm('', text, 'below 1.8e308')
