@@ -189,7 +189,7 @@ def test_a_misspelled_key_is_named(tmp_path):
     ('', '', 'exactly one of shape, shapes'),
     ('shape: {sphere: {radius: 1}}, shapes: [{sphere: {radius: 1}}]', '',
      'exactly one of shape, shapes'),
-    ('shapes: []', '.shapes', 'at least 1'), ('shapes: [3]', '.shapes[0]', 'object'),
+    ('shapes: []', '.shapes', 'at least 1'), ('shapes: [3]', '.shapes[0]', 'mapping'),
     ('shapes: [{sphere: {radius: 1}, box: {size: [1, 1, 1]}}]', '.shapes[0]', 'exactly one of'),
     ('shapes: [{sphere: {radius: 1}}, {sphere: {radius: .inf}}]', '.shapes[1].sphere', 'finite'),
     ('shapes: [{sphere: {radius: 1}, position: [0, 0.5, 0]}]', '.shapes', 'centre of mass'),
