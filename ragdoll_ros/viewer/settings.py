@@ -104,8 +104,8 @@ class Settings:
         if found:
             return
         ground = (scene.ground or Ground()) if self.ground.value else None
-        new = dataclasses.replace(scene, gravity=sheet['gravity'], material=material, ground=ground)
-        self._ask(lambda: self.source.use(new))
+        self._ask(lambda: self.source.use(dataclasses.replace(
+            scene, gravity=sheet['gravity'], material=material, ground=ground)))
 
     def _ask(self, change: Callable[[], None]) -> None:
         """Ask for a change; say why where it is refused."""

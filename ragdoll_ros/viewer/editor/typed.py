@@ -58,9 +58,9 @@ def numbers(text: str, count: int, unit: str = '') -> tuple[float, ...]:
 
     The unit stands behind each or behind all; errors are those of ``number``.
     """
-    found = parts(text, count, unit)
+    found, apart = parts(text, count, unit), ';' in _plain(text)
     try:
-        return tuple(number(part, unit) if ';' in _plain(text) else _read(part, power, text, unit)
+        return tuple(number(part, unit) if apart else _read(part, power, text, unit)
                      for part, power in found)
     except NoNumber:
         raise _not_so_many(text, count) from None
