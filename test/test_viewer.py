@@ -434,6 +434,8 @@ def test_another_scene_is_framed_while_the_camera_follows(page):
     client = page.open()
     wait(lambda: page.frame)
     client.update(page.view.follow, True)
+    # The page's wish and the scenes below come by different ways: it follows before they do.
+    wait(lambda: page.server.scene.get_handle_by_name('/followed'))
     camera, = (each.camera for each in page.server.get_clients().values())
     for name in ('crowd', 'flight'):
         page.source.load(name)
