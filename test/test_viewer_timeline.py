@@ -209,22 +209,37 @@ def test_time_stands_while_one_types_it():
     with served(Simulated(DROP)) as page:
         client, slider = page.open(), page.timeline.slider
         wait(lambda: slider.value > 0.8)
-        told, = (handle for handle in page.server.gui._gui_input_handle_from_uuid.values()
-                 if getattr(handle, 'label', '') == 'typing')
-        client.update(told, '0 hold')
+        told = page.timeline.typing
+        client.update(told, '0 typing')
         wait(lambda: not page.timeline.is_live)
         shown, before = slider.value, page.source.frame.time
         wait(lambda: page.source.frame.time > before + 2 * timeline.PERIOD)
         assert slider.value == shown == page.timeline.looked_at(time.monotonic())
-        client.update(told, '1 free')
+        client.update(told, '1 no more')
         wait(lambda: page.timeline.is_live and slider.value > shown)
-        client.update(told, '2 hold')
+        client.update(told, '2 typing')
         wait(lambda: not page.timeline.is_live)
         client.update(slider, 0.5)
-        client.update(told, '3 free')
+        client.update(told, '3 no more')
         before = page.source.frame.time
         wait(lambda: page.source.frame.time > before + 2 * timeline.PERIOD)
         assert page.timeline.looked_at(time.monotonic()) == 0.5
+
+
+def test_time_goes_on_when_the_page_that_types_it_closes():
+    """And not when another one leaves its field."""
+    with served(Simulated(DROP)) as page:
+        one, other = page.open(), page.open()
+        wait(lambda: page.timeline.slider.value > 0)
+        one.update(page.timeline.typing, '0 typing')
+        wait(lambda: not page.timeline.is_live)
+        other.update(page.timeline.typing, '0 no more')
+        # Comes after that by the same way.
+        other.update(page.controls.pace, 0.5)
+        wait(lambda: page.source.report.pace == 0.5)
+        assert not page.timeline.is_live
+        one.close()
+        wait(lambda: page.timeline.is_live)
 
 
 def test_nothing_is_taken_hold_of_in_the_past_and_a_reset_leads_back():

@@ -9,6 +9,7 @@ import viser
 from ..model.scene import Scene
 from ..physics.arrow_keys import STRENGTH, TAP, Pressed, total
 from .sources.source import Source
+from .told import tell
 
 ARROWS = {'←': 'left', '↑': 'up', '↓': 'down', '→': 'right'}
 """Label of each push: short, so that all stand in one row."""
@@ -28,43 +29,35 @@ REFRESH = 0.04
 LASTS = 0.1
 """s of simulated time that each of them pushes, unless the next one comes first."""
 
-KEYS = """<img src="data:," style="display:none" onerror="
-  const isFirst = !window.ragdollKeys;
-  window.ragdollKeys = '{uuid}';
-  if (isFirst) {{
+KEYS = """
     const down = new Set();
-    let count = 0;
-    const tell = () => window.__viserMutable.sendMessage({{
-      type: 'GuiUpdateMessage', uuid: window.ragdollKeys,
-      updates: {{value: [count++, ...down].join(' ')}}}});
-    const letGo = () => {{ if (down.size) {{ down.clear(); tell(); }} }};
+    const tellAll = () => tell([...down].join(' '));
+    const letGo = () => { if (down.size) { down.clear(); tellAll(); } };
     const root = document.documentElement;
-    root.addEventListener('keydown', (event) => {{
+    root.addEventListener('keydown', (event) => {
       const key = event.key.replace('Arrow', '').toLowerCase();
       const arrow = event.key.startsWith('Arrow');
       if (arrow || key === 'e') event.stopPropagation();
       if (!arrow || event.target.matches('input, textarea, select')
           || event.ctrlKey || event.altKey || event.metaKey || down.has(key)) return;
       down.add(key);
-      tell();
-    }});
-    root.addEventListener('keyup', (event) => {{
-      if (down.delete(event.key.replace('Arrow', '').toLowerCase())) tell();
-    }});
+      tellAll();
+    });
+    root.addEventListener('keyup', (event) => {
+      if (down.delete(event.key.replace('Arrow', '').toLowerCase())) tellAll();
+    });
     window.addEventListener('blur', letGo);
     document.addEventListener('visibilitychange', letGo);
-    setInterval(() => {{ if (down.size) tell(); }}, 100);
-    document.addEventListener('click', (event) => {{
+    setInterval(() => { if (down.size) tellAll(); }, 100);
+    document.addEventListener('click', (event) => {
       const at = document.activeElement;
       const typed = at?.matches('input:not([type=checkbox]), textarea');
       if (event.detail && (!typed || event.target.closest('[role=option]'))) at?.blur();
-    }});
-  }}">"""
-"""Tells which arrows are down, in the value of a field that nobody sees; again and again while any
-is, as a page may go without a word. Arrows and E are kept from viser's camera, which would turn or
-rise with them; commands still get E: they listen where this does, the camera further out. What was
-clicked gives the keys back, or Space would press it again, a checkbox keep all keys; but for a
-field in which one types."""
+    });"""
+"""For told.py: tells which arrows are down; again and again while any is, as a page may go without
+a word. Arrows and E are kept from viser's camera, which would turn or rise with them; commands
+still get E: they listen where this does, the camera further out. What was clicked gives the keys
+back, or Space would press it again, a checkbox keep all keys; not so a field in which one types."""
 
 
 class PushKeys:
@@ -78,8 +71,8 @@ class PushKeys:
         self._next = 0.0
         self._pushing = False
         gui = server.gui
-        self.told = told = gui.add_text('keys', '', visible=False)
-        gui.add_html(KEYS.format(uuid=told._impl.uuid))
+        self.told = tell(gui, 'keys', KEYS, lambda page, down: self.take(
+            page, down.split(), time.monotonic()))
         buttons = gui.add_button_group(
             'Push', tuple(ARROWS), hint='as seen from in front of the doll: left, away, toward '
             'you, right; arrow keys do the same, and push on while they are held')
@@ -91,10 +84,6 @@ class PushKeys:
         for arrow in ARROWS.values():
             command = gui.add_command(f'Push {arrow}')
             command.on_trigger(lambda _, arrow=arrow: self.tap(arrow))
-
-        @told.on_update
-        async def _(event: viser.GuiEvent) -> None:
-            self.take(event.client_id, event.target.value.split()[1:], time.monotonic())
 
         @server.on_client_disconnect
         def _(client: viser.ClientHandle) -> None:

@@ -8,11 +8,11 @@ import time
 import viser
 
 from ..sources.source import Frame, Source
+from ..told import tell
 from .history import Cut, History, cut_of
 from .look import Look
 from .package import zipped
 from .strip import strip
-from .time_field import HOLD, tell
 
 PERIOD = 0.5
 """s between two updates of the panel while frames come."""
@@ -24,6 +24,18 @@ SPEEDS = {'1': 1.0, '1/2': 0.5, '1/4': 0.25, '1/10': 0.1, '1/50': 0.02}
 """s of the run in each s on the wall, by their names."""
 
 BACK, PLAY, FORTH, LIVE = '<', 'Play', '>', 'Live'
+
+TYPING, NO_MORE = 'typing', 'no more'
+"""What pages tell when one begins to type a time, and when that is over."""
+
+FOCUS = f"""
+    document.addEventListener('focusin', (event) => {{
+      if (isTyped(event.target)) tell('{TYPING}');
+    }});
+    document.addEventListener('focusout', (event) => {{
+      if (isTyped(event.target)) tell('{NO_MORE}');
+    }});"""
+"""For told.py."""
 
 CAN_WRITE_MCAP = importlib.util.find_spec('mcap') is not None
 
@@ -41,6 +53,8 @@ class Timeline:
         self._whole: Cut | None = None
         self._held: Look | None = None
         """The look back that began with a click into the field of the time, until one goes on."""
+        self._holder: int | None = None
+        """The page where that was."""
         self._next = 0.0
         self._again = False
         """Whether the slider is to be sent though it seems to be where it should."""
@@ -53,8 +67,7 @@ class Timeline:
             self.slider = gui.add_slider('Time', 0.0, 1.0, STEP, 0.0, hint='s; drag to look back: '
                                          'what goes on goes on')
             self.strip = gui.add_html('')
-            told = gui.add_text('typing', '', visible=False)
-            gui.add_html(tell(self.slider._impl.uuid, told._impl.uuid))
+            self.typing = tell(gui, 'time', FOCUS, self._typing, self.slider)
             self.buttons = gui.add_button_group(
                 'Look', (BACK, PLAY, FORTH, LIVE),
                 hint='J, K, L: a frame back, play or stand, a frame on; Live: what goes on')
@@ -62,7 +75,6 @@ class Timeline:
             self.save = gui.add_button('Save this', icon=viser.Icon.DOWNLOAD,
                                        hint='All of the timeline as run.zip: MCAP, glTF, BVH, CSV')
         self.slider.on_update(self._slid)
-        told.on_update(self._typing)
         self.buttons.on_click(lambda event: self._press(event.target.value))
         self.speed.on_update(lambda _: self._set_speed())
         self.save.on_click(self._send)
@@ -70,6 +82,10 @@ class Timeline:
                                    ('A frame on', 'L', FORTH)):
             command = gui.add_command(label, hotkey=key)
             command.on_trigger(lambda _, button=button: self._press(button))
+
+        @server.on_client_disconnect
+        def _(client: viser.ClientHandle) -> None:
+            self._typing(client.client_id, NO_MORE)
 
     @property
     def is_live(self) -> bool:
@@ -130,17 +146,18 @@ class Timeline:
         if event.client is not None:
             self.go_to(event.target.value)
 
-    async def _typing(self, event: viser.GuiEvent) -> None:
+    def _typing(self, page: int, what: str) -> None:
         """Stand while one types a time; go on with what goes on if nothing came of it."""
         with self._lock:
-            if event.target.value.endswith(HOLD):
+            if what == TYPING:
+                self._holder = page
                 was_live = self._look is None
                 self.go_to(self.slider.value)
                 if self._look is not None:
                     self._look.plays = False
                 self._held = self._look if was_live else None
                 self._again = False
-            elif self._held is not None and self._held is self._look:
+            elif page == self._holder and self._held is self._look:
                 self._look = None
 
     def _begin(self) -> Look | None:
