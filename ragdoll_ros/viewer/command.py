@@ -7,6 +7,7 @@ import errno
 import importlib.util
 import io
 import ipaddress
+import math
 import os
 import queue
 import signal
@@ -38,7 +39,8 @@ OWN_FOLDER = 'ragdolls'
 
 REMEDIES = {
     errno.EADDRINUSE: f'without --port, the next free one from {PORT} on is taken',
-    errno.EACCES: f'ports below 1024 are for root alone: expected one from 1024 to {LAST_PORT}'}
+    errno.EACCES: 'ports below 1024 are for root alone, unless the system says otherwise: expected '
+                  f'one from 1024 to {LAST_PORT}'}
 """What to do about a port that cannot be had."""
 
 ENDING = 0.5
@@ -74,6 +76,7 @@ def main(arguments: list[str] | None = None) -> int:
         if importlib.util.find_spec('viser') is None:
             # Said before machine code is made, which takes half a minute.
             raise CannotServe(NO_VISER)
+        check(options, for_ros)
         if options.static is not None:
             write_static(options, for_ros)
         else:
@@ -121,7 +124,7 @@ def parser() -> argparse.ArgumentParser:
                         'machine alone; 0.0.0.0: whoever reaches this machine may steer)')
     parser.add_argument('--port', type=port, help=f'port to serve at; it must be free ({PORT}, or '
                         'the next free one)')
-    parser.add_argument('--start-after', type=float, metavar='S', help='the node waits, started '
+    parser.add_argument('--start-after', type=patience, metavar='S', help='the node waits, started '
                         'with start_paused: let it go once a page shows it, or after so many s '
                         'without one')
     parser.add_argument('--folder', help='where the page saves and loads scenes, and keeps the '
@@ -135,8 +138,34 @@ def port(text: str) -> int:
     number = int(text) if text.isdecimal() else -1
     if not 0 <= number <= LAST_PORT:
         raise argparse.ArgumentTypeError(
-            f'{text}: expected a whole number from 1024 to {LAST_PORT}, or 0 for any free port')
+            f'{text}: expected a whole number up to {LAST_PORT}; 0 stands for any free port')
     return number
+
+
+def patience(text: str) -> float:
+    """Read for how long to wait for a page, s; inf: until there is one."""
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not seconds >= 0:
+        raise argparse.ArgumentTypeError(f'{text}: expected seconds, 0 or more')
+    return seconds
+
+
+def check(options: argparse.Namespace, for_ros: list[str]) -> None:
+    """Refuse, with CannotServe, options that do not go together."""
+    alone = next((f'--{key}' for key in ('scene', 'play') if getattr(options, key) is not None), '')
+    if options.static is not None and (not alone or for_ros):
+        raise CannotServe('--static: expected --scene or --play with it, and nothing of ROS; a '
+                          "node's run is recorded first: ros2 bag record")
+    if alone and for_ros:
+        raise CannotServe(f'{" ".join(for_ros)}: not with {alone}, which does without ROS')
+    if options.engine is not None and options.scene is None:
+        raise CannotServe(f'--engine {options.engine}: only with --scene')
+    if options.start_after is not None and alone:
+        raise CannotServe(f'--start-after {options.start_after:g}: not with {alone}, which waits '
+                          'for a page as long as it takes')
 
 
 def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event) -> None:
@@ -176,9 +205,6 @@ def folder_for_files(wanted: str | None) -> Path:
 
 def write_static(options: argparse.Namespace, for_ros: list[str]) -> None:
     """Write the page that needs no server; RagdollError if it cannot be as asked."""
-    if (options.scene is None and options.play is None) or for_ros:
-        raise CannotServe('--static: expected --scene or --play with it, and nothing of ROS; a '
-                          "node's run is recorded first: ros2 bag record")
     scene = None if options.scene is None else load_scene(options.scene)
     page_class()
     from .static import fall, save_static
@@ -203,11 +229,6 @@ def page_class() -> type:
 
 def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
     """Simulate a scene here, play a run, or listen to a node; RagdollError if that cannot be."""
-    alone = next((f'--{key}' for key in ('scene', 'play') if getattr(options, key) is not None), '')
-    if alone and for_ros:
-        raise CannotServe(f'{" ".join(for_ros)}: not with {alone}, which does without ROS')
-    if options.engine is not None and options.scene is None:
-        raise CannotServe(f'--engine {options.engine}: only with --scene')
     if options.play is not None:
         from ..recordings.mcap_file import load_recording
         from .sources.playback import Playback
