@@ -170,6 +170,29 @@ def test_arrows_pressed_together_add_up(page):
     wait(lambda: page.frame.pushes and page.frame.pushes[0].force == (-2000, -2000, 2))
 
 
+def buttons_and_keys(page):
+    """Labels of all that can be used on a page, and all commands by which it can be."""
+    gui = page.server.gui
+    shown = {handle.label for handle in gui._gui_input_handle_from_uuid.values() if handle.visible}
+    return shown, {handle.label for handle in gui._command_handle_from_uuid.values()}
+
+
+def test_a_recording_offers_nothing_that_it_cannot_do():
+    """Nothing pushes it, and it has one scene, simulated once. The hint says so little, too."""
+    run = Recording(DROP, np.array((0, 1.0)), np.zeros((2, 10, 3)),
+                    np.tile((0, 0, 0, 1.0), (2, 10, 1)))
+    changes = {'Push', 'Strength, N', 'Scene', 'Engine'}
+    pushes = {'Push up', 'Push down', 'Push left', 'Push right'}
+    with served(Simulated(DROP)) as page:
+        shown, keys = buttons_and_keys(page)
+        assert changes < shown and pushes < keys and 'Reset' in shown
+    with served(Playback(run)) as page:
+        page.open()
+        wait(lambda: page.stage)
+        shown, keys = buttons_and_keys(page)
+        assert not changes & shown and not pushes & keys and {'Pause', 'Reset', 'Time'} < shown
+
+
 def test_pause_step_reset_and_pace(page):
     client = page.open()
     wait(lambda: page.frame and page.frame.time > 0.2)

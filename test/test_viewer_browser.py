@@ -230,6 +230,9 @@ def test_a_run_is_played_back(browser, states, tmp_path):
           opened(browser, url, SCENE) as page):
         page.wait(lambda: abs(page.bodies(SCENE) - recording.positions[-1]).max() < 1e-6)
         page.page.get_by_text(re.compile(r'run\.mcap: [0-9.]+ of [0-9.]+ s')).wait_for()
+        page.page.get_by_text('A recorded run.').wait_for()
+        for words in ('Strength, N', 'Scene', 'Engine', 'Settings'):
+            assert not page.page.get_by_text(words, exact=True).count()
 
 
 def test_the_view_is_saved_as_png(view, tmp_path):

@@ -28,7 +28,7 @@ class Controls:
         self._shown = Report()
         self._scene_shown = OTHER
         self._loop = server.get_event_loop()
-        gui = server.gui
+        gui, is_simulated = server.gui, source.recording is None
         self.pushes = PushKeys(server, source)
         self.pause = gui.add_button('Pause', icon='player-pause', hint='Space')
         self.step_button = gui.add_button('Step', icon='player-track-next', disabled=True,
@@ -36,8 +36,10 @@ class Controls:
         self.reset = gui.add_button('Reset', icon='player-skip-back', hint='R')
         self.pace = gui.add_slider('Pace', *PACES, step=0.05, initial_value=1.0,
                                    hint='simulated seconds for each second on the wall')
-        self.scene = gui.add_dropdown('Scene', (OTHER, *scene_names()), initial_value=OTHER)
+        self.scene = gui.add_dropdown('Scene', (OTHER, *scene_names()), initial_value=OTHER,
+                                      visible=is_simulated)
         self.engine = gui.add_dropdown('Engine', ENGINES, initial_value=ENGINES[0],
+                                       visible=is_simulated,
                                        hint='what simulates; another one starts anew')
         self.pace.on_update(lambda event: event.client and self.source.set_pace(self.pace.value))
         self.scene.on_update(self._choose)

@@ -22,7 +22,7 @@ from .editor.editor import Editor
 from .editor.form import GREY, RED, colored
 from .editor.on_top import ON_TOP
 from .editor.own_uploads import OWN_UPLOADS
-from .hint import HINT
+from .hint import OF_DOLL, OF_RECORDING, hint
 from .lost import LOST
 from .opening import Opening
 from .pointer import Pointer
@@ -60,7 +60,9 @@ class Page:
         light(server)
         theme(server, dark=False)
         server.gui.main_panel.dock_right()
-        for html in (FREE, HINT, LOST, KEEP_PAGE, PAINT, NO_ARROW, ON_TOP, OWN_UPLOADS):
+        said = (hint(OF_DOLL, 'ragdollHint') if source.recording is None
+                else hint(OF_RECORDING, 'ragdollRecordingHint'))
+        for html in (FREE, said, LOST, KEEP_PAGE, PAINT, NO_ARROW, ON_TOP, OWN_UPLOADS):
             server.gui.add_html(html)
         self.problem = server.gui.add_html('')
         self.tabs = server.gui.add_tab_group()

@@ -61,7 +61,10 @@ back, or Space would press it again, a checkbox keep all keys; not so a field in
 
 
 class PushKeys:
-    """Buttons, keys and a slider that push, in the GUI container that is current."""
+    """Buttons, keys and a slider that push, in the GUI container that is current.
+
+    Of a recording, which nothing pushes, there are none to be seen.
+    """
 
     def __init__(self, server: viser.ViserServer, source: Source) -> None:
         self._source = source
@@ -70,18 +73,19 @@ class PushKeys:
         self._mass = 0.0
         self._next = 0.0
         self._pushing = False
-        gui = server.gui
+        gui, can_push = server.gui, source.recording is None
         self.told = tell(gui, 'keys', KEYS, lambda page, down: self.take(
             page, down.split(), time.monotonic()))
         buttons = gui.add_button_group(
-            'Push', tuple(ARROWS), hint='as seen from in front of the doll: left, away, toward '
-            'you, right; arrow keys do the same, and push on while they are held')
+            'Push', tuple(ARROWS), visible=can_push, hint='as seen from in front of the doll: '
+            'left, away, toward you, right; arrow keys do the same, and push on while they are '
+            'held')
         self.strength = gui.add_slider('Strength, N', *STRENGTHS, step=STEP,
-                                       initial_value=STRENGTH, hint='of a push')
-        self._effect = gui.add_html('')
+                                       initial_value=STRENGTH, visible=can_push, hint='of a push')
+        self._effect = gui.add_html('', visible=can_push)
         self.strength.on_update(lambda _: self._tell_effect())
         buttons.on_click(lambda event: self.tap(ARROWS[event.target.value]))
-        for arrow in ARROWS.values():
+        for arrow in ARROWS.values() if can_push else ():
             command = gui.add_command(f'Push {arrow}')
             command.on_trigger(lambda _, arrow=arrow: self.tap(arrow))
 

@@ -42,7 +42,8 @@ class Settings:
         self._shown = ''
         gui = server.gui
         self.health = gui.add_html('')
-        with gui.add_folder('Settings', expand_by_default=False):
+        with gui.add_folder('Settings', expand_by_default=False,
+                            visible=source.recording is None):
             self.accuracy = gui.add_dropdown('Accuracy', tuple(ACCURACIES), visible=False,
                                              hint='how finely it steps; goes on from where it is')
             self.price = gui.add_html('')
