@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import re
 import zipfile
 
@@ -302,6 +303,47 @@ def test_a_body_and_its_joint_are_edited_saved_undone_and_loaded(view, folder):
     view.press('Load')
     view.see('loaded edited')
     assert saved(view, folder, 'loaded') == edited()
+
+
+def test_a_colour_is_typed_or_refused(view, folder):
+    """By a name that viser does not know; what is none is told at its field, and once more by
+    Update, as the field shows the colour before by then; a click into the picker forgets it.
+    """
+    view.hold_at(SCENE, START)
+    view.tab('Edit')
+    choose(view, 'head')
+    field, names, blue = view.field('colour'), map(str, itertools.count()), (30, 144, 255)
+
+    def color():
+        scene = saved(view, folder, 'color_' + next(names))
+        return tuple(round(255 * part) for part in scene.bones[scene.bone_index('head')].color[:3])
+
+    def type_there(text):
+        field.fill(text)
+        field.blur()
+    for text, meant in (('rebeccapurple', (102, 51, 153)), ('30 144 255', blue)):
+        field.fill(text)
+        view.press('Update')
+        view.wait(lambda meant=meant: field.input_value() == f'rgb{meant}' and color() == meant)
+    words = view.page.get_by_text('colour must be')
+    for text in ('redd', '#1e90f', 'rgb(300, 2, 3)'):
+        type_there(text)
+        words.wait_for()
+        assert words.text_content().endswith(f', not {text}')
+        view.wait(lambda: field.input_value() == f'rgb{blue}')
+        view.press('Update')
+        assert color() == blue
+        words.wait_for()
+        view.press('Update')
+        words.wait_for(state='hidden')
+        assert color() == blue
+    type_there('redd')
+    words.wait_for()
+    field.click()
+    view.page.locator('.mantine-ColorInput-saturation').click()
+    words.wait_for(state='hidden')
+    view.press('Update')
+    view.wait(lambda: color() != blue)
 
 
 def test_what_is_edited_falls(view):

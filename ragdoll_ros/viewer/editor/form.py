@@ -12,7 +12,9 @@ import viser
 from ...model import errors
 from ...model.ragdoll import JOINT_KINDS
 from ...model.shapes import SHAPES
+from ..told import tell
 from . import typed, words
+from .color_field import LEFT, color
 from .sheet import Field, Sheet, Value
 
 NUMBERS = ('number', 'vector')
@@ -50,6 +52,11 @@ class Form:
         """What a field of numbers was filled with, as text and exactly."""
         self.errors: dict[str, viser.GuiHtmlHandle] = {}
         """What is written under the fields, seen where something is wrong."""
+        self._colors: dict[str, Value] = {}
+        """What a field of a colour shows."""
+        self._unread: dict[str, errors.ModelError] = {}
+        """What was typed there and is none: refused at the next reading, as the field itself shows
+        the one before again."""
         self._on_kind = on_kind
         self._filling = Quiet()
         for field in fields:
@@ -57,6 +64,8 @@ class Form:
             self.errors[field.key] = gui.add_html('', visible=False)
             if field.widget in ('shape', 'joint'):
                 widget.on_update(lambda event, key=field.key: self._chosen(key))
+            if field.widget == 'color':
+                self._connect_color(gui, field.key, widget)
 
     def __getitem__(self, key: str) -> Any:
         """Widget of a field."""
@@ -68,6 +77,7 @@ class Form:
         What was typed and is what the sheet has stays as it was typed.
         """
         self.tell(())
+        self._unread.clear()
         with self._filling:
             for key, widget in self._widgets.items():
                 widget.visible = key in sheet
@@ -89,12 +99,42 @@ class Form:
     def tell(self, found: Iterable[errors.ModelError]) -> None:
         """Write each error under the field that its path names; take the others away."""
         said = {error.path: error for error in found}
-        for key, place in self.errors.items():
-            text = words.sentence(said[key], *_named(self._fields[key])) if key in said else ''
-            place.content = colored(text, RED)
-            place.visible = key in said
+        for key in self.errors:
+            self._say(key, said.get(key))
+
+    def _say(self, key: str, error: errors.ModelError | None) -> None:
+        place, text = self.errors[key], ''
+        if error is not None:
+            text = words.sentence(error, *_named(self._fields[key]))
+        place.content = colored(text, RED)
+        place.visible = error is not None
+
+    def _connect_color(self, gui: viser.GuiApi, key: str, widget: viser.GuiRgbHandle) -> None:
+        """Take what is typed into the field of a colour, and what is picked there."""
+        def typed_there(page: int, told: str) -> None:
+            try:
+                self._colors[key] = color(told)
+                self._unread.pop(key, None)
+            except errors.ModelError as error:
+                self._unread[key] = error
+            self._say(key, self._unread.get(key))
+            red, *others = self._colors[key]
+            # Viser sends nothing that it holds to be there already; the last of both is sent.
+            widget.value = (red ^ 1, *others)
+            widget.value = self._colors[key]
+
+        async def picked(event: viser.GuiEvent) -> None:
+            if event.client is not None and max(event.target.value) <= 255:
+                self._colors[key] = event.target.value
+                self._unread.pop(key, None)
+                self._say(key, None)
+
+        widget.on_update(picked)
+        tell(gui, key, LEFT, typed_there, widget)
 
     def _fill(self, key: str, widget: Any, value: Value) -> None:
+        if self._fields[key].widget == 'color':
+            self._colors[key] = value
         if self._fields[key].widget not in NUMBERS:
             widget.value = value
             return
@@ -108,6 +148,8 @@ class Form:
 
     def _read(self, key: str, given: Any) -> Value:
         """What a widget's value means; parts of a text that nobody touched are what they were."""
+        if key in self._unread:
+            raise self._unread.pop(key)
         field = self._fields[key]
         if field.widget not in NUMBERS:
             return given

@@ -56,7 +56,7 @@ BODY = (
     Field('friction', 'friction', 'text', "coefficient, inf for no slip; empty: the scene's"),
     Field('rolling_friction', 'rolling, m', 'text', "lever arm; empty: the scene's"),
     Field('restitution', 'restitution', 'text', "0 to 1; empty: the scene's"),
-    Field('color', 'colour', 'color', 'by a click, or typed: #1e90ff'))
+    Field('color', 'colour', 'color', 'by a click, or typed: red, #1e90ff, 30 144 255'))
 
 JOINT = (
     Field('kind', 'joint', 'joint', 'to the parent'),
