@@ -125,7 +125,7 @@ class Page:
                 self.cameras.show(frame)
         self.cameras.follow(frame, now, self.view.follow.value)
         self.controls.show_rest(self._rest.lies(live, report.paused, now))
-        self.settings.show(report, live.scene)
+        self.settings.show(report, live.scene, now)
 
     def _at_hand(self) -> Frame | None:
         """What a pointer may take hold of: nothing of what is over."""

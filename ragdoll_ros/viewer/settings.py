@@ -20,6 +20,9 @@ from .sources.source import Report, Source
 
 AMBER = '#e67700'
 
+PERIOD = 0.5
+"""s for which figures stand, to be read; a warning comes and goes at once."""
+
 ERRORS_MM = {'rigid': {'draft': 0.37, 'normal': 0.2, 'exact': 0.02},
              'bullet': {'draft': 14, 'normal': 13, 'exact': 15},
              'mujoco': {'draft': 18, 'normal': 18, 'exact': 16}}
@@ -40,6 +43,8 @@ class Settings:
         self._loop = server.get_event_loop()
         self._scene: Scene | None = None
         self._shown = ''
+        self._next = 0.0
+        self._warns = False
         gui = server.gui
         self.health = gui.add_html('')
         with gui.add_folder('Settings', expand_by_default=False,
@@ -55,19 +60,23 @@ class Settings:
         self.accuracy.on_update(self._choose)
         self.use.on_click(lambda _: self._use())
 
-    def show(self, report: Report, scene: Scene) -> None:
-        """Show how the source does, and the settings of its scene if that is another one."""
+    def show(self, report: Report, scene: Scene, now: float) -> None:
+        """Show how the source does at ``now`` s of a steady clock, and the settings of its scene
+        if that is another one.
+        """
         if scene is not self._scene:
             self._scene = scene
             self.form.fill({'gravity': scene.gravity, 'restitution': scene.material.restitution,
                             'friction': typed.shown(scene.material.friction)})
             self.ground.value = scene.ground is not None
         line, warns = health(report, scene)
-        _write(self.health, colored(line, AMBER if warns else GREEN))
+        if now >= self._next or warns != self._warns:
+            self._next, self._warns = now + PERIOD, warns
+            _write(self.health, colored(line, AMBER if warns else GREEN))
+            _write(self.price, colored(self._price(report), GREEN))
         self.accuracy.visible = report.accuracy in ACCURACIES
         if report.accuracy != self._shown and report.accuracy in ACCURACIES:
             self._shown = self.accuracy.value = report.accuracy
-        _write(self.price, colored(self._price(report), GREEN))
 
     @staticmethod
     def _price(report: Report) -> str:
