@@ -132,9 +132,15 @@ def test_options_of_a_fit_are_refused_where_nothing_is_fitted(capsys, name, opti
     assert 'a .glb or .gltf to fit' in error
 
 
-def test_no_such_file(capsys):
-    assert main(['no_such.glb']) == 2
-    assert 'no_such.glb' in capsys.readouterr().err
+@pytest.mark.parametrize(('name', 'why'), [
+    ('no_such.glb', 'no such file'), ('no_such.urdf', 'no such file'),
+    ('folder.glb', 'not a regular file'), ('folder.urdf', 'not a regular file')])
+def test_what_is_no_file_is_told_so(tmp_path, capsys, name, why):
+    (tmp_path / 'folder.glb').mkdir()
+    (tmp_path / 'folder.urdf').mkdir()
+    assert main([str(tmp_path / name)]) == 2
+    said = capsys.readouterr().err
+    assert name in said and why in said
 
 
 def test_help_has_an_example():

@@ -65,7 +65,8 @@ class GltfFile:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         if not self.path.is_file():
-            raise errors.Unreadable('', str(path), 'a .glb or .gltf file')
+            there = 'not a regular file' if self.path.exists() else 'no such file'
+            raise errors.Unreadable('', there, 'a .glb or .gltf file')
         self.size = os.stat(self.path).st_size
         with self.path.open('rb') as file:
             head = file.read(4)

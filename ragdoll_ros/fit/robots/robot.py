@@ -46,7 +46,8 @@ def read_urdf(path: str | Path) -> tuple[Ragdoll, tuple[str, ...]]:
     path = Path(path)
     try:
         if not path.is_file():
-            raise errors.Unreadable('', str(path), 'a URDF file')
+            there = 'not a regular file' if path.exists() else 'no such file'
+            raise errors.Unreadable('', there, 'a URDF file')
         if path.stat().st_size > LARGEST_TEXT:
             raise errors.Unreadable('', path.stat().st_size, f'at most {LARGEST_TEXT} bytes')
         doll, notes = _doll(parse_urdf(urdf_text(path.read_bytes())), path.parent)
