@@ -92,13 +92,22 @@ def _construct(text: str) -> object:
 def _check_depth(text: str) -> None:
     """Refuse what is nested so deeply that libyaml's recursion would end the process."""
     depth = 0
-    for event in yaml.parse(text, _Loader):
-        depth += isinstance(event, yaml.CollectionStartEvent)
-        depth -= isinstance(event, yaml.CollectionEndEvent)
-        if depth > DEEPEST:
-            mark = event.start_mark
-            raise errors.Unreadable(f'line {mark.line + 1}, column {mark.column + 1}',
-                                    'nested too deeply', f'at most {DEEPEST} levels')
+    try:
+        for event in yaml.parse(text, _Loader):
+            depth += isinstance(event, yaml.CollectionStartEvent)
+            depth -= isinstance(event, yaml.CollectionEndEvent)
+            if depth > DEEPEST:
+                raise _too_deep(event.start_mark)
+    except yaml.MarkedYAMLError as error:
+        # PyYAML from 6.0.4 on has a limit in its scanner, which reads ahead of the events.
+        if 'maximum nesting depth' in (error.problem or ''):
+            raise _too_deep(error.problem_mark) from None
+        raise
+
+
+def _too_deep(mark: yaml.Mark) -> errors.Unreadable:
+    return errors.Unreadable(f'line {mark.line + 1}, column {mark.column + 1}',
+                             'nested too deeply', f'at most {DEEPEST} levels')
 
 
 def _unfolded(node: yaml.Node, sizes: dict[int, float]) -> float:
