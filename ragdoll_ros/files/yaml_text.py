@@ -66,7 +66,7 @@ def parse(content: bytes) -> object:
         raise
     except yaml.YAMLError as error:
         mark = getattr(error, 'problem_mark', None)
-        where = f'line {mark.line + 1}, column {mark.column + 1}' if mark else ''
+        where = _place(mark) if mark else ''
         line = text.splitlines()[mark.line:][:1] if mark else []
         problem = getattr(error, 'problem', None) or getattr(error, 'reason', None)
         raise errors.Unreadable(where, ''.join(line).strip(),
@@ -106,8 +106,11 @@ def _check_depth(text: str) -> None:
 
 
 def _too_deep(mark: yaml.Mark) -> errors.Unreadable:
-    return errors.Unreadable(f'line {mark.line + 1}, column {mark.column + 1}',
-                             'nested too deeply', f'at most {DEEPEST} levels')
+    return errors.Unreadable(_place(mark), 'nested too deeply', f'at most {DEEPEST} levels')
+
+
+def _place(mark: yaml.Mark) -> str:
+    return f'line {mark.line + 1}, column {mark.column + 1}'
 
 
 def _unfolded(node: yaml.Node, sizes: dict[int, float]) -> float:
