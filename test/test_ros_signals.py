@@ -16,6 +16,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from ragdoll_ros.ros.run_log import PAST
+from ragdoll_ros.ros.signals import end_unbroken, ended_by_signals
 
 pytestmark = pytest.mark.usefixtures('nothing_runs_on')
 
@@ -154,3 +155,20 @@ def test_a_signal_while_it_compiles_ends_it(ros, monkeypatch, tmp_path, delay):
     code, _, errors = outcome(process)
     assert code == 0 and 'Traceback' not in errors
     assert time.monotonic() - sent < 5
+
+
+def test_a_first_signal_does_not_cut_short_the_end():
+    """As where ROS, which takes signals too, has shut down before Python takes this one."""
+    stood = {number: signal.getsignal(number) for number in SIGNS}
+    said = []
+
+    def end():
+        signal.raise_signal(signal.SIGINT)
+        said.append('ended')
+
+    try:
+        assert ended_by_signals(lambda: end_unbroken(end) or 0) == 0
+    finally:
+        for number, handler in stood.items():
+            signal.signal(number, handler)
+    assert said == ['ended']

@@ -31,7 +31,7 @@ from .rescue import Rescue
 from .run_log import RunLog
 from .services import Services
 from .session import ros_session
-from .signals import ended_by_signals
+from .signals import end_unbroken, ended_by_signals
 from .stamps import Stamps
 from .tally import Tally
 from .ticker import CALLS, MISFITS, Ticker
@@ -165,10 +165,8 @@ class RagdollNode(Node):
     def end(self) -> None:
         """Give all back and say how far it came: ROS may be gone already, the log is not."""
         line = end_line(self.simulation, self.tally.refused.total(), self._ticker.dropped)
-        try:
-            self.destroy_node()
-        finally:  # which may fail where a thread that took the signal shuts ROS down meanwhile
-            self.get_logger().info(line)
+        self.destroy_node()
+        self.get_logger().info(line)
 
     def destroy_node(self) -> None:
         """Give the engine back as well."""
@@ -295,7 +293,7 @@ def _spin(arguments: list[str]) -> int:
         try:
             rclpy.spin(node)
         finally:
-            node.end()
+            end_unbroken(node.end)
     return 0
 
 

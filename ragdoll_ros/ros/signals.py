@@ -25,6 +25,21 @@ def hold_back() -> None:
         signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
 
 
+def end_unbroken(end: Callable[[], None]) -> None:
+    """Run what ends a program whole, though the first signal comes only now.
+
+    ROS takes signals too, and may shut down before Python does: what ran has ended by then, and
+    the interrupt would come in the midst of the end.
+    """
+    try:
+        for number in ENDING:
+            signal.signal(number, lambda *_: None)
+    except KeyboardInterrupt:  # the first signal's; no later one interrupts
+        pass
+    finally:
+        end()
+
+
 def ended_by_signals(run: Callable[[], int]) -> int:
     """Run what the first signal may end at any time, which is no error; give the exit code.
 
