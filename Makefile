@@ -54,21 +54,21 @@ slow: $(COMPILED) ## the tests that take minutes
 	@$(BIN)/python -m pytest -m slow
 
 soak: $(COMPILED) ## 864 000 ticks, pushed, set back, with other scenes: nothing may grow; 25 min
-	@$(BIN)/python -m ragdoll_ros.ros.soak
+	@$(BIN)/python -m ragdoll_ros.ros.tools.soak
 
 bench: $(COMPILED) ## cost of a tick and of its parts, of crowds, swings, people, the page, 30 min
-	@$(BIN)/python -m ragdoll_ros.ros.bench
-	@$(BIN)/python -m ragdoll_ros.ros.crowd_bench
+	@$(BIN)/python -m ragdoll_ros.ros.tools.bench
+	@$(BIN)/python -m ragdoll_ros.ros.tools.crowd_bench
 	@$(BIN)/python -m ragdoll_ros.accuracy.crowds
 	@$(BIN)/python -m ragdoll_ros.physics.swing.bench
 	@$(BIN)/python test/fit_cost.py
 	@$(BIN)/python test/page_cost.py
 
 report: $(COMPILED) ## accuracy against independent references, into docs/, 40 min
-	@$(BIN)/python -m ragdoll_ros.accuracy.command --out docs
+	@$(BIN)/python -m ragdoll_ros.accuracy.report.command --out docs
 
 hard: $(COMPILED) ## hard cases, each with its rule, as a table
-	@$(BIN)/python -m ragdoll_ros.accuracy.hard
+	@$(BIN)/python -m ragdoll_ros.accuracy.report.hard
 
 WORKSPACE := build/colcon
 COLCON = PATH="$(CURDIR)/$(BIN):$$PATH" colcon --log-base $(WORKSPACE)/log

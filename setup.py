@@ -10,10 +10,10 @@ from setuptools.command.build_py import build_py
 NAME = 'ragdoll_ros'
 EXECUTABLES = {
     'ragdoll_node': 'ragdoll_ros.ros.node:main',
-    'ragdoll_teleop': 'ragdoll_ros.ros.teleop:main',
+    'ragdoll_teleop': 'ragdoll_ros.ros.teleop.teleop:main',
     'ragdoll_viewer': 'ragdoll_ros.viewer.command:main',
     'ragdoll_fit': 'ragdoll_ros.fit.command:main',
-    'ragdoll_report': 'ragdoll_ros.accuracy.command:main',
+    'ragdoll_report': 'ragdoll_ros.accuracy.report.command:main',
     'ragdoll_replay': 'ragdoll_ros.replay.command:main',
     'ragdoll_falls': 'ragdoll_ros.falls.command:main',
     'ragdoll_person': 'ragdoll_ros.people.command:main',

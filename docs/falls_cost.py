@@ -18,8 +18,8 @@ from ragdoll_ros.falls import simulate as falls
 from ragdoll_ros.falls.formats import lerobot
 from ragdoll_ros.falls.recipe import Recipe, load_recipe, recipe_of
 from ragdoll_ros.falls.start import start_of
-from ragdoll_ros.physics.engine import clusters
-from ragdoll_ros.physics.settings import ACCURACIES
+from ragdoll_ros.physics.accuracy import ACCURACIES
+from ragdoll_ros.physics.engine.rigid import clusters
 from ragdoll_ros.physics.simulation import Simulation
 
 PARTS = ('machine code', 'the rest of ticks', 'frames', 'set up', 'Parquet')

@@ -10,7 +10,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from ragdoll_ros.files.run_scene import run_scene_text, scene_digest
 from ragdoll_ros.model.scene import SECOND
-from ragdoll_ros.physics.recorded import RecordedSimulation, state_digest
+from ragdoll_ros.physics.logged_simulation import RecordedSimulation, state_digest
 
 STORAGE = {'.mcap': StoragePlugin.MCAP, '.db3': StoragePlugin.SQLITE3}
 

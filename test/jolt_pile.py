@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ragdoll_ros.accuracy.depth import BoneDepth
-from ragdoll_ros.accuracy.pile import DURATION, HEAD, LOOKS, Outcome, enter_depths
+from ragdoll_ros.accuracy.crowds.depth import BoneDepth
+from ragdoll_ros.accuracy.crowds.pile import DURATION, HEAD, LOOKS, Outcome, enter_depths
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.ragdoll import joint_axes

@@ -7,13 +7,13 @@ import numpy as np
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.coordinates import DofLayout, GeneralizedState
 from ragdoll_ros.model.state import State
+from ragdoll_ros.physics.engine.rigid.build_system import system_of
 from ragdoll_ros.physics.kernels.advance import observe
 from ragdoll_ros.physics.kernels.compiling.bundle import bind, bundle_at
 from ragdoll_ros.physics.kernels.dynamics.bias import integrate
 from ragdoll_ros.physics.kernels.dynamics.forward import accelerations
 from ragdoll_ros.physics.kernels.flight.path import along, path_step
 from ragdoll_ros.physics.kernels.system import COURSE, ROOM, SYSTEM, make_course, make_room
-from ragdoll_ros.physics.system import system_of
 
 SYSTEM_AT, ROOM_AT, COURSE_AT = bundle_at(SYSTEM), bundle_at(ROOM), bundle_at(COURSE)
 

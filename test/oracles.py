@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from ragdoll_ros.physics.settings import NORMAL
+from ragdoll_ros.physics.accuracy import NORMAL
 
 PROBE = 2.0 ** -10
 """s: the step that measures accelerations; a power of two, so that dividing by it is exact."""

@@ -14,7 +14,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
-from ragdoll_ros.ros.session import ros_session
+from ragdoll_ros.ros.rclpy_context import ros_session
 
 PAST = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 TOPICS = ('/ragdoll/scene', '/ragdoll/events')

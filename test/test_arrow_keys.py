@@ -7,7 +7,8 @@ from conserved import conserved
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model.push import Push
-from ragdoll_ros.physics.arrow_keys import (
+from ragdoll_ros.physics.simulation import Simulation
+from ragdoll_ros.realtime.arrow_keys import (
     DIRECTIONS,
     FIRST,
     HOLD,
@@ -19,7 +20,6 @@ from ragdoll_ros.physics.arrow_keys import (
     Pressed,
     total,
 )
-from ragdoll_ros.physics.simulation import Simulation
 
 FLIGHT = load_scene('flight')
 RATES = (11, 25, 30)

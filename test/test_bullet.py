@@ -11,8 +11,8 @@ from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.scene import Ground, Material, Placement, Scene
 from ragdoll_ros.model.shapes import Box, Sphere
-from ragdoll_ros.physics.engine.bullet import BulletEngine
 from ragdoll_ros.physics.engine.protocol import GROUND, AppliedWrench, pressed
+from ragdoll_ros.physics.engine.substepped.bullet import BulletEngine
 
 
 def one(shape, mass, **scene):
@@ -115,6 +115,7 @@ def test_more_joints_than_pybullet_tells_of_are_refused():
 def test_pybullet_is_imported_without_a_word():
     """It prints when it was built; what a program says before and after is not lost."""
     done = subprocess.run(
-        [sys.executable, '-c', 'print("before"); import ragdoll_ros.physics.engine.bullet\n'
+        [sys.executable, '-c', 'print("before"); '
+         'import ragdoll_ros.physics.engine.substepped.bullet\n'
          'print("after")'], capture_output=True, text=True, timeout=60, check=True)
     assert (done.stdout, done.stderr) == ('before\nafter\n', '')

@@ -13,7 +13,7 @@ pytest.importorskip('numba', reason='numba is not installed: there is no rigid e
 from conserved import conserved
 
 from ragdoll_ros import Push, Simulation, load_scene
-from ragdoll_ros.accuracy import crowd_digests
+from ragdoll_ros.accuracy.crowds import crowd_digests
 from ragdoll_ros.model.scene import Placement
 
 APART = 2.5
@@ -149,7 +149,7 @@ def test_each_doll_sleeps_and_wakes_by_itself():
 def test_dolls_that_pile_up_do_not_go_through_each_other():
     """Four dropped onto each other lie higher than one, and no bone is deep in another's."""
     pytest.importorskip('mujoco')
-    from ragdoll_ros.accuracy.depth import BoneDepth
+    from ragdoll_ros.accuracy.crowds.depth import BoneDepth
     crowd = field(4, 0.0, (0.0, 1.6, 3.2, 4.8))
     with Simulation(crowd, engine='rigid') as simulation:
         scales, deepest = BoneDepth(crowd), 0.0
@@ -172,7 +172,7 @@ def test_dolls_at_the_ends_of_a_row_that_closes_touch_each_other_too():
     from between them, and they meet; momentum is kept, and none goes through the other.
     """
     pytest.importorskip('mujoco')
-    from ragdoll_ros.accuracy.depth import BoneDepth
+    from ragdoll_ros.accuracy.crowds.depth import BoneDepth
     crowd = field(3, 1.0, gravity=(0.0, 0.0, 0.0), ground=None)
     speeds = (1.5, 0.0, 0.0), (0.0, 6.0, 0.0), (-1.5, 0.0, 0.0)
     crowd = dataclasses.replace(crowd, dolls=tuple(

@@ -4,7 +4,7 @@ from __future__ import annotations
 import pytest
 
 from ragdoll_ros.model import errors
-from ragdoll_ros.viewer.editor.color_field import color
+from ragdoll_ros.viewer.widgets.color_field import color
 
 DODGER_BLUE = (30, 144, 255)
 

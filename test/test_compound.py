@@ -19,9 +19,9 @@ from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Ground, Placement, Scene
 from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Part, Sphere
 from ragdoll_ros.physics import kernels
-from ragdoll_ros.physics.engine.bullet import BulletEngine
-from ragdoll_ros.physics.engine.mujoco import MujocoEngine
 from ragdoll_ros.physics.engine.protocol import GROUND
+from ragdoll_ros.physics.engine.substepped.bullet import BulletEngine
+from ragdoll_ros.physics.engine.substepped.mujoco import MujocoEngine
 
 ASKEW = Compound((Part(Box((0.1, 0.2, 0.4)), (0.3, 0, -0.1), TURN),
                   Part(Capsule(0.05, 0.3), (-0.1, 0.2, 0.1), (0.3, 0, 0.1, 0.9)),
@@ -36,7 +36,7 @@ ENGINES = {BulletEngine: bullet_acceleration, MujocoEngine: mujoco_acceleration}
 if kernels.ready():
     from kernel_dynamics import KernelDynamics
 
-    from ragdoll_ros.physics.engine.rigid import RigidEngine
+    from ragdoll_ros.physics.engine.rigid.engine import RigidEngine
 
     ENGINES[RigidEngine] = lambda engine, coordinates: KernelDynamics(
         engine.scene).acceleration(coordinates)

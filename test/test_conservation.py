@@ -16,13 +16,13 @@ from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Ground, Placement, Scene
 from ragdoll_ros.model.shapes import Sphere
 from ragdoll_ros.model.state import State
-from ragdoll_ros.physics.account import Account
-from ragdoll_ros.physics.conservation import ConservationProjection
-from ragdoll_ros.physics.engine.bullet import BulletEngine
 from ragdoll_ros.physics.engine.protocol import AppliedWrench
+from ragdoll_ros.physics.engine.substepped.bullet import BulletEngine
+from ragdoll_ros.physics.engine.substepped.conservation import ConservationProjection
+from ragdoll_ros.physics.engine.substepped.doll_sums import DollSums
+from ragdoll_ros.physics.engine.substepped.energy_account import Account
 from ragdoll_ros.physics.ground_heights import GroundHeights
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.physics.sums import DollSums
 
 BALL = Ragdoll('ball', (Bone('ball', Sphere(0.1), 1.0, (0.0, 0.0, 0.0)),))
 

@@ -11,8 +11,8 @@ from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.coordinates import GeneralizedState
 from ragdoll_ros.model.scene import Placement
-from ragdoll_ros.physics.engine.bullet import BulletEngine
-from ragdoll_ros.physics.settings import NORMAL
+from ragdoll_ros.physics.accuracy import NORMAL
+from ragdoll_ros.physics.engine.substepped.bullet import BulletEngine
 
 ARTICLE_CM = {
     # Centres in the article's axes (x left, y up, z forward) and centimetres.

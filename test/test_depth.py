@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip('mujoco')
 
 from ragdoll_ros import Bone, Box, Capsule, Cylinder, Placement, Ragdoll, Scene, Sphere
-from ragdoll_ros.accuracy.depth import BoneDepth
+from ragdoll_ros.accuracy.crowds.depth import BoneDepth
 from ragdoll_ros.accuracy.trajectory import Trajectory
 from ragdoll_ros.model import rotation
 

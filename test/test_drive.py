@@ -15,7 +15,7 @@ from ragdoll_ros.model.drive import FASTEST, MOST_FORCE, MOST_TORQUE, Drive
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Placement, Scene, above_ground
 from ragdoll_ros.model.shapes import Box, Sphere
-from ragdoll_ros.physics.settings import resolve_accuracy
+from ragdoll_ros.physics.accuracy import resolve_accuracy
 from ragdoll_ros.physics.simulation import Simulation
 
 DROP, FLIGHT = load_scene('drop'), load_scene('flight')

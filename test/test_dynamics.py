@@ -25,8 +25,8 @@ from samples import (
 from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.state import State
-from ragdoll_ros.physics.engine.bullet import BulletEngine
 from ragdoll_ros.physics.engine.protocol import AppliedWrench
+from ragdoll_ros.physics.engine.substepped.bullet import BulletEngine
 
 
 def random_loads(scene, seed):

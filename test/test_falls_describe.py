@@ -8,10 +8,10 @@ from falls_recipes import SHOVE, recipe
 
 from ragdoll_ros.falls import describe, generate
 from ragdoll_ros.falls.command import main
-from ragdoll_ros.falls.contents import read
+from ragdoll_ros.falls.dataset import read
+from ragdoll_ros.falls.generate import run
 from ragdoll_ros.falls.parts import bones_of
 from ragdoll_ros.falls.pictures import hull
-from ragdoll_ros.falls.run import run
 from ragdoll_ros.falls.shard import Order, make_shard
 
 pytest.importorskip('pyarrow')

@@ -14,14 +14,14 @@ from ragdoll_ros.falls import generate, load_recipe
 from ragdoll_ros.falls.command import main
 from ragdoll_ros.falls.formats.registry import FORMATS
 from ragdoll_ros.falls.formats.settled import ALIKE, different
-from ragdoll_ros.falls.run import run
+from ragdoll_ros.falls.generate import run
+from ragdoll_ros.falls.imu_samples import by_frames, worn_samples
 from ragdoll_ros.falls.shard import Order, make_shard
-from ragdoll_ros.falls.worn import by_frames, worn_samples
 from ragdoll_ros.files.urdf import to_urdf
 from ragdoll_ros.fit.command import main as fit
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.errors import OutOfRange, WrongForm
-from ragdoll_ros.physics.imu import Mount, imu_samples
+from ragdoll_ros.physics.sensors.imu import Mount, imu_samples
 
 parquet = pytest.importorskip('pyarrow.parquet')
 pandas = pytest.importorskip('pandas')

@@ -6,7 +6,7 @@ import pytest
 from falls_recipes import DROP, contents, recipe
 
 from ragdoll_ros.falls import cluster
-from ragdoll_ros.falls.run import run
+from ragdoll_ros.falls.generate import run
 from ragdoll_ros.falls.shard import SIZE, Order, make_shard
 from ragdoll_ros.model.errors import Unreadable
 

@@ -15,9 +15,9 @@ import yaml
 from conftest import ROOT
 from falls_recipes import DROP, contents, recipe
 
+from ragdoll_ros.falls.generate import run
 from ragdoll_ros.falls.manifest import FILE, Manifest
 from ragdoll_ros.falls.pool import make_shards
-from ragdoll_ros.falls.run import run
 from ragdoll_ros.falls.shard import SIZE, Order, make_shard
 from ragdoll_ros.model.errors import Unreadable
 

@@ -12,8 +12,8 @@ from ragdoll_ros.model import errors
 from ragdoll_ros.model.compound import Compound
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.shapes import Box, Capsule, Cylinder, Part, Sphere
-from ragdoll_ros.physics.engine.bullet import BulletEngine
-from ragdoll_ros.physics.settings import NORMAL
+from ragdoll_ros.physics.accuracy import NORMAL
+from ragdoll_ros.physics.engine.substepped.bullet import BulletEngine
 
 FIVE = """
 gravity: [0, 0, -9.8]

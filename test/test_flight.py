@@ -19,7 +19,7 @@ from ragdoll_ros.accuracy.motions.motion import without_damping
 from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.shapes import Box
-from ragdoll_ros.physics.settings import resolve_accuracy
+from ragdoll_ros.physics.accuracy import resolve_accuracy
 from ragdoll_ros.physics.simulation import Simulation
 
 FREE = unlimited(scene_of(load_doll('doll')))

@@ -14,16 +14,16 @@ from ragdoll_ros.model import errors
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.model.shapes import Box, Sphere
-from ragdoll_ros.physics.engine.pull import mobility
-from ragdoll_ros.physics.grab import (
+from ragdoll_ros.physics.accuracy import NORMAL
+from ragdoll_ros.physics.actions.grab import (
     FREQUENCY,
     LARGEST_ACCELERATION,
     LARGEST_PULL,
     MOST_HANDS,
 )
-from ragdoll_ros.physics.settings import NORMAL
+from ragdoll_ros.physics.engine.substepped.doll_sums import DollSums
+from ragdoll_ros.physics.engine.substepped.explicit_springs import mobility
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.physics.sums import DollSums
 
 DROP, FLIGHT = load_scene('drop'), load_scene('flight')
 BONES = DROP.bone_names

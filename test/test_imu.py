@@ -12,7 +12,7 @@ from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Ground, Placement, Scene
 from ragdoll_ros.model.shapes import Box
-from ragdoll_ros.physics.imu import Flaws, Mount, sensor_motion, trail_samples
+from ragdoll_ros.physics.sensors.imu import Flaws, Mount, sensor_motion, trail_samples
 from ragdoll_ros.physics.simulation import Simulation
 
 G = 9.8

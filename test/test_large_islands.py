@@ -13,8 +13,8 @@ from ragdoll_ros.model import rotation
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Ground, Material, Placement, Scene
 from ragdoll_ros.model.shapes import Box, Sphere
-from ragdoll_ros.physics.engine.rigid import RigidEngine
-from ragdoll_ros.physics.settings import ACCURACIES, NORMAL
+from ragdoll_ros.physics.accuracy import ACCURACIES, NORMAL
+from ragdoll_ros.physics.engine.rigid.engine import RigidEngine
 from ragdoll_ros.physics.simulation import Simulation
 
 G = 9.8

@@ -8,11 +8,11 @@ import pytest
 
 pytest.importorskip('scipy')
 
+from ragdoll_ros.accuracy.cases.trial import Trial, angle_places, posed
 from ragdoll_ros.accuracy.measure import Measure, compare
 from ragdoll_ros.accuracy.motions.motion import without_damping
 from ragdoll_ros.accuracy.references.articulated import Articulated
 from ragdoll_ros.accuracy.trajectory import Trajectory
-from ragdoll_ros.accuracy.trial import Trial, angle_places, posed
 from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import rotation
@@ -20,7 +20,7 @@ from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.scene import Ground, Placement, Scene
 from ragdoll_ros.model.shapes import Box, Sphere
-from ragdoll_ros.physics.sums import DollSums
+from ragdoll_ros.physics.engine.substepped.doll_sums import DollSums
 
 DOLL = without_damping(load_doll('doll'))
 
@@ -176,8 +176,8 @@ def test_comparison_names_the_worst_and_the_mean():
 
 def test_a_scene_starts_where_posed_says():
     """posed() against the engine's own placing of a spinning scene."""
-    from ragdoll_ros.physics.engine.bullet import BulletEngine
-    from ragdoll_ros.physics.settings import NORMAL
+    from ragdoll_ros.physics.accuracy import NORMAL
+    from ragdoll_ros.physics.engine.substepped.bullet import BulletEngine
     scene = load_scene('drop')
     placement = dataclasses.replace(scene.dolls[0], velocity=(1, 2, 3), spin=(3, 2, 1),
                                     orientation=tuple(rotation.from_rpy(.3, .2, .1)))

@@ -17,10 +17,10 @@ from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.scene import Ground, Material, Placement, Scene
 from ragdoll_ros.model.shapes import Box, Sphere
-from ragdoll_ros.physics.engine.bullet import BulletEngine
-from ragdoll_ros.physics.engine.mujoco import MujocoEngine
+from ragdoll_ros.physics.accuracy import NORMAL
 from ragdoll_ros.physics.engine.protocol import GROUND, AppliedWrench
-from ragdoll_ros.physics.settings import NORMAL
+from ragdoll_ros.physics.engine.substepped.bullet import BulletEngine
+from ragdoll_ros.physics.engine.substepped.mujoco import MujocoEngine
 
 ENGINES = [BulletEngine, MujocoEngine]
 

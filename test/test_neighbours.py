@@ -8,7 +8,7 @@ import pytest
 from ragdoll_ros import Bone, Ground, Placement, Ragdoll, Scene, Simulation
 from ragdoll_ros.model.scene import Material
 from ragdoll_ros.model.shapes import Sphere
-from ragdoll_ros.physics.engine.neighbours import SPARE, SUDDEN, Neighbours
+from ragdoll_ros.physics.engine.rigid.broad_phase import SPARE, SUDDEN, Neighbours
 
 RADIUS, AHEAD = 0.1, 0.02
 BALL = Ragdoll('ball', (Bone('ball', Sphere(RADIUS), 2.0, (0, 0, 0)),))

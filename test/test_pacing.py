@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from ragdoll_ros.physics.pacing import MOST_LAG, Pacer
+from ragdoll_ros.realtime.pacer import MOST_LAG, Pacer
 
 PERIOD = 10_000_000
 

@@ -10,8 +10,8 @@ pytest.importorskip('mujoco')
 pytest.importorskip('numba', reason='numba is not installed: there is no rigid engine')
 
 from ragdoll_ros import load_scene
-from ragdoll_ros.accuracy import pile
-from ragdoll_ros.accuracy.depth import BoneDepth
+from ragdoll_ros.accuracy.crowds import pile
+from ragdoll_ros.accuracy.crowds.depth import BoneDepth
 
 
 def course(**placed):

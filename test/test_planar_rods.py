@@ -15,7 +15,7 @@ from ragdoll_ros.accuracy.motions import planar_doll
 from ragdoll_ros.accuracy.references import contact_modes, event_driven, impacts
 from ragdoll_ros.accuracy.references.planar_chain import PlanarChain
 from ragdoll_ros.accuracy.references.planar_rods import PlanarRods
-from ragdoll_ros.physics.settings import NORMAL
+from ragdoll_ros.physics.accuracy import NORMAL
 from ragdoll_ros.physics.simulation import Simulation
 
 G, LENGTH, MASS = 9.8, 1.0, 2.0

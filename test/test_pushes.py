@@ -12,7 +12,7 @@ from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Ground, Material, Placement, Scene
 from ragdoll_ros.model.shapes import Box, Sphere
-from ragdoll_ros.physics.push_queue import MOST_PUSHES
+from ragdoll_ros.physics.actions.push_queue import MOST_PUSHES
 from ragdoll_ros.physics.simulation import Simulation
 
 DROP, FLIGHT = load_scene('drop'), load_scene('flight')

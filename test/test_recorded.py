@@ -15,8 +15,13 @@ from ragdoll_ros.model import errors
 from ragdoll_ros.model.drive import Drive
 from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.scene import Ground
-from ragdoll_ros.physics.recorded import RecordedSimulation, accuracy_from, repeat, state_digest
-from ragdoll_ros.physics.settings import NORMAL, Accuracy
+from ragdoll_ros.physics.accuracy import NORMAL, Accuracy
+from ragdoll_ros.physics.logged_simulation import (
+    RecordedSimulation,
+    accuracy_from,
+    repeat,
+    state_digest,
+)
 from ragdoll_ros.physics.simulation import Simulation
 
 QUIET = {'checkpoint', 'advance', 'measures', 'close', 'swings', 'contacts', 'coordinates'}

@@ -17,9 +17,9 @@ from ragdoll_ros.model.scene import SECOND, Placement, above_ground
 from ragdoll_ros.model.shapes import Capsule
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.bvh_file import bvh_text
-from ragdoll_ros.recordings.creased import creased
 from ragdoll_ros.recordings.csv_file import csv_text
-from ragdoll_ros.recordings.gltf_file import gltf_bytes
+from ragdoll_ros.recordings.gltf.gltf_file import gltf_bytes
+from ragdoll_ros.recordings.gltf.vertex_normals import creased
 from ragdoll_ros.recordings.recording import Pose, Recorder
 from ragdoll_ros.recordings.save import FORMATS, save_recording
 

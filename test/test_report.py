@@ -13,18 +13,10 @@ from conftest import ROOT
 pytest.importorskip('scipy')
 pytest.importorskip('mujoco')
 
-from ragdoll_ros.accuracy import (
-    command,
-    figures,
-    goals,
-    hard,
-    many_starts,
-    methods,
-    plots,
-    starts,
-    tables,
-)
-from ragdoll_ros.accuracy.hard_cases import hard_cases
+from ragdoll_ros.accuracy import methods
+from ragdoll_ros.accuracy.cases import starts
+from ragdoll_ros.accuracy.cases.hard_cases import hard_cases
+from ragdoll_ros.accuracy.cases.trial import Trial
 from ragdoll_ros.accuracy.measure import Measure
 from ragdoll_ros.accuracy.methods import bullet, by_name, median_run, ours, quickstart, run
 from ragdoll_ros.accuracy.motions.flight import free_fall, gentle_flight, tumbling_box
@@ -33,10 +25,11 @@ from ragdoll_ros.accuracy.parts import classes, orders
 from ragdoll_ros.accuracy.parts.hard import violations
 from ragdoll_ros.accuracy.references.articulated import Articulated
 from ragdoll_ros.accuracy.references.rigid_body import torque_free_rotation
-from ragdoll_ros.accuracy.runner import Job, attempt
-from ragdoll_ros.accuracy.sections import markdown
+from ragdoll_ros.accuracy.report import command, hard, many_starts, plots
+from ragdoll_ros.accuracy.report.sections import markdown
+from ragdoll_ros.accuracy.results import figures, goals, tables
+from ragdoll_ros.accuracy.results.runner import Job, attempt
 from ragdoll_ros.accuracy.trajectory import Trajectory
-from ragdoll_ros.accuracy.trial import Trial
 from ragdoll_ros.model import rotation
 
 
@@ -104,7 +97,7 @@ def test_finer_settings_are_finer_in_long_ticks_too(tick):
 def test_the_quickstart_owes_nothing_to_what_ran_before():
     """PyBullet keeps its contact margin for a whole process, whichever client sets it."""
     code = ('from ragdoll_ros.accuracy.methods import quickstart, run\n'
-            'from ragdoll_ros.accuracy.starts import trial\n'
+            'from ragdoll_ros.accuracy.cases.starts import trial\n'
             'print(run(quickstart(), trial("drop .4 m", 0)).trajectory.positions.tobytes().hex())')
     alone = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
                            cwd=ROOT, check=True).stdout.split()[-1]

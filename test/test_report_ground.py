@@ -8,15 +8,15 @@ import pytest
 pytest.importorskip('scipy')
 pytest.importorskip('mujoco')
 
-from ragdoll_ros.accuracy import goals
-from ragdoll_ros.accuracy.contact_cases import two_dolls
-from ragdoll_ros.accuracy.fuzzed import fuzzed
-from ragdoll_ros.accuracy.ground_plots import STYLES, draw_convergence, draw_drops
-from ragdoll_ros.accuracy.ground_sections import CONVERGENCE, DROPS, PIECES, RESTITUTION
+from ragdoll_ros.accuracy.cases.contact_cases import two_dolls
+from ragdoll_ros.accuracy.cases.fuzzed import fuzzed
 from ragdoll_ros.accuracy.measure import Measure
 from ragdoll_ros.accuracy.methods import bullet, by_name, core, reference, run
 from ragdoll_ros.accuracy.parts import convergence, drops, estimate, restitution
 from ragdoll_ros.accuracy.references.closed_forms import bounce_times
+from ragdoll_ros.accuracy.report.ground_plots import STYLES, draw_convergence, draw_drops
+from ragdoll_ros.accuracy.report.ground_sections import CONVERGENCE, DROPS, PIECES, RESTITUTION
+from ragdoll_ros.accuracy.results import goals
 from ragdoll_ros.accuracy.trajectory import Trajectory
 from ragdoll_ros.model.ragdoll import JOINT_KINDS
 from ragdoll_ros.model.shapes import SHAPES

@@ -14,17 +14,19 @@ ARROWS = {
     'model': set(),
     'files': {'model'},
     'physics': {'files', 'model'},
+    'realtime': {'model'},
     'people': {'files', 'model'},
     'fit': {'physics', 'files', 'model'},
-    'ros': {'physics', 'files', 'model'},
+    'ros': {'realtime', 'physics', 'files', 'model'},
     'recordings': {'physics', 'files', 'model'},
-    'viewer': {'physics', 'fit', 'recordings', 'files', 'model'},
+    'viewer': {'realtime', 'physics', 'fit', 'recordings', 'files', 'model'},
     'replay': {'physics', 'fit', 'recordings', 'files', 'model'},
     'accuracy': {'physics', 'people', 'files', 'model'},
     'falls': {'physics', 'people', 'files', 'model'}}
 """What a room may import of others."""
 
-ONLY = {'pybullet': 'physics/engine/bullet.py', 'mujoco': 'physics/engine/mujoco.py',
+ONLY = {'pybullet': 'physics/engine/substepped/bullet.py',
+        'mujoco': 'physics/engine/substepped/mujoco.py',
         'numba': 'physics/kernels/', 'viser': 'viewer/',
         'matplotlib': ('fit/', 'accuracy/', 'falls/pictures.py'),
         'trimesh': 'fit/robots/mesh_file.py', 'DracoPy': 'fit/reading/draco.py',
@@ -45,7 +47,7 @@ Edges = list[tuple[str, str]]
 
 MACHINE_CODE = {'numba', 'llvmlite', 'numpy', *sys.stdlib_module_names}
 
-REPORTS_OWN = {'accuracy/quickstart.py': {'pybullet'}, 'accuracy/depth.py': {'mujoco'}}
+REPORTS_OWN = {'accuracy/quickstart.py': {'pybullet'}, 'accuracy/crowds/depth.py': {'mujoco'}}
 
 
 def modules(package: Path) -> dict[str, Path]:
@@ -92,7 +94,7 @@ def broken_arrows(edges: Edges) -> list[str]:
         room, other = name.partition('.')[0], target.partition('.')[0]
         if target.startswith(':') or room == other or room in ('', 'riders') or target == '':
             continue
-        tied = name.startswith(('viewer.sources.remote', 'replay.published')) and other == 'ros'
+        tied = name.startswith(('viewer.sources.node', 'replay.published')) and other == 'ros'
         if not tied and other not in ARROWS.get(room, set()):
             found.append(f'{name} -> {target}')
         if room == 'physics' and other == 'files' and not name.startswith('physics.engine.'):
@@ -160,7 +162,8 @@ def copy_with(tmp_path: Path, file: str, line: str) -> Path:
     package = tmp_path / 'ragdoll_ros'
     for name in ('model/scene.py', 'model/push.py', 'physics/simulation.py', 'ros/node.py',
                  'fit/shapes/axes.py', 'physics/kernels/contact/rows.py',
-                 'physics/kernels/stepping/step.py', 'viewer/page.py', 'viewer/sources/remote.py'):
+                 'physics/kernels/stepping/step.py', 'viewer/page.py',
+                 'viewer/sources/node/source.py'):
         path = package / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text('')
@@ -186,7 +189,7 @@ def test_an_arrow_that_is_broken_on_purpose_is_found(tmp_path, file, line):
 
 
 def test_what_listens_to_a_node_may_know_the_ros_room(tmp_path):
-    package = copy_with(tmp_path, 'viewer/sources/remote.py', 'from ...ros import node')
+    package = copy_with(tmp_path, 'viewer/sources/node/source.py', 'from ...ros import node')
     assert broken_arrows(imports(package)) == []
 
 

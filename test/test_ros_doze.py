@@ -8,8 +8,8 @@ import pytest
 from geometry_msgs.msg import PoseArray, Vector3, Wrench
 from peer import kill, start
 
-from ragdoll_ros.ros.crowd_bench import shares, wait_asleep
 from ragdoll_ros.ros.ticker import DOZING
+from ragdoll_ros.ros.tools.crowd_bench import shares, wait_asleep
 
 TICK = 10_000_000
 
@@ -63,7 +63,7 @@ def test_a_push_wakes_it(asleep, peer):
 @pytest.mark.slow
 def test_a_sleeper_costs_no_more_than_an_empty_timer_at_its_rate(ros, peer):
     """At most half a percent of a core above it, in the median of ten turns of 2 s."""
-    processes = [start('crowd_bench', 'empty'), start('node', compiled=True)]
+    processes = [start('tools.crowd_bench', 'empty'), start('node', compiled=True)]
     try:
         wait_asleep(peer, ['ragdoll'])
         timer, node = shares(processes)

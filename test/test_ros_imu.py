@@ -8,7 +8,7 @@ from sensor_msgs.msg import Imu
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model.errors import RagdollError
-from ragdoll_ros.physics.imu import Mount, trail_samples
+from ragdoll_ros.physics.sensors.imu import Mount, trail_samples
 from ragdoll_ros.physics.simulation import Simulation
 
 SCENE = {'scene': 'woman_faints', 'publish_clock': True}

@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import pytest
 
-from ragdoll_ros.ros.keys import Decoder
+from ragdoll_ros.ros.teleop.terminal_keys import Decoder
 
 ARROWS = {'up': b'\x1b[A', 'down': b'\x1b[B', 'right': b'\x1b[C', 'left': b'\x1b[D'}
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 import pytest
 
 from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.ros import crowd_bench
-from ragdoll_ros.ros.listen import FIRST, Heard
+from ragdoll_ros.ros.tools import crowd_bench
+from ragdoll_ros.ros.tools.listen import FIRST, Heard
 
 
 def test_a_line_tells_rate_size_and_the_time_between(make_node, peer):

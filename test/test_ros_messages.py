@@ -14,8 +14,8 @@ from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.ros.glance import Glance
-from ragdoll_ros.ros.handles import GROWTH, Handles
-from ragdoll_ros.ros.markers import Markers
+from ragdoll_ros.ros.messages.interactive_markers import GROWTH, Handles
+from ragdoll_ros.ros.messages.markers import Markers
 
 
 @pytest.fixture(params=SPECIMENS)
@@ -135,7 +135,7 @@ def test_another_scene_leaves_nothing_of_the_last_one():
 def test_the_benchmark_times_all_parts(ros, monkeypatch):
     import rclpy
 
-    from ragdoll_ros.ros import bench
+    from ragdoll_ros.ros.tools import bench
     monkeypatch.setattr(bench, 'ROUNDS', 1)
     node = rclpy.create_node('bench')
     costs = bench.row(node, load_scene('drop'), 'draft', 0)

@@ -23,9 +23,7 @@ from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.ragdoll import DEFAULT_COLOR
 from ragdoll_ros.physics.engine.protocol import GROUND, Contacts
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.ros.handles import Handles
-from ragdoll_ros.ros.markers import BROWN, KINDS, RED, ROD, Markers, paint
-from ragdoll_ros.ros.messages import (
+from ragdoll_ros.ros.messages.convert import (
     contact_poses,
     to_header,
     to_joint_state,
@@ -35,7 +33,9 @@ from ragdoll_ros.ros.messages import (
     to_pose_array,
     to_vector,
 )
-from ragdoll_ros.ros.packed import Packed, packed_poses, poses_in
+from ragdoll_ros.ros.messages.interactive_markers import Handles
+from ragdoll_ros.ros.messages.markers import BROWN, KINDS, RED, ROD, Markers, paint
+from ragdoll_ros.ros.messages.serialized import Packed, packed_poses, poses_in
 
 STAMPS = (0, 1, 999_999_999, 1_795_257_907_785_147_064)
 

@@ -23,7 +23,7 @@ from std_msgs.msg import String
 from ragdoll_ros.files.scene import load_scene, save_scene
 from ragdoll_ros.files.urdf_tree import parse_urdf
 from ragdoll_ros.model.errors import ModelErrors, RagdollError
-from ragdoll_ros.physics.settings import EXACT
+from ragdoll_ros.physics.accuracy import EXACT
 from ragdoll_ros.ros.node import RagdollNode
 from ragdoll_ros.ros.outputs import LATCHED
 from ragdoll_ros.ros.parameters import SPECS, Settings

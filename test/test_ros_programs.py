@@ -9,7 +9,8 @@ from geometry_msgs.msg import PoseArray
 from peer import PATIENCE, Peer, end, start, start_on_terminal
 from screen import Screen
 
-from ragdoll_ros.ros import node, run, teleop
+from ragdoll_ros.ros import node, run
+from ragdoll_ros.ros.teleop import teleop
 
 pytestmark = pytest.mark.usefixtures('nothing_runs_on')
 

@@ -7,7 +7,7 @@ import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 
-from ragdoll_ros.ros.transforms import TFMessage
+from ragdoll_ros.ros.messages.tf import TFMessage
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [(ROOT / 'README.md').read_text(), *(path.read_text() for path in ROOT.glob('docs/*.md'))]

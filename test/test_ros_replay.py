@@ -22,9 +22,9 @@ from visualization_msgs.msg import InteractiveMarkerFeedback
 
 from ragdoll_ros.files.run_scene import read_run_scene, scene_digest
 from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.physics.recorded import state_digest
+from ragdoll_ros.physics.logged_simulation import state_digest
 from ragdoll_ros.replay.command import main
-from ragdoll_ros.ros.run_log import HASHED
+from ragdoll_ros.ros.event_log import HASHED
 
 EVENTS, SCENE = '/ragdoll/events', '/ragdoll/scene'
 
@@ -153,7 +153,7 @@ def test_the_scene_is_that_of_the_node_and_who_comes_late_hears_it(make_node, pe
 def test_nothing_is_hashed_while_nobody_listens(make_node, monkeypatch):
     """Counted where it is made: the digest of a state."""
     node, made = make_node(scene='flight'), []
-    monkeypatch.setattr('ragdoll_ros.ros.run_log.state_digest', lambda state: made.append(state))
+    monkeypatch.setattr('ragdoll_ros.ros.event_log.state_digest', lambda state: made.append(state))
     for _ in range(2 * HASHED):
         node.tick()
     assert made == []

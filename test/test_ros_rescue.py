@@ -9,7 +9,7 @@ from poison import poison
 from rclpy.logging import get_logging_directory
 
 from ragdoll_ros.physics.guard import BOUND
-from ragdoll_ros.ros.rescue import IN_A_ROW, MOST_DUMPS
+from ragdoll_ros.ros.recovery import IN_A_ROW, MOST_DUMPS
 from ragdoll_ros.ros.state_dump import STATES
 
 

@@ -65,7 +65,7 @@ def test_the_policy_allows_what_the_node_does_and_no_more(make_node, given):
 
 
 def test_the_policy_allows_what_the_teleoperation_does_and_no_more(ros, given):
-    from ragdoll_ros.ros.teleop import Teleop
+    from ragdoll_ros.ros.teleop.teleop import Teleop
     teleop = Teleop()
     try:
         publish, hear, answer, ask = given(teleop)

@@ -15,7 +15,7 @@ from peer import PATIENCE, start
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
-from ragdoll_ros.ros.run_log import PAST
+from ragdoll_ros.ros.event_log import PAST
 from ragdoll_ros.ros.signals import end_unbroken, ended_by_signals
 
 pytestmark = pytest.mark.usefixtures('nothing_runs_on')

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from conftest import light
 
-from ragdoll_ros.ros.soak import CHANGES, GROWTH, SAMPLES, SCENES, WARM, Sample, growth
+from ragdoll_ros.ros.tools.soak import CHANGES, GROWTH, SAMPLES, SCENES, WARM, Sample, growth
 
 ROUND = SAMPLES // CHANGES * len(SCENES)
 
@@ -36,7 +36,7 @@ def test_growth_is_what_memory_grows_by_once_it_is_warm(rate):
 def test_a_short_soak_counts_hears_and_finds_nothing_bad(ros):
     """PyBullet will do, and 1000 ticks: whether memory grows they cannot tell, and say so."""
     done = subprocess.run(
-        [sys.executable, '-m', 'ragdoll_ros.ros.soak', '--ticks', '1000', '--seed', '4'],
+        [sys.executable, '-m', 'ragdoll_ros.ros.tools.soak', '--ticks', '1000', '--seed', '4'],
         capture_output=True, text=True, timeout=120, env=light())
     assert done.returncode == 0, done.stderr
     *lines, last = [line for line in done.stdout.splitlines() if 'MB' in line]
@@ -46,6 +46,6 @@ def test_a_short_soak_counts_hears_and_finds_nothing_bad(ros):
 
 
 def test_too_few_ticks_are_refused():
-    done = subprocess.run([sys.executable, '-m', 'ragdoll_ros.ros.soak', '--ticks', '7'],
+    done = subprocess.run([sys.executable, '-m', 'ragdoll_ros.ros.tools.soak', '--ticks', '7'],
                           capture_output=True, text=True, timeout=60, env=light())
     assert done.returncode == 2 and '--ticks 7: expected 1000 or more' in done.stderr

@@ -14,7 +14,7 @@ from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import SetBool, Trigger
 
-from ragdoll_ros.ros.messages import to_time
+from ragdoll_ros.ros.messages.convert import to_time
 from ragdoll_ros.ros.stamps import DOUBT, SLACK, Stamps
 
 SECOND = 1_000_000_000

@@ -13,7 +13,7 @@ from screen import Screen
 from sensor_msgs.msg import MultiDOFJointState
 
 from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.ros.followed import Followed
+from ragdoll_ros.ros.teleop.find_node import Followed
 
 pytestmark = pytest.mark.usefixtures('nothing_runs_on')
 MASSES = np.array([bone.mass for bone in load_scene('flight').bones])
@@ -43,7 +43,7 @@ def centre_speed(message):
 def heard_teleop(peer, namespace):
     """What a teleop without a node sends, its process and its screen."""
     got = peer.collect(Wrench, f'{namespace}/ragdoll/force')
-    process, terminal = start_on_terminal('teleop', '--ros-args', '-r', f'__ns:={namespace}')
+    process, terminal = start_on_terminal('teleop.teleop', '--ros-args', '-r', f'__ns:={namespace}')
     peer.wait(lambda: peer.count_publishers(f'{namespace}/ragdoll/force'))
     screen = Screen(terminal)
     screen.wait('waiting for the node')
@@ -96,7 +96,7 @@ def test_a_tap_gives_a_metre_a_second_to_a_node_of_any_name(peer, where):
     node = start('node', '--ros-args', *where, '-p', 'scene:=flight')
     states = peer.collect(MultiDOFJointState, f'{name}/state')
     peer.wait(lambda: states)
-    process, terminal = start_on_terminal('teleop')
+    process, terminal = start_on_terminal('teleop.teleop')
     screen = Screen(terminal)
     screen.wait(r'pace \d')
     speeds = [0.0]
@@ -124,7 +124,7 @@ def test_of_several_nodes_a_user_says_which(peer):
     followed = Followed(peer, '')
     # Of a busy machine's nodes some are found later than others.
     peer.wait(lambda: not followed.look() and '/two/one, /two/other' in followed.problem)
-    _, terminal = start_on_terminal('teleop', 'two/other')
+    _, terminal = start_on_terminal('teleop.teleop', 'two/other')
     screen = Screen(terminal)
 
     def pushed():
@@ -136,7 +136,7 @@ def test_of_several_nodes_a_user_says_which(peer):
 
 
 def test_a_name_that_no_node_can_have_is_refused(peer):
-    process, _ = start_on_terminal('teleop', 'no/such name')
+    process, _ = start_on_terminal('teleop.teleop', 'no/such name')
     _, said = process.communicate(timeout=PATIENCE)
     assert process.returncode == 2
     assert 'no/such name' in said and 'Traceback' not in said

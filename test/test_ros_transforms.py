@@ -21,8 +21,8 @@ from ragdoll_ros.model import rotation
 from ragdoll_ros.model.pose import Pose
 from ragdoll_ros.model.push import Push
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.ros import transforms
-from ragdoll_ros.ros.link_tree import LinkTree
+from ragdoll_ros.ros.messages import tf
+from ragdoll_ros.ros.messages.link_tree import LinkTree
 
 TICK = 0.0002
 """s: the shortest, so that differences over two of them are rates."""
@@ -149,7 +149,7 @@ def test_limits_have_effort_and_velocity():
 
 @pytest.mark.parametrize(('begin', 'lines'), [('all', 1), ('root', 1), ('none', 0)])
 def test_a_node_without_tf2_msgs_runs_and_says_once_what_is_missing(make_node, capfd, begin, lines):
-    if transforms.TFMessage is not None:
+    if tf.TFMessage is not None:
         pytest.skip('tf2_msgs is installed')
     node = make_node(publish_tf=begin)
     assert capfd.readouterr().err.count('/tf is not published') == lines
@@ -162,7 +162,7 @@ def test_a_node_without_tf2_msgs_runs_and_says_once_what_is_missing(make_node, c
     assert '/tf' not in {publisher.topic_name for publisher in node.publishers}
 
 
-@pytest.mark.skipif(transforms.TFMessage is None, reason='tf2_msgs is not installed')
+@pytest.mark.skipif(tf.TFMessage is None, reason='tf2_msgs is not installed')
 def test_the_topic_is_there_while_it_is_wanted(make_node):
     node = make_node()
     for tree, offered in (('none', False), ('root', True), ('all', True), ('none', False)):

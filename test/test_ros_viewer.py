@@ -26,11 +26,11 @@ from ragdoll_ros.files.scene import load_scene, save_scene
 from ragdoll_ros.files.urdf import scene_to_urdf
 from ragdoll_ros.model.errors import RagdollError
 from ragdoll_ros.model.shapes import Sphere
-from ragdoll_ros.ros.messages import to_pose_array
-from ragdoll_ros.ros.packed import poses_in
-from ragdoll_ros.viewer.sources import remote as remote_source
-from ragdoll_ros.viewer.sources.remote import Remote
-from ragdoll_ros.viewer.sources.remote_scene import scene_of_node
+from ragdoll_ros.ros.messages.convert import to_pose_array
+from ragdoll_ros.ros.messages.serialized import poses_in
+from ragdoll_ros.viewer.sources.node import source as remote_source
+from ragdoll_ros.viewer.sources.node.scene import scene_of_node
+from ragdoll_ros.viewer.sources.node.source import Remote
 from ragdoll_ros.viewer.sources.source import Wanted
 
 OPEN = Wanted(frames=True)

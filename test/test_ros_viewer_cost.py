@@ -11,7 +11,7 @@ pytest.importorskip('viser')
 from page_client import served, wait
 from page_cost import bench, many_dolls, middle, one_doll, row
 
-from ragdoll_ros.viewer.sources.remote import Remote
+from ragdoll_ros.viewer.sources.node.source import Remote
 
 pytestmark = pytest.mark.slow
 

@@ -18,7 +18,7 @@ FALL = """
 import dataclasses, hashlib, math, sys
 import numba
 from ragdoll_ros import Push, Simulation, load_scene
-from ragdoll_ros.accuracy.crowd_digests import of_workers
+from ragdoll_ros.accuracy.crowds.crowd_digests import of_workers
 from ragdoll_ros.files.repeat import repeated
 from ragdoll_ros.model.scene import Ground, Placement
 

@@ -15,15 +15,17 @@ OWN = 'physics/kernels/compiling/cache.py'
 """Unpickles machine code that the same user has kept."""
 
 WRITERS = {
-    'accuracy/command.py': '--out', 'accuracy/figures.py': '--out', 'accuracy/plots.py': '--out',
-    'accuracy/many_starts.py': '--out', 'accuracy/quickstart.py': 'a temporary file',
+    'accuracy/report/command.py': '--out', 'accuracy/results/figures.py': '--out',
+    'accuracy/report/plots.py': '--out',
+    'accuracy/report/many_starts.py': '--out', 'accuracy/quickstart.py': 'a temporary file',
     'falls/describe.py': '--out', 'falls/manifest.py': '--out', 'falls/pictures.py': '--out',
     'files/doll.py': 'save_doll(path)', 'files/scene.py': 'save_scene(path)',
     'fit/command.py': '--out, --urdf', 'fit/picture.py': '--picture',
-    'physics/engine/bullet.py': 'a temporary file', 'physics/engine/hush.py': 'os.devnull',
+    'physics/engine/substepped/bullet.py': 'a temporary file',
+    'physics/engine/substepped/silence.py': 'os.devnull',
     'physics/kernels/compiling/cache.py': 'machine code, NUMBA_CACHE_DIR',
     'recordings/save.py': '--save, save_recording(path)', 'viewer/static.py': '--static',
-    'ros/crowd_bench.py': 'a temporary file', 'ros/rescue.py': 'dump_directory',
+    'ros/tools/crowd_bench.py': 'a temporary file', 'ros/recovery.py': 'dump_directory',
     'ros/state_dump.py': 'dump_directory', 'viewer/command.py': '~/ragdolls',
     'viewer/editor/folder.py': '--folder, ~/ragdolls'}
 """Files that write files, and what says where."""

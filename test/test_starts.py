@@ -13,16 +13,16 @@ pytest.importorskip('numba', reason='numba is not installed: there is no rigid e
 
 from conserved import conserved
 
-from ragdoll_ros.accuracy.fuzzed import fuzzed
-from ragdoll_ros.accuracy.starts import trial
-from ragdoll_ros.accuracy.trial import angle_limits, posed
+from ragdoll_ros.accuracy.cases.fuzzed import fuzzed
+from ragdoll_ros.accuracy.cases.starts import trial
+from ragdoll_ros.accuracy.cases.trial import angle_limits, posed
 from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.model.coordinates import GeneralizedState
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.scene import Material, Placement, Scene, height
 from ragdoll_ros.model.shapes import Sphere
-from ragdoll_ros.physics.engine.rigid import RigidEngine
-from ragdoll_ros.physics.settings import NORMAL
+from ragdoll_ros.physics.accuracy import NORMAL
+from ragdoll_ros.physics.engine.rigid.engine import RigidEngine
 
 TICK = 0.01
 DEEP = 1e-3
@@ -153,7 +153,7 @@ def test_joints_come_back_in_free_fall_without_moving_the_whole(spin):
 def test_bones_that_begin_in_each_other_are_brought_apart(seed):
     """By 66 to 107 mm in free space, at rest before and after; MuJoCo tells the depths."""
     pytest.importorskip('mujoco')
-    from ragdoll_ros.accuracy.depth import BoneDepth
+    from ragdoll_ros.accuracy.crowds.depth import BoneDepth
     doll, rng = load_doll('doll'), np.random.default_rng(seed)
     scene = Scene('free', (Placement(doll),), None, gravity=(0, 0, 0))
     engine, scales = RigidEngine(scene, NORMAL), BoneDepth(scene)

@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip('viser')
 
 from ragdoll_ros.model import errors
-from ragdoll_ros.viewer.editor.typed import number, numbers, shown
+from ragdoll_ros.viewer.widgets.number_parsing import number, numbers, shown
 
 
 @pytest.mark.parametrize(('text', 'value'), [

@@ -8,7 +8,7 @@ pytest.importorskip('viser')
 from browser import View, chromium, serving
 
 from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.viewer.lost import WORDS
+from ragdoll_ros.viewer.browser.disconnected_banner import WORDS
 
 SCENE = load_scene('drop')
 START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])

@@ -203,7 +203,7 @@ def test_a_page_of_a_recording_or_a_node_needs_no_engine():
     """It may run on a machine without PyBullet."""
     done = subprocess.run([sys.executable, '-c', 'import sys\n'
                            'import ragdoll_ros.viewer.page, ragdoll_ros.viewer.sources.playback\n'
-                           'try: import ragdoll_ros.viewer.sources.remote\n'
+                           'try: import ragdoll_ros.viewer.sources.node.source\n'
                            'except ModuleNotFoundError as error: assert error.name == "rclpy"\n'
                            'sys.exit("pybullet" in sys.modules)'], cwd=ROOT, timeout=60)
     assert done.returncode == 0

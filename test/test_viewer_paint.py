@@ -23,7 +23,7 @@ from ragdoll_ros.fit.skin import skin_of
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.scene import above_ground
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.recordings.gltf_file import gltf_bytes
+from ragdoll_ros.recordings.gltf.gltf_file import gltf_bytes
 from ragdoll_ros.recordings.recording import Recorder
 from ragdoll_ros.viewer.sources.playback import Playback
 from ragdoll_ros.viewer.static import save_static

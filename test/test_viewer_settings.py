@@ -12,7 +12,7 @@ pytest.importorskip('viser')
 from page_client import served, wait
 
 from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.physics.settings import ACCURACIES
+from ragdoll_ros.physics.accuracy import ACCURACIES
 from ragdoll_ros.viewer.health import health
 from ragdoll_ros.viewer.settings import ERRORS_MM
 from ragdoll_ros.viewer.sources.simulated import Simulated

@@ -24,9 +24,9 @@ from ragdoll_ros.viewer.sources.playback import Playback
 from ragdoll_ros.viewer.sources.simulated import Simulated
 from ragdoll_ros.viewer.sources.source import Frame
 from ragdoll_ros.viewer.timeline import timeline
-from ragdoll_ros.viewer.timeline.history import MOST_NUMBERS, SPAN, History
-from ragdoll_ros.viewer.timeline.look import Look
-from ragdoll_ros.viewer.timeline.package import zipped
+from ragdoll_ros.viewer.timeline.export_zip import zipped
+from ragdoll_ros.viewer.timeline.frame_buffer import MOST_NUMBERS, SPAN, History
+from ragdoll_ros.viewer.timeline.playhead import Look
 from ragdoll_ros.viewer.timeline.strip import WIDTH, strip
 
 DROP = load_scene('drop')

@@ -5,8 +5,8 @@ import dataclasses
 import functools
 
 from ..model.errors import RagdollError
+from ..physics.accuracy import ACCURACIES, NORMAL, Accuracy
 from ..physics.engine.registry import resolve_engine
-from ..physics.settings import ACCURACIES, NORMAL, Accuracy
 
 TICK = 0.01
 """s in which substeps are counted."""

@@ -13,8 +13,8 @@ import numpy as np
 from ..model import rotation
 from ..model.ragdoll import Joint
 from ..model.scene import Placement, Scene
+from .cases.trial import Trial
 from .trajectory import Trajectory
-from .trial import Trial
 
 End = tuple[int, np.ndarray, np.ndarray]
 """A bone at a joint: its index, the anchor (m) from its centre along its own axes, and the

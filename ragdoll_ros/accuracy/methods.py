@@ -13,16 +13,16 @@ import numpy as np
 from ..model import errors
 from ..model.state import State
 from ..physics import kernels
-from ..physics.engine.bullet import BulletEngine
-from ..physics.engine.mujoco import MujocoEngine
+from ..physics.accuracy import ACCURACIES, Accuracy
 from ..physics.engine.protocol import Engine
-from ..physics.settings import ACCURACIES, Accuracy
+from ..physics.engine.substepped.bullet import BulletEngine
+from ..physics.engine.substepped.mujoco import MujocoEngine
 from ..physics.simulation import Simulation
 from . import fineness
+from .cases.trial import Trial
 from .quickstart import STEP as QUICKSTART_STEP
 from .quickstart import Quickstart
 from .trajectory import Trajectory
-from .trial import Trial
 
 
 class Run(Protocol):

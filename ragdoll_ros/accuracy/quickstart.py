@@ -13,8 +13,8 @@ import pybullet
 
 from ..files.urdf import to_urdf
 from ..model.state import State
-from ..physics.engine.bullet import BREAKING_DISTANCE
-from .trial import Trial
+from ..physics.engine.substepped.bullet import BREAKING_DISTANCE
+from .cases.trial import Trial
 
 STEP = 1 / 240
 

@@ -13,7 +13,7 @@ from ..model.vectors import finite, unit
 from ..people.person import HEIGHTS, MASSES
 from ..physics.simulation import MOST_PARTS
 from .distribution import choices, distribution_errors, support
-from .worn import flaws_of
+from .imu_samples import flaws_of
 
 RATE = 100
 """Frames in each s where a recipe does not say."""

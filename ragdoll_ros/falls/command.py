@@ -10,10 +10,10 @@ from pathlib import Path
 from ..model.errors import RagdollError
 from . import cluster, describe, pool
 from .formats.registry import FORMATS
+from .generate import run
 from .manifest import Manifest
 from .progress import Progress
 from .recipe import load_recipe
-from .run import run
 from .shard import Order
 
 EXAMPLE = """examples:

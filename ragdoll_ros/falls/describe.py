@@ -8,7 +8,7 @@ import numpy as np
 
 from ..people.real_falls import DESCENT, IMPACT_SPEEDS, SHARE_THAT_HITS
 from . import pictures
-from .contents import DIRECTIONS, Contents, read
+from .dataset import DIRECTIONS, Contents, read
 from .parts import bones_of
 from .simulate import generate
 

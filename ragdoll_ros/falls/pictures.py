@@ -8,7 +8,7 @@ import numpy as np
 from ..model import errors
 from ..model.state import State
 from ..people.real_falls import DESCENT, IMPACT_SPEEDS
-from .contents import Contents
+from .dataset import Contents
 from .fall import Fall
 from .parts import bones_of
 

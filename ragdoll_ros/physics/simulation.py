@@ -13,14 +13,13 @@ from ..model.drive import Drive
 from ..model.push import Push
 from ..model.scene import SECOND, STEP_RANGE, Scene
 from ..model.state import State
+from .accuracy import Accuracy, resolve_accuracy
+from .actions.grab import EVENLY, Grab, Hands
+from .actions.joint_springs import Hold, Holds
+from .actions.push_queue import PushQueue
 from .engine.protocol import Contacts, Engine, Springs
 from .engine.registry import resolve_engine
-from .grab import EVENLY, Grab, Hands
-from .ground_heights import GroundHeights
-from .hold import Hold, Holds
-from .joint_gap import JointGap
-from .push_queue import PushQueue
-from .settings import Accuracy, resolve_accuracy
+from .ground_heights import GroundHeights, JointGap
 from .sleeping import SleepDetector
 from .swing.pose import SwingState
 from .swing.simulation import SwingSimulation

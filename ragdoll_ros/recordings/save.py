@@ -8,7 +8,7 @@ from ..model import errors
 from ..model.skin import Skin
 from .bvh_file import bvh_text
 from .csv_file import csv_text
-from .gltf_file import gltf_bytes
+from .gltf.gltf_file import gltf_bytes
 from .mcap_file import recording_bytes
 from .recording import Recording
 

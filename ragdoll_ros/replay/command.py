@@ -9,8 +9,8 @@ from pathlib import Path
 from ..files.bag import read_messages
 from ..files.run_scene import versions
 from ..model import errors
+from ..physics.accuracy import ACCURACIES
 from ..physics.engine.registry import ENGINES
-from ..physics.settings import ACCURACIES
 from ..physics.simulation import Simulation
 from ..recordings.mcap_file import load_recording
 from ..recordings.save import check_format

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from ..model import errors
-from ..physics.recorded import accuracy_from, repeat, state_digest
+from ..physics.logged_simulation import accuracy_from, repeat, state_digest
 from ..physics.simulation import Simulation
 from .run import Event, Run
 

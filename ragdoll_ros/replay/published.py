@@ -11,7 +11,7 @@ from rclpy.node import Node
 from ..model.ragdoll import WORLD
 from ..physics.simulation import Simulation
 from ..ros.outputs import Outputs
-from ..ros.session import ros_session
+from ..ros.rclpy_context import ros_session
 from ..ros.signals import ended_by_signals
 from ..ros.stamps import Stamps
 from ..ros.ticker import Ticker

@@ -12,8 +12,8 @@ from rclpy.node import Node
 
 from ..model.push import Push
 from ..model.scene import SECOND
-from .messages import to_time
-from .tally import Tally
+from .input_counts import Tally
+from .messages.convert import to_time
 
 if TYPE_CHECKING:  # else the page and the teleop, which read this file, would load an engine
     from ..physics.simulation import Simulation

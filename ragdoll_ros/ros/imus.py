@@ -9,10 +9,10 @@ from rclpy.node import Node
 from sensor_msgs.msg import Imu
 
 from ..model.scene import Scene
-from ..physics.imu import trail_samples
-from .messages import to_imu
-from .packed import Packed
-from .worn import mount_of, sensor_topic
+from ..physics.sensors.imu import trail_samples
+from .imu_parameters import mount_of, sensor_topic
+from .messages.convert import to_imu
+from .messages.serialized import Packed
 
 if TYPE_CHECKING:
     from ..physics.simulation import Simulation

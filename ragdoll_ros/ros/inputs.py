@@ -16,8 +16,8 @@ from ..model.push import Push
 from ..model.ragdoll import WORLD
 from ..model.scene import Scene
 from ..model.vectors import Vector, shortened
+from .input_counts import Tally
 from .parameters import Settings
-from .tally import Tally
 
 LEVER = 0.1
 """m: a torque may be as strong as the strongest force at this lever."""

@@ -35,12 +35,12 @@ from visualization_msgs.srv import GetInteractiveMarkers
 
 from ..model import errors, rotation
 from ..model.ragdoll import WORLD
-from ..physics.grab import EVENLY
+from ..physics.actions.grab import EVENLY
 from ..physics.simulation import Simulation
-from .handles import Handles
+from .input_counts import Tally
+from .messages.interactive_markers import Handles
 from .outputs import MARKER_PERIOD
 from .parameters import Settings
-from .tally import Tally
 
 DEPTH = 100
 """Messages that wait at the most on either topic, as with interactive_markers' own server."""

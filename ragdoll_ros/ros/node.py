@@ -21,21 +21,21 @@ from ..model import errors
 from ..model.scene import Scene
 from ..physics.simulation import Simulation
 from .diagnostics import Diagnostics
+from .event_log import RunLog
 from .imus import Imus
+from .input_counts import Tally
 from .inputs import Inputs
 from .interactive import Interactive
+from .log_lines import end_line, start_line
 from .namesakes import Namesakes
 from .outputs import Outputs
 from .parameters import SPECS, Parameters, Settings, make_simulation, parts_of, step_of
-from .rescue import Rescue
-from .run_log import RunLog
+from .rclpy_context import ros_session
+from .recovery import Rescue
 from .services import Services
-from .session import ros_session
 from .signals import end_unbroken, ended_by_signals
 from .stamps import Stamps
-from .tally import Tally
 from .ticker import CALLS, MISFITS, Ticker
-from .told import end_line, start_line
 
 InvalidROSArguments = rclpy_implementation.RCLInvalidROSArgsError
 

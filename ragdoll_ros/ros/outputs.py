@@ -14,10 +14,10 @@ from visualization_msgs.msg import MarkerArray
 
 from ..files.urdf import scene_to_urdf
 from ..model.scene import Scene
-from .layouts import Layouts
-from .messages import contact_poses, count_masses, poses_of, to_time, twists_of
-from .packed import packed_poses
-from .transforms import Transforms
+from .messages.convert import contact_poses, count_masses, poses_of, to_time, twists_of
+from .messages.serialized import packed_poses
+from .messages.templates import Layouts
+from .messages.tf import Transforms
 
 if TYPE_CHECKING:  # else the page, which reads this file, would load an engine
     from ..physics.simulation import Simulation

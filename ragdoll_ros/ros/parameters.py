@@ -21,13 +21,13 @@ from ..model.drive import FORCE_PER_SPEED, TORQUE_PER_SPEED
 from ..model.errors import RagdollError
 from ..model.ragdoll import WORLD
 from ..model.scene import STEP_RANGE, Scene
+from ..physics.accuracy import ACCURACIES
 from ..physics.engine.registry import ENGINES, check_engine
-from ..physics.imu import Flaws
-from ..physics.recorded import RecordedSimulation
-from ..physics.settings import ACCURACIES
+from ..physics.logged_simulation import RecordedSimulation
+from ..physics.sensors.imu import Flaws
 from ..physics.simulation import MOST_WORKERS
-from .transforms import TREES
-from .worn import check_worn
+from .imu_parameters import check_worn
+from .messages.tf import TREES
 from .written import as_numbers, unknown
 
 

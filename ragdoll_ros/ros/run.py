@@ -19,9 +19,9 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.utilities import remove_ros_args
 
-from .session import ros_session
+from .rclpy_context import ros_session
 from .signals import ended_by_signals
-from .teleop import HELP, Teleop, show, steer
+from .teleop.teleop import HELP, Teleop, show, steer
 
 LOG_PERIOD = 1.0
 """s between two lines without a terminal."""

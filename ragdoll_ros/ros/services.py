@@ -8,7 +8,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from ..model.scene import SECOND
 from ..physics.simulation import Simulation
-from .tally import Tally
+from .input_counts import Tally
 
 
 class Served(Protocol):

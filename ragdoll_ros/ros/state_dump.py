@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..model.push import Push
-from ..physics.grab import Grab
+from ..physics.actions.grab import Grab
 from ..physics.guard import BadState
 from ..physics.simulation import Simulation
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from rclpy.clock import Clock
 from rclpy.node import Node
 
-from ..physics.pacing import Pacer
+from ..realtime.pacer import Pacer
 from .glance import Glance
 
 SHORTEST_PERIOD = 1_000_000

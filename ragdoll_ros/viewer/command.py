@@ -25,7 +25,7 @@ from ..physics.engine.registry import ENGINES
 from .sources.source import Source
 
 if TYPE_CHECKING:
-    from .opening import Opening
+    from .start_when_visible import Opening
 
 PORT = 8080
 LAST_PORT = 65535
@@ -238,7 +238,7 @@ def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
         from .sources.simulated import Simulated
         return Simulated(scene, options.engine or 'auto')
     try:
-        from .sources.remote import Remote
+        from .sources.node.source import Remote
     except ImportError as error:
         raise CannotServe(f'{error}: {NO_ROS}') from None
     return Remote(for_ros)
@@ -246,7 +246,7 @@ def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
 
 def opening(options: argparse.Namespace, source: Source) -> Opening | None:
     """What lets a scene of its own, or a node that waits, go once it is seen; else None."""
-    from .opening import Opening
+    from .start_when_visible import Opening
     if options.scene is not None:
         source.pause(True)
         return Opening(source, None)

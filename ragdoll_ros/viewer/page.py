@@ -8,29 +8,29 @@ from pathlib import Path
 import viser
 
 from ..model.scene import Scene
+from .browser.disconnected_banner import LOST
+from .browser.hide_drag_arrow import NO_ARROW
+from .browser.hint import OF_DOLL, OF_RECORDING, hint
+from .browser.materials import PAINT
+from .browser.panel_layout import FREE
+from .browser.upload_notices import OWN_UPLOADS
 from .controls import Controls
-from .docking import FREE
 from .drawing.camera import Cameras
-from .drawing.drag_arrow import NO_ARROW
 from .drawing.ground import light
-from .drawing.paint import PAINT
 from .drawing.plots import Plots
 from .drawing.skin import KEEP_PAGE
 from .drawing.stage import Stage
 from .drawing.view import View, theme
 from .editor.editor import Editor
-from .editor.form import GREY, RED, colored
 from .editor.on_top import ON_TOP
-from .editor.own_uploads import OWN_UPLOADS
-from .hint import OF_DOLL, OF_RECORDING, hint
-from .lost import LOST
-from .opening import Opening
 from .pointer import Pointer
 from .recording_panel import RecordingPanel
-from .rest import Rest
+from .rest_detector import Rest
 from .settings import Settings
 from .sources.source import Frame, Report, Source, Wanted
+from .start_when_visible import Opening
 from .timeline.timeline import Timeline
+from .widgets.form import GREY, RED, colored
 
 PERIOD = 1 / 60
 """s between two drawings at the least."""

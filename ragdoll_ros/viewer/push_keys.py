@@ -7,9 +7,9 @@ import time
 import viser
 
 from ..model.scene import Scene
-from ..physics.arrow_keys import STRENGTH, TAP, Pressed, total
+from ..realtime.arrow_keys import STRENGTH, TAP, Pressed, total
+from .browser.client_events import tell
 from .sources.source import Source
-from .told import tell
 
 ARROWS = {'←': 'left', '↑': 'up', '↓': 'down', '→': 'right'}
 """Label of each push: short, so that all stand in one row."""

@@ -10,13 +10,13 @@ import viser
 
 from ..model import errors
 from ..model.scene import Ground, Scene
-from ..physics.settings import ACCURACIES
-from .editor import typed
-from .editor.form import GREEN, RED, Form, colored
+from ..physics.accuracy import ACCURACIES
 from .editor.sheet import Field
-from .editor.words import in_words
 from .health import health
 from .sources.source import Report, Source
+from .widgets import number_parsing
+from .widgets.error_text import in_words
+from .widgets.form import GREEN, RED, Form, colored
 
 AMBER = '#e67700'
 
@@ -67,7 +67,7 @@ class Settings:
         if scene is not self._scene:
             self._scene = scene
             self.form.fill({'gravity': scene.gravity, 'restitution': scene.material.restitution,
-                            'friction': typed.shown(scene.material.friction)})
+                            'friction': number_parsing.shown(scene.material.friction)})
             self.ground.value = scene.ground is not None
         line, warns = health(report, scene)
         if now >= self._next or warns != self._warns:
@@ -100,7 +100,7 @@ class Settings:
         if scene is None:
             return
         try:
-            sheet['friction'] = typed.number(sheet['friction'], infinite=True)
+            sheet['friction'] = number_parsing.number(sheet['friction'], infinite=True)
         except errors.ModelError as error:
             del sheet['friction']
             found.append(error.at('friction'))

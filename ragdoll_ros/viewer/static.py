@@ -14,9 +14,9 @@ from ..model import errors
 from ..model.scene import Scene
 from ..physics.simulation import Simulation
 from ..recordings.recording import Recorder, Recording
+from .browser.materials import DRESS
 from .drawing.camera import CAMERA, FIELD
 from .drawing.ground import light
-from .drawing.paint import DRESS
 from .drawing.stage import Stage
 from .sources.playback import Playback
 

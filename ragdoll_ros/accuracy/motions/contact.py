@@ -10,9 +10,9 @@ from ...model import rotation
 from ...model.ragdoll import Bone, Ragdoll
 from ...model.scene import Ground, Material, Placement, Scene
 from ...model.shapes import Box, Sphere
+from ..cases.trial import Trial, posed
 from ..references import closed_forms
 from ..trajectory import Trajectory
-from ..trial import Trial, posed
 from .motion import Motion, orientations_about
 
 GRAVITY = 9.8

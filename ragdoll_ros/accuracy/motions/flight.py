@@ -14,12 +14,12 @@ from ...model.push import Push
 from ...model.ragdoll import Bone, Joint, Ragdoll
 from ...model.scene import Placement, Scene
 from ...model.shapes import Box
+from ..cases.trial import Trial, angle_places, inner_angles, posed
 from ..references.articulated import Articulated
 from ..references.closed_forms import fall
 from ..references.planar_chain import PlanarChain
 from ..references.rigid_body import torque_free_rotation
 from ..trajectory import Trajectory
-from ..trial import Trial, angle_places, inner_angles, posed
 from .motion import Motion, alone, orientations_about, without_limits
 
 EQUATIONS = 'equations of motion of the tree, DOP853 at 1e-12'

@@ -11,9 +11,9 @@ from ...model import rotation
 from ...model.ragdoll import Bone, Ragdoll
 from ...model.scene import Ground, Material, Placement, Scene
 from ...model.shapes import Box, Cylinder, Shape, Sphere
+from ..cases.trial import Trial
 from ..references import impacts, sliding_disc
 from ..trajectory import Trajectory
-from ..trial import Trial
 from .motion import Motion, orientations_about
 
 GRAVITY = 9.8

@@ -14,10 +14,10 @@ from ...model.push import Push
 from ...model.ragdoll import Bone, Joint, Ragdoll
 from ...model.scene import Placement
 from ...model.shapes import Box, Sphere
+from ..cases.trial import Trial, posed
 from ..references.closed_forms import pendulum_angle
 from ..references.integration import integrate
 from ..trajectory import Trajectory
-from ..trial import Trial, posed
 from .motion import Motion, alone, orientations_about
 
 PIVOT = 1e12

@@ -10,8 +10,8 @@ import numpy as np
 from ...model import rotation
 from ...model.ragdoll import Ragdoll
 from ...model.scene import Placement, Scene
+from ..cases.trial import Trial
 from ..trajectory import Trajectory
-from ..trial import Trial
 
 
 @dataclass(frozen=True)

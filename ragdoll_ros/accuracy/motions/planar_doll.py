@@ -7,10 +7,10 @@ from ...model.coordinates import GeneralizedState
 from ...model.ragdoll import Bone, Joint, Ragdoll
 from ...model.scene import Ground, Material, Placement, Scene
 from ...model.shapes import Capsule
+from ..cases.trial import Trial, posed
 from ..references import event_driven
 from ..references.planar_rods import PlanarRods
 from ..trajectory import Trajectory
-from ..trial import Trial, posed
 from .motion import Motion, orientations_about
 
 PITCH = (0.0, 1.0, 0.0)

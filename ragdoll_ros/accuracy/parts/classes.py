@@ -7,15 +7,15 @@ import math
 
 import numpy as np
 
-from ...physics.settings import ACCURACIES
-from ..depth import BoneDepth
-from ..goals import EXCESS
+from ...physics.accuracy import ACCURACIES
+from ..cases.starts import CLASSES, trial
+from ..cases.trial import Trial
+from ..crowds.depth import BoneDepth
 from ..measure import Measure
 from ..methods import Result, bullet, by_name, ours, run
-from ..runner import Job, Options, Row
-from ..starts import CLASSES, trial
+from ..results.goals import EXCESS
+from ..results.runner import Job, Options, Row
 from ..trajectory import Trajectory
-from ..trial import Trial
 
 NAME = 'classes'
 RATIOS = 'ratios'

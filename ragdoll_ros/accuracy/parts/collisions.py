@@ -4,12 +4,12 @@ from __future__ import annotations
 import functools
 import math
 
-from ...physics.settings import ACCURACIES
-from ..contact_cases import COLLISIONS, two_dolls
-from ..depth import BoneDepth
+from ...physics.accuracy import ACCURACIES
+from ..cases.contact_cases import COLLISIONS, two_dolls
+from ..crowds.depth import BoneDepth
 from ..measure import Measure
 from ..methods import by_name, run
-from ..runner import Job, Options, Row
+from ..results.runner import Job, Options, Row
 
 NAME = 'collisions'
 OTHERS = ('bullet-4', 'bullet-10', 'mujoco-implicitfast-4', 'mujoco-implicitfast-10')

@@ -14,7 +14,7 @@ from ..methods import Method, bullet, core, mujoco, run
 from ..motions.contact import contact_motions
 from ..motions.impacts import impact_motions
 from ..motions.planar_doll import planar_motions
-from ..runner import Job, Options, Row
+from ..results.runner import Job, Options, Row
 from .orders import slope
 from .precision import motions
 

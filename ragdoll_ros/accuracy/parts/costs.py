@@ -12,7 +12,7 @@ from ...files.scene import load_scene
 from ...model.ragdoll import Ragdoll
 from ...model.scene import Placement, Scene
 from ...physics.simulation import Simulation
-from ..runner import Job, Options, Row
+from ..results.runner import Job, Options, Row
 
 NAME = 'costs'
 TICKS = 100

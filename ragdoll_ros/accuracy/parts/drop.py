@@ -9,11 +9,11 @@ from ...files.doll import load_doll
 from ...files.scene import load_scene
 from ...model import rotation
 from ...model.scene import Placement
+from ..cases.trial import Trial, posed
 from ..measure import Measure
 from ..methods import bullet, mujoco, ours, quickstart, run
 from ..motions.motion import alone, without_damping, without_limits
-from ..runner import Job, Options, Row
-from ..trial import Trial, posed
+from ..results.runner import Job, Options, Row
 
 NAME = 'energy'
 COST = 'real_time'

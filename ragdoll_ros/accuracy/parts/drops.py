@@ -13,13 +13,13 @@ import numpy as np
 
 from ...files.scene import load_scene
 from ...model import rotation
-from ...physics.settings import ACCURACIES
-from .. import starts
+from ...physics.accuracy import ACCURACIES
+from ..cases import starts
+from ..cases.trial import Trial
 from ..measure import Measure
 from ..methods import by_name, reference, run
-from ..runner import Job, Options, Row
+from ..results.runner import Job, Options, Row
 from ..trajectory import Trajectory
-from ..trial import Trial
 
 NAME = 'drops'
 PARTS = 50

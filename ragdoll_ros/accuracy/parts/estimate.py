@@ -11,7 +11,7 @@ import numpy as np
 
 from ..methods import simulated
 from ..references.articulated import Articulated
-from ..runner import Job, Options, Row
+from ..results.runner import Job, Options, Row
 from .precision import motions
 
 NAME = 'estimate'

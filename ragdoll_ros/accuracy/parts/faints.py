@@ -22,9 +22,9 @@ from ...people.real_falls import DESCENT, IMPACT_SPEEDS, SHARE_THAT_HITS, Known
 from ...physics.engine.protocol import GROUND
 from ...physics.ground_heights import GroundHeights
 from ...physics.simulation import Simulation
-from ..figures import Row
-from ..runner import Job, Options
-from ..tables import table
+from ..results.figures import Row
+from ..results.runner import Job, Options
+from ..results.tables import table
 
 NAME = 'faints'
 COUNT, QUICK_COUNT, CHUNK = 1000, 4, 20

@@ -13,16 +13,16 @@ from ...model.ragdoll import Bone, Ragdoll
 from ...model.scene import Placement
 from ...model.shapes import Sphere
 from ...physics.simulation import Simulation
-from ..depth import BoneDepth
-from ..fuzzed import fuzzed
-from ..goals import EXCESS
-from ..hard_case import SINKING, HardCase, Rule
-from ..hard_cases import hard_cases
+from ..cases.fuzzed import fuzzed
+from ..cases.hard_case import SINKING, HardCase, Rule
+from ..cases.hard_cases import hard_cases
+from ..cases.trial import Trial
+from ..crowds.depth import BoneDepth
 from ..measure import Measure
 from ..methods import by_name, run
-from ..runner import Job, Options, Row
+from ..results.goals import EXCESS
+from ..results.runner import Job, Options, Row
 from ..trajectory import Trajectory
-from ..trial import Trial
 
 NAME = 'hard'
 RESTING = 'rest for 10 min'

@@ -9,10 +9,10 @@ import math
 import numpy as np
 
 from ...physics import kernels
-from ...physics.settings import ACCURACIES
+from ...physics.accuracy import ACCURACIES
 from ..measure import compare
 from ..methods import Method, bullet, mujoco, ours, run
-from ..runner import Job, Options, Row
+from ..results.runner import Job, Options, Row
 from .precision import motions
 
 NAME = 'orders'

@@ -14,12 +14,12 @@ import numpy as np
 
 from ...files.scene import load_scene
 from ...model.coordinates import GeneralizedState
-from ...physics.settings import ACCURACIES
+from ...physics.accuracy import ACCURACIES
+from ..cases.trial import Trial
 from ..measure import Measure, compare
 from ..methods import Method, bullet, by_name, mujoco, reference, run, simulated
-from ..runner import Job, Options, Row
+from ..results.runner import Job, Options, Row
 from ..trajectory import Trajectory
-from ..trial import Trial
 
 NAME = 'pieces'
 LENGTH = 0.1

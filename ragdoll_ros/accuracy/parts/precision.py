@@ -13,7 +13,7 @@ from ..motions.impacts import impact_motions
 from ..motions.mechanisms import mechanism_motions
 from ..motions.motion import Motion
 from ..motions.planar_doll import planar_motions
-from ..runner import Job, Options, Row
+from ..results.runner import Job, Options, Row
 from ..trajectory import Trajectory
 
 NAME = 'precision'

@@ -10,12 +10,12 @@ import numpy as np
 from ...model.ragdoll import Bone, Ragdoll
 from ...model.scene import Ground, Material, Placement, Scene
 from ...model.shapes import Box, Capsule, Shape, Sphere
-from ...physics.settings import ACCURACIES
+from ...physics.accuracy import ACCURACIES
+from ..cases.trial import Trial
 from ..methods import by_name, run
 from ..references.closed_forms import bounce_times
-from ..runner import Job, Options, Row
+from ..results.runner import Job, Options, Row
 from ..trajectory import Trajectory
-from ..trial import Trial
 
 NAME = 'restitution'
 RESTITUTIONS = tuple(k / 10 for k in range(1, 11))

@@ -20,7 +20,7 @@ from ...model.swing import Link, Swing
 from ...physics.swing.mount import Mount
 from ...physics.swing.swings import Swings
 from ..references.closed_forms import pendulum_angle
-from ..runner import Job, Options, Row
+from ..results.runner import Job, Options, Row
 
 NAME = 'swing'
 RATES = (15, 30, 60, 120, 240)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..fall import Fall
+from ..imu_samples import NAMES, by_frames
 from ..recipe import Recipe
-from ..worn import NAMES, by_frames
 
 POSE = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
 VELOCITY = ('vx', 'vy', 'vz', 'wx', 'wy', 'wz')

@@ -16,8 +16,8 @@ import numpy as np
 from ...model import rotation
 from ...model.errors import WrongForm
 from ..fall import Fall
+from ..imu_samples import worn_orientations, worn_samples
 from ..recipe import Recipe
-from ..worn import worn_orientations, worn_samples
 
 SENSOR = 'sensor_data/SA{shard:06d}/S{shard:06d}T01R{trial:02d}.csv'
 LABELS = 'label_data/SA{shard:06d}_label.csv'

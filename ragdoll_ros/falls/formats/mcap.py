@@ -16,8 +16,8 @@ from mcap_ros2.writer import Writer
 
 from ...files.urdf import to_urdf
 from ..fall import Fall
+from ..imu_samples import flaws_of, worn_samples
 from ..recipe import Recipe
-from ..worn import flaws_of, worn_samples
 from .definitions import DEFINITIONS
 
 NAME = 'mcap/fall_{number:07d}.mcap'

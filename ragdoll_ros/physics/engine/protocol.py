@@ -12,8 +12,8 @@ from ...model import errors
 from ...model.coordinates import DofLayout, GeneralizedState
 from ...model.scene import Scene
 from ...model.state import State
+from ..accuracy import Accuracy
 from ..motion import Motion
-from ..settings import Accuracy
 
 GROUND = -1
 """Index that stands for the ground where a bone's would stand."""

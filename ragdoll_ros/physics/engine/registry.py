@@ -33,18 +33,18 @@ def resolve_engine(engine: str | type[Engine]) -> EngineChoice:
         raise MissingEngine(f'engine rigid: {problem}; expected numba 0.59 or newer, or engine '
                             'bullet')
     if engine == 'mujoco':
-        from .mujoco import MujocoEngine
+        from .substepped.mujoco import MujocoEngine
         return EngineChoice('mujoco', MujocoEngine)
     if engine == 'bullet' or problem:
         return EngineChoice('bullet', _bullet_engine(problem), problem)
-    from .rigid import RigidEngine
+    from .rigid.engine import RigidEngine
     return EngineChoice('rigid', RigidEngine)
 
 
 def _bullet_engine(problem: str) -> type[Engine]:
     """PyBullet's; ``problem`` is what the rigid engine lacks, if that was asked for first."""
     try:
-        from .bullet import BulletEngine
+        from .substepped.bullet import BulletEngine
     except ImportError as error:
         reasons = [f'engine bullet: {error}', *([f'engine rigid: {problem}'] if problem else [])]
         raise MissingEngine('; '.join([*reasons, 'expected PyBullet, or numba 0.59 or newer for '

@@ -9,7 +9,7 @@ from ...model import errors
 from ...model.scene import Scene
 from ...model.skin import Skin
 from ...model.state import State
-from ...recordings.gltf_skin import by_material, paint_bytes
+from ...recordings.gltf.gltf_skin import by_material, paint_bytes
 from .bodies import WXYZ
 
 MOST = 30

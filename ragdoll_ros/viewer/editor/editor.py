@@ -12,13 +12,13 @@ import viser
 
 from ...model import errors
 from ...model.scene import Scene
+from ..widgets.error_text import in_words
 from . import changes, growth, mirror, sheet
 from .files import Files
 from .folder import Folder
 from .handles import Handles
 from .history import History
 from .panel import Panel
-from .words import in_words
 
 UNSEEN = 20
 """Scenes given to the page that it has not shown yet."""

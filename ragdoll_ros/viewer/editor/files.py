@@ -9,9 +9,9 @@ import viser
 
 from ...model import errors
 from ...model.scene import Scene
+from ..widgets.error_text import in_words
+from ..widgets.form import GREEN, GREY, RED, colored
 from .folder import CHARACTERS, DOLLS, LARGEST_UPLOAD, Folder
-from .form import GREEN, GREY, RED, colored
-from .words import in_words
 
 NONE = '(choose one)'
 

@@ -7,10 +7,10 @@ import viser
 
 from ...model import errors
 from ...model.scene import Scene
-from .form import RED, ROOMY, Form, Quiet, colored
+from ..widgets.error_text import in_words
+from ..widgets.form import RED, ROOMY, Form, Quiet, colored
 from .history import History
 from .sheet import BODY, JOINT, Sheet
-from .words import in_words
 
 NONE = '(no bone)'
 

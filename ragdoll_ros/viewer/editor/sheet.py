@@ -18,7 +18,8 @@ from ...model.ragdoll import DEFAULT_COLOR, JOINT_KINDS, Joint
 from ...model.scene import Scene
 from ...model.shapes import SHAPES, SIZES, Shape
 from ...model.vectors import unit
-from . import changes, typed
+from ..widgets import number_parsing
+from . import changes
 
 Value = str | float | tuple[float, ...]
 Sheet = dict[str, Value]
@@ -206,7 +207,7 @@ def _not_across(new: Sheet, shown: Sheet) -> errors.WrongAxes:
     if new[key] == shown.get(key):
         key, other = other, key
     return errors.WrongAxes(key, new[key], f'perpendicular to {other.replace("_", " ")}, which is '
-                            + typed.shown_all(new[other]))
+                            + number_parsing.shown_all(new[other]))
 
 
 def _pair(key: str, text: str, symmetric: bool) -> tuple[float, float] | None:
@@ -215,7 +216,7 @@ def _pair(key: str, text: str, symmetric: bool) -> tuple[float, float] | None:
         return None
     for count in (2, 1) if symmetric else (2,):
         with suppress(errors.WrongForm):
-            numbers = typed.numbers(text, count, '°')
+            numbers = number_parsing.numbers(text, count, '°')
             return (numbers[0] if count == 2 else -numbers[0]), numbers[-1]
     raise errors.WrongForm(
         key, text, 'two angles in degrees, lower and upper, such as -90; 45.5, or nothing')
@@ -225,7 +226,7 @@ def _moments(text: str) -> tuple[float, ...] | None:
     if not text.strip():
         return None
     try:
-        return typed.numbers(text, 3)
+        return number_parsing.numbers(text, 3)
     except errors.WrongForm as error:
         raise error.at('inertia') from None
 
@@ -233,7 +234,9 @@ def _moments(text: str) -> tuple[float, ...] | None:
 def _number_or_none(key: str, text: str) -> float | None:
     unit = 'm' if key == 'rolling_friction' else ''
     try:
-        return typed.number(text, unit, infinite=key == 'friction') if text.strip() else None
+        if not text.strip():
+            return None
+        return number_parsing.number(text, unit, infinite=key == 'friction')
     except errors.WrongForm as error:
         raise error.at(key) from None
 

@@ -15,9 +15,9 @@ from ...model import errors, rotation
 from ...model.push import Push
 from ...model.scene import SECOND, Scene
 from ...model.vectors import Vector
-from ...physics.grab import EVENLY
-from ...physics.pacing import Pacer
+from ...physics.actions.grab import EVENLY
 from ...physics.simulation import Simulation
+from ...realtime.pacer import Pacer
 from .source import PACES, Frame, Held, Report, Source, Wanted
 from .tempo import Tempo
 

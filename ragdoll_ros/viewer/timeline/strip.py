@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .history import Cut
+from .frame_buffer import Cut
 
 WIDTH = 300
 """Columns: about the panel's width in pixels."""

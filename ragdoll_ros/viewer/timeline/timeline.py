@@ -7,11 +7,11 @@ import time
 
 import viser
 
+from ..browser.client_events import tell
 from ..sources.source import Frame, Source
-from ..told import tell
-from .history import Cut, History, cut_of
-from .look import Look
-from .package import zipped
+from .export_zip import zipped
+from .frame_buffer import Cut, History, cut_of
+from .playhead import Look
 from .strip import strip
 
 PERIOD = 0.5

@@ -1,0 +1,1 @@
+"""What is tried: trials, hard cases, starts."""

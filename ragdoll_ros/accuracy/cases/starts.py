@@ -1,0 +1,108 @@
+"""Nine classes of random starts of the default doll over the ground, the same for ever.
+
+A start is known by its class and its number alone. Poses are drawn from the inner part of all
+joint ranges, so that no bone starts inside another; lowest points are placed exactly.
+"""
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from ...files.scene import load_scene
+from ...model import rotation
+from ...model.coordinates import GeneralizedState
+from ...model.push import Push
+from ...model.scene import Placement, Scene, height
+from ..references.articulated import Articulated
+from .trial import Trial, angle_limits, angle_places, inner_angles, posed
+
+SETTLING = 2.0
+"""s simulated after the first touch."""
+
+
+@functools.cache
+def drop() -> Scene:
+    """The default scene, read once."""
+    return load_scene('drop')
+
+
+def trial(class_name: str, number: int) -> Trial:
+    """Start ``number`` of a class."""
+    rng = np.random.default_rng([list(CLASSES).index(class_name), number])
+    return CLASSES[class_name](rng)
+
+
+def _push(rng: np.random.Generator) -> Trial:
+    """2000 N along the ground on the torso, as the arrow keys do, for 0.1 to 3 s."""
+    scene = drop()
+    heading = rng.uniform(0, 2 * math.pi)
+    force = (2000 * math.cos(heading), 2000 * math.sin(heading), 1.0)
+    start, duration = round(rng.uniform(0, 1), 2), round(rng.uniform(0.1, 3.0), 2)
+    push = Push('torso', force, start=start, duration=duration)
+    return Trial(scene, round(start + duration + 1.5, 2), None, (push,))
+
+
+def _spin(speed: float) -> Callable[[np.random.Generator], Trial]:
+    """A rigid spin about any axis, 2 m above the ground."""
+    def make(rng: np.random.Generator) -> Trial:
+        axis = rotation.normalized(rng.normal(size=3))
+        return _let_go(rng, 2.0, inner_angles(drop().dolls[0].doll, rng), spin=tuple(speed * axis))
+    return make
+
+
+def _drop(fall: float) -> Callable[[np.random.Generator], Trial]:
+    """A fall from rest, at any orientation."""
+    def make(rng: np.random.Generator) -> Trial:
+        return _let_go(rng, fall, inner_angles(drop().dolls[0].doll, rng))
+    return make
+
+
+def _slam(rng: np.random.Generator) -> Trial:
+    """Every joint flung toward one of its limits at 10 to 20 rad/s."""
+    doll = drop().dolls[0].doll
+    rates = {name: rng.choice((-1, 1)) * rng.uniform(10, 20) for name in angle_places(doll)}
+    return _let_go(rng, 0.4, inner_angles(doll, rng), rates)
+
+
+def _outside(rng: np.random.Generator) -> Trial:
+    """Half of all joint angles 5 to 30 degrees past a limit."""
+    doll = drop().dolls[0].doll
+    angles = inner_angles(doll, rng)
+    for name, (lower, upper) in angle_limits(doll).items():
+        if rng.random() < 0.5:
+            past = math.radians(rng.uniform(5, 30))
+            angles[name] = upper + past if rng.random() < 0.5 else lower - past
+    return _let_go(rng, 0.4, angles)
+
+
+CLASSES: dict[str, Callable[[np.random.Generator], Trial]] = {
+    'push .1 to 3 s': _push, 'spin 10 rad/s': _spin(10.0), 'spin 20 rad/s': _spin(20.0),
+    'drop .4 m': _drop(0.4), 'drop 2 m': _drop(2.0), 'drop 10 m': _drop(10.0),
+    'drop 50 m': _drop(50.0), 'limit slam': _slam, 'start outside': _outside}
+
+
+def _let_go(rng: np.random.Generator, fall: float, angles: dict[str, float],
+            rates: dict[str, float] | None = None, **moving: object) -> Trial:
+    """The doll at any orientation, with its lowest point ``fall`` m above the ground."""
+    scene = drop()
+    orientation = tuple(rotation.normalized(rng.normal(size=4)))
+    placement = Placement(scene.dolls[0].doll, orientation=orientation, **moving)
+    start = lifted(scene, posed(placement, angles, rates), fall)
+    scene = dataclasses.replace(scene, dolls=(placement,))
+    duration = math.sqrt(2 * fall / 9.8) + SETTLING
+    return Trial(scene, round(duration, 2), start)
+
+
+def lifted(scene: Scene, start: GeneralizedState, clearance: float) -> GeneralizedState:
+    """The same start with the lowest point of all bones ``clearance`` m above level ground."""
+    doll = scene.dolls[0].doll
+    state = Articulated(doll).state(start.q, start.v)
+    lowest = min(height(bone, position, orientation, scene.ground)
+                 for bone, position, orientation
+                 in zip(doll.bones, state.positions, state.orientations, strict=True))
+    start.q[2] += clearance - lowest
+    return start

@@ -1,0 +1,1 @@
+"""Many dolls at once: cost, depth, equal bits."""

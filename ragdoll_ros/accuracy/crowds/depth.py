@@ -1,0 +1,89 @@
+"""How deep bones are in each other, by a judge that moves none of them: MuJoCo's distances."""
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from ...files.mjcf import to_mjcf
+from ...model import rotation
+from ...model.scene import Scene
+from ..trajectory import Trajectory
+
+APART = 1e-3
+"""m: a pair that starts deeper in each other counts from when it is no deeper than this."""
+
+SEARCHED = 0.01
+"""m of distance from which a pair is apart, however far."""
+
+
+class BoneDepth:
+    """Depths of all pairs of a scene's bones that may collide: those without a joint between.
+
+    None may where the scene has no self-collision.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        import mujoco
+        self._mujoco = mujoco
+        self._model = mujoco.MjModel.from_xml_string(to_mjcf(scene))
+        self._data = mujoco.MjData(self._model)
+        bodies = [self._model.body(name).id for name in scene.bone_names]
+        self._geoms = [np.flatnonzero(self._model.geom_bodyid == body) for body in bodies]
+        self._bones = np.repeat(np.arange(len(bodies)), [len(own) for own in self._geoms])
+        own = np.concatenate(self._geoms)
+        self._own, self._places = own, self._model.geom_pos[own]
+        self._turns = self._model.geom_quat[own][:, [1, 2, 3, 0]]
+        self._radii = np.array([np.linalg.norm(bone.shape.half_extents) for bone in scene.bones])
+        apart = {frozenset(scene.bone_index(scene.qualified(placement, name)) for name in pair)
+                 for placement in scene.dolls for pair in placement.doll.never_collide}
+        pairs = itertools.combinations(range(len(bodies)), 2) if scene.self_collision else ()
+        self._pairs = np.array([pair for pair in pairs if frozenset(pair) not in apart],
+                               int).reshape(-1, 2)
+
+    def depths(self, positions: np.ndarray, orientations: np.ndarray) -> np.ndarray:
+        """Of each pair, m, at poses (n, 3) and (n, 4); 0 where they are apart."""
+        a, b = self._pairs.T
+        far = np.linalg.norm(positions[a] - positions[b], axis=1) > self._radii[a] + self._radii[b]
+        found = np.zeros(len(self._pairs))
+        if not far.all():
+            self._pose(positions, orientations)
+        for index in np.flatnonzero(~far):
+            found[index] = max(0.0, *(-self._distance(int(one), int(other)) for one, other in
+                                      itertools.product(*map(self._geoms.__getitem__,
+                                                             self._pairs[index]))))
+        return found
+
+    def deepest(self, trajectory: Trajectory) -> float:
+        """Largest depth of any pair, m, each from when it first was apart."""
+        return _deepest(self._course(trajectory))
+
+    def since_apart(self, trajectory: Trajectory) -> tuple[Trajectory, float]:
+        """What comes after all pairs that begin in each other, and come apart, have done so; and
+        the deepest() of that.
+        """
+        found = self._course(trajectory)
+        begin = int((found <= APART).argmax(axis=0).max(initial=0))
+        return trajectory.part(slice(begin, None)), _deepest(found[begin:])
+
+    def _course(self, trajectory: Trajectory) -> np.ndarray:
+        """Depths (t, pairs), m."""
+        return np.array([self.depths(positions, orientations) for positions, orientations
+                         in zip(trajectory.positions, trajectory.orientations, strict=True)])
+
+    def _pose(self, positions: np.ndarray, orientations: np.ndarray) -> None:
+        """Put every geom where its bone is; MuJoCo's quaternions are w, x, y, z."""
+        turns = orientations[self._bones]
+        self._data.geom_xpos[self._own] = positions[self._bones] + rotation.rotate(
+            turns, self._places)
+        self._data.geom_xmat[self._own] = rotation.matrix(
+            rotation.multiply(turns, self._turns)).reshape(-1, 9)
+
+    def _distance(self, one: int, other: int) -> float:
+        return self._mujoco.mj_geomDistance(self._model, self._data, one, other, SEARCHED, None)
+
+
+def _deepest(found: np.ndarray) -> float:
+    """Largest of depths (t, pairs), m, each pair's from when it first was apart."""
+    counts = np.maximum.accumulate(found <= APART, axis=0)
+    return float(found[counts].max(initial=0.0))

@@ -1,0 +1,1 @@
+"""The report's pages, plots and command."""

@@ -1,0 +1,145 @@
+"""`ragdoll_report`: runs every case by every method, writes JSON, Markdown and pictures."""
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..parts import (
+    classes,
+    collisions,
+    convergence,
+    costs,
+    drop,
+    drops,
+    estimate,
+    faints,
+    hard,
+    orders,
+    pieces,
+    precision,
+    restitution,
+    swing,
+)
+from ..results import figures
+from ..results.runner import Job, Options, run_jobs
+from .plots import draw_all
+from .sections import markdown
+
+PARTS = {'precision': precision, 'orders': orders, 'restitution': restitution,
+         'convergence': convergence, 'pieces': pieces, 'drop': drop, 'drops': drops,
+         'classes': classes, 'collisions': collisions, 'hard': hard,
+         'costs': costs, 'estimate': estimate, 'swing': swing, 'faints': faints}
+"""Modules by the names that --case takes: each says by jobs() what it has to run."""
+
+NEEDED = ('scipy', 'matplotlib', 'mujoco')
+"""What the extra `report` brings; imported where it is used, never by a node."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Exit code of the command: 2 for a wrong call or a missing package."""
+    options = parser().parse_args(arguments)
+    missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
+    if missing:
+        sys.stderr.write(f'ragdoll_report needs {", ".join(missing)}: '
+                         'pip install "ragdoll_ros[report]"\n')
+        return 2
+    try:
+        return report(options)
+    except WrongCall as error:
+        sys.stderr.write(f'ragdoll_report: {error}\n')
+        return 2
+
+
+class WrongCall(ValueError):
+    """An option whose value cannot be used."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """Options of the command."""
+    made = argparse.ArgumentParser(
+        prog='ragdoll_report', description='Measure how wrong and how fast the simulation is, '
+        'beside PyBullet and MuJoCo. Writes accuracy.json, accuracy.md and pictures.',
+        epilog='example: ragdoll_report --quick --out /tmp/report; '
+        'ragdoll_report --case classes --starts 300')
+    made.add_argument('--quick', action='store_true',
+                      help='fewer motions, methods and starts: at most 90 s (else 40 min)')
+    made.add_argument('--case', action='append', metavar='NAME', default=[],
+                      help='only this part or motion; may be given again; "list" names them all')
+    made.add_argument('--starts', type=int, default=100, metavar='N',
+                      help='starts of each of the nine classes (100)')
+    made.add_argument('--out', type=Path, metavar='DIR', help='folder to write into (docs; with '
+                      '--case build/report, so that the published page stays whole)')
+    made.add_argument('--from-json', action='store_true',
+                      help='measure nothing, write page and pictures anew from DIR/accuracy.json')
+    return made
+
+
+def report(options: argparse.Namespace) -> int:
+    """Measure, unless the figures are there already, and write; 0."""
+    if options.case == ['list']:
+        sys.stdout.write('\n'.join(labels()) + '\n')
+        return 0
+    options.out = options.out or Path('build/report' if options.case else 'docs')
+    folder = options.out.absolute()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise WrongCall(f'--out {options.out}: {error.strerror}') from None
+    if options.from_json:
+        if not (folder / figures.FILE).is_file():
+            raise WrongCall(f'--from-json: there is no {folder / figures.FILE}')
+    else:
+        figures.save(measured(options), folder)
+    write(folder)
+    return 0
+
+
+def measured(options: argparse.Namespace) -> dict:
+    """What the JSON holds, from running the jobs."""
+    if options.starts < 1:
+        raise WrongCall(f'--starts {options.starts}: expected 1 or more')
+    began = time.monotonic()
+    rows = run_jobs(chosen(options.case, Options(options.quick, options.starts)))
+    for part, join in ((classes.NAME, classes.merged), (drops.NAME, drops.merged)):
+        if part in rows:
+            rows[part] = join(rows[part])
+    words = ['ragdoll_report', *(['--quick'] if options.quick else []),
+             *(f'--case {name}' for name in options.case),
+             *([f'--starts {options.starts}'] if options.starts != 100 else [])]
+    return {'about': figures.about(' '.join(words), time.monotonic() - began, options.quick,
+                                   options.starts), 'figures': rows}
+
+
+def write(folder: Path) -> None:
+    """Write page and pictures from the JSON in a folder."""
+    data = figures.load(folder)
+    pictures = draw_all(data['figures'], folder)
+    page = folder / 'accuracy.md'
+    page.write_text(markdown(data, pictures), encoding='utf-8')
+    sys.stdout.write(f'{page} and {len(pictures)} pictures\n')
+
+
+def chosen(names: Sequence[str], options: Options) -> list[Job]:
+    """All jobs, or those of the parts and motions named; WrongCall for a name that is none."""
+    jobs = [(part, job) for part, module in PARTS.items() for job in module.jobs(options)]
+    for name in names:
+        if any(name in (part, job.part, job.label) for part, job in jobs):
+            continue
+        if name in labels():
+            raise WrongCall(f'--case {name}: not in the quick report; leave --quick out')
+        raise WrongCall(f'--case {name}: expected one of {", ".join(labels())}')
+    return [job for part, job in jobs
+            if not names or {part, job.part, job.label}.intersection(names)]
+
+
+def labels() -> list[str]:
+    """Names that --case takes."""
+    return [*PARTS, *precision.motions()]
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Figures of the report, what they are held to, and how they are run."""

@@ -1,0 +1,95 @@
+"""The report's data: one JSON file that holds every figure, and about what they were taken."""
+from __future__ import annotations
+
+import datetime
+import importlib.metadata
+import json
+import math
+import os
+import platform
+from collections.abc import Iterable
+from pathlib import Path
+
+from ...physics import kernels
+
+FILE = 'accuracy.json'
+
+Row = dict[str, object]
+"""One result: figures by their names, which end in their units."""
+
+Figures = dict[str, list[Row]]
+"""The rows of each part."""
+
+
+def about(command: str, seconds: float, quick: bool, starts: int) -> dict[str, object]:
+    """Versions, machine, date: what a reader needs to compare the figures with his own."""
+    return {'date': datetime.datetime.now(datetime.timezone.utc).strftime('%Y-%m-%d %H:%M UTC'),
+            'command': command, 'quick': quick, 'starts': starts, 'seconds': round(seconds, 1),
+            'machine': _processor(), 'cores': os.cpu_count(),
+            'system': f'{platform.system()} {platform.machine()}',
+            'python': platform.python_version(),
+            'engine': 'rigid' if kernels.ready() else 'bullet',
+            'versions': {name: _version(name) for name in
+                         ('ragdoll_ros', 'pybullet', 'mujoco', 'numpy', 'scipy', 'numba')}}
+
+
+def save(data: dict, folder: Path) -> Path:
+    """Path of the JSON file, written with a line for each row: a change shows in a diff by rows.
+
+    Infinity becomes the text 'inf', NaN null: JSON has neither.
+    """
+    parts = (f'{_line(part)}: [\n' + ',\n'.join(map(_line, rows)) + '\n]'
+             for part, rows in data['figures'].items())
+    path = folder / FILE
+    path.write_text(f'{{"about": {_line(data["about"])},\n"figures": {{\n' + ',\n'.join(parts)
+                    + '\n}}\n', encoding='utf-8')
+    return path
+
+
+def load(folder: Path) -> dict:
+    """What save() wrote: 'about' and, under 'figures', the rows of each part."""
+    return json.loads((folder / FILE).read_text(encoding='utf-8'))
+
+
+def number(value: object) -> float:
+    """A figure of the JSON, in which infinity is the text 'inf' and NaN is null."""
+    return math.nan if value is None else float(value)
+
+
+def sound(rows: Iterable[Row]) -> list[Row]:
+    """The rows of jobs that did not fail."""
+    return [row for row in rows if 'failed' not in row]
+
+
+def _line(value: object) -> str:
+    return json.dumps(_plain(value), allow_nan=False, ensure_ascii=False)
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, float):
+        if math.isnan(value):
+            return None
+        if math.isinf(value):
+            return 'inf'
+        return float(f'{value:.6g}')
+    return value
+
+
+def _version(name: str) -> str:
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return 'from the source tree'
+
+
+def _processor() -> str:
+    try:
+        lines = Path('/proc/cpuinfo').read_text(encoding='utf-8').splitlines()
+    except OSError:
+        return platform.processor() or 'unknown'
+    names = [line.split(':', 1)[1].strip() for line in lines if line.startswith('model name')]
+    return names[0] if names else platform.machine()

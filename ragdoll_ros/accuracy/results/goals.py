@@ -1,0 +1,163 @@
+"""What was promised, held against the figures of this run: a line for each promise."""
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...physics.accuracy import ACCURACIES
+from .figures import Figures, Row, number, sound
+from .ground_goals import ground_goals
+from .promise import by_setting, promise
+
+ROUNDING = 1e-12
+"""m or rad: errors below count as none on the front, and the page says so."""
+
+EXCESS = 1e-5
+"""Largest energy from nothing, over that at the start and the work done."""
+
+RATIOS = {'draft': 0.5, 'normal': 0.8, 'exact': 1.3}
+"""CPU time of each setting over that of PyBullet at N = 10."""
+
+
+def _follows_on(row: Row) -> bool:
+    """Whether a row of starts counts as is promised now, and not as figures of older versions."""
+    return 'restless' in row
+
+
+@dataclass(frozen=True)
+class Bound:
+    """At each setting, the largest figure in rows of a part is at most so much."""
+
+    goal: str
+    part: str
+    keys: tuple[str, ...]
+    most: dict[str, float]
+    """By setting, in the unit that is shown."""
+    wanted: str
+    found: str
+    """Formats of the bound and of the largest figure."""
+    keep: Callable[[Row], bool]
+    """Which rows the bound is about."""
+    factor: float = 1.0
+    """Shown unit over SI unit."""
+
+
+BOUNDS = (
+    Bound('worst limit overshoot', 'classes', ('worst_overshoot_rad',), {'normal': 0.2},
+          'at most {:g}°', '{:.2f}°', _follows_on, 180 / math.pi),
+    Bound('worst sinking, bone in bone included', 'classes',
+          ('worst_sinking_m', 'worst_depth_m'), {'normal': 1.0}, 'at most {:g} mm', '{:.2f} mm',
+          _follows_on, 1e3),
+    Bound('gentle flight of 0.28 s', 'precision', ('position_worst_m',),
+          {'draft': 3e-3, 'normal': 60e-6, 'exact': 10e-6}, 'at most {:g} m', '{:.1e} m',
+          lambda row: row['motion'] == 'flight_gentle'),
+    Bound('free fall and throw', 'precision', ('position_worst_m',),
+          dict.fromkeys(ACCURACIES, 1e-9), 'at most 1e-9 m', '{:.1e} m',
+          lambda row: row['motion'] in ('free_fall', 'projectile')),
+    Bound('momentum and angular momentum kept', 'precision',
+          ('momentum_drift', 'angular_momentum_drift'), dict.fromkeys(ACCURACIES, 1e-9),
+          'to 1e-9', '{:.1e}', lambda row: 'momentum_drift' in row))
+
+
+def goals(figures: Figures) -> list[Row]:
+    """One row for each promise that this run has figures for: what, wanted, found, held."""
+    rows = [*_energy(figures), *_cost(figures)]
+    for bound in BOUNDS:
+        rows += _largest(bound, figures)
+    for goal in (ground_goals, _hard, _estimate, _costs_fall, _orders, _front):
+        rows += goal(figures)
+    return rows
+
+
+def _largest(bound: Bound, figures: Figures) -> Iterator[Row]:
+    """NaN holds no bound."""
+    for accuracy, rows in by_setting(figures, bound.part, bound.keep):
+        if accuracy not in bound.most:
+            continue
+        largest = bound.factor * float(np.max([
+            number(row[key]) for row in rows for key in bound.keys if key in row]))
+        most = bound.most[accuracy]
+        yield promise(f'{bound.goal}, {accuracy}', bound.wanted.format(most),
+                      bound.found.format(largest), largest <= most)
+
+
+def _energy(figures: Figures) -> Iterator[Row]:
+    for accuracy, rows in by_setting(figures, 'classes', _follows_on):
+        bad, starts = (sum(row[key] for row in rows) for key in ('bad', 'starts'))
+        worst = max(number(row['worst_excess']) for row in rows)
+        yield promise(f'energy excess in every start, {accuracy}', 'at most 1e-5',
+                      f'{bad} of {starts} bad, worst {worst:.1e}', not bad and worst <= EXCESS)
+
+
+def _cost(figures: Figures) -> Iterator[Row]:
+    base = sum(number(row['cpu_s']) for row in figures.get('ratios', ())
+               if row.get('method') == 'bullet-10')
+    if not base:
+        return
+    for accuracy, rows in by_setting(figures, 'ratios'):
+        ratio, most = sum(number(row['cpu_s']) for row in rows) / base, RATIOS[accuracy]
+        yield promise(f'CPU over PyBullet N = 10, {accuracy}', f'at most {most:g}', f'{ratio:.2f}',
+                      ratio <= most)
+
+
+def _hard(figures: Figures) -> Iterator[Row]:
+    rows = [row for row in figures.get('hard', ()) if row.get('method') == 'ours-normal']
+    failing = ', '.join(row['case'] for row in rows if not row['passed'])
+    if rows:
+        yield promise('hard cases at normal', f'all {len(rows)}',
+                      f'{sum(row["passed"] for row in rows)} hold'
+                      + (f'; not: {failing}' if failing else ''), not failing)
+
+
+def _estimate(figures: Figures) -> Iterator[Row]:
+    for row in figures.get('estimate', ()):
+        share = number(row.get('within_3'))
+        if row.get('ticks') and 'rounding' in row:
+            yield promise(f'live estimate within a factor 3, {row.get("label")}',
+                          '90 % of flight ticks beyond rounding',
+                          f'{share:.0%} of {row.get("ticks")}', share >= 0.9)
+
+
+def _costs_fall(figures: Figures) -> Iterator[Row]:
+    costs = [number(row['tick_s']) for row in figures.get('costs', ()) if 'tick_s' in row]
+    # timing on a shared machine is good to a tenth
+    rising = sum(later > 1.1 * earlier for earlier, later in itertools.pairwise(costs))
+    if costs:
+        yield promise('a scene that needs less costs less', 'falls from row to row',
+                      f'rises {rising} times' if rising else 'falls', not rising)
+
+
+def _orders(figures: Figures) -> Iterator[Row]:
+    rows = [row for row in figures.get('orders', ()) if row.get('theory')]
+    off = [f'{row["method"]} {number(row["order"]):.2f} ({row["motion"]})' for row in rows
+           if not abs(number(row['order']) - row['theory']) <= 0.2]
+    if rows:
+        yield promise('orders', 'within 0.2 of theory', ', '.join(off) or 'all are', not off)
+
+
+def _front(figures: Figures) -> Iterator[Row]:
+    """No other method is both faster and more accurate."""
+    rows = sound(figures.get('precision', ()))
+    beaten: dict[str, list[str]] = {}
+    for row in rows:
+        if row['family'] == 'ours':
+            motions = beaten.setdefault(row['method'], [])
+            if any(_beats(other, row) for other in rows):
+                motions.append(row['motion'])
+    count = len({row['motion'] for row in rows})
+    for method, motions in beaten.items():
+        yield promise(f'on the front of speed and error, {method}', f'in all {count} motions',
+                      f'beaten in {len(motions)}: {", ".join(motions)}' if motions else 'yes',
+                      not motions)
+
+
+def _beats(other: Row, ours: Row) -> bool:
+    """Whether another method is faster and nearer to the truth, beyond rounding."""
+    cost, error = number(ours['cpu_s_per_s']), number(ours[ours['yardstick']])
+    return (other['motion'] == ours['motion'] and other['family'] != 'ours'
+            and number(other['cpu_s_per_s']) < cost and error > ROUNDING
+            and number(other[other['yardstick']]) < error * (1 - 1e-9))

@@ -1,0 +1,1 @@
+"""The package's own engine: clusters, broad phase, and the tables of its kernels."""

@@ -1,0 +1,1 @@
+"""What the engines share that go in equal substeps: PyBullet and MuJoCo."""

@@ -1,0 +1,1 @@
+"""Recordings as glTF, with and without a skin."""

@@ -1,0 +1,125 @@
+"""A doll's skin in a glTF file: its surface with materials and images, and what moves it."""
+from __future__ import annotations
+
+import numpy as np
+
+from ...model import rotation
+from ...model.pose import Pose
+from ...model.skin import Paint, Skin
+from ..y_up import orientations_y_up, points_y_up
+from .glb import ATTRIBUTES, INDICES, Glb
+from .vertex_normals import smooth_normals
+
+ROUGHNESS = 0.8
+"""Of surfaces that bring none, as glTF's materials have it: no mirror, no chalk."""
+
+INFLUENCES = 4
+"""Bones that move a vertex, at the most: what every reader of glTF can do."""
+
+
+def add_skin(glb: Glb, skin: Skin, nodes: list[int], name: str) -> int:
+    """Add a doll's skin, Y up, moved by the nodes of its bones; the node that shows it."""
+    weights = np.pad(skin.weights, ((0, 0), (0, max(0, INFLUENCES - skin.weights.shape[1]))))
+    joints = np.argsort(-weights, axis=1, kind='stable')[:, :INFLUENCES]
+    weights = np.take_along_axis(weights, joints, axis=1)
+    # The specification wants slots without weight to be zero.
+    joints = np.where(weights > 0, joints, 0).astype(np.uint16)
+    weights = weights / weights.sum(axis=1, keepdims=True)
+    moved = {'JOINTS_0': glb.accessor(joints, ATTRIBUTES),
+             'WEIGHTS_0': glb.accessor(weights.astype(np.float32), ATTRIBUTES)}
+    inverses = glb.accessor(_inverse_binds(skin).astype(np.float32))
+    bound = glb.add('skins', joints=[nodes[bone] for bone in skin.bones],
+                    inverseBindMatrices=inverses)
+    mesh = glb.add('meshes', primitives=_primitives(
+        glb, skin, points_y_up(skin.vertices), {'NORMAL': points_y_up(skin_normals(skin))}, moved))
+    return glb.add('nodes', name=name, mesh=mesh, skin=bound)
+
+
+def paint_bytes(skin: Skin) -> bytes:
+    """The surface alone, in its bind pose, as a .glb for viser: the doll's frame, z up.
+
+    Its primitives are the runs of `by_material`. Normals are the attribute _NORMAL as well, since
+    viser makes others of its own.
+    """
+    glb = Glb()
+    normals = skin_normals(skin)
+    mesh = glb.add('meshes', primitives=_primitives(
+        glb, skin, skin.vertices, {'NORMAL': normals, '_NORMAL': normals}, {}))
+    glb.document['scene'] = glb.add('scenes', nodes=[glb.add('nodes', mesh=mesh)])
+    return glb.content()
+
+
+def by_material(skin: Skin) -> tuple[np.ndarray, list[tuple[int, int, int]]]:
+    """Triangles (t, 3), those of a material together, and each run's material, begin and end."""
+    numbers = np.full(len(skin.triangles), -1) if skin.paint is None else skin.paint.numbers
+    order = np.argsort(numbers, kind='stable')
+    found, firsts = np.unique(numbers[order], return_index=True)
+    ends = [*firsts[1:].tolist(), len(numbers)]
+    return skin.triangles[order], list(zip(found.tolist(), firsts.tolist(), ends, strict=True))
+
+
+def skin_normals(skin: Skin) -> np.ndarray:
+    """Unit normals (v, 3) in the bind pose, doll's frame: the file's, where it has any."""
+    smooth = smooth_normals(skin.vertices, skin.triangles)
+    if skin.paint is None:
+        return smooth
+    return np.where(skin.paint.normals.any(axis=1, keepdims=True), skin.paint.normals, smooth)
+
+
+def add_material(glb: Glb, color: tuple[float, ...]) -> int:
+    """A plain surface of an sRGB colour with opacity, each from 0 to 1."""
+    values = np.array(color[:3])
+    # IEC 61966-2-1: glTF's factors are linear.
+    linear = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+    return glb.add('materials', alphaMode='OPAQUE' if color[3] == 1 else 'BLEND',
+                   pbrMetallicRoughness={'baseColorFactor': [*linear.tolist(), color[3]],
+                                         'metallicFactor': 0.0, 'roughnessFactor': ROUGHNESS})
+
+
+def _primitives(glb: Glb, skin: Skin, points: np.ndarray, directions: dict[str, np.ndarray],
+                attributes: dict[str, int]) -> list[dict]:
+    """One for each material, all of the same vertices."""
+    given = {'POSITION': points, **directions}
+    if skin.paint is not None:
+        given['TEXCOORD_0'] = skin.paint.uvs
+    attributes = attributes | {name: glb.accessor(values.astype(np.float32), ATTRIBUTES)
+                               for name, values in given.items()}
+    triangles, runs = by_material(skin)
+    taken = [] if skin.paint is None else _add_materials(glb, skin.paint)
+    return [{'attributes': attributes,
+             'material': taken[number] if number >= 0 else add_material(glb, skin.color),
+             'indices': glb.accessor(triangles[begin:end].astype(np.uint32).ravel(), INDICES)}
+            for number, begin, end in runs]
+
+
+def _add_materials(glb: Glb, paint: Paint) -> list[int]:
+    """The materials of a paint with their textures; their indices in the file."""
+    textures = []
+    for texture in paint.textures:
+        image = glb.add('images', bufferView=glb.view(texture.image), mimeType=texture.kind)
+        textures.append(glb.add('textures', source=image,
+                                sampler=glb.add('samplers', **texture.sampler)))
+    return [glb.add('materials', **_with_textures(glb, each, textures)) for each in paint.materials]
+
+
+def _with_textures(glb: Glb, entry: dict, textures: list[int]) -> dict:
+    """A material whose textures are those of the file; its extensions are named there."""
+    made = {}
+    for key, value in entry.items():
+        made[key] = _with_textures(glb, value, textures) if isinstance(value, dict) else value
+        if key == 'index':
+            made[key] = textures[value]
+        elif key == 'extensions':
+            used = glb.document.setdefault('extensionsUsed', [])
+            used += [name for name in value if name not in used]
+    return made
+
+
+def _inverse_binds(skin: Skin) -> np.ndarray:
+    """Matrices (b, 16), column by column, from the skin's place into its bones' axes."""
+    bound = Pose(points_y_up(skin.positions), orientations_y_up(skin.orientations))
+    inverses = np.zeros((len(skin.bones), 4, 4))
+    inverses[:, :3, :3] = rotation.matrix(rotation.inverse(bound.orientation))
+    inverses[:, :3, 3] = bound.inward(np.zeros(3))
+    inverses[:, 3, 3] = 1
+    return inverses.transpose(0, 2, 1).reshape(-1, 16)

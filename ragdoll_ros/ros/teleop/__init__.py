@@ -1,0 +1,1 @@
+"""Keys of a terminal as pushes of a node."""

@@ -1,0 +1,78 @@
+"""Says of topics with PoseArrays how many messages come, how large, and how evenly."""
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+
+import numpy as np
+import rclpy
+from geometry_msgs.msg import PoseArray
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.utilities import remove_ros_args
+
+from ..rclpy_context import ros_session
+
+TOPIC = '/ragdoll/poses'
+
+FIRST = 10
+"""Messages of each topic that are not counted, as discovery bunches them."""
+
+EXAMPLE = """examples:
+  python -m ragdoll_ros.ros.tools.listen
+  python -m ragdoll_ros.ros.tools.listen --seconds 10 /east/ragdoll/poses /west/ragdoll/poses
+"""
+
+
+class Heard:
+    """Arrivals and sizes of what comes on a topic."""
+
+    def __init__(self, node: Node, topic: str) -> None:
+        self.topic = topic
+        self.arrivals: list[int] = []
+        """ns of the steady clock."""
+        self.bytes = 0
+        node.create_subscription(PoseArray, topic, self._take, 100, raw=True)
+
+    def _take(self, data: bytes) -> None:
+        self.arrivals.append(time.monotonic_ns())
+        self.bytes += len(data)
+
+    def line(self) -> str:
+        """Messages and bytes in a second, and ms from one message to the next."""
+        counted = self.arrivals[FIRST:]
+        if len(counted) < 2:
+            return f'{self.topic}: {len(self.arrivals)} messages'
+        gaps = np.diff(counted) / 1e6
+        rate = 1e3 / gaps.mean()
+        return (f'{self.topic}: {rate:.1f} messages/s of {self.bytes // len(self.arrivals)} bytes, '
+                f'{rate * self.bytes / len(self.arrivals) / 1e6:.2f} MB/s; between them '
+                f'p50 {np.median(gaps):.2f} ms, p99 {np.percentile(gaps, 99):.2f} ms, '
+                f'at the most {gaps.max():.1f} ms')
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Listen, from the first message of every topic on, and print a line for each."""
+    arguments = sys.argv if arguments is None else arguments
+    parser = argparse.ArgumentParser(
+        'python -m ragdoll_ros.ros.tools.listen', description=__doc__, epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('topics', nargs='*', default=[TOPIC], help=f'({TOPIC})')
+    parser.add_argument('--seconds', type=float, default=5.0, help='for how long (%(default)s)')
+    options = parser.parse_args(remove_ros_args(arguments)[1:])
+    with ros_session(arguments), SingleThreadedExecutor() as executor:
+        node = Node('listen')
+        executor.add_node(node)
+        heard = [Heard(node, topic) for topic in options.topics]
+        while rclpy.ok() and not all(each.arrivals for each in heard):
+            executor.spin_once(timeout_sec=1.0)
+        end = time.monotonic() + options.seconds
+        while rclpy.ok() and time.monotonic() < end:
+            executor.spin_once(timeout_sec=0.1)
+        print('\n'.join(each.line() for each in heard), flush=True)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Fields of the page's panels, and how they read what is typed."""
