@@ -7,52 +7,52 @@ import numpy as np
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.coordinates import DofLayout, GeneralizedState
 from ragdoll_ros.model.state import State
-from ragdoll_ros.physics.engine.rigid.build_system import system_of
-from ragdoll_ros.physics.kernels.advance import observe
+from ragdoll_ros.physics.engine.rigid.build_system import build_system
+from ragdoll_ros.physics.kernels.advance import write_bone_states
 from ragdoll_ros.physics.kernels.compiling.bundle import bind, bundle_at
-from ragdoll_ros.physics.kernels.dynamics.bias import integrate
-from ragdoll_ros.physics.kernels.dynamics.forward import accelerations
-from ragdoll_ros.physics.kernels.flight.path import along, path_step
-from ragdoll_ros.physics.kernels.system import COURSE, ROOM, SYSTEM, make_course, make_room
+from ragdoll_ros.physics.kernels.dynamics.bias_forces import integrate_positions
+from ragdoll_ros.physics.kernels.dynamics.forward_dynamics import forward_dynamics
+from ragdoll_ros.physics.kernels.flight.dense_step import evaluate_dense_step, dop853_step
+from ragdoll_ros.physics.kernels.system import CLUSTER_STATE, WORKSPACE, SYSTEM, make_cluster_state, make_workspace
 
-SYSTEM_AT, ROOM_AT, COURSE_AT = bundle_at(SYSTEM), bundle_at(ROOM), bundle_at(COURSE)
+SYSTEM_AT, ROOM_AT, COURSE_AT = bundle_at(SYSTEM), bundle_at(WORKSPACE), bundle_at(CLUSTER_STATE)
 
 
 @numba.njit
 def _observe(s, r, course, rows):
     course = COURSE_AT(course)
-    observe(SYSTEM_AT(s), ROOM_AT(r), course.q, course.v, rows)
+    write_bone_states(SYSTEM_AT(s), ROOM_AT(r), course.q, course.v, rows)
 
 
 @numba.njit
 def _accelerate(s, r, course, loads, out):
     s, course = SYSTEM_AT(s), COURSE_AT(course)
-    accelerations(s.tree, s.gravity, loads, course.q, course.v, ROOM_AT(r).work, out)
+    forward_dynamics(s.tree, s.gravity, loads, course.q, course.v, ROOM_AT(r).work, out)
 
 
 @numba.njit
 def _integrate(s, r, course, h, out):
     course = COURSE_AT(course)
-    integrate(SYSTEM_AT(s).tree, course.q, course.v, h, out)
+    integrate_positions(SYSTEM_AT(s).tree, course.q, course.v, h, out)
 
 
 @numba.njit
 def _step(s, r, course, loads, h):
-    path_step(SYSTEM_AT(s), ROOM_AT(r), loads, COURSE_AT(course), h)
+    dop853_step(SYSTEM_AT(s), ROOM_AT(r), loads, COURSE_AT(course), h)
 
 
 @numba.njit
 def _along(s, r, course, time, q, v):
-    along(SYSTEM_AT(s).tree, COURSE_AT(course), time, q, v)
+    evaluate_dense_step(SYSTEM_AT(s).tree, COURSE_AT(course), time, q, v)
 
 
 class KernelDynamics:
     """A scene's dynamics, without any choice of steps; coordinates are those of engines."""
 
     def __init__(self, scene):
-        system = system_of(scene)
-        self._course = make_course(system)
-        self._parts = system, make_room(system, self._course), self._course
+        system = build_system(scene)
+        self._course = make_cluster_state(system)
+        self._parts = system, make_workspace(system, self._course), self._course
         self._rows = [bind(part) for part in self._parts]
         self._addresses = [rows[0].ctypes.data for rows in self._rows]
         self._layout = DofLayout([placement.doll for placement in scene.dolls])
@@ -89,7 +89,7 @@ class KernelDynamics:
             return self._outwards(q, v)
         return at
 
-    def fly(self, start, duration, steps, wrenches=()):
+    def follow_dense_step(self, start, duration, steps, wrenches=()):
         """The coordinates ``duration`` s later, in equal steps."""
         for _ in range(steps):
             start = self.step(start, duration / steps, wrenches)(1.0)
@@ -105,7 +105,7 @@ class KernelDynamics:
 
     def _turned(self, q, v, way):
         v, spins = v.copy(), self._layout.root_spins
-        v[spins] = rotation.rotate(way(q[self._layout.root_orientations]), v[spins])
+        v[spins] = rotation.rotate(motion_bound(q[self._layout.root_orientations]), v[spins])
         return v
 
 

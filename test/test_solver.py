@@ -7,12 +7,12 @@ import pytest
 numba = pytest.importorskip('numba')
 
 from ragdoll_ros.physics.kernels.impulses.active_set import solve_active_set  # noqa: E402
-from ragdoll_ros.physics.kernels.impulses.one_contact import one_contact  # noqa: E402
+from ragdoll_ros.physics.kernels.impulses.one_contact import solve_one_contact  # noqa: E402
 
 
 @numba.njit
 def _one_contact(ease, c, last, mu):
-    return one_contact(ease, 3, 0, c[0], c[1], c[2], last[0], last[1], last[2], mu)
+    return solve_one_contact(ease, 3, 0, c[0], c[1], c[2], last[0], last[1], last[2], mu)
 
 
 @numba.njit

@@ -9,9 +9,9 @@ import pytest
 numba = pytest.importorskip('numba')
 
 from ragdoll_ros.physics.kernels.contact.gaps import TOUCHING  # noqa: E402
-from ragdoll_ros.physics.kernels.stepping.control import TRIES, meet  # noqa: E402
-from ragdoll_ros.physics.kernels.stepping.give_back import keep_limits  # noqa: E402
-from ragdoll_ros.physics.kernels.stepping.touch import (  # noqa: E402
+from ragdoll_ros.physics.kernels.stepping.step_control import TRIES, activate_contacts  # noqa: E402
+from ragdoll_ros.physics.kernels.stepping.position_correction import clip_to_joint_limits  # noqa: E402
+from ragdoll_ros.physics.kernels.stepping.time_of_impact import (  # noqa: E402
     SUNK,
     between,
     narrow,
@@ -23,13 +23,13 @@ from ragdoll_ros.physics.kernels.stepping.touch import (  # noqa: E402
 Scene = collections.namedtuple('Scene', 'pairs bounds doll_of bone_of')
 Met = collections.namedtuple('Met', 'gaps later met')
 Gaps = collections.namedtuple('Gaps', 'gaps later above below bracket')
-BOUND = [('q', int), ('v', int), ('lower', float), ('upper', float)]
+JOINT_LIMIT = [('q', int), ('v', int), ('lower', float), ('upper', float)]
 
 
 def scene(*bounds):
     """What of a scene limits are: none, or those of coordinates 0, 1, ... of one doll, rad."""
     rows = [(k, k, lower, upper) for k, (lower, upper) in enumerate(bounds)]
-    return Scene(np.zeros(0), np.array(rows, BOUND), np.zeros(len(rows), int),
+    return Scene(np.zeros(0), np.array(rows, JOINT_LIMIT), np.zeros(len(rows), int),
                  np.arange(len(rows)))
 
 
@@ -47,30 +47,30 @@ def _tries(scene, r, v, length, step, starts, falls, powers):
     tries = 0
     while tries < 100:
         tries += 1
-        r.later[:] = starts - falls * (length / step) ** powers
+        r.gaps_end[:] = starts - falls * (length / step) ** powers
         for k in range(len(v)):
-            r.later[2 * k] += v[k] * length
-            r.later[2 * k + 1] -= v[k] * length
-        sunk, landed, _ = touched(scene, r, length)
-        if not narrow(scene, r, length, sunk, landed):
+            r.gaps_end[2 * k] += v[k] * length
+            r.gaps_end[2 * k + 1] -= v[k] * length
+        sunk, landed, _ = impact_found(scene, r, length)
+        if not update_bracket(scene, r, length, sunk, landed):
             break
-        length = between(scene, r, v)
+        length = next_trial_step(scene, r, v)
     return tries
 
 
 @numba.njit
 def _until_limit(scene, r, v, step):
-    return until_limit(scene, r, v, step)
+    return step_to_joint_limit(scene, r, v, step)
 
 
 @numba.njit
 def _meet(scene, r, h):
-    return meet(scene, r, h)
+    return activate_contacts(scene, r, h)
 
 
 @numba.njit
 def _keep_limits(scene, q, shift):
-    keep_limits(scene, q, shift)
+    clip_to_joint_limits(scene, q, shift)
 
 
 def tries(starts, falls, powers, step=2e-3):
@@ -79,7 +79,7 @@ def tries(starts, falls, powers, step=2e-3):
     r.gaps[:] = starts
     made = _tries(scene(), r, still, step, step, np.array(starts), np.array(falls),
                   np.array(powers))
-    return made, r.later.min()
+    return made, r.gaps_end.min()
 
 
 def test_two_gaps_that_lag_by_turns_are_brought_to_their_first_touch():
@@ -123,10 +123,10 @@ def test_a_joint_is_taken_to_its_limit_by_its_rate():
                       np.full(4, 2.0))
         if bend > 0:
             assert made == 2
-            assert SUNK <= r.later[1] <= TOUCHING
+            assert SUNK <= r.gaps_end[1] <= TOUCHING
         else:  # a step like others; the next one begins from there
             assert made == 1
-            assert 0 < r.later[1] < 2e-4
+            assert 0 < r.gaps_end[1] < 2e-4
 
 
 def test_what_is_given_back_takes_a_joint_to_its_limit_at_most():
@@ -149,4 +149,4 @@ def test_what_lands_fast_has_met_where_touches_are_not_sought():
     for before, met in ((0.01, True), (1e-5, False)):
         r = Met(np.array([1.0, before]), np.array([1.0, 0.0]), np.array([1.0, before]))
         assert _meet(limits, r, h) == met
-        assert (r.met[1] == 0.0) == met
+        assert (r.gaps_active[1] == 0.0) == met

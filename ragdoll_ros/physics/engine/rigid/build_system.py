@@ -10,8 +10,8 @@ from ....model import rotation
 from ....model.coordinates import DofLayout
 from ....model.ragdoll import Joint, Ragdoll, joint_axes
 from ....model.scene import Scene
-from ...kernels.record import RECORD
-from ...kernels.system import BOUND, GEOM, PAIR, STICKS, System
+from ...kernels.dynamics.body import BODY
+from ...kernels.system import JOINT_LIMIT, GEOM, PAIR, NO_SLIP, System
 from ...motion import damping_rate
 
 KINDS = {'sphere': 0, 'capsule': 1, 'box': 2, 'cylinder': 3}
@@ -28,12 +28,12 @@ Law = tuple[float, float, float]
 """Friction, rolling friction (m), restitution."""
 
 
-def system_of(scene: Scene) -> System:
+def build_system(scene: Scene) -> System:
     """The tables of a scene; ``pairs`` are those within dolls."""
-    tree = table(scene)
+    tree = kinematic_tree_table(scene)
     layout = DofLayout([placement.doll for placement in scene.dolls])
     ground = scene.ground
-    bounds = np.zeros(len(layout.limited[0]), BOUND)
+    bounds = np.zeros(len(layout.limited[0]), JOINT_LIMIT)
     bounds['q'], bounds['v'] = layout.limited
     bounds['lower'], bounds['upper'] = layout.limits
     geoms = _geoms(scene, tree)
@@ -48,7 +48,7 @@ def system_of(scene: Scene) -> System:
         flies=np.array([float(damping_rate(scene) < STIFFEST)]))
 
 
-def table(scene: Scene) -> np.ndarray:
+def kinematic_tree_table(scene: Scene) -> np.ndarray:
     """Records of all bones of a scene, coordinates in the order of DofLayout."""
     places = {name: place for place, name in enumerate(scene.bone_names)}
     records: list[np.ndarray] = []
@@ -57,7 +57,7 @@ def table(scene: Scene) -> np.ndarray:
         doll, at = placement.doll, {}
         for joint in (None, *doll.joints_depth_first()):
             bone = doll.bone(joint.child) if joint else doll.root
-            record = np.zeros((), RECORD)
+            record = np.zeros((), BODY)
             record['parent'], record['free'] = -1, 1
             if joint:
                 _enter_joint(record, doll, joint, at)
@@ -70,7 +70,7 @@ def table(scene: Scene) -> np.ndarray:
                 q, v = q + 7, v + 6
             else:
                 q, v = q + (4 if record['free'] else joint.dof), v + joint.dof
-    return np.array(records, RECORD)
+    return np.array(records, BODY)
 
 
 def _enter_joint(record: np.ndarray, doll: Ragdoll, joint: Joint, at: dict[str, int]) -> None:
@@ -83,13 +83,13 @@ def _enter_joint(record: np.ndarray, doll: Ragdoll, joint: Joint, at: dict[str, 
     record['axes'][:joint.dof] = joint_axes(joint)
 
 
-def joined(systems: Sequence[System], pairs: np.ndarray) -> System:
+def join_systems(systems: Sequence[System], pairs: np.ndarray) -> System:
     """The tables of several systems as one, and ``pairs`` between their geoms."""
     q = v = bones = geoms = points = 0
     parts = []
     for one in systems:
         tree, shapes, own, bounds = (part.copy() for part in (
-            one.tree, one.geoms, one.pairs, one.bounds))
+            one.tree, one.geoms, one.pairs, one.joint_limits))
         tree['parent'] += np.where(tree['parent'] >= 0, bones, 0)
         tree['bone'] += bones
         shapes['bone'] += bones
@@ -101,10 +101,10 @@ def joined(systems: Sequence[System], pairs: np.ndarray) -> System:
         own['b'] += geoms
         parts.append(one._replace(
             tree=tree, geoms=shapes, pairs=own, bounds=bounds,
-            up=np.where(one.up >= 0, one.up + v, -1), last=one.last + v,
-            bone_of=one.bone_of + bones, root_of=one.root_of + bones,
-            doll_of=one.doll_of + sum(len(part.doll_masses) for part in parts)))
-        q, v, bones = q + coordinates(one), v + len(one.up), bones + len(tree)
+            up=np.where(one.dof_parent >= 0, one.dof_parent + v, -1), last=one.body_last_dof + v,
+            bone_of=one.dof_body + bones, root_of=one.body_root + bones,
+            doll_of=one.body_doll + sum(len(part.doll_masses) for part in parts)))
+        q, v, bones = q + coordinates(one), v + len(one.dof_parent), bones + len(tree)
         geoms, points = geoms + len(shapes), points + int(shapes['count'].sum())
     whole = {name: np.concatenate([getattr(part, name) for part in parts]) for name in (
         'tree', 'up', 'last', 'bone_of', 'root_of', 'doll_of', 'damping', 'geoms', 'bounds',
@@ -114,12 +114,12 @@ def joined(systems: Sequence[System], pairs: np.ndarray) -> System:
         **whole, pairs=np.concatenate([*(part.pairs for part in parts), pairs]),
         heft=np.array([tree['mass'].sum() * shapes['reach'].max()
                        * math.hypot(*parts[0].gravity)]),
-        flies=np.array([min(part.flies[0] for part in parts)]))
+        flies=np.array([min(part.flight_enabled[0] for part in parts)]))
 
 
 def coordinates(system: System) -> int:
     """How many coordinates a system has."""
-    return len(system.up) + int(system.tree['free'].sum())
+    return len(system.dof_parent) + int(system.tree['free'].sum())
 
 
 def pairs_between(scene: Scene, couples: np.ndarray) -> np.ndarray:
@@ -140,8 +140,8 @@ def contact_law(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """
     out = np.empty(np.broadcast_shapes(a.shape, b.shape))
     low, high = np.minimum(a[..., 0], b[..., 0]), np.maximum(a[..., 0], b[..., 0])
-    mean = np.sqrt(np.minimum(low, STICKS) * np.minimum(high, STICKS))
-    out[..., 0] = np.where(np.isfinite(high), mean, np.minimum(low, STICKS))
+    mean = np.sqrt(np.minimum(low, NO_SLIP) * np.minimum(high, NO_SLIP))
+    out[..., 0] = np.where(np.isfinite(high), mean, np.minimum(low, NO_SLIP))
     out[..., 1] = (a[..., 1] + b[..., 1]) / 2
     out[..., 2] = np.sqrt(a[..., 2] * b[..., 2])
     return out

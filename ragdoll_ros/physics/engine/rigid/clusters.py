@@ -13,10 +13,10 @@ from ....model.scene import Scene
 from ...accuracy import Accuracy
 from ...kernels.compiling.bundle import bind
 from ...kernels.loaded import advance as kernels
-from ...kernels.system import TALLY, Course, Room, System, make_course, make_room
+from ...kernels.system import STEP_STATS, ClusterState, Workspace, System, make_cluster_state, make_workspace
 from ..protocol import GROUND
 from .broad_phase import NO_COUPLES
-from .build_system import joined, pairs_between, system_of
+from .build_system import join_systems, pairs_between, build_system
 from .doll_states import KEPT, Courses, room_for_contacts
 
 COUNTS = ('flights', 'steps', 'impacts', 'sweeps', 'unsolved', 'left_out', 'stalls', 'softened',
@@ -42,8 +42,8 @@ class Cluster:
     v: np.ndarray
     """Where their coordinates and velocities stand among the scene's."""
     system: System
-    course: Course
-    rooms: list[Room]
+    course: ClusterState
+    rooms: list[Workspace]
     bundles: list[list[np.ndarray]]
     """The rows that bind system, course, and a room for each worker; see compiling/bundle.py."""
 
@@ -52,7 +52,7 @@ class Cluster:
         system, course, *rooms = (rows[0].ctypes.data for rows in self.bundles)
         return [system, rooms[worker % len(rooms)], course]
 
-    def use(self, course: Course) -> None:
+    def use(self, course: ClusterState) -> None:
         """Go on with this course, of which other arrays act than before."""
         self.course = course
         self.bundles[1][0][:] = bind(course)[0]
@@ -68,14 +68,14 @@ class Clusters:
         self._v = [np.arange(own.start, own.stop) for own in layout.own_v]
         self._doll_of_v = np.repeat(np.arange(len(self._v)), list(map(len, self._v)))
         self._bones = [np.arange(own.start, own.stop) for own in scene.bone_slices]
-        self._rooms: dict[int, list[Room]] = {}
+        self._rooms: dict[int, list[Workspace]] = {}
         self._workers, self._threads = workers, None
         self._courses = Courses(self._systems)
         whole = self._courses.whole
         self.q, self.v, self.rows = whole['q'], whole['v'], whole['rows'].reshape(-1, 13)
         self.sums, self.tally = whole['sums'], whole['tally']
         """A joined cluster counts where its first doll does."""
-        first = TALLY.fields['pushed'][1] // TALLY.fields['handed'][0].itemsize
+        first = STEP_STATS.fields['pushed'][1] // STEP_STATS.fields['handed'][0].itemsize
         self._work = self.tally.view(float).reshape(len(self.tally), -1)[:, first:first + 2]
         """(d, 2) J, of pushes and of hands."""
         trees = {id(system): system.tree['bone'] for system in self._systems}
@@ -149,7 +149,7 @@ class Clusters:
         for cluster in self._joined:
             if dolls[cluster.dolls[0]]:
                 cluster.course.v[:] = 0.0
-                cluster.course.path[:] = 0
+                cluster.course.dense_step[:] = 0
 
     def gather(self) -> None:
         """Let joined clusters go on from where the scene's q and v are."""
@@ -159,11 +159,11 @@ class Clusters:
     def within(self, flags: list[np.ndarray]) -> None:
         """Enter why pairs of each doll do not collide."""
         for cluster, own in zip(self._alone, flags, strict=True):
-            cluster.course.within[:] = own
+            cluster.course.excluded[:] = own
 
     def flags(self, kind: int) -> list[np.ndarray]:
         """Those of a kind, WITHIN or OUTSIDE, of each doll's pairs."""
-        return [cluster.course.within & kind for cluster in self._alone]
+        return [cluster.course.excluded & kind for cluster in self._alone]
 
     def begin(self) -> None:
         """Let all go on by themselves, nothing known of what is to come."""
@@ -200,9 +200,9 @@ class Clusters:
         found = [_touching(courses.whole['known'][known], self._records, self._first[dolls],
                            self.tally['lasted'][dolls])]
         for cluster in self._joined:
-            tally = cluster.course.tally[0]
-            if not cluster.course.path['valid'][0]:
-                known = cluster.course.known[:tally['contacts']]
+            tally = cluster.course.stats[0]
+            if not cluster.course.dense_step['valid'][0]:
+                known = cluster.course.contacts[:tally['contacts']]
                 found.append(_touching(known, cluster.bones[cluster.system.tree['bone']],
                                        np.zeros(len(known), np.int64),
                                        np.full(len(known), tally['lasted'])))
@@ -210,7 +210,7 @@ class Clusters:
 
     def _touching_of_one(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The same of a scene of one doll, three times as quick."""
-        known, lasted = self._known_of_one(), self._alone[0].course.tally['lasted'][0]
+        known, lasted = self._known_of_one(), self._alone[0].course.stats['lasted'][0]
         return _touching(known, self._records, np.zeros(len(known), np.int64),
                          np.full(len(known), lasted))
 
@@ -230,7 +230,7 @@ class Clusters:
     def _known_of_one(self) -> np.ndarray:
         """Contacts, and joints at their limits, of the last step of a scene of one doll."""
         course = self._alone[0].course
-        return course.known[:0 if course.path['valid'][0] else int(course.tally['contacts'][0])]
+        return course.contacts[:0 if course.dense_step['valid'][0] else int(course.stats['contacts'][0])]
 
     def save(self) -> object:
         """A snapshot that restore() brings back to the bit."""
@@ -246,13 +246,13 @@ class Clusters:
         for cluster, course in joint:
             for name in KEPT:
                 getattr(cluster.course, name)[:] = getattr(course, name)
-            cluster.course.known[:len(course.known)] = course.known
+            cluster.course.contacts[:len(course.contacts)] = course.contacts
 
     def checkpoint(self) -> dict[str, np.ndarray]:
         """What no look at the scene would tell; as bytes, as numpy copies records slowly."""
         return {name: self._courses.whole[name].view(np.uint8).copy() for name in UNSEEN}
 
-    def go_back(self, checkpoint: dict[str, np.ndarray]) -> None:
+    def bisect_first_contact(self, checkpoint: dict[str, np.ndarray]) -> None:
         """Go on from a checkpoint, all by themselves."""
         for name, values in checkpoint.items():
             self._courses.whole[name].view(np.uint8)[:] = values
@@ -302,19 +302,19 @@ class Clusters:
     def _spread(self, cluster: Cluster) -> None:
         """Enter what a joined cluster has come to among the scene's."""
         self.q[cluster.q], self.v[cluster.v] = cluster.course.q, cluster.course.v
-        self.rows[cluster.bones] = cluster.course.rows
-        self.sums[cluster.dolls] = cluster.course.sums
+        self.rows[cluster.bones] = cluster.course.bone_states
+        self.sums[cluster.dolls] = cluster.course.doll_sums
         at = 0
         for doll in cluster.dolls:
-            within = self._alone[doll].course.within
-            within[:] = cluster.course.within[at:at + len(within)]
+            within = self._alone[doll].course.excluded
+            within[:] = cluster.course.excluded[at:at + len(within)]
             at += len(within)
 
     def _begin(self, cluster: Cluster) -> None:
         """Nothing is known of its contacts, its gaps and its next flight."""
-        cluster.course.path[:] = cluster.course.reaction[:] = 0
+        cluster.course.dense_step[:] = cluster.course.contact_accelerations[:] = 0
         for name in ('contacts', 'settled', 'lasted', 'next', 'seen'):
-            cluster.course.tally[name] = 0
+            cluster.course.stats[name] = 0
 
     def _single(self, doll: int) -> Cluster:
         """A doll by itself; its state is a part of the scene's, its scratch that of its equals."""
@@ -322,8 +322,8 @@ class Clusters:
         bones, q, v = self._bones[doll], self._q[doll], self._v[doll]
         course = self._courses[doll]
         if id(system) not in self._rooms:
-            self._rooms[id(system)] = [make_room(system, course) for _ in range(self._workers)]
-        rooms = [room._replace(tally=course.tally, within=course.within, gaps=course.gaps)
+            self._rooms[id(system)] = [make_workspace(system, course) for _ in range(self._workers)]
+        rooms = [room._replace(tally=course.stats, within=course.excluded, gaps=course.gaps)
                  for room in self._rooms[id(system)]]
         return _bound(np.array([doll]), NO_COUPLES, bones, q, v, system, course, rooms)
 
@@ -341,12 +341,12 @@ class Clusters:
             for a, b in [(place[int(one)], place[int(other)])]])
         scene = dataclasses.replace(
             self._scene, dolls=tuple(self._scene.dolls[doll] for doll in dolls))
-        system = joined(systems, pairs_between(scene, geoms))
+        system = join_systems(systems, pairs_between(scene, geoms))
         alone = [self._alone[doll].course for doll in dolls]
-        course = make_course(system, room_for_contacts(system))._replace(
+        course = make_cluster_state(system, room_for_contacts(system))._replace(
             q=self.q[q], v=self.v[v], tally=self.tally[dolls[0]:dolls[0] + 1],
-            within=np.concatenate([course.within for course in alone]))
-        return _bound(dolls, couples, bones, q, v, system, course, [make_room(system, course)])
+            within=np.concatenate([course.excluded for course in alone]))
+        return _bound(dolls, couples, bones, q, v, system, course, [make_workspace(system, course)])
 
 
 def _bound(*parts: object) -> Cluster:
@@ -360,7 +360,7 @@ def _systems(scene: Scene) -> list[System]:
     made: dict[int, System] = {}
     for placement in scene.dolls:
         if id(placement.doll) not in made:
-            made[id(placement.doll)] = system_of(dataclasses.replace(scene, dolls=(placement,)))
+            made[id(placement.doll)] = build_system(dataclasses.replace(scene, dolls=(placement,)))
     return [made[id(placement.doll)] for placement in scene.dolls]
 
 
@@ -379,6 +379,6 @@ def _touching(known: np.ndarray, records: np.ndarray, first: np.ndarray,
     return known, bones, np.where(lasted > 0, lasted, 1.0)
 
 
-def _copied(course: Course) -> Course:
-    known = course.known[:int(course.tally['contacts'][0])]
-    return Course(*(part.copy() for part in course._replace(known=known)))
+def _copied(course: ClusterState) -> ClusterState:
+    known = course.contacts[:int(course.stats['contacts'][0])]
+    return ClusterState(*(part.copy() for part in course._replace(known=known)))

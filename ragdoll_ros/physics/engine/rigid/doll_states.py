@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...kernels.system import Course, System, make_course
+from ...kernels.system import ClusterState, System, make_cluster_state
 
 KEPT = ('dense', 'ends', 'path', 'within', 'gaps', 'reaction', 'q', 'v', 'rows', 'sums', 'tally')
 """What a snapshot holds beside the contacts that are known."""
@@ -18,7 +18,7 @@ class Courses(Sequence):
     """A course of each doll; ``whole`` are their arrays, flat, doll by doll."""
 
     def __init__(self, systems: Sequence[System]) -> None:
-        blank = {id(system): make_course(system, room_for_contacts(system)) for system in systems}
+        blank = {id(system): make_cluster_state(system, room_for_contacts(system)) for system in systems}
         own = [blank[id(system)] for system in systems]
         parts = []
         for name in (*KEPT, 'known'):
@@ -29,12 +29,12 @@ class Courses(Sequence):
                 flat[end - part.size:end].reshape(part.shape)
                 for end, part in zip(ends.tolist(), each, strict=True)]))
         self.whole = {name: flat for name, flat, _ in parts}
-        self._room = np.array([len(course.known) for course in own])
+        self._room = np.array([len(course.contacts) for course in own])
         self._first = np.cumsum(self._room) - self._room
         self._each = [course._replace(**{name: views[doll] for name, _, views in parts})
                       for doll, course in enumerate(own)]
 
-    def __getitem__(self, doll: int) -> Course:
+    def __getitem__(self, doll: int) -> ClusterState:
         return self._each[doll]
 
     def __len__(self) -> int:
@@ -62,4 +62,4 @@ class Courses(Sequence):
 
 def room_for_contacts(system: System) -> int:
     """Contacts for which a course of this system has room."""
-    return CONTACTS_OF_GEOM * len(system.geoms) + len(system.bounds)
+    return CONTACTS_OF_GEOM * len(system.geoms) + len(system.joint_limits)

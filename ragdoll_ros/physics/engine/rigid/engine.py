@@ -15,7 +15,7 @@ from ....model.scene import Scene
 from ....model.state import State
 from ...accuracy import Accuracy
 from ...ground_heights import GroundHeights
-from ...kernels.system import OUTSIDE, WITHIN
+from ...kernels.system import JOINT_OUTSIDE_LIMITS, OVERLAPPING
 from ...motion import Motion
 from ..protocol import GROUND, Contacts, Drives, Springs, Wrenches, pressed
 from .broad_phase import Neighbours
@@ -46,10 +46,10 @@ class RigidEngine:
         self._heights = GroundHeights(scene)
         self._spins = self.layout.root_spins
         self.resting = np.zeros(len(scene.dolls), bool)
-        self._designed = [np.full(len(own), WITHIN) for own in self._clusters.flags(WITHIN)]
+        self._designed = [np.full(len(own), OVERLAPPING) for own in self._clusters.flags(OVERLAPPING)]
         """Pairs that are within each other as bound: they are left so until they come apart."""
         self.place(self._placed())
-        self._designed = self._clusters.flags(WITHIN)
+        self._designed = self._clusters.flags(OVERLAPPING)
 
     @property
     def state(self) -> State:
@@ -95,7 +95,7 @@ class RigidEngine:
         self.resting[:] = False
         self._look()
         self._lift_out()
-        clusters.within([own | OUTSIDE for own in self._designed])
+        clusters.within([own | JOINT_OUTSIDE_LIMITS for own in self._designed])
         self._look()
         self._age = KEPT
         self._start_energy = float(self.motion.energy.sum())
@@ -170,7 +170,7 @@ class RigidEngine:
         """Where all is and what the accounts say: far cheaper than save()."""
         return self._clusters.checkpoint(), self.resting.copy(), self._start_energy
 
-    def go_back(self, checkpoint: tuple) -> None:
+    def bisect_first_contact(self, checkpoint: tuple) -> None:
         """Go on from a checkpoint; see Engine."""
         kept, self.resting[:], self._start_energy = checkpoint
         self._clusters.go_back(kept)
@@ -212,7 +212,7 @@ class RigidEngine:
         self._clusters.advance(duration, accuracy, self.resting)
         for cluster in acted:
             cluster.use(cluster.course._replace(loads=NO_LOADS, springs=NO_SPRINGS))
-            cluster.course.path[:] = 0
+            cluster.course.dense_step[:] = 0
         self._show()
 
     def _show(self) -> None:
@@ -235,7 +235,7 @@ class RigidEngine:
             cluster.use(cluster.course._replace(
                 loads=load_rows(loads, bones),
                 springs=spring_rows(hands, drives, self.scene, bones, records)))
-            cluster.course.path[:] = 0
+            cluster.course.dense_step[:] = 0
             acted.append(cluster)
         return acted
 

@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from ....model.scene import Scene
-from ...kernels.system import HAND, HOLDS, MOVES, TURNS
+from ...kernels.system import GRAB, JOINT_SPRING, LINEAR_DRIVE, TURNS
 from ..protocol import AppliedDrive, AppliedHold, Drives, Spring, Springs, Wrenches
 
 NO_LOADS = np.zeros((0, 11))
@@ -44,7 +44,7 @@ def _hand(record: int, spring: Spring) -> np.ndarray:
     spring = spring.after(0.0)
     speed = (spring.target - spring.position) / spring.left if spring.left > 0 else np.zeros(3)
     return np.concatenate([[record], spring.point, spring.position, speed, [
-        spring.left, spring.stiffness, spring.damping, spring.most, 1.0, 0.0, 0.0, 0.0, HAND, 0.0]])
+        spring.left, spring.stiffness, spring.damping, spring.most, 1.0, 0.0, 0.0, 0.0, GRAB, 0.0]])
 
 
 def _hold(record: int, hold: AppliedHold, scene: Scene) -> np.ndarray:
@@ -53,7 +53,7 @@ def _hold(record: int, hold: AppliedHold, scene: Scene) -> np.ndarray:
     row = np.zeros(20)
     row[[0, 1, 4]] = record, hold.axis, hold.target
     row[10:15] = math.inf, hold.stiffness, hold.damping, math.inf, 1.0
-    row[18:] = HOLDS, mobility
+    row[18:] = JOINT_SPRING, mobility
     return row
 
 
@@ -68,5 +68,5 @@ def _drive(record: int, drive: AppliedDrive, scene: Scene) -> list[np.ndarray]:
     return [np.concatenate([[record], none, target, [math.inf, 0.0, gain, most, 1.0, 0.0, 0.0, 0.0,
                                                      kind, mobility]])
             for kind, target, gain, most, mobility in zip(
-                (MOVES, TURNS), drive.targets, drive.gains, drive.most, mobilities, strict=True)
+                (LINEAR_DRIVE, TURNS), drive.targets, drive.gains, drive.most, mobilities, strict=True)
             if gain > 0]

@@ -12,9 +12,9 @@ import numpy as np
 from ..collision.pair import separation
 from ..collision.shapes import CAPSULE, SPHERE, extent
 from ..compiling.decorators import compiled
-from ..dynamics.forward import Work, pose
+from ..dynamics.forward_dynamics import Kinematics, forward_kinematics
 from ..maths.quaternion import cross, times, to_matrix, turned
-from ..system import OUTSIDE, WITHIN, Room, System
+from ..system import JOINT_OUTSIDE_LIMITS, OVERLAPPING, Workspace, System
 
 TOUCHING = 1e-6
 """m or rad: what is nearer touches."""
@@ -39,18 +39,18 @@ NEVER = 1e6
 
 
 @compiled
-def place_geoms(tree: np.ndarray, root_of: np.ndarray, geoms: np.ndarray, work: Work,
+def place_geoms(tree: np.ndarray, root_of: np.ndarray, geoms: np.ndarray, work: Kinematics,
                 q: np.ndarray, centres: np.ndarray, turns: np.ndarray) -> None:
     """Centres (g, 3) m and rotation matrices (g, 3, 3) of all geoms; work is posed at q."""
     for k in range(len(geoms)):
         geom = geoms[k]
         i = geom.bone
-        t, c, root = work.turns[i], work.centres[i], tree[root_of[i]].q
-        x, y, z = turned(t[0], t[1], t[2], t[3], geom.offset[0], geom.offset[1], geom.offset[2])
+        t, c, root = work.orientations[i], work.positions[i], tree[root_of[i]].q
+        x, y, z = turned(t[0], t[1], t[2], t[3], geom.position[0], geom.position[1], geom.position[2])
         at = centres[k]
         at[0], at[1], at[2] = q[root] + c[0] + x, q[root + 1] + c[1] + y, q[root + 2] + c[2] + z
-        x, y, z, w = times(t[0], t[1], t[2], t[3], geom.turn[0], geom.turn[1], geom.turn[2],
-                           geom.turn[3])
+        x, y, z, w = times(t[0], t[1], t[2], t[3], geom.orientation[0], geom.orientation[1], geom.orientation[2],
+                           geom.orientation[3])
         to_matrix(x, y, z, w, turns[k])
 
 
@@ -59,10 +59,10 @@ def ground_gaps(geom: np.record, at: np.ndarray, turn: np.ndarray, n: np.ndarray
                 out: np.ndarray) -> None:
     """Heights of a geom's points over the ground: see ground_point()."""
     high = at[0] * n[0] + at[1] * n[1] + at[2] * n[2] - offset
-    first = geom.first
-    if high > geom.radius + FAR:
-        for k in range(geom.count):
-            out[first + k] = high - geom.radius
+    first = geom.first_point
+    if high > geom.bounding_radius + FAR:
+        for k in range(geom.point_count):
+            out[first + k] = high - geom.bounding_radius
         return
     a = turn[0, 0] * n[0] + turn[1, 0] * n[1] + turn[2, 0] * n[2]
     b = turn[0, 1] * n[0] + turn[1, 1] * n[1] + turn[2, 1] * n[2]
@@ -124,76 +124,76 @@ def ground_point(geom: np.record, k: int, at: np.ndarray, turn: np.ndarray, n: n
 
 
 @compiled
-def all_gaps(s: System, q: np.ndarray, r: Room, before: np.ndarray, h: float,
+def update_gaps(s: System, q: np.ndarray, r: Workspace, before: np.ndarray, h: float,
              out: np.ndarray) -> None:
     """All gaps; work is posed at q. ``before``: those h s earlier; h infinite: unknown. What bones
     were moved and turned since beside their velocities: r.own[:, 2] m, r.own[:, 3] rad.
     """
-    place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
+    place_geoms(s.tree, s.body_root, s.geoms, r.kinematics, q, r.geom_positions, r.geom_rotations)
     n = 0
     for k in range(len(s.geoms)):
-        if s.offset[0] > -math.inf:
-            ground_gaps(s.geoms[k], r.at[k], r.turn[k], s.normal, s.offset[0], out)
-        n += s.geoms[k].count
-    for k in range(len(s.bounds)):
-        bound = s.bounds[k]
-        out[n], out[n + 1] = q[bound.q] - bound.lower, bound.upper - q[bound.q]
+        if s.ground_offset[0] > -math.inf:
+            ground_gaps(s.geoms[k], r.geom_positions[k], r.geom_rotations[k], s.ground_normal, s.ground_offset[0], out)
+        n += s.geoms[k].point_count
+    for k in range(len(s.joint_limits)):
+        bound = s.joint_limits[k]
+        out[n], out[n + 1] = q[bound.q_index] - bound.lower, bound.upper - q[bound.q_index]
         n += 2
     if len(s.pairs):
         for i in range(len(s.tree)):
-            x, y, z, w = bone_velocity(r.work, i)
+            x, y, z, w = bone_velocity(r.kinematics, i)
             r.own[i, 0], r.own[i, 1] = math.sqrt(x * x + y * y + z * z), w
     for k in range(len(s.pairs)):
-        if k < len(r.within) and r.within[k]:
+        if k < len(r.excluded) and r.excluded[k]:
             out[n + k] = NEVER
             continue
         a, b = s.geoms[s.pairs[k].a], s.geoms[s.pairs[k].b]
         least = before[n + k] - 2 * (
-            way(r.own[a.bone], a.reach, h) + way(r.own[b.bone], b.reach, h))
+            motion_bound(r.own[a.bone], a.reach, h) + motion_bound(r.own[b.bone], b.reach, h))
         out[n + k] = least if least > NEAR else pair_gap(
-            a, b, r.at[s.pairs[k].a], r.turn[s.pairs[k].a], r.at[s.pairs[k].b],
-            r.turn[s.pairs[k].b])
+            a, b, r.geom_positions[s.pairs[k].a], r.geom_rotations[s.pairs[k].a], r.geom_positions[s.pairs[k].b],
+            r.geom_rotations[s.pairs[k].b])
 
 
 @compiled
-def way(own: np.ndarray, reach: float, h: float) -> float:
+def motion_bound(own: np.ndarray, reach: float, h: float) -> float:
     """How far, m, a point of a bone within its reach goes in h s; see all_gaps()."""
     return h * (own[0] + own[1] * reach) + own[2] + own[3] * reach
 
 
 @compiled
-def part_pairs(s: System, r: Room, q: np.ndarray, v: np.ndarray) -> bool:
+def enable_separated_pairs(s: System, r: Workspace, q: np.ndarray, v: np.ndarray) -> bool:
     """Let those collide from now on that were within each other and have come apart, and those with
     a joint in between that was outside its limits and is back: nothing is to hold that back.
     Whether there are any, whose gaps are not known yet.
     """
     some = False
-    for k in range(len(r.within)):
-        some |= r.within[k] != 0
+    for k in range(len(r.excluded)):
+        some |= r.excluded[k] != 0
     if not some:
         return False
     some = False
-    pose(s.tree, q, v, r.work)
-    place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
+    forward_kinematics(s.tree, q, v, r.kinematics)
+    place_geoms(s.tree, s.body_root, s.geoms, r.kinematics, q, r.geom_positions, r.geom_rotations)
     for i in range(len(s.tree)):
         r.own[i, 0] = 0.0
-    for k in range(len(s.bounds)):
-        bound = s.bounds[k]
-        if max(bound.lower - q[bound.q], q[bound.q] - bound.upper) > 2 * BEYOND:
-            r.own[s.bone_of[bound.v], 0] = 1.0
-    for k in range(len(r.within)):
-        a, b, before = s.pairs[k].a, s.pairs[k].b, r.within[k]
-        if r.within[k] & WITHIN and pair_gap(s.geoms[a], s.geoms[b], r.at[a], r.turn[a], r.at[b],
-                                             r.turn[b]) > -NEARLY:
-            r.within[k] &= ~WITHIN
-        if r.within[k] & OUTSIDE and not outside_between(s, r, s.geoms[a].bone, s.geoms[b].bone):
-            r.within[k] &= ~OUTSIDE
-        some |= before != 0 and r.within[k] == 0
+    for k in range(len(s.joint_limits)):
+        bound = s.joint_limits[k]
+        if max(bound.lower - q[bound.q_index], q[bound.q_index] - bound.upper) > 2 * BEYOND:
+            r.own[s.dof_body[bound.dof], 0] = 1.0
+    for k in range(len(r.excluded)):
+        a, b, before = s.pairs[k].a, s.pairs[k].b, r.excluded[k]
+        if r.excluded[k] & OVERLAPPING and pair_gap(s.geoms[a], s.geoms[b], r.geom_positions[a], r.geom_rotations[a], r.geom_positions[b],
+                                             r.geom_rotations[b]) > -NEARLY:
+            r.excluded[k] &= ~OVERLAPPING
+        if r.excluded[k] & JOINT_OUTSIDE_LIMITS and not limit_violated_between(s, r, s.geoms[a].bone, s.geoms[b].bone):
+            r.excluded[k] &= ~JOINT_OUTSIDE_LIMITS
+        some |= before != 0 and r.excluded[k] == 0
     return some
 
 
 @compiled
-def outside_between(s: System, r: Room, i: int, j: int) -> bool:
+def limit_violated_between(s: System, r: Workspace, i: int, j: int) -> bool:
     """Whether a joint on the way from one bone to another is marked in r.own; parents stand before
     their children.
     """
@@ -207,15 +207,15 @@ def outside_between(s: System, r: Room, i: int, j: int) -> bool:
 
 
 @compiled
-def bone_velocity(work: Work, i: int) -> tuple[float, float, float, float]:
+def bone_velocity(work: Kinematics, i: int) -> tuple[float, float, float, float]:
     """Velocity (3) m/s of a bone's centre and its angular speed, rad/s; work is posed."""
-    m, c = work.moves[i], work.centres[i]
+    m, c = work.spatial_velocities[i], work.positions[i]
     x, y, z = cross(m[0], m[1], m[2], c[0], c[1], c[2])
     return (m[3] + x, m[4] + y, m[5] + z, math.sqrt(m[0] ** 2 + m[1] ** 2 + m[2] ** 2))
 
 
 @compiled
-def along(kind: int, size: np.ndarray, r: np.ndarray, x: float, y: float, z: float) -> float:
+def evaluate_dense_step(kind: int, size: np.ndarray, r: np.ndarray, x: float, y: float, z: float) -> float:
     """How far, m, a geom reaches from its centre along a unit vector of the world."""
     if kind == SPHERE:
         return size[0]
@@ -231,33 +231,33 @@ def pair_gap(a: np.record, b: np.record, pa: np.ndarray, ra: np.ndarray, pb: np.
     """
     x, y, z = pa[0] - pb[0], pa[1] - pb[1], pa[2] - pb[2]
     length = math.sqrt(x * x + y * y + z * z)
-    far = length - (a.radius + b.radius)
+    far = length - (a.bounding_radius + b.bounding_radius)
     if far > NEAR:
         return far
     if length > NEAR:
         x, y, z = x / length, y / length, z / length
-        far = length - along(a.kind, a.size, ra, x, y, z) - along(b.kind, b.size, rb, x, y, z)
+        far = length - evaluate_dense_step(a.kind, a.size, ra, x, y, z) - evaluate_dense_step(b.kind, b.size, rb, x, y, z)
         if far > NEAR:
             return far
     return separation(a.kind, a.size, pa, ra, b.kind, b.size, pb, rb, NEAR)
 
 
 @compiled
-def of_limit(s: System, gaps: np.ndarray, j: int) -> bool:
+def is_joint_limit_gap(s: System, gaps: np.ndarray, j: int) -> bool:
     """Whether gap j of all is a joint's from a limit, in rad."""
-    first = first_limit(s, gaps)
-    return first <= j < first + 2 * len(s.bounds)
+    first = first_joint_limit_gap(s, gaps)
+    return first <= j < first + 2 * len(s.joint_limits)
 
 
 @compiled
-def first_limit(s: System, gaps: np.ndarray) -> int:
+def first_joint_limit_gap(s: System, gaps: np.ndarray) -> int:
     """The first of all gaps that is a joint's from a limit."""
-    return len(gaps) - len(s.pairs) - 2 * len(s.bounds)
+    return len(gaps) - len(s.pairs) - 2 * len(s.joint_limits)
 
 
 @compiled
-def look(s: System, r: Room, q: np.ndarray, v: np.ndarray, before: np.ndarray, h: float,
+def update_kinematics_and_gaps(s: System, r: Workspace, q: np.ndarray, v: np.ndarray, before: np.ndarray, h: float,
          out: np.ndarray) -> None:
     """Pose all at q and v, and enter all gaps; see all_gaps()."""
-    pose(s.tree, q, v, r.work)
-    all_gaps(s, q, r, before, h, out)
+    forward_kinematics(s.tree, q, v, r.kinematics)
+    update_gaps(s, q, r, before, h, out)

@@ -5,21 +5,21 @@ import math
 
 from ..compiling.decorators import compiled
 from ..maths.transcendental import asinh
-from ..system import Room
+from ..system import Workspace
 
 SEGMENT = 0.5
 """Mean distance of a segment's points from its middle over that of its ends."""
 
 
 @compiled
-def shrink(r: Room, begin: int, end: int) -> None:
+def contract_friction_points(r: Workspace, begin: int, end: int) -> None:
     """Draw the arms of one patch towards the middle by the ratio of the mean distances."""
     contacts, count = r.contacts, end - begin
     x = y = z = 0.0
     for e in range(begin, end):
         p = contacts[e].point
         x, y, z = x + p[0] / count, y + p[1] / count, z + p[2] / count
-    t, w = contacts[begin].across[0], contacts[begin].across[1]
+    t, w = contacts[begin].tangents[0], contacts[begin].tangents[1]
     flat = r.solver  # room for angle, and the place along t and w, in the order of the angles
     corners = 0.0
     for e in range(begin, end):
@@ -27,7 +27,7 @@ def shrink(r: Room, begin: int, end: int) -> None:
         a, b, c = p[0] - x, p[1] - y, p[2] - z
         u, v = a * t[0] + b * t[1] + c * t[2], a * w[0] + b * w[1] + c * w[2]
         corners += math.sqrt(u * u + v * v) / count
-        angle, k = way(u, v), e - begin
+        angle, k = motion_bound(u, v), e - begin
         while k > 0 and flat[0, k - 1] > angle:
             flat[0, k], flat[1, k], flat[2, k] = flat[0, k - 1], flat[1, k - 1], flat[2, k - 1]
             k -= 1
@@ -44,13 +44,13 @@ def shrink(r: Room, begin: int, end: int) -> None:
         share = 1.0
     for e in range(begin, end):
         c = contacts[e]
-        c.arm[0] = x + share * (c.point[0] - x)
-        c.arm[1] = y + share * (c.point[1] - y)
-        c.arm[2] = z + share * (c.point[2] - z)
+        c.friction_point[0] = x + share * (c.point[0] - x)
+        c.friction_point[1] = y + share * (c.point[1] - y)
+        c.friction_point[2] = z + share * (c.point[2] - z)
 
 
 @compiled
-def way(x: float, y: float) -> float:
+def motion_bound(x: float, y: float) -> float:
     """What orders directions as their angle does: -2 to 2 for -pi to pi."""
     size = abs(x) + abs(y)
     return math.copysign(1 - x / size, y) if size > 0.0 else 0.0

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..maths.cholesky import factor_row, substitute
-from ..system import STICKS
-from .sweep import LIMIT, ROLLING, velocities
+from ..system import NO_SLIP
+from .gauss_seidel import LIMIT, ROLLING, velocities
 
 TURNS = 4
 """Changes of the active set, for each contact, after which there is taken to be no end."""
@@ -21,7 +21,7 @@ TURNS = 4
 def is_convex(kinds: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int) -> bool:
     """Whether no friction of m contacts has a bound that its normal impulse sets."""
     for c in range(m):
-        if kinds[c] != LIMIT and (0.0 < mu[c] < STICKS or (kinds[c] == ROLLING and roll[c] > 0)):
+        if kinds[c] != LIMIT and (0.0 < mu[c] < NO_SLIP or (kinds[c] == ROLLING and roll[c] > 0)):
             return False
     return True
 
@@ -36,7 +36,7 @@ def solve_active_set(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, m: int
     of W at the active rows, which are ``places``.
     """
     z, u, normal, places = room[0], room[1], room[2], room[7]
-    count = first_rows(kinds, rows, mu, m, p, places, normal)
+    count = initial_active_set(kinds, rows, mu, m, p, places, normal)
     if not factor_rows(W, n, places, 0, count, U):
         return False
     for _ in range(TURNS * m + 8):
@@ -54,7 +54,7 @@ def solve_active_set(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, m: int
         if drop >= 0:
             p[int(places[drop])] = 0.0
             count -= 1
-            leave_out(U, n, places, drop, count)
+            remove_column(U, n, places, drop, count)
             if not factor_rows(W, n, places, drop, count, U):
                 return False
             continue
@@ -62,7 +62,7 @@ def solve_active_set(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, m: int
         if enter < 0:
             return True
         places[count] = enter
-        take_in(W, U, n, places, count)
+        append_column(W, U, n, places, count)
         count += 1
         if not factor_rows(W, n, places, count - 1, count, U):
             return False
@@ -70,7 +70,7 @@ def solve_active_set(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, m: int
 
 
 @compiled
-def first_rows(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, m: int, p: np.ndarray,
+def initial_active_set(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, m: int, p: np.ndarray,
                places: np.ndarray, normal: np.ndarray) -> int:
     """Begin with the rows that stick and the normals that press; how many they are. ``normal`` (n,)
     becomes which rows push only.
@@ -81,7 +81,7 @@ def first_rows(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, m: int, p: n
         normal[a] = 1.0
         for i in range(a + 1, a + kinds[c]):
             normal[i] = 0.0
-            if i < a + 3 and mu[c] >= STICKS:
+            if i < a + 3 and mu[c] >= NO_SLIP:
                 places[count] = i
                 count += 1
             else:
@@ -110,7 +110,7 @@ def factor_rows(W: np.ndarray, n: int, places: np.ndarray, start: int, count: in
 
 
 @compiled
-def take_in(W: np.ndarray, U: np.ndarray, n: int, places: np.ndarray, last: int) -> None:
+def append_column(W: np.ndarray, U: np.ndarray, n: int, places: np.ndarray, last: int) -> None:
     """Put the column of the row that came last, ``last``, into the factor's rows above it."""
     at = int(places[last]) * n
     for k in range(last):
@@ -121,7 +121,7 @@ def take_in(W: np.ndarray, U: np.ndarray, n: int, places: np.ndarray, last: int)
 
 
 @compiled
-def leave_out(U: np.ndarray, n: int, places: np.ndarray, drop: int, count: int) -> None:
+def remove_column(U: np.ndarray, n: int, places: np.ndarray, drop: int, count: int) -> None:
     """Take a row from ``places`` and its column from the factor's rows above it."""
     for j in range(drop, count):
         places[j] = places[j + 1]

@@ -12,9 +12,9 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..system import STICKS
-from .one_contact import on_disc
-from .sweep import velocities
+from ..system import NO_SLIP
+from .one_contact import project_to_disc
+from .gauss_seidel import velocities
 
 NEWTON_STEPS = 40
 """At the most; from the sweeps' end some three are. All are taken in full: on the way the residual
@@ -40,11 +40,11 @@ def residual(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarr
         for k in range(1, kinds[c], 2):
             i = a + k
             own = max(W[i * n + i], W[(i + 1) * n + i + 1])
-            if k == 1 and mu[c] >= STICKS:
+            if k == 1 and mu[c] >= NO_SLIP:
                 phi[i], phi[i + 1] = u[i], u[i + 1]
             else:
                 most = push * max(0.0, mu[c] if k == 1 else roll[c])
-                y, z = on_disc(p[i] - u[i] / own, p[i + 1] - u[i + 1] / own, most)
+                y, z = project_to_disc(p[i] - u[i] / own, p[i + 1] - u[i + 1] / own, most)
                 phi[i], phi[i + 1] = (p[i] - y) * own, (p[i + 1] - z) * own
             worst = max(worst, abs(phi[i]), abs(phi[i + 1]))
     return worst
@@ -64,7 +64,7 @@ def linearize(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndar
         own = W[a * n + a]
         push = p[a] - u[a] / own
         active = push > 0
-        follow(W, G, n, a, active, resist)
+        write_velocity_row(W, G, n, a, active, resist)
         if not active:
             way[a] = -p[a]
         for k in range(1, kinds[c], 2):
@@ -73,10 +73,10 @@ def linearize(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndar
             law = max(0.0, mu[c] if k == 1 else roll[c])
             y, z = p[i] - u[i] / own_t, p[i + 1] - u[i + 1] / own_t
             size, most = math.sqrt(y * y + z * z), law * max(0.0, push)
-            sticks = k == 1 and law >= STICKS
+            sticks = k == 1 and law >= NO_SLIP
             if sticks or not active or size <= most:
                 for e in range(i, i + 2):
-                    follow(W, G, n, e, active or sticks, resist)
+                    write_velocity_row(W, G, n, e, active or sticks, resist)
                     if not active and not sticks:
                         way[e] = -p[e]
                 continue
@@ -96,7 +96,7 @@ def linearize(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndar
 
 
 @compiled
-def follow(W: np.ndarray, G: np.ndarray, n: int, i: int, active: bool, resist: float) -> None:
+def write_velocity_row(W: np.ndarray, G: np.ndarray, n: int, i: int, active: bool, resist: float) -> None:
     """Let the step bring row i's velocity to nothing, or, if it is not ``active``, its impulse."""
     at = i * n
     for j in range(n):
@@ -105,7 +105,7 @@ def follow(W: np.ndarray, G: np.ndarray, n: int, i: int, active: bool, resist: f
 
 
 @compiled
-def gauss(G: np.ndarray, n: int, x: np.ndarray) -> bool:
+def gaussian_elimination(G: np.ndarray, n: int, x: np.ndarray) -> bool:
     """Solve G x = b in b's place, rows swapped by their largest; false if G is singular."""
     for k in range(n):
         best, most = k, abs(G[k * n + k])
@@ -134,7 +134,7 @@ def gauss(G: np.ndarray, n: int, x: np.ndarray) -> bool:
 
 
 @compiled
-def solve_active(G: np.ndarray, n: int, x: np.ndarray, places: np.ndarray) -> bool:
+def solve_reduced(G: np.ndarray, n: int, x: np.ndarray, places: np.ndarray) -> bool:
     """Solve G x = b, flat (n * n), in b's place; False if that fails. Rows of what is open have but
     their diagonal: they are solved for first, the others by gauss(). places (2n,): room.
     """
@@ -165,7 +165,7 @@ def solve_active(G: np.ndarray, n: int, x: np.ndarray, places: np.ndarray) -> bo
             G[k] = G[i * n + int(places[c])]
             k += 1
         places[n + a] = x[i]
-    if not gauss(G, m, places[n:n + m]):
+    if not gaussian_elimination(G, m, places[n:n + m]):
         return False
     for a in range(m):
         x[int(places[a])] = places[n + a]
@@ -191,7 +191,7 @@ def newton(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray
         if best <= tolerance or late > PATIENCE or turn == NEWTON_STEPS:
             break
         linearize(kinds, rows, mu, roll, m, n, W, p, u, phi, resist, G, way)
-        if not solve_active(G, n, way, places):
+        if not solve_reduced(G, n, way, places):
             break
         total = 0.0
         for i in range(n):

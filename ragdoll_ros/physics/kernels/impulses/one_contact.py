@@ -6,14 +6,14 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..system import STICKS
+from ..system import NO_SLIP
 
 NARROWINGS = 50
 """Steps in which a sliding contact is sought at the most; some four are taken."""
 
 
 @compiled
-def one_contact(W: np.ndarray, n: int, a: int, c0: float, c1: float, c2: float, x: float,
+def solve_one_contact(W: np.ndarray, n: int, a: int, c0: float, c1: float, c2: float, x: float,
                 y: float, z: float, mu: float) -> tuple[float, float, float]:
     """Impulse of one contact by itself, whose velocity without it is c; near the last (x, y, z).
 
@@ -33,14 +33,14 @@ def one_contact(W: np.ndarray, n: int, a: int, c0: float, c1: float, c2: float, 
         sx = -(d0 * c0 + d1 * c1 + d2 * c2) / det
         sy = -(d1 * c0 + e11 * c1 + e12 * c2) / det
         sz = -(d2 * c0 + e12 * c1 + e22 * c2) / det
-        if sx >= 0 and (mu >= STICKS or sy * sy + sz * sz <= mu * mu * sx * sx):
+        if sx >= 0 and (mu >= NO_SLIP or sy * sy + sz * sz <= mu * mu * sx * sx):
             return sx, sy, sz
-    if mu >= STICKS:
+    if mu >= NO_SLIP:
         det = w11 * w22 - w12 * w12
         return 0.0, (w12 * c2 - w22 * c1) / det, (w12 * c1 - w11 * c2) / det
     if c0 >= 0:
         return 0.0, 0.0, 0.0
-    drag = first_drag(w11, w22, -c0 * mu / w00, c1 + w01 * x + w11 * y + w12 * z,
+    drag = initial_drag(w11, w22, -c0 * mu / w00, c1 + w01 * x + w11 * y + w12 * z,
                       c2 + w02 * x + w12 * y + w22 * z, c1, c2, y, z)
     least, most = 0.0, math.inf
     for _ in range(NARROWINGS):
@@ -66,12 +66,12 @@ def one_contact(W: np.ndarray, n: int, a: int, c0: float, c1: float, c2: float, 
         drag -= over * size / slope if slope > 0 else math.inf
         if not least < drag < most:
             drag = (least + most) / 2 if most < math.inf else 2 * least + w11 + w22
-    y, z = on_disc(y, z, mu * x)
+    y, z = project_to_disc(y, z, mu * x)
     return x, y, z
 
 
 @compiled
-def first_drag(w11: float, w22: float, most: float, u1: float, u2: float, c1: float, c2: float,
+def initial_drag(w11: float, w22: float, most: float, u1: float, u2: float, c1: float, c2: float,
                y: float, z: float) -> float:
     """Where to begin to seek u_t / -p_t: from the last impulses (y, z), whose u is known; without
     any, from friction ``most`` against c along a surface that nothing else acts on.
@@ -83,7 +83,7 @@ def first_drag(w11: float, w22: float, most: float, u1: float, u2: float, c1: fl
 
 
 @compiled
-def on_disc(y: float, z: float, radius: float) -> tuple[float, float]:
+def project_to_disc(y: float, z: float, radius: float) -> tuple[float, float]:
     """The point of a disc nearest to (y, z)."""
     size = math.sqrt(y * y + z * z)
     if size > radius:

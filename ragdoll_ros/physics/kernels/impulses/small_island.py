@@ -7,8 +7,8 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..maths.cholesky import factor_row, substitute
-from ..system import COMPLIANCE, OF_IMPACTS, Room
-from .solver import solve_impulses, solve_normals, weaken_by
+from ..system import COMPLIANCE, IMPACT_COMPLIANCE, Workspace
+from .solver import solve_island_impulses, solve_normals, scale_to_no_work
 
 SWEEPS = 8
 """Sweeps before Newton's method is asked for the first time."""
@@ -27,38 +27,38 @@ STRAIGHT = 1e-11
 
 
 @compiled
-def solve_small(r: Room, count: int, n: int, h: float, tolerance: float, thrown: bool,
+def solve_small(r: Workspace, count: int, n: int, h: float, tolerance: float, thrown: bool,
                 deep: bool) -> None:
     """Solve an island of n rows over h s, or at an impact, h = 0, for its impulses, r.p[1], and, if
     something is ``deep``, for those that give depths back, r.p[2]. ``thrown``: r.p[0] asks for
     restitution, which may make energy.
     """
     b, p, start, soft = r.p[0], r.p[1], r.p[3], r.p[4]
-    form_matrix(r, count, n, COMPLIANCE if h > 0 else OF_IMPACTS)
+    form_matrix(r, count, n, COMPLIANCE if h > 0 else IMPACT_COMPLIANCE)
     if h > 0:
-        follow_curve(r, count, n)
-    rest_locked(r.W, n, b)
-    left, turns = solve_impulses(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, b, p, tolerance,
+        add_curvature_bias(r, count, n)
+    mask_singular_rows(r.W, n, b)
+    left, turns = solve_island_impulses(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, b, p, tolerance,
                                  SWEEPS, r.solver, r.G)
-    if thrown and gained(r.W, start, p, n) > 0:
+    if thrown and energy_gain(r.W, start, p, n) > 0:
         for j in range(n):
             soft[j] = p[j]
-        solve_impulses(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, start, soft, tolerance, SWEEPS,
+        solve_island_impulses(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, start, soft, tolerance, SWEEPS,
                        r.solver, r.G)
-        if gained(r.W, start, soft, n) > 0:
-            weaken_impulses(r.W, start, soft, n)
-        hold_energy(r.W, start, soft, p, n)
-        r.tally[0].softened += 1
-    r.tally[0].sweeps += turns
+        if energy_gain(r.W, start, soft, n) > 0:
+            scale_to_energy_bound(r.W, start, soft, n)
+        bound_energy(r.W, start, soft, p, n)
+        r.stats[0].restitution_reduced += 1
+    r.stats[0].sweeps += turns
     if not left <= UNSOLVED:
-        r.tally[0].unsolved += 1
-        weaken_impulses(r.W, start, p, n)
+        r.stats[0].unsolved += 1
+        scale_to_energy_bound(r.W, start, p, n)
     if deep:
         solve_normals(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, r.need, r.p[2], r.solver, r.G)
 
 
 @compiled
-def form_matrix(r: Room, count: int, n: int, compliance: float) -> None:
+def form_matrix(r: Workspace, count: int, n: int, compliance: float) -> None:
     """W = Y Y^T, flat (n * n), its diagonal with the compliance; row by row of Y^T, which a
     processor does several columns of at once.
     """
@@ -69,7 +69,7 @@ def form_matrix(r: Room, count: int, n: int, compliance: float) -> None:
     for k in range(count):
         i = int(r.need[1, k])
         for e in range(r.rows[k], r.rows[k] + r.kinds[k]):
-            for x in range(r.contacts[i].support):
+            for x in range(r.contacts[i].dof_count):
                 YT[r.support[i, x], e] = Y[e, x]
     for k in range(count):
         i = int(r.need[1, k])
@@ -77,7 +77,7 @@ def form_matrix(r: Room, count: int, n: int, compliance: float) -> None:
             own = W[e * n:e * n + e + 1]
             for f in range(e + 1):
                 own[f] = 0.0
-            support, x = r.contacts[i].support, 0
+            support, x = r.contacts[i].dof_count, 0
             while x + 4 <= support:
                 at = r.support[i]
                 a, b, c, d = YT[at[x]], YT[at[x + 1]], YT[at[x + 2]], YT[at[x + 3]]
@@ -96,7 +96,7 @@ def form_matrix(r: Room, count: int, n: int, compliance: float) -> None:
 
 
 @compiled
-def follow_curve(r: Room, count: int, n: int) -> None:
+def add_curvature_bias(r: Workspace, count: int, n: int) -> None:
     """Add to r.p[0] what rows see of a curved way, r.p[4], as far as it is a motion of the bodies:
     the points of a patch that turns see more than any motion could answer. What opens sees its own.
 
@@ -130,7 +130,7 @@ def follow_curve(r: Room, count: int, n: int) -> None:
 
 
 @compiled
-def rest_locked(W: np.ndarray, n: int, b: np.ndarray) -> None:
+def mask_singular_rows(W: np.ndarray, n: int, b: np.ndarray) -> None:
     """Let rows ask for nothing along which nothing can move, as no joint lets it: W is zero there,
     and would be divided by.
     """
@@ -146,7 +146,7 @@ def rest_locked(W: np.ndarray, n: int, b: np.ndarray) -> None:
 
 
 @compiled
-def gained(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> float:
+def energy_gain(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> float:
     """Kinetic energy, J, that impulses p give to what moves at u: p (u + W p / 2); 0 if that is
     rounding.
     """
@@ -161,7 +161,7 @@ def gained(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> float:
 
 
 @compiled
-def weaken_impulses(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> None:
+def scale_to_energy_bound(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> None:
     """Scale impulses that are no solution so that they make no energy."""
     work = spent = 0.0
     for i in range(n):
@@ -170,11 +170,11 @@ def weaken_impulses(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> None
             w += W[i * n + j] * p[j]
         work += p[i] * u[i]
         spent += p[i] * w
-    weaken_by(p, n, work, spent)
+    scale_to_no_work(p, n, work, spent)
 
 
 @compiled
-def hold_energy(W: np.ndarray, u: np.ndarray, soft: np.ndarray, p: np.ndarray, n: int) -> None:
+def bound_energy(W: np.ndarray, u: np.ndarray, soft: np.ndarray, p: np.ndarray, n: int) -> None:
     """Draw p towards the ``soft`` impulses, those of no restitution, until no energy is made.
 
     Newton's law with friction can make some (Kane and Levinson 1985). Soft impulses never do:
@@ -189,7 +189,7 @@ def hold_energy(W: np.ndarray, u: np.ndarray, soft: np.ndarray, p: np.ndarray, n
             ws += W[i * n + j] * soft[j]
         a += (p[i] - soft[i]) * w / 2
         b += (p[i] - soft[i]) * (u[i] + ws)
-    c = min(0.0, gained(W, u, soft, n))
+    c = min(0.0, energy_gain(W, u, soft, n))
     root = math.sqrt(max(0.0, b * b - 4 * a * c))
     share = (-2 * c / (b + root) if b > 0 else (root - b) / (2 * a)) if a > 0 else 1.0
     share = min(1.0, max(0.0, share))

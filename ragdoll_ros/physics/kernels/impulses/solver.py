@@ -14,11 +14,11 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..system import STICKS
+from ..system import NO_SLIP
 from .active_set import is_convex, solve_active_set
 from .newton import newton
-from .one_contact import on_disc
-from .sweep import LIMIT, sweep
+from .one_contact import project_to_disc
+from .gauss_seidel import LIMIT, gauss_seidel_sweep
 
 ROUNDS, LOOSER = 6, 3
 """Of sweeps, twice as many as in the round before, and of Newton's method, against ten times as
@@ -33,17 +33,17 @@ OPENING = 1e-4
 
 
 @compiled
-def admissible(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
+def project_to_cones(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
                p: np.ndarray) -> None:
     """Bring all impulses into their cones: no contact ever pulls."""
     for c in range(m):
         a = rows[c]
         p[a] = max(0.0, p[a])
         for k in range(1, kinds[c], 2):
-            if k == 1 and mu[c] >= STICKS:
+            if k == 1 and mu[c] >= NO_SLIP:
                 continue
             most = p[a] * max(0.0, mu[c] if k == 1 else roll[c])
-            p[a + k], p[a + k + 1] = on_disc(p[a + k], p[a + k + 1], most)
+            p[a + k], p[a + k + 1] = project_to_disc(p[a + k], p[a + k + 1], most)
 
 
 @compiled
@@ -58,13 +58,13 @@ def solve_cones(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.nd
     for turn in range(ROUNDS):
         for _ in range(sweeps):
             done += 1
-            worst = sweep(kinds, rows, mu, roll, m, n, W, b, p, room[0])
+            worst = gauss_seidel_sweep(kinds, rows, mu, roll, m, n, W, b, p, room[0])
             if worst <= tolerance:
                 return worst, done
         if convex and solve_active_set(kinds, rows, mu, m, n, W, b, p, tolerance, room, G):
             return tolerance, done
         left = newton(kinds, rows, mu, roll, m, n, W, b, p, tolerance, resist, room, G)
-        admissible(kinds, rows, mu, roll, m, p)
+        project_to_cones(kinds, rows, mu, roll, m, p)
         if turn < LOOSER:
             tolerance *= 10
         if left <= tolerance:
@@ -74,7 +74,7 @@ def solve_cones(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.nd
 
 
 @compiled
-def opens(W: np.ndarray, n: int, a: int, b: np.ndarray, p: np.ndarray) -> bool:
+def is_opening(W: np.ndarray, n: int, a: int, b: np.ndarray, p: np.ndarray) -> bool:
     """Whether a contact comes apart."""
     u = b[a]
     for j in range(n):
@@ -83,7 +83,7 @@ def opens(W: np.ndarray, n: int, a: int, b: np.ndarray, p: np.ndarray) -> bool:
 
 
 @compiled
-def solve_impulses(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
+def solve_island_impulses(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
                    n: int, W: np.ndarray, b: np.ndarray, p: np.ndarray, tolerance: float,
                    sweeps: int, room: np.ndarray, G: np.ndarray) -> tuple[float, int]:
     """Solve for p (n,), from where it stands; the largest residual left, m/s, and the sweeps.
@@ -99,13 +99,13 @@ def solve_impulses(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np
             a = rows[c]
             if kinds[c] == LIMIT:
                 continue
-            if turn == 0 and mu[c] >= STICKS and p[a] <= 0.0 and (
-                    p[a + 1] != 0.0 or p[a + 2] != 0.0) and opens(W, n, a, b, p):
+            if turn == 0 and mu[c] >= NO_SLIP and p[a] <= 0.0 and (
+                    p[a + 1] != 0.0 or p[a + 2] != 0.0) and is_opening(W, n, a, b, p):
                 mu[c] = -1.0
                 p[a] = p[a + 1] = p[a + 2] = 0.0
                 some = True
             elif turn == 1 and mu[c] < 0 and p[a] > 0:
-                mu[c] = STICKS
+                mu[c] = NO_SLIP
                 some = True
         if not some:
             break
@@ -139,7 +139,7 @@ def solve_normals(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.
 
 
 @compiled
-def weaken_by(p: np.ndarray, n: int, work: float, spent: float) -> None:
+def scale_to_no_work(p: np.ndarray, n: int, work: float, spent: float) -> None:
     """Scale impulses p (n,) whose energy is ``work`` + ``spent`` / 2, J, so that it is none; what
     is no number becomes none.
     """

@@ -13,33 +13,33 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..dynamics.mass import turn_inertias
+from ..dynamics.mass_matrix import rotate_inertias
 from ..maths.cholesky import solve
 from ..maths.quaternion import cross, turned
-from ..system import Room, System
+from ..system import Workspace, System
 
 SMALL = 0.01
 """Share of a motion's energy that may be taken out of it without a word."""
 
 
 @compiled
-def sum_dolls(s: System, q: np.ndarray, r: Room, out: np.ndarray) -> None:
+def sum_dolls(s: System, q: np.ndarray, r: Workspace, out: np.ndarray) -> None:
     """Sums (d,) over each doll; work is posed at q."""
-    turn_inertias(s.tree, r.work, r.own)
+    rotate_inertias(s.tree, r.kinematics, r.own)
     for d in range(len(out)):
         doll = out[d]
         doll.kinetic = 0.0
         for k in range(3):
-            doll.centre[k] = doll.momentum[k] = doll.angular[k] = 0.0
+            doll.centre[k] = doll.momentum[k] = doll.angular_momentum[k] = 0.0
             for j in range(3):
                 doll.inertia[j, k] = 0.0
     for i in range(len(s.tree)):
-        d, m, c, root = s.doll_of[i], s.tree[i].mass, r.work.centres[i], s.tree[s.root_of[i]].q
+        d, m, c, root = s.body_doll[i], s.tree[i].mass, r.kinematics.positions[i], s.tree[s.body_root[i]].q_start
         for k in range(3):
             out[d].centre[k] += m * (q[root + k] + c[k]) / s.doll_masses[d]
     for i in range(len(s.tree)):
-        add_bone(out[s.doll_of[i]], s.tree[i].mass, r.work.centres[i], r.work.moves[i], r.own[i],
-                 q, s.tree[s.root_of[i]].q)
+        add_body(out[s.body_doll[i]], s.tree[i].mass, r.kinematics.positions[i], r.kinematics.spatial_velocities[i], r.own[i],
+                 q, s.tree[s.body_root[i]].q_start)
     for d in range(len(out)):
         doll, g = out[d], s.gravity
         doll.energy = doll.kinetic - s.doll_masses[d] * (
@@ -47,7 +47,7 @@ def sum_dolls(s: System, q: np.ndarray, r: Room, out: np.ndarray) -> None:
 
 
 @compiled
-def add_bone(doll: np.record, m: float, c: np.ndarray, move: np.ndarray, I: np.ndarray,
+def add_body(doll: np.record, m: float, c: np.ndarray, move: np.ndarray, I: np.ndarray,
              q: np.ndarray, root: int) -> None:
     """Add a bone of mass m, kg, ``c`` (3,) m from its doll's root, which stands in q at ``root``,
     with the spatial velocity ``move`` and the inertia I (6,) about its own centre.
@@ -65,9 +65,9 @@ def add_bone(doll: np.record, m: float, c: np.ndarray, move: np.ndarray, I: np.n
     doll.momentum[1] += m * vy
     doll.momentum[2] += m * vz
     vx, vy, vz = cross(x, y, z, m * vx, m * vy, m * vz)
-    doll.angular[0] += vx + lx
-    doll.angular[1] += vy + ly
-    doll.angular[2] += vz + lz
+    doll.angular_momentum[0] += vx + lx
+    doll.angular_momentum[1] += vy + ly
+    doll.angular_momentum[2] += vz + lz
     own = doll.inertia
     own[0, 0] += I[0] + m * (y * y + z * z)
     own[1, 1] += I[3] + m * (x * x + z * z)
@@ -102,27 +102,27 @@ def give(given: np.record, sign: float, x: float, y: float, z: float, jx: float,
 
 
 @compiled
-def give_contacts(s: System, r: Room, m: int, given: np.ndarray) -> None:
+def add_contact_impulses(s: System, r: Workspace, m: int, given: np.ndarray) -> None:
     """Enter the impulses of m contacts, and who bears whom."""
     for n in range(m):
         c = r.contacts[n]
         if c.kind == 1:
             continue
-        one = s.doll_of[c.a]
-        other = s.doll_of[c.b] if c.b >= 0 else -1
+        one = s.body_doll[c.a]
+        other = s.body_doll[c.b] if c.b >= 0 else -1
         if other < 0:
             p = c.impulse  # what sticks may be held sideways alone
             if p[0] != 0.0 or p[1] != 0.0 or p[2] != 0.0:
-                given[one].borne = 1
+                given[one].on_ground = 1
             continue
         if one == other:
             continue
-        given[one].meets = given[other].meets = 1
-        p, t, w = c.impulse, c.across[0], c.across[1]
+        given[one].touches_other = given[other].touches_other = 1
+        p, t, w = c.impulse, c.tangents[0], c.tangents[1]
         for doll, sign in ((one, 1.0), (other, -1.0)):
             give(given[doll], sign, c.point[0], c.point[1], c.point[2], p[0] * c.normal[0],
                  p[0] * c.normal[1], p[0] * c.normal[2])
-            give(given[doll], sign, c.arm[0], c.arm[1], c.arm[2], p[1] * t[0] + p[2] * w[0],
+            give(given[doll], sign, c.friction_point[0], c.friction_point[1], c.friction_point[2], p[1] * t[0] + p[2] * w[0],
                  p[1] * t[1] + p[2] * w[1], p[1] * t[2] + p[2] * w[2])
             if c.kind == 5:
                 for k in range(3):
@@ -130,7 +130,7 @@ def give_contacts(s: System, r: Room, m: int, given: np.ndarray) -> None:
 
 
 @compiled
-def keep_momentum(s: System, r: Room, h: float, q: np.ndarray, v: np.ndarray) -> None:
+def conserve_momentum(s: System, r: Workspace, h: float, q: np.ndarray, v: np.ndarray) -> None:
     """Change q and v at the end of a step of h s, before which the sums were r.before, so that each
     doll which the ground does not bear has the momentum and the place that are due; r.after are
     the sums at q and v. Giving depths back may have moved dolls apart that touch each other: their
@@ -138,26 +138,26 @@ def keep_momentum(s: System, r: Room, h: float, q: np.ndarray, v: np.ndarray) ->
     """
     gained, mean, turn, moved = r.table[12], r.table[13], r.table[14], r.table[15]
     for i in range(len(s.tree)):
-        bone, d = s.tree[i], s.doll_of[i]
-        if bone.parent >= 0 or r.given[d].borne:
+        bone, d = s.tree[i], s.body_doll[i]
+        if bone.parent >= 0 or r.external[d].on_ground:
             continue
-        old, new, given, m = r.before[d], r.after[d], r.given[d], s.doll_masses[d]
-        at, rate = bone.q, bone.v
+        old, new, given, m = r.sums_before[d], r.sums_after[d], r.external[d], s.doll_masses[d]
+        at, rate = bone.q_start, bone.v_start
         for k in range(3):
             due = old.momentum[k] + given.impulse[k] + m * s.gravity[k] * h
             place = old.centre[k] + h * (old.momentum[k] + due) / (2 * m)
             mean[k] = (old.centre[k] + place) / 2
-            mean[3 + k] = place - (given.centre[k] if given.meets else new.centre[k])
+            mean[3 + k] = place - (given.centre[k] if given.touches_other else new.centre[k])
             gained[k] = (due - new.momentum[k]) / m
             moved[k] = new.centre[k] + mean[3 + k] - place
             turn[k] = due
         x, y, z = cross(mean[0], mean[1], mean[2], given.impulse[0], given.impulse[1],
                         given.impulse[2])
         dx, dy, dz = cross(moved[0], moved[1], moved[2], turn[0], turn[1], turn[2])
-        turn[0] = old.angular[0] + given.moment[0] - x - dx - new.angular[0]
-        turn[1] = old.angular[1] + given.moment[1] - y - dy - new.angular[1]
-        turn[2] = old.angular[2] + given.moment[2] - z - dz - new.angular[2]
-        lock(new, r.work.matrix, turn)
+        turn[0] = old.angular_momentum[0] + given.moment[0] - x - dx - new.angular_momentum[0]
+        turn[1] = old.angular_momentum[1] + given.moment[1] - y - dy - new.angular_momentum[1]
+        turn[2] = old.angular_momentum[2] + given.moment[2] - z - dz - new.angular_momentum[2]
+        locked_angular_velocity(new, r.kinematics.matrix, turn)
         x, y, z = cross(turn[0], turn[1], turn[2], q[at] - new.centre[0], q[at + 1] - new.centre[1],
                         q[at + 2] - new.centre[2])
         v[rate] += gained[0] + x
@@ -172,21 +172,21 @@ def keep_momentum(s: System, r: Room, h: float, q: np.ndarray, v: np.ndarray) ->
 
 
 @compiled
-def inner_energy(s: System, r: Room) -> float:
+def internal_kinetic_energy(s: System, r: Workspace) -> float:
     """Kinetic energy, J, of v - w in take_out, by the sums r.after."""
     spin, inner = r.table[14], 0.0
-    for d in range(len(r.after)):
-        inner += r.after[d].kinetic
-        if not r.given[d].borne:
+    for d in range(len(r.sums_after)):
+        inner += r.sums_after[d].kinetic
+        if not r.external[d].on_ground:
             for k in range(3):
-                spin[k] = r.after[d].angular[k]
-            lock(r.after[d], r.work.matrix, spin)
-            inner -= rigid_energy(r.after[d], s.doll_masses[d], spin)
+                spin[k] = r.sums_after[d].angular_momentum[k]
+            locked_angular_velocity(r.sums_after[d], r.kinematics.matrix, spin)
+            inner -= rigid_energy(r.sums_after[d], s.doll_masses[d], spin)
     return inner
 
 
 @compiled
-def take_out(s: System, r: Room, gained: float, q: np.ndarray, v: np.ndarray) -> None:
+def remove_energy(s: System, r: Workspace, gained: float, q: np.ndarray, v: np.ndarray) -> None:
     """Take energy, J, that came from nothing out of the motion v at q, the sums there being
     r.after, as far as there is any.
 
@@ -194,21 +194,21 @@ def take_out(s: System, r: Room, gained: float, q: np.ndarray, v: np.ndarray) ->
     one rigid body: their momenta stay. What is at rest against w stays so, and what slides or comes
     apart does so in the same direction.
     """
-    matrix, spin, inner = r.work.matrix, r.table[14], inner_energy(s, r)
+    matrix, spin, inner = r.kinematics.matrix, r.table[14], internal_kinetic_energy(s, r)
     share = math.sqrt(max(0.0, 1 - gained / inner)) if inner > 0 else 1.0
     for i in range(len(s.tree)):
-        bone, new = s.tree[i], r.after[s.doll_of[i]]
-        at, rate = bone.q, bone.v
-        if bone.parent >= 0 or r.given[s.doll_of[i]].borne:
-            for k in range(bone.dof if bone.parent >= 0 else 6):
+        bone, new = s.tree[i], r.sums_after[s.body_doll[i]]
+        at, rate = bone.q_start, bone.v_start
+        if bone.parent >= 0 or r.external[s.body_doll[i]].on_ground:
+            for k in range(bone.dof_count if bone.parent >= 0 else 6):
                 v[rate + k] *= share
             continue
         for k in range(3):
-            spin[k] = new.angular[k]
-        lock(new, matrix, spin)
+            spin[k] = new.angular_momentum[k]
+        locked_angular_velocity(new, matrix, spin)
         x, y, z = cross(spin[0], spin[1], spin[2], q[at] - new.centre[0], q[at + 1] - new.centre[1],
                         q[at + 2] - new.centre[2])
-        mass = s.doll_masses[s.doll_of[i]]
+        mass = s.doll_masses[s.body_doll[i]]
         x, y, z = new.momentum[0] / mass + x, new.momentum[1] / mass + y, new.momentum[2] / mass + z
         v[rate] = x + share * (v[rate] - x)
         v[rate + 1] = y + share * (v[rate + 1] - y)
@@ -220,7 +220,7 @@ def take_out(s: System, r: Room, gained: float, q: np.ndarray, v: np.ndarray) ->
 
 
 @compiled
-def lock(doll: np.record, matrix: np.ndarray, spin: np.ndarray) -> None:
+def locked_angular_velocity(doll: np.record, matrix: np.ndarray, spin: np.ndarray) -> None:
     """Put in an angular momentum's place the angular velocity (3,) rad/s of a doll that has it as
     one rigid body.
     """
@@ -233,6 +233,6 @@ def lock(doll: np.record, matrix: np.ndarray, spin: np.ndarray) -> None:
 @compiled
 def rigid_energy(doll: np.record, mass: float, spin: np.ndarray) -> float:
     """Kinetic energy, J, of that body."""
-    p, l = doll.momentum, doll.angular
+    p, l = doll.momentum, doll.angular_momentum
     return ((p[0] ** 2 + p[1] ** 2 + p[2] ** 2) / mass + spin[0] * l[0] + spin[1] * l[1]
             + spin[2] * l[2]) / 2

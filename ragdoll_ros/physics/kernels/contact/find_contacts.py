@@ -8,13 +8,13 @@ import numpy as np
 from ..collision.pair import collide
 from ..compiling.decorators import compiled
 from ..maths.quaternion import cross
-from ..system import Room, System
+from ..system import Workspace, System
 from .gaps import TOUCHING, ground_point
-from .patch import shrink
+from .patch import contract_friction_points
 
 
 @compiled
-def find_contacts(s: System, q: np.ndarray, r: Room, gaps: np.ndarray, margin: float) -> int:
+def find_contacts(s: System, q: np.ndarray, r: Workspace, gaps: np.ndarray, margin: float) -> int:
     """Enter all contacts whose gap in ``gaps`` says that they touch, as they are at q, into
     r.contacts; of a pair those points that are nearer than ``margin``. Their number.
 
@@ -23,62 +23,62 @@ def find_contacts(s: System, q: np.ndarray, r: Room, gaps: np.ndarray, margin: f
     m, n, most = 0, 0, len(r.contacts)
     for k in range(len(s.geoms)):
         geom = s.geoms[k]
-        if s.offset[0] > -math.inf:
-            for j in range(geom.count):
+        if s.ground_offset[0] > -math.inf:
+            for j in range(geom.point_count):
                 if gaps[n + j] <= TOUCHING and m < most:
                     c = r.contacts[m]
-                    c.kind = 5 if geom.rolling > 0 else 3
-                    c.a, c.b, c.key, c.group = geom.bone, -1, n + j, k
-                    ground_point(geom, j, r.at[k], r.turn[k], s.normal, c.point)
-                    high = -s.offset[0]
+                    c.kind = 5 if geom.rolling_friction > 0 else 3
+                    c.a, c.b, c.id, c.patch = geom.bone, -1, n + j, k
+                    ground_point(geom, j, r.geom_positions[k], r.geom_rotations[k], s.ground_normal, c.point)
+                    high = -s.ground_offset[0]
                     for e in range(3):
-                        c.normal[e] = s.normal[e]
-                        high += c.point[e] * s.normal[e]
+                        c.normal[e] = s.ground_normal[e]
+                        high += c.point[e] * s.ground_normal[e]
                     c.gap = high
-                    c.friction, c.rolling = geom.friction, geom.rolling
+                    c.friction, c.rolling_friction = geom.friction, geom.rolling_friction
                     c.restitution = geom.restitution
                     m += 1
-        n += geom.count
-    for k in range(len(s.bounds)):
+        n += geom.point_count
+    for k in range(len(s.joint_limits)):
         for side in range(2):
             if gaps[n + side] <= TOUCHING and m < most:
-                c, bound = r.contacts[m], s.bounds[k]
-                c.kind, c.a, c.b, c.key, c.group = 1, bound.v, -1, n + side, -1
+                c, bound = r.contacts[m], s.joint_limits[k]
+                c.kind, c.a, c.b, c.id, c.patch = 1, bound.dof, -1, n + side, -1
                 c.normal[0] = 1.0 if side == 0 else -1.0
-                c.gap = q[bound.q] - bound.lower if side == 0 else bound.upper - q[bound.q]
-                c.friction = c.rolling = c.restitution = 0.0
+                c.gap = q[bound.q_index] - bound.lower if side == 0 else bound.upper - q[bound.q_index]
+                c.friction = c.rolling_friction = c.restitution = 0.0
                 m += 1
         n += 2
     for k in range(len(s.pairs)):
         if gaps[n + k] <= TOUCHING:
-            m = enter_pair(s, k, r, m, margin, n + len(s.pairs) + 4096 * k)
-    arms(s, r, m)
+            m = add_pair_contacts(s, k, r, m, margin, n + len(s.pairs) + 4096 * k)
+    set_friction_points(s, r, m)
     return m
 
 
 @compiled
-def enter_pair(s: System, k: int, r: Room, m: int, margin: float, key: int) -> int:
+def add_pair_contacts(s: System, k: int, r: Workspace, m: int, margin: float, key: int) -> int:
     """Enter the points of a pair's patch; the number of contacts after."""
     pair = s.pairs[k]
     a, b = s.geoms[pair.a], s.geoms[pair.b]
-    found = collide(a.kind, a.size, r.at[pair.a], r.turn[pair.a], b.kind, b.size, r.at[pair.b],
-                    r.turn[pair.b], margin, r.table)
+    found = collide(a.kind, a.size, r.geom_positions[pair.a], r.geom_rotations[pair.a], b.kind, b.size, r.geom_positions[pair.b],
+                    r.geom_rotations[pair.b], margin, r.table)
     for j in range(found):
         if m >= len(r.contacts):
             break
         c, row = r.contacts[m], r.table[j]
-        c.kind = 5 if pair.rolling > 0 else 3
-        c.a, c.b, c.key, c.group = a.bone, b.bone, key + int(row[7]), len(s.geoms) + k
+        c.kind = 5 if pair.rolling_friction > 0 else 3
+        c.a, c.b, c.id, c.patch = a.bone, b.bone, key + int(row[7]), len(s.geoms) + k
         for e in range(3):
             c.point[e], c.normal[e] = row[e], row[3 + e]
         c.gap = row[6]
-        c.friction, c.rolling, c.restitution = pair.friction, pair.rolling, pair.restitution
+        c.friction, c.rolling_friction, c.restitution = pair.friction, pair.rolling_friction, pair.restitution
         m += 1
     return m
 
 
 @compiled
-def arms(s: System, r: Room, m: int) -> None:
+def set_friction_points(s: System, r: Workspace, m: int) -> None:
     """Where friction acts: in a patch nearer its middle than the points that bear it.
 
     Under an even pressure p a patch that turns about its middle brakes with mu times the integral
@@ -87,22 +87,22 @@ def arms(s: System, r: Room, m: int) -> None:
     c = 0
     while c < m:
         d = c + 1
-        group = r.contacts[c].group
-        while d < m and r.contacts[d].group == group and group >= 0:
+        group = r.contacts[c].patch
+        while d < m and r.contacts[d].patch == group and group >= 0:
             d += 1
         for e in range(c, d):
-            basis(r.contacts[e])
+            set_tangents(r.contacts[e])
             for k in range(3):
-                r.contacts[e].arm[k] = r.contacts[e].point[k]
+                r.contacts[e].friction_point[k] = r.contacts[e].point[k]
         if d - c > 2 and group < len(s.geoms) and s.geoms[group].kind == 3:
-            on_disc(s.geoms[group], r.at[group], r.turn[group], r.contacts, c, d)
+            project_to_disc(s.geoms[group], r.geom_positions[group], r.geom_rotations[group], r.contacts, c, d)
         elif d - c > 1:
-            shrink(r, c, d)
+            contract_friction_points(r, c, d)
         c = d
 
 
 @compiled
-def on_disc(geom: np.record, at: np.ndarray, turn: np.ndarray, contacts: np.ndarray, begin: int,
+def project_to_disc(geom: np.record, at: np.ndarray, turn: np.ndarray, contacts: np.ndarray, begin: int,
             end: int) -> None:
     """Draw the arms of a cylinder's face, which stands on the ground, to two thirds of its radius,
     the mean distance of a disc.
@@ -114,11 +114,11 @@ def on_disc(geom: np.record, at: np.ndarray, turn: np.ndarray, contacts: np.ndar
         c = contacts[e]
         for k in range(3):
             middle = at[k] + turn[k, 2] * low
-            c.arm[k] = middle + 2 / 3 * (c.point[k] - middle)
+            c.friction_point[k] = middle + 2 / 3 * (c.point[k] - middle)
 
 
 @compiled
-def basis(c: np.record) -> None:
+def set_tangents(c: np.record) -> None:
     """Two directions across a contact's normal."""
     n = c.normal
     if abs(n[2]) > 0.7:
@@ -127,5 +127,5 @@ def basis(c: np.record) -> None:
         x, y, z = -n[2] * n[0], -n[2] * n[1], 1 - n[2] * n[2]
     size = math.sqrt(x * x + y * y + z * z)
     x, y, z = x / size, y / size, z / size
-    c.across[0, 0], c.across[0, 1], c.across[0, 2] = x, y, z
-    c.across[1, 0], c.across[1, 1], c.across[1, 2] = cross(n[0], n[1], n[2], x, y, z)
+    c.tangents[0, 0], c.tangents[0, 1], c.tangents[0, 2] = x, y, z
+    c.tangents[1, 0], c.tangents[1, 1], c.tangents[1, 2] = cross(n[0], n[1], n[2], x, y, z)

@@ -12,15 +12,15 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..maths.quaternion import times, to_matrix, turned
-from .forward import Work
+from .forward_dynamics import Kinematics
 
 
 @compiled
-def root_axes(tree: np.ndarray, q: np.ndarray, axes: np.ndarray) -> None:
+def root_motion_subspaces(tree: np.ndarray, q: np.ndarray, axes: np.ndarray) -> None:
     """Motion subspaces of the roots' six velocities, which pose() leaves out."""
     for i in range(len(tree)):
         if tree[i].parent < 0:
-            at, row = tree[i].q + 3, tree[i].v
+            at, row = tree[i].q_start + 3, tree[i].v_start
             for k in range(3):
                 for j in range(6):
                     axes[row + k, j] = axes[row + 3 + k, j] = 0.0
@@ -31,13 +31,13 @@ def root_axes(tree: np.ndarray, q: np.ndarray, axes: np.ndarray) -> None:
 
 
 @compiled
-def turn_inertias(tree: np.ndarray, work: Work, own: np.ndarray) -> None:
+def rotate_inertias(tree: np.ndarray, work: Kinematics, own: np.ndarray) -> None:
     """Inertias (n, 6) about the bones' centres along the world's axes: xx, xy, xz, yy, yz, zz."""
     matrix = work.matrix
     for i in range(len(tree)):
-        bone, turn = tree[i], work.turns[i]
-        x, y, z, w = times(turn[0], turn[1], turn[2], turn[3], bone.bind[0], bone.bind[1],
-                           bone.bind[2], bone.bind[3])
+        bone, turn = tree[i], work.orientations[i]
+        x, y, z, w = times(turn[0], turn[1], turn[2], turn[3], bone.inertial_orientation[0], bone.inertial_orientation[1],
+                           bone.inertial_orientation[2], bone.inertial_orientation[3])
         to_matrix(x, y, z, w, matrix)
         a, b, c = bone.inertia[0], bone.inertia[1], bone.inertia[2]
         n = 0
@@ -49,11 +49,11 @@ def turn_inertias(tree: np.ndarray, work: Work, own: np.ndarray) -> None:
 
 
 @compiled
-def crba(tree: np.ndarray, up: np.ndarray, bone_of: np.ndarray, work: Work, own: np.ndarray,
+def composite_rigid_body(tree: np.ndarray, up: np.ndarray, bone_of: np.ndarray, work: Kinematics, own: np.ndarray,
          composite: np.ndarray, H: np.ndarray) -> None:
     """Mass matrix, its lower triangle, at each pair of velocities of one branch alone."""
     for i in range(len(tree)):
-        m, c = tree[i].mass, work.centres[i]
+        m, c = tree[i].mass, work.positions[i]
         x, y, z = c[0], c[1], c[2]
         row = composite[i]
         row[0], row[1], row[2], row[3] = m, m * x, m * y, m * z
@@ -69,7 +69,7 @@ def crba(tree: np.ndarray, up: np.ndarray, bone_of: np.ndarray, work: Work, own:
             for k in range(10):
                 composite[p, k] += composite[i, k]
     for d in range(len(up)):
-        a, I = work.axes[d], composite[bone_of[d]]
+        a, I = work.motion_subspaces[d], composite[bone_of[d]]
         wx, wy, wz, vx, vy, vz = a[0], a[1], a[2], a[3], a[4], a[5]
         m, cx, cy, cz = I[0], I[1], I[2], I[3]
         px, py, pz = (m * vx + wy * cz - wz * cy, m * vy + wz * cx - wx * cz,
@@ -79,13 +79,13 @@ def crba(tree: np.ndarray, up: np.ndarray, bone_of: np.ndarray, work: Work, own:
         lz = I[6] * wx + I[8] * wy + I[9] * wz + cx * vy - cy * vx
         j = d
         while j >= 0:
-            s = work.axes[j]
+            s = work.motion_subspaces[j]
             H[d, j] = (s[0] * lx + s[1] * ly + s[2] * lz + s[3] * px + s[4] * py + s[5] * pz)
             j = up[j]
 
 
 @compiled
-def factor(H: np.ndarray, up: np.ndarray) -> None:
+def factor_ltl(H: np.ndarray, up: np.ndarray) -> None:
     """Put L, H = L^T L, in H's place."""
     for k in range(len(up) - 1, -1, -1):
         H[k, k] = math.sqrt(H[k, k])

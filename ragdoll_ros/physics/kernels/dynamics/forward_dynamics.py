@@ -20,7 +20,7 @@ from ..maths.cholesky import solve
 from ..maths.quaternion import cross, times, to_matrix, turned
 from ..maths.transcendental import sine_and_cosine
 
-Work = collections.namedtuple(
+Kinematics = collections.namedtuple(
     'Work', 'turns centres moves axes inertias biases drifts pulls matrix')
 """Room for n bones and nv velocities: turns (n, 4) from the bind pose, centres of mass (n, 3) from
 the root, spatial velocities (n, 6), motion subspaces (nv, 6), articulated inertias (n, 6, 6),
@@ -29,12 +29,12 @@ inertia times it, the inverse of its own part and the force along it (nv, 8); a 
 
 
 @compiled
-def pose(tree: np.ndarray, q: np.ndarray, v: np.ndarray, work: Work) -> None:
+def forward_kinematics(tree: np.ndarray, q: np.ndarray, v: np.ndarray, work: Kinematics) -> None:
     """Go from the roots to the leaves: turns, centres, velocities and axes."""
-    turns, centres, moves, axes = work.turns, work.centres, work.moves, work.axes
+    turns, centres, moves, axes = work.orientations, work.positions, work.spatial_velocities, work.motion_subspaces
     for i in range(len(tree)):
         bone = tree[i]
-        at, rate, up = bone.q, bone.v, bone.parent
+        at, rate, up = bone.q_start, bone.v_start, bone.parent
         if up < 0:
             x, y, z, w = q[at + 3], q[at + 4], q[at + 5], q[at + 6]
             moves[i, 0], moves[i, 1], moves[i, 2] = turned(
@@ -42,56 +42,56 @@ def pose(tree: np.ndarray, q: np.ndarray, v: np.ndarray, work: Work) -> None:
             moves[i, 3], moves[i, 4], moves[i, 5] = v[rate], v[rate + 1], v[rate + 2]
             centres[i, 0] = centres[i, 1] = centres[i, 2] = 0.0
             turns[i, 0], turns[i, 1], turns[i, 2], turns[i, 3] = times(
-                x, y, z, w, -bone.bind[0], -bone.bind[1], -bone.bind[2], bone.bind[3])
+                x, y, z, w, -bone.inertial_orientation[0], -bone.inertial_orientation[1], -bone.inertial_orientation[2], bone.inertial_orientation[3])
             continue
         x, y, z, w = turns[up, 0], turns[up, 1], turns[up, 2], turns[up, 3]
-        a, b, c = turned(x, y, z, w, bone.before[0], bone.before[1], bone.before[2])
+        a, b, c = turned(x, y, z, w, bone.parent_to_joint[0], bone.parent_to_joint[1], bone.parent_to_joint[2])
         a, b, c = centres[up, 0] + a, centres[up, 1] + b, centres[up, 2] + c
         for k in range(6):
             moves[i, k] = moves[up, k]
-        if bone.free:
+        if bone.has_quaternion:
             # frame * q * frame^-1: the joint's frame is not that of the doll
             d, e, f = q[at], q[at + 1], q[at + 2]
             x, y, z, w = times(
-                x, y, z, w, bone.axes[0, 0] * d + bone.axes[1, 0] * e + bone.axes[2, 0] * f,
-                bone.axes[0, 1] * d + bone.axes[1, 1] * e + bone.axes[2, 1] * f,
-                bone.axes[0, 2] * d + bone.axes[1, 2] * e + bone.axes[2, 2] * f, q[at + 3])
-        for k in range(bone.dof):
-            d, e, f = bone.axes[k, 0], bone.axes[k, 1], bone.axes[k, 2]
+                x, y, z, w, bone.joint_axes[0, 0] * d + bone.joint_axes[1, 0] * e + bone.joint_axes[2, 0] * f,
+                bone.joint_axes[0, 1] * d + bone.joint_axes[1, 1] * e + bone.joint_axes[2, 1] * f,
+                bone.joint_axes[0, 2] * d + bone.joint_axes[1, 2] * e + bone.joint_axes[2, 2] * f, q[at + 3])
+        for k in range(bone.dof_count):
+            d, e, f = bone.joint_axes[k, 0], bone.joint_axes[k, 1], bone.joint_axes[k, 2]
             sx, sy, sz = turned(x, y, z, w, d, e, f)
             axes[rate, 0], axes[rate, 1], axes[rate, 2] = sx, sy, sz
             axes[rate, 3], axes[rate, 4], axes[rate, 5] = cross(a, b, c, sx, sy, sz)
             for j in range(6):
                 moves[i, j] += axes[rate, j] * v[rate]
-            if not bone.free:
+            if not bone.has_quaternion:
                 sine, cosine = sine_and_cosine(q[at + k] / 2)
                 x, y, z, w = times(x, y, z, w, d * sine, e * sine, f * sine, cosine)
             rate += 1
         turns[i, 0], turns[i, 1], turns[i, 2], turns[i, 3] = x, y, z, w
-        d, e, f = turned(x, y, z, w, bone.after[0], bone.after[1], bone.after[2])
+        d, e, f = turned(x, y, z, w, bone.joint_to_com[0], bone.joint_to_com[1], bone.joint_to_com[2])
         centres[i, 0], centres[i, 1], centres[i, 2] = a + d, b + e, c + f
 
 
 @compiled
-def accelerations(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray,
-                  v: np.ndarray, work: Work, out: np.ndarray) -> None:
+def forward_dynamics(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray,
+                  v: np.ndarray, work: Kinematics, out: np.ndarray) -> None:
     """Rates of change (nv,) of v. ``loads`` (m, 11): the bone's place in the scene, force and
     torque, the force's point on the bone, and 1 if all are along the bone's axes.
     """
-    pose(tree, q, v, work)
+    forward_kinematics(tree, q, v, work)
     for i in range(len(tree)):
-        _inertia(tree[i], work.turns[i], work.centres[i], work.moves[i], work.inertias[i],
-                 work.biases[i], loads, work.matrix)
+        _inertia(tree[i], work.orientations[i], work.positions[i], work.spatial_velocities[i], work.articulated_inertias[i],
+                 work.bias_forces[i], loads, work.matrix)
     for i in range(len(tree) - 1, -1, -1):
         if tree[i].parent >= 0:
             aba_backward(tree[i], i, v, work)
     for i in range(len(tree)):
-        bone, bias, move = tree[i], work.biases[i], work.moves[i]
+        bone, bias, move = tree[i], work.bias_forces[i], work.spatial_velocities[i]
         if bone.parent < 0:
             for k in range(6):
                 bias[k] = -bias[k]
-            solve(work.inertias[i], bias)
-            at, rate = bone.q + 3, bone.v
+            solve(work.articulated_inertias[i], bias)
+            at, rate = bone.q_start + 3, bone.v_start
             x, y, z = cross(move[0], move[1], move[2], move[3], move[4], move[5])
             out[rate] = bias[3] + x + gravity[0]
             out[rate + 1] = bias[4] + y + gravity[1]
@@ -106,8 +106,8 @@ def accelerations(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: n
 def _inertia(bone: np.record, turn: np.ndarray, centre: np.ndarray, move: np.ndarray,
              inertia: np.ndarray, bias: np.ndarray, loads: np.ndarray, matrix: np.ndarray) -> None:
     """A bone's own inertia, and the force that its motion and loads ask for."""
-    a, b, c, d = times(turn[0], turn[1], turn[2], turn[3], bone.bind[0], bone.bind[1],
-                       bone.bind[2], bone.bind[3])
+    a, b, c, d = times(turn[0], turn[1], turn[2], turn[3], bone.inertial_orientation[0], bone.inertial_orientation[1],
+                       bone.inertial_orientation[2], bone.inertial_orientation[3])
     to_matrix(a, b, c, d, matrix)
     x, y, z, mass = centre[0], centre[1], centre[2], bone.mass
     far = mass * (x * x + y * y + z * z)
@@ -155,19 +155,19 @@ def _inertia(bone: np.record, turn: np.ndarray, centre: np.ndarray, move: np.nda
 
 
 @inlined
-def aba_backward(bone: np.record, i: int, v: np.ndarray, work: Work) -> None:
+def aba_backward(bone: np.record, i: int, v: np.ndarray, work: Kinematics) -> None:
     """Hand a bone's inertia and bias on to its parent, through the axes of its joint."""
-    inertia, bias = work.inertias[i], work.biases[i]
+    inertia, bias = work.articulated_inertias[i], work.bias_forces[i]
     # what carries an axis moves as the bone does but for that axis and those behind it
-    by = bone.parent if bone.free else i
-    wx, wy, wz = work.moves[by, 0], work.moves[by, 1], work.moves[by, 2]
-    vx, vy, vz = work.moves[by, 3], work.moves[by, 4], work.moves[by, 5]
-    for d in range(bone.dof - 1, -1, -1):
-        at = bone.v + d
-        axis, drift, pull, rate = work.axes[at], work.drifts[at], work.pulls[at], v[at]
+    by = bone.parent if bone.has_quaternion else i
+    wx, wy, wz = work.spatial_velocities[by, 0], work.spatial_velocities[by, 1], work.spatial_velocities[by, 2]
+    vx, vy, vz = work.spatial_velocities[by, 3], work.spatial_velocities[by, 4], work.spatial_velocities[by, 5]
+    for d in range(bone.dof_count - 1, -1, -1):
+        at = bone.v_start + d
+        axis, drift, pull, rate = work.motion_subspaces[at], work.bias_accelerations[at], work.aba_terms[at], v[at]
         sx, sy, sz = axis[0] * rate, axis[1] * rate, axis[2] * rate
         tx, ty, tz = axis[3] * rate, axis[4] * rate, axis[5] * rate
-        if not bone.free:
+        if not bone.has_quaternion:
             wx, wy, wz, vx, vy, vz = wx - sx, wy - sy, wz - sz, vx - tx, vy - ty, vz - tz
         drift[0], drift[1], drift[2] = cross(wx, wy, wz, sx, sy, sz)
         sx, sy, sz = cross(vx, vy, vz, sx, sy, sz)
@@ -193,19 +193,19 @@ def aba_backward(bone: np.record, i: int, v: np.ndarray, work: Work) -> None:
             bias[j] = value
     for j in range(6):
         for k in range(6):
-            work.inertias[bone.parent, j, k] += inertia[j, k]
-        work.biases[bone.parent, j] += bias[j]
+            work.articulated_inertias[bone.parent, j, k] += inertia[j, k]
+        work.bias_forces[bone.parent, j] += bias[j]
 
 
 @inlined
-def aba_forward(bone: np.record, i: int, work: Work, out: np.ndarray) -> None:
+def aba_forward(bone: np.record, i: int, work: Kinematics, out: np.ndarray) -> None:
     """Take a bone's acceleration, in its bias' place, and its joint's from the parent's."""
-    rate = work.biases[i]
+    rate = work.bias_forces[i]
     for k in range(6):
-        rate[k] = work.biases[bone.parent, k]
-    for d in range(bone.dof):
-        at = bone.v + d
-        axis, drift, pull = work.axes[at], work.drifts[at], work.pulls[at]
+        rate[k] = work.bias_forces[bone.parent, k]
+    for d in range(bone.dof_count):
+        at = bone.v_start + d
+        axis, drift, pull = work.motion_subspaces[at], work.bias_accelerations[at], work.aba_terms[at]
         left = pull[7]
         for k in range(6):
             rate[k] += drift[k]
@@ -216,31 +216,31 @@ def aba_forward(bone: np.record, i: int, work: Work, out: np.ndarray) -> None:
 
 
 @compiled
-def rates(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray, v: np.ndarray,
-          work: Work, out: np.ndarray) -> None:
+def state_derivative(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray, v: np.ndarray,
+          work: Kinematics, out: np.ndarray) -> None:
     """Rates of change (nq + nv,) of q and v."""
     for i in range(len(tree)):
         bone = tree[i]
-        at, rate = bone.q, bone.v
+        at, rate = bone.q_start, bone.v_start
         if bone.parent < 0:
             out[at], out[at + 1], out[at + 2] = v[rate], v[rate + 1], v[rate + 2]
             at, rate = at + 3, rate + 3
-        if bone.free:
+        if bone.has_quaternion:
             out[at], out[at + 1], out[at + 2], out[at + 3] = times(
                 q[at], q[at + 1], q[at + 2], q[at + 3], v[rate] / 2, v[rate + 1] / 2,
                 v[rate + 2] / 2, 0.0)
         else:
-            for k in range(bone.dof):
+            for k in range(bone.dof_count):
                 out[at + k] = v[rate + k]
-    accelerations(tree, gravity, loads, q, v, work, out[len(q):])
+    forward_dynamics(tree, gravity, loads, q, v, work, out[len(q):])
 
 
 @compiled
 def normalize(tree: np.ndarray, q: np.ndarray) -> None:
     """Bring all quaternions in q to length one."""
     for i in range(len(tree)):
-        if tree[i].free:
-            at = tree[i].q + (3 if tree[i].parent < 0 else 0)
+        if tree[i].has_quaternion:
+            at = tree[i].q_start + (3 if tree[i].parent < 0 else 0)
             size = math.sqrt(q[at] ** 2 + q[at + 1] ** 2 + q[at + 2] ** 2 + q[at + 3] ** 2)
             for k in range(at, at + 4):
                 q[k] /= size

@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import numpy as np
 
-RECORD = np.dtype([
+BODY = np.dtype([
     ('bone', np.int64), ('parent', np.int64), ('free', np.int64), ('dof', np.int64),
     ('q', np.int64), ('v', np.int64), ('mass', float), ('inertia', float, 3), ('bind', float, 4),
     ('before', float, 3), ('after', float, 3), ('axes', float, (3, 3)), ('damping', float)],

@@ -12,19 +12,19 @@ import numpy as np
 from ..compiling.decorators import compiled
 from ..maths.quaternion import cross, times, turned
 from ..maths.transcendental import sine_and_cosine
-from .forward import Work
+from .forward_dynamics import Kinematics
 
 
 @compiled
 def bias_forces(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray,
-                v: np.ndarray, work: Work, own: np.ndarray, out: np.ndarray) -> None:
+                v: np.ndarray, work: Kinematics, own: np.ndarray, out: np.ndarray) -> None:
     """Generalised forces (nv,) of gravity, loads and the motion itself: H dv/dt where no joint
     resists. work is posed at q and v; its biases and inertias are lost.
 
     ``loads`` (m, 11) are those of dynamics.accelerations().
     """
-    forces, moves = work.biases, work.moves
-    acceleration = work.inertias  # room: (n, 6) of it, a bone's spatial acceleration
+    forces, moves = work.bias_forces, work.spatial_velocities
+    acceleration = work.articulated_inertias  # room: (n, 6) of it, a bone's spatial acceleration
     for i in range(len(tree)):
         bone, move, here = tree[i], moves[i], acceleration[i, 0]
         wx, wy, wz = move[0], move[1], move[2]
@@ -38,8 +38,8 @@ def bias_forces(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.
                 here[k] = above[k]
             by = moves[bone.parent]
             bx, by_, bz, cx, cy, cz = by[0], by[1], by[2], by[3], by[4], by[5]
-            for k in range(bone.dof):
-                axis, rate = work.axes[bone.v + k], v[bone.v + k]
+            for k in range(bone.dof_count):
+                axis, rate = work.motion_subspaces[bone.v_start + k], v[bone.v_start + k]
                 sx, sy, sz = axis[0] * rate, axis[1] * rate, axis[2] * rate
                 tx, ty, tz = axis[3] * rate, axis[4] * rate, axis[5] * rate
                 x, y, z = cross(bx, by_, bz, sx, sy, sz)
@@ -54,10 +54,10 @@ def bias_forces(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.
                 here[3] += x
                 here[4] += y
                 here[5] += z
-                if not bone.free:
+                if not bone.has_quaternion:
                     bx, by_, bz, cx, cy, cz = (bx + sx, by_ + sy, bz + sz, cx + tx, cy + ty,
                                                cz + tz)
-        c, m, I = work.centres[i], bone.mass, own[i]
+        c, m, I = work.positions[i], bone.mass, own[i]
         x, y, z = cross(wx, wy, wz, c[0], c[1], c[2])
         ux, uy, uz = move[3] + x, move[4] + y, move[5] + z
         x, y, z = cross(wx, wy, wz, ux, uy, uz)
@@ -75,33 +75,33 @@ def bias_forces(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.
         force[0], force[1], force[2] = nx + x, ny + y, nz + z
         force[3], force[4], force[5] = fx, fy, fz
     for n in range(len(loads)):
-        add_load(tree, loads[n], work, forces)
+        subtract_load(tree, loads[n], work, forces)
     for i in range(len(tree) - 1, -1, -1):
         bone, force = tree[i], forces[i]
         if bone.parent < 0:
             for k in range(6):
-                axis, s = work.axes[bone.v + k], 0.0
+                axis, s = work.motion_subspaces[bone.v_start + k], 0.0
                 for j in range(6):
                     s += axis[j] * force[j]
-                out[bone.v + k] = -s
+                out[bone.v_start + k] = -s
         else:
-            for k in range(bone.dof):
-                axis, s = work.axes[bone.v + k], 0.0
+            for k in range(bone.dof_count):
+                axis, s = work.motion_subspaces[bone.v_start + k], 0.0
                 for j in range(6):
                     s += axis[j] * force[j]
-                out[bone.v + k] = -s
+                out[bone.v_start + k] = -s
             for j in range(6):
                 forces[bone.parent, j] += force[j]
 
 
 @compiled
-def add_load(tree: np.ndarray, load: np.ndarray, work: Work, forces: np.ndarray) -> None:
+def subtract_load(tree: np.ndarray, load: np.ndarray, work: Kinematics, forces: np.ndarray) -> None:
     """Take a load (11,) off the forces (n, 6) about the root that its bone's motion asks for."""
     for i in range(len(tree)):
         if load[0] == tree[i].bone:
-            bone, turn, c = tree[i], work.turns[i], work.centres[i]
-            a, b, d, e = times(turn[0], turn[1], turn[2], turn[3], bone.bind[0], bone.bind[1],
-                               bone.bind[2], bone.bind[3])
+            bone, turn, c = tree[i], work.orientations[i], work.positions[i]
+            a, b, d, e = times(turn[0], turn[1], turn[2], turn[3], bone.inertial_orientation[0], bone.inertial_orientation[1],
+                               bone.inertial_orientation[2], bone.inertial_orientation[3])
             fx, fy, fz, nx, ny, nz = load[1], load[2], load[3], load[4], load[5], load[6]
             if load[10] > 0:
                 fx, fy, fz = turned(a, b, d, e, fx, fy, fz)
@@ -117,36 +117,36 @@ def add_load(tree: np.ndarray, load: np.ndarray, work: Work, forces: np.ndarray)
 
 
 @compiled
-def update_moves(tree: np.ndarray, q: np.ndarray, v: np.ndarray, work: Work) -> None:
+def update_velocities(tree: np.ndarray, q: np.ndarray, v: np.ndarray, work: Kinematics) -> None:
     """Spatial velocities of all bones at ``v``, where work is posed at q already."""
-    moves = work.moves
+    moves = work.spatial_velocities
     for i in range(len(tree)):
         bone, move = tree[i], moves[i]
         if bone.parent < 0:
-            at, rate = bone.q, bone.v
+            at, rate = bone.q_start, bone.v_start
             move[0], move[1], move[2] = turned(q[at + 3], q[at + 4], q[at + 5], q[at + 6],
                                                v[rate + 3], v[rate + 4], v[rate + 5])
             move[3], move[4], move[5] = v[rate], v[rate + 1], v[rate + 2]
         else:
             for j in range(6):
                 move[j] = moves[bone.parent, j]
-            for k in range(bone.dof):
-                axis, rate_ = work.axes[bone.v + k], v[bone.v + k]
+            for k in range(bone.dof_count):
+                axis, rate_ = work.motion_subspaces[bone.v_start + k], v[bone.v_start + k]
                 for j in range(6):
                     move[j] += axis[j] * rate_
 
 
 @compiled
-def integrate(tree: np.ndarray, q: np.ndarray, v: np.ndarray, h: float, out: np.ndarray) -> None:
+def integrate_positions(tree: np.ndarray, q: np.ndarray, v: np.ndarray, h: float, out: np.ndarray) -> None:
     """Coordinates ``out`` after h s at the velocities v, roots' angular ones along own axes."""
     for i in range(len(tree)):
         bone = tree[i]
-        at, rate = bone.q, bone.v
+        at, rate = bone.q_start, bone.v_start
         if bone.parent < 0:
             for k in range(3):
                 out[at + k] = q[at + k] + h * v[rate + k]
             at, rate = at + 3, rate + 3
-        if bone.free:
+        if bone.has_quaternion:
             a, b, c = v[rate] * h, v[rate + 1] * h, v[rate + 2] * h
             n = math.sqrt(a * a + b * b + c * c)
             sine, cosine = sine_and_cosine(n / 2)
@@ -155,5 +155,5 @@ def integrate(tree: np.ndarray, q: np.ndarray, v: np.ndarray, h: float, out: np.
             n = math.sqrt(x * x + y * y + z * z + w * w)
             out[at], out[at + 1], out[at + 2], out[at + 3] = x / n, y / n, z / n, w / n
         else:
-            for k in range(bone.dof):
+            for k in range(bone.dof_count):
                 out[at + k] = q[at + k] + h * v[rate + k]

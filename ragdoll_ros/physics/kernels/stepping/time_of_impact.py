@@ -13,9 +13,9 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..contact.gaps import NEVER, TOUCHING, first_limit, of_limit
-from ..system import Room, System
-from .step import SLOW, SLOW_TURN
+from ..contact.gaps import NEVER, TOUCHING, first_joint_limit_gap, is_joint_limit_gap
+from ..system import Workspace, System
+from .contact_step import SLOW, SLOW_TURN
 
 SUNK = -1e-7
 """m or rad: what is found deeper than this at a step's end has met on the way."""
@@ -28,30 +28,30 @@ CHORDS = 2
 
 
 @compiled
-def met_fast(s: System, r: Room, j: int, h: float) -> bool:
+def is_fast_impact(s: System, r: Workspace, j: int, h: float) -> bool:
     """Whether what gap j parts met in the step of h s just gone, too fast for the next one."""
-    slow = SLOW_TURN if of_limit(s, r.gaps, j) else SLOW
-    return (r.gaps[j] > TOUCHING and r.later[j] <= TOUCHING
-            and r.gaps[j] - r.later[j] > slow * h)
+    slow = SLOW_TURN if is_joint_limit_gap(s, r.gaps, j) else SLOW
+    return (r.gaps[j] > TOUCHING and r.gaps_end[j] <= TOUCHING
+            and r.gaps[j] - r.gaps_end[j] > slow * h)
 
 
 @compiled
-def touched(s: System, r: Room, h: float) -> tuple[bool, bool, bool]:
+def impact_found(s: System, r: Workspace, h: float) -> tuple[bool, bool, bool]:
     """Whether something that met fast in the step of h s just gone, or whose touch is sought, is
     SUNK at its end; whether something is there or touches; and whether that came fast.
     """
     sunk = landed = fast = False
     for j in range(len(r.gaps)):
-        quick = met_fast(s, r, j, h)
-        if quick or (r.below[j] < 0 and r.later[j] <= TOUCHING):
+        quick = is_fast_impact(s, r, j, h)
+        if quick or (r.below[j] < 0 and r.gaps_end[j] <= TOUCHING):
             fast |= quick
             landed = True
-            sunk |= r.later[j] < SUNK
+            sunk |= r.gaps_end[j] < SUNK
     return sunk, landed, fast
 
 
 @compiled
-def open_bracket(r: Room) -> None:
+def open_bracket(r: Workspace) -> None:
     """Begin to seek the instant of a touch: all that is known is that it is after the start."""
     r.bracket[0], r.bracket[1], r.bracket[2] = 0.0, math.inf, 0.0
     r.bracket[3], r.bracket[4] = math.inf, 0.0
@@ -60,7 +60,7 @@ def open_bracket(r: Room) -> None:
 
 
 @compiled
-def narrow(s: System, r: Room, h: float, sunk: bool, landed: bool) -> bool:
+def update_bracket(s: System, r: Workspace, h: float, sunk: bool, landed: bool) -> bool:
     """Let a step of h s, at the end of which something is ``sunk``, or nothing is, be an end of
     r.bracket; whether the instant of the touch is to be sought between its ends.
 
@@ -72,10 +72,10 @@ def narrow(s: System, r: Room, h: float, sunk: bool, landed: bool) -> bool:
     if sunk:
         for j in range(len(r.gaps)):
             low = NEVER
-            if r.later[j] < SUNK and (r.below[j] < 0 or met_fast(s, r, j, h)):
-                low = r.later[j]
+            if r.gaps_end[j] < SUNK and (r.below[j] < 0 or is_fast_impact(s, r, j, h)):
+                low = r.gaps_end[j]
             if ends[2] > 0:
-                r.above[j] *= bent(r.below[j], low)
+                r.above[j] *= anderson_bjorck_weight(r.below[j], low)
             r.below[j] = low
         ends[1], ends[2] = h, 1.0
         return h > SHORTEST
@@ -83,14 +83,14 @@ def narrow(s: System, r: Room, h: float, sunk: bool, landed: bool) -> bool:
         return False
     for j in range(len(r.gaps)):
         if ends[2] < 0:
-            r.below[j] *= bent(r.above[j], r.later[j])
-        r.above[j] = r.later[j]
+            r.below[j] *= anderson_bjorck_weight(r.above[j], r.gaps_end[j])
+        r.above[j] = r.gaps_end[j]
     ends[0], ends[2] = h, -1.0
     return ends[1] < math.inf
 
 
 @compiled
-def bent(before: float, now: float) -> float:
+def anderson_bjorck_weight(before: float, now: float) -> float:
     """By how much the far end of a chord counts less when the near end moves from a value to one
     of the same sign; by half where that says nothing.
     """
@@ -99,7 +99,7 @@ def bent(before: float, now: float) -> float:
 
 
 @compiled
-def between(s: System, r: Room, v: np.ndarray) -> float:
+def next_trial_step(s: System, r: Workspace, v: np.ndarray) -> float:
     """Length of a step, s, at the end of which the first of those meets that r.bracket parts; ``v``
     are the velocities at its start.
     """
@@ -115,10 +115,10 @@ def between(s: System, r: Room, v: np.ndarray) -> float:
     for j in range(len(r.gaps)):
         if r.below[j] < 0:
             above = max(0.0, r.above[j])
-            if straight or not of_limit(s, r.gaps, j):
+            if straight or not is_joint_limit_gap(s, r.gaps, j):
                 share = min(share, above / (above - r.below[j]))
             else:
-                share = min(share, parabola(above, limit_rate(s, r, v, j) * width, r.below[j]))
+                share = min(share, parabola(above, limit_gap_rate(s, r, v, j) * width, r.below[j]))
     return max(SHORTEST, low + share * width)
 
 
@@ -132,21 +132,21 @@ def parabola(above: float, slope: float, below: float) -> float:
 
 
 @compiled
-def limit_rate(s: System, r: Room, v: np.ndarray, j: int) -> float:
+def limit_gap_rate(s: System, r: Workspace, v: np.ndarray, j: int) -> float:
     """Rate, rad/s, at which gap j, a joint's from a limit, opens."""
-    k = j - first_limit(s, r.gaps)
-    rate = v[s.bounds[k // 2].v]
+    k = j - first_joint_limit_gap(s, r.gaps)
+    rate = v[s.joint_limits[k // 2].v]
     return -rate if k % 2 else rate
 
 
 @compiled
-def until_limit(s: System, r: Room, v: np.ndarray, h: float) -> float:
+def step_to_joint_limit(s: System, r: Workspace, v: np.ndarray, h: float) -> float:
     """Length of a step, at most h s, at the end of which the first joint is at a limit that it
     nears fast, if it goes on at its rate of now.
     """
-    first = first_limit(s, r.gaps)
-    for j in range(first, first + 2 * len(s.bounds)):
-        rate = -limit_rate(s, r, v, j)
+    first = first_joint_limit_gap(s, r.gaps)
+    for j in range(first, first + 2 * len(s.joint_limits)):
+        rate = -limit_gap_rate(s, r, v, j)
         if rate > SLOW_TURN and r.gaps[j] > TOUCHING and r.gaps[j] < h * rate:
             h = max(SHORTEST, r.gaps[j] / rate)
     return h
