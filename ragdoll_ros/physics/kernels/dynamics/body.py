@@ -1,16 +1,20 @@
-"""What compiled code knows of a bone: one record of a table, parents first."""
+"""The kinematic tree as compiled code sees it: one record for each body, parents first."""
 from __future__ import annotations
 
 import numpy as np
 
 BODY = np.dtype([
-    ('bone', np.int64), ('parent', np.int64), ('free', np.int64), ('dof', np.int64),
-    ('q', np.int64), ('v', np.int64), ('mass', float), ('inertia', float, 3), ('bind', float, 4),
-    ('before', float, 3), ('after', float, 3), ('axes', float, (3, 3)), ('damping', float)],
+    ('bone', np.int64), ('parent', np.int64), ('has_quaternion', np.int64),
+    ('dof_count', np.int64), ('q_start', np.int64), ('v_start', np.int64), ('mass', float),
+    ('inertia', float, 3), ('inertial_orientation', float, 4), ('parent_to_joint', float, 3),
+    ('joint_to_com', float, 3), ('joint_axes', float, (3, 3)), ('joint_damping', float)],
     align=True)
-"""``bone``: its place in the scene. ``parent``: the record of its parent, -1 for a root.
-``free``: 1 where a quaternion in q stands for its turn: roots and ball joints without limits.
-``dof``: of its joint, none for a root's. ``q``, ``v``: where its coordinates begin.
-``bind``: its principal axes in the doll's. ``before``, ``after``: from the parent's centre of mass
-to the anchor, and from there to its own, m, and ``axes``, rows, all along the doll's axes as in
-the bind pose."""
+"""A body and the joint to its parent.
+
+bone: index in the scene. parent: record of the parent, -1 for a root. has_quaternion: 1 if q holds
+a quaternion (roots, and ball joints without limits). dof_count: degrees of freedom of the joint,
+0 for a root, which has six. q_start, v_start: where its coordinates begin in q and v. mass, kg;
+inertia: principal moments about the center of mass, kg m^2; inertial_orientation: principal axes
+relative to the doll's axes (x, y, z, w). parent_to_joint, joint_to_com: from the parent's center of
+mass to the joint and on to the body's own, m; joint_axes: rows; all three along the doll's axes in
+the bind pose. joint_damping: N m s/rad."""

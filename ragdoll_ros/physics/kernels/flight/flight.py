@@ -1,112 +1,131 @@
-"""Whether all that touches comes apart, and the flight along a path to its end or first touch."""
+"""Flight: whether everything that touches separates, and the motion along a step with dense output
+to its end or its first contact.
+"""
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
+from ..cluster_state import ClusterState
 from ..compiling.decorators import compiled
 from ..contact.find_contacts import find_contacts
-from ..contact.gaps import TOUCHING, update_kinematics_and_gaps, place_geoms
-from ..dynamics.forward_dynamics import forward_kinematics, state_derivative
+from ..contact.gaps import TOUCHING, update_kinematics_and_gaps
+from ..contact_kind import LIMIT
+from ..dynamics.forward_dynamics import state_derivative
+from ..dynamics.kinematics import forward_kinematics, place_geoms
+from ..maths.vectors import dot, norm, vec
 from ..stepping.step_control import clear_contact_accelerations
-from ..stepping.work import power
-from ..system import ClusterState, Workspace, System
-from .first_contact import time_until_contact_possible
-from .dense_step import evaluate_dense_step, point_velocity
+from ..stepping.work import load_power
+from ..system import System
+from ..workspace import Workspace
+from .dense_step import evaluate_dense_step
+from .first_contact import arm_gaps, normal_velocity, time_without_contact
 
-APART = 5e-3
-"""m/s or rad/s at which what touches comes apart for a flight: to 1.3 um under gravity, which is
-what TOUCHING can tell."""
+SEPARATION_SPEED = 5e-3
+"""m/s or rad/s at which contacts separate for a flight: to 1.3 um under gravity, which is what
+TOUCHING can tell."""
 
 STILL = 1e-6
 """rad/s, or rad/s^2, at which a joint that leans on its limit does not press on it."""
 
-NOTHING = 1e-9
-"""Share of a doll's weight below which nothing presses on anything: what falls with all its joints
-at their limits presses on them by rounding alone."""
+WEIGHTLESS = 1e-9
+"""Share of a doll's weight below which no contact presses: what falls with all its joints at their
+limits presses on them by rounding alone."""
 
-WORTH = 6
-"""Steps on the ground that cost as much as one of flight."""
+WORTHWHILE = 6
+"""Contact steps that cost as much as a step of flight."""
 
-GAUSS = ((0.046910077030668, 0.118463442528095), (0.230765344947158, 0.239314335249683),
-         (0.5, 0.284444444444444), (0.769234655052842, 0.239314335249683),
-         (0.953089922969332, 0.118463442528095))
-"""Places and weights of Gauss and Legendre's rule of five points on (0, 1)."""
+GAUSS_LEGENDRE = (
+    (0.046910077030668, 0.118463442528095), (0.230765344947158, 0.239314335249683),
+    (0.5, 0.284444444444444), (0.769234655052842, 0.239314335249683),
+    (0.953089922969332, 0.118463442528095))
+"""Nodes and weights of Gauss-Legendre quadrature with five points on (0, 1)."""
 
 
 @compiled
-def can_fly(s: System, r: Workspace, course: ClusterState, loads: np.ndarray, step: float) -> bool:
-    """Whether all that touches comes apart, and for long enough; r.gaps are those of now."""
-    q, v, tally, armed = course.q, course.v, r.stats[0], r.armed
-    g = math.sqrt(s.gravity[0] ** 2 + s.gravity[1] ** 2 + s.gravity[2] ** 2)
-    least = NOTHING * g * s.doll_masses[0] * tally.last_dt
-    for i in range(tally.contact_count):
-        if tally.ended_without_impact and course.contacts[i].impulse[0] > least:
+def can_fly(s: System, ws: Workspace, cluster: ClusterState, nominal: float) -> bool:
+    """Whether everything that touches separates, and for long enough; ws.gaps are those of now.
+    ``nominal``: length of a contact step, s.
+    """
+    q, v, stats, flight = cluster.q, cluster.v, ws.stats[0], ws.flight
+    kin, g = flight.kinematics, norm(vec(s.gravity))
+    least = WEIGHTLESS * g * s.doll_masses[0] * stats.last_dt
+    for i in range(stats.contact_count):
+        if stats.ended_without_impact and cluster.contacts[i].impulse[0] > least:
             return False
-    forward_kinematics(s.tree, q, v, r.kinematics)
-    place_geoms(s.tree, s.body_root, s.geoms, r.kinematics, q, r.geom_positions, r.geom_rotations)
-    m = find_contacts(s, q, r, r.gaps, TOUCHING)
-    leaning = False
-    for i in range(m):
-        c = r.contacts[i]
-        if c.kind == 1:
-            leaning |= c.normal[0] * v[c.a] < APART
-            if c.normal[0] * v[c.a] < -STILL:
-                return False
-            continue
-        apart = point_velocity(r.kinematics, c.a, q, s.tree[s.body_root[c.a]].q_start, c.point, c.normal)
-        if c.b >= 0:
-            apart -= point_velocity(r.kinematics, c.b, q, s.tree[s.body_root[c.b]].q_start, c.point, c.normal)
-        if apart < APART:
-            return False
-    if leaning:
-        state_derivative(s.tree, s.gravity, loads, q, v, r.kinematics, r.row)
-        for i in range(m):
-            c = r.contacts[i]
-            if c.kind == 1 and c.normal[0] * v[c.a] < APART and (
-                    c.normal[0] * r.row[len(q) + c.a] < -STILL):
-                return False
-        forward_kinematics(s.tree, q, v, r.kinematics)
-    if m == 0 or len(s.tree) == len(r.external):
+    forward_kinematics(s.tree, q, v, kin)
+    place_geoms(s.tree, s.body_root, s.geoms, q, kin)
+    m = find_contacts(s, ws, kin, q, ws.gaps, TOUCHING)
+    if not contacts_separate(s, ws, cluster, m):
+        return False
+    if m == 0 or len(s.tree) == len(ws.step.external):
         return True
-    update_kinematics_and_gaps(s, r, q, v, r.gaps, math.inf, r.gaps)
+    update_kinematics_and_gaps(s, ws, kin, q, v, ws.gaps, math.inf, ws.gaps)
     fast = 0.0
     for k in range(len(s.geoms)):
-        move = r.kinematics.spatial_velocities[s.geoms[k].bone]
-        fast = max(fast, (move[0] ** 2 + move[1] ** 2 + move[2] ** 2) * s.geoms[k].reach)
-    for j in range(len(armed)):
-        armed[j] = 1.0 if r.gaps[j] > TOUCHING else 0.0
-    return time_until_contact_possible(s, r, q, v, r.gaps, armed, g + 2 * fast + 1e-3, g + 2 * fast + 1e-3,
-                     course.end_rates) > WORTH * step
+        turn = vec(kin.spatial_velocities[s.geoms[k].body])
+        fast = max(fast, dot(turn, turn) * s.geoms[k].reach)
+    arm_gaps(ws)
+    bound = g + 2 * fast + 1e-3
+    return time_without_contact(s, ws, kin, q, v, ws.gaps, bound, bound,
+                                cluster.end_rates) > WORTHWHILE * nominal
 
 
 @compiled
-def follow_dense_step(s: System, r: Workspace, course: ClusterState, left: float, loads: np.ndarray) -> tuple[float, bool]:
-    """Go along the path by ``left`` s or to its end or its first touch; the time gone, and whether
-    something touches.
+def contacts_separate(s: System, ws: Workspace, cluster: ClusterState, m: int) -> bool:
+    """Whether all of m contacts separate, and no joint presses on a limit that it leans on."""
+    q, v, flight = cluster.q, cluster.v, ws.flight
+    kin, leaning = flight.kinematics, False
+    for i in range(m):
+        c = ws.contacts.found[i]
+        if c.kind == LIMIT:
+            leaning |= c.limit_sign * v[c.dof] < SEPARATION_SPEED
+            if c.limit_sign * v[c.dof] < -STILL:
+                return False
+            continue
+        point, normal = vec(c.point), vec(c.normal)
+        apart = normal_velocity(s, kin, q, c.body_a, point, normal)
+        if c.body_b >= 0:
+            apart -= normal_velocity(s, kin, q, c.body_b, point, normal)
+        if apart < SEPARATION_SPEED:
+            return False
+    if leaning:
+        state_derivative(s.tree, s.gravity, cluster.loads, q, v, kin, ws.step.dynamics,
+                         flight.derivative)
+        for i in range(m):
+            c = ws.contacts.found[i]
+            if c.kind == LIMIT and c.limit_sign * v[c.dof] < SEPARATION_SPEED and (
+                    c.limit_sign * flight.derivative[len(q) + c.dof] < -STILL):
+                return False
+    return True
+
+
+@compiled
+def follow_dense_step(s: System, ws: Workspace, cluster: ClusterState,
+                      left: float) -> tuple[float, bool]:
+    """Advance along the step by ``left`` s, or to its end or its first contact. Returns the time
+    advanced, and whether something touches.
     """
-    path = course.dense_step[0]
-    end = min(path.length, path.event_time)
-    gone = min(left, end - path.elapsed)
+    step, flight, loads = cluster.dense_step[0], ws.flight, cluster.loads
+    end = min(step.length, step.event_time)
+    gone = min(left, end - step.elapsed)
     if len(loads):
-        q2, v2 = r.states[1], r.vectors[0]
-        for place, weight in GAUSS:
-            evaluate_dense_step(s.tree, course, path.elapsed + place * gone, q2, v2)
-            forward_kinematics(s.tree, q2, v2, r.kinematics)
+        for node, weight in GAUSS_LEGENDRE:
+            evaluate_dense_step(s.tree, cluster, step.elapsed + node * gone, flight.q, flight.v)
+            forward_kinematics(s.tree, flight.q, flight.v, flight.kinematics)
             for k in range(len(loads)):
-                r.stats[0].work_pushes += weight * gone * power(s.tree, r.kinematics, loads[k], False)
-    path.elapsed += gone
-    clear_contact_accelerations(course)
-    evaluate_dense_step(s.tree, course, path.elapsed, course.q, course.v)
-    if path.elapsed < end - 1e-15:
+                ws.stats[0].work_pushes += weight * gone * load_power(
+                    s.tree, flight.kinematics, loads[k], False)
+    step.elapsed += gone
+    clear_contact_accelerations(cluster)
+    evaluate_dense_step(s.tree, cluster, step.elapsed, cluster.q, cluster.v)
+    if step.elapsed < end - 1e-15:
         return gone, False
-    path.valid = 0
-    touched = path.event_time <= path.length
-    path.first_rate_known = 0 if touched else 1
+    step.valid = 0
+    touched = step.event_time <= step.length
+    step.first_rate_known = 0 if touched else 1
     if touched:
-        path.next_length = 0.0
+        step.next_length = 0.0
     else:
-        for j in range(course.end_rates.shape[1]):
-            course.end_rates[0, j] = course.end_rates[1, j]
+        for j in range(cluster.end_rates.shape[1]):
+            cluster.end_rates[0, j] = cluster.end_rates[1, j]
     return gone, touched

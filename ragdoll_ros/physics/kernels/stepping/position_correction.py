@@ -1,93 +1,102 @@
-"""Depths given back in position alone, as far as motion can pay and joints allow."""
-from __future__ import annotations
+"""Position correction: penetrations are removed by a displacement, without velocity.
 
-import math
+It raises the potential energy. The motion pays for that, so it goes no further than a share of the
+kinetic energy allows; nor does it take a joint past a limit.
+"""
+from __future__ import annotations
 
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..contact.gaps import BEYOND, BURIED, bone_velocity
-from ..dynamics.bias_forces import update_velocities
-from ..maths.quaternion import cross
-from ..system import Workspace, System
+from ..contact.gaps import BEYOND_LIMIT, DEEP_PENETRATION
+from ..contact_kind import LIMIT
+from ..dynamics.kinematics import Kinematics, body_velocity, linear, update_velocities
+from ..maths.vectors import add, cross, dot, norm, scale, vec
+from ..system import System
+from ..workspace import Workspace
 from .momentum import internal_kinetic_energy
 
-PAID = 0.005
-"""Share of the kinetic energy that giving depths back may cost in a step."""
+PAID_SHARE = 0.005
+"""Share of the internal kinetic energy that position correction may cost in a step."""
 
 
 @compiled
-def correction_energy(s: System, r: Workspace, shift: np.ndarray) -> float:
-    """Energy of height, J, that a displacement (nv,) gives; axes, composites are those of now."""
-    total, g = 0.0, s.gravity
-    for j in range(len(shift)):
-        if shift[j] != 0.0:
-            a, c = r.kinematics.motion_subspaces[j], r.composite[s.dof_body[j]]
-            x, y, z = cross(a[0], a[1], a[2], c[1], c[2], c[3])
-            total -= shift[j] * (g[0] * (c[0] * a[3] + x) + g[1] * (c[0] * a[4] + y)
-                                 + g[2] * (c[0] * a[5] + z))
+def correction_energy(s: System, ws: Workspace, kin: Kinematics, correction: np.ndarray) -> float:
+    """Potential energy, J, that a displacement ``correction`` (nv,) adds; composite inertias and
+    motion subspaces are those of ``kin``.
+    """
+    total, g = 0.0, vec(s.gravity)
+    for j in range(len(correction)):
+        if correction[j] != 0.0:
+            axis, subtree = (kin.motion_subspaces[j],
+                             ws.step.dynamics.composite_inertias[s.dof_body[j]])
+            total -= correction[j] * dot(g, add(scale(subtree.mass, linear(axis)),
+                                                cross(vec(axis), vec(subtree.moment))))
     return total
 
 
 @compiled
-def limit_correction_energy(s: System, r: Workspace, m: int, shift: np.ndarray) -> None:
-    """Let the motion pay for giving depths back, by a ``shift`` (nv,) that costs r.lift[0] J: where
-    it would be more than a part of its energy, they are given back by less. What is deep in the
-    ground or beyond a limit comes out whatever it costs: what the motion does not pay is booked.
+def limit_correction_energy(s: System, ws: Workspace, m: int, correction: np.ndarray) -> None:
+    """Scale a displacement ``correction`` (nv,) so that the potential energy it adds stays below a
+    share of the internal kinetic energy. Deep penetrations into the ground or past a limit are
+    corrected whatever the energy; what the motion does not pay is booked.
     """
-    deep = False
+    deep, scalars = False, ws.step.scalars[0]
     for i in range(m):
-        c = r.contacts[i]
-        deep |= c.b < 0 and c.gap < -(BEYOND if c.kind == 1 else BURIED)
-    paid = PAID * max(0.0, internal_kinetic_energy(s, r))
-    if r.lift[0] <= paid:
+        c = ws.contacts.found[i]
+        deep |= c.body_b < 0 and c.gap < -(BEYOND_LIMIT if c.kind == LIMIT else DEEP_PENETRATION)
+    paid = PAID_SHARE * max(0.0, internal_kinetic_energy(s, ws))
+    if scalars.correction_energy <= paid:
         return
     if deep:
-        r.stats[0].work_position_correction += r.lift[0] - paid
+        ws.stats[0].work_position_correction += scalars.correction_energy - paid
     else:
-        share = paid / r.lift[0]
-        for j in range(len(shift)):
-            shift[j] *= share
-        r.lift[0] *= share
+        share = paid / scalars.correction_energy
+        for j in range(len(correction)):
+            correction[j] *= share
+        scalars.correction_energy *= share
 
 
 @compiled
-def note_correction(s: System, r: Workspace, q: np.ndarray, shift: np.ndarray) -> None:
-    """Enter by how much a ``shift`` (nv,) moves and turns each bone, m and rad, into r.own[:, 2:4];
-    work is posed about there.
+def enter_correction_bounds(s: System, kin: Kinematics, q: np.ndarray, correction: np.ndarray,
+                            motion: np.ndarray) -> None:
+    """Enter by how much a displacement ``correction`` (nv,) moves, m, and turns, rad, each body
+    into ``motion``. ``kin`` is that of q; its velocities are overwritten.
     """
     some = False
-    for j in range(len(shift)):
-        some |= shift[j] != 0.0
+    for j in range(len(correction)):
+        some |= correction[j] != 0.0
     if some:
-        update_velocities(s.tree, q, shift, r.kinematics)
+        update_velocities(s.tree, q, correction, kin)
     for i in range(len(s.tree)):
-        r.own[i, 2] = r.own[i, 3] = 0.0
+        motion[i].correction = motion[i].correction_angle = 0.0
         if some:
-            x, y, z, r.own[i, 3] = bone_velocity(r.kinematics, i)
-            r.own[i, 2] = math.sqrt(x * x + y * y + z * z)
+            moved, motion[i].correction_angle = body_velocity(kin, i)
+            motion[i].correction = norm(moved)
 
 
 @compiled
-def clip_to_joint_limits(s: System, q: np.ndarray, shift: np.ndarray) -> None:
-    """Shorten a ``shift`` (nv,) of a doll that would take a joint past a limit not met yet."""
+def clip_to_joint_limits(s: System, q: np.ndarray, correction: np.ndarray) -> None:
+    """Scale the displacement ``correction`` (nv,) of each doll so that it takes no joint past a
+    limit that it has not reached.
+    """
     share, doll = 1.0, -1
     for k in range(len(s.joint_limits)):
-        bound = s.joint_limits[k]
-        if s.body_doll[s.dof_body[bound.dof]] != doll:
-            shorten(s, doll, share, shift)
-            share, doll = 1.0, s.body_doll[s.dof_body[bound.dof]]
-        way = shift[bound.dof]
-        room = q[bound.q_index] - bound.lower if way < 0 else bound.upper - q[bound.q_index]
+        limit = s.joint_limits[k]
+        if s.body_doll[s.dof_body[limit.dof]] != doll:
+            scale_doll(s, doll, share, correction)
+            share, doll = 1.0, s.body_doll[s.dof_body[limit.dof]]
+        way = correction[limit.dof]
+        room = q[limit.q] - limit.lower if way < 0 else limit.upper - q[limit.q]
         if room > 0 and abs(way) > room:
             share = min(share, room / abs(way))
-    shorten(s, doll, share, shift)
+    scale_doll(s, doll, share, correction)
 
 
 @compiled
-def shorten(s: System, doll: int, share: float, shift: np.ndarray) -> None:
-    """Scale what of a ``shift`` (nv,) is a doll's."""
+def scale_doll(s: System, doll: int, share: float, correction: np.ndarray) -> None:
+    """Scale the part of a displacement (nv,) that is one doll's."""
     if share < 1:
-        for j in range(len(shift)):
+        for j in range(len(correction)):
             if s.body_doll[s.dof_body[j]] == doll:
-                shift[j] *= share
+                correction[j] *= share
