@@ -24,8 +24,8 @@ def poison(simulation, kind, dolls=slice(0, 1)):
         for own in owns:
             numbers = getattr(engine._clusters, array)[own]
             numbers[place] = spoilt(numbers[place])
-        engine._clusters.gather()
-        engine._clusters.forget()  # a path of flight that is under way would write over it
+        engine._clusters.gather_state()
+        engine._clusters.invalidate()  # a step of flight that is under way would write over it
     else:
         here = {'q': engine.coordinates.q.copy(), 'v': engine.coordinates.v.copy()}
         here[array][place] = spoilt(here[array][place])

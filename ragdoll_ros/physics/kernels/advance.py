@@ -58,8 +58,8 @@ LONGEST_FLIGHT = 0.05
 """s: the longest step of flight that is tried."""
 
 MAX_IMPACTS = 200
-"""Impacts of one doll in one tick, over the cube of the number of dolls in the cluster: from then on
-no time of impact is sought, so that many dolls do not cost their square."""
+"""Impacts of one doll in one tick, over the cube of the number of dolls in the cluster: from then
+on no time of impact is sought, so that many dolls do not cost their square."""
 
 system_at, workspace_at, cluster_state_at = (bundle_at(SYSTEM), bundle_at(WORKSPACE),
                                              bundle_at(CLUSTER_STATE))

@@ -31,8 +31,8 @@ JOINT_LIMIT = np.dtype([('q', np.int64), ('dof', np.int64), ('lower', float), ('
 
 System = collections.namedtuple(
     'System', 'tree gravity dof_parent dof_body dof_damping body_last_dof body_root body_doll '
-    'geoms pairs joint_limits ground_normal ground_offset restitution_speed doll_masses energy_scale '
-    'flight_enabled')
+    'geoms pairs joint_limits ground_normal ground_offset restitution_speed doll_masses '
+    'energy_scale flight_enabled')
 """A scene of n bodies, nv degrees of freedom and d dolls. ``tree`` (n,): the kinematic trees, see
 dynamics/body.py. ``gravity`` (3,) m/s^2. ``dof_parent`` (nv,): the next degree of freedom towards
 the root, -1 at its end; ``dof_body`` (nv,); ``dof_damping`` (nv,) N m s/rad. ``body_last_dof``

@@ -92,7 +92,7 @@ def _enter_joint(body: np.ndarray, doll: Ragdoll, joint: Joint, at: dict[str, in
 
 
 def _energy_scale(tree: np.ndarray, geoms: np.ndarray, gravity: Sequence[float]) -> np.ndarray:
-    """m g L, J, of all bodies, L the largest reach of a geom."""
+    """M g L, J, of all bodies, L the largest reach of a geom."""
     return np.array([tree['mass'].sum() * geoms['reach'].max() * math.hypot(*gravity)])
 
 

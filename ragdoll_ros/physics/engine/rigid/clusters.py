@@ -51,7 +51,7 @@ class Cluster:
     state: ClusterState
     workspaces: list[Workspace]
     bundles: list[list[np.ndarray]]
-    """The rows that bind system, state, and a workspace for each thread; see compiling/bundle.py."""
+    """Rows that bind system, state, and a workspace for each thread; see compiling/bundle.py."""
 
     def addresses(self, worker: int) -> list[int]:
         """Addresses of its bundles, for compiled code."""
@@ -119,7 +119,7 @@ class Clusters:
         return not len(pairs) or bool(np.isin(self._numbers(pairs), self._pair_numbers).all())
 
     def form(self, pairs: np.ndarray) -> None:
-        """Form clusters of the dolls that ``pairs`` (k, 2) connect, and of every other by itself."""
+        """Form clusters of dolls that ``pairs`` (k, 2) connect, and of every other by itself."""
         label = np.arange(len(self._singles))
         for one, other in pairs:
             low, high = sorted((label[one], label[other]))
@@ -169,7 +169,7 @@ class Clusters:
             cluster.state.excluded[:] = own
 
     def excluded(self, kind: int) -> list[np.ndarray]:
-        """Flags (p,) of the pairs of each doll, of one kind: OVERLAPPING or JOINT_OUTSIDE_LIMITS."""
+        """Flags (p,) of each doll's pairs, of one kind: OVERLAPPING or JOINT_OUTSIDE_LIMITS."""
         return [cluster.state.excluded & kind for cluster in self._singles]
 
     def separate(self) -> None:
@@ -197,8 +197,8 @@ class Clusters:
         return {name: self.stats[name].sum() for name in COUNTS}
 
     def contacts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Contacts (c,) of all last steps, none in flight; the bones (c, 2) of the scene that touch,
-        or GROUND; the length (c,) s of the step.
+        """Contacts (c,) of all last steps, none in flight; the bones (c, 2) of the scene that
+        touch, or GROUND; the length (c,) s of the step.
         """
         if len(self._singles) == 1:
             found, dt = self._contacts_of_one(), self._singles[0].state.stats['last_dt'][0]

@@ -147,8 +147,10 @@ class RigidEngine:
         """What went wrong since the start, and what was done: names end in their units."""
         stats = self._clusters.totals()
         return {
-            'energy_excess_J': self.energy_excess, 'energy_lifted_J': float(stats['work_position_correction']),
-            'work_of_pushes_J': float(stats['work_pushes']), 'work_of_grabs_J': float(stats['work_grabs']),
+            'energy_excess_J': self.energy_excess,
+            'energy_lifted_J': float(stats['work_position_correction']),
+            'work_of_pushes_J': float(stats['work_pushes']),
+            'work_of_grabs_J': float(stats['work_grabs']),
             'error_estimate_m': self._estimate_error(), 'error_trusted': True,
             'flights': int(stats['flight_steps']), 'substeps': int(stats['steps']),
             'impacts': int(stats['impacts']), 'unsolved_total': int(stats['unsolved'])}

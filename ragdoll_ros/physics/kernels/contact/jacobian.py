@@ -96,7 +96,7 @@ def apply_inverse_factor(dof_parent: np.ndarray, L: np.ndarray, island: Island, 
 @compiled
 def contact_velocities(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray,
                        c: np.record) -> None:
-    """Enter the velocities along a contact's rows into c.start_velocity; ``kin`` is that of q, v."""
+    """Enter the velocities along a contact's rows into c.start_velocity; ``kin``: of q and v."""
     start = c.start_velocity
     if c.kind == LIMIT:
         start[0] = c.limit_sign * v[c.dof]

@@ -44,7 +44,8 @@ Dynamics = collections.namedtuple(
     'composite_inertias H matrix')
 """Scratch of the dynamics of n bodies and nv degrees of freedom: articulated inertias (n, 6, 6);
 bias forces (n, 6); spatial accelerations (n, 6); bias accelerations (nv, 6) of the joints' axes; U
-(nv, 6) = I_A S; D_inverse (nv,) = 1 / (S . U); u (nv,) = tau - S . p_A; composite inertias (n,); H (nv, nv), the mass matrix or its factor; a matrix (3, 3)."""
+(nv, 6) = I_A S; D_inverse (nv,) = 1 / (S . U); u (nv,) = tau - S . p_A; composite inertias (n,); H
+(nv, nv), the mass matrix or its factor; a matrix (3, 3)."""
 
 
 def make_dynamics(bodies: int, dofs: int) -> Dynamics:

@@ -210,7 +210,7 @@ def release_opening_contacts(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray
 
 @compiled
 def work_terms(island: Island, n: int, u: np.ndarray, p: np.ndarray) -> tuple[float, float]:
-    """p u and p W p, J, of impulses p, of which island.z is Y^T p, on row velocities u."""
+    """P u and p W p, J, of impulses p, of which island.z is Y^T p, on row velocities u."""
     work = spent = 0.0
     for i in range(n):
         work += p[i] * u[i]

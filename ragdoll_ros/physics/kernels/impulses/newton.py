@@ -102,7 +102,7 @@ def linearize(island: Island, m: int, n: int, p: np.ndarray, proximal: float) ->
 @compiled
 def write_velocity_row(W: np.ndarray, G: np.ndarray, n: int, i: int, active: bool,
                        proximal: float) -> None:
-    """Let the step bring the velocity of row i to zero, or, if it is not ``active``, its impulse."""
+    """Let the step zero the velocity of row i, or, if it is not ``active``, its impulse."""
     at = i * n
     for j in range(n):
         G[at + j] = W[at + j] if active else 0.0

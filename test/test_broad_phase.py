@@ -8,7 +8,7 @@ import pytest
 from ragdoll_ros import Bone, Ground, Placement, Ragdoll, Scene, Simulation
 from ragdoll_ros.model.scene import Material
 from ragdoll_ros.model.shapes import Sphere
-from ragdoll_ros.physics.engine.rigid.broad_phase import SPARE, SUDDEN, Neighbours
+from ragdoll_ros.physics.engine.rigid.broad_phase import IMPACT_SPEEDUP, MARGIN, BroadPhase
 
 RADIUS, AHEAD = 0.1, 0.02
 BALL = Ragdoll('ball', (Bone('ball', Sphere(RADIUS), 2.0, (0, 0, 0)),))
@@ -29,7 +29,7 @@ def found(scene, groups=None):
     rows[:, 6] = 1
     rows[:, 7:10] = [placement.velocity for placement in scene.dolls]
     count = len(rows)
-    pairs = Neighbours(scene, np.full(count, RADIUS)).couples(
+    pairs = BroadPhase(scene, np.full(count, RADIUS)).pairs(
         rows, AHEAD, np.ones(count, bool), np.arange(count) if groups is None else groups)
     return {tuple(pair) for pair in pairs.tolist()}
 
@@ -39,8 +39,9 @@ def by_pairs(scene):
     speeds where the ground is no farther from one than its own.
     """
     def at_ground(placement):
-        height = placement.position[2] - RADIUS - SPARE / 2
-        return bool(scene.ground) and height < SUDDEN * AHEAD * np.linalg.norm(placement.velocity)
+        height = placement.position[2] - RADIUS - MARGIN / 2
+        way = IMPACT_SPEEDUP * AHEAD * np.linalg.norm(placement.velocity)
+        return bool(scene.ground) and height < way
 
     pairs = set()
     for (a, one), (b, other) in itertools.combinations(enumerate(scene.dolls), 2):
@@ -48,7 +49,7 @@ def by_pairs(scene):
         speed = (np.linalg.norm(u) + np.linalg.norm(v) if at_ground(one) or at_ground(other)
                  else np.linalg.norm(u - v))
         way = np.linalg.norm(np.subtract(one.position, other.position))
-        if way < 2 * RADIUS + SPARE + SUDDEN * AHEAD * speed:
+        if way < 2 * RADIUS + MARGIN + IMPACT_SPEEDUP * AHEAD * speed:
             pairs.add((a, b))
     return pairs
 

@@ -1,4 +1,4 @@
-"""The instant of a touch within a step, where gaps close that are not straight."""
+"""The time of impact within a step, where gaps close that are not straight."""
 from __future__ import annotations
 
 import collections
@@ -9,21 +9,28 @@ import pytest
 numba = pytest.importorskip('numba')
 
 from ragdoll_ros.physics.kernels.contact.gaps import TOUCHING  # noqa: E402
-from ragdoll_ros.physics.kernels.stepping.step_control import TRIES, activate_contacts  # noqa: E402
-from ragdoll_ros.physics.kernels.stepping.position_correction import clip_to_joint_limits  # noqa: E402
-from ragdoll_ros.physics.kernels.stepping.time_of_impact import (  # noqa: E402
-    SUNK,
-    between,
-    narrow,
-    open_bracket,
-    touched,
-    until_limit,
+from ragdoll_ros.physics.kernels.stepping.position_correction import (  # noqa: E402
+    clip_to_joint_limits,
 )
+from ragdoll_ros.physics.kernels.stepping.step_control import (  # noqa: E402
+    MAX_TRIES,
+    activate_contacts,
+)
+from ragdoll_ros.physics.kernels.stepping.time_of_impact import (  # noqa: E402
+    OVERSHOT,
+    impacts_at_end,
+    next_trial_step,
+    open_bracket,
+    step_to_joint_limit,
+    update_bracket,
+)
+from ragdoll_ros.physics.kernels.system import JOINT_LIMIT  # noqa: E402
+from ragdoll_ros.physics.kernels.workspace import BRACKET  # noqa: E402
 
-Scene = collections.namedtuple('Scene', 'pairs bounds doll_of bone_of')
-Met = collections.namedtuple('Met', 'gaps later met')
-Gaps = collections.namedtuple('Gaps', 'gaps later above below bracket')
-JOINT_LIMIT = [('q', int), ('v', int), ('lower', float), ('upper', float)]
+Scene = collections.namedtuple('Scene', 'pairs joint_limits body_doll dof_body')
+Gaps = collections.namedtuple('Gaps', 'gaps contacts step')
+Contacts = collections.namedtuple('Contacts', 'gaps_end gaps_active')
+Step = collections.namedtuple('Step', 'bracket gaps_low gaps_high')
 
 
 def scene(*bounds):
@@ -33,53 +40,55 @@ def scene(*bounds):
                  np.arange(len(rows)))
 
 
-def gaps(count):
-    return Gaps(*(np.zeros(count) for _ in range(4)), np.zeros(5))
+def gaps(start):
+    """What of a workspace gaps are."""
+    count = len(start)
+    return Gaps(np.array(start), Contacts(np.zeros(count), np.array(start)),
+                Step(np.zeros(1, BRACKET), np.zeros(count), np.zeros(count)))
 
 
 @numba.njit
-def _tries(scene, r, v, length, step, starts, falls, powers):
+def _tries(scene, ws, v, length, step, starts, falls, powers):
     """Lengths of a step of ``step`` s tried, this one first, until one ends at the touch. Gap k at
     the end of h s is starts[k] - falls[k] (h / step) ** powers[k], and coordinate k moves by v[k] h
     from its lower limit's gap to its upper one's.
     """
-    open_bracket(r)
+    open_bracket(ws)
     tries = 0
     while tries < 100:
         tries += 1
-        r.gaps_end[:] = starts - falls * (length / step) ** powers
+        ws.contacts.gaps_end[:] = starts - falls * (length / step) ** powers
         for k in range(len(v)):
-            r.gaps_end[2 * k] += v[k] * length
-            r.gaps_end[2 * k + 1] -= v[k] * length
-        sunk, landed, _ = impact_found(scene, r, length)
-        if not update_bracket(scene, r, length, sunk, landed):
+            ws.contacts.gaps_end[2 * k] += v[k] * length
+            ws.contacts.gaps_end[2 * k + 1] -= v[k] * length
+        overshot, landed, _ = impacts_at_end(scene, ws, length)
+        if not update_bracket(scene, ws, length, overshot, landed):
             break
-        length = next_trial_step(scene, r, v)
+        length = next_trial_step(scene, ws, v)
     return tries
 
 
 @numba.njit
-def _until_limit(scene, r, v, step):
-    return step_to_joint_limit(scene, r, v, step)
+def _step_to_joint_limit(scene, ws, v, step):
+    return step_to_joint_limit(scene, ws, v, step)
 
 
 @numba.njit
-def _meet(scene, r, h):
-    return activate_contacts(scene, r, h)
+def _activate_contacts(scene, ws, h):
+    return activate_contacts(scene, ws, h)
 
 
 @numba.njit
-def _keep_limits(scene, q, shift):
-    clip_to_joint_limits(scene, q, shift)
+def _clip_to_joint_limits(scene, q, correction):
+    clip_to_joint_limits(scene, q, correction)
 
 
 def tries(starts, falls, powers, step=2e-3):
     """As many tries as are made, and the least gap at the end."""
-    r, still = gaps(len(starts)), np.zeros(0)
-    r.gaps[:] = starts
-    made = _tries(scene(), r, still, step, step, np.array(starts), np.array(falls),
+    ws, still = gaps(starts), np.zeros(0)
+    made = _tries(scene(), ws, still, step, step, np.array(starts), np.array(falls),
                   np.array(powers))
-    return made, r.gaps_end.min()
+    return made, ws.contacts.gaps_end.min()
 
 
 def test_two_gaps_that_lag_by_turns_are_brought_to_their_first_touch():
@@ -88,8 +97,8 @@ def test_two_gaps_that_lag_by_turns_are_brought_to_their_first_touch():
     past its limit.
     """
     made, least = tries([2.06e-6, 9.36e-3], [7.4e-4, 2.24e-2], [5.0, 1.3])
-    assert SUNK <= least <= TOUCHING
-    assert made < TRIES
+    assert OVERSHOT <= least <= TOUCHING
+    assert made < MAX_TRIES
 
 
 @pytest.mark.parametrize('seed', range(4))
@@ -104,9 +113,9 @@ def test_the_first_touch_of_several_gaps_is_met(seed):
         starts = 10 ** draw.uniform(-5.7, -2, count)
         falls, powers = starts + 10 ** draw.uniform(-4.2, -2, count), draw.uniform(1, 4, count)
         made, least = tries(starts, falls, powers)
-        assert SUNK <= least <= TOUCHING, (starts, falls, powers)
+        assert OVERSHOT <= least <= TOUCHING, (starts, falls, powers)
         worst = max(worst, made)
-    assert worst <= TRIES
+    assert worst <= MAX_TRIES
 
 
 def test_a_joint_is_taken_to_its_limit_by_its_rate():
@@ -115,18 +124,18 @@ def test_a_joint_is_taken_to_its_limit_by_its_rate():
     """
     limits, rate = scene((-1.0, 0.01), (-1.0, 1.0)), np.array([4.0, 0.05])
     for bend in (3e-4, -3e-4):  # rad in a step of 2 ms: by 150 rad/s^2
-        r = gaps(4)
-        r.gaps[:] = starts = np.array([1.0, 0.006, 1.0, 1e-5])  # too slow: the second
-        step = _until_limit(limits, r, rate, 2e-3)
+        starts = np.array([1.0, 0.006, 1.0, 1e-5])  # too slow: the second
+        ws = gaps(starts)
+        step = _step_to_joint_limit(limits, ws, rate, 2e-3)
         assert step == pytest.approx(0.006 / 4)
-        made = _tries(limits, r, rate, step, 2e-3, starts, np.array([0.0, bend, 0.0, 0.0]),
+        made = _tries(limits, ws, rate, step, 2e-3, starts, np.array([0.0, bend, 0.0, 0.0]),
                       np.full(4, 2.0))
         if bend > 0:
             assert made == 2
-            assert SUNK <= r.gaps_end[1] <= TOUCHING
+            assert OVERSHOT <= ws.contacts.gaps_end[1] <= TOUCHING
         else:  # a step like others; the next one begins from there
             assert made == 1
-            assert 0 < r.gaps_end[1] < 2e-4
+            assert 0 < ws.contacts.gaps_end[1] < 2e-4
 
 
 def test_what_is_given_back_takes_a_joint_to_its_limit_at_most():
@@ -136,7 +145,7 @@ def test_what_is_given_back_takes_a_joint_to_its_limit_at_most():
     limits, shift = scene((-1.0, 1.0), (-1.0, 1.0)), np.array([1e-3, 1e-3])
     for at, left in ((1.0 - 2e-4, 0.2), (1.0 - 2e-9, 2e-6), (1.0 + 2e-9, 1.0)):
         moved = shift.copy()
-        _keep_limits(limits, np.array([at, 0.0]), moved)
+        _clip_to_joint_limits(limits, np.array([at, 0.0]), moved)
         np.testing.assert_allclose(moved, shift * left, atol=1e-12)
         assert at > 1 or at + moved[0] <= 1 + 1e-15
 
@@ -147,6 +156,7 @@ def test_what_lands_fast_has_met_where_touches_are_not_sought():
     """
     limits, h = scene((-1.0, 1.0)), 2e-3
     for before, met in ((0.01, True), (1e-5, False)):
-        r = Met(np.array([1.0, before]), np.array([1.0, 0.0]), np.array([1.0, before]))
-        assert _meet(limits, r, h) == met
-        assert (r.gaps_active[1] == 0.0) == met
+        ws = gaps([1.0, before])
+        ws.contacts.gaps_end[:] = 1.0, 0.0
+        assert _activate_contacts(limits, ws, h) == met
+        assert (ws.contacts.gaps_active[1] == 0.0) == met
