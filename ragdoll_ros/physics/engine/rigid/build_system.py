@@ -12,7 +12,7 @@ from ....model.ragdoll import Joint, Ragdoll, joint_axes
 from ....model.scene import Scene
 from ...kernels.record import RECORD
 from ...kernels.system import BOUND, GEOM, PAIR, STICKS, System
-from ...motion import damping_rate
+from ...rigid_body import damping_rate
 
 KINDS = {'sphere': 0, 'capsule': 1, 'box': 2, 'cylinder': 3}
 """Numbers of the kinds of shapes, as in kernels/collision/shapes.py."""

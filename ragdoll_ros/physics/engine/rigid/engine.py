@@ -14,10 +14,10 @@ from ....model.coordinates import DofLayout, GeneralizedState
 from ....model.scene import Scene
 from ....model.state import State
 from ...accuracy import Accuracy
+from ...doll_totals import DollTotals
 from ...ground_heights import GroundHeights
 from ...kernels.system import OUTSIDE, WITHIN
-from ...motion import Motion
-from ..protocol import GROUND, Contacts, Drives, Springs, Wrenches, pressed
+from ..protocol import GROUND, Contacts, Drives, Springs, Wrenches, allowed_penetration
 from .broad_phase import Neighbours
 from .clusters import Cluster, Clusters
 from .loads import NO_LOADS, NO_SPRINGS, load_rows, spring_rows
@@ -36,7 +36,7 @@ class RigidEngine:
     """An Engine by the rigid core; see Engine."""
 
     energy_error = 1e-2
-    holds = True
+    supports_joint_springs = True
 
     def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
         self.scene, self.accuracy = scene, accuracy
@@ -45,10 +45,10 @@ class RigidEngine:
         self._neighbours = Neighbours(scene, self._clusters.reach())
         self._heights = GroundHeights(scene)
         self._spins = self.layout.root_spins
-        self.resting = np.zeros(len(scene.dolls), bool)
+        self.sleeping = np.zeros(len(scene.dolls), bool)
         self._designed = [np.full(len(own), WITHIN) for own in self._clusters.flags(WITHIN)]
         """Pairs that are within each other as bound: they are left so until they come apart."""
-        self.place(self._placed())
+        self.set_coordinates(self._placed())
         self._designed = self._clusters.flags(WITHIN)
 
     @property
@@ -75,16 +75,16 @@ class RigidEngine:
         return self.layout.joint_rates(GeneralizedState(self._clusters.q, self._clusters.v))
 
     @property
-    def motion(self) -> Motion:
+    def doll_totals(self) -> DollTotals:
         """Sums over each doll now."""
-        return self._motion
+        return self._doll_totals
 
     @property
-    def groups(self) -> np.ndarray:
+    def cluster_of_doll(self) -> np.ndarray:
         """Number (d,) of what each doll goes on with: dolls of one number fall asleep together."""
         return self._clusters.of_doll
 
-    def place(self, coordinates: GeneralizedState) -> None:
+    def set_coordinates(self, coordinates: GeneralizedState) -> None:
         """Put all dolls there and begin; see Engine."""
         clusters, q, v = self._clusters, self._clusters.q, self._clusters.v
         q[:], v[:] = coordinates.q, coordinates.v
@@ -92,13 +92,13 @@ class RigidEngine:
         v[self._spins] = rotation.rotate(turns, v[self._spins])
         clusters.tally[:] = 0
         clusters.begin()
-        self.resting[:] = False
+        self.sleeping[:] = False
         self._look()
         self._lift_out()
         clusters.within([own | OUTSIDE for own in self._designed])
         self._look()
         self._age = KEPT
-        self._start_energy = float(self.motion.energy.sum())
+        self._start_energy = float(self.doll_totals.energy.sum())
         self._departure = None
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
@@ -106,19 +106,20 @@ class RigidEngine:
         """Go on by ``duration`` s; see Engine."""
         clusters, acting = self._clusters, (wrenches, springs, drives)
         self._departure = clusters.q.copy(), clusters.v.copy(), duration, acting
+        of_doll = self.cluster_of_doll
         for acts in (*wrenches, *springs, *drives):
-            self.resting[self.groups == self.groups[self.scene.doll_of_bone[acts.bone]]] = False
+            self.sleeping[of_doll == of_doll[self.scene.doll_of_bone[acts.bone]]] = False
         self._meet(duration)
         self._go(duration, acting, self.accuracy)
 
-    def stop(self, dolls: np.ndarray) -> None:
+    def put_to_sleep(self, dolls: np.ndarray) -> None:
         """Bring dolls (d,) to rest where they are; the energy that is left is lost for good."""
         self._clusters.stop(dolls)
-        self.resting[dolls] = True
+        self.sleeping[dolls] = True
         self._departure = None
         self._look()
 
-    def grounded(self) -> np.ndarray:
+    def dolls_on_ground(self) -> np.ndarray:
         """Which dolls (d,) rest on the ground."""
         known, bones, _ = self._clusters.touching()
         found = np.zeros(len(self.scene.dolls), bool)
@@ -139,7 +140,7 @@ class RigidEngine:
     @property
     def energy_excess(self) -> float:
         """Energy, J, above that at the start and all work since."""
-        return (float(self._motion.energy.sum()) - self._start_energy
+        return (float(self._doll_totals.energy.sum()) - self._start_energy
                 - self._clusters.work())
 
     def measures(self) -> dict[str, float]:
@@ -154,25 +155,25 @@ class RigidEngine:
 
     def save(self) -> object:
         """A snapshot that restore brings back to the bit."""
-        return self._clusters.save(), self.resting.copy(), self._age, self._start_energy
+        return self._clusters.save(), self.sleeping.copy(), self._age, self._start_energy
 
     def restore(self, snapshot: tuple) -> None:
         """Go back to a snapshot."""
-        kept, self.resting[:], self._age, self._start_energy = snapshot
+        kept, self.sleeping[:], self._age, self._start_energy = snapshot
         self._clusters.restore(kept)
         self._departure = None
         self._show()
 
-    def forget(self, snapshot: object) -> None:
+    def discard(self, snapshot: object) -> None:
         """Nothing to release: the memory goes with the object."""
 
     def checkpoint(self) -> object:
         """Where all is and what the accounts say: far cheaper than save()."""
-        return self._clusters.checkpoint(), self.resting.copy(), self._start_energy
+        return self._clusters.checkpoint(), self.sleeping.copy(), self._start_energy
 
-    def go_back(self, checkpoint: tuple) -> None:
+    def restore_checkpoint(self, checkpoint: tuple) -> None:
         """Go on from a checkpoint; see Engine."""
-        kept, self.resting[:], self._start_energy = checkpoint
+        kept, self.sleeping[:], self._start_energy = checkpoint
         self._clusters.go_back(kept)
         self._age = KEPT
         self._departure = None
@@ -189,19 +190,19 @@ class RigidEngine:
         if len(self.scene.dolls) == 1:
             return
         rows = self._clusters.rows
-        near = self._neighbours.couples(rows, duration, ~self.resting, self.groups)
+        near = self._neighbours.couples(rows, duration, ~self.sleeping, self.cluster_of_doll)
         self._age += 1
-        if (self._clusters.know(near) and not self.resting[near].any()
+        if (self._clusters.know(near) and not self.sleeping[near].any()
                 and (self._age <= KEPT or self._clusters.all_alone)):
             return
         while True:
-            near = self._neighbours.couples(rows, max(duration, AHEAD), ~self.resting,
-                                            self.groups)
-            if not self.resting[near].any():
+            near = self._neighbours.couples(rows, max(duration, AHEAD), ~self.sleeping,
+                                            self.cluster_of_doll)
+            if not self.sleeping[near].any():
                 break
-            self.resting[near] = False
+            self.sleeping[near] = False
         asleep = self._clusters.couples
-        asleep = asleep[self.resting[asleep].all(axis=1)]
+        asleep = asleep[self.sleeping[asleep].all(axis=1)]
         self._clusters.group(np.unique(np.concatenate([near, asleep]), axis=0))
         self._age = 0
 
@@ -209,7 +210,7 @@ class RigidEngine:
             accuracy: Accuracy) -> None:
         """Take all clusters on that do not rest."""
         acted = self._act(acting) if any(acting) else ()
-        self._clusters.advance(duration, accuracy, self.resting)
+        self._clusters.advance(duration, accuracy, self.sleeping)
         for cluster in acted:
             cluster.use(cluster.course._replace(loads=NO_LOADS, springs=NO_SPRINGS))
             cluster.course.path[:] = 0
@@ -218,7 +219,7 @@ class RigidEngine:
     def _show(self) -> None:
         """The state and the sums that all have come to."""
         self._state = State.of(self._clusters.rows.copy())
-        self._motion = Motion.of(self._clusters.sums.view(float).reshape(-1, 20).copy())
+        self._doll_totals = DollTotals.of(self._clusters.sums.view(float).reshape(-1, 20).copy())
 
     def _act(self, acting: tuple[Wrenches, Springs, Drives]) -> list[Cluster]:
         """Enter what acts where it acts; the clusters concerned, whose flights begin anew."""
@@ -241,7 +242,7 @@ class RigidEngine:
 
     def _look(self) -> None:
         """See where all is."""
-        self._clusters.advance(0.0, self.accuracy, np.zeros(len(self.resting), bool))
+        self._clusters.advance(0.0, self.accuracy, np.zeros(len(self.sleeping), bool))
         self._show()
 
     def _lift_out(self) -> None:
@@ -250,7 +251,7 @@ class RigidEngine:
             return
         depths = -np.minimum.reduceat(self._heights(self.state),
                                       [own.start for own in self.scene.bone_slices])
-        for doll in np.flatnonzero(depths > pressed(self.scene)):
+        for doll in np.flatnonzero(depths > allowed_penetration(self.scene)):
             at = self.layout.root_positions[doll]
             self._clusters.q[at] += depths[doll] * np.array(self.scene.ground.normal)
 

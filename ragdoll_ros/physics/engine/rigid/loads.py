@@ -7,7 +7,7 @@ import numpy as np
 
 from ....model.scene import Scene
 from ...kernels.system import HAND, HOLDS, MOVES, TURNS
-from ..protocol import AppliedDrive, AppliedHold, Drives, Spring, Springs, Wrenches
+from ..protocol import AppliedDrive, AppliedJointSpring, Drives, Spring, Springs, Wrenches
 
 NO_LOADS = np.zeros((0, 11))
 NO_SPRINGS = np.zeros((0, 20))
@@ -33,7 +33,7 @@ def spring_rows(springs: Springs, drives: Drives, scene: Scene, bones: list[int]
     rows = []
     for spring in springs:
         record = records.index(bones.index(spring.bone))
-        rows.append(_hold(record, spring, scene) if isinstance(spring, AppliedHold)
+        rows.append(_hold(record, spring, scene) if isinstance(spring, AppliedJointSpring)
                     else _hand(record, spring))
     for drive in drives:
         rows += _drive(records.index(bones.index(drive.bone)), drive, scene)
@@ -47,7 +47,7 @@ def _hand(record: int, spring: Spring) -> np.ndarray:
         spring.left, spring.stiffness, spring.damping, spring.most, 1.0, 0.0, 0.0, 0.0, HAND, 0.0]])
 
 
-def _hold(record: int, hold: AppliedHold, scene: Scene) -> np.ndarray:
+def _hold(record: int, hold: AppliedJointSpring, scene: Scene) -> np.ndarray:
     """The mobility is that of the bone alone about its thinnest axis, the most that it can be."""
     mobility = 1 / min(scene.bones[hold.bone].inertia)
     row = np.zeros(20)
