@@ -42,7 +42,7 @@ def test_energy_and_momentum_are_those_of_the_mechanics_module():
     """What the simulation steers itself by, judged by sums written apart: to rounding."""
     scene, _, moved = moving_doll()
     measure, mechanics = Measure(scene), DollSums(scene)
-    motions = [mechanics.motion(moved.at(i)) for i in range(len(moved.times))]
+    motions = [mechanics.totals(moved.at(i)) for i in range(len(moved.times))]
     for own, theirs in (
             (measure.energy(moved), [motion.energy[0] for motion in motions]),
             (measure.momentum(moved), [motion.momentum[0] for motion in motions]),
