@@ -14,9 +14,9 @@ from ....model.coordinates import DofLayout, GeneralizedState
 from ....model.scene import Scene
 from ....model.state import State
 from ...accuracy import Accuracy
-from ...doll_totals import DollTotals
 from ...ground_heights import GroundHeights
 from ...kernels.system import OUTSIDE, WITHIN
+from ..doll_totals import DollTotals
 from ..protocol import GROUND, Contacts, Drives, Springs, Wrenches, allowed_penetration
 from .broad_phase import Neighbours
 from .clusters import Cluster, Clusters
