@@ -235,23 +235,15 @@ class Simulation:
 
         Raises:
             UnknownBone: the scene has no such bone.
-            NotFinite, OutOfRange: point or target is not finite or too far away, or there are
-                20 hands.
+            NotFinite, OutOfRange: point or target is invalid or far away, or 20 hands are in use.
 
         >>> simulation.grab('right', 'head')
         """
         self._hands.grab(hand, bone, point, target, self.state)
 
     def drag(self, hand: str, target: Sequence[float], within: float = DRAG_TIME) -> None:
-        """Move a hand at constant velocity; does nothing for a hand that holds nothing.
-
-        Args:
-            hand: name of the hand.
-            target: (3,) m, world frame.
-            within: duration of the movement, s of simulated time.
-
-        Raises:
-            NotFinite, OutOfRange: a number is not finite or too large.
+        """Move a hand to ``target`` (3,) m, world frame, at constant velocity ``within`` s of
+        simulated time. Does nothing for a hand that holds nothing. Raises NotFinite, OutOfRange.
 
         >>> simulation.drag('right', target=(0, 0, 1.5), within=0.5)
         """
@@ -321,14 +313,8 @@ class Simulation:
         """Set pose and velocities of all dolls, for now and for later resets, and reset().
 
         Collision is disabled between bones of a doll that overlap there by more than
-        allowed_penetration(); a doll that is deeper in the ground is lifted onto it.
-
-        Args:
-            coordinates: generalised coordinates and velocities, as ``coordinates`` returns them.
-
-        Raises:
-            OutOfRange: lengths differ from the scene's.
-            NotFinite, NotUnit: a number is not finite, or an orientation has no unit length.
+        allowed_penetration(); a doll that is deeper in the ground is lifted onto it. Raises
+        OutOfRange for lengths other than the scene's, NotFinite, NotUnit for orientations.
 
         >>> simulation.place(simulation.coordinates) is simulation.state
         True

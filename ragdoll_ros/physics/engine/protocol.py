@@ -13,7 +13,7 @@ from ...model.coordinates import DofLayout, GeneralizedState
 from ...model.scene import Scene
 from ...model.state import State
 from ..accuracy import Accuracy
-from ..doll_totals import DollTotals
+from .doll_totals import DollTotals
 
 GROUND = -1
 """Body index of the ground, in place of a bone's."""

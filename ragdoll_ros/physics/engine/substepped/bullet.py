@@ -185,7 +185,6 @@ class BulletEngine(SubsteppedEngine):
             raise
 
     def contacts(self) -> Contacts:
-        """Contact points of the last substep."""
         found = []
         # PyBullet divides the impulse of a substep by the duration of all substeps.
         substeps = self._timing[1] if self._timing else 1
@@ -199,7 +198,6 @@ class BulletEngine(SubsteppedEngine):
         return Contacts.of(found)
 
     def close(self) -> None:
-        """Disconnect the client; further calls do nothing."""
         if self._client >= 0:
             pybullet.disconnect(self._client)
             self._client = -1

@@ -12,10 +12,9 @@ import numpy as np
 from ....model.coordinates import DofLayout, GeneralizedState
 from ....model.scene import Scene
 from ....model.state import State
-from ...doll_totals import DollTotals
 from ...rigid_body import cross
+from ..doll_totals import DollSums, DollTotals
 from ..protocol import Wrenches
-from .doll_sums import DollSums
 from .energy_account import EnergyAccount
 from .work import mean_wrench
 

@@ -11,10 +11,9 @@ from ....model.coordinates import DofLayout, GeneralizedState
 from ....model.scene import Scene
 from ....model.state import State
 from ...accuracy import Accuracy
-from ...doll_totals import DollTotals
 from ...ground_heights import GroundHeights
+from ..doll_totals import DollSums, DollTotals
 from ..protocol import GROUND, Drives, Springs, Wrenches, allowed_penetration
-from .doll_sums import DollSums
 from .energy_account import EnergyAccount
 from .explicit_springs import CONSTANT_FORCE_TIME, SpringWrench, drive_wrenches, spring_wrenches
 from .work import steady_time, work
@@ -28,7 +27,7 @@ LEAST_SHARE = 0.01
 
 
 class SubsteppedEngine(ABC):
-    """Base class of engines that wrap a library with fixed time steps.
+    """Base class of engines that wrap a library with fixed time steps; see Engine for its methods.
 
     advance() splits its duration into intervals of constant loads, each of one or more equal
     substeps. One thread computes all of them, whatever ``workers`` is.
@@ -53,31 +52,26 @@ class SubsteppedEngine(ABC):
 
     @property
     def state(self) -> State:
-        """Poses and velocities of all bones."""
         if self._state is None:
             self._state = self._read_state()
         return self._state
 
     @property
     def coordinates(self) -> GeneralizedState:
-        """Generalised coordinates and velocities of all dolls."""
         if self._coordinates is None:
             self._coordinates = self._read_coordinates()
         return self._coordinates
 
     @property
     def joint_angles(self) -> np.ndarray:
-        """Joint angles (k,) rad."""
         return self.layout.joint_angles(self.coordinates.q)
 
     @property
     def joint_rates(self) -> np.ndarray:
-        """Time derivatives of the joint angles (k,) rad/s."""
         return self.layout.joint_rates(self.coordinates)
 
     @property
     def doll_totals(self) -> DollTotals:
-        """Energy, momentum and inertia of each doll."""
         if self._doll_totals is None:
             self._doll_totals = self._sums.totals(self.state)
         return self._doll_totals
@@ -88,7 +82,6 @@ class SubsteppedEngine(ABC):
         return np.zeros(len(self.sleeping), np.int64)
 
     def set_coordinates(self, coordinates: GeneralizedState) -> None:
-        """Set the state and restart the energy account; see Engine."""
         self.sleeping[:] = False
         self._set_state(coordinates)
         self._lift_out_of_ground()
@@ -99,7 +92,6 @@ class SubsteppedEngine(ABC):
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
                 drives: Drives = ()) -> None:
-        """Integrate over ``duration`` s; see Engine."""
         self.sleeping[:] = False
         self._taken, least, left = 0, LEAST_SHARE * duration, duration
         while left > 1e-12 * duration:
@@ -124,14 +116,12 @@ class SubsteppedEngine(ABC):
         return np.full(len(self.sleeping), any(GROUND in pair for pair in self._touching_pairs()))
 
     def bones_on_ground(self) -> np.ndarray:
-        """Which bones (n,) touch the ground."""
         contacts, on = self.contacts(), np.zeros(len(self.scene.bones), bool)
         on[contacts.a[contacts.b == GROUND]] = True
         return on
 
     @property
     def energy_excess(self) -> float:
-        """Energy, J, minus that at the start and all work since."""
         return self._account.excess(self.doll_totals.energy)
 
     def measures(self) -> dict[str, float]:
@@ -139,11 +129,9 @@ class SubsteppedEngine(ABC):
         return {**self._account.measures(self.doll_totals.energy), 'substeps': self._taken}
 
     def save(self) -> object:
-        """Take a snapshot that restore() reproduces to the bit."""
         return self._save(), self._account.copy()
 
     def restore(self, snapshot: object) -> None:
-        """Restore a snapshot."""
         held, account = snapshot
         self.sleeping[:] = False
         self._restore(held)
@@ -151,15 +139,12 @@ class SubsteppedEngine(ABC):
         self._invalidate()
 
     def discard(self, snapshot: object) -> None:
-        """Release the memory of a snapshot."""
         self._discard(snapshot[0])
 
     def checkpoint(self) -> object:
-        """Save coordinates and energy account only: far cheaper than save()."""
         return self.coordinates, self._account.copy()
 
     def restore_checkpoint(self, checkpoint: tuple) -> None:
-        """Restore a checkpoint; see Engine."""
         coordinates, account = checkpoint
         self._set_state(coordinates)
         self._account = account.copy()

@@ -5,8 +5,8 @@ import numpy as np
 
 from ....model.state import State
 from ...rigid_body import point_motion
+from ..doll_totals import DollSums
 from ..protocol import AppliedDrive, AppliedWrench, Drives, Spring, Springs
-from .doll_sums import DollSums
 
 CONSTANT_FORCE_TIME = 2.5e-3
 """s: longest interval over which the force of a hand or a drive is constant."""

@@ -52,7 +52,6 @@ class MujocoEngine(SubsteppedEngine):
         self.set_coordinates(self._initial_coordinates())
 
     def contacts(self) -> Contacts:
-        """All contact points."""
         self._mujoco.mj_forward(self._model, self._data)
         self._stale = False
         found, force = [], np.zeros(6)
