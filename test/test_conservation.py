@@ -16,10 +16,10 @@ from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Ground, Placement, Scene
 from ragdoll_ros.model.shapes import Sphere
 from ragdoll_ros.model.state import State
+from ragdoll_ros.physics.engine.doll_totals import DollSums
 from ragdoll_ros.physics.engine.protocol import AppliedWrench
 from ragdoll_ros.physics.engine.substepped.bullet import BulletEngine
 from ragdoll_ros.physics.engine.substepped.conservation import ConservationProjection
-from ragdoll_ros.physics.engine.substepped.doll_sums import DollSums
 from ragdoll_ros.physics.engine.substepped.energy_account import EnergyAccount
 from ragdoll_ros.physics.ground_heights import GroundHeights
 from ragdoll_ros.physics.simulation import Simulation

@@ -21,7 +21,7 @@ from ragdoll_ros.physics.actions.grab import (
     MAX_FORCE,
     MAX_HANDS,
 )
-from ragdoll_ros.physics.engine.substepped.doll_sums import DollSums
+from ragdoll_ros.physics.engine.doll_totals import DollSums
 from ragdoll_ros.physics.engine.substepped.explicit_springs import mobility
 from ragdoll_ros.physics.simulation import Simulation
 

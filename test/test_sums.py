@@ -5,7 +5,7 @@ import pytest
 from conserved import conserved
 from samples import SCENES, random_state
 
-from ragdoll_ros.physics.engine.substepped.doll_sums import DollSums
+from ragdoll_ros.physics.engine.doll_totals import DollSums
 
 
 @pytest.mark.parametrize('seed', range(3))
