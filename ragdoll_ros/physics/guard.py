@@ -82,7 +82,7 @@ class Guard:
         # The kinetic energy is computed only where it matters.
         if not gained <= share * self._energy_scale and not gained <= share * (
                 self._energy_scale + simulation.kinetic_energy - gained):
-            return f'energy rose by {gained:.4g} J that nothing put in'
+            return f'energy rose by {gained:.4g} J without work of a load'
         self._excess = excess
         return ''
 

@@ -277,7 +277,7 @@ class Simulation:
         >>> simulation.hold('left_shin', stiffness=300, damping=5)
         """
         if not self._engine.supports_joint_springs:
-            raise errors.WrongForm('engine', self.engine_name, 'rigid, which holds joints')
+            raise errors.WrongForm('engine', self.engine_name, 'rigid, which has joint springs')
         self._joint_springs.hold(angle, stiffness, damping, target, self.joint_angles)
 
     def go_limp(self, angles: Sequence[str] | None = None) -> None:

@@ -49,7 +49,7 @@ class JointSprings:
         """Add or replace a spring, see Simulation.hold(); ``angles`` (k,) rad: the current ones."""
         index = self._index(angle)
         if self._axes[index] is None:
-            raise errors.WrongAxes('angle', angle, 'an angle of no ball joint without limits')
+            raise errors.WrongAxes('angle', angle, 'no ball joint without limits: it has no angles')
         for key, value in (('stiffness', stiffness), ('damping', damping)):
             errors.check_range(key, value, 0.0, MAX_STIFFNESS)
         aim = float(angles[index]) if target is None else float(target)

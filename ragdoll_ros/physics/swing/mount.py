@@ -48,7 +48,7 @@ def mount_swings(scene: Scene) -> list[SwingMount]:
         for swing in placement.doll.swings:
             index = scene.bone_index(scene.qualified(placement, swing.bone))
             found.append(SwingMount.on(swing, placement.doll.bone(swing.bone), index,
-                                  scene.qualified(placement, swing.name)))
+                                       scene.qualified(placement, swing.name)))
     return found
 
 
@@ -58,14 +58,14 @@ class Roots:
 
     bone: np.ndarray
     """(n,) bone indices."""
-    place: np.ndarray
+    positions: np.ndarray
     """(3, n) m, in the bones' frames."""
 
     @classmethod
     def of(cls, mounted: Sequence[SwingMount]) -> Roots:
         """Collect the roots of mounted swings."""
-        place = np.array([mount.root for mount in mounted], float).reshape(-1, 3).T
-        return cls(np.array([mount.bone for mount in mounted], int), np.ascontiguousarray(place))
+        points = np.array([mount.root for mount in mounted], float).reshape(-1, 3).T
+        return cls(np.array([mount.bone for mount in mounted], int), np.ascontiguousarray(points))
 
     def frames(self, bones: State) -> BaseFrames:
         """Frames at the roots for this state of the bones."""
@@ -73,7 +73,7 @@ class Roots:
         rows = np.concatenate([axes, bones.positions.T, bones.linear_velocities.T,
                                bones.angular_velocities.T]).take(self.bone, axis=1)
         axes, spin = rows[:9].reshape(3, 3, -1), rows[15:18]
-        arm = np.einsum('jin,jn->in', axes, self.place)
+        arm = np.einsum('jin,jn->in', axes, self.positions)
         return BaseFrames(rows[9:12] + arm, rows[12:15] + cross(spin, arm), axes, spin)
 
 

@@ -66,18 +66,18 @@ class Swings:
         if self._begin is None or time < self._time:
             self.begin(time)
         elif time == self._time:
-            return self._answer
+            return self._last
         whole = math.floor((time - self._begin) / self.step + _ROUNDING)
         for index in range(self._count, whole):
             self._now = self._advance(self._now, self._instant(index),
                                       self._instant(index + 1), self.step)
         self._count, self._time = whole, time
-        rest = time - self._instant(whole)
+        remainder = time - self._instant(whole)
         now = self._now
-        if rest > _ROUNDING * self.step:
-            now = self._advance(now, self._instant(whole), time, rest)
-        self._answer = self._state(now, time)
-        return self._answer
+        if remainder > _ROUNDING * self.step:
+            now = self._advance(now, self._instant(whole), time, remainder)
+        self._last = self._state(now, time)
+        return self._last
 
     def begin(self, time: float, directions: np.ndarray | None = None,
               rates: np.ndarray | None = None) -> None:
@@ -103,12 +103,12 @@ class Swings:
             base = level.tips(self._now[-1])
             offset += count
         self._free.begin(time, bones)
-        self._answer = self._state(self._now, time)
+        self._last = self._state(self._now, time)
 
     def _grid(self) -> float:
-        quickest = max((math.sqrt(np.max(np.linalg.norm(level.gravity, axis=0) / level.reach))
+        fastest = max((math.sqrt(np.max(np.linalg.norm(level.gravity, axis=0) / level.reach))
                         for level in self._levels), default=0.0)
-        return LONGEST_STEP / max(1, math.ceil(LONGEST_STEP * quickest / LARGEST_PHASE))
+        return LONGEST_STEP / max(1, math.ceil(LONGEST_STEP * fastest / LARGEST_PHASE))
 
     def _instant(self, index: int) -> float:
         return self._begin + index * self.step
@@ -119,13 +119,13 @@ class Swings:
             return now
         base = self._roots.frames(self.motion(end))
         forces = self._levels[0].forces(now[0].base, base, h)
-        parts = _substep_count(forces, h)
-        if parts == 1:
+        substeps = _substep_count(forces, h)
+        if substeps == 1:
             return self._swing(now, base, h, forces)
-        for index in range(1, parts):
-            between = self._roots.frames(self.motion(begin + h * index / parts))
-            now = self._swing(now, between, h / parts)
-        return self._swing(now, base, h / parts)
+        for index in range(1, substeps):
+            between = self._roots.frames(self.motion(begin + h * index / substeps))
+            now = self._swing(now, between, h / substeps)
+        return self._swing(now, base, h / substeps)
 
     def _swing(self, now: list[Links], base: BaseFrames, h: float,
                forces: tuple[np.ndarray, np.ndarray] | None = None) -> list[Links]:
@@ -153,7 +153,7 @@ class Swings:
                           self._mass_index)
 
 
-_NOTHING = FreeMasses(np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 4)))
+_NO_MASSES = FreeMasses(np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 4)))
 
 
 class _FreeFall:
@@ -179,7 +179,7 @@ class _FreeFall:
     def at(self, time: float) -> FreeMasses:
         """State of the masses at ``time`` s."""
         if not len(self._bone):
-            return _NOTHING
+            return _NO_MASSES
         t = time - self._begin
         return FreeMasses(self._from + self._velocity * t + self._gravity * (t * t / 2),
                       self._velocity + self._gravity * t, self._turn)
