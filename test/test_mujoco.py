@@ -39,7 +39,7 @@ def test_poses_and_velocities_are_those_of_the_tree(engine, doll, seed):
     """Forward kinematics of three independent programs; 1e-7 rad is the root of rounding."""
     simulated = engine(flying(doll), PLAIN)
     placed = random_coordinates(flying(doll), seed, bend=.4)
-    simulated.place(placed)
+    simulated.set_coordinates(placed)
     back = simulated.coordinates
     sign = np.sign(back.q[3:7] @ placed.q[3:7])
     back.q[3:7] *= sign

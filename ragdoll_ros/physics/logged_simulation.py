@@ -100,7 +100,7 @@ class LoggedSimulation(Simulation):
         self.on_event('reset', self.conditions)
         return state
 
-    def go_back(self, checkpoint: object) -> State:
+    def go_back(self, checkpoint: tuple[int, object]) -> State:
         # No tick lies between the checkpoint and now: apply_event restores the current state.
         state = super().go_back(checkpoint)
         self.on_event('go_back', {})

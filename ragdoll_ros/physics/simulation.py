@@ -5,6 +5,7 @@ import os
 import warnings
 from collections.abc import Sequence
 from functools import cached_property, partial
+from typing import cast
 
 import numpy as np
 
@@ -69,12 +70,19 @@ class Simulation:
         ((10, 3), 1000000000)
     """
 
+    time: int
+    """Simulated time since the start, ns."""
+    substates: tuple[State, ...]
+    """States at the start of the last tick and at the end of each of its sub-intervals."""
+    asleep: bool
+    """Whether all dolls sleep, so that advance() does not integrate."""
+
     def __init__(self, scene: Scene, step: float | None = None,
                  accuracy: str | Accuracy = 'normal', engine: str | type[Engine] = 'auto',
                  workers: int | str = 1) -> None:
         if workers == 'auto':
             workers = len(os.sched_getaffinity(0))
-        errors.check_range('workers', workers, 1, MAX_WORKERS)
+        errors.check_range('workers', cast(int, workers), 1, MAX_WORKERS)
         self.scene = scene
         self.step = scene.step if step is None else step
         self._samples_per_tick = 1
@@ -106,7 +114,7 @@ class Simulation:
     @property
     def swings(self) -> SwingState | None:
         """State of all swing masses; None for a scene without swings."""
-        return self._swings and self._swings.state
+        return self._swings.state if self._swings else None
 
     @property
     def step(self) -> float:
@@ -331,11 +339,11 @@ class Simulation:
         self._start = self._engine.save()
         return self.reset()
 
-    def checkpoint(self) -> object:
+    def checkpoint(self) -> tuple[int, object]:
         """Save time and state for go_back(); cheap enough for every tick."""
         return self.time, self._engine.checkpoint()
 
-    def go_back(self, checkpoint: tuple) -> State:
+    def go_back(self, checkpoint: tuple[int, object]) -> State:
         """Restore a checkpoint; pushes and hands are kept, swings start at rest.
 
         A new engine is made, as a diverged state may have damaged the old one: a NaN stays in
@@ -363,14 +371,11 @@ class Simulation:
         self.reset_count += 1
         self._engine.restore(self._start)
         self.time = 0
-        """Simulated time since the start, ns."""
-        self.substates: tuple[State, ...] = (self.state,)
-        """States at the start of the last tick and at the end of each of its sub-intervals."""
+        self.substates = (self.state,)
         self._pushes = PushQueue(self.scene)
         self._hands, self._joint_springs = Hands(self.scene), JointSprings(self.scene)
         self._sleep_detector.restart()
         self.asleep = False
-        """Whether all dolls sleep, so that advance() does not integrate."""
         if self._swings:
             self._swings.reset(self.time, self.state)
         return self.state
@@ -393,7 +398,7 @@ class Simulation:
     def close(self) -> None:
         """Release the engine; further calls do nothing."""
         self._engine.close()
-        self._engine = _ClosedEngine()
+        self._engine = cast(Engine, _ClosedEngine())
 
     def _advance_until(self, end: int) -> None:
         """Integrate until ``end``, ns; no push begins or ends before."""
