@@ -26,23 +26,18 @@ from .sleeping import SleepDetector
 from .swing.pose import SwingState
 from .swing.simulation import SwingSimulation
 
-MAX_SAMPLES_PER_TICK = 200
-"""For a sensor of 1 kHz in the longest tick."""
-
-MAX_WORKERS = 64
-"""Threads; each has its own workspace."""
+MAX_SAMPLES_PER_TICK = 200  # those of a sensor of 1 kHz in the longest tick
+MAX_WORKERS = 64  # threads, each with its own workspace
 
 
 def _deprecated(old: str, new: str) -> property:
     """Alias of attribute ``new`` that warns; kept for one version."""
-    def value(simulation: Simulation) -> object:
-        warnings.warn(f'Simulation.{old} is now {new}', DeprecationWarning, stacklevel=2)
-        return getattr(simulation, new)
-
-    def set_value(simulation: Simulation, value: object) -> None:
-        warnings.warn(f'Simulation.{old} is now {new}', DeprecationWarning, stacklevel=2)
-        setattr(simulation, new, value)
-    return property(value, set_value, doc=f'Deprecated name of {new}.')
+    def warned() -> str:
+        warnings.warn(f'Simulation.{old} is now {new}', DeprecationWarning, stacklevel=3)
+        return new
+    return property(lambda simulation: getattr(simulation, warned()),
+                    lambda simulation, value: setattr(simulation, warned(), value),
+                    doc=f'Deprecated name of {new}.')
 
 
 class Simulation:

@@ -146,8 +146,7 @@ class MujocoEngine(SubsteppedEngine):
         self._mujoco.mj_setState(self._model, self._data, held, kind)
         self._stale = True
 
-    def _discard(self, held: object) -> None:
-        """Do nothing: memory is freed with the object."""
+    def _discard(self, held: object) -> None: ...
 
     def _build(self) -> None:
         mujoco = self._mujoco

@@ -7,15 +7,12 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
-STREAMS = (1, 2)
-"""File descriptors of standard output and standard error."""
-
 
 @contextmanager
 def silenced_output() -> Iterator[None]:
     """Redirect the process's standard output and standard error to the null device."""
     with ExitStack() as streams:
-        for stream in STREAMS:
+        for stream in (1, 2):
             streams.enter_context(_silenced(stream))
         yield
 
