@@ -29,5 +29,5 @@ def poison(simulation, kind, dolls=slice(0, 1)):
     else:
         here = {'q': engine.coordinates.q.copy(), 'v': engine.coordinates.v.copy()}
         here[array][place] = spoilt(here[array][place])
-        engine._put(GeneralizedState(**here))
+        engine._set_state(GeneralizedState(**here))
     return reason

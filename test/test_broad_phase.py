@@ -93,7 +93,7 @@ def test_dolls_that_fall_side_by_side_go_their_own_ways():
     with Simulation(balls(places, [(0, 0, -60.0)] * 9, Ground()), engine='rigid') as simulation:
         for _ in range(100):
             simulation.advance()
-            assert len(set(simulation._engine.groups.tolist())) == 9
+            assert len(set(simulation._engine.cluster_of_doll.tolist())) == 9
 
 
 @pytest.mark.parametrize('ground', [None, Ground()])
@@ -111,7 +111,7 @@ def test_balls_that_close_at_3_m_s_as_they_fall_at_60_bounce_as_they_do_at_rest(
         groups = set()
         for _ in range(round(end / simulation.step)):
             state = simulation.advance()
-            groups.add(tuple(simulation._engine.groups.tolist()))
+            groups.add(tuple(simulation._engine.cluster_of_doll.tolist()))
     after = end - gap / speed
     mean, share = 0.5, restitution * speed / 2
     assert state.linear_velocities[:, 0] == pytest.approx([mean - share, mean + share, 0], abs=1e-6)

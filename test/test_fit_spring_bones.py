@@ -15,7 +15,7 @@ from ragdoll_ros.model import rotation
 from ragdoll_ros.model.scene import above_ground
 from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.physics.swing.mount import Mount
+from ragdoll_ros.physics.swing.mount import SwingMount
 from ragdoll_ros.physics.swing.swings import Swings
 
 POINTS = [(0, 1.7, -.1), (0, 1.68, -.25), (.05, 1.5, -.3), (.05, 1.25, -.3)]
@@ -144,7 +144,7 @@ def vrm_frames(rod, length, angle, gravity_way, count):
 
 def still(swing):
     frame = State(np.zeros((1, 3)), np.array([rotation.IDENTITY]), *np.zeros((2, 1, 3)))
-    mount = Mount(swing, 0, swing.name, np.zeros(3), np.array(swing.directions()))
+    mount = SwingMount(swing, 0, swing.name, np.zeros(3), np.array(swing.directions()))
     return Swings([mount], (0, 0, -9.8), lambda time: frame)
 
 

@@ -173,8 +173,8 @@ def test_a_flood_does_not_pile_up(node, inputs):
 
 def test_a_queue_that_is_full_refuses(node, inputs):
     from ragdoll_ros.model.push import Push
-    from ragdoll_ros.physics.actions.push_queue import MOST_PUSHES
-    for _ in range(MOST_PUSHES):
+    from ragdoll_ros.physics.actions.push_queue import MAX_PUSHES
+    for _ in range(MAX_PUSHES):
         node.simulation.push(Push('head', (1, 0, 0), start=1.0))
     inputs.take_force(wrench((1, 0, 0)))
     assert node.tally.refused == {'~/force': 1}

@@ -11,7 +11,7 @@ from ..model.ragdoll import Ragdoll
 from ..model.rotation import IDENTITY
 from ..model.vectors import finite, unit
 from ..people.person import HEIGHTS, MASSES
-from ..physics.simulation import MOST_PARTS
+from ..physics.simulation import MAX_SAMPLES_PER_TICK
 from .distribution import choices, distribution_errors, support
 from .imu_samples import flaws_of
 
@@ -109,9 +109,9 @@ def _wrong_rate(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
     record = data.get('record')
     if not any_under(found, 'record') and isinstance(record, dict) and 'imu_rate' in record:
         rate, fast = record.get('rate', RATE), record['imu_rate']
-        if fast % rate or not 1 <= fast // rate <= MOST_PARTS:
+        if fast % rate or not 1 <= fast // rate <= MAX_SAMPLES_PER_TICK:
             yield errors.OutOfRange('record.imu_rate', fast,
-                                    f'1 to {MOST_PARTS} times the rate, {rate}')
+                                    f'1 to {MAX_SAMPLES_PER_TICK} times the rate, {rate}')
 
 
 def _wrong_imus(data: dict, found: list[ModelError]) -> Iterator[ModelError]:

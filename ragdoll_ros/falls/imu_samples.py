@@ -5,7 +5,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from ..physics.sensors.imu import Flaws, Mount, imu_samples, sensor_motion
+from ..physics.sensors.imu import ImuErrors, ImuMount, imu_samples, sensor_motion
 from .fall import Fall
 
 NAMES = ('ax', 'ay', 'az', 'wx', 'wy', 'wz')
@@ -39,12 +39,12 @@ def worn_orientations(fall: Fall, imu: int) -> np.ndarray:
     return sensor_motion(fall.worn[:, imu], mounted(fall, imu))[1]
 
 
-def flaws_of(sensor: dict) -> Flaws:
+def flaws_of(sensor: dict) -> ImuErrors:
     """What a recipe's sensor adds to what it should read; NotFinite, OutOfRange."""
-    return Flaws(**{field.name: sensor[field.name] for field in fields(Flaws)
+    return ImuErrors(**{field.name: sensor[field.name] for field in fields(ImuErrors)
                     if field.name in sensor})
 
 
-def mounted(fall: Fall, imu: int) -> Mount:
+def mounted(fall: Fall, imu: int) -> ImuMount:
     """Where the sensor is worn."""
-    return Mount(**{key: fall.imus[imu][key] for key in ('bone', 'position', 'orientation')})
+    return ImuMount(**{key: fall.imus[imu][key] for key in ('bone', 'position', 'orientation')})

@@ -74,7 +74,7 @@ class Recipe:
     @property
     def imus(self) -> list[dict]:
         """Sensors that are worn: name, bone, position m and orientation along the bone's axes, and
-        of Flaws what is given.
+        of ImuErrors what is given.
         """
         return self.data['record']['imus']
 

@@ -33,7 +33,7 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
             failure = ''
         except RagdollError as error:
             failure = str(error)
-        simulation.parts = recipe.parts
+        simulation.samples_per_tick = recipe.parts
         guard, limp = Guard(simulation), list(start.limp)
         while frames.valid < recipe.frames and not failure:
             frames.add(simulation)
@@ -74,7 +74,8 @@ class _Frames:
         self.angles[at], self.rates[at] = simulation.joint_angles, simulation.joint_rates
         if self._wearers:
             last = at * self._parts
-            for back, state in enumerate(simulation.trail[:0:-1] if at else simulation.trail):
+            substates = simulation.substates
+            for back, state in enumerate(substates[:0:-1] if at else substates):
                 self.worn[last - back] = state.rows[self._wearers]
         self.valid += 1
 

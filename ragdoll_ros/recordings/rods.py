@@ -6,7 +6,7 @@ import numpy as np
 from ..model import rotation
 from ..model.scene import Scene
 from ..model.state import State
-from ..physics.swing.mount import mounts
+from ..physics.swing.mount import mount_swings
 
 
 class Rods:
@@ -16,7 +16,7 @@ class Rods:
         bones, roots, firsts, free = [], [], [], []
         self.count = 0
         """Masses of all swings."""
-        for mount in mounts(scene):
+        for mount in mount_swings(scene):
             links = len(mount.swing.links)
             bones.append(mount.bone)
             roots.append(mount.root)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from ..model import errors
-from ..physics.logged_simulation import accuracy_from, repeat, state_digest
+from ..physics.logged_simulation import accuracy_from, apply_event, state_digest
 from ..physics.simulation import Simulation
 from .run import Event, Run
 
@@ -90,7 +90,7 @@ class Player:
                 scene, float(fields['step']),
                 self._accuracy or accuracy_from(fields['accuracy']),
                 self._engine or str(fields['engine']))
-            self.simulation.parts = int(fields.get('parts', 1))
+            self.simulation.samples_per_tick = int(fields.get('parts', 1))
         except errors.RagdollError:
             raise
         except (KeyError, TypeError, ValueError):
@@ -102,7 +102,7 @@ class Player:
 
     def _repeat(self, event: Event) -> None:
         try:
-            repeat(self.simulation, event.kind, event.fields)
+            apply_event(self.simulation, event.kind, event.fields)
         except errors.ModelError as error:
             raise error.at(f'event {event.number}') from None
         self.acts += 1

@@ -22,7 +22,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
 from ..files.run_scene import run_scene_text, scene_digest
-from ..physics.logged_simulation import RecordedSimulation, state_digest
+from ..physics.logged_simulation import LoggedSimulation, state_digest
 from .outputs import LATCHED
 
 HASHED = 100
@@ -38,14 +38,14 @@ class RunLog:
     def __init__(self, node: Node) -> None:
         self._events = node.create_publisher(String, '~/events', PAST)
         self._scene = node.create_publisher(String, '~/scene', LATCHED)
-        self._simulation: RecordedSimulation | None = None
+        self._simulation: LoggedSimulation | None = None
         self._number = self._tick = 0
 
-    def follow(self, simulation: RecordedSimulation) -> None:
+    def follow(self, simulation: LoggedSimulation) -> None:
         """Tell of this simulation from now on; of the same one again, nothing new."""
         if simulation is self._simulation:
             return
-        self._simulation, simulation.tell = simulation, self.tell
+        self._simulation, simulation.on_event = simulation, self.tell
         text = run_scene_text(simulation.scene)
         self._digest = scene_digest(text)
         self._scene.publish(String(data=text))

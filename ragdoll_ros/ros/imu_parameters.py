@@ -7,10 +7,10 @@ from rclpy.exceptions import InvalidTopicNameException
 from rclpy.validate_topic_name import validate_topic_name
 
 from ..model import errors, rotation
-from ..physics.sensors.imu import Mount
+from ..physics.sensors.imu import ImuMount
 
 
-def mount_of(text: str, bones: Sequence[str]) -> Mount:
+def mount_of(text: str, bones: Sequence[str]) -> ImuMount:
     """From one of ``bones``, with x y z (m) or x y z roll pitch yaw (rad) behind it or nothing.
 
     Raises UnknownBone for another text, NotFinite for a number that is none.
@@ -27,7 +27,7 @@ def mount_of(text: str, bones: Sequence[str]) -> Mount:
             except ValueError:
                 break
             turn = rotation.from_rpy(*angles) if angles else rotation.IDENTITY
-            return Mount(name, (x, y, z), tuple(turn))
+            return ImuMount(name, (x, y, z), tuple(turn))
     raise errors.UnknownBone('imus', text, f'{errors.one_of(bones, text)}; behind it nothing, '
                              'x y z, or x y z roll pitch yaw')
 

@@ -9,7 +9,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import Imu
 
 from ..model.scene import Scene
-from ..physics.sensors.imu import trail_samples
+from ..physics.sensors.imu import tick_samples
 from .imu_parameters import mount_of, sensor_topic
 from .messages.convert import to_imu
 from .messages.serialized import Packed
@@ -57,8 +57,8 @@ class Imus:
         for index, (publisher, mount, bone, layout) in enumerate(self._worn.values()):
             if not publisher.get_subscription_count():
                 continue
-            true = trail_samples(simulation.trail, bone, mount, simulation.step,
-                                 simulation.scene.gravity)
+            true = tick_samples(simulation.substates, bone, mount, simulation.step,
+                                simulation.scene.gravity)
             samples = self._flaws(true, _random(self._seed, index, simulation.time))
             apart = simulation.tick / len(samples) / self._pace
             for number, sample in enumerate(samples, 1 - len(samples)):

@@ -35,7 +35,7 @@ from visualization_msgs.srv import GetInteractiveMarkers
 
 from ..model import errors, rotation
 from ..model.ragdoll import WORLD
-from ..physics.actions.grab import EVENLY
+from ..physics.actions.grab import DRAG_TIME
 from ..physics.simulation import Simulation
 from .input_counts import Tally
 from .messages.interactive_markers import Handles
@@ -132,7 +132,7 @@ class Interactive:
             drag.heard = self._now()
             if kind == message.POSE_UPDATE:
                 self._simulation.drag(hand, position + rotation.rotate(orientation, drag.point),
-                                      EVENLY * self.settings.real_time_factor)
+                                      DRAG_TIME * self.settings.real_time_factor)
 
     def _check(self, message: InteractiveMarkerFeedback) -> None:
         """Refuse what is for no bone, in another frame or of another kind."""

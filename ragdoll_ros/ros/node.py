@@ -254,8 +254,8 @@ class RagdollNode(Node):
             self.simulation.accuracy = settings.accuracy
         if changed & IMU_SETTINGS:
             self._imus.use(self.simulation.scene, settings)
-            if self.simulation.parts != parts_of(settings):
-                self.simulation.parts = parts_of(settings)
+            if self.simulation.samples_per_tick != parts_of(settings):
+                self.simulation.samples_per_tick = parts_of(settings)
         if changed & {'scene', 'rate', 'real_time_factor'}:
             self.simulation.step = step_of(settings)
             self._go_on()

@@ -23,9 +23,9 @@ from ..model.ragdoll import WORLD
 from ..model.scene import STEP_RANGE, Scene
 from ..physics.accuracy import ACCURACIES
 from ..physics.engine.registry import ENGINES, check_engine
-from ..physics.logged_simulation import RecordedSimulation
-from ..physics.sensors.imu import Flaws
-from ..physics.simulation import MOST_WORKERS
+from ..physics.logged_simulation import LoggedSimulation
+from ..physics.sensors.imu import ImuErrors
+from ..physics.simulation import MAX_WORKERS
 from .imu_parameters import check_worn
 from .messages.tf import TREES
 from .written import as_numbers, unknown
@@ -82,7 +82,7 @@ class Settings:
                            constraints='one of ' + ', '.join(ENGINES))
     workers: int = _setting(
         1, 'Threads over which dolls are spread that do not touch, 0: as many as there are cores; '
-        'another number starts anew', (0, MOST_WORKERS))
+        'another number starts anew', (0, MAX_WORKERS))
     imus: tuple[str, ...] = _setting(
         ('',), "Bones that wear an inertial sensor, each heard on ~/imu/<bone>/data_raw: 'bone', "
         "'bone x y z' (m from its centre of mass along its axes) or 'bone x y z roll pitch yaw' "
@@ -104,10 +104,10 @@ class Settings:
         0, "Of the sensors' noise: the same seed, the same noise", (0, 2 ** 31 - 1))
 
     @property
-    def imu_flaws(self) -> Flaws:
+    def imu_flaws(self) -> ImuErrors:
         """What each sensor adds. Raises a ModelError for what can not be."""
         try:
-            return Flaws(self.imu_noise_acceleration, self.imu_noise_rate, self.imu_bias,
+            return ImuErrors(self.imu_noise_acceleration, self.imu_noise_rate, self.imu_bias,
                          self.imu_range)
         except errors.ModelError as error:
             raise type(error)(f'imu_{error.path}', error.value, error.expected) from None
@@ -266,11 +266,11 @@ def parts_of(settings: Settings) -> int:
     return round(settings.imu_rate / settings.rate) if any(settings.imus) else 1
 
 
-def make_simulation(scene: Scene, settings: Settings) -> RecordedSimulation:
+def make_simulation(scene: Scene, settings: Settings) -> LoggedSimulation:
     """Build the simulation that the settings ask for."""
-    simulation = RecordedSimulation(scene, step_of(settings), settings.accuracy, settings.engine,
+    simulation = LoggedSimulation(scene, step_of(settings), settings.accuracy, settings.engine,
                                     settings.workers or 'auto')
-    simulation.parts = parts_of(settings)
+    simulation.samples_per_tick = parts_of(settings)
     return simulation
 
 

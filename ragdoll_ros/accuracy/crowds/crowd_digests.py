@@ -44,17 +44,17 @@ def run(simulation: Simulation, ticks: int, seen: Counter | None = None) -> tupl
     scene, crowd, first = simulation.scene, hashlib.sha256(), hashlib.sha256()
     engine, pushes = simulation._engine, PUSHES if len(scene.dolls) > 1 else {}
     for tick in range(ticks):
-        rested = engine.resting.copy()
+        rested = engine.sleeping.copy()
         if 10 * tick % ticks == 0 and 10 * tick // ticks in pushes:
             simulation.push(pushes[10 * tick // ticks])
         rows = simulation.advance().rows
         crowd.update(rows.tobytes())
         first.update(rows[scene.bone_slices[0]].tobytes())
         if seen is not None:
-            joined = len(scene.dolls) - len(set(engine.groups.tolist()))
+            joined = len(scene.dolls) - len(set(engine.cluster_of_doll.tolist()))
             seen['joined'] = max(seen['joined'], joined)
-            seen['slept'] += int((engine.resting & ~rested).sum())
-            seen['woke'] += int((rested & ~engine.resting).sum())
+            seen['slept'] += int((engine.sleeping & ~rested).sum())
+            seen['woke'] += int((rested & ~engine.sleeping).sum())
     return crowd.hexdigest(), first.hexdigest()
 
 

@@ -20,7 +20,7 @@ from ...physics.swing.pose import SwingState
 
 if TYPE_CHECKING:  # else the page, which reads this file, would load an engine
     from ...physics.engine.protocol import Contacts
-    from ...physics.sensors.imu import Flaws
+    from ...physics.sensors.imu import ImuErrors
 
 
 def count_masses(scene: Scene) -> int:
@@ -115,7 +115,7 @@ def to_multi_dof(frame: str, names: tuple[str, ...], stamp: int, poses: np.ndarr
         twist=[to_twist(row) for row in twists.tolist()])
 
 
-def to_imu(frame: str, flaws: Flaws, stamp: int, rate: np.ndarray, force: np.ndarray) -> Imu:
+def to_imu(frame: str, flaws: ImuErrors, stamp: int, rate: np.ndarray, force: np.ndarray) -> Imu:
     """Angular rate (3,) rad/s and specific force (3,) m/s^2 of a sensor, in its ``frame``: data_raw
     of REP 145, which measures no orientation. Without noise the covariance is unknown.
     """

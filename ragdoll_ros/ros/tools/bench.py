@@ -48,7 +48,7 @@ def row(node: Node, scene: Scene, accuracy: str, ticks_before: int) -> dict[str,
     ready = to_pose_array('world', 0, poses_of(simulation.state))
     publisher = node.create_publisher(PoseArray, '~/bare', 10)
     bare = BulletEngine(scene, BARE)
-    bare.place(simulation.coordinates)
+    bare.set_coordinates(simulation.coordinates)
 
     def step_barely() -> None:
         bare.advance(scene.step)

@@ -19,7 +19,7 @@ from ...kernels.system import (
     System,
     coordinate_count,
 )
-from ...motion import damping_rate
+from ...rigid_body import damping_rate
 
 KINDS = {'sphere': 0, 'capsule': 1, 'box': 2, 'cylinder': 3}
 """Numbers of the kinds of shapes, as in kernels/collision/shapes.py."""

@@ -136,17 +136,17 @@ class Clusters:
                 _invalidate(made[-1])
         self._set(made)
 
-    def advance(self, duration: float, accuracy: Accuracy, resting: np.ndarray) -> None:
-        """Advance all clusters by ``duration`` s, except those of ``resting`` dolls (d,)."""
+    def advance(self, duration: float, accuracy: Accuracy, sleeping: np.ndarray) -> None:
+        """Advance all clusters by ``duration`` s, except those of ``sleeping`` dolls (d,)."""
         jobs = self._jobs
-        if np.count_nonzero(resting):
-            jobs = jobs[:, ~resting[self._firsts]]
+        if np.count_nonzero(sleeping):
+            jobs = jobs[:, ~sleeping[self._firsts]]
         if self._workers == 1 or jobs.shape[1] < 2:
             kernels.advance(jobs[0], duration, accuracy.step, accuracy.flight_error)
         else:
-            self._advance_parallel(jobs, duration, accuracy, resting)
+            self._advance_parallel(jobs, duration, accuracy, sleeping)
         for cluster in self._several:
-            if not resting[cluster.dolls[0]]:
+            if not sleeping[cluster.dolls[0]]:
                 self._scatter_state(cluster)
 
     def stop(self, dolls: np.ndarray) -> None:
@@ -284,12 +284,12 @@ class Clusters:
         """(workers, k, 3)"""
 
     def _advance_parallel(self, jobs: np.ndarray, duration: float, accuracy: Accuracy,
-                          resting: np.ndarray) -> None:
+                          sleeping: np.ndarray) -> None:
         """Advance clusters on several threads, those first that took most steps the last time."""
         self._threads = self._threads or ThreadPoolExecutor(self._workers - 1, 'clusters')
         effort = self.stats['steps'] + self.stats['impacts'] + 6 * self.stats['flight_steps']
         spent, self._effort = effort - self._effort, effort
-        order = np.argsort(-spent[self._firsts[~resting[self._firsts]]], kind='stable')
+        order = np.argsort(-spent[self._firsts[~sleeping[self._firsts]]], kind='stable')
         shares = min(len(order), PARTS_PER_THREAD * self._workers)
         parts = itertools.count()
 

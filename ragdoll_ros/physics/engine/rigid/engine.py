@@ -16,8 +16,8 @@ from ....model.state import State
 from ...accuracy import Accuracy
 from ...ground_heights import GroundHeights
 from ...kernels.system import JOINT_OUTSIDE_LIMITS, OVERLAPPING
-from ...motion import Motion
-from ..protocol import GROUND, Contacts, Drives, Springs, Wrenches, pressed
+from ..doll_totals import DollTotals
+from ..protocol import GROUND, Contacts, Drives, Springs, Wrenches, allowed_penetration
 from .broad_phase import BroadPhase
 from .clusters import Cluster, Clusters
 from .loads import NO_LOADS, NO_SPRINGS, load_records, spring_records
@@ -36,7 +36,7 @@ class RigidEngine:
     """An Engine of rigid bodies; see Engine."""
 
     energy_error = 1e-2
-    holds = True
+    supports_joint_springs = True
 
     def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
         self.scene, self.accuracy = scene, accuracy
@@ -45,11 +45,11 @@ class RigidEngine:
         self._broad_phase = BroadPhase(scene, self._clusters.reach())
         self._heights = GroundHeights(scene)
         self._spins = self.layout.root_spins
-        self.resting = np.zeros(len(scene.dolls), bool)
+        self.sleeping = np.zeros(len(scene.dolls), bool)
         self._initial_overlaps = [np.full(len(own), OVERLAPPING)
                                   for own in self._clusters.excluded(OVERLAPPING)]
         """Pairs that overlap at the start: they are excluded until they separate."""
-        self.place(self._placed())
+        self.set_coordinates(self._placed())
         self._initial_overlaps = self._clusters.excluded(OVERLAPPING)
 
     @property
@@ -76,16 +76,16 @@ class RigidEngine:
         return self.layout.joint_rates(GeneralizedState(self._clusters.q, self._clusters.v))
 
     @property
-    def motion(self) -> Motion:
+    def doll_totals(self) -> DollTotals:
         """Sums over each doll now."""
-        return self._motion
+        return self._doll_totals
 
     @property
-    def groups(self) -> np.ndarray:
+    def cluster_of_doll(self) -> np.ndarray:
         """Number (d,) of what each doll goes on with: dolls of one number fall asleep together."""
         return self._clusters.of_doll
 
-    def place(self, coordinates: GeneralizedState) -> None:
+    def set_coordinates(self, coordinates: GeneralizedState) -> None:
         """Put all dolls there and begin; see Engine."""
         clusters, q, v = self._clusters, self._clusters.q, self._clusters.v
         q[:], v[:] = coordinates.q, coordinates.v
@@ -93,13 +93,13 @@ class RigidEngine:
         v[self._spins] = rotation.rotate(turns, v[self._spins])
         clusters.stats[:] = 0
         clusters.separate()
-        self.resting[:] = False
+        self.sleeping[:] = False
         self._refresh()
         self._lift_out()
         clusters.exclude([own | JOINT_OUTSIDE_LIMITS for own in self._initial_overlaps])
         self._refresh()
         self._age = MAX_AGE
-        self._start_energy = float(self.motion.energy.sum())
+        self._start_energy = float(self.doll_totals.energy.sum())
         self._last_start = None
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
@@ -107,19 +107,20 @@ class RigidEngine:
         """Go on by ``duration`` s; see Engine."""
         clusters, acting = self._clusters, (wrenches, springs, drives)
         self._last_start = clusters.q.copy(), clusters.v.copy(), duration, acting
+        of_doll = self.cluster_of_doll
         for acts in (*wrenches, *springs, *drives):
-            self.resting[self.groups == self.groups[self.scene.doll_of_bone[acts.bone]]] = False
+            self.sleeping[of_doll == of_doll[self.scene.doll_of_bone[acts.bone]]] = False
         self._update_clusters(duration)
         self._advance(duration, acting, self.accuracy)
 
-    def stop(self, dolls: np.ndarray) -> None:
+    def put_to_sleep(self, dolls: np.ndarray) -> None:
         """Bring dolls (d,) to rest where they are; the energy that is left is lost for good."""
         self._clusters.stop(dolls)
-        self.resting[dolls] = True
+        self.sleeping[dolls] = True
         self._last_start = None
         self._refresh()
 
-    def grounded(self) -> np.ndarray:
+    def dolls_on_ground(self) -> np.ndarray:
         """Which dolls (d,) rest on the ground."""
         contacts, bones, _ = self._clusters.contacts()
         found = np.zeros(len(self.scene.dolls), bool)
@@ -140,7 +141,7 @@ class RigidEngine:
     @property
     def energy_excess(self) -> float:
         """Energy, J, above that at the start and all work since."""
-        return (float(self._motion.energy.sum()) - self._start_energy
+        return (float(self._doll_totals.energy.sum()) - self._start_energy
                 - self._clusters.work())
 
     def measures(self) -> dict[str, float]:
@@ -157,25 +158,25 @@ class RigidEngine:
 
     def save(self) -> object:
         """A snapshot that restore brings back to the bit."""
-        return self._clusters.save(), self.resting.copy(), self._age, self._start_energy
+        return self._clusters.save(), self.sleeping.copy(), self._age, self._start_energy
 
     def restore(self, snapshot: tuple) -> None:
         """Go back to a snapshot."""
-        kept, self.resting[:], self._age, self._start_energy = snapshot
+        kept, self.sleeping[:], self._age, self._start_energy = snapshot
         self._clusters.restore(kept)
         self._last_start = None
         self._update_state()
 
-    def forget(self, snapshot: object) -> None:
+    def discard(self, snapshot: object) -> None:
         """Nothing to release: the memory goes with the object."""
 
     def checkpoint(self) -> object:
         """Where all is and what the accounts say: far cheaper than save()."""
-        return self._clusters.checkpoint(), self.resting.copy(), self._start_energy
+        return self._clusters.checkpoint(), self.sleeping.copy(), self._start_energy
 
-    def go_back(self, checkpoint: tuple) -> None:
+    def restore_checkpoint(self, checkpoint: tuple) -> None:
         """Go on from a checkpoint; see Engine."""
-        kept, self.resting[:], self._start_energy = checkpoint
+        kept, self.sleeping[:], self._start_energy = checkpoint
         self._clusters.restore_checkpoint(kept)
         self._age = MAX_AGE
         self._last_start = None
@@ -194,29 +195,29 @@ class RigidEngine:
         clusters = self._clusters
         near = self._near(duration)
         self._age += 1
-        if (clusters.covers(near) and not self.resting[near].any()
+        if (clusters.covers(near) and not self.sleeping[near].any()
                 and (self._age <= MAX_AGE or clusters.all_alone)):
             return
         while True:
             near = self._near(max(duration, LOOK_AHEAD))
-            if not self.resting[near].any():
+            if not self.sleeping[near].any():
                 break
-            self.resting[near] = False
+            self.sleeping[near] = False
         asleep = clusters.pairs
-        asleep = asleep[self.resting[asleep].all(axis=1)]
+        asleep = asleep[self.sleeping[asleep].all(axis=1)]
         clusters.form(np.unique(np.concatenate([near, asleep]), axis=0))
         self._age = 0
 
     def _near(self, ahead: float) -> np.ndarray:
         """Pairs (k, 2) of dolls that may touch within ``ahead`` s, one of each awake."""
-        return self._broad_phase.pairs(self._clusters.bone_states, ahead, ~self.resting,
-                                       self.groups)
+        return self._broad_phase.pairs(self._clusters.bone_states, ahead, ~self.sleeping,
+                                       self.cluster_of_doll)
 
     def _advance(self, duration: float, acting: tuple[Wrenches, Springs, Drives],
                  accuracy: Accuracy) -> None:
         """Advance all clusters that do not rest."""
         acted = self._act(acting) if any(acting) else ()
-        self._clusters.advance(duration, accuracy, self.resting)
+        self._clusters.advance(duration, accuracy, self.sleeping)
         for cluster in acted:
             cluster.set_loads(NO_LOADS, NO_SPRINGS)
         self._update_state()
@@ -224,7 +225,7 @@ class RigidEngine:
     def _update_state(self) -> None:
         """Copy state and sums from the clusters."""
         self._state = State.of(self._clusters.bone_states.copy())
-        self._motion = Motion.of(self._clusters.sums.view(float).reshape(-1, 20).copy())
+        self._doll_totals = DollTotals.of(self._clusters.sums.view(float).reshape(-1, 20).copy())
 
     def _act(self, acting: tuple[Wrenches, Springs, Drives]) -> list[Cluster]:
         """Let loads and springs act on their clusters, which are returned."""
@@ -245,7 +246,7 @@ class RigidEngine:
 
     def _refresh(self) -> None:
         """Compute state and gaps from q and v."""
-        self._clusters.advance(0.0, self.accuracy, np.zeros(len(self.resting), bool))
+        self._clusters.advance(0.0, self.accuracy, np.zeros(len(self.sleeping), bool))
         self._update_state()
 
     def _lift_out(self) -> None:
@@ -254,7 +255,7 @@ class RigidEngine:
             return
         depths = -np.minimum.reduceat(self._heights(self.state),
                                       [own.start for own in self.scene.bone_slices])
-        for doll in np.flatnonzero(depths > pressed(self.scene)):
+        for doll in np.flatnonzero(depths > allowed_penetration(self.scene)):
             at = self.layout.root_positions[doll]
             self._clusters.q[at] += depths[doll] * np.array(self.scene.ground.normal)
 

@@ -14,7 +14,7 @@ from ...kernels.dynamics.loads import (
     LOAD,
     SPRING,
 )
-from ..protocol import AppliedDrive, AppliedHold, Drives, Spring, Springs, Wrenches
+from ..protocol import AppliedDrive, AppliedJointSpring, Drives, Spring, Springs, Wrenches
 
 NO_LOADS = np.zeros(0, LOAD)
 NO_SPRINGS = np.zeros(0, SPRING)
@@ -35,7 +35,7 @@ def spring_records(springs: Springs, drives: Drives, scene: Scene, bones: list[i
     records = []
     for spring in springs:
         body = bodies.index(bones.index(spring.bone))
-        records.append(_joint_spring(body, spring, scene) if isinstance(spring, AppliedHold)
+        records.append(_joint_spring(body, spring, scene) if isinstance(spring, AppliedJointSpring)
                        else _grab(body, spring))
     for drive in drives:
         records += _drive(bodies.index(bones.index(drive.bone)), drive, scene)
@@ -52,7 +52,7 @@ def _grab(body: int, spring: Spring) -> np.ndarray:
     return record
 
 
-def _joint_spring(body: int, hold: AppliedHold, scene: Scene) -> np.ndarray:
+def _joint_spring(body: int, hold: AppliedJointSpring, scene: Scene) -> np.ndarray:
     """The mobility is that of the bone alone about its thinnest axis, the most that it can be."""
     record = _record(JOINT_SPRING, body, hold.stiffness, hold.damping, math.inf)
     record['axis'], record['target_angle'] = hold.axis, hold.target
