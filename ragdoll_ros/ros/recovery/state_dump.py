@@ -1,4 +1,4 @@
-"""The last states and what acted on them, in memory, and as a file where something went wrong."""
+"""Ring buffer of the last states and what acted on them, written to a file after a bad state."""
 from __future__ import annotations
 
 from collections import deque
@@ -7,41 +7,40 @@ from pathlib import Path
 
 import numpy as np
 
-from ..model.push import Push
-from ..physics.actions.grab import Grab
-from ..physics.guard import BadState
-from ..physics.simulation import Simulation
+from ...model.push import Push
+from ...physics.actions.grab import Grab
+from ...physics.guard import BadState
+from ...physics.simulation import Simulation
 
-STATES = 100
-"""Ticks that are remembered."""
+LENGTH = 100
+"""Ticks in the buffer."""
 
 
 class StateDump:
-    """The last STATES states of a simulation, each with what acted as its tick began.
+    """The last LENGTH states of a simulation, with the pushes and grabs that acted in each tick.
 
-    A state is no copy but that which the tick has made, so that to remember it costs next to
-    nothing; those of a thousand dolls take 1 MB each.
+    States are kept by reference, without a copy; 100 of a thousand dolls take 100 MB.
     """
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
-        self._ticks: deque[tuple] = deque(maxlen=STATES)
-        self.acting()
+        self._ticks: deque[tuple] = deque(maxlen=LENGTH)
+        self.record_inputs()
 
-    def acting(self) -> None:
-        """Note what acts, before a tick."""
-        self._acting = self._simulation.pushes, self._simulation.grabs
+    def record_inputs(self) -> None:
+        """Record pushes and grabs; to be called before a tick."""
+        self._inputs = self._simulation.pushes, self._simulation.grabs
 
-    def note(self) -> None:
-        """Note what the tick has come to."""
-        self._ticks.append((self._simulation.time, self._simulation.state, *self._acting))
+    def record_state(self) -> None:
+        """Record the state after a tick."""
+        self._ticks.append((self._simulation.time, self._simulation.state, *self._inputs))
 
     def write(self, path: Path, bad: BadState) -> None:
-        """Write all, ``bad`` last, as an .npz that numpy.load opens without pickle.
+        """Write the buffer and the ``bad`` state as an .npz, readable without pickle.
 
-        Raises OSError where it cannot be written; nothing is left of it then.
+        Raises OSError if that fails, and removes the file.
         """
-        ticks = [*self._ticks, (bad.time, bad.state, *self._acting)][-STATES:]
+        ticks = [*self._ticks, (bad.time, bad.state, *self._inputs)][-LENGTH:]
         times, states, pushes, grabs = zip(*ticks, strict=True)
         simulation = self._simulation
         try:
@@ -57,10 +56,10 @@ class StateDump:
             raise
 
 
-def _table(name: str, acting: Sequence[Sequence], row: object, width: int,
+def _table(name: str, inputs: Sequence[Sequence], row: object, width: int,
            bone: object) -> dict[str, np.ndarray]:
-    """What acted in all ticks: at which of them, on which bone, and its numbers (k, width)."""
-    flat = [(tick, one) for tick, those in enumerate(acting) for one in those]
+    """The inputs of all ticks as arrays (k,): index of the tick, bone, and numbers (k, width)."""
+    flat = [(tick, one) for tick, those in enumerate(inputs) for one in those]
     return {f'{name}_ticks': np.array([tick for tick, _ in flat], np.int64),
             f'{name}_bones': np.array([bone(one) for _, one in flat], str),
             f'{name}_numbers': np.array([row(one) for _, one in flat], float).reshape(-1, width)}
