@@ -141,7 +141,7 @@ def test_the_benchmark_times_all_parts(ros, monkeypatch):
     costs = bench.row(node, load_scene('drop'), 'draft', 0)
     node.destroy_node()
     assert set(costs) == {
-        'simulation', 'checked', 'conversion', 'messages', 'bare engine', 'bare publish'}
+        'simulation', 'guarded', 'conversion', 'messages', 'base engine', 'base publish'}
     assert min(costs.values()) > 0
 
 

@@ -9,8 +9,7 @@ from poison import poison
 from rclpy.logging import get_logging_directory
 
 from ragdoll_ros.physics.guard import BOUND
-from ragdoll_ros.ros.recovery.recovery import MAX_CONSECUTIVE, MAX_DUMPS
-from ragdoll_ros.ros.recovery.state_dump import LENGTH
+from ragdoll_ros.ros.recovery import DUMP_LENGTH, MAX_CONSECUTIVE, MAX_DUMPS
 
 
 def places(messages):
@@ -48,14 +47,15 @@ def test_what_is_put_into_the_engine_is_never_published(make_node, peer, tmp_pat
     file, = tmp_path.iterdir()
     with np.load(file, allow_pickle=False) as dump:
         assert reason in str(dump['reason'])
-        assert dump['states'].shape == (LENGTH, 10, 13) and dump['times'].shape == (LENGTH,)
+        assert dump['states'].shape == (DUMP_LENGTH, 10, 13)
+        assert dump['times'].shape == (DUMP_LENGTH,)
         np.testing.assert_array_equal(dump['states'][-2], last)
         bad = dump['states'][-1]
         assert kind == 'energy' or not np.linalg.norm(bad) <= BOUND
         np.testing.assert_array_equal(np.diff(dump['times']), node.simulation.tick)
         assert tuple(dump['bone_names']) == node.simulation.scene.bone_names
         # Ticks 130 to 133, 133 the last.
-        np.testing.assert_array_equal(dump['push_ticks'], np.arange(LENGTH - 4, LENGTH))
+        np.testing.assert_array_equal(dump['push_ticks'], np.arange(DUMP_LENGTH - 4, DUMP_LENGTH))
         assert set(dump['push_bones']) == {'torso'}
         np.testing.assert_array_equal(dump['push_numbers'][:, 0], 500.0)
         assert dump['grab_numbers'].shape == (0, 6)

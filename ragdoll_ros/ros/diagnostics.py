@@ -28,16 +28,13 @@ MIN_SPEED_RATIO = 0.95
 class Diagnostics:
     """Measures the cost of ticks; reports real-time factor, cost, error measures and counters.
 
-    ``node_values()``: values of the node to report, by key; ``requested_factor()``: the requested
-    real-time factor, 0 while paused; ``stamp()``: stamp of a report, ns.
+    ``node_values()``: values of the node to report, by key; ``stamp()``: stamp of a report, ns.
     """
 
     def __init__(self, node: Node, steady: Clock, counts: InputCounts,
-                 node_values: Callable[[], dict], requested_factor: Callable[[], float],
-                 stamp: Callable[[], int]) -> None:
+                 node_values: Callable[[], dict], stamp: Callable[[], int]) -> None:
         self._node, self._steady, self._counts = node, steady, counts
-        self._node_values, self._requested_factor = node_values, requested_factor
-        self._stamp = stamp
+        self._node_values, self._stamp = node_values, stamp
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._last_counted = self._last_dropped = self._last_bad = 0
         self._last: dict[str, float] | None = None
@@ -90,11 +87,11 @@ class Diagnostics:
 
     def _level_and_message(self) -> tuple[bytes, str]:
         """ERROR for bad states, WARN for refused input or lag since the last report, else OK."""
-        counts, requested = self._counts, self._requested_factor()
+        counts, values = self._counts, self._node_values()
+        requested = 0.0 if values['paused'] else values['real_time_factor']
         counted = counts.refused.total() + counts.clamped.total()
         refused, self._last_counted = counted > self._last_counted, counted
         warnings = [counts.last_reason] if refused else []
-        values = self._node_values()
         if values['namesakes']:
             warnings.append(f'{values["namesakes"] + 1} nodes have this name')
         warnings += self._lag_warnings(requested, values)
@@ -108,9 +105,7 @@ class Diagnostics:
         return DiagnosticStatus.OK, 'running' if requested else 'paused'
 
     def _lag_warnings(self, requested: float, values: dict) -> list[str]:
-        """Warnings about the real-time factor, dropped ticks, and a mean lag of over one tick; a
-        single late tick is normal on a busy machine.
-        """
+        """Warnings about the real-time factor, dropped ticks, and a mean lag of over one tick."""
         last, found = self._last, []
         if requested and self._ticks and last['pace'] < MIN_SPEED_RATIO * requested:
             found.append(f'real-time factor {last["pace"]:.3g} is below the requested '

@@ -28,11 +28,11 @@ from .inputs.interactive_marker_server import InteractiveMarkerServer
 from .inputs.subscriptions import PushSubscriptions
 from .log_lines import end_line, start_line
 from .outputs import Outputs
-from .parameters.node_settings import SPECS, NodeSettings, samples_per_tick, step_of
+from .parameters.node_settings import SPECS, NodeSettings
 from .parameters.parameters import Parameters, make_simulation
 from .process.rclpy_context import rclpy_context
 from .process.signals import run_uninterrupted, run_until_signal
-from .recovery.recovery import Recovery
+from .recovery import Recovery
 from .services import Services
 from .stamps import Stamps
 from .ticker import QOS_EVENT_INTERVAL, SERVICE_INTERVAL, Ticker
@@ -79,8 +79,7 @@ class RagdollNode(Node):
         self.inputs = PushSubscriptions(self, self.input_counts)
         self.interactive = InteractiveMarkerServer(self, self.input_counts, time.monotonic_ns)
         self._diagnostics = Diagnostics(self, self._steady, self.input_counts,
-                                        self._diagnostic_values, self._requested_factor,
-                                        self._report_stamp)
+                                        self._diagnostic_values, self._report_stamp)
         Services(self, self)
         self._duplicate_nodes = DuplicateNodes(self)
         self.recovery = Recovery(self)
@@ -201,9 +200,7 @@ class RagdollNode(Node):
         self.interactive.publish(now, self.paused)
 
     def _publish_start(self) -> None:
-        """Publish a new start: first its stamp on /diagnostics, so that subscribers know which
-        simulated time the next stamps are.
-        """
+        """Publish a new start; first /diagnostics, which maps stamps to simulated time."""
         self._stamps.advance()
         self._diagnostics.publish()
         self._publish()
@@ -259,14 +256,11 @@ class RagdollNode(Node):
             self.simulation.accuracy = settings.accuracy
         if changed & IMU_SETTINGS:
             self._imus.configure(self.simulation.scene, settings)
-            if self.simulation.parts != samples_per_tick(settings):
-                self.simulation.parts = samples_per_tick(settings)
+            if self.simulation.parts != settings.samples_per_tick:
+                self.simulation.parts = settings.samples_per_tick
         if changed & {'scene', 'rate', 'real_time_factor'}:
-            self.simulation.step = step_of(settings)
+            self.simulation.step = settings.step
             self._restart_ticker()
-
-    def _requested_factor(self) -> float:
-        return 0.0 if self.paused else self.settings.real_time_factor
 
     def _diagnostic_values(self) -> dict:
         """Values of the node for /diagnostics; ``stamp_pace``: simulated time per stamp time."""

@@ -47,9 +47,7 @@ class Outputs:
         self._clock: Publisher | None = None
 
     def set_scene(self, scene: Scene, frame: str, publish_tf: str) -> None:
-        """Prepare the templates for a scene and publish its URDF; ``frame`` is the world frame's
-        name, ``publish_tf`` the parameter.
-        """
+        """Prepare the templates for a scene and publish its URDF; ``frame``: the world frame."""
         self._templates, self._frame = SceneTemplates(scene, frame), frame
         self._set_swings_publisher(count_masses(scene) > 0)
         self._next_markers = 0

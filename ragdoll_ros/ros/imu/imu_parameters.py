@@ -39,8 +39,7 @@ def check_imus(imus: Sequence[str], bones: Sequence[str]) -> None:
         try:
             validate_topic_name(imu_topic(bone))
         except InvalidTopicNameException:
-            raise errors.WrongForm('imus', bone, 'a bone whose name is valid in a topic name'
-                                   ) from None
+            raise errors.WrongForm('imus', bone, 'a name that a topic may contain') from None
         if mounted.count(bone) > 1:
             raise errors.DuplicateName('imus', bone, 'one sensor on a bone')
 

@@ -77,7 +77,5 @@ class ImuPublishers:
 
 
 def _noise(seed: int, sensor: int, time: int) -> np.random.Generator:
-    """Generator of a sensor's noise in the tick that ends at ``time``, ns: the same numbers no
-    matter which earlier ticks were published.
-    """
+    """Generator of a sensor's noise in the tick that ends at ``time``, ns, for each tick anew."""
     return np.random.Generator(np.random.Philox(key=[seed, sensor], counter=[0, 0, 0, time]))

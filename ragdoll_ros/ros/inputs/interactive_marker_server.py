@@ -77,8 +77,7 @@ class InteractiveMarkerServer:
         self.settings: NodeSettings
         self._updates = node.create_publisher(InteractiveMarkerUpdate, '~/interactive/update',
                                               DEPTH)
-        node.create_subscription(InteractiveMarkerFeedback, FEEDBACK, self.on_feedback,
-                                 DEPTH)
+        node.create_subscription(InteractiveMarkerFeedback, FEEDBACK, self.on_feedback, DEPTH)
         node.create_service(GetInteractiveMarkers, '~/interactive/get_interactive_markers',
                             self._get_markers)
 

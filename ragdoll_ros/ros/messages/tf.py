@@ -77,9 +77,7 @@ class TfPublisher:
             self._publisher.publish(self._template.serialize(simulation, stamp))
 
     def republish(self, simulation: Simulation, stamp: int) -> None:
-        """While paused, publish again for a new subscriber: /tf is not latched, and tf2 warns of
-        repeated stamps.
-        """
+        """While paused, publish again, but only for a new subscriber: tf2 warns of old stamps."""
         before, self._subscribers = self._subscribers, self._count_subscribers()
         if self._subscribers > before:
             self.publish(simulation, stamp)

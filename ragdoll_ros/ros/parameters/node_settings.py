@@ -92,6 +92,16 @@ class NodeSettings:
         0, "Seed of the sensors' noise", (0, 2 ** 31 - 1))
 
     @property
+    def step(self) -> float:
+        """Length of a tick, s, clipped to STEP_RANGE against rounding of the rate."""
+        return min(max(1 / self.rate, STEP_RANGE[0]), STEP_RANGE[1])
+
+    @property
+    def samples_per_tick(self) -> int:
+        """Samples of the inertial sensors in a tick; 1 without sensors."""
+        return round(self.imu_rate / self.rate) if any(self.imus) else 1
+
+    @property
     def imu_flaws(self) -> Flaws:
         """Noise, bias and range of each sensor. Raises a ModelError for invalid ones."""
         try:
@@ -136,13 +146,3 @@ def check(settings: NodeSettings, scene: Scene) -> None:
     if any(settings.imus) and (samples < 1 - 1e-9 or abs(samples / round(samples) - 1) > 1e-9):
         raise errors.OutOfRange('imu_rate', settings.imu_rate,
                                 f'a multiple of rate, {settings.rate:g}')
-
-
-def step_of(settings: NodeSettings) -> float:
-    """Length of a tick, s, clipped to STEP_RANGE against rounding of the rate."""
-    return min(max(1 / settings.rate, STEP_RANGE[0]), STEP_RANGE[1])
-
-
-def samples_per_tick(settings: NodeSettings) -> int:
-    """Samples of the inertial sensors in a tick; 1 without sensors."""
-    return round(settings.imu_rate / settings.rate) if any(settings.imus) else 1

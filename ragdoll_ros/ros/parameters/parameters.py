@@ -19,15 +19,7 @@ from ...files.scene import load_scene
 from ...model.errors import RagdollError
 from ...model.scene import Scene
 from ...physics.logged_simulation import RecordedSimulation
-from .node_settings import (
-    BONE_NAMES,
-    SPECS,
-    NodeSettings,
-    check,
-    samples_per_tick,
-    scene_defaults,
-    step_of,
-)
+from .node_settings import BONE_NAMES, SPECS, NodeSettings, check, scene_defaults
 
 DOUBLES = {name for name, field in SPECS.items() if isinstance(field.default, float)}
 """Parameters of type double."""
@@ -71,11 +63,10 @@ class Parameters:
             found.append(str(error))
         if found:
             raise InvalidParameters('\n'.join(found))
-        self._bone_names = ParameterDescriptor(
-            description='Names of all bones, in the order of ~/poses', read_only=True)
         # An override, as in a dump of another scene's parameters, would be wrong.
-        node.declare_parameter(BONE_NAMES, list(self.scene.bone_names), self._bone_names,
-                               ignore_override=True)
+        node.declare_parameter(BONE_NAMES, list(self.scene.bone_names), ParameterDescriptor(
+            description='Names of all bones, in the order of ~/poses', read_only=True),
+            ignore_override=True)
         declared = [name for name in overrides if node.has_parameter(name)]
         for warning in unknown_parameters(overrides, {*SPECS, *declared}):
             node.get_logger().warning(warning)
@@ -150,9 +141,9 @@ class Parameters:
 
 def make_simulation(scene: Scene, settings: NodeSettings) -> RecordedSimulation:
     """Create a simulation with these settings."""
-    simulation = RecordedSimulation(scene, step_of(settings), settings.accuracy, settings.engine,
+    simulation = RecordedSimulation(scene, settings.step, settings.accuracy, settings.engine,
                                     settings.workers or 'auto')
-    simulation.parts = samples_per_tick(settings)
+    simulation.parts = settings.samples_per_tick
     return simulation
 
 

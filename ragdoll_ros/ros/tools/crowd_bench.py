@@ -106,10 +106,7 @@ def without_subscriber(node: Node, folder: Path, *counts: int) -> None:
 
 def with_subscriber(folder: Path, count: int, pose: str, seconds: float,
                     wait_ready: Callable[[], None] = lambda: None) -> None:
-    """Print the statistics of a subscriber to ~/poses, and the load of the node.
-
-    The subscriber starts after ``wait_ready`` returns.
-    """
+    """Print the statistics of a subscriber to ~/poses, started after ``wait_ready``, and load."""
     listen = ['--seconds', str(seconds), TOPIC]
     with child_process('ros.node', node_arguments(folder, count, pose),
                        stderr=subprocess.DEVNULL) as process:

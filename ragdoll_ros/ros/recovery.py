@@ -1,20 +1,27 @@
-"""Recovery from bad states: they are not published, logged, and dumped to a file."""
+"""Recovery from bad states: they are not published, but undone, logged, and dumped to a file."""
 from __future__ import annotations
 
 import os
 import time
+from collections import deque
+from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 from rclpy.logging import get_logging_directory
 from rclpy.node import Node
 
-from ...model.scene import SECOND
-from ...physics.guard import BadState, Guard
-from ...physics.simulation import Simulation
-from .state_dump import StateDump
+from ..model.push import Push
+from ..model.scene import SECOND
+from ..physics.actions.grab import Grab
+from ..physics.guard import BadState, Guard
+from ..physics.simulation import Simulation
 
 MAX_CONSECUTIVE = 3
 """Bad ticks in a row after which the scene is restarted instead of the tick repeated."""
+
+DUMP_LENGTH = 100
+"""Ticks in a state dump."""
 
 MAX_DUMPS = 10
 """Files that a node writes at most."""
@@ -39,9 +46,7 @@ class Recovery:
         self._consecutive = 0
 
     def advance(self, directory: str) -> bool:
-        """Make one tick; False if it was bad and has been undone. ``directory`` for state dumps;
-        '': ROS's log directory.
-        """
+        """Make one tick; False if it was bad and undone. ``directory`` of dumps; '': ROS's log."""
         self._state_dump.record_inputs()
         bad = self._guard.advance()
         if bad is None:
@@ -87,3 +92,60 @@ class Recovery:
             return f'the last states could not be written: {error}'
         self._dump = str(path)
         return f'the last states are in {path}'
+
+
+class StateDump:
+    """The last DUMP_LENGTH states of a simulation, with the pushes and grabs of each tick.
+
+    States are kept by reference, without a copy; 100 of a thousand dolls take 100 MB.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        self._ticks: deque[tuple] = deque(maxlen=DUMP_LENGTH)
+        self.record_inputs()
+
+    def record_inputs(self) -> None:
+        """Record pushes and grabs; to be called before a tick."""
+        self._inputs = self._simulation.pushes, self._simulation.grabs
+
+    def record_state(self) -> None:
+        """Record the state after a tick."""
+        self._ticks.append((self._simulation.time, self._simulation.state, *self._inputs))
+
+    def write(self, path: Path, bad: BadState) -> None:
+        """Write the buffer and the ``bad`` state as an .npz, readable without pickle.
+
+        Raises OSError if that fails, and removes the file.
+        """
+        ticks = [*self._ticks, (bad.time, bad.state, *self._inputs)][-DUMP_LENGTH:]
+        times, states, pushes, grabs = zip(*ticks, strict=True)
+        simulation = self._simulation
+        try:
+            with path.open('xb') as file:
+                np.savez(
+                    file, reason=bad.reason, scene=simulation.scene.name,
+                    engine=simulation.engine_name, bone_names=simulation.scene.bone_names,
+                    times=np.array(times), states=np.array([state.rows for state in states]),
+                    **_table('push', pushes, _push_row, 10, lambda push: push.bone),
+                    **_table('grab', grabs, _grab_row, 6, lambda grab: grab.bone))
+        except OSError:
+            path.unlink(missing_ok=True)
+            raise
+
+
+def _table(name: str, inputs: Sequence[Sequence], row: object, width: int,
+           bone: object) -> dict[str, np.ndarray]:
+    """The inputs of all ticks: index of the tick (k,), bone (k,) and numbers (k, width)."""
+    flat = [(tick, one) for tick, those in enumerate(inputs) for one in those]
+    return {f'{name}_ticks': np.array([tick for tick, _ in flat], np.int64),
+            f'{name}_bones': np.array([bone(one) for _, one in flat], str),
+            f'{name}_numbers': np.array([row(one) for _, one in flat], float).reshape(-1, width)}
+
+
+def _push_row(push: Push) -> list[float]:
+    return [*push.force, *push.torque, *push.point, push.local]
+
+
+def _grab_row(grab: Grab) -> list[float]:
+    return [*grab.point, *grab.target]

@@ -1,1 +1,0 @@
-"""What the node does after a tick that ends in a bad state."""
