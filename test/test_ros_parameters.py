@@ -128,7 +128,7 @@ def test_two_nodes_of_one_name_are_told_of(make_node, peer):
 def test_the_start_is_told_in_one_line(make_node, peer):
     said = rosout(peer, make_node(scene='crowd', accuracy='draft', engine='bullet'))
     peer.wait(lambda: ('scene crowd: 10 dolls of 100 bones, engine bullet, accuracy draft; poses '
-                       'are on /ragdoll/poses, status on /diagnostics') in said())
+                       'on /ragdoll/poses, status on /diagnostics') in said())
 
 
 def dump(peer, path):
