@@ -77,5 +77,5 @@ class ImuPublishers:
 
 
 def _noise(seed: int, sensor: int, time: int) -> np.random.Generator:
-    """Generator of a sensor's noise in the tick that ends at ``time``, ns, for each tick anew."""
+    """Random generator of a sensor's noise in the tick that ends at ``time``, ns."""
     return np.random.Generator(np.random.Philox(key=[seed, sensor], counter=[0, 0, 0, time]))
