@@ -42,7 +42,7 @@ def test_a_wrong_start_ends_with_2_and_a_reason(ros, broken_scene):
              (('node', '--ros-args', '-p', 'rate'), ['rate']),
              (('node', '--ros-args', '-p', f'scene:={path}'), words),
              (('run', str(path)), words),
-             (('teleop',), ['terminal'])]
+             (('teleop.teleop',), ['terminal'])]
     for (arguments, words), process in [(case, start(*case[0])) for case in cases]:
         _, errors = process.communicate(timeout=PATIENCE)
         assert process.returncode == 2, arguments

@@ -39,7 +39,7 @@ class SceneMarkers:
                  for part in bone.shape.primitives]
         self._bones = np.array([index for index, _ in parts])
         self._part_poses = Pose(np.array([part.position for _, part in parts]),
-                            np.array([part.orientation for _, part in parts]))
+                                np.array([part.orientation for _, part in parts]))
         self._arrow_count = 0
         self._is_first = True
 
