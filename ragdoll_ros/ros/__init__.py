@@ -1,4 +1,4 @@
-"""The ROS 2 side: nodes, publishers, subscriptions and messages. Physics is in the simulation."""
+"""The ROS 2 side: nodes, publishers, subscriptions and messages around a simulation."""
 from .process.signals import block_signals
 
 block_signals()
