@@ -316,11 +316,11 @@ def test_uninstall_would_leave_nothing(prefix):
 
 def test_parameter_file_holds_the_defaults():
     """All of them but those that the scene brings along."""
-    from ragdoll_ros.ros.parameters import Settings
+    from ragdoll_ros.ros.parameters.node_settings import NodeSettings
     given = yaml.safe_load((ROOT / 'config/node.yaml').read_text())['/**']['ros__parameters']
     # YAML has lists where settings, which are frozen, have tuples.
     defaults = {key: list(value) if isinstance(value, tuple) else value
-                for key, value in vars(Settings()).items() if key not in DEFAULTS_OF_A_SCENE}
+                for key, value in vars(NodeSettings()).items() if key not in DEFAULTS_OF_A_SCENE}
     assert given == defaults
     assert {key: type(value) for key, value in given.items()} == {
         key: type(value) for key, value in defaults.items()}

@@ -140,6 +140,11 @@ def test_rooms_are_those_of_the_plan():
     assert {path.name for path in PACKAGE.glob('*.py')} == {'__init__.py', 'riders.py'}
 
 
+@pytest.mark.parametrize('room', ['physics', 'ros', 'accuracy'])
+def test_a_floor_has_at_most_a_dozen_files(room):
+    assert len(list((PACKAGE / room).glob('*.py'))) <= 12
+
+
 def test_imports_follow_the_arrows(edges):
     assert broken_arrows(edges) == []
 

@@ -11,8 +11,8 @@ from rclpy.node import Node
 from ..model.ragdoll import WORLD
 from ..physics.simulation import Simulation
 from ..ros.outputs import Outputs
-from ..ros.rclpy_context import ros_session
-from ..ros.signals import ended_by_signals
+from ..ros.process.rclpy_context import rclpy_context
+from ..ros.process.signals import run_until_signal
 from ..ros.stamps import Stamps
 from ..ros.ticker import Ticker
 
@@ -25,7 +25,7 @@ def publish(steps: Iterator[Simulation], pace: float, arguments: list[str]) -> i
     ``arguments`` are those for ROS, from --ros-args on. The exit code.
     """
     def spin() -> int:
-        with ros_session(arguments):
+        with rclpy_context(arguments):
             node = PublishedRun(steps, pace)
             try:
                 while not node.is_over:
@@ -33,7 +33,7 @@ def publish(steps: Iterator[Simulation], pace: float, arguments: list[str]) -> i
             finally:
                 node.destroy_node()
         return 0
-    return ended_by_signals(spin)
+    return run_until_signal(spin)
 
 
 class PublishedRun(Node):
@@ -58,11 +58,11 @@ class PublishedRun(Node):
             return
         if simulation is not self._simulation:
             self._simulation = simulation
-            self._outputs.describe(simulation.scene, WORLD, 'all')
+            self._outputs.set_scene(simulation.scene, WORLD, 'all')
             self.set_parameters([rclpy.Parameter(BONE_NAMES, value=list(
                 simulation.scene.bone_names))])
-        self._stamps.take(due)
-        self._outputs.publish(simulation, self._stamps.newest, time.monotonic_ns())
+        self._stamps.advance(due)
+        self._outputs.publish(simulation, self._stamps.latest, time.monotonic_ns())
         if simulation.tick / self._pace != self._period:
             self._period = simulation.tick / self._pace
             self._ticker.start(self._period)

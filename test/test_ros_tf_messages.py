@@ -42,9 +42,9 @@ def flight(scene):
         yield simulation
 
 
-def frames_of(simulation, frame='map', roots_alone=False):
+def frames_of(simulation, frame='map', roots_only=False):
     """Pose of every frame of /tf in the world, by name, going from parent to child."""
-    tree = LinkTree(simulation.scene, frame, roots_alone)
+    tree = LinkTree(simulation.scene, frame, roots_only)
     poses = tree.poses(simulation.state, simulation.joint_angles)
     found = {frame: Pose()}
     for (parent, child), row in zip(tree.edges, poses, strict=True):
@@ -74,7 +74,7 @@ def test_joint_states_and_the_urdf_hold_the_bones_there_too(moving):
     angles = dict(zip(moving.scene.angle_names, moving.joint_angles, strict=True))
     placed = tree.poses({child: angles.get(joint.name, 0.0)
                          for child, joint in tree.joints.items()})
-    roots, frames = frames_of(moving, roots_alone=True), {}
+    roots, frames = frames_of(moving, roots_only=True), {}
     for name in tree.order:
         joint = tree.joints.get(name)
         if name in roots:
@@ -110,7 +110,7 @@ def test_frames_form_the_tree_of_the_urdf(moving):
     edges = {(joint.parent, joint.child) for joint in urdf.joints.values()}
     found = LinkTree(scene, 'map').edges
     assert set(found) == edges | roots and len(found) == len(set(found))
-    assert set(LinkTree(scene, 'map', roots_alone=True).edges) == roots
+    assert set(LinkTree(scene, 'map', roots_only=True).edges) == roots
 
 
 def test_rates_are_what_the_angles_change_by():

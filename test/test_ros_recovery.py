@@ -9,8 +9,7 @@ from poison import poison
 from rclpy.logging import get_logging_directory
 
 from ragdoll_ros.physics.guard import BOUND
-from ragdoll_ros.ros.recovery import IN_A_ROW, MOST_DUMPS
-from ragdoll_ros.ros.state_dump import STATES
+from ragdoll_ros.ros.recovery import DUMP_LENGTH, MAX_CONSECUTIVE, MAX_DUMPS
 
 
 def places(messages):
@@ -33,7 +32,7 @@ def test_what_is_put_into_the_engine_is_never_published(make_node, peer, tmp_pat
     peer.wait_heard(node, '/ragdoll/poses')
     for tick in range(150):
         if tick == 130:
-            node.inputs.take_force(Wrench(force=Vector3(x=500.0)))
+            node.inputs.on_force(Wrench(force=Vector3(x=500.0)))
         if tick == 133:
             last = node.simulation.state.rows.copy()
             reason = poison(node.simulation, kind)
@@ -48,14 +47,15 @@ def test_what_is_put_into_the_engine_is_never_published(make_node, peer, tmp_pat
     file, = tmp_path.iterdir()
     with np.load(file, allow_pickle=False) as dump:
         assert reason in str(dump['reason'])
-        assert dump['states'].shape == (STATES, 10, 13) and dump['times'].shape == (STATES,)
+        assert dump['states'].shape == (DUMP_LENGTH, 10, 13)
+        assert dump['times'].shape == (DUMP_LENGTH,)
         np.testing.assert_array_equal(dump['states'][-2], last)
         bad = dump['states'][-1]
         assert kind == 'energy' or not np.linalg.norm(bad) <= BOUND
         np.testing.assert_array_equal(np.diff(dump['times']), node.simulation.tick)
         assert tuple(dump['bone_names']) == node.simulation.scene.bone_names
         # Ticks 130 to 133, 133 the last.
-        np.testing.assert_array_equal(dump['push_ticks'], np.arange(STATES - 4, STATES))
+        np.testing.assert_array_equal(dump['push_ticks'], np.arange(DUMP_LENGTH - 4, DUMP_LENGTH))
         assert set(dump['push_bones']) == {'torso'}
         np.testing.assert_array_equal(dump['push_numbers'][:, 0], 500.0)
         assert dump['grab_numbers'].shape == (0, 6)
@@ -87,11 +87,11 @@ def test_three_in_a_row_begin_the_scene_anew(make_node, tmp_path):
     for _ in range(20):
         node.tick()
     before = node.simulation
-    for number in range(1, IN_A_ROW):
+    for number in range(1, MAX_CONSECUTIVE):
         poison(node.simulation, 'a NaN')
         node.tick()
         assert node.simulation is before and node.simulation.time == 20 * before.tick
-        assert node._facts()['bad_states'] == number
+        assert node._diagnostic_values()['bad_states'] == number
     poison(node.simulation, 'a NaN')
     node.tick()
     assert node.simulation is not before and node.simulation.time == 0
@@ -103,12 +103,12 @@ def test_three_in_a_row_begin_the_scene_anew(make_node, tmp_path):
 def test_files_are_few_however_often_states_are_bad(make_node, tmp_path):
     node = make_node(dump_directory=str(tmp_path / 'made' / 'on demand'))
     node.pause(True)
-    for _ in range(MOST_DUMPS + 5):
+    for _ in range(MAX_DUMPS + 5):
         poison(node.simulation, 'a NaN')
         node.tick()
         node.tick()
-    assert len(list((tmp_path / 'made' / 'on demand').iterdir())) == MOST_DUMPS
-    assert node._facts()['bad_states'] == MOST_DUMPS + 5
+    assert len(list((tmp_path / 'made' / 'on demand').iterdir())) == MAX_DUMPS
+    assert node._diagnostic_values()['bad_states'] == MAX_DUMPS + 5
 
 
 def test_without_a_place_to_write_the_doll_goes_on(make_node, tmp_path):
@@ -119,7 +119,7 @@ def test_without_a_place_to_write_the_doll_goes_on(make_node, tmp_path):
     node.tick()
     node.tick()
     assert node.simulation.time == node.simulation.tick
-    assert node._facts()['state_dump'] == ''
+    assert node._diagnostic_values()['state_dump'] == ''
 
 
 def test_by_default_files_go_where_ros_has_its_logs(make_node):

@@ -1,4 +1,4 @@
-"""Packed messages against rclpy's own classes and serialization."""
+"""Serialized message templates against rclpy's own classes and serialization."""
 from __future__ import annotations
 
 import dataclasses
@@ -33,9 +33,20 @@ from ragdoll_ros.ros.messages.convert import (
     to_pose_array,
     to_vector,
 )
-from ragdoll_ros.ros.messages.interactive_markers import Handles
-from ragdoll_ros.ros.messages.markers import BROWN, KINDS, RED, ROD, Markers, paint
-from ragdoll_ros.ros.messages.serialized import Packed, packed_poses, poses_in
+from ragdoll_ros.ros.messages.interactive_markers import InteractiveMarkers
+from ragdoll_ros.ros.messages.markers import (
+    BROWN,
+    MARKER_TYPES,
+    RED,
+    ROD_WIDTH,
+    SceneMarkers,
+    set_color,
+)
+from ragdoll_ros.ros.messages.serialized import (
+    SerializedTemplate,
+    deserialize_pose_array,
+    serialize_pose_array,
+)
 
 STAMPS = (0, 1, 999_999_999, 1_795_257_907_785_147_064)
 
@@ -50,9 +61,9 @@ def test_packed_messages_are_what_rclpy_serializes(frame, count):
     for make, values in ((functools.partial(to_pose_array, frame), (poses,)),
                          (functools.partial(to_multi_dof, frame, names), (poses, twists)),
                          (functools.partial(to_joint_state, frame, names), (angles, rates))):
-        packed = Packed(make, *(value.shape for value in values))
+        template = SerializedTemplate.trace(make, *(value.shape for value in values))
         for stamp in STAMPS:
-            assert_same(packed.message(stamp, *values), make(stamp, *values))
+            assert_same(template.serialize(stamp, *values), make(stamp, *values))
 
 
 def assert_same(data, message):
@@ -63,8 +74,8 @@ def assert_same(data, message):
 
 def test_a_doll_without_joints_has_an_empty_joint_state():
     make = functools.partial(to_joint_state, 'world', ())
-    packed = Packed(make, (0,), (0,))
-    assert_same(packed.message(5, np.zeros(0), np.zeros(0)), make(5, np.zeros(0), np.zeros(0)))
+    template = SerializedTemplate.trace(make, (0,), (0,))
+    assert_same(template.serialize(5, np.zeros(0), np.zeros(0)), make(5, np.zeros(0), np.zeros(0)))
 
 
 @pytest.mark.parametrize('frame', ['', 'w', 'wo', 'wor', 'world', 'Wörld'])
@@ -72,15 +83,16 @@ def test_a_doll_without_joints_has_an_empty_joint_state():
 def test_poses_of_any_number_are_what_rclpy_serializes(frame, count):
     poses = np.random.default_rng(count).normal(size=(count, 7))
     for stamp in STAMPS:
-        data = packed_poses(frame, stamp, poses)
+        data = serialize_pose_array(frame, stamp, poses)
         assert_same(data, to_pose_array(frame, stamp, poses))
-        assert poses_in(data)[0] == stamp
-        np.testing.assert_array_equal(poses_in(data)[1], poses)
+        assert deserialize_pose_array(data)[0] == stamp
+        np.testing.assert_array_equal(deserialize_pose_array(data)[1], poses)
 
 
-def test_a_message_that_has_its_numbers_in_another_order_is_not_packed():
+def test_a_message_that_has_its_numbers_in_another_order_is_refused():
     with pytest.raises(ValueError, match='order'):
-        Packed(lambda stamp, poses: to_pose_array('world', stamp, poses[::-1]), (3, 7))
+        SerializedTemplate.trace(
+            lambda stamp, poses: to_pose_array('world', stamp, poses[::-1]), (3, 7))
 
 
 def plain_markers(frame, stamp, simulation, pushes=(), gone=0, before=()):
@@ -90,17 +102,17 @@ def plain_markers(frame, stamp, simulation, pushes=(), gone=0, before=()):
     for index, (name, bone) in enumerate(zip(scene.bone_names, scene.bones, strict=True)):
         for number, part in enumerate(bone.shape.primitives):
             pose = state.poses(index).compose(part.pose)
-            marker = Marker(header=header, ns=name, id=number, type=KINDS[part.kind],
+            marker = Marker(header=header, ns=name, id=number, type=MARKER_TYPES[part.kind],
                             pose=to_pose(np.concatenate(pose).tolist()),
                             scale=to_vector(part.size))
-            paint(marker, bone.color or DEFAULT_COLOR)
+            set_color(marker, bone.color or DEFAULT_COLOR)
             array.markers.append(marker)
     if simulation.swings is not None:
         marker = Marker(header=header, ns='swings', type=Marker.LINE_LIST)
-        marker.scale.x, marker.pose.orientation.w = ROD, 1.0
+        marker.scale.x, marker.pose.orientation.w = ROD_WIDTH, 1.0
         marker.points = [to_point(end) for rod in zip(
             simulation.swings.roots, simulation.swings.positions, strict=True) for end in rod]
-        paint(marker, BROWN)
+        set_color(marker, BROWN)
         array.markers.append(marker)
     for number, push in enumerate(pushes):
         bone = scene.bone_index(push.bone)
@@ -108,7 +120,7 @@ def plain_markers(frame, stamp, simulation, pushes=(), gone=0, before=()):
         marker = Marker(header=header, ns='push', id=number, type=Marker.ARROW, pose=to_pose(
             (*tail, *rotation.shortest_arc(np.array([1.0, 0, 0]), tip - tail))))
         marker.scale = to_vector((np.linalg.norm(tip - tail), 0.04, 0.06))
-        paint(marker, RED)
+        set_color(marker, RED)
         array.markers.append(marker)
     array.markers += [Marker(header=header, ns='push', id=len(pushes) + number,
                              action=Marker.DELETE) for number in range(gone)]
@@ -122,13 +134,13 @@ def test_markers_are_what_rclpy_serializes(frame, name):
     with Simulation(load_scene(name)) as simulation:
         bones = simulation.scene.bone_names
         first, second = Push(bones[0], (100.0, 0, 0)), Push(bones[-1], (0, 0, -300.0))
-        markers = Markers(simulation.scene, frame)
+        markers = SceneMarkers(simulation.scene, frame)
         for stamp, pushes, more in (
                 (0, (), {'before': [Marker.DELETEALL]}), (1, (), {}), (STAMPS[-1], (first,), {}),
                 (3, (first, second), {}), (4, (second,), {'gone': 1}), (5, (), {'gone': 1}),
                 (6, (), {})):
             simulation.advance()
-            data = markers.message(stamp, simulation.state, pushes, simulation.swings)
+            data = markers.serialize(stamp, simulation.state, pushes, simulation.swings)
             assert_same(data, rounded(plain_markers(frame, stamp, simulation, pushes, **more)))
 
 
@@ -142,10 +154,10 @@ def rounded(message):
 def test_updates_of_handles_are_what_rclpy_serializes(frame, name):
     with Simulation(load_scene(name)) as simulation:
         scene = simulation.scene
-        handles = Handles(scene, frame, '/stage/ragdoll')
+        handles = InteractiveMarkers(scene, frame, '/stage/ragdoll')
         for number in (1, 2, 2 ** 53 + 1):
             state = simulation.advance()
-            assert_same(handles.update(number, state), InteractiveMarkerUpdate(
+            assert_same(handles.serialize_update(number, state), InteractiveMarkerUpdate(
                 server_id='/stage/ragdoll', seq_num=number, type=InteractiveMarkerUpdate.UPDATE,
                 poses=[InteractiveMarkerPose(header=Header(frame_id=frame), name=bone, pose=to_pose(
                     np.concatenate(state.poses(index)).tolist()))
@@ -167,9 +179,9 @@ def test_a_contact_s_pose_has_x_along_its_normal():
 def test_packing_is_worth_it():
     poses = np.random.default_rng(0).normal(size=(1000, 7))
     make = functools.partial(to_pose_array, 'world')
-    packed = Packed(make, poses.shape)
+    template = SerializedTemplate.trace(make, poses.shape)
     plain = min(timeit.repeat(lambda: serialize_message(make(1, poses)), number=1, repeat=5))
-    quick = min(timeit.repeat(lambda: packed.message(1, poses), number=1, repeat=5))
+    quick = min(timeit.repeat(lambda: template.serialize(1, poses), number=1, repeat=5))
     assert quick < plain / 20, 'measured: a hundredth'
 
 

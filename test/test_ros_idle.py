@@ -8,8 +8,8 @@ import pytest
 from geometry_msgs.msg import PoseArray, Vector3, Wrench
 from peer import kill, start
 
-from ragdoll_ros.ros.ticker import DOZING
-from ragdoll_ros.ros.tools.crowd_bench import shares, wait_asleep
+from ragdoll_ros.ros.ticker import IDLE_TICKS
+from ragdoll_ros.ros.tools.crowd_bench import cpu_loads, wait_asleep
 
 TICK = 10_000_000
 
@@ -39,8 +39,8 @@ def ticks_for_a_wake(node, peer, ticks=60):
 def test_a_sleeper_that_nobody_hears_wakes_for_every_second_tick(asleep, peer):
     ticks_for_a_wake(asleep, peer)
     # A busy machine makes more of them at once, and so does one that does not doze.
-    assert ticks_for_a_wake(asleep, peer) > 0.8 * DOZING
-    assert asleep._ticker._timer.timer_period_ns == DOZING * TICK
+    assert ticks_for_a_wake(asleep, peer) > 0.8 * IDLE_TICKS
+    assert asleep._ticker._timer.timer_period_ns == IDLE_TICKS * TICK
 
 
 def test_who_listens_hears_every_tick_on_time(asleep, peer):
@@ -55,7 +55,7 @@ def test_who_listens_hears_every_tick_on_time(asleep, peer):
 
 def test_a_push_wakes_it(asleep, peer):
     ticks_for_a_wake(asleep, peer)
-    asleep.inputs.take_force(Wrench(force=Vector3(z=2000.0)))
+    asleep.inputs.on_force(Wrench(force=Vector3(z=2000.0)))
     peer.wait(lambda: asleep.simulation.state.linear_velocities[0, 2] > 1)
     assert asleep._ticker._timer.timer_period_ns == TICK
 
@@ -66,7 +66,7 @@ def test_a_sleeper_costs_no_more_than_an_empty_timer_at_its_rate(ros, peer):
     processes = [start('tools.crowd_bench', 'empty'), start('node', compiled=True)]
     try:
         wait_asleep(peer, ['ragdoll'])
-        timer, node = shares(processes)
+        timer, node = cpu_loads(processes)
         assert statistics.median(b - a for a, b in zip(timer, node, strict=True)) < 0.5
     finally:
         for process in processes:

@@ -1,4 +1,4 @@
-"""ROS from its start to a signal."""
+"""rclpy from init to shutdown, as a context manager."""
 from __future__ import annotations
 
 import sys
@@ -11,16 +11,15 @@ from rclpy.executors import ExternalShutdownException
 
 
 @contextmanager
-def ros_session(arguments: list[str]) -> Iterator[None]:
-    """Have ROS until the context ends, or until SIGINT or SIGTERM ends it, which is no error.
+def rclpy_context(arguments: list[str]) -> Iterator[None]:
+    """Initialize rclpy, and shut it down at the end of the context, or at SIGINT or SIGTERM.
 
-    rclpy shuts down where the signal finds it, so that whatever a callback in progress does
-    next with ROS fails: errors after a shutdown are its consequence. Where ROS does not even start
-    the process ends with 2, and says why.
+    rclpy's signal handler invalidates the context while a callback may still use it, so errors
+    after a shutdown are ignored. Exits with 2 and a message if rclpy cannot be initialized.
     """
     try:
         rclpy.init(args=arguments)
-    except RuntimeError as error:  # such as a log that has no folder, or one that is read-only
+    except RuntimeError as error:  # e.g. the log directory is missing or read-only
         print(f'ROS does not start: {error}', file=sys.stderr)
         raise SystemExit(2) from error
     try:
@@ -31,6 +30,6 @@ def ros_session(arguments: list[str]) -> Iterator[None]:
         if rclpy.ok():
             raise
     finally:
-        # The thread that takes the signal may be shutting down at this very moment.
+        # The signal handler's thread may be shutting down at the same time.
         with suppress(RCLError):
             rclpy.try_shutdown()
