@@ -123,7 +123,7 @@ def test_dry_friction_is_named_and_left_out(tmp_path):
                        joint('b', inside=resists), joint('c', inside=resists),
                        joint('d', inside='<dynamics damping="0.5" friction="0"/>'))
     [note] = notes
-    assert note.startswith('to_b, to_c: dry friction') and 'left out' in note
+    assert note.startswith('to_b, to_c: dry friction') and 'ignored' in note
     assert [each.damping for each in doll.joints] == [0.5] * 3
 
 
@@ -131,7 +131,7 @@ def test_how_links_touch_in_pybullet_is_named_and_left_out(tmp_path):
     rubber = '<contact><lateral_friction value="2"/></contact></link>'
     soles = [link(name).replace('</link>', rubber) for name in 'ac']
     _, [note] = read(tmp_path, soles[0], link('b'), soles[1], joint('b'), joint('c'))
-    assert note.startswith('a, c: ') and '<contact>' in note and 'left out' in note
+    assert note.startswith('a, c: ') and '<contact>' in note and 'ignored' in note
 
 
 def test_a_link_without_a_shape_rides_and_gives_its_mass(tmp_path):
@@ -155,7 +155,7 @@ def test_a_bare_root_gives_way_to_its_child(tmp_path):
 def test_two_branches_of_a_bare_root_stay_one_doll(tmp_path):
     doll, notes = read(tmp_path, link('base', '', 0), link('a'), link('b'),
                        joint('a', 'base', xyz='0 1 0'), joint('b', 'base', xyz='0 -1 0'))
-    assert notes == ('to_a: nothing with a shape above it: left out',)
+    assert notes == ('to_a: no link above it has a shape: ignored',)
     assert [(j.parent, j.child, j.kind) for j in doll.joints] == [('a', 'b', 'hinge')]
 
 
@@ -193,13 +193,13 @@ def test_a_joint_that_mimics_turns_by_itself_and_is_named(tmp_path):
     doll, notes = read(tmp_path, link('a'), link('b'), link('c'), joint('b'),
                        joint('c', inside='<mimic joint="to_b" multiplier="2"/>'))
     assert [j.kind for j in doll.joints] == ['hinge', 'hinge']
-    assert notes == ('to_c: mimics to_b: in the doll it turns by itself',)
+    assert notes == ('to_c: mimics to_b: becomes an independent joint',)
 
 
 def test_a_shape_of_no_size_is_left_out_and_named(tmp_path):
     doll, notes = read(tmp_path, link('a'), link('b', '<sphere radius="0"/>', 0),
                        joint('b', kind='fixed'))
-    assert len(doll.bones) == 1 and notes == ('b: a <sphere> of no size is left out',)
+    assert len(doll.bones) == 1 and notes == ('b: a <sphere> of no size is ignored',)
 
 
 def test_hinges_apart_keep_the_first_and_say_so(tmp_path):
@@ -324,7 +324,7 @@ def test_what_is_only_a_mesh_becomes_the_box_of_the_same_inertia(tmp_path):
     assert sorted(doll.root.shape.size) == pytest.approx([0.1, 0.2, 0.4])
     assert sorted(doll.root.inertia) == pytest.approx(sorted((x, y, z)))
     assert np.allclose(doll.root.position, (0, 0, 0.5))
-    assert 'a.stl is left out: no such file' in notes[0]
+    assert 'a.stl is ignored: no such file' in notes[0]
     assert 'box of the same inertia' in notes[1]
     # What no box as dense as matter could have: a cube of water's size.
     doll, notes = read(tmp_path, mesh.replace(f'ixx="{x}"', 'ixx="1"').replace(

@@ -11,7 +11,7 @@ from test_fit_fall import energy, gaps
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.fit.command import main
 from ragdoll_ros.fit.judging.verdict import judge
-from ragdoll_ros.fit.pipeline import Options, fit_character, fit_characters
+from ragdoll_ros.fit.pipeline import FitOptions, fit_character, fit_characters
 from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.fit.skin import skin_of, skins_of
 from ragdoll_ros.model import errors
@@ -197,7 +197,7 @@ def test_what_is_kept_is_kept_of_the_one_that_has_it(tmp_path):
     first, second = (person(name, x=x, bones=fit_rigs.humanoid('unreal', fingers=True))
                      for name, x in (('', 0), ('other ', 2.5)))
     character = read_character(write_two(tmp_path, first, second, 1))
-    fits = fit_characters(character, Options(keep=('other index_01_l',)))
+    fits = fit_characters(character, FitOptions(keep=('other index_01_l',)))
     assert [sum('index' in bone.name for bone in fit.doll.bones) for fit in fits] == [0, 1]
     with pytest.raises(errors.UnknownBone, match='keep'):
-        fit_characters(character, Options(keep=('nobody',)))
+        fit_characters(character, FitOptions(keep=('nobody',)))
