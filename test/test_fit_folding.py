@@ -77,7 +77,7 @@ def test_a_hock_that_folds_the_other_way_is_not_good(tmp_path):
     assert 'Leftf: a limb that goes 3' in str(verdict) and 'past straight' in str(verdict)
 
 
-def test_limbs_that_nothing_tells_of_are_told():
+def test_limbs_without_name_or_bend_get_a_note():
     notes = fit_rigs.fitted('star').notes
     assert any('ball joints are used' in note for note in notes)
 

@@ -1,4 +1,4 @@
-"""Sectors of the picture: from the joint, over what its limits allow."""
+"""Sectors of the picture: from the anchor, between the limits of an angle."""
 import numpy as np
 import pytest
 

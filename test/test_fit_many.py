@@ -101,7 +101,7 @@ def test_a_strand_that_is_named_is_bodies_and_no_swing(tmp_path, name):
     ('index_1_l', errors.UnknownBone, 'keep.*index_1_l.*index_01_l'),
     ('*Thumbs*', errors.UnknownBone, r'keep.*Thumbs.*thumb_0'),
     ('pole', errors.WrongForm, 'keep.*pole.*moves 4 vertices or more')])
-def test_what_cannot_be_kept_is_refused(tmp_path, keep, kind, words):
+def test_a_bone_that_cannot_be_forced_is_refused(tmp_path, keep, kind, words):
     character = fit_rigs.fitted('unreal').character
     with_pole = replace(
         character, bone_names=(*character.bone_names, 'pole'), parents=(*character.parents, 0),

@@ -118,7 +118,7 @@ def test_what_is_no_person_follows_its_skin():
         bone.mass for bone in by_skin.doll.bones]
 
 
-def test_a_skin_that_tells_no_volume_is_told():
+def test_a_skin_without_volume_gets_a_note():
     """Every triangle twice, once inside out: no volume at all."""
     character = fitted('two_bones').character
     both = np.concatenate([character.triangles, character.triangles[:, ::-1]])

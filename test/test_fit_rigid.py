@@ -92,7 +92,7 @@ def test_a_helmet_is_part_of_the_head(tmp_path, mirrored):
     assert after.shape.volume > 1.5 * before.shape.volume
 
 
-def test_a_mesh_on_no_bone_is_left_out_and_told(tmp_path):
+def test_a_mesh_on_no_bone_is_ignored_with_a_note(tmp_path):
     made = fit_rigs.document(PERSON)
     helmet(made)
     made.data['nodes'].append({'name': 'floor', 'mesh': 1})

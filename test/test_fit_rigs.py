@@ -132,7 +132,7 @@ def test_another_skeleton_is_jointed_where_it_touches():
     assert (first.parent, first.kind) == ('mixamorig:Head', 'ball')
 
 
-def test_another_skeleton_that_touches_nothing_is_tied_and_told(tmp_path):
+def test_another_skeleton_that_touches_nothing_is_fixed_with_a_note(tmp_path):
     far = [dataclasses.replace(bone, head=(*bone.head[:2], bone.head[2] - 1),
                                tail=(*bone.tail[:2], bone.tail[2] - 1))
            if bone.name.startswith('whip') else bone for bone in RIGS['two_skeletons'].bones]

@@ -241,7 +241,7 @@ def test_broken_springs_end_in_one_sentence(tmp_path, capsys, name):
     assert 'extensions.VRM' in error
 
 
-def test_a_spring_of_one_node_is_left_out_with_a_note(tmp_path):
+def test_a_spring_of_one_node_is_ignored_with_a_note(tmp_path):
     change = set_all([{'joints': [{'node': FIRST}]}], 'VRMC_springBone', 'springs')
     fit = fit_character(read_character(written(tmp_path, change)))
     assert not fit.doll.swings

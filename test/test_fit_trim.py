@@ -56,7 +56,7 @@ def test_a_deep_overlap_stays(shape):
 
 
 @pytest.mark.parametrize('name', RIGS)
-def test_what_no_joint_connects_is_apart_or_named(name):
+def test_bodies_without_a_joint_are_separate_or_excluded_from_collision(name):
     doll = fit_rigs.fitted(name).doll
     for i, first in enumerate(doll.bones):
         for second in doll.bones[:i]:

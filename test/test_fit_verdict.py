@@ -199,7 +199,7 @@ def test_a_robot_may_be_of_steel():
                      for measured in (False, True)) == words
 
 
-def test_a_joint_past_its_limits_is_told_by_a_fall():
+def test_the_drop_test_finds_a_joint_past_its_limits():
     """Bound 57 degrees outside its range."""
     doll = fitted('mixamo').doll
     assert run_drop_test(doll, 1.8) == []

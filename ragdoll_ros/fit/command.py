@@ -72,7 +72,7 @@ def _parser() -> argparse.ArgumentParser:
                         help="mass of each doll (default: the skin's volume of water)")
     parser.add_argument('--masses', choices=('best', 'volume', 'proportions'), default='best',
                         help="distribute the mass by the skin's volume, by a person's proportions, "
-                        'or by volume and, for a person, the mean of both (default)')
+                        'or by volume and, for a person, their geometric mean (default)')
     parser.add_argument('--scale', type=float, metavar='M',
                         help='metres per unit of the file (default: 1, or an estimate)')
     parser.add_argument('--shape', default='best',

@@ -109,7 +109,7 @@ class SkinForest:
             large = self.areas[inside].sum() > MAX_LOOSE_AREA * self.areas.sum()
             unrelated = not file_edge and self._file_root(edge[0]) != self._file_root(edge[1])
             if unrelated and (large or distance > touching):
-                # At its own root: nothing tells where it could articulate.
+                # At its own root: where it could articulate is unknown.
                 top = next(bone for bone in inside if self.skinned_parents[bone] not in inside)
                 edge = int(top), int(outside[np.argmin(distances[top, outside])])
                 self.fixed.append(edge)
