@@ -1,4 +1,4 @@
-"""What the bodies carry: every bone of the skeleton, and the swings."""
+"""Attachments of the bodies: frames of the skeleton's bones, and swings."""
 from __future__ import annotations
 
 import numpy as np
@@ -7,13 +7,13 @@ from ..model.pose import Pose
 from ..model.ragdoll import Bone, SkeletonFrame
 from ..model.swing import Swing
 from .reading.character import Character
-from .reading.spring_recipe import swing_of
+from .reading.spring_to_swing import swing_from_spring
 
 
 def skeleton_frames(character: Character, carrier: dict[int, Bone]) -> tuple[SkeletonFrame, ...]:
-    """Every bone of the skeleton, fixed on the body that carries it, in the skeleton's order.
+    """Frame of every bone of the skeleton, fixed to a body, in the skeleton's order.
 
-    ``carrier`` has that body by the index of each of the character's bones.
+    ``carrier`` maps the index of a character's bone to that body.
     """
     frames = []
     for index, name in enumerate(character.bone_names):
@@ -24,12 +24,12 @@ def skeleton_frames(character: Character, carrier: dict[int, Bone]) -> tuple[Ske
 
 
 def swings(character: Character, carrier: dict[int, Bone], notes: list[str]) -> tuple[Swing, ...]:
-    """Each spring of the character as a swing; a note says where its gravity had to be cut."""
+    """The character's spring bones as swings; a note reports gravity that had to be clamped."""
     made = []
     for spring in character.springs:
-        swing, cut = swing_of(spring, carrier[spring.carrier].name, character.scale)
+        swing, cut = swing_from_spring(spring, carrier[spring.carrier].name, character.scale)
         made.append(swing)
         if cut:
-            notes.append(f'spring {spring.name} has too much gravity: a share of '
-                         f'{swing.gravity:g} is taken')
+            notes.append(f'gravity of spring {spring.name} is clamped to a factor of '
+                         f'{swing.gravity:g}')
     return tuple(made)

@@ -7,8 +7,8 @@ import pytest
 from fit_rigs import RIGS
 
 from ragdoll_ros.files.doll import load_doll
-from ragdoll_ros.fit.judging.doubts import extent, find_doubts
-from ragdoll_ros.fit.pipeline import Options, fit_character
+from ragdoll_ros.fit.judging.plausibility import extent, find_implausible
+from ragdoll_ros.fit.pipeline import FitOptions, fit_character
 from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.ragdoll import Ragdoll, joint_axes
@@ -28,7 +28,7 @@ def sound(article):
 
 
 def sentences(doll):
-    return [finding.sentence for finding in find_doubts(doll)]
+    return [finding.sentence for finding in find_implausible(doll)]
 
 
 def in_centimetres(doll):
@@ -49,7 +49,7 @@ def with_the_signs_of_ode(doll):
 
 
 def test_a_sound_doll_raises_no_doubt(sound):
-    assert find_doubts(sound) == []
+    assert find_implausible(sound) == []
     # Feet at 0.40 m, head up to 1.55 m; arms out to 0.60 m on both sides.
     assert extent(sound) == pytest.approx(1.2)
 
@@ -62,7 +62,7 @@ def test_the_articles_arms_are_too_dense(article):
 
 
 def test_the_doll_in_centimetres(sound):
-    assert any('smells of centimetres' in doubt for doubt in sentences(in_centimetres(sound)))
+    assert any('may be centimetres' in doubt for doubt in sentences(in_centimetres(sound)))
 
 
 def test_odes_signs_left_in(sound):
@@ -142,7 +142,7 @@ def test_left_and_right_mirror_in_their_limits():
 
 
 def test_the_bone_direction_is_along_the_bone():
-    fit = fit_character(fit_rigs.fitted('mixamo').character, Options(orientation='bone'))
+    fit = fit_character(fit_rigs.fitted('mixamo').character, FitOptions(orientation='bone'))
     shin = fit.doll.bone('mixamorig:LeftLeg')
     z = rotation.rotate(np.array(shin.orientation), np.array([0, 0, 1.0]))
     direction = np.array([-.03, 0, -.41])

@@ -1,4 +1,4 @@
-"""Some of a character's bones as a character of their own, in a frame of its own."""
+"""A subset of a character's bones as a character of its own, and changes of its frame."""
 from __future__ import annotations
 
 from dataclasses import replace
@@ -10,21 +10,21 @@ from ...model.pose import Pose
 from .character import Character
 
 
-def part_of(character: Character, own: np.ndarray) -> Character:
-    """The character of those bones, (n,) bool, that are its ``own``.
+def subset_character(character: Character, own: np.ndarray) -> Character:
+    """The character of those bones that the mask ``own`` (n,) selects.
 
-    It has every vertex that any of them moves, and the springs that hang from them; skin that no
-    bone moves goes with the first bone.
+    It has all vertices that any of them moves, and the spring bones attached to them; unweighted
+    vertices belong to the first bone of the file.
     """
     if own.all():
         return character
     place = np.cumsum(own) - 1
     theirs = own[character.bones] & (character.weights > 0)
     moved = character.weights.any(axis=1)
-    kept = np.where(moved, theirs.any(axis=1), own[0])
-    triangles = kept[character.triangles].all(axis=1)
+    used = np.where(moved, theirs.any(axis=1), own[0])
+    triangles = used[character.triangles].all(axis=1)
     paint = character.paint and replace(
-        character.paint, normals=character.paint.normals[kept], uvs=character.paint.uvs[kept],
+        character.paint, normals=character.paint.normals[used], uvs=character.paint.uvs[used],
         numbers=character.paint.numbers[triangles])
     chosen = np.flatnonzero(own)
     springs = tuple(replace(spring, carrier=int(place[spring.carrier]),
@@ -35,14 +35,14 @@ def part_of(character: Character, own: np.ndarray) -> Character:
         parents=tuple(int(place[up]) if up >= 0 and own[up] else -1
                       for up in np.array(character.parents)[chosen]),
         positions=character.positions[own], orientations=character.orientations[own],
-        vertices=character.vertices[kept],
-        triangles=(np.cumsum(kept) - 1)[character.triangles[triangles]],
-        bones=np.where(theirs, place[character.bones], 0)[kept],
-        weights=np.where(theirs, character.weights, 0.0)[kept], springs=springs, paint=paint)
+        vertices=character.vertices[used],
+        triangles=(np.cumsum(used) - 1)[character.triangles[triangles]],
+        bones=np.where(theirs, place[character.bones], 0)[used],
+        weights=np.where(theirs, character.weights, 0.0)[used], springs=springs, paint=paint)
 
 
-def seen_from(character: Character, frame: Pose) -> Character:
-    """The character in another frame, which stands at ``frame`` in its own; z of both is up."""
+def to_frame(character: Character, frame: Pose) -> Character:
+    """The character in another frame, whose pose in the current one is ``frame``; z stays up."""
     back = rotation.inverse(frame.orientation)
     paint = character.paint and replace(
         character.paint, normals=rotation.rotate(back, character.paint.normals))

@@ -1,8 +1,8 @@
-"""Sectors of the picture: from the joint, over what its limits allow."""
+"""Sectors of the picture: from the anchor, between the limits of an angle."""
 import numpy as np
 import pytest
 
-from ragdoll_ros.fit.dials import dials
+from ragdoll_ros.fit.picture import joint_range_arcs
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.shapes import Box
 
@@ -14,7 +14,7 @@ def doll(kind, axes, limits):
 
 
 def test_a_hinges_sector_goes_from_limit_to_limit():
-    (number, points), = dials(doll('hinge', ((0, 1, 0),), ((0, np.pi / 2),)))
+    (number, points), = joint_range_arcs(doll('hinge', ((0, 1, 0),), ((0, np.pi / 2),)))
     assert number == 0
     for end in (0, -1):
         assert points[end] == pytest.approx((0, 0, 1))
@@ -27,6 +27,7 @@ def test_a_hinges_sector_goes_from_limit_to_limit():
 
 
 def test_free_and_fixed_angles_have_no_sector():
-    assert dials(doll('fixed', (), ())) == []
-    assert dials(doll('ball', ((0, 0, 1),), ())) == []
-    assert [number for number, _ in dials(doll('ball', ((0, 0, 1),), ((-1, 1), None)))] == [0, 1]
+    assert joint_range_arcs(doll('fixed', (), ())) == []
+    assert joint_range_arcs(doll('ball', ((0, 0, 1),), ())) == []
+    partly_free = doll('ball', ((0, 0, 1),), ((-1, 1), None))
+    assert [number for number, _ in joint_range_arcs(partly_free)] == [0, 1]

@@ -11,7 +11,7 @@ from test_fit_fall import energy, gaps
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.fit.command import main
 from ragdoll_ros.fit.judging.verdict import judge
-from ragdoll_ros.fit.pipeline import Options, fit_character, fit_characters
+from ragdoll_ros.fit.pipeline import FitOptions, fit_character, fit_characters
 from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.fit.skin import skin_of, skins_of
 from ragdoll_ros.model import errors
@@ -55,7 +55,7 @@ def fit_alone(bones, folder):
 @pytest.mark.slow
 @pytest.mark.parametrize('skin', wild_rigs.SKINS)
 @pytest.mark.parametrize('place', [(0, 1.2), (2.6, 0)], ids=['ahead', 'side by side'])
-def test_two_in_any_kind_of_skin_are_told_apart(tmp_path, skin, place):
+def test_two_in_any_kind_of_skin_are_split(tmp_path, skin, place):
     """Side by side each is the other's mirror image, whose hips are no halves of one pelvis."""
     first, second = person(), person('other ', x=place[0], z=place[1])
     wild = wild_rigs.Wild(Rig('two', together(first, second)), skin, {}, ())
@@ -193,11 +193,11 @@ def test_a_dog_a_bird_and_a_person_are_three(tmp_path):
     assert [placement.position[1] for placement in scene.dolls] == pytest.approx([0, 2, -2])
 
 
-def test_what_is_kept_is_kept_of_the_one_that_has_it(tmp_path):
+def test_a_forced_body_is_one_of_the_character_that_has_the_bone(tmp_path):
     first, second = (person(name, x=x, bones=fit_rigs.humanoid('unreal', fingers=True))
                      for name, x in (('', 0), ('other ', 2.5)))
     character = read_character(write_two(tmp_path, first, second, 1))
-    fits = fit_characters(character, Options(keep=('other index_01_l',)))
+    fits = fit_characters(character, FitOptions(keep=('other index_01_l',)))
     assert [sum('index' in bone.name for bone in fit.doll.bones) for fit in fits] == [0, 1]
     with pytest.raises(errors.UnknownBone, match='keep'):
-        fit_characters(character, Options(keep=('nobody',)))
+        fit_characters(character, FitOptions(keep=('nobody',)))
