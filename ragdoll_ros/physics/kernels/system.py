@@ -8,6 +8,7 @@ import collections
 import numba
 import numpy as np
 
+from .collision.manifold import CONTACT_POINT, MAX_MANIFOLD_POINTS
 from .compiling.bundle import bundle_type
 from .dynamics.forward import Work
 from .record import RECORD
@@ -99,8 +100,8 @@ a stretch: bones' ``rows`` (n, 13) and the dolls' ``sums`` (d,). What acts in it
 and ``springs`` (k, 20) of hands, drives and held joints; see engine/acting.py."""
 
 Room = collections.namedtuple(
-    'Room', 'work own composite H contacts table at turn gaps later Y YT support W G p solver '
-    'kinds rows mu roll need label vectors states given before after begun count lift tally '
+    'Room', 'work own composite H contacts manifold table at turn gaps later Y YT support W G p '
+    'solver kinds rows mu roll need label vectors states given before after begun count lift tally '
     'within armed met above below bracket stages row place blocks unsought left')
 """Scratch of the rigid core, but for ``tally``, ``within`` and ``gaps``, which are the course's.
 
@@ -162,7 +163,8 @@ def make_room(system: System, course: Course) -> Room:
                 np.zeros((nv, 6)), np.zeros((nv, 8)), np.zeros((3, 3)))
     return Room(
         work=work, own=np.zeros((bones, 6)), composite=np.zeros((bones, 10)),
-        H=np.zeros((nv, nv)), contacts=np.zeros(contacts, CONTACT), table=np.zeros((16, 8)),
+        H=np.zeros((nv, nv)), contacts=np.zeros(contacts, CONTACT),
+        manifold=np.zeros(MAX_MANIFOLD_POINTS, CONTACT_POINT), table=np.zeros((16, 8)),
         at=np.zeros((geoms, 3)), turn=np.zeros((geoms, 3, 3)), gaps=course.gaps,
         later=np.zeros(gaps), Y=np.zeros((rows, wide)), YT=np.zeros((nv, few)),
         support=np.zeros((contacts, wide), np.int64), W=np.zeros(few * few),

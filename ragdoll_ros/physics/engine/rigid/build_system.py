@@ -10,12 +10,10 @@ from ....model import rotation
 from ....model.coordinates import DofLayout
 from ....model.ragdoll import Joint, Ragdoll, joint_axes
 from ....model.scene import Scene
+from ...kernels.collision.shapes import SHAPE_KIND
 from ...kernels.record import RECORD
 from ...kernels.system import BOUND, GEOM, PAIR, STICKS, System
 from ...motion import damping_rate
-
-KINDS = {'sphere': 0, 'capsule': 1, 'box': 2, 'cylinder': 3}
-"""Numbers of the kinds of shapes, as in kernels/collision/shapes.py."""
 
 STIFFEST = 1000.0
 """1/s at which joint damping may end a motion for it to be flown; above, steps take it
@@ -175,7 +173,7 @@ def _geoms(scene: Scene, tree: np.ndarray) -> np.ndarray:
     geoms, first = np.zeros(len(parts), GEOM), 0
     for geom, (index, bone, part) in zip(geoms, parts, strict=True):
         shape, count = part.shape, GROUND_POINTS[part.shape.kind]
-        geom['bone'], geom['kind'] = record[index], KINDS[shape.kind]
+        geom['bone'], geom['kind'] = record[index], SHAPE_KIND[shape.kind]
         geom['size'] = _size(shape)
         geom['offset'] = rotation.rotate(bone.orientation, np.array(part.position))
         geom['turn'] = rotation.multiply(bone.orientation, np.array(part.orientation))

@@ -5,7 +5,8 @@ import math
 
 import numpy as np
 
-from ..collision.pair import collide
+from ..collision.narrow_phase import collide
+from ..collision.shapes import CYLINDER, shape_at
 from ..compiling.decorators import compiled
 from ..maths.quaternion import cross
 from ..system import Room, System
@@ -61,17 +62,17 @@ def enter_pair(s: System, k: int, r: Room, m: int, margin: float, key: int) -> i
     """Enter the points of a pair's patch; the number of contacts after."""
     pair = s.pairs[k]
     a, b = s.geoms[pair.a], s.geoms[pair.b]
-    found = collide(a.kind, a.size, r.at[pair.a], r.turn[pair.a], b.kind, b.size, r.at[pair.b],
-                    r.turn[pair.b], margin, r.table)
+    found = collide(shape_at(a, r.at[pair.a], r.turn[pair.a]),
+                    shape_at(b, r.at[pair.b], r.turn[pair.b]), margin, r.manifold)
     for j in range(found):
         if m >= len(r.contacts):
             break
-        c, row = r.contacts[m], r.table[j]
+        c, contact = r.contacts[m], r.manifold[j]
         c.kind = 5 if pair.rolling > 0 else 3
-        c.a, c.b, c.key, c.group = a.bone, b.bone, key + int(row[7]), len(s.geoms) + k
+        c.a, c.b, c.key, c.group = a.bone, b.bone, key + contact.feature_id, len(s.geoms) + k
         for e in range(3):
-            c.point[e], c.normal[e] = row[e], row[3 + e]
-        c.gap = row[6]
+            c.point[e], c.normal[e] = contact.point[e], contact.normal[e]
+        c.gap = contact.gap
         c.friction, c.rolling, c.restitution = pair.friction, pair.rolling, pair.restitution
         m += 1
     return m
@@ -94,7 +95,7 @@ def arms(s: System, r: Room, m: int) -> None:
             basis(r.contacts[e])
             for k in range(3):
                 r.contacts[e].arm[k] = r.contacts[e].point[k]
-        if d - c > 2 and group < len(s.geoms) and s.geoms[group].kind == 3:
+        if d - c > 2 and group < len(s.geoms) and s.geoms[group].kind == CYLINDER:
             on_disc(s.geoms[group], r.at[group], r.turn[group], r.contacts, c, d)
         elif d - c > 1:
             shrink(r, c, d)

@@ -9,11 +9,12 @@ import math
 
 import numpy as np
 
-from ..collision.pair import separation
-from ..collision.shapes import CAPSULE, SPHERE, extent
+from ..collision.narrow_phase import separation
+from ..collision.shapes import BOX, CAPSULE, SPHERE, extent, shape_at
 from ..compiling.decorators import compiled
 from ..dynamics.forward import Work, pose
 from ..maths.quaternion import cross, times, to_matrix, turned
+from ..maths.vectors import divide, norm, sub, vec
 from ..system import OUTSIDE, WITHIN, Room, System
 
 TOUCHING = 1e-6
@@ -68,11 +69,11 @@ def ground_gaps(geom: np.record, at: np.ndarray, turn: np.ndarray, n: np.ndarray
     b = turn[0, 1] * n[0] + turn[1, 1] * n[1] + turn[2, 1] * n[2]
     c = turn[0, 2] * n[0] + turn[1, 2] * n[1] + turn[2, 2] * n[2]
     size = geom.size
-    if geom.kind == 0:
+    if geom.kind == SPHERE:
         out[first] = high - size[0]
-    elif geom.kind == 1:
+    elif geom.kind == CAPSULE:
         out[first], out[first + 1] = high - size[1] * c - size[0], high + size[1] * c - size[0]
-    elif geom.kind == 2:
+    elif geom.kind == BOX:
         a, b, c = a * size[0], b * size[1], c * size[2]
         for k in range(8):
             out[first + k] = (high + (a if k & 1 else -a) + (b if k & 2 else -b)
@@ -101,12 +102,12 @@ def ground_point(geom: np.record, k: int, at: np.ndarray, turn: np.ndarray, n: n
     """
     size = geom.size
     x = y = z = 0.0
-    if geom.kind <= 1:
-        z = 0.0 if geom.kind == 0 else (size[1] if k else -size[1])
+    if geom.kind <= CAPSULE:
+        z = 0.0 if geom.kind == SPHERE else (size[1] if k else -size[1])
         for j in range(3):
             out[j] = at[j] + turn[j, 2] * z - size[0] * n[j]
         return
-    if geom.kind == 2:
+    if geom.kind == BOX:
         x, y, z = (size[0] if k & 1 else -size[0], size[1] if k & 2 else -size[1],
                    size[2] if k & 4 else -size[2])
     else:
@@ -215,31 +216,23 @@ def bone_velocity(work: Work, i: int) -> tuple[float, float, float, float]:
 
 
 @compiled
-def along(kind: int, size: np.ndarray, r: np.ndarray, x: float, y: float, z: float) -> float:
-    """How far, m, a geom reaches from its centre along a unit vector of the world."""
-    if kind == SPHERE:
-        return size[0]
-    reach = extent(kind, size, r, x, y, z)
-    return reach + size[0] if kind == CAPSULE else reach
-
-
-@compiled
 def pair_gap(a: np.record, b: np.record, pa: np.ndarray, ra: np.ndarray, pb: np.ndarray,
              rb: np.ndarray) -> float:
     """Separation of two geoms, m; of what is farther apart than NEAR, a bound below it: that of
     spheres around them, then that along the line of their centres.
     """
-    x, y, z = pa[0] - pb[0], pa[1] - pb[1], pa[2] - pb[2]
-    length = math.sqrt(x * x + y * y + z * z)
+    c = sub(vec(pa), vec(pb))
+    length = norm(c)
     far = length - (a.radius + b.radius)
     if far > NEAR:
         return far
+    one, other = shape_at(a, pa, ra), shape_at(b, pb, rb)
     if length > NEAR:
-        x, y, z = x / length, y / length, z / length
-        far = length - along(a.kind, a.size, ra, x, y, z) - along(b.kind, b.size, rb, x, y, z)
+        n = divide(c, length)
+        far = length - extent(one, n) - extent(other, n)
         if far > NEAR:
             return far
-    return separation(a.kind, a.size, pa, ra, b.kind, b.size, pb, rb, NEAR)
+    return separation(one, other, NEAR)
 
 
 @compiled

@@ -5,7 +5,8 @@ import math
 
 import numpy as np
 
-from ..collision.pair import collide
+from ..collision.narrow_phase import collide
+from ..collision.shapes import shape_at
 from ..compiling.decorators import compiled
 from ..contact.gaps import FAR, NEAR, TOUCHING, bone_velocity, ground_point, look
 from ..system import Course, Room, System
@@ -79,14 +80,14 @@ def pair_closing(s: System, r: Room, q: np.ndarray, k: int, gap: float) -> float
     pair = s.pairs[k]
     a, b = s.geoms[pair.a], s.geoms[pair.b]
     if gap < NEAR:
-        found = collide(a.kind, a.size, r.at[pair.a], r.turn[pair.a], b.kind, b.size,
-                        r.at[pair.b], r.turn[pair.b], max(gap, 0.0) + 1e-4, r.table)
+        found = collide(shape_at(a, r.at[pair.a], r.turn[pair.a]),
+                        shape_at(b, r.at[pair.b], r.turn[pair.b]), max(gap, 0.0) + 1e-4, r.manifold)
         if found:
             best = 0
             for j in range(1, found):
-                if r.table[j, 6] < r.table[best, 6]:
+                if r.manifold[j].gap < r.manifold[best].gap:
                     best = j
-            point, n = r.table[best, :3], r.table[best, 3:6]
+            point, n = r.manifold[best].point, r.manifold[best].normal
             return (point_velocity(r.work, b.bone, q, s.tree[s.root_of[b.bone]].q, point, n)
                     - point_velocity(r.work, a.bone, q, s.tree[s.root_of[a.bone]].q, point, n))
     ax, ay, az, aw = bone_velocity(r.work, a.bone)
