@@ -92,8 +92,8 @@ def touching(rng, kind_a, kind_b, wanted=0.0):
 
 def places(found):
     """Points in an order of their own."""
-    rows = np.round(found[:, :3], 7) + 0.0
-    return found[np.lexsort(rows.T)][:, :3]
+    rows = np.round(found['point'], 7) + 0.0
+    return found[np.lexsort(rows.T)]['point']
 
 
 class Peer:
@@ -250,7 +250,7 @@ def test_a_tilt_of_rounding_leaves_four_corners_and_their_names():
     for _ in range(200):
         tilt = Rotation.from_rotvec(rng.normal(size=3) * 10.0 ** -rng.integers(6, 17))
         found = contacts(Body(BOX, [.1, .1, .1], [.03, .02, .2], tilt), Body(BOX, [.1, .1, .1]))
-        assert len(found) == 4 and found[:, 5] == pytest.approx(1, abs=1e-9)
+        assert len(found) == 4 and found['normal'][:, 2] == pytest.approx(1, abs=1e-9)
         names.add(tuple(np.sort(found['feature_id'])))
     assert len(names) <= 2      # one for each of the faces that may be the reference
 
@@ -261,7 +261,8 @@ def test_a_turned_box_on_a_box_stands_on_an_octagon():
     assert len(found) == 8
     # corners of the octagon within both squares are at .1 and .1 (sqrt 2 - 1)
     near = .1 * (math.sqrt(2) - 1)
-    assert np.sort(np.abs(found[:, :2]), axis=1) == pytest.approx(np.tile([near, .1], (8, 1)))
+    assert np.sort(np.abs(found['point'][:, :2]), axis=1) == pytest.approx(
+        np.tile([near, .1], (8, 1)))
 
 
 def test_a_box_on_its_edge_touches_at_two_points():
@@ -270,7 +271,8 @@ def test_a_box_on_its_edge_touches_at_two_points():
     assert places(contacts(a, Body(BOX, [.5, .5, .1]))) == pytest.approx(
         np.array([[.05, -.2, .1], [.05, .2, .1]]))
     # and where the edge stands out over the face it ends with the face
-    assert np.sort(contacts(a, Body(BOX, [.5, .15, .1]))[:, 1]) == pytest.approx([-.15, .15])
+    found = contacts(a, Body(BOX, [.5, .15, .1]))
+    assert np.sort(found['point'][:, 1]) == pytest.approx([-.15, .15])
 
 
 def test_edges_that_cross_touch_where_they_cross():
@@ -278,8 +280,8 @@ def test_edges_that_cross_touch_where_they_cross():
              Rotation.from_euler('y', math.pi / 4))
     b = Body(BOX, [.3, .1, .1], [0, 0, 0], Rotation.from_euler('x', math.pi / 4))
     found = contacts(a, b)
-    assert found[:, :7] == pytest.approx(np.array(
-        [[.02, 0, .1 * math.sqrt(2) - 5e-5, 0, 0, 1, -1e-4]]), abs=1e-12)
+    assert np.column_stack([found['point'], found['normal'], found['gap']]) == pytest.approx(
+        np.array([[.02, 0, .1 * math.sqrt(2) - 5e-5, 0, 0, 1, -1e-4]]), abs=1e-12)
 
 
 @pytest.mark.parametrize('kind', [CAPSULE, CYLINDER])
@@ -300,24 +302,24 @@ def test_what_lies_on_a_box_touches_at_two_points(kind):
 @pytest.mark.parametrize('kinds', list(itertools.product([CAPSULE, CYLINDER], repeat=2)))
 def test_side_by_side_they_touch_at_two_points(kinds):
     a, b = Body(kinds[0], [.05, .2], [.09999, 0, .1]), Body(kinds[1], [.05, .3])
-    assert np.sort(contacts(a, b)[:, 2]) == pytest.approx([-.1, .3])
-    assert contacts(a, b)[:, 3] == pytest.approx(1)
+    assert np.sort(contacts(a, b)['point'][:, 2]) == pytest.approx([-.1, .3])
+    assert contacts(a, b)['normal'][:, 0] == pytest.approx(1)
     across = Body(kinds[0], [.05, .2], [.1, .02, .1], Rotation.from_euler('x', math.pi / 2))
-    assert contacts(across, b)[:, :3] == pytest.approx(np.array([[.05, 0, .1]]), abs=1e-9)
+    assert contacts(across, b)['point'] == pytest.approx(np.array([[.05, 0, .1]]), abs=1e-9)
 
 
 def test_a_cylinder_stands_on_its_rim():
     a = Body(CYLINDER, [.1, .2], [.02, 0, .3])
-    found = contacts(a, Body(BOX, [.5, .5, .1]))
-    assert len(found) == 8 and np.ptp(found[:, 2]) < 1e-12
-    angles = np.sort(np.arctan2(found[:, 1], found[:, 0] - .02))
-    assert np.hypot(found[:, 0] - .02, found[:, 1]) == pytest.approx(.1)
+    x, y, z = contacts(a, Body(BOX, [.5, .5, .1]))['point'].T
+    assert len(z) == 8 and np.ptp(z) < 1e-12
+    angles = np.sort(np.arctan2(y, x - .02))
+    assert np.hypot(x - .02, y) == pytest.approx(.1)
     assert np.diff(angles) == pytest.approx(math.pi / 4)
     # on a smaller box: the box's corners, which all lie under the disc
     assert len(contacts(a, Body(BOX, [.05, .05, .1]))) == 4
     # on another cylinder: as much as the smaller has
-    found = contacts(a, Body(CYLINDER, [.3, .1]))
-    assert np.hypot(found[:, 0] - .02, found[:, 1]) == pytest.approx(.1) and len(found) == 8
+    x, y, _ = contacts(a, Body(CYLINDER, [.3, .1]))['point'].T
+    assert np.hypot(x - .02, y) == pytest.approx(.1) and len(x) == 8
 
 
 @pytest.mark.parametrize('degrees', [1e-5, .01, 1, 30, 80])
@@ -338,7 +340,7 @@ def test_a_tilted_cylinder_stands_where_its_rim_is_lowest(degrees):
 
 def test_contacts_keep_their_names_while_a_box_slides():
     names = {tuple(np.sort(contacts(Body(BOX, [.1, .1, .1], [.01 * k, .05, .2], Rotation.from_euler(
-        'z', .3)), Body(BOX, [.5, .5, .1]))[:, 7])) for k in range(30)}
+        'z', .3)), Body(BOX, [.5, .5, .1]))['feature_id'])) for k in range(30)}
     assert len(names) == 1
 
 

@@ -15,8 +15,6 @@ Then these axes are the start of two searches, both with GJK on disjoint shapes 
 """
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ..compiling.decorators import compiled
