@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 pytest.importorskip('numba')
 import numba
 
-from ragdoll_ros.physics.kernels.collision.manifold import CONTACT_POINT, MAX_MANIFOLD_POINTS
 from ragdoll_ros.physics.kernels.collision.narrow_phase import collide, separation
 from ragdoll_ros.physics.kernels.collision.shapes import (
     BOX,
@@ -22,6 +21,7 @@ from ragdoll_ros.physics.kernels.collision.shapes import (
     SPHERE,
     Shape,
 )
+from ragdoll_ros.physics.kernels.system import CONTACT_POINT, MAX_MANIFOLD_POINTS
 
 KINDS = (SPHERE, CAPSULE, BOX, CYLINDER)
 PAIRS = list(itertools.combinations_with_replacement(KINDS, 2))

@@ -8,7 +8,6 @@ import collections
 import numba
 import numpy as np
 
-from .collision.manifold import CONTACT_POINT, MAX_MANIFOLD_POINTS
 from .compiling.bundle import bundle_type
 from .dynamics.forward import Work
 from .record import RECORD
@@ -44,6 +43,13 @@ acts, and ``arm``, where friction does, are in the world, m; ``normal`` is from 
 two directions along the surface. ``key`` tells it from all others at all times, ``group`` those of
 one patch. ``before``: its normal velocity, m/s. ``begun``: whether it was there when the step
 began, with the velocities ``start`` along its rows."""
+
+MAX_MANIFOLD_POINTS = 8
+
+CONTACT_POINT = np.dtype([('point', float, 3), ('normal', float, 3), ('gap', float),
+                          ('feature_id', np.int64)], align=True)
+"""A point midway between the surfaces, m, and the unit normal from b to a, both world; the ``gap``
+along it, m, negative if the shapes overlap; an id that points of the same features keep."""
 
 System = collections.namedtuple(
     'System', 'tree gravity up last bone_of root_of doll_of damping geoms pairs bounds normal '

@@ -10,13 +10,7 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..maths.vectors import dot, put, sub, vec
-
-MAX_MANIFOLD_POINTS = 8
-
-CONTACT_POINT = np.dtype([('point', float, 3), ('normal', float, 3), ('gap', float),
-                          ('feature_id', np.int64)], align=True)
-"""A point midway between the surfaces, m, and the unit normal from b to a, both world; the ``gap``
-along it, m, negative if the shapes overlap; an id that points of the same features keep."""
+from ..system import MAX_MANIFOLD_POINTS
 
 CLIP_VERTEX = np.dtype([('point', float, 3), ('gap', float), ('feature_id', np.int64)], align=True)
 """A vertex of a polygon that is clipped, then a candidate for a point of a manifold."""
