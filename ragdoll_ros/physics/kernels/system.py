@@ -29,6 +29,13 @@ JOINT_LIMIT = np.dtype([('q', np.int64), ('dof', np.int64), ('lower', float), ('
                        align=True)
 """A limited joint coordinate: its index in q, its degree of freedom, and its limits, rad."""
 
+MAX_MANIFOLD_POINTS = 8
+
+CONTACT_POINT = np.dtype([('point', float, 3), ('normal', float, 3), ('gap', float),
+                          ('feature_id', np.int64)], align=True)
+"""A point midway between the surfaces, m, and the unit normal from b to a, both world; the ``gap``
+along it, m, negative if the shapes overlap; an id that points of the same features keep."""
+
 System = collections.namedtuple(
     'System', 'tree gravity dof_parent dof_body dof_damping body_last_dof body_root body_doll '
     'geoms pairs joint_limits ground_normal ground_offset restitution_speed doll_masses '

@@ -9,7 +9,15 @@ from .cluster_state import CONTACT, DOLL_SUMS, ClusterState, make_cluster_state
 from .compiling.bundle import bundle_type
 from .dynamics.forward_dynamics import make_dynamics
 from .dynamics.kinematics import make_kinematics
-from .system import MAX_DENSE_ROWS, System, blank_system, coordinate_count, tree_depth
+from .system import (
+    CONTACT_POINT,
+    MAX_DENSE_ROWS,
+    MAX_MANIFOLD_POINTS,
+    System,
+    blank_system,
+    coordinate_count,
+    tree_depth,
+)
 
 MOTION = np.dtype([('speed', float), ('angular_speed', float), ('correction', float),
                    ('correction_angle', float)], align=True)
@@ -114,7 +122,7 @@ def make_workspace(system: System, cluster: ClusterState) -> Workspace:
     found = Contacts(
         found=np.zeros(contacts, CONTACT), start=np.zeros(contacts, CONTACT),
         gaps_end=np.zeros(gaps), gaps_active=np.zeros(gaps),
-        manifold=np.zeros((16, 8)), motion=np.zeros(bodies, MOTION),
+        manifold=np.zeros(MAX_MANIFOLD_POINTS, CONTACT_POINT), motion=np.zeros(bodies, MOTION),
         joint_outside=np.zeros(bodies, np.int64), angles=np.zeros(max(contacts, 8)),
         u=np.zeros(max(contacts, 8)), v=np.zeros(max(contacts, 8)))
     return Workspace(

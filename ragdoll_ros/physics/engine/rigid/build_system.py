@@ -10,6 +10,7 @@ from ....model import rotation
 from ....model.coordinates import DofLayout
 from ....model.ragdoll import Joint, Ragdoll, joint_axes
 from ....model.scene import Scene
+from ...kernels.collision.shapes import SHAPE_KIND
 from ...kernels.dynamics.body import BODY
 from ...kernels.system import (
     GEOM,
@@ -20,9 +21,6 @@ from ...kernels.system import (
     coordinate_count,
 )
 from ...rigid_body import damping_rate
-
-KINDS = {'sphere': 0, 'capsule': 1, 'box': 2, 'cylinder': 3}
-"""Numbers of the kinds of shapes, as in kernels/collision/shapes.py."""
 
 MAX_FLIGHT_DAMPING = 1000.0
 """1/s: largest decay rate of joint damping that is integrated explicitly, in flight; above, contact
@@ -184,7 +182,7 @@ def _geoms(scene: Scene, tree: np.ndarray) -> np.ndarray:
     geoms, first = np.zeros(len(parts), GEOM), 0
     for geom, (index, bone, part) in zip(geoms, parts, strict=True):
         shape, count = part.shape, GROUND_POINTS[part.shape.kind]
-        geom['body'], geom['kind'] = record[index], KINDS[shape.kind]
+        geom['body'], geom['kind'] = record[index], SHAPE_KIND[shape.kind]
         geom['size'] = _size(shape)
         geom['position'] = rotation.rotate(bone.orientation, np.array(part.position))
         geom['orientation'] = rotation.multiply(bone.orientation, np.array(part.orientation))

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from ..collision.pair import collide
+from ..collision.narrow_phase import collide
 from ..collision.shapes import CYLINDER
 from ..compiling.decorators import compiled
 from ..contact_kind import FRICTIONAL, LIMIT, ROLLING
@@ -13,7 +13,7 @@ from ..dynamics.kinematics import Kinematics
 from ..maths.vectors import add_scaled, column, cross, divide, dot, norm, put, sub, vec
 from ..system import System
 from ..workspace import Contacts, Workspace
-from .gaps import TOUCHING, ground_point
+from .gaps import TOUCHING, ground_point, placed_shape
 from .patch import contract_friction_points
 
 IDS_PER_PAIR = 4096
@@ -82,19 +82,18 @@ def add_pair_contacts(s: System, contacts: Contacts, kin: Kinematics, k: int, m:
     """Add the points of the patch of pair k to m contacts; returns their number then."""
     pair = s.pairs[k]
     a, b = s.geoms[pair.a], s.geoms[pair.b]
-    found = collide(a.kind, a.size, kin.geom_positions[pair.a], kin.geom_rotations[pair.a], b.kind,
-                    b.size, kin.geom_positions[pair.b], kin.geom_rotations[pair.b], margin,
+    found = collide(placed_shape(s, kin, pair.a), placed_shape(s, kin, pair.b), margin,
                     contacts.manifold)
     for j in range(found):
         if m >= len(contacts.found):
             break
-        c, row = contacts.found[m], contacts.manifold[j]
+        c, at = contacts.found[m], contacts.manifold[j]
         c.kind = ROLLING if pair.rolling_friction > 0 else FRICTIONAL
-        c.body_a, c.body_b, c.id = a.body, b.body, first_id + int(row[7])
+        c.body_a, c.body_b, c.id = a.body, b.body, first_id + at.feature_id
         c.patch = len(s.geoms) + k
-        for e in range(3):
-            c.point[e], c.normal[e] = row[e], row[3 + e]
-        c.gap, c.friction, c.rolling_friction = row[6], pair.friction, pair.rolling_friction
+        put(c.point, vec(at.point))
+        put(c.normal, vec(at.normal))
+        c.gap, c.friction, c.rolling_friction = at.gap, pair.friction, pair.rolling_friction
         c.restitution = pair.restitution
         m += 1
     return m

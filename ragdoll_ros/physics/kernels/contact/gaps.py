@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from ..collision.pair import separation
-from ..collision.shapes import BOX, CAPSULE, SPHERE, extent
+from ..collision.narrow_phase import separation
+from ..collision.shapes import BOX, CAPSULE, SPHERE, Shape, extent, shape_at
 from ..compiling.decorators import compiled
 from ..dynamics.kinematics import Kinematics, body_velocity, forward_kinematics, place_geoms
 from ..maths.vectors import Vec3, divide, dot, norm, sub, to_local, vec
@@ -207,12 +207,9 @@ def limit_violated_between(s: System, contacts: Contacts, i: int, j: int) -> boo
 
 
 @compiled
-def support_extent(kind: int, size: np.ndarray, r: np.ndarray, direction: Vec3) -> float:
-    """Distance, m, from a geom's center to its support point along a unit vector."""
-    if kind == SPHERE:
-        return size[0]
-    reach = extent(kind, size, r, direction[0], direction[1], direction[2])
-    return reach + size[0] if kind == CAPSULE else reach
+def placed_shape(s: System, kin: Kinematics, k: int) -> Shape:
+    """Geom k where ``kin`` has placed it."""
+    return shape_at(s.geoms[k], kin.geom_positions[k], kin.geom_rotations[k])
 
 
 @compiled
@@ -221,20 +218,18 @@ def pair_gap(s: System, k: int, kin: Kinematics) -> float:
     bounding spheres or their extents along the line of their centers.
     """
     i, j = s.pairs[k].a, s.pairs[k].b
-    a, b, ra, rb = s.geoms[i], s.geoms[j], kin.geom_rotations[i], kin.geom_rotations[j]
     way = sub(vec(kin.geom_positions[i]), vec(kin.geom_positions[j]))
     length = norm(way)
-    far = length - (a.bounding_radius + b.bounding_radius)
+    far = length - (s.geoms[i].bounding_radius + s.geoms[j].bounding_radius)
     if far > NEAR:
         return far
+    a, b = placed_shape(s, kin, i), placed_shape(s, kin, j)
     if length > NEAR:
         way = divide(way, length)
-        far = length - support_extent(a.kind, a.size, ra, way) - support_extent(
-            b.kind, b.size, rb, way)
+        far = length - extent(a, way) - extent(b, way)
         if far > NEAR:
             return far
-    return separation(a.kind, a.size, kin.geom_positions[i], ra, b.kind, b.size,
-                      kin.geom_positions[j], rb, NEAR)
+    return separation(a, b, NEAR)
 
 
 @compiled

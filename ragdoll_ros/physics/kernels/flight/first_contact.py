@@ -6,9 +6,16 @@ import math
 import numpy as np
 
 from ..cluster_state import ClusterState
-from ..collision.pair import collide
+from ..collision.narrow_phase import collide
 from ..compiling.decorators import compiled
-from ..contact.gaps import FAR, NEAR, TOUCHING, ground_point, update_kinematics_and_gaps
+from ..contact.gaps import (
+    FAR,
+    NEAR,
+    TOUCHING,
+    ground_point,
+    placed_shape,
+    update_kinematics_and_gaps,
+)
 from ..contact.jacobian import root_of
 from ..dynamics.kinematics import Kinematics, body_velocity, velocity_at
 from ..maths.vectors import Vec3, dot, norm, sub, vec
@@ -99,15 +106,14 @@ def pair_closing_speed(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray,
     pair, manifold = s.pairs[k], ws.contacts.manifold
     a, b = s.geoms[pair.a], s.geoms[pair.b]
     if gap < NEAR:
-        found = collide(a.kind, a.size, kin.geom_positions[pair.a], kin.geom_rotations[pair.a],
-                        b.kind, b.size, kin.geom_positions[pair.b], kin.geom_rotations[pair.b],
+        found = collide(placed_shape(s, kin, pair.a), placed_shape(s, kin, pair.b),
                         max(gap, 0.0) + 1e-4, manifold)
         if found:
             best = 0
             for j in range(1, found):
-                if manifold[j, 6] < manifold[best, 6]:
+                if manifold[j].gap < manifold[best].gap:
                     best = j
-            point, normal = vec(manifold[best]), vec(manifold[best, 3:6])
+            point, normal = vec(manifold[best].point), vec(manifold[best].normal)
             return (normal_velocity(s, kin, q, b.body, point, normal)
                     - normal_velocity(s, kin, q, a.body, point, normal))
     one, turn_a = body_velocity(kin, a.body)
