@@ -9,7 +9,7 @@ from ..model.errors import ModelError, ModelErrors
 from . import config, yaml_text
 
 
-def read_named(name: str) -> tuple[object, Path]:
+def read_by_name(name: str) -> tuple[object, Path]:
     """What the YAML file of a path or a shipped name holds, and its path; or ModelErrors."""
     try:
         path = config.find(name)
@@ -18,7 +18,7 @@ def read_named(name: str) -> tuple[object, Path]:
         raise ModelErrors(str(name), [error]) from None
 
 
-def attempt(found: list[ModelError], where: str, make: type, *args: object,
+def try_build(found: list[ModelError], where: str, make: type, *args: object,
             **kwargs: object) -> object:
     """Make a part; where that fails, note the error and give None."""
     try:
@@ -28,7 +28,7 @@ def attempt(found: list[ModelError], where: str, make: type, *args: object,
         return None
 
 
-def any_under(found: list[ModelError], where: str) -> bool:
+def has_error_under(found: list[ModelError], where: str) -> bool:
     """Whether an error is at a place or below it."""
     return any(re.match(re.escape(where) + r'($|[.\[])', error.path) for error in found)
 
@@ -44,12 +44,12 @@ def build_each(data: dict, key: str, make: Callable, found: list[ModelError]) ->
     made = []
     for index, entry in enumerate(entries(data, key)):
         where = f'{key}[{index}]'
-        if not any_under(found, where):
-            made.append(attempt(found, where, make, entry))
+        if not has_error_under(found, where):
+            made.append(try_build(found, where, make, entry))
     return made
 
 
-def raise_or_give(path: Path, made: object, found: list[ModelError]) -> object:
+def value_or_raise(path: Path, made: object, found: list[ModelError]) -> object:
     """What was made; ModelErrors with all of them if there are any."""
     if found:
         raise ModelErrors(str(path), found)

@@ -47,13 +47,13 @@ float64 w
 _HEAD = b'\0\1\0\0'
 
 
-def string_bytes(text: str) -> bytes:
+def encode_string(text: str) -> bytes:
     """A String."""
     content = text.encode() + b'\0'
     return _HEAD + struct.pack('<I', len(content)) + content
 
 
-def text_of(data: bytes) -> str:
+def decode_string(data: bytes) -> str:
     """What a String holds; Unreadable where that is none."""
     try:
         length, = struct.unpack_from(_order(data) + 'I', data, 4)
@@ -62,7 +62,7 @@ def text_of(data: bytes) -> str:
         raise errors.Unreadable('', data[:40], f'{STRING} in CDR') from None
 
 
-def poses_bytes(stamp: int, frame: str, poses: np.ndarray) -> bytes:
+def encode_poses(stamp: int, frame: str, poses: np.ndarray) -> bytes:
     """A PoseArray of poses (n, 7), position m and orientation x, y, z, w; ``stamp`` in ns."""
     name = frame.encode() + b'\0'
     head = struct.pack('<iII', *divmod(stamp, SECOND), len(name)) + name
@@ -70,7 +70,7 @@ def poses_bytes(stamp: int, frame: str, poses: np.ndarray) -> bytes:
     return _HEAD + head + bytes(-len(head) % 8) + np.ascontiguousarray(poses, '<f8').tobytes()
 
 
-def poses_of(data: bytes) -> tuple[int, np.ndarray]:
+def decode_poses(data: bytes) -> tuple[int, np.ndarray]:
     """Stamp, ns, and poses (n, 7) of a PoseArray; Unreadable where that is none."""
     try:
         order = _order(data)

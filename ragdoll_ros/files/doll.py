@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from ..model.compound import Compound
@@ -16,17 +16,17 @@ from ..model.ragdoll import (
     Joint,
     Ragdoll,
     SkeletonFrame,
-    angle_errors,
-    carried_errors,
-    pair_errors,
+    angle_name_errors,
+    attachment_errors,
+    no_collision_errors,
     tree_errors,
 )
 from ..model.rotation import IDENTITY
 from ..model.shapes import SHAPES, Part, Shape
+from ..model.swing import Link, Swing, strand
 from . import yaml_text
-from .building import build_each, entries, raise_or_give, read_named
+from .building import build_each, entries, read_by_name, value_or_raise
 from .schema import schema_errors
-from .swing import swing_data, swing_from
 
 LARGEST_MASS_RATIO = 1e8
 """Heaviest to lightest bone of a file: real robots have up to 6.1e7, and at 2e8 a tick takes a
@@ -35,8 +35,8 @@ second, as an impact's equations have 16 digits."""
 
 def load_doll(name: str) -> Ragdoll:
     """Read a doll's file; ModelErrors with all that is wrong in it."""
-    data, path = read_named(name)
-    return raise_or_give(path, *build_doll(data, path))
+    data, path = read_by_name(name)
+    return value_or_raise(path, *build_doll(data, path))
 
 
 def save_doll(doll: Ragdoll, path: str | Path, head: str = '') -> None:
@@ -52,7 +52,7 @@ def build_doll(data: object, path: Path = Path('doll')) -> tuple[Ragdoll | None,
         return None, found
     bones = build_each(data, 'bones', _bone, found)
     joints = build_each(data, 'joints', _joint, found)
-    swings = build_each(data, 'swings', swing_from, found)
+    swings = build_each(data, 'swings', _swing, found)
     riders = build_each(data, 'riders', lambda entry: SkeletonFrame(**entry), found)
     names = [entry.get('name') for entry in entries(data, 'bones')]
     edges = [(entry.get('parent'), entry.get('child')) for entry in entries(data, 'joints')]
@@ -61,10 +61,10 @@ def build_doll(data: object, path: Path = Path('doll')) -> tuple[Ragdoll | None,
         for key in ('swings', 'riders'):
             carried = [(entry.get('name'), entry.get('bone')) for entry in entries(data, key)]
             if all(isinstance(text, str) for text in sum(carried, ())):
-                found += carried_errors(key, names, carried)
+                found += attachment_errors(key, names, carried)
         if not found:
-            found += pair_errors(names, data.get('no_collision', ()))
-            found += angle_errors(joints) + mass_errors(bones)
+            found += no_collision_errors(names, data.get('no_collision', ()))
+            found += angle_name_errors(joints) + mass_errors(bones)
     if found:
         return None, found
     model = str(path.parent / data['model']) if 'model' in data else None
@@ -82,7 +82,7 @@ def doll_data(doll: Ragdoll, folder: Path | None = None) -> dict:
     if doll.no_collision:
         data['no_collision'] = [list(pair) for pair in doll.no_collision]
     if doll.swings:
-        data['swings'] = [swing_data(swing) for swing in doll.swings]
+        data['swings'] = [_swing_data(swing) for swing in doll.swings]
     if doll.riders:
         data['riders'] = [_rider_data(rider) for rider in doll.riders]
     if doll.model is not None:
@@ -196,3 +196,38 @@ def _joint_data(joint: Joint) -> dict:
     if joint.names:
         data['names'] = list(joint.names)
     return data
+
+
+def _swing(data: dict) -> Swing:
+    """Make a swing of what a file holds; a ModelError tells where in it."""
+    fields = dict(data)
+    if 'strand' in fields:
+        links = _at('strand', strand, fields.pop('strand'))
+    else:
+        links = tuple(_at(f'links[{index}]', Link, entry)
+                      for index, entry in enumerate(fields.pop('links')))
+    return Swing(links=links, **fields)
+
+
+def _swing_data(swing: Swing) -> dict:
+    """A swing as a file holds it; _swing gives an equal one back."""
+    data = {'name': swing.name, 'bone': swing.bone, 'root': list(swing.root),
+            'direction': list(swing.direction), 'gravity': swing.gravity, 'mode': swing.mode}
+    if any(swing.velocity):
+        data['velocity'] = list(swing.velocity)
+    data['links'] = [_link_data(link) for link in swing.links]
+    return data
+
+
+def _link_data(link: Link) -> dict:
+    data = {key: getattr(link, key) for key in ('length', 'mass', 'stiffness', 'damping')}
+    if link.direction is not None:
+        data['direction'] = list(link.direction)
+    return data
+
+
+def _at(where: str, make: Callable[..., object], fields: dict) -> object:
+    try:
+        return make(**fields)
+    except ModelError as error:
+        raise error.at(where) from None

@@ -21,7 +21,7 @@ import numpy as np
 from ..model import rotation
 from ..model.pose import Pose
 from ..model.ragdoll import Bone, Joint, joint_axes
-from ..model.scene import Placement, Scene, grip
+from ..model.scene import Placement, Scene, finite_friction
 from ..model.shapes import Part, Shape
 
 CONTACT_TIME = 0.02
@@ -45,7 +45,7 @@ def to_mjcf(scene: Scene, apart: Collection[frozenset[str]] = ()) -> str:
     for placement in scene.dolls:
         _add_doll(world, scene, placement)
     contact = ET.SubElement(root, 'contact')
-    for index, (a, b) in enumerate(sorted(map(sorted, {*_never_collide(scene), *apart}))):
+    for index, (a, b) in enumerate(sorted(map(sorted, {*_excluded_pairs(scene), *apart}))):
         ET.SubElement(contact, 'exclude', name=f'apart_{index}', body1=a, body2=b)
     ET.indent(root)
     return ET.tostring(root, encoding='unicode') + '\n'
@@ -68,9 +68,9 @@ def damping_ratio(restitution: float) -> float:
     return max(0.01, high)
 
 
-def _never_collide(scene: Scene) -> set[frozenset[str]]:
+def _excluded_pairs(scene: Scene) -> set[frozenset[str]]:
     return {frozenset(scene.qualified(placement, name) for name in pair)
-            for placement in scene.dolls for pair in placement.doll.never_collide}
+            for placement in scene.dolls for pair in placement.doll.excluded_pairs}
 
 
 def _add_ground(world: ET.Element, scene: Scene) -> None:
@@ -125,7 +125,7 @@ def _placed(part: Part) -> dict[str, str]:
 def _joints(joint: Joint, child: Bone) -> Iterable[dict[str, str]]:
     """Attributes of one element for each axis, in the child's frame; none for a fixed joint."""
     back = rotation.inverse(child.orientation)
-    place = {'pos': _text(child.pose.inward(joint.anchor)), 'damping': repr(joint.damping)}
+    place = {'pos': _text(child.pose.apply_inverse(joint.anchor)), 'damping': repr(joint.damping)}
     if joint.is_free_ball:
         yield {'name': joint.child, 'type': 'ball', **place}
         return
@@ -146,7 +146,7 @@ def _size(shape: Shape) -> tuple[float, ...]:
 def _material(scene: Scene, bone: Bone | None) -> dict[str, str]:
     """Friction and restitution of a bone, or of the ground."""
     friction, rolling, restitution = scene.material.on(bone)
-    friction = math.sqrt(grip(friction) * grip(scene.material.friction))
+    friction = math.sqrt(finite_friction(friction) * finite_friction(scene.material.friction))
     if bone is None:
         friction = rolling = 0.0
     restitution = math.sqrt(restitution * scene.material.restitution)

@@ -10,7 +10,7 @@ from ..model import rotation
 from ..model.scene import Placement
 
 
-def repeated(first: Placement, repeat: dict) -> list[Placement]:
+def repeated_placements(first: Placement, repeat: dict) -> list[Placement]:
     """Copies of a placement, named ``name_1`` on; see scene.schema.json for ``repeat``.
 
     The grid grows from the first's place along x, then y, then z; each copy is then moved by up to

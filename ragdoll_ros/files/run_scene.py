@@ -10,7 +10,7 @@ from pathlib import Path
 from ..model.errors import ModelErrors, Unreadable
 from ..model.scene import Scene
 from . import yaml_text
-from .scene import scene_from, scene_text
+from .scene import scene_from_data, scene_text
 
 LIBRARIES = ('ragdoll_ros', 'numpy', 'numba', 'pybullet', 'mujoco')
 """What decides on the last bits of a run, beside the processor."""
@@ -39,7 +39,7 @@ def read_run_scene(text: str) -> tuple[Scene, str]:
     found = _VERSIONS.search(text)
     if not found:
         raise ModelErrors('~/scene', [Unreadable('', text[:60], 'a line "# versions: ..."')])
-    return scene_from(yaml_text.parse(text.encode()), Path('/scene')), found[1]
+    return scene_from_data(yaml_text.parse(text.encode()), Path('/scene')), found[1]
 
 
 def scene_digest(text: str) -> str:

@@ -12,9 +12,9 @@ from ..model.errors import ModelError, OutOfRange
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Ground, Material, Placement, Scene, above_ground
 from . import config, yaml_text
-from .building import any_under, attempt, raise_or_give, read_named
+from .building import has_error_under, read_by_name, try_build, value_or_raise
 from .doll import build_doll, doll_data
-from .repeat import repeated
+from .repeat import repeated_placements
 from .schema import schema_errors
 
 MOST_DOLLS = 1000
@@ -22,14 +22,14 @@ MOST_DOLLS = 1000
 
 def load_scene(name: str) -> Scene:
     """Read a scene, or a doll (then above level ground); ModelErrors with all that is wrong."""
-    return scene_from(*read_named(name))
+    return scene_from_data(*read_by_name(name))
 
 
-def scene_from(data: object, path: Path) -> Scene:
+def scene_from_data(data: object, path: Path) -> Scene:
     """Make a scene from what a YAML file at ``path`` holds, a scene or a doll; see load_scene."""
     if isinstance(data, dict) and 'bones' in data:
-        return above_ground(raise_or_give(path, *build_doll(data, path)))
-    return raise_or_give(path, *build_scene(data, path))
+        return above_ground(value_or_raise(path, *build_doll(data, path)))
+    return value_or_raise(path, *build_scene(data, path))
 
 
 def save_scene(scene: Scene, path: str | Path, head: str = '') -> None:
@@ -59,25 +59,25 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
         else:
             doll, more = named(source) if isinstance(source, str) else (None, [])
         found += [error.at(f'{where}.doll') for error in more]
-        if doll is not None and not any_under(found, where):
+        if doll is not None and not has_error_under(found, where):
             doll, more = _with_swings(doll, entry, path)
             found += [error.at(where) for error in more]
-        if doll is not None and not any_under(found, where):
+        if doll is not None and not has_error_under(found, where):
             fields = {'position', 'orientation', 'velocity', 'spin', 'name'} & set(entry)
-            first = attempt(found, where, Placement, doll, **{key: entry[key] for key in fields})
-            placements += repeated(first, entry['repeat']) if first and 'repeat' in entry else [
+            first = try_build(found, where, Placement, doll, **{key: entry[key] for key in fields})
+            placements += repeated_placements(first, entry['repeat']) if first and 'repeat' in entry else [
                 first]
     if len(placements) > MOST_DOLLS:
         found.append(OutOfRange('dolls', len(placements), f'at most {MOST_DOLLS} in all'))
     parts = {}
     for key, part in (('ground', Ground), ('material', Material)):
-        if isinstance(data.get(key), dict) and not any_under(found, key):
-            parts[key] = attempt(found, key, part, **data[key])
+        if isinstance(data.get(key), dict) and not has_error_under(found, key):
+            parts[key] = try_build(found, key, part, **data[key])
     if found:
         return None, found
     plain = {key: data[key] for key in ('gravity', 'step', 'pace', 'self_collision')
              if key in data}
-    scene = attempt(found, '', Scene, data.get('name', path.stem), tuple(placements),
+    scene = try_build(found, '', Scene, data.get('name', path.stem), tuple(placements),
                      **parts, **plain)
     return scene, found
 

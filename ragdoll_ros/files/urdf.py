@@ -130,7 +130,7 @@ def _geometries(bone: Bone, pose: Pose, dialect: str) -> Iterator[tuple[Pose, st
         if part.kind == 'capsule' and dialect == 'ros':
             # URDF has none: a cylinder between two balls.
             for piece in part.shape.primitives:
-                yield Pose(place.outward(piece.position), place.orientation), _geometry(piece.shape)
+                yield Pose(place.apply(piece.position), place.orientation), _geometry(piece.shape)
         else:
             yield place, _geometry(part.shape)
 

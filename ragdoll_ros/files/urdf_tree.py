@@ -5,6 +5,7 @@ part of the motion (transmissions, sensors, colours) is not read.
 """
 from __future__ import annotations
 
+import codecs
 import math
 from dataclasses import dataclass, field
 from xml.etree import ElementTree
@@ -117,6 +118,27 @@ def parse_urdf(text: str) -> UrdfTree:
         raise type(error)(path, error.value, error.expected.replace('bone', 'link'))
     return UrdfTree(root.get('name') or 'robot', {link.name: link for link in links},
                     {joint.child: joint for joint in joints})
+
+
+def decode_urdf(data: bytes) -> str:
+    """XML without its declaration, each line where it is in the file."""
+    text = _decoded(data).rstrip('\0 \t\r\n')
+    head, found, rest = text.partition('<?xml')
+    # Before a declaration nothing may stand, and what it says of the encoding is done with.
+    if found and '<robot' not in head:
+        declaration, _, text = rest.partition('?>')
+        text = '\n' * (head + declaration).count('\n') + text
+    return text
+
+
+def _decoded(data: bytes) -> str:
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode('utf-16', errors='replace')
+    try:
+        return data.decode('utf-8-sig')
+    except UnicodeDecodeError:
+        # Every byte is a letter of Latin-1; only names and comments can come out wrong.
+        return data.decode('latin-1')
 
 
 def _link(element: ElementTree.Element) -> UrdfLink:

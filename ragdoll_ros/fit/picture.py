@@ -61,7 +61,7 @@ def draw(doll: Ragdoll, character: Character | None, path: str | Path) -> None:
 
 def _triangles(bone: Bone) -> np.ndarray:
     corners, triangles = bone.shape.mesh()
-    return bone.pose.outward(corners)[triangles]
+    return bone.pose.apply(corners)[triangles]
 
 
 def _draw_solids(axes: object, solids: list[tuple[np.ndarray, np.ndarray]], alpha: float) -> None:

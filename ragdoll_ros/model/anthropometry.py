@@ -71,7 +71,7 @@ WOMEN = Sample(1.735, {
 SAMPLES = {'female': WOMEN, 'male': MEN}
 
 TRUNK = ('chest', 'abdomen', 'pelvis')
-MIDDLE = ('head', *TRUNK)
+UNPAIRED = ('head', *TRUNK)
 """Segments that the body has one of; of the others it has two."""
 
 PERCENTILES = {
@@ -79,13 +79,13 @@ PERCENTILES = {
     'male': {5: (1.648, 64.4), 50: (1.755, 84.6), 95: (1.870, 110.7)}}
 """Height, m, and mass, kg, at percentiles of ANSUR II."""
 
-ANKLE = 0.039
+ANKLE_HEIGHT = 0.039
 """Height of the ankle's joint above the sole, share of the standing height: Drillis and Contini
 1966 (Body Segment Parameters, New York University, Report 1163.03)."""
 
 
 @dataclass(frozen=True)
-class Girth:
+class BodyDimensions:
     """Lengths across a body, mm: means of ANSUR II, of people of HEIGHT and MASS in the mean."""
 
     head: float = 570.04
@@ -114,11 +114,11 @@ class Girth:
     """The hand's circumference."""
 
 
-GIRTH, HEIGHT, MASS = Girth(), 1.71441, 79.709
+BODY, HEIGHT, MASS = BodyDimensions(), 1.71441, 79.709
 
 
-def shares(sex: str) -> dict[str, float]:
+def mass_fractions(sex: str) -> dict[str, float]:
     """Share of the mass of each segment, of limbs one side's; all segments together make 1."""
     table = SAMPLES[sex].segments
-    whole = sum(part.mass * (1 if name in MIDDLE else 2) for name, part in table.items())
+    whole = sum(part.mass * (1 if name in UNPAIRED else 2) for name, part in table.items())
     return {name: part.mass / whole for name, part in table.items()}

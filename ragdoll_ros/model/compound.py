@@ -45,15 +45,15 @@ class Compound:
     @property
     def centroid(self) -> np.ndarray:
         """Centre of mass (3,) m of the uniform solid."""
-        return self._shares() @ np.array([part.position for part in self.parts])
+        return self._mass_fractions() @ np.array([part.position for part in self.parts])
 
     @property
     def half_extents(self) -> Vector:
         """Half edges, m, of the smallest box about the origin that holds it."""
-        return floats(np.maximum(self.reach(np.eye(3)), self.reach(-np.eye(3))))
+        return floats(np.maximum(self.support(np.eye(3)), self.support(-np.eye(3))))
 
     @property
-    def support(self) -> tuple[float, ...]:
+    def support_terms(self) -> tuple[float, ...]:
         """That of the box of its half extents: it reaches no farther."""
         return (*self.half_extents, 0.0, 0.0, 0.0)
 
@@ -63,17 +63,17 @@ class Compound:
         return tuple(Part(piece.shape, *part.pose.compose(piece.pose))
                      for part in self.parts for piece in part.shape.primitives)
 
-    def reach(self, direction: np.ndarray) -> np.ndarray:
+    def support(self, direction: np.ndarray) -> np.ndarray:
         """How far (...,) m it extends along unit directions (..., 3): as its farthest part."""
         direction = np.asarray(direction, float)
-        return np.max([direction @ np.array(part.position) + part.shape.reach(
+        return np.max([direction @ np.array(part.position) + part.shape.support(
             rotation.rotate(rotation.inverse(part.orientation), direction))
             for part in self.parts], axis=0)
 
     def inertia_matrix(self, mass: float) -> np.ndarray:
         """Inertia (3, 3) kg m^2 about the origin: parts of one density, by Steiner's theorem."""
         total = np.zeros((3, 3))
-        for part, share in zip(self.parts, mass * self._shares(), strict=True):
+        for part, share in zip(self.parts, mass * self._mass_fractions(), strict=True):
             axes, at = rotation.matrix(part.orientation), np.array(part.position)
             total += axes * part.shape.inertia(share) @ axes.T
             total += share * (at @ at * np.eye(3) - np.outer(at, at))
@@ -85,12 +85,12 @@ class Compound:
 
     def signed_distance(self, points: np.ndarray) -> np.ndarray:
         """(p,) m of points (p, 3) from its surface; inside, no less deep than in some part."""
-        return np.min([part.shape.signed_distance(part.pose.inward(points))
+        return np.min([part.shape.signed_distance(part.pose.apply_inverse(points))
                        for part in self.parts], axis=0)
 
     def mesh(self) -> tuple[np.ndarray, np.ndarray]:
         """Corners (p, 3) m and triangles (t, 3) of all parts."""
-        meshes = [(part.pose.outward(corners), triangles) for part in self.parts
+        meshes = [(part.pose.apply(corners), triangles) for part in self.parts
                   for corners, triangles in [part.shape.mesh()]]
         starts = itertools.accumulate((len(corners) for corners, _ in meshes), initial=0)
         return (np.concatenate([corners for corners, _ in meshes]),
@@ -99,10 +99,10 @@ class Compound:
 
     def principal_pose(self) -> Pose:
         """Its centre of mass and its principal axes, those nearest to the axes it is given in."""
-        return Pose(self.centroid, principal_axes(self.seen_from(Pose(self.centroid))
+        return Pose(self.centroid, principal_axes(self.in_frame(Pose(self.centroid))
                                                   .inertia_matrix(1.0)))
 
-    def seen_from(self, pose: Pose) -> Compound:
+    def in_frame(self, pose: Pose) -> Compound:
         """The same solid in the axes of a frame that stands at ``pose``."""
         return Compound(tuple(Part(part.shape, *pose.relative(part.pose)) for part in self.parts))
 
@@ -121,7 +121,7 @@ class Compound:
                 'no products of inertia xy, xz, yz for 1 kg, or an inertia given: the principal '
                 f'axes are turned by {list(turn)}'))
 
-    def _shares(self) -> np.ndarray:
+    def _mass_fractions(self) -> np.ndarray:
         """Share (p,) of each part in the mass."""
         volumes = np.array([part.shape.volume for part in self.parts])
         return volumes / volumes.sum()

@@ -42,8 +42,8 @@ class DofLayout:
         self._free_angles: list[tuple[slice, slice, slice]] = []
         """Where among the joint angles, in q and in v each free ball joint stands."""
         v = 0
-        self.own_q: list[slice] = []
-        self.own_v: list[slice] = []
+        self.doll_q: list[slice] = []
+        self.doll_v: list[slice] = []
         """What of q and of v is each doll's."""
         for doll in dolls:
             q, first_v, at = len(bounds), v, {}
@@ -69,35 +69,35 @@ class DofLayout:
                                               slice(begin, begin + 4), slice(first, first + 3)))
                 angles += range(begin, begin + joint.dof)
                 rates += range(first, first + joint.dof)
-            self.own_q.append(slice(q, len(bounds)))
-            self.own_v.append(slice(first_v, v))
+            self.doll_q.append(slice(q, len(bounds)))
+            self.doll_v.append(slice(first_v, v))
         self.sizes = (len(bounds), v)
         """Numbers in q and in v."""
         self._angles, self._rates = np.array(angles, int), np.array(rates, int)
         """(k,) where in q each joint angle stands, and in v its rate, in the order of
         Scene.angle_names."""
-        self._plain = (np.array(plain_q), np.array(plain_v))
-        self._turning = self._indices(roots + balls)
-        self.root_orientations, self.root_spins = self._indices(roots)
+        self._scalars = (np.array(plain_q), np.array(plain_v))
+        self._quaternions = self._indices(roots + balls)
+        self.root_orientations, self.root_angular_velocities = self._indices(roots)
         self.root_positions = self.root_orientations[:, :1] - 3 + np.arange(3)
         """(d, 4) and (d, 3): where in q each root's orientation and position stand."""
-        self.root_velocities = self.root_spins[:, :1] - 3 + np.arange(3)
+        self.root_velocities = self.root_angular_velocities[:, :1] - 3 + np.arange(3)
         """(d, 3) each: where in v each root's linear and angular velocity stand."""
         low, high = np.array(bounds)[plain_q].T
         some = np.isfinite(low) | np.isfinite(high)
-        self.limited = (self._plain[0][some], self._plain[1][some])
+        self.limited = (self._scalars[0][some], self._scalars[1][some])
         """Where the limited angles stand in q and their rates in v."""
         self.limits = (low[some], high[some])
 
     def normalized(self, q: np.ndarray) -> np.ndarray:
         """The same coordinates with every quaternion of length one."""
-        q, at = q.copy(), self._turning[0]
+        q, at = q.copy(), self._quaternions[0]
         q[at] = rotation.normalized(q[at])
         return q
 
     def check_orientations(self, q: np.ndarray) -> None:
         """Raise NotUnit for a quaternion of length zero."""
-        if (np.linalg.norm(q[self._turning[0]], axis=1) < 1e-9).any():
+        if (np.linalg.norm(q[self._quaternions[0]], axis=1) < 1e-9).any():
             raise errors.NotUnit('coordinates', 0.0, 'quaternions x, y, z, w, not zero')
 
     def joint_angles(self, q: np.ndarray) -> np.ndarray:
@@ -106,7 +106,7 @@ class DofLayout:
         """
         angles = q[self._angles]
         for own, at, _ in self._free_angles:
-            angles[own] = rotation.to_xyz(q[at])
+            angles[own] = rotation.to_euler_xyz(q[at])
         return angles
 
     def with_joint_angles(self, q: np.ndarray, angles: np.ndarray) -> np.ndarray:
@@ -115,7 +115,7 @@ class DofLayout:
         free = np.ones(len(angles), bool)
         for own, at, _ in self._free_angles:
             free[own] = False
-            q[at] = rotation.from_xyz(*angles[own])
+            q[at] = rotation.from_euler_xyz(*angles[own])
         q[self._angles[free]] = angles[free]
         return q
 
@@ -123,11 +123,11 @@ class DofLayout:
         """What joint_angles() changes by, rad/s."""
         rates = coordinates.v[self._rates]
         for own, at, spin in self._free_angles:
-            rates[own] = rotation.xyz_rates(rotation.to_xyz(coordinates.q[at]),
+            rates[own] = rotation.euler_xyz_rates(rotation.to_euler_xyz(coordinates.q[at]),
                                             coordinates.v[spin])
         return rates
 
-    def past_limits(self, q: np.ndarray) -> np.ndarray:
+    def limit_violations(self, q: np.ndarray) -> np.ndarray:
         """Angles (k,) rad by which the limited joints are past their limits; negative inside."""
         angles = q[self.limited[0]]
         return np.maximum(angles - self.limits[1], self.limits[0] - angles)

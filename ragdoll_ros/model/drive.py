@@ -6,16 +6,16 @@ from dataclasses import dataclass
 
 from . import errors
 from .errors import set_fields
-from .push import LARGEST, Push, check_times
-from .vectors import Vector, finite, shortened
+from .push import MAX_LOAD, Push, check_times
+from .vectors import Vector, clamp_norm, finite_floats
 
-FASTEST = 1e3
+MAX_SPEED = 1e3
 """m/s and rad/s: beyond it a drive is refused."""
 
-FORCE_PER_SPEED, MOST_FORCE = 4000.0, 2000.0
+FORCE_PER_SPEED, MAX_FORCE = 4000.0, 2000.0
 """N/(m/s) and N: with less, a doll of 55 kg that lies where nothing slides is hardly moved."""
 
-TORQUE_PER_SPEED, MOST_TORQUE = 1000.0, 600.0
+TORQUE_PER_SPEED, MAX_TORQUE = 1000.0, 600.0
 """N m/(rad/s) and N m: likewise for turning it."""
 
 
@@ -35,8 +35,8 @@ class Drive:
     angular_velocity: Vector | None = None
     force_per_speed: float = FORCE_PER_SPEED
     torque_per_speed: float = TORQUE_PER_SPEED
-    most_force: float = MOST_FORCE
-    most_torque: float = MOST_TORQUE
+    most_force: float = MAX_FORCE
+    most_torque: float = MAX_TORQUE
     duration: float = 0.6
     start: float | None = None
 
@@ -44,11 +44,11 @@ class Drive:
         for key in ('velocity', 'angular_velocity'):
             if getattr(self, key) is None:
                 continue
-            set_fields(self, **{key: finite(key, getattr(self, key))})
-            if math.hypot(*getattr(self, key)) > FASTEST:
-                raise errors.OutOfRange(key, getattr(self, key), f'at most {FASTEST:g} long')
+            set_fields(self, **{key: finite_floats(key, getattr(self, key))})
+            if math.hypot(*getattr(self, key)) > MAX_SPEED:
+                raise errors.OutOfRange(key, getattr(self, key), f'at most {MAX_SPEED:g} long')
         for key in ('force_per_speed', 'torque_per_speed', 'most_force', 'most_torque'):
-            errors.check_range(key, getattr(self, key), 0, LARGEST)
+            errors.check_range(key, getattr(self, key), 0, MAX_LOAD)
         check_times(self.duration, self.start)
 
     @property
@@ -60,4 +60,4 @@ class Drive:
 
 
 def _at_most(most: float, gain: float, missing: Vector | None) -> Vector:
-    return shortened([gain * value for value in missing or (0.0, 0.0, 0.0)], most)[0]
+    return clamp_norm([gain * value for value in missing or (0.0, 0.0, 0.0)], most)[0]

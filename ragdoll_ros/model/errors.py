@@ -6,13 +6,13 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
-LISTED = 40
+MAX_LISTED_NAMES = 40
 """Names that an error lists; of more, those beside which the wrong one would stand."""
 
 
 def one_of(names: Sequence[str], wrong: str) -> str:
     """What is expected instead of a wrong name."""
-    if len(names) <= LISTED:
+    if len(names) <= MAX_LISTED_NAMES:
         return 'one of ' + ', '.join(names)
     ordered = sorted(names)
     place = max(0, min(bisect.bisect(ordered, wrong) - 2, len(ordered) - 5))

@@ -14,21 +14,21 @@ class Pose(NamedTuple):
     position: np.ndarray = np.zeros(3)
     orientation: np.ndarray = np.array(rotation.IDENTITY)
 
-    def outward(self, points: np.ndarray) -> np.ndarray:
+    def apply(self, points: np.ndarray) -> np.ndarray:
         """Points (..., 3) m of the frame, in the other one."""
         return self.position + rotation.rotate(self.orientation, points)
 
-    def inward(self, points: np.ndarray) -> np.ndarray:
+    def apply_inverse(self, points: np.ndarray) -> np.ndarray:
         """Points (..., 3) m of the other one, in the frame."""
         back = rotation.inverse(self.orientation)
         return rotation.rotate(back, np.subtract(points, self.position))
 
     def compose(self, inner: Pose) -> Pose:
         """Pose in the other one of what stands at ``inner`` in the frame."""
-        return Pose(self.outward(inner.position),
+        return Pose(self.apply(inner.position),
                     rotation.multiply(self.orientation, inner.orientation))
 
     def relative(self, pose: Pose) -> Pose:
         """Pose in the frame of what stands at ``pose`` in the other one."""
         back = rotation.inverse(self.orientation)
-        return Pose(self.inward(pose.position), rotation.multiply(back, pose.orientation))
+        return Pose(self.apply_inverse(pose.position), rotation.multiply(back, pose.orientation))

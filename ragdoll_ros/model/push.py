@@ -8,12 +8,12 @@ import numpy as np
 
 from . import errors, rotation
 from .errors import set_fields
-from .vectors import Vector, finite
+from .vectors import Vector, finite_floats
 
-LARGEST = 1e7
+MAX_LOAD = 1e7
 """N and N m: beyond it a push is refused, as no body that this package is for meets it."""
 
-ARROW = 0.5
+ARROW_LENGTH = 0.5
 """m: length of the arrow of a push of 1 kN; longer and shorter ones go by the square root."""
 
 
@@ -45,10 +45,10 @@ class Push:
 
     def __post_init__(self) -> None:
         for key in ('force', 'torque', 'point'):
-            set_fields(self, **{key: finite(key, getattr(self, key))})
+            set_fields(self, **{key: finite_floats(key, getattr(self, key))})
         for key in ('force', 'torque'):
-            if math.hypot(*getattr(self, key)) > LARGEST:
-                raise errors.OutOfRange(key, getattr(self, key), f'at most {LARGEST:g} long')
+            if math.hypot(*getattr(self, key)) > MAX_LOAD:
+                raise errors.OutOfRange(key, getattr(self, key), f'at most {MAX_LOAD:g} long')
         check_times(self.duration, self.start)
 
     def arrow(self, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
@@ -60,6 +60,6 @@ class Push:
         if self.local:
             force, point = rotation.rotate(orientation, np.stack([force, point]))
         strength = float(np.linalg.norm(force))
-        length = ARROW * (strength / 1000) ** 0.5
+        length = ARROW_LENGTH * (strength / 1000) ** 0.5
         tip = position + point
         return np.stack([tip - force * (length / max(strength, 1e-300)), tip])

@@ -22,7 +22,7 @@ from .pose import Pose
 from .rotation import IDENTITY
 from .shapes import Shape
 from .swing import Swing
-from .vectors import Quaternion, Vector, finite, floats, unit
+from .vectors import Quaternion, Vector, finite_floats, floats, unit_vector
 
 Limits = tuple[float, float]
 
@@ -55,8 +55,8 @@ class Bone:
     moments: Vector | None = None
 
     def __post_init__(self) -> None:
-        set_fields(self, mass=float(self.mass), position=finite('position', self.position),
-                   orientation=unit('orientation', self.orientation, count=4))
+        set_fields(self, mass=float(self.mass), position=finite_floats('position', self.position),
+                   orientation=unit_vector('orientation', self.orientation, count=4))
         if self.name == WORLD:
             raise errors.DuplicateName('name', self.name, "a name other than the world frame's")
         errors.check_positive('mass', self.mass)
@@ -65,11 +65,11 @@ class Bone:
             if getattr(self, key) is not None:
                 errors.check_range(key, getattr(self, key), 0, most)
         if self.color is not None:
-            set_fields(self, color=finite('color', self.color, 4))
+            set_fields(self, color=finite_floats('color', self.color, 4))
             for part in self.color:
                 errors.check_range('color', part, 0, 1)
         if self.moments is not None:
-            set_fields(self, moments=_moments(finite('inertia', self.moments)))
+            set_fields(self, moments=_checked_moments(finite_floats('inertia', self.moments)))
         elif isinstance(self.shape, Compound):
             self.shape.check_principal()
 
@@ -84,7 +84,7 @@ class Bone:
         return self.shape.inertia(self.mass) if self.moments is None else self.moments
 
 
-LARGEST_SWING = math.radians(85)
+MAX_SWING = math.radians(85)
 """Largest swing of a limited ball joint: at 90 degrees its three angles lose a freedom."""
 
 
@@ -140,9 +140,10 @@ class Joint:
         kind = JOINT_KINDS[self.kind]
         if self.kind == 'ball' and len(self.axes) == 2:
             kind = dataclasses.replace(kind, axes=2, limits=3)
-        set_fields(self, anchor=finite('anchor', self.anchor), damping=float(self.damping),
-                   axes=tuple(unit('axes', axis) for axis in self.axes), names=tuple(self.names),
-                   limits=tuple(_angles(pair) for pair in self.limits or (None,) * kind.limits))
+        set_fields(self, anchor=finite_floats('anchor', self.anchor), damping=float(self.damping),
+                   axes=tuple(unit_vector('axes', axis) for axis in self.axes),
+                   limits=tuple(map(_rounded_limits, self.limits or (None,) * kind.limits)),
+                   names=tuple(self.names))
         if len(self.axes) != kind.axes:
             raise errors.WrongAxes('axes', self.axes, f'{kind.axes} for a {self.kind} joint')
         if len(self.limits) != kind.limits:
@@ -167,13 +168,13 @@ class Joint:
             if max(map(abs, pair)) > 2 * math.pi:
                 raise errors.OutOfRange(path, pair, 'within one turn')
         if len(self.limits) == 3:
-            if self.limits[1] is None or max(map(abs, self.limits[1])) > LARGEST_SWING:
+            if self.limits[1] is None or max(map(abs, self.limits[1])) > MAX_SWING:
                 raise errors.OutOfRange('limits[1]', self.limits[1], 'a swing up to 85 degrees')
         elif self.kind == 'ball' and any(self.limits):
             self._check_ball(*self.limits)
 
     def _check_ball(self, swing: Limits | None, twist: Limits | None) -> None:
-        if swing is None or not 0 < swing[1] <= LARGEST_SWING:
+        if swing is None or not 0 < swing[1] <= MAX_SWING:
             raise errors.OutOfRange('limits[0]', swing, 'a swing up to 85 degrees, or no limits')
         for index, pair in enumerate((swing, twist)):
             if pair and (pair[0] != -pair[1] or pair[1] <= 0):
@@ -225,8 +226,8 @@ class SkeletonFrame:
     orientation: Quaternion = IDENTITY
 
     def __post_init__(self) -> None:
-        set_fields(self, position=finite('position', self.position),
-                   orientation=unit('orientation', self.orientation, count=4))
+        set_fields(self, position=finite_floats('position', self.position),
+                   orientation=unit_vector('orientation', self.orientation, count=4))
 
 
 @dataclass(frozen=True, repr=False)
@@ -257,9 +258,9 @@ class Ragdoll:
         found = tree_errors(names, edges)
         for key in ('swings', 'riders'):
             carried = [(each.name, each.bone) for each in getattr(self, key)]
-            found += carried_errors(key, names, carried)
-        found += pair_errors(names, self.no_collision)
-        found += angle_errors(self.joints)
+            found += attachment_errors(key, names, carried)
+        found += no_collision_errors(names, self.no_collision)
+        found += angle_name_errors(self.joints)
         for error in found:
             raise error
 
@@ -287,7 +288,7 @@ class Ragdoll:
         return sum(bone.mass * np.array(bone.position) for bone in self.bones) / self.mass
 
     @property
-    def never_collide(self) -> frozenset[frozenset[str]]:
+    def excluded_pairs(self) -> frozenset[frozenset[str]]:
         """Pairs of bones, by name, that pass through each other: jointed ones, ``no_collision``."""
         jointed = ((joint.parent, joint.child) for joint in self.joints)
         return frozenset(frozenset(pair) for pair in (*jointed, *self.no_collision))
@@ -359,7 +360,7 @@ def tree_errors(names: list[str], edges: list[tuple[str, str]]) -> list[errors.M
         if child in parent_of:
             found.append(errors.ConnectedTwice(
                 f'joints[{index}].child', child, 'a bone that has no parent yet'))
-        elif _reaches(parent_of, parent, child):
+        elif _is_ancestor(parent_of, parent, child):
             found.append(errors.JointCycle(
                 f'joints[{index}]', f'{parent} -> {child}', 'joints that close no ring'))
         else:
@@ -370,7 +371,7 @@ def tree_errors(names: list[str], edges: list[tuple[str, str]]) -> list[errors.M
     return found
 
 
-def carried_errors(key: str, names: list[str],
+def attachment_errors(key: str, names: list[str],
                    carried: list[tuple[str, str]]) -> list[errors.ModelError]:
     """Find what of (name, carrying bone) rides on no bone or shares a name."""
     found: list[errors.ModelError] = []
@@ -385,7 +386,8 @@ def carried_errors(key: str, names: list[str],
     return found
 
 
-def pair_errors(names: list[str], pairs: Sequence[Sequence[str]]) -> list[errors.ModelError]:
+def no_collision_errors(names: list[str],
+                        pairs: Sequence[Sequence[str]]) -> list[errors.ModelError]:
     """Find what of pairs that do not collide is no pair of two bones."""
     found: list[errors.ModelError] = []
     for index, pair in enumerate(pairs):
@@ -397,7 +399,7 @@ def pair_errors(names: list[str], pairs: Sequence[Sequence[str]]) -> list[errors
     return found
 
 
-def angle_errors(joints: Sequence[Joint]) -> list[errors.ModelError]:
+def angle_name_errors(joints: Sequence[Joint]) -> list[errors.ModelError]:
     """Find joints whose angles are called as another's."""
     found: list[errors.ModelError] = []
     seen: set[str] = set()
@@ -425,14 +427,14 @@ def joint_axes(joint: Joint) -> np.ndarray:
     return np.array(joint.axes).reshape(-1, 3)
 
 
-def _reaches(parent_of: dict[str, str], start: str, goal: str) -> bool:
+def _is_ancestor(parent_of: dict[str, str], start: str, goal: str) -> bool:
     """Whether ``goal`` is ``start`` itself or one of its ancestors."""
     while start != goal and start in parent_of:
         start = parent_of[start]
     return start == goal
 
 
-def _moments(moments: Vector) -> Vector:
+def _checked_moments(moments: Vector) -> Vector:
     """Principal moments that a body can have: each at most the sum of the other two.
 
     Two make up the third of what is flat. What six digits have rounded beyond that is taken back,
@@ -445,7 +447,7 @@ def _moments(moments: Vector) -> Vector:
     return tuple(map(min, moments, others))
 
 
-def _angles(pair: Limits | None) -> Limits | None:
+def _rounded_limits(pair: Limits | None) -> Limits | None:
     if pair is None:
         return None
     return floats(math.radians(round(math.degrees(angle), 9)) for angle in pair)

@@ -114,7 +114,7 @@ def from_rotation_vector(vectors: np.ndarray) -> np.ndarray:
     return np.concatenate([np.sinc(half / np.pi) / 2 * vectors, np.cos(half)], axis=-1)
 
 
-def mean_of_turn(vector: np.ndarray) -> np.ndarray:
+def mean_rotation_matrix(vector: np.ndarray) -> np.ndarray:
     """Mean (3, 3) of all rotation matrices on a steady way from none to a rotation vector (3,).
 
     1 + (1 - cos a) / a^2 [r] + (a - sin a) / a^3 [r]^2 for the vector r, a long, and [r] w = r x w.
@@ -159,7 +159,7 @@ def to_rpy(q: np.ndarray) -> tuple[float, float, float]:
     return roll, pitch, yaw
 
 
-def from_xyz(x: float, y: float, z: float) -> np.ndarray:
+def from_euler_xyz(x: float, y: float, z: float) -> np.ndarray:
     """Unit quaternion (4,) of turns in rad about x, then the new y, then the new z."""
     q = np.array(IDENTITY)
     for axis, angle in zip(np.eye(3), (x, y, z), strict=True):
@@ -167,15 +167,15 @@ def from_xyz(x: float, y: float, z: float) -> np.ndarray:
     return q
 
 
-def to_xyz(q: np.ndarray) -> tuple[float, float, float]:
+def to_euler_xyz(q: np.ndarray) -> tuple[float, float, float]:
     """Angles in rad about x, then the new y, then the new z that make up one quaternion's turn."""
     r = matrix(q)
     return (math.atan2(-r[1, 2], r[2, 2]), math.asin(max(-1.0, min(1.0, r[0, 2]))),
             math.atan2(-r[0, 1], r[0, 0]))
 
 
-def xyz_rates(angles: np.ndarray, spin: np.ndarray) -> np.ndarray:
-    """Rates (3,) rad/s of the angles of to_xyz while what they turn spins with ``spin`` (3,)
+def euler_xyz_rates(angles: np.ndarray, spin: np.ndarray) -> np.ndarray:
+    """Rates (3,) rad/s of the angles of to_euler_xyz while what they turn spins with ``spin`` (3,)
     rad/s along its own axes; without bound as the second angle comes near a quarter turn.
     """
     _, second, third = angles

@@ -18,7 +18,7 @@ from .errors import set_fields
 from .pose import Pose
 from .ragdoll import Bone, Ragdoll
 from .rotation import IDENTITY
-from .vectors import Quaternion, Vector, finite, unit
+from .vectors import Quaternion, Vector, finite_floats, unit_vector
 
 SECOND = 1_000_000_000
 """Nanoseconds in a second: time is counted in whole nanoseconds, as in ROS."""
@@ -71,7 +71,7 @@ class Ground:
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        set_fields(self, normal=unit('normal', self.normal), offset=float(self.offset))
+        set_fields(self, normal=unit_vector('normal', self.normal), offset=float(self.offset))
         errors.check_finite('offset', self.offset)
 
 
@@ -92,8 +92,8 @@ class Placement:
 
     def __post_init__(self) -> None:
         for key in ('position', 'velocity', 'spin'):
-            set_fields(self, **{key: finite(key, getattr(self, key))})
-        set_fields(self, name=self.name or self.doll.name, orientation=unit(
+            set_fields(self, **{key: finite_floats(key, getattr(self, key))})
+        set_fields(self, name=self.name or self.doll.name, orientation=unit_vector(
             'orientation', self.orientation, 'a quaternion x, y, z, w, not zero', 4))
 
     def bone_pose(self, bone: Bone) -> Pose:
@@ -124,7 +124,7 @@ class Scene:
     self_collision: bool = True
 
     def __post_init__(self) -> None:
-        set_fields(self, dolls=tuple(self.dolls), gravity=finite('gravity', self.gravity))
+        set_fields(self, dolls=tuple(self.dolls), gravity=finite_floats('gravity', self.gravity))
         if not self.dolls:
             raise errors.WrongForm('dolls', (), 'at least one doll')
         errors.check_range('step', self.step, *STEP_RANGE)
@@ -185,7 +185,7 @@ def height(bone: Bone, position: np.ndarray, orientation: np.ndarray, ground: Gr
     """Distance of a bone's lowest point from the ground, m; negative inside it."""
     normal = np.array(ground.normal)
     inward = rotation.rotate(rotation.inverse(orientation), -normal)
-    return float(position @ normal - ground.offset - bone.shape.reach(inward))
+    return float(position @ normal - ground.offset - bone.shape.support(inward))
 
 
 def above_ground(doll: Ragdoll, clearance: float = 0.4) -> Scene:
@@ -206,6 +206,6 @@ def all_above_ground(name: str, placements: Sequence[Placement], clearance: floa
         for placement in placements), ground)
 
 
-def grip(friction: float) -> float:
+def finite_friction(friction: float) -> float:
     """The coefficient of friction that PyBullet and MuJoCo are to work with."""
     return NO_SLIP if math.isinf(friction) else min(friction, LARGEST_FRICTION)

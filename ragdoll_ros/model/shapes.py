@@ -16,7 +16,7 @@ from . import errors
 from .errors import set_fields
 from .pose import Pose
 from .rotation import IDENTITY
-from .vectors import Quaternion, Vector, finite, floats, unit
+from .vectors import Quaternion, Vector, finite_floats, floats, unit_vector
 
 SEGMENTS = 20
 """Corners of a circle in a mesh."""
@@ -45,9 +45,9 @@ class Solid:
         """What it is drawn as: boxes, cylinders and spheres, as every viewer knows just these."""
         return _by_itself(self)
 
-    def reach(self, direction: np.ndarray) -> np.ndarray:
+    def support(self, direction: np.ndarray) -> np.ndarray:
         """How far (...,) m it extends along unit directions (..., 3) of its own axes."""
-        return support_distance(np.array(self.support), np.asarray(direction, float))
+        return support_distance(np.array(self.support_terms), np.asarray(direction, float))
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,8 @@ class Part:
     orientation: Quaternion = IDENTITY
 
     def __post_init__(self) -> None:
-        set_fields(self, position=finite('position', self.position),
-                   orientation=unit('orientation', self.orientation, count=4))
+        set_fields(self, position=finite_floats('position', self.position),
+                   orientation=unit_vector('orientation', self.orientation, count=4))
         if not isinstance(self.shape, Solid):
             raise errors.WrongForm('shape', self.shape, 'one of ' + ', '.join(SHAPES))
 
@@ -114,7 +114,7 @@ class Sphere(Solid):
         return (self.radius,) * 3
 
     @property
-    def support(self) -> tuple[float, ...]:
+    def support_terms(self) -> tuple[float, ...]:
         return (0.0, 0.0, 0.0, 0.0, self.radius, 0.0)
 
     def inertia(self, mass: float) -> Vector:
@@ -136,7 +136,7 @@ class Box(Solid):
     kind: ClassVar[str] = 'box'
 
     def __post_init__(self) -> None:
-        set_fields(self, size=finite('box', self.size))
+        set_fields(self, size=finite_floats('box', self.size))
         errors.check_positive('box', self.size)
 
     @property
@@ -148,7 +148,7 @@ class Box(Solid):
         return floats(edge / 2 for edge in self.size)
 
     @property
-    def support(self) -> tuple[float, ...]:
+    def support_terms(self) -> tuple[float, ...]:
         return (*self.half_extents, 0.0, 0.0, 0.0)
 
     def inertia(self, mass: float) -> Vector:
@@ -187,7 +187,7 @@ class Cylinder(Solid):
         return (self.radius, self.radius, self.length / 2)
 
     @property
-    def support(self) -> tuple[float, ...]:
+    def support_terms(self) -> tuple[float, ...]:
         return (0.0, 0.0, 0.0, self.length / 2, 0.0, self.radius)
 
     def inertia(self, mass: float) -> Vector:
@@ -227,7 +227,7 @@ class Capsule(Solid):
         return (self.radius, self.radius, self.length / 2 + self.radius)
 
     @property
-    def support(self) -> tuple[float, ...]:
+    def support_terms(self) -> tuple[float, ...]:
         return (0.0, 0.0, 0.0, self.length / 2, self.radius, 0.0)
 
     @property

@@ -19,17 +19,17 @@ class Texture:
 
 
 @dataclass(frozen=True)
-class Paint:
+class Appearance:
     """What a skin's surface looks like; v vertices and t triangles are the skin's.
 
     ``normals`` (v, 3) are unit vectors of the bind pose, zero where the file has none; ``uvs``
     (v, 2) as in glTF. ``materials`` are glTF's (2.0, 5.19), whose textures are indices of
-    ``textures``; ``numbers`` (t,) say which each triangle has, -1: none.
+    ``textures``; ``material_indices`` (t,) are the triangles', -1: none.
     """
 
     normals: np.ndarray
     uvs: np.ndarray
-    numbers: np.ndarray
+    material_indices: np.ndarray
     materials: tuple[dict, ...] = ()
     textures: tuple[Texture, ...] = ()
 
@@ -41,7 +41,7 @@ class Skin:
     ``bones`` (b,) are the doll's bones that carry riders, ``weights`` (v, b) theirs. ``positions``
     (b, 3) m and ``orientations`` (b, 4) are where these bones were when the skin was bound to
     them: in the doll's bind pose, unless a limb has been moved with its skin since. Without
-    ``paint`` it is of one ``color``: red, green, blue, opacity.
+    ``appearance`` it is of one ``color``: red, green, blue, opacity.
     """
 
     vertices: np.ndarray
@@ -50,5 +50,5 @@ class Skin:
     weights: np.ndarray
     positions: np.ndarray
     orientations: np.ndarray
-    paint: Paint | None = None
+    appearance: Appearance | None = None
     color: tuple[float, float, float, float] = SKIN_COLOR

@@ -22,15 +22,15 @@ from dataclasses import dataclass
 
 from . import errors
 from .errors import set_fields
-from .vectors import Vector, finite, unit
+from .vectors import Vector, finite_floats, unit_vector
 
 MODES = ('spring', 'pendulum', 'free')
-LENGTHS = (1e-3, 1e3)
+LENGTH_RANGE = (1e-3, 1e3)
 """Shortest and longest rod, m: the shortest still swings slowly enough to be resolved."""
-MASSES = (1e-9, 1e6)
-STIFFEST = 1e15
-MOST_DAMPED = 1e4
-LARGEST_SHARE = 10.0
+MASS_RANGE = (1e-9, 1e6)
+MAX_STIFFNESS = 1e15
+MAX_DAMPING = 1e4
+MAX_GRAVITY = 10.0
 
 
 @dataclass(frozen=True)
@@ -49,12 +49,12 @@ class Link:
     def __post_init__(self) -> None:
         set_fields(self, **{key: float(getattr(self, key))
                             for key in ('length', 'mass', 'stiffness', 'damping')})
-        errors.check_range('length', self.length, *LENGTHS)
-        errors.check_range('mass', self.mass, *MASSES)
-        errors.check_range('stiffness', self.stiffness, 0, STIFFEST)
-        errors.check_range('damping', self.damping, 0, MOST_DAMPED)
+        errors.check_range('length', self.length, *LENGTH_RANGE)
+        errors.check_range('mass', self.mass, *MASS_RANGE)
+        errors.check_range('stiffness', self.stiffness, 0, MAX_STIFFNESS)
+        errors.check_range('damping', self.damping, 0, MAX_DAMPING)
         if self.direction is not None:
-            set_fields(self, direction=unit('direction', self.direction))
+            set_fields(self, direction=unit_vector('direction', self.direction))
 
 
 @dataclass(frozen=True)
@@ -76,10 +76,10 @@ class Swing:
     velocity: Vector = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        set_fields(self, root=finite('root', self.root),
-                   direction=unit('direction', self.direction), links=tuple(self.links),
-                   gravity=float(self.gravity), velocity=finite('velocity', self.velocity))
-        errors.check_range('gravity', self.gravity, -LARGEST_SHARE, LARGEST_SHARE)
+        set_fields(self, root=finite_floats('root', self.root),
+                   direction=unit_vector('direction', self.direction), links=tuple(self.links),
+                   gravity=float(self.gravity), velocity=finite_floats('velocity', self.velocity))
+        errors.check_range('gravity', self.gravity, -MAX_GRAVITY, MAX_GRAVITY)
         if self.mode not in MODES:
             raise errors.WrongForm('mode', self.mode, 'one of ' + ', '.join(MODES))
         if not self.links:

@@ -15,7 +15,7 @@ def floats(values: object) -> tuple[float, ...]:
     return tuple(float(value) for value in values)
 
 
-def finite(path: str, values: object, count: int = 3) -> tuple[float, ...]:
+def finite_floats(path: str, values: object, count: int = 3) -> tuple[float, ...]:
     """``count`` floats; WrongForm where that is not what is given, NotFinite for NaN, infinity."""
     try:
         found = floats(values)
@@ -27,17 +27,17 @@ def finite(path: str, values: object, count: int = 3) -> tuple[float, ...]:
     return found
 
 
-def unit(path: str, values: object, expected: str = 'a direction, not zero',
+def unit_vector(path: str, values: object, expected: str = 'a direction, not zero',
          count: int = 3) -> tuple[float, ...]:
-    """``count`` numbers scaled to length one; NotUnit for zero, else as finite()."""
-    values = finite(path, values, count)
+    """``count`` numbers scaled to length one; NotUnit for zero, else as finite_floats()."""
+    values = finite_floats(path, values, count)
     length = math.hypot(*values)
     if length < 1e-9:
         raise errors.NotUnit(path, values, expected)
     return values if abs(length - 1) < 1e-15 else floats(value / length for value in values)
 
 
-def shortened(values: Sequence[float], most: float) -> tuple[Vector, float]:
+def clamp_norm(values: Sequence[float], most: float) -> tuple[Vector, float]:
     """A finite vector, at most ``most`` long, and the length that it had.
 
     The vector is first divided by its largest component, so that nothing overflows on the way.

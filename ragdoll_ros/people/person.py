@@ -7,7 +7,7 @@ what is left of it (see anthropometry.py). Shapes do not weigh: they are what to
 from __future__ import annotations
 
 from ..model import errors
-from ..model.anthropometry import PERCENTILES, SAMPLES, SEXES, Segment, shares
+from ..model.anthropometry import PERCENTILES, SAMPLES, SEXES, Segment, mass_fractions
 from ..model.compound import Compound
 from ..model.ragdoll import Bone, Ragdoll
 from .joints import joints
@@ -42,7 +42,7 @@ def person(height: float, mass: float, sex: str, name: str = 'person') -> Ragdol
     errors.check_range('mass', mass, *MASSES)
     _check_sex(sex)
     at = places(height, mass, sex)
-    sample, share = SAMPLES[sex], shares(sex)
+    sample, share = SAMPLES[sex], mass_fractions(sex)
     bones = []
     for bone, part in at.segments:
         segment = sample.segments[part]

@@ -18,7 +18,7 @@ from .y_up import orientations_y_up, points_y_up
 
 CENTIMETRES = 100.0
 
-EVEN = 1e-7
+TIME_TOLERANCE = 1e-7
 """s by which times may be off from equal ones: the nanoseconds of a file's stamps add up to less.
 What is off by more is taken between poses."""
 
@@ -26,7 +26,7 @@ What is off by more is taken between poses."""
 def bvh_text(recording: Recording, doll: int = 0) -> str:
     """The motion of one doll of a recording, by its index in the scene, as a BVH file."""
     ragdoll, part = recording.scene.dolls[doll].doll, recording.scene.bone_slices[doll]
-    step, positions, orientations = _evenly(recording)
+    step, positions, orientations = _resampled(recording)
     joints = ragdoll.joints_depth_first()
     place = {bone.name: k for k, bone in enumerate(ragdoll.bones)}
     names = [ragdoll.root.name, *(joint.child for joint in joints)]
@@ -51,7 +51,7 @@ def _hierarchy(doll: Ragdoll, name: str, depth: int) -> Iterator[str]:
     at = _joint_place(doll, name)
     indent, inner = '\t' * depth, '\t' * (depth + 1)
     places = 'Xposition Yposition Zposition ' if above is None else ''
-    yield f'{indent}{"ROOT" if above is None else "JOINT"} {_word(name)}'
+    yield f'{indent}{"ROOT" if above is None else "JOINT"} {_without_spaces(name)}'
     yield indent + '{'
     # A root's place is in its channels, to which some readers add its offset, and others do not.
     yield inner + _offset(at - (at if above is None else _joint_place(doll, above)))
@@ -79,19 +79,19 @@ def _offset(vector: np.ndarray) -> str:
     return 'OFFSET ' + ' '.join(f'{value:.7f}' for value in CENTIMETRES * points_y_up(vector))
 
 
-def _word(name: str) -> str:
+def _without_spaces(name: str) -> str:
     """A name without white space, which ends names in BVH."""
     return '_'.join(name.split())
 
 
-def _evenly(recording: Recording) -> tuple[float, np.ndarray, np.ndarray]:
+def _resampled(recording: Recording) -> tuple[float, np.ndarray, np.ndarray]:
     """Time from pose to pose, s, and poses at such times: the recording's own if they are."""
     count = len(recording)
     if count == 1:
         return 1.0, recording.positions, recording.orientations
     step = recording.duration / (count - 1)
     times = step * np.arange(count)
-    if abs(recording.times - times).max() < EVEN:
+    if abs(recording.times - times).max() < TIME_TOLERANCE:
         return step, recording.positions, recording.orientations
     poses = [recording.at(time) for time in times]
     return (step, np.array([pose.positions for pose in poses]),

@@ -18,10 +18,10 @@ from ..files.cdr import (
     DEFINITIONS,
     POSE_ARRAY,
     STRING,
-    poses_bytes,
-    poses_of,
-    string_bytes,
-    text_of,
+    decode_poses,
+    decode_string,
+    encode_poses,
+    encode_string,
 )
 from ..files.run_scene import read_run_scene, run_scene_text
 from ..model import errors
@@ -30,7 +30,7 @@ from ..model.ragdoll import WORLD
 from ..model.rotation import IDENTITY
 from ..model.scene import SECOND, Scene
 from ..model.state import State
-from .recording import Pose, Recorder, Recording
+from .recording import RecordedPose, Recorder, Recording
 from .rods import Rods
 
 KINDS = {'scene': STRING, 'poses': POSE_ARRAY, 'swings': POSE_ARRAY}
@@ -55,14 +55,14 @@ def recording_bytes(recording: Recording) -> bytes:
     def write(topic: str, stamp: int, data: bytes) -> None:
         writer.add_message(channels[topic], stamp, data, stamp)
 
-    write('scene', 0, string_bytes(run_scene_text(recording.scene)))
+    write('scene', 0, encode_string(run_scene_text(recording.scene)))
     for index, time in enumerate(recording.times):
         stamp, pose = round(time * SECOND), recording.pose(index)
-        write('poses', stamp, poses_bytes(stamp, WORLD, np.hstack(
+        write('poses', stamp, encode_poses(stamp, WORLD, np.hstack(
             [pose.positions, pose.orientations])))
         if pose.rods is not None:
             masses = pose.rods[:, 1]
-            write('swings', stamp, poses_bytes(stamp, WORLD, np.hstack(
+            write('swings', stamp, encode_poses(stamp, WORLD, np.hstack(
                 [masses, np.tile(IDENTITY, (len(masses), 1))])))
     writer.finish()
     return stream.getvalue()
@@ -88,9 +88,9 @@ def _recording(path: Path) -> Recording:
     for topic, kind, data in read_messages(path, lambda text: print(text, file=sys.stderr)):
         last = topic.rpartition('/')[2]
         if KINDS.get(last) == kind == STRING:
-            scenes.add(text_of(data))
+            scenes.add(decode_string(data))
         elif KINDS.get(last) == kind:
-            heard[last].append(poses_of(data))
+            heard[last].append(decode_poses(data))
     if len(scenes) != 1 or not heard['poses']:
         raise errors.WrongForm('', f'{len(scenes)} scenes, {len(heard["poses"])} instants',
                                'one scene and its poses: ros2 bag record /ragdoll/scene '
@@ -111,6 +111,6 @@ def _recorded(scene: Scene, heard: Stamped, swings: dict[int, np.ndarray]) -> Re
             if len(masses) != rods.count:
                 raise errors.WrongForm('swings', f'{len(masses)} masses', f'{rods.count} masses')
             unknown = np.zeros_like(positions)
-            ends = rods.between(masses[:, :3], State(positions, orientations, unknown, unknown))
-        recorder.add((stamp - heard[0][0]) / SECOND, Pose(positions, orientations, ends))
+            ends = rods.ends(masses[:, :3], State(positions, orientations, unknown, unknown))
+        recorder.add((stamp - heard[0][0]) / SECOND, RecordedPose(positions, orientations, ends))
     return recorder.recording()

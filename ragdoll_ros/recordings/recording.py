@@ -12,12 +12,12 @@ from ..model.scene import SECOND, Scene
 if TYPE_CHECKING:
     from ..physics.simulation import Simulation
 
-UNIT = 1e-6
+UNIT_TOLERANCE = 1e-6
 """How far a quaternion's length may be from 1."""
 
 
 @dataclass(frozen=True)
-class Pose:
+class RecordedPose:
     """Where all is at one instant: positions (n, 3) m, orientations (n, 4), rods (m, 2, 3) m."""
 
     positions: np.ndarray
@@ -49,8 +49,8 @@ class Recording:
         if not count or self.times[0] != 0 or (np.diff(self.times) <= 0).any():
             raise errors.OutOfRange('times', list(self.times[:4]), 'from 0 on, ascending')
         lengths = np.linalg.norm(self.orientations, axis=2)
-        if (abs(lengths - 1) > UNIT).any():
-            worst = self.orientations[abs(lengths - 1) > UNIT][0]
+        if (abs(lengths - 1) > UNIT_TOLERANCE).any():
+            worst = self.orientations[abs(lengths - 1) > UNIT_TOLERANCE][0]
             raise errors.NotUnit('orientations', worst.tolist(), 'unit quaternions x, y, z, w')
 
     @property
@@ -58,7 +58,7 @@ class Recording:
         """Instant of the last pose, s."""
         return float(self.times[-1])
 
-    def at(self, time: float) -> Pose:
+    def at(self, time: float) -> RecordedPose:
         """Where all is at ``time`` s; before the first and after the last pose, that one.
 
         Between two: positions on the straight line, orientations on the shorter arc (normalised
@@ -74,13 +74,13 @@ class Recording:
         near = np.where((begin.orientations * end.orientations).sum(axis=1) < 0, -1.0, 1.0)
         orientations = (1 - share) * begin.orientations + share * near[:, None] * end.orientations
         rods = None if begin.rods is None else (1 - share) * begin.rods + share * end.rods
-        return Pose((1 - share) * begin.positions + share * end.positions,
+        return RecordedPose((1 - share) * begin.positions + share * end.positions,
                     rotation.normalized(orientations), rods)
 
-    def pose(self, index: int) -> Pose:
+    def pose(self, index: int) -> RecordedPose:
         """Where all was at an instant of ``times``."""
         rods = None if self.rods is None else self.rods[index]
-        return Pose(self.positions[index], self.orientations[index], rods)
+        return RecordedPose(self.positions[index], self.orientations[index], rods)
 
     def __len__(self) -> int:
         return len(self.times)
@@ -95,7 +95,7 @@ class Recorder:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self._times: list[float] = []
-        self._poses: list[Pose] = []
+        self._poses: list[RecordedPose] = []
         self._last = 0.0
         self._shift = 0.0
 
@@ -107,7 +107,7 @@ class Recorder:
         """Instant of the last pose, s."""
         return self._times[-1] if self._times else 0.0
 
-    def add(self, time: float, pose: Pose) -> None:
+    def add(self, time: float, pose: RecordedPose) -> None:
         """Take the pose at ``time`` s, which must stay as it is; the same instant again is not."""
         if not self._times or time < self._last:
             self._shift = self.duration - time
@@ -119,7 +119,7 @@ class Recorder:
     def take(self, simulation: Simulation) -> None:
         """Take where all of a simulation is now."""
         state, swings = simulation.state, simulation.swings
-        self.add(simulation.time / SECOND, Pose(state.positions, state.orientations,
+        self.add(simulation.time / SECOND, RecordedPose(state.positions, state.orientations,
                                                 None if swings is None else swings.rods))
 
     def recording(self) -> Recording:

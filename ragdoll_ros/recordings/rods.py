@@ -27,7 +27,7 @@ class Rods:
         self._bones, self._roots = np.array(bones, int), np.array(roots).reshape(-1, 3)
         self._firsts, self._free = np.array(firsts, int), np.array(free, int)
 
-    def between(self, masses: np.ndarray, state: State) -> np.ndarray:
+    def ends(self, masses: np.ndarray, state: State) -> np.ndarray:
         """Both ends (m, 2, 3) m of every rod, from the masses (m, 3) m and the bones' poses.
 
         A free mass has no rod: both ends are its own place.

@@ -26,7 +26,7 @@ def check_format(path: Path) -> None:
         raise errors.OutOfRange('', path.name, 'a name that ends in ' + ', '.join(FORMATS))
 
 
-def contents(recording: Recording, path: str | Path,
+def encoded_files(recording: Recording, path: str | Path,
              skins: Mapping[int, Skin] = {}) -> dict[Path, bytes]:
     """Files with their contents; OutOfRange for a suffix that is not one of FORMATS.
 
@@ -46,7 +46,7 @@ def contents(recording: Recording, path: str | Path,
 def save_recording(recording: Recording, path: str | Path,
                    skins: Mapping[int, Skin] = {}) -> list[Path]:
     """Write what `contents` has; the paths. Unreadable where the disk refuses."""
-    made = contents(recording, path, skins)
+    made = encoded_files(recording, path, skins)
     try:
         for file, content in made.items():
             file.write_bytes(content)

@@ -17,7 +17,7 @@ from ..recordings.save import check_format
 from .comparison import Comparison
 from .kept import Keeper, save
 from .player import Player
-from .run import Run, read_run
+from .run import ReplayedRun, read_run
 
 EXAMPLE = """examples:
   ragdoll_replay rosbag2_2026_01_31-12_00_00      are its hashes those of the run?
@@ -85,7 +85,7 @@ def pace(text: str) -> float:
     return float(text)
 
 
-def tell(run: Run) -> None:
+def tell(run: ReplayedRun) -> None:
     """Say whose run it is, and warn where others than what is here have computed it."""
     scenes = ', '.join(scene.name for scene in run.scenes.values())
     print(f'{run.node}: scene {scenes or "unknown"}, {len(run.events)} events')
@@ -94,7 +94,7 @@ def tell(run: Run) -> None:
             warn(f'recorded by {recorded}; here is {versions()}: the last bits may differ')
 
 
-def replay(run: Run, options: argparse.Namespace, for_ros: list[str]) -> int:
+def replay(run: ReplayedRun, options: argparse.Namespace, for_ros: list[str]) -> int:
     """Repeat a run and check it, publish and save it as asked; the exit code."""
     player, keeper = Player(run, warn), Keeper(warn)
     steps = keeper.through(player.ticks()) if options.save else player.ticks()
@@ -125,7 +125,7 @@ def has_poses_alone(bag: Path) -> bool:
     return 'poses' in topics and 'events' not in topics
 
 
-def compare(run: Run, engine: str | None, accuracy: str | None) -> int:
+def compare(run: ReplayedRun, engine: str | None, accuracy: str | None) -> int:
     """Repeat a run as it was and otherwise, and say where both part; the exit code."""
     comparison = Comparison()
     one, other = Player(run, warn), Player(run, lambda _: None, engine, accuracy)

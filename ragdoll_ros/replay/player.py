@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ..model import errors
 from ..physics.logged_simulation import accuracy_from, repeat, state_digest
 from ..physics.simulation import Simulation
-from .run import Event, Run
+from .run import Event, ReplayedRun
 
 TOLD = ('pause', 'parameters')
 """Kinds of events that do nothing by themselves."""
@@ -27,7 +27,7 @@ class Player:
     ``warn`` is told what can not be repeated.
     """
 
-    def __init__(self, run: Run, warn: Callable[[str], None], engine: str | None = None,
+    def __init__(self, run: ReplayedRun, warn: Callable[[str], None], engine: str | None = None,
                  accuracy: str | None = None) -> None:
         self._run, self._warn = run, warn
         self._engine, self._accuracy = engine, accuracy

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..files.bag import read_messages
-from ..files.cdr import STRING, text_of
+from ..files.cdr import STRING, decode_string
 from ..files.run_scene import read_run_scene, scene_digest
 from ..model import errors
 from ..model.scene import Scene
@@ -31,7 +31,7 @@ class Event:
 
 
 @dataclass(frozen=True)
-class Run:
+class ReplayedRun:
     """What a node did and what acted on it."""
 
     node: str
@@ -53,13 +53,13 @@ class Run:
         return self.scenes[digest]
 
 
-def read_run(path: Path, node: str | None, warn: Callable[[str], None]) -> Run:
+def read_run(path: Path, node: str | None, warn: Callable[[str], None]) -> ReplayedRun:
     """The run of a ``node`` in a bag; of the one that is in it, if not said. RagdollError."""
     found: dict[tuple[str, str], list[str]] = {}
     for topic, kind, data in read_messages(path, warn):
         name, _, last = topic.rpartition('/')
         if kind == STRING and last in ('events', 'scene'):
-            found.setdefault((name, last), []).append(text_of(data))
+            found.setdefault((name, last), []).append(decode_string(data))
     nodes = sorted({name for name, last in found if last == 'events'})
     if not nodes:
         raise errors.Unreadable('', str(path), f'a recording of ~/events and ~/scene: {RECORD}')
@@ -72,7 +72,7 @@ def read_run(path: Path, node: str | None, warn: Callable[[str], None]) -> Run:
                                'recording begins late, call ~/reset while it records')
     texts = found.get((name, 'scene'), [])
     read = {scene_digest(text): read_run_scene(text) for text in texts}
-    return Run(name, events, {digest: scene for digest, (scene, _) in read.items()},
+    return ReplayedRun(name, events, {digest: scene for digest, (scene, _) in read.items()},
                tuple(sorted({versions for _, versions in read.values()})))
 
 

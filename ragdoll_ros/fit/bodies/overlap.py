@@ -20,12 +20,12 @@ def filling(shape: Shape) -> np.ndarray:
 
 def cloud(bone: Bone) -> np.ndarray:
     """Points (p, 3) m on a body and in it, doll's frame."""
-    return bone.pose.outward(np.concatenate([bone.shape.mesh()[0], filling(bone.shape)]))
+    return bone.pose.apply(np.concatenate([bone.shape.mesh()[0], filling(bone.shape)]))
 
 
 def depth_in(bone: Bone, points: np.ndarray) -> np.ndarray:
     """How deep (p,) m points (p, 3) of the doll's frame are in a body; below zero outside."""
-    return -bone.shape.signed_distance(bone.pose.inward(points))
+    return -bone.shape.signed_distance(bone.pose.apply_inverse(points))
 
 
 def overlapping_pairs(bones: tuple[Bone, ...]) -> list[tuple[str, str]]:
@@ -47,7 +47,7 @@ def overlapping_pairs(bones: tuple[Bone, ...]) -> list[tuple[str, str]]:
 def colliding_pairs(doll: Ragdoll) -> tuple[tuple[str, str], ...]:
     """Names of the pairs of bodies that overlap and that the doll lets collide."""
     return tuple(pair for pair in overlapping_pairs(doll.bones)
-                 if frozenset(pair) not in doll.never_collide)
+                 if frozenset(pair) not in doll.excluded_pairs)
 
 
 def covered(bones: tuple[Bone, ...], points: np.ndarray, tolerance: float) -> np.ndarray:
@@ -62,7 +62,7 @@ def shared_volume(bones: tuple[Bone, ...]) -> float:
     """Share of the bodies' volume, 0 to 1, that lies in another body too."""
     whole = shared = 0.0
     for bone in bones:
-        points = bone.pose.outward(filling(bone.shape))
+        points = bone.pose.apply(filling(bone.shape))
         others = tuple(other for other in bones if other is not bone)
         share = float(np.mean(covered(others, points, 0.0))) if others else 0.0
         whole += bone.shape.volume

@@ -58,7 +58,7 @@ def trimmed(groups: list[Group], fits: list[Fitted], frames: list[np.ndarray]) -
 
 def _holds(bone: Bone, anchors: np.ndarray) -> bool:
     """Whether a body is still at all its joints (k, 3)."""
-    return bool((outside(bone.shape, bone.pose.inward(anchors)) <= NEAR).all())
+    return bool((outside(bone.shape, bone.pose.apply_inverse(anchors)) <= NEAR).all())
 
 
 def _cuts(bones: list[Bone], pair: tuple[int, int],
@@ -94,14 +94,14 @@ def _penetration(first: Bone, second: Bone) -> tuple[float, np.ndarray]:
 
 def _reach(bone: Bone, ways: np.ndarray) -> np.ndarray:
     """How far (k,) m a body reaches from its centre along directions (k, 3) of the doll's frame."""
-    return bone.shape.reach(rotation.rotate(rotation.inverse(np.array(bone.orientation)), ways))
+    return bone.shape.support(rotation.rotate(rotation.inverse(np.array(bone.orientation)), ways))
 
 
 def _cut(bone: Bone, way: np.ndarray, depth: float) -> Bone:
     """The body, reaching ``depth`` m less far along a unit direction (3,); its far side stays."""
     turned = rotation.rotate(rotation.inverse(np.array(bone.orientation)), way)
     shape, back = _narrower(bone.shape, turned, depth)
-    return dataclasses.replace(bone, shape=shape, position=bone.pose.outward(back[None])[0])
+    return dataclasses.replace(bone, shape=shape, position=bone.pose.apply(back[None])[0])
 
 
 def _narrower(shape: Shape, way: np.ndarray, depth: float) -> tuple[Shape, np.ndarray]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...model import errors, rotation
 from ...model.ragdoll import WORLD
-from ...model.skin import Paint
+from ...model.skin import Appearance
 from ..roles.names import plain_name, side_of
 from .draco import decompressed
 from .gltf_file import GltfFile
@@ -54,7 +54,7 @@ class Character:
     """A sentence for each thing that could not be taken over as it is."""
     springs: tuple[Spring, ...] = ()
     """Its points in m, the character's frame."""
-    paint: Paint | None = None
+    appearance: Appearance | None = None
     """What its surface looks like; None where the file says nothing of that."""
 
     @functools.cached_property
@@ -129,16 +129,17 @@ def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) 
     parents = tuple(_parent_bone(node, nodes.parents, place) for node in joints)
     metres = metres_per_unit(names, parents, positions, vertices, notes) if scale is None else scale
     springs = _springs(file, nodes, skins, place, metres * axes, notes)
-    paint = _paint(file, skins, axes, notes)
+    appearance = _appearance(file, skins, axes, notes)
     stem = _bone_names([file.path.stem])[0]
     return Character(
         stem, names, parents,
         positions * metres, np.stack([_nearest_rotation(matrix) for matrix in linear]),
         vertices * metres, skins.triangles, lookup[skins.nodes], skins.weights, metres,
-        tuple(notes), springs, paint)
+        tuple(notes), springs, appearance)
 
 
-def _paint(file: GltfFile, skins: Skins, axes: np.ndarray, notes: list[str]) -> Paint | None:
+def _appearance(file: GltfFile, skins: Skins, axes: np.ndarray,
+                notes: list[str]) -> Appearance | None:
     """What the surface looks like, normals taken to the character's frame by ``axes`` (3, 3)."""
     materials = Materials(file, notes)
     numbers = np.array([materials.number(each) for each in skins.materials], int)
@@ -147,7 +148,7 @@ def _paint(file: GltfFile, skins: Skins, axes: np.ndarray, notes: list[str]) -> 
     normals = skins.normals @ axes.T
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 1e-30)
-    return Paint(np.nan_to_num(normals), skins.uvs, numbers[skins.meshes],
+    return Appearance(np.nan_to_num(normals), skins.uvs, numbers[skins.meshes],
                  tuple(materials.entries), tuple(materials.textures))
 
 

@@ -23,9 +23,9 @@ def part_of(character: Character, own: np.ndarray) -> Character:
     moved = character.weights.any(axis=1)
     kept = np.where(moved, theirs.any(axis=1), own[0])
     triangles = kept[character.triangles].all(axis=1)
-    paint = character.paint and replace(
-        character.paint, normals=character.paint.normals[kept], uvs=character.paint.uvs[kept],
-        numbers=character.paint.numbers[triangles])
+    seen = character.appearance
+    appearance = seen and replace(seen, normals=seen.normals[kept], uvs=seen.uvs[kept],
+                                  material_indices=seen.material_indices[triangles])
     chosen = np.flatnonzero(own)
     springs = tuple(replace(spring, carrier=int(place[spring.carrier]),
                             bones=tuple(int(place[bone]) for bone in spring.bones if own[bone]))
@@ -38,17 +38,18 @@ def part_of(character: Character, own: np.ndarray) -> Character:
         vertices=character.vertices[kept],
         triangles=(np.cumsum(kept) - 1)[character.triangles[triangles]],
         bones=np.where(theirs, place[character.bones], 0)[kept],
-        weights=np.where(theirs, character.weights, 0.0)[kept], springs=springs, paint=paint)
+        weights=np.where(theirs, character.weights, 0.0)[kept], springs=springs,
+        appearance=appearance)
 
 
 def seen_from(character: Character, frame: Pose) -> Character:
     """The character in another frame, which stands at ``frame`` in its own; z of both is up."""
     back = rotation.inverse(frame.orientation)
-    paint = character.paint and replace(
-        character.paint, normals=rotation.rotate(back, character.paint.normals))
+    appearance = character.appearance and replace(
+        character.appearance, normals=rotation.rotate(back, character.appearance.normals))
     return replace(
-        character, positions=frame.inward(character.positions),
+        character, positions=frame.apply_inverse(character.positions),
         orientations=rotation.multiply(back, character.orientations),
-        vertices=frame.inward(character.vertices), paint=paint,
-        springs=tuple(replace(spring, points=frame.inward(spring.points))
+        vertices=frame.apply_inverse(character.vertices), appearance=appearance,
+        springs=tuple(replace(spring, points=frame.apply_inverse(spring.points))
                       for spring in character.springs))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...model import errors
-from ...model.swing import LENGTHS
+from ...model.swing import LENGTH_RANGE
 from .gltf_file import GltfFile, nested, objects
 from .nodes import Nodes
 
@@ -98,10 +98,10 @@ def placed(spring: Spring, nodes: Nodes, rests: dict[int, np.ndarray]) -> Spring
 def without_short_rods(spring: Spring, notes: list[str]) -> Spring:
     """The spring (points in m) without rods too short to swing: their ends become one point."""
     lengths = np.linalg.norm(np.diff(spring.points, axis=0), axis=1)
-    long = lengths >= LENGTHS[0]
+    long = lengths >= LENGTH_RANGE[0]
     if long.all():
         return spring
-    notes.append(f'spring {spring.name} has rods below {1000 * LENGTHS[0]:g} mm: left out')
+    notes.append(f'spring {spring.name} has rods below {1000 * LENGTH_RANGE[0]:g} mm: left out')
     return replace(spring, points=spring.points[np.concatenate([[True], long])],
                    rods=tuple(rod for rod, keep in zip(spring.rods, long, strict=True) if keep))
 

@@ -22,7 +22,7 @@ import math
 
 import numpy as np
 
-from ...model.swing import LARGEST_SHARE, MOST_DAMPED, Link, Swing
+from ...model.swing import MAX_DAMPING, MAX_GRAVITY, Link, Swing
 from .spring_bones import Rod, Spring
 
 RATE = 60.0
@@ -53,13 +53,13 @@ def swing_of(spring: Spring, bone: str, metres: float) -> tuple[Swing, bool]:
     wanted = float(np.mean([rod.gravity / max(rod.stiffness, SOFTEST / metres) * stiff * reach
                             for rod, (stiff, _), reach in zip(spring.rods, rates, reaches,
                                                               strict=True)])) / GRAVITY
-    share = min(max(wanted, -LARGEST_SHARE), LARGEST_SHARE)
+    share = min(max(wanted, -MAX_GRAVITY), MAX_GRAVITY)
     links = []
     for index, (stiff, damping) in enumerate(rates):
         pull = math.sqrt(stiff + abs(share) * GRAVITY / reaches[index])
         links.append(Link(_short(lengths[index]), _short(masses[index]),
                           _short(carried[index][0] * stiff),
-                          _short(min(damping / (2 * pull), MOST_DAMPED)),
+                          _short(min(damping / (2 * pull), MAX_DAMPING)),
                           tuple(steps[index] / lengths[index])))
     root = tuple(round(float(x), 10) for x in spring.points[0])
     swing = Swing(spring.name, bone, root, links[0].direction, tuple(links), _short(share))

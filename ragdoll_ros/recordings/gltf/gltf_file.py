@@ -18,7 +18,7 @@ from ..recording import Recording
 from ..y_up import orientations_y_up, points_y_up
 from .glb import ATTRIBUTES, Glb
 from .gltf_skin import add_material, add_skin
-from .vertex_normals import creased
+from .vertex_normals import crease_normals
 
 
 def gltf_bytes(recording: Recording, skins: Mapping[int, Skin] = {}) -> bytes:
@@ -83,7 +83,7 @@ class _Shapes:
     def _surface(self, shape: Shape | Compound) -> dict[str, int]:
         if shape not in self._attributes:
             places, normals = (points_y_up(each).astype(np.float32)
-                               for each in creased(*shape.mesh()))
+                               for each in crease_normals(*shape.mesh()))
             self._attributes[shape] = {'POSITION': self._glb.accessor(places, ATTRIBUTES),
                                        'NORMAL': self._glb.accessor(normals, ATTRIBUTES)}
         return self._attributes[shape]

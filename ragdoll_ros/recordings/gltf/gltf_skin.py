@@ -5,7 +5,7 @@ import numpy as np
 
 from ...model import rotation
 from ...model.pose import Pose
-from ...model.skin import Paint, Skin
+from ...model.skin import Appearance, Skin
 from ..y_up import orientations_y_up, points_y_up
 from .glb import ATTRIBUTES, INDICES, Glb
 from .vertex_normals import smooth_normals
@@ -35,10 +35,10 @@ def add_skin(glb: Glb, skin: Skin, nodes: list[int], name: str) -> int:
     return glb.add('nodes', name=name, mesh=mesh, skin=bound)
 
 
-def paint_bytes(skin: Skin) -> bytes:
+def surface_glb(skin: Skin) -> bytes:
     """The surface alone, in its bind pose, as a .glb for viser: the doll's frame, z up.
 
-    Its primitives are the runs of `by_material`. Normals are the attribute _NORMAL as well, since
+    Its primitives are the runs of `group_by_material`. Normals are the attribute _NORMAL as well, since
     viser makes others of its own.
     """
     glb = Glb()
@@ -49,21 +49,23 @@ def paint_bytes(skin: Skin) -> bytes:
     return glb.content()
 
 
-def by_material(skin: Skin) -> tuple[np.ndarray, list[tuple[int, int, int]]]:
+def group_by_material(skin: Skin) -> tuple[np.ndarray, list[tuple[int, int, int]]]:
     """Triangles (t, 3), those of a material together, and each run's material, begin and end."""
-    numbers = np.full(len(skin.triangles), -1) if skin.paint is None else skin.paint.numbers
-    order = np.argsort(numbers, kind='stable')
-    found, firsts = np.unique(numbers[order], return_index=True)
-    ends = [*firsts[1:].tolist(), len(numbers)]
+    materials = (np.full(len(skin.triangles), -1) if skin.appearance is None
+                 else skin.appearance.material_indices)
+    order = np.argsort(materials, kind='stable')
+    found, firsts = np.unique(materials[order], return_index=True)
+    ends = [*firsts[1:].tolist(), len(materials)]
     return skin.triangles[order], list(zip(found.tolist(), firsts.tolist(), ends, strict=True))
 
 
 def skin_normals(skin: Skin) -> np.ndarray:
     """Unit normals (v, 3) in the bind pose, doll's frame: the file's, where it has any."""
     smooth = smooth_normals(skin.vertices, skin.triangles)
-    if skin.paint is None:
+    if skin.appearance is None:
         return smooth
-    return np.where(skin.paint.normals.any(axis=1, keepdims=True), skin.paint.normals, smooth)
+    normals = skin.appearance.normals
+    return np.where(normals.any(axis=1, keepdims=True), normals, smooth)
 
 
 def add_material(glb: Glb, color: tuple[float, ...]) -> int:
@@ -80,26 +82,27 @@ def _primitives(glb: Glb, skin: Skin, points: np.ndarray, directions: dict[str, 
                 attributes: dict[str, int]) -> list[dict]:
     """One for each material, all of the same vertices."""
     given = {'POSITION': points, **directions}
-    if skin.paint is not None:
-        given['TEXCOORD_0'] = skin.paint.uvs
+    if skin.appearance is not None:
+        given['TEXCOORD_0'] = skin.appearance.uvs
     attributes = attributes | {name: glb.accessor(values.astype(np.float32), ATTRIBUTES)
                                for name, values in given.items()}
-    triangles, runs = by_material(skin)
-    taken = [] if skin.paint is None else _add_materials(glb, skin.paint)
+    triangles, runs = group_by_material(skin)
+    taken = [] if skin.appearance is None else _add_materials(glb, skin.appearance)
     return [{'attributes': attributes,
              'material': taken[number] if number >= 0 else add_material(glb, skin.color),
              'indices': glb.accessor(triangles[begin:end].astype(np.uint32).ravel(), INDICES)}
             for number, begin, end in runs]
 
 
-def _add_materials(glb: Glb, paint: Paint) -> list[int]:
-    """The materials of a paint with their textures; their indices in the file."""
+def _add_materials(glb: Glb, appearance: Appearance) -> list[int]:
+    """Add the materials with their textures; their indices in the file."""
     textures = []
-    for texture in paint.textures:
+    for texture in appearance.textures:
         image = glb.add('images', bufferView=glb.view(texture.image), mimeType=texture.kind)
         textures.append(glb.add('textures', source=image,
                                 sampler=glb.add('samplers', **texture.sampler)))
-    return [glb.add('materials', **_with_textures(glb, each, textures)) for each in paint.materials]
+    return [glb.add('materials', **_with_textures(glb, material, textures))
+            for material in appearance.materials]
 
 
 def _with_textures(glb: Glb, entry: dict, textures: list[int]) -> dict:
@@ -120,6 +123,6 @@ def _inverse_binds(skin: Skin) -> np.ndarray:
     bound = Pose(points_y_up(skin.positions), orientations_y_up(skin.orientations))
     inverses = np.zeros((len(skin.bones), 4, 4))
     inverses[:, :3, :3] = rotation.matrix(rotation.inverse(bound.orientation))
-    inverses[:, :3, 3] = bound.inward(np.zeros(3))
+    inverses[:, :3, 3] = bound.apply_inverse(np.zeros(3))
     inverses[:, 3, 3] = 1
     return inverses.transpose(0, 2, 1).reshape(-1, 16)

@@ -10,7 +10,7 @@ CREASE = math.radians(40)
 faces of a ball or cylinder of 20 corners, less than a box's 90."""
 
 
-def creased(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def crease_normals(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (3t, 3) m, three to a triangle of ``triangles`` (t, 3), and their unit normals.
 
     A corner's normal is the mean of those of the faces around it that are within CREASE of its own

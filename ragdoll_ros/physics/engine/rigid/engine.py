@@ -44,7 +44,7 @@ class RigidEngine:
         self._clusters = Clusters(scene, self.layout, workers)
         self._neighbours = Neighbours(scene, self._clusters.reach())
         self._heights = GroundHeights(scene)
-        self._spins = self.layout.root_spins
+        self._spins = self.layout.root_angular_velocities
         self.resting = np.zeros(len(scene.dolls), bool)
         self._designed = [np.full(len(own), WITHIN) for own in self._clusters.flags(WITHIN)]
         """Pairs that are within each other as bound: they are left so until they come apart."""
