@@ -1,7 +1,4 @@
-"""Dolls as YAML files: read, checked with all errors at once, written.
-
-The form is that of config/doll.schema.json.
-"""
+"""Dolls as YAML files (config/doll.schema.json): reading with all errors at once, writing."""
 from __future__ import annotations
 
 import math
@@ -29,24 +26,52 @@ from .building import build_each, entries, read_by_name, value_or_raise
 from .schema import schema_errors
 
 LARGEST_MASS_RATIO = 1e8
-"""Heaviest to lightest bone of a file: real robots have up to 6.1e7, and at 2e8 a tick takes a
-second, as an impact's equations have 16 digits."""
+"""Largest ratio of two masses in a file. Robots have up to 6.1e7; at 2e8 a tick takes a second, as
+the equations of an impact are ill-conditioned."""
 
 
 def load_doll(name: str) -> Ragdoll:
-    """Read a doll's file; ModelErrors with all that is wrong in it."""
+    """Read a doll from a YAML file.
+
+    Args:
+        name: path, or name of a shipped doll in config/.
+
+    Returns:
+        The doll.
+
+    Raises:
+        ModelErrors: all errors of the file, each with its path, its value, what is expected.
+
+    Example:
+        >>> load_doll('doll').mass
+        55.0
+    """
     data, path = read_by_name(name)
     return value_or_raise(path, *build_doll(data, path))
 
 
 def save_doll(doll: Ragdoll, path: str | Path, head: str = '') -> None:
-    """Write a doll; load_doll gives an equal one back."""
+    """Write a doll to a YAML file, from which load_doll reads an equal one.
+
+    Args:
+        doll: the doll; the path of its ``model`` is written relative to the file.
+        path: of the file.
+        head: text of a comment at its top.
+
+    Raises:
+        OSError: the file can not be written.
+
+    Example:
+        >>> save_doll(load_doll('doll'), 'copy.yaml')
+        >>> load_doll('copy.yaml') == load_doll('doll')
+        True
+    """
     text = yaml_text.to_text(doll_data(doll, Path(path).parent), 'doll', head)
     Path(path).write_text(text, encoding='utf-8')
 
 
 def build_doll(data: object, path: Path = Path('doll')) -> tuple[Ragdoll | None, list[ModelError]]:
-    """Make a doll from what the YAML file at ``path`` holds: the doll, or None and every error."""
+    """Build a doll from the data of the YAML file at ``path``; else None and every error."""
     found = schema_errors('doll', data)
     if not isinstance(data, dict):
         return None, found
@@ -73,9 +98,9 @@ def build_doll(data: object, path: Path = Path('doll')) -> tuple[Ragdoll | None,
 
 
 def doll_data(doll: Ragdoll, folder: Path | None = None) -> dict:
-    """A doll as plain lists and numbers, the form of doll.schema.json.
+    """A doll as lists and numbers in the form of doll.schema.json.
 
-    The path of its character is written as seen from ``folder``, if given.
+    The path of its character is made relative to ``folder``, if given.
     """
     data = {'name': doll.name, 'bones': [_bone_data(bone) for bone in doll.bones],
             'joints': [_joint_data(joint) for joint in doll.joints]}
@@ -86,21 +111,21 @@ def doll_data(doll: Ragdoll, folder: Path | None = None) -> dict:
     if doll.riders:
         data['riders'] = [_rider_data(rider) for rider in doll.riders]
     if doll.model is not None:
-        data['model'] = doll.model if folder is None else _seen_from(folder, doll.model)
+        data['model'] = doll.model if folder is None else _relative_path(folder, doll.model)
     return data
 
 
-def _seen_from(folder: Path, model: str) -> str:
-    """Path of a character as it stands in a file of ``folder``: with slashes, relative."""
+def _relative_path(folder: Path, model: str) -> str:
+    """Path of a character relative to ``folder``, with slashes."""
     try:
         return Path(os.path.relpath(model, folder)).as_posix()
     except ValueError:
-        # Another drive has no way there.
+        # It is on another drive.
         return model
 
 
 def mass_errors(bones: Sequence[Bone]) -> list[ModelError]:
-    """The heaviest bone, where a tick of the doll would take seconds."""
+    """Error of the heaviest bone, if the ratio of masses exceeds LARGEST_MASS_RATIO."""
     lightest, heaviest = (choose(bones, key=lambda bone: bone.mass) for choose in (min, max))
     if heaviest.mass <= LARGEST_MASS_RATIO * lightest.mass:
         return []
@@ -199,7 +224,7 @@ def _joint_data(joint: Joint) -> dict:
 
 
 def _swing(data: dict) -> Swing:
-    """Make a swing of what a file holds; a ModelError tells where in it."""
+    """Build a swing from a file's data. Raises a ModelError with its path."""
     fields = dict(data)
     if 'strand' in fields:
         links = _at('strand', strand, fields.pop('strand'))
@@ -210,7 +235,6 @@ def _swing(data: dict) -> Swing:
 
 
 def _swing_data(swing: Swing) -> dict:
-    """A swing as a file holds it; _swing gives an equal one back."""
     data = {'name': swing.name, 'bone': swing.bone, 'root': list(swing.root),
             'direction': list(swing.direction), 'gravity': swing.gravity, 'mode': swing.mode}
     if any(swing.velocity):

@@ -1,7 +1,4 @@
-"""Scenes as YAML files: found, read, checked with all errors at once, written.
-
-The form is that of config/scene.schema.json.
-"""
+"""Scenes as YAML files (config/scene.schema.json): reading with all errors at once, writing."""
 from __future__ import annotations
 
 import functools
@@ -21,30 +18,58 @@ MOST_DOLLS = 1000
 
 
 def load_scene(name: str) -> Scene:
-    """Read a scene, or a doll (then above level ground); ModelErrors with all that is wrong."""
+    """Read a scene from a YAML file.
+
+    Args:
+        name: path, or name of a shipped scene or doll in config/.
+
+    Returns:
+        The scene; of a doll's file, that doll 0.4 m above level ground.
+
+    Raises:
+        ModelErrors: all errors of the file, each with its path, its value, what is expected.
+
+    Example:
+        >>> load_scene('drop').bone_names[0]
+        'torso'
+    """
     return scene_from_data(*read_by_name(name))
 
 
 def scene_from_data(data: object, path: Path) -> Scene:
-    """Make a scene from what a YAML file at ``path`` holds, a scene or a doll; see load_scene."""
+    """Build a scene from the data of a scene's or a doll's file. Raises ModelErrors."""
     if isinstance(data, dict) and 'bones' in data:
         return above_ground(value_or_raise(path, *build_doll(data, path)))
     return value_or_raise(path, *build_scene(data, path))
 
 
 def save_scene(scene: Scene, path: str | Path, head: str = '') -> None:
-    """Write a scene with its dolls in it; load_scene gives an equal one back."""
+    """Write a scene with its dolls to a YAML file, from which load_scene reads an equal one.
+
+    Args:
+        scene: the scene; paths of its dolls' ``model`` are written relative to the file.
+        path: of the file.
+        head: text of a comment at its top.
+
+    Raises:
+        OSError: the file can not be written.
+
+    Example:
+        >>> save_scene(load_scene('drop'), 'copy.yaml')
+        >>> load_scene('copy.yaml') == load_scene('drop')
+        True
+    """
     Path(path).write_text(scene_text(scene, Path(path).parent, head), encoding='utf-8')
 
 
 def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError]]:
-    """Make a scene from what a YAML file holds: the scene, or None and every error."""
+    """Build a scene from the data of a scene's file; else None and every error."""
     found = schema_errors('scene', data)
     if not isinstance(data, dict):
         return None, found
     placements = []
     entries = data.get('dolls')
-    # A crowd's is read once, also where it stands in the file itself, with aliases for the others.
+    # A doll that many entries share, by name or by alias, is built once.
     named = functools.cache(lambda name: _named_doll(name, path))
     inline: dict[int, tuple] = {}
     for index, entry in enumerate(entries if isinstance(entries, list) else ()):
@@ -65,8 +90,8 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
         if doll is not None and not has_error_under(found, where):
             fields = {'position', 'orientation', 'velocity', 'spin', 'name'} & set(entry)
             first = try_build(found, where, Placement, doll, **{key: entry[key] for key in fields})
-            placements += repeated_placements(first, entry['repeat']) if first and 'repeat' in entry else [
-                first]
+            placements += repeated_placements(first, entry['repeat']) if (
+                first and 'repeat' in entry) else [first]
     if len(placements) > MOST_DOLLS:
         found.append(OutOfRange('dolls', len(placements), f'at most {MOST_DOLLS} in all'))
     parts = {}
@@ -83,9 +108,9 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
 
 
 def scene_data(scene: Scene, folder: Path | None = None) -> dict:
-    """A scene as plain lists and numbers, the form of scene.schema.json; see doll_data.
+    """A scene as lists and numbers in the form of scene.schema.json; see doll_data.
 
-    Where placements share a doll, so do their entries: YAML writes it once.
+    Placements that share a doll share its data, which YAML writes once.
     """
     dolls: dict[int, dict] = {}
     data = {'name': scene.name, 'gravity': list(scene.gravity), 'step': scene.step,
@@ -104,12 +129,12 @@ def scene_data(scene: Scene, folder: Path | None = None) -> dict:
 
 
 def scene_text(scene: Scene, folder: Path, head: str = '') -> str:
-    """What save_scene writes into a file of ``folder``."""
+    """YAML of a scene for a file in ``folder``."""
     return yaml_text.to_text(scene_data(scene, folder), 'scene', head)
 
 
 def _named_doll(name: str, path: Path) -> tuple[Ragdoll | None, list[ModelError]]:
-    """Make the doll a scene names; errors of another file carry its name."""
+    """Build the doll of another file; its errors have the file's name."""
     try:
         file = config.find(name, beside=path.parent)
         doll, found = build_doll(yaml_text.read(file), file)
@@ -119,7 +144,7 @@ def _named_doll(name: str, path: Path) -> tuple[Ragdoll | None, list[ModelError]
 
 
 def _with_swings(doll: Ragdoll, entry: dict, path: Path) -> tuple[Ragdoll | None, list[ModelError]]:
-    """The doll with the swings that its place in the scene adds to its own."""
+    """The doll with the swings of its scene's entry added to its own."""
     if not entry.get('swings'):
         return doll, []
     own = len(doll.swings)

@@ -1,4 +1,4 @@
-"""Pushes: a force and a torque on a bone, at a point, from when, for how long."""
+"""Pushes: a constant force and torque on a bone for a time."""
 from __future__ import annotations
 
 import math
@@ -11,14 +11,14 @@ from .errors import set_fields
 from .vectors import Vector, finite_floats
 
 MAX_LOAD = 1e7
-"""N and N m: beyond it a push is refused, as no body that this package is for meets it."""
+"""N and N m, largest force and torque of a push: far beyond what a body of this package meets."""
 
 ARROW_LENGTH = 0.5
-"""m: length of the arrow of a push of 1 kN; longer and shorter ones go by the square root."""
+"""m, length of the arrow of 1 kN; others are in proportion to the square root of the force."""
 
 
 def check_times(duration: float, start: float | None) -> None:
-    """Check for how long, s, and from when on, s or None, something acts; see Push."""
+    """Check the duration (s) and start (s, or None) of a push or drive."""
     errors.check_positive('duration', duration)
     errors.check_range('duration', duration, 0, 1e6)
     if start is not None:
@@ -27,12 +27,24 @@ def check_times(duration: float, start: float | None) -> None:
 
 @dataclass(frozen=True)
 class Push:
-    """A steady ``force`` (N) and ``torque`` (N m) on one bone.
+    """A constant force and torque on one bone.
 
-    ``point`` (m) is where the force attacks, from the bone's centre of mass. With ``local``,
-    force, torque and point are given along the bone's own axes and turn with it; otherwise
-    force and torque are along the world's axes, and the point keeps to the bone all the same.
-    It acts for ``duration`` s of simulated time from ``start`` s (None: from the next instant).
+    Args:
+        bone: its name in Scene.bone_names.
+        force: (3,) N, world axes.
+        torque: (3,) N m, world axes.
+        point: (3,) m, where the force acts, from the bone's centre of mass along the world's axes
+            as it starts; the point moves with the bone.
+        duration: s of simulated time.
+        start: s of simulated time; None: when it is given to Simulation.push.
+        local: whether force, torque and point are in the bone's axes and turn with it.
+
+    Raises:
+        OutOfRange, NotPositive, NotFinite, WrongForm: for its fields.
+
+    Example:
+        >>> Push('torso', force=(500, 0, 0), duration=0.2).force
+        (500.0, 0.0, 0.0)
     """
 
     bone: str
@@ -52,9 +64,9 @@ class Push:
         check_times(self.duration, self.start)
 
     def arrow(self, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
-        """Tail and tip (2, 3) m, world frame, of an arrow that ends where the force attacks.
+        """Tail and tip (2, 3) m, world frame, of an arrow that ends where the force acts.
 
-        The bone's centre of mass is at ``position`` (3,) m, its axes at ``orientation`` (4,).
+        ``position`` (3,) m and ``orientation`` (4,) are the bone's pose.
         """
         force, point = np.array(self.force), np.array(self.point)
         if self.local:

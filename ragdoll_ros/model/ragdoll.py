@@ -1,8 +1,7 @@
-"""What a doll is: bones with shapes and masses, joints between them, one tree.
+"""A doll: a kinematic tree of rigid bodies (bones) and joints. Frozen, validated data.
 
-Frozen data, no behaviour but validation. SI units, radians, REP 103: x forward, y left, z up.
-All positions, axes and orientations are given in the doll's frame in the bind pose, the pose
-in which every joint angle is zero. Quaternions are x, y, z, w.
+SI units, radians, REP 103: x forward, y left, z up. All positions, axes and orientations are in
+the doll's frame in the bind pose, where every joint angle is zero. Quaternions are x, y, z, w.
 """
 from __future__ import annotations
 
@@ -27,20 +26,35 @@ from .vectors import Quaternion, Vector, finite_floats, floats, unit_vector
 Limits = tuple[float, float]
 
 DEFAULT_COLOR = (0.5, 0.64, 0.82, 1.0)
-"""Red, green, blue, opacity of a bone that has no colour of its own."""
+"""Red, green, blue, opacity of a bone without a colour."""
 
 WORLD = 'world'
-"""Name of the frame that everything is in; no bone may bear it, for frames are told by names."""
+"""Name of the world frame; no bone may have it, as tf frames are named by bones."""
 
 
 @dataclass(frozen=True)
 class Bone:
-    """A rigid body of ``mass`` kg with its centre of mass at ``position``.
+    """A rigid body.
 
-    ``orientation`` turns the shape's own axes, which are its principal axes of inertia, into the
-    doll's. ``friction``, ``rolling_friction`` (m) and ``restitution`` override the scene's
-    material; None keeps it. ``color`` is red, green, blue, alpha from 0 to 1. ``moments`` are
-    those about the centre of mass along its axes, kg m^2; None: those of the uniform solid.
+    Args:
+        name: unique in its doll, not 'world'.
+        shape: a Box, Capsule, Compound, Cylinder or Sphere; its axes are the bone's.
+        mass: kg.
+        position: (3,) m, the centre of mass in the doll's frame, bind pose.
+        orientation: quaternion x, y, z, w, bone's axes (principal axes of inertia) to doll's.
+        friction: Coulomb's coefficient; None: the scene's material's.
+        rolling_friction: lever arm, m; None: the material's.
+        restitution: 0 to 1; None: the material's.
+        color: red, green, blue, opacity, 0 to 1.
+        moments: (3,) kg m^2, principal moments about the centre of mass along the bone's axes;
+            None: those of a uniform solid of its shape.
+
+    Raises:
+        ModelError: for a field out of its range, by a subclass that names the fault.
+
+    Example:
+        >>> Bone('head', Sphere(0.1), mass=5, position=(0, 0, 1.6)).position
+        (0.0, 0.0, 1.6)
     """
 
     name: str
@@ -75,22 +89,22 @@ class Bone:
 
     @property
     def pose(self) -> Pose:
-        """Of its centre of mass and its shape's axes, doll's frame, bind pose."""
+        """Pose in the doll's frame, bind pose."""
         return Pose(np.array(self.position), np.array(self.orientation))
 
     @property
     def inertia(self) -> Vector:
-        """Principal moments about the centre of mass along the shape's axes, kg m^2."""
+        """Principal moments (3,) kg m^2 about the centre of mass, given or of the shape."""
         return self.shape.inertia(self.mass) if self.moments is None else self.moments
 
 
 MAX_SWING = math.radians(85)
-"""Largest swing of a limited ball joint: at 90 degrees its three angles lose a freedom."""
+"""rad, largest swing limit of a ball joint: at 90 degrees its Euler angles are singular."""
 
 
 @dataclass(frozen=True)
 class JointKind:
-    """How many axes a kind of joint names and how many pairs of limits it takes."""
+    """Numbers of axes, of pairs of limits and of degrees of freedom of a kind of joint."""
 
     name: str
     axes: int
@@ -107,22 +121,33 @@ JOINT_KINDS = {kind.name: kind for kind in (
 
 @dataclass(frozen=True)
 class Joint:
-    """What ties ``child`` to ``parent`` at ``anchor``.
-
-    An angle is that of the child relative to the parent, right-handed about its axis.
+    """A joint between two bones of a doll; angles are the child's relative to the parent.
 
     - hinge: one axis, one pair of limits.
-    - universal: the first axis is fixed in the parent, the second in the child; they turn in
-      that order and are perpendicular in the bind pose.
-    - ball: one axis, the twist axis; either free, or limited by a swing (-s, s) about each of
-      two axes across it (a pyramid, as in PhysX; s at most 85 degrees) and a twist (-t, t). Or two
-      axes, the twist axis and x across it, and three pairs of limits: about x, which is fixed in
-      the parent, about y = twist axis times x (85 degrees at the most), and the twist.
+    - universal: the first axis is fixed in the parent, the second in the child, perpendicular in
+      the bind pose; R = R(first) R(second).
+    - ball: one axis, the twist axis; free, or with limits (-s, s), s up to 85 degrees, about two
+      axes across it (a pyramid, as in PhysX) and a twist (-t, t). Or two axes, twist and x
+      across it, and three pairs of limits: about x, which is fixed in the parent, about
+      y = twist axis times x (up to 85 degrees), and the twist.
     - fixed: no axes.
 
-    ``limits`` in rad, None for a free axis; kept to 1e-9 degrees, so that files written in
-    degrees read back to the same bits. ``damping`` is in N m s/rad on each axis. ``names`` are
-    those of the joint's angles, one for each; without them they are called as the child.
+    Args:
+        parent, child: names of the bones.
+        kind: 'hinge', 'universal', 'ball' or 'fixed'.
+        anchor: (3,) m, doll's frame, bind pose.
+        axes: unit vectors (3,), doll's frame, bind pose; normalised. Angles are right-handed.
+        limits: pairs (lower, upper), rad, None for a free axis; rounded to 1e-9 degrees, so that
+            files in degrees read back to the same bits.
+        damping: N m s/rad on each axis.
+        names: of the angles; default the child's, with a suffix where there are several.
+
+    Raises:
+        WrongAxes, LimitsReversed, OutOfRange, WrongForm, NotUnit, NotFinite: for its fields.
+
+    Example:
+        >>> Joint('thigh', 'shin', 'hinge', (0, 0, 0.5), ((0, 1, 0),), ((0, 2.5),)).angle_names
+        ('shin',)
     """
 
     parent: str
@@ -182,7 +207,7 @@ class Joint:
 
     @property
     def is_free_ball(self) -> bool:
-        """Whether a quaternion stands for its turn: a ball joint without limits."""
+        """Whether it is a ball joint without limits, whose coordinate is a quaternion."""
         return self.kind == 'ball' and not any(self.limits)
 
     @property
@@ -192,9 +217,7 @@ class Joint:
 
     @property
     def angle_names(self) -> tuple[str, ...]:
-        """Name of each joint angle: its own, else the child's, with a suffix where there are
-        several.
-        """
+        """Name of each joint angle; see ``names``."""
         if self.names:
             return self.names
         suffixes = {'universal': ('_1', '_2'), 'ball': ('_x', '_y', '_z')}
@@ -203,7 +226,7 @@ class Joint:
 
     @property
     def angle_limits(self) -> tuple[Limits | None, ...]:
-        """Limits of each angle of angle_names, rad; None where it is free."""
+        """Limits of each angle of angle_names, rad; None: free."""
         if self.kind == 'ball' and len(self.limits) == 2:
             swing, twist = self.limits
             return (swing, swing, twist)
@@ -212,12 +235,11 @@ class Joint:
 
 @dataclass(frozen=True)
 class SkeletonFrame:
-    """A bone of the skin's skeleton, fixed on the body that carries it.
+    """A frame of the skin's skeleton fixed to a bone of the doll: an entry of ``riders``.
 
-    ``bone`` names the carrying bone of the doll; ``position`` (m) and ``orientation`` are those
-    of the rider in that bone's own frame: its centre of mass and its shape's axes. Riders have
-    no mass and meet nothing; they are there so that a skin can follow (see riders.py). Their
-    names are their own: a rider may be called as the bone that carries it.
+    ``position`` (m) and ``orientation`` are in the frame of ``bone``: its centre of mass and its
+    axes. It has no mass and no shape; a skin follows it (see skeleton.py). Its name may be that
+    of a bone.
     """
 
     name: str
@@ -232,12 +254,25 @@ class SkeletonFrame:
 
 @dataclass(frozen=True, repr=False)
 class Ragdoll:
-    """A tree of bones. ``bones`` fixes the order; one of them, the root, has no parent.
+    """A doll: a kinematic tree of bones and joints.
 
-    ``swings`` ride on bones and do not act back on them; ``riders`` are what else moves with the
-    bones, in the order of the skeleton they are of. ``model`` is the path of the character that
-    the riders are of, made absolute; nothing here opens it. ``no_collision`` are pairs of bones,
-    by name, that do not collide with each other, beside those that a joint connects.
+    Args:
+        name: of the doll.
+        bones: their order is that of all arrays; exactly one, the root, is no joint's child.
+        joints: one for each other bone.
+        swings: chains of point masses attached to bones (model/swing.py); they do not act back.
+        riders: frames of a skin's skeleton, attached to bones; see Riders.
+        model: path of the character that the riders are from; made absolute, not opened.
+        no_collision: pairs of names of bones that do not collide, beside jointed ones.
+
+    Raises:
+        DuplicateName, UnknownBone, ConnectedTwice, JointCycle, Detached, WrongForm: if it is no
+            tree or a name is wrong.
+
+    Example:
+        >>> ball = Ragdoll('ball', (Bone('ball', Sphere(0.1), mass=1, position=(0, 0, 0)),))
+        >>> ball
+        Ragdoll 'ball': 1 bones, 0 joints, 0 degrees of freedom, 1 kg
     """
 
     name: str
@@ -266,7 +301,7 @@ class Ragdoll:
 
     @property
     def extent(self) -> float:
-        """Longest side, m, of the box around the doll as it is bound, along the world's axes."""
+        """Upper bound, m, of the longest edge of its bounding box in the bind pose."""
         positions = np.array([bone.position for bone in self.bones])
         largest = max(max(bone.shape.half_extents) for bone in self.bones)
         return float(np.ptp(positions, axis=0).max() + 2 * largest)
@@ -289,7 +324,7 @@ class Ragdoll:
 
     @property
     def excluded_pairs(self) -> frozenset[frozenset[str]]:
-        """Pairs of bones, by name, that pass through each other: jointed ones, ``no_collision``."""
+        """Pairs of names of bones that do not collide: jointed ones and ``no_collision``."""
         jointed = ((joint.parent, joint.child) for joint in self.joints)
         return frozenset(frozenset(pair) for pair in (*jointed, *self.no_collision))
 
@@ -298,7 +333,7 @@ class Ragdoll:
                 f'{sum(joint.dof for joint in self.joints)} degrees of freedom, {self.mass:.4g} kg')
 
     def bone(self, name: str) -> Bone:
-        """Find a bone by its name; UnknownBone if there is none."""
+        """The bone of a name. Raises UnknownBone."""
         for bone in self.bones:
             if bone.name == name:
                 return bone
@@ -313,7 +348,7 @@ class Ragdoll:
         return tuple(ordered)
 
     def joints_depth_first(self) -> tuple[Joint, ...]:
-        """All joints, each one's whole branch before the next, as engines count them."""
+        """All joints, depth first, as engines order them."""
         below = self._joints_below()
         ordered = below[self.root.name]
         for after, joint in enumerate(ordered, start=1):
@@ -321,21 +356,21 @@ class Ragdoll:
         return tuple(ordered)
 
     def _joints_below(self) -> defaultdict[str, list[Joint]]:
-        """The joints of each bone to its children."""
+        """Joints to the children of each bone."""
         below: defaultdict[str, list[Joint]] = defaultdict(list)
         for joint in self.joints:
             below[joint.parent].append(joint)
         return below
 
     def replace_bone(self, name: str, **changes: object) -> Ragdoll:
-        """The same doll with one bone changed."""
+        """A copy with fields of one bone replaced. Raises UnknownBone."""
         self.bone(name)
         bones = tuple(dataclasses.replace(bone, **changes) if bone.name == name else bone
                       for bone in self.bones)
         return dataclasses.replace(self, bones=bones)
 
     def renamed(self, rename: Callable[[str], str]) -> Ragdoll:
-        """The same doll with every bone named anew."""
+        """A copy with every bone renamed."""
         bones = tuple(dataclasses.replace(bone, name=rename(bone.name)) for bone in self.bones)
         joints = tuple(dataclasses.replace(joint, parent=rename(joint.parent),
                                            child=rename(joint.child)) for joint in self.joints)
@@ -344,7 +379,7 @@ class Ragdoll:
 
 
 def tree_errors(names: list[str], edges: list[tuple[str, str]]) -> list[errors.ModelError]:
-    """Find all that keeps (parent, child) edges from being one tree over the named bones."""
+    """Errors that keep (parent, child) edges from being one tree over the named bones."""
     found: list[errors.ModelError] = []
     if not names:
         found.append(errors.Detached('bones', names, 'at least one bone'))
@@ -373,7 +408,7 @@ def tree_errors(names: list[str], edges: list[tuple[str, str]]) -> list[errors.M
 
 def attachment_errors(key: str, names: list[str],
                    carried: list[tuple[str, str]]) -> list[errors.ModelError]:
-    """Find what of (name, carrying bone) rides on no bone or shares a name."""
+    """Errors of what is attached to bones, pairs (name, bone): unknown bones, equal names."""
     found: list[errors.ModelError] = []
     known, seen = set(names), set()
     for index, (name, bone) in enumerate(carried):
@@ -388,7 +423,7 @@ def attachment_errors(key: str, names: list[str],
 
 def no_collision_errors(names: list[str],
                         pairs: Sequence[Sequence[str]]) -> list[errors.ModelError]:
-    """Find what of pairs that do not collide is no pair of two bones."""
+    """Errors of pairs of ``no_collision`` that are not two bones."""
     found: list[errors.ModelError] = []
     for index, pair in enumerate(pairs):
         where = f'no_collision[{index}]'
@@ -400,7 +435,7 @@ def no_collision_errors(names: list[str],
 
 
 def angle_name_errors(joints: Sequence[Joint]) -> list[errors.ModelError]:
-    """Find joints whose angles are called as another's."""
+    """Errors of joints that share a name of an angle."""
     found: list[errors.ModelError] = []
     seen: set[str] = set()
     for index, joint in enumerate(joints):
@@ -411,7 +446,7 @@ def angle_name_errors(joints: Sequence[Joint]) -> list[errors.ModelError]:
 
 
 def joint_frame(joint: Joint) -> np.ndarray:
-    """Orientation (4,) of a joint's frame in the doll's: of a ball joint, z is the twist axis."""
+    """Orientation (4,) of a joint's frame in the doll's; of a ball joint z is the twist axis."""
     if joint.kind != 'ball':
         return np.array(rotation.IDENTITY)
     if len(joint.axes) == 2:
@@ -435,10 +470,9 @@ def _is_ancestor(parent_of: dict[str, str], start: str, goal: str) -> bool:
 
 
 def _checked_moments(moments: Vector) -> Vector:
-    """Principal moments that a body can have: each at most the sum of the other two.
+    """Principal moments that fulfil the triangle inequality, with a tolerance of 1e-6.
 
-    Two make up the third of what is flat. What six digits have rounded beyond that is taken back,
-    as PyBullet takes such an inertia for zero and MuJoCo refuses it.
+    Rounding beyond it is removed: PyBullet takes such an inertia for zero, MuJoCo refuses it.
     """
     errors.check_positive('inertia', moments)
     others = tuple(sum(moments[:axis] + moments[axis + 1:]) for axis in range(3))

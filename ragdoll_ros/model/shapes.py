@@ -1,6 +1,6 @@
-"""Simple shapes of bones: sphere, box, cylinder, capsule; uniform solids in their own axes, in m.
+"""Primitive shapes of bones: sphere, box, cylinder, capsule. Uniform solids in their own axes, m.
 
-Several of them together are a Compound (compound.py).
+A bone of several shapes has a Compound (compound.py).
 """
 from __future__ import annotations
 
@@ -19,42 +19,52 @@ from .rotation import IDENTITY
 from .vectors import Quaternion, Vector, finite_floats, floats, unit_vector
 
 SEGMENTS = 20
-"""Corners of a circle in a mesh."""
+"""Vertices of a circle in a mesh."""
 
 
 class Solid:
-    """What the simple shapes have in common; a Compound has all of it too.
+    """Base of the primitive shapes; a Compound has the same properties and methods.
 
-    Each has besides, in its own axes:
-    - ``volume``, m^3, and ``half_extents``, m, half the size of its bounding box
-    - ``support``: six terms, m, of its support function; see support_distance
+    Each shape defines, in its own axes:
+    - ``volume``, m^3, and ``half_extents``, m, half the edges of its bounding box
+    - ``support_terms``: six terms, m, of its support function; see support_distance
     - ``inertia(mass)``: principal moments of the uniform solid about its centre, kg m^2
     - ``signed_distance(points)``: (p,) m of points (p, 3) from its surface, negative inside
-    - ``mesh()``: corners (p, 3) m, triangles (t, 3), counter-clockwise as seen from outside
+    - ``mesh()``: vertices (p, 3) m, triangles (t, 3), counter-clockwise seen from outside
     """
 
     kind: ClassVar[str]
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """The simple shapes that it is for whatever collides with it: itself alone."""
-        return _by_itself(self)
+        """The shapes that collide: itself alone."""
+        return _as_parts(self)
 
     @property
     def primitives(self) -> tuple[Part, ...]:
-        """What it is drawn as: boxes, cylinders and spheres, as every viewer knows just these."""
-        return _by_itself(self)
+        """Boxes, cylinders and spheres to draw: every viewer has these."""
+        return _as_parts(self)
 
     def support(self, direction: np.ndarray) -> np.ndarray:
-        """How far (...,) m it extends along unit directions (..., 3) of its own axes."""
+        """Support function (...,) m: its extent along unit directions (..., 3) in its own axes."""
         return support_distance(np.array(self.support_terms), np.asarray(direction, float))
 
 
 @dataclass(frozen=True)
 class Part:
-    """A simple shape within another one: its centre at ``position`` m along that one's own axes.
+    """One primitive shape of a Compound, at its pose in the compound's axes.
 
-    ``orientation`` turns the part's axes into those of the whole.
+    Args:
+        shape: a Sphere, Box, Cylinder or Capsule.
+        position: (3,) m, its centre.
+        orientation: quaternion x, y, z, w, part's axes to compound's axes; normalised.
+
+    Raises:
+        WrongForm, NotFinite, NotUnit: for a field that is none of these.
+
+    Example:
+        >>> Part(Sphere(0.1), position=(0, 0, 0.2)).size
+        (0.2, 0.2, 0.2)
     """
 
     shape: Shape
@@ -69,34 +79,45 @@ class Part:
 
     @property
     def is_centred(self) -> bool:
-        """Whether its centre and axes are those of the whole."""
+        """Whether its pose is the identity."""
         return not any(self.position) and self.orientation == IDENTITY
 
     @property
     def kind(self) -> str:
-        """Its shape's."""
+        """Its shape's kind."""
         return self.shape.kind
 
     @property
     def size(self) -> Vector:
-        """Edges, or diameters and length, m."""
+        """(3,) m, edges of its bounding box."""
         return floats(2 * half for half in self.shape.half_extents)
 
     @property
     def pose(self) -> Pose:
-        """Of its centre and axes, in those of the whole."""
+        """Pose in the compound's axes."""
         return Pose(np.array(self.position), np.array(self.orientation))
 
 
 @functools.lru_cache(4096)
-def _by_itself(shape: Shape) -> tuple[Part, ...]:
-    """Asked for many times while a simulation is built: a batch builds one for each fall."""
+def _as_parts(shape: Shape) -> tuple[Part, ...]:
+    """One part. Cached: a batch of simulations asks for the same shapes many times."""
     return (Part(shape),)
 
 
 @dataclass(frozen=True)
 class Sphere(Solid):
-    """A solid ball of ``radius`` m."""
+    """A solid sphere.
+
+    Args:
+        radius: m.
+
+    Raises:
+        NotPositive, NotFinite: for the radius.
+
+    Example:
+        >>> round(Sphere(0.1).volume, 6)
+        0.004189
+    """
 
     radius: float
     kind: ClassVar[str] = 'sphere'
@@ -130,7 +151,18 @@ class Sphere(Solid):
 
 @dataclass(frozen=True)
 class Box(Solid):
-    """A solid box with full edge lengths ``size`` m along its x, y and z."""
+    """A solid box.
+
+    Args:
+        size: (3,) m, full edges along its x, y and z.
+
+    Raises:
+        NotPositive, NotFinite, WrongForm: for the size.
+
+    Example:
+        >>> Box((0.2, 0.3, 0.5)).half_extents
+        (0.1, 0.15, 0.25)
+    """
 
     size: Vector
     kind: ClassVar[str] = 'box'
@@ -168,7 +200,19 @@ class Box(Solid):
 
 @dataclass(frozen=True)
 class Cylinder(Solid):
-    """A solid cylinder along its own z: ``radius`` and full ``length``, m."""
+    """A solid cylinder along its own z.
+
+    Args:
+        radius: m.
+        length: m, from face to face.
+
+    Raises:
+        NotPositive, NotFinite: for the radius or the length.
+
+    Example:
+        >>> Cylinder(radius=0.1, length=0.4).half_extents
+        (0.1, 0.1, 0.2)
+    """
 
     radius: float
     length: float
@@ -205,9 +249,18 @@ class Cylinder(Solid):
 
 @dataclass(frozen=True)
 class Capsule(Solid):
-    """A cylinder along its own z of ``length`` m between two half balls of ``radius`` m.
+    """A solid cylinder along its own z with a hemisphere on each end.
 
-    The whole is length + 2 radius long, as in MuJoCo, PyBullet and SDF.
+    Args:
+        radius: m.
+        length: m, of the cylinder; the whole is length + 2 radius long, as in MuJoCo and SDF.
+
+    Raises:
+        NotPositive, NotFinite: for the radius or the length.
+
+    Example:
+        >>> Capsule(radius=0.125, length=0.5).half_extents
+        (0.125, 0.125, 0.375)
     """
 
     radius: float
@@ -232,7 +285,7 @@ class Capsule(Solid):
 
     @property
     def primitives(self) -> tuple[Part, ...]:
-        """What it is drawn as: a cylinder between two balls."""
+        """A cylinder and two spheres."""
         end = self.length / 2
         return (Part(Cylinder(self.radius, self.length)),
                 *(Part(Sphere(self.radius), (0.0, 0.0, z)) for z in (end, -end)))
@@ -240,8 +293,8 @@ class Capsule(Solid):
     def inertia(self, mass: float) -> Vector:
         """Principal moments of the uniform solid about its centre, kg m^2.
 
-        The sum of a cylinder and two half balls, each half ball moved by Steiner's theorem
-        from the flat face to the end of the cylinder (centre of mass 3/8 r off the face).
+        Those of a cylinder and two hemispheres, each moved to the cylinder's end by the parallel
+        axis theorem (its centre of mass is 3/8 r from its face).
         """
         r, length = self.radius, self.length
         barrel = mass * length / (length + 4 / 3 * r)
@@ -266,24 +319,23 @@ Shape = Sphere | Box | Cylinder | Capsule
 SHAPES: dict[str, type] = {shape.kind: shape for shape in (Sphere, Box, Cylinder, Capsule)}
 SIZES = {kind: tuple(field.name for field in dataclasses.fields(shape))
          for kind, shape in SHAPES.items()}
-"""Names of the sizes of each kind of shape."""
+"""Names of each kind's sizes."""
 
 
-def support_distance(support: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Support function: how far (...,) m shapes extend along unit directions of their own axes.
+def support_distance(terms: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Support function (...,) m of shapes along unit directions (..., 3) in their own axes.
 
-    ``support`` (..., 6) m are half edges along x, y and z, half the length of an axis along z, a
-    radius all round and one across z; ``direction`` (..., 3).
+    ``terms`` (..., 6) m: half edges along x, y and z; half length of the axis along z; radius of
+    the sphere swept along it; radius of the disc across it.
     """
-    down = np.abs(direction)
-    across = np.sqrt(np.maximum(0, 1 - down[..., 2] ** 2))
-    edges, along, rounds, rims = (support[..., :3], support[..., 3], support[..., 4],
-                                  support[..., 5])
-    return (edges * down).sum(axis=-1) + along * down[..., 2] + rounds + rims * across
+    cosines = np.abs(direction)
+    sines = np.sqrt(np.maximum(0, 1 - cosines[..., 2] ** 2))
+    edges, along, sphere, disc = (terms[..., :3], terms[..., 3], terms[..., 4], terms[..., 5])
+    return (edges * cosines).sum(axis=-1) + along * cosines[..., 2] + sphere + disc * sines
 
 
 def _beyond_faces(beyond: np.ndarray) -> np.ndarray:
-    """Signed distance (p,) from how far beyond each pair of faces points are, (p, k)."""
+    """Signed distance (p,) m, given the distances (p, k) beyond k pairs of faces."""
     inside = np.minimum(beyond.max(axis=1), 0)
     return np.linalg.norm(np.maximum(beyond, 0), axis=1) + inside
 
@@ -293,7 +345,7 @@ def _half_circle() -> np.ndarray:
 
 
 def _revolved(radii: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Surface of revolution about z of a profile that runs upwards."""
+    """Mesh of the surface of revolution of a profile about z, from bottom to top."""
     turn = np.linspace(0, 2 * np.pi, SEGMENTS, endpoint=False)
     circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     rings = np.concatenate([radii[:, None, None] * circle,

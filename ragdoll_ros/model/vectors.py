@@ -11,12 +11,12 @@ Quaternion = tuple[float, float, float, float]
 
 
 def floats(values: object) -> tuple[float, ...]:
-    """Turn any sequence of numbers into a tuple of floats: hashable, comparable, exact."""
+    """A tuple of floats."""
     return tuple(float(value) for value in values)
 
 
 def finite_floats(path: str, values: object, count: int = 3) -> tuple[float, ...]:
-    """``count`` floats; WrongForm where that is not what is given, NotFinite for NaN, infinity."""
+    """``count`` finite floats. Raises WrongForm, NotFinite."""
     try:
         found = floats(values)
     except (TypeError, ValueError):
@@ -29,7 +29,7 @@ def finite_floats(path: str, values: object, count: int = 3) -> tuple[float, ...
 
 def unit_vector(path: str, values: object, expected: str = 'a direction, not zero',
          count: int = 3) -> tuple[float, ...]:
-    """``count`` numbers scaled to length one; NotUnit for zero, else as finite_floats()."""
+    """``count`` floats scaled to length one. Raises NotUnit for zero, WrongForm, NotFinite."""
     values = finite_floats(path, values, count)
     length = math.hypot(*values)
     if length < 1e-9:
@@ -38,9 +38,9 @@ def unit_vector(path: str, values: object, expected: str = 'a direction, not zer
 
 
 def clamp_norm(values: Sequence[float], most: float) -> tuple[Vector, float]:
-    """A finite vector, at most ``most`` long, and the length that it had.
+    """A finite vector scaled to a norm of at most ``most``, and its norm before.
 
-    The vector is first divided by its largest component, so that nothing overflows on the way.
+    It is first divided by its largest component, so that nothing overflows.
     """
     largest = max(map(abs, values))
     if largest == 0:

@@ -1,4 +1,4 @@
-"""A run as poses over time: taken as they come, and asked for the pose at any instant."""
+"""Recordings: poses of a scene over time, with interpolation."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ if TYPE_CHECKING:
     from ..physics.simulation import Simulation
 
 UNIT_TOLERANCE = 1e-6
-"""How far a quaternion's length may be from 1."""
+"""Largest deviation of a quaternion's norm from 1."""
 
 
 @dataclass(frozen=True)
 class RecordedPose:
-    """Where all is at one instant: positions (n, 3) m, orientations (n, 4), rods (m, 2, 3) m."""
+    """One instant: positions (n, 3) m, orientations (n, 4) x, y, z, w, rods (m, 2, 3) m."""
 
     positions: np.ndarray
     orientations: np.ndarray
@@ -27,7 +27,7 @@ class RecordedPose:
 
 @dataclass(frozen=True)
 class Recording:
-    """Poses of a scene's n bones at k >= 1 instants; a ModelError for arrays that do not fit."""
+    """World poses of a scene's n bones at k >= 1 instants. Raises a ModelError for wrong arrays."""
 
     scene: Scene
     times: np.ndarray
@@ -37,7 +37,7 @@ class Recording:
     orientations: np.ndarray
     """(k, n, 4) unit quaternions x, y, z, w."""
     rods: np.ndarray | None = None
-    """(k, m, 2, 3) m: both ends of every rod of the swings."""
+    """(k, m, 2, 3) m: both ends of each rod of the swings."""
 
     def __post_init__(self) -> None:
         count, bones = len(self.times), len(self.scene.bones)
@@ -55,15 +55,14 @@ class Recording:
 
     @property
     def duration(self) -> float:
-        """Instant of the last pose, s."""
+        """Time of the last pose, s."""
         return float(self.times[-1])
 
     def at(self, time: float) -> RecordedPose:
-        """Where all is at ``time`` s; before the first and after the last pose, that one.
+        """Interpolated pose at ``time`` s, clamped to the recording.
 
-        Between two: positions on the straight line, orientations on the shorter arc (normalised
-        mean, less than 0.04 degrees from the arc's even motion as long as a bone rotates less
-        than 30 degrees in between).
+        Positions are linear, orientations normalised linear along the shorter arc: within 0.04
+        degrees of slerp for rotations of less than 30 degrees between poses.
         """
         index = int(np.clip(np.searchsorted(self.times, time, 'right') - 1, 0, len(self) - 1))
         begin = self.pose(index)
@@ -78,7 +77,7 @@ class Recording:
                     rotation.normalized(orientations), rods)
 
     def pose(self, index: int) -> RecordedPose:
-        """Where all was at an instant of ``times``."""
+        """Pose at ``times[index]``."""
         rods = None if self.rods is None else self.rods[index]
         return RecordedPose(self.positions[index], self.orientations[index], rods)
 
@@ -87,9 +86,22 @@ class Recording:
 
 
 class Recorder:
-    """Takes poses of one scene as they come.
+    """Collects poses of one scene into a recording.
 
-    Time that goes backwards is a reset: the recording goes on where it is, at the next pose.
+    A time that goes backwards is a reset: the recording continues at its end.
+
+    Args:
+        scene: of all the poses.
+
+    Example:
+        >>> scene = load_scene('drop')
+        >>> recorder = Recorder(scene)
+        >>> with Simulation(scene) as simulation:
+        ...     for _ in range(3):
+        ...         recorder.take(simulation)
+        ...         state = simulation.advance()
+        >>> recorder.recording().times
+        array([0.  , 0.01, 0.02])
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -104,11 +116,11 @@ class Recorder:
 
     @property
     def duration(self) -> float:
-        """Instant of the last pose, s."""
+        """Time of the last pose, s."""
         return self._times[-1] if self._times else 0.0
 
     def add(self, time: float, pose: RecordedPose) -> None:
-        """Take the pose at ``time`` s, which must stay as it is; the same instant again is not."""
+        """Add the pose at ``time`` s, without a copy; the same time again is ignored."""
         if not self._times or time < self._last:
             self._shift = self.duration - time
         self._last = time
@@ -117,13 +129,13 @@ class Recorder:
             self._poses.append(pose)
 
     def take(self, simulation: Simulation) -> None:
-        """Take where all of a simulation is now."""
+        """Add the current poses of a simulation."""
         state, swings = simulation.state, simulation.swings
         self.add(simulation.time / SECOND, RecordedPose(state.positions, state.orientations,
                                                 None if swings is None else swings.rods))
 
     def recording(self) -> Recording:
-        """What was taken; OutOfRange if that is nothing."""
+        """The recording so far. Raises OutOfRange if it is empty."""
         poses = self._poses
         if not poses:
             raise errors.OutOfRange('recording', 0, 'at least one pose')
@@ -135,7 +147,7 @@ class Recorder:
 
 
 def _check(key: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
-    """Raise a ModelError unless an array has this shape and finite numbers alone."""
+    """Raise WrongForm or NotFinite unless an array has the shape and is finite."""
     if array.shape != shape:
         raise errors.WrongForm(key, array.shape, f'the shape {shape}')
     if not np.isfinite(array).all():

@@ -1,4 +1,4 @@
-"""Rods of swings from their masses alone, as a topic tells them."""
+"""Rods of swings from the positions of their masses."""
 from __future__ import annotations
 
 import numpy as np
@@ -10,12 +10,12 @@ from ..physics.swing.mount import mounts
 
 
 class Rods:
-    """Where each rod of a scene's swings begins: on a bone, or at the mass before it."""
+    """Start of each rod of a scene's swings: on a bone, or the mass before it."""
 
     def __init__(self, scene: Scene) -> None:
         bones, roots, firsts, free = [], [], [], []
         self.count = 0
-        """Masses of all swings."""
+        """Number of masses of all swings."""
         for mount in mounts(scene):
             links = len(mount.swing.links)
             bones.append(mount.bone)
@@ -28,9 +28,9 @@ class Rods:
         self._firsts, self._free = np.array(firsts, int), np.array(free, int)
 
     def ends(self, masses: np.ndarray, state: State) -> np.ndarray:
-        """Both ends (m, 2, 3) m of every rod, from the masses (m, 3) m and the bones' poses.
+        """Both ends (m, 2, 3) m of each rod, from the masses (m, 3) m and the bones' poses.
 
-        A free mass has no rod: both ends are its own place.
+        Of a free mass, which has no rod, both are its position.
         """
         begins = np.concatenate([masses[:1], masses[:-1]])
         begins[self._firsts] = state.positions[self._bones] + rotation.rotate(

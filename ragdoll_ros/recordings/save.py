@@ -1,4 +1,4 @@
-"""A recording into a file of the format that the file's suffix names."""
+"""Writing a recording in the format of the file's suffix."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
@@ -17,22 +17,18 @@ FORMATS: dict[str, Callable[[Recording, Mapping[int, Skin]], bytes]] = {
     '.glb': gltf_bytes,
     '.bvh': lambda recording, skins: bvh_text(recording).encode(),
     '.csv': lambda recording, skins: csv_text(recording).encode()}
-"""By suffix: MCAP, glTF, BVH, CSV."""
+"""Encoders by suffix."""
 
 
 def check_format(path: Path) -> None:
-    """Raise OutOfRange for a file's name whose suffix is not one of FORMATS."""
+    """Raise OutOfRange for a suffix that is not in FORMATS."""
     if path.suffix not in FORMATS:
         raise errors.OutOfRange('', path.name, 'a name that ends in ' + ', '.join(FORMATS))
 
 
 def encoded_files(recording: Recording, path: str | Path,
              skins: Mapping[int, Skin] = {}) -> dict[Path, bytes]:
-    """Files with their contents; OutOfRange for a suffix that is not one of FORMATS.
-
-    It is one file but for the BVH of several dolls, which is one for each: run.bvh becomes
-    run_left.bvh and run_right.bvh. ``skins`` are those of some dolls, by index, for glTF.
-    """
+    """Contents of the files that save_recording writes, by path. Raises OutOfRange."""
     path = Path(path)
     check_format(path)
     dolls = recording.scene.dolls
@@ -45,7 +41,29 @@ def encoded_files(recording: Recording, path: str | Path,
 
 def save_recording(recording: Recording, path: str | Path,
                    skins: Mapping[int, Skin] = {}) -> list[Path]:
-    """Write what `contents` has; the paths. Unreadable where the disk refuses."""
+    """Write a recording as MCAP, glTF, BVH or CSV.
+
+    Args:
+        recording: from Recorder.recording().
+        path: of the file; its suffix .mcap, .glb, .bvh or .csv is the format. BVH of several dolls
+            is a file for each: run.bvh becomes run_left.bvh and run_right.bvh.
+        skins: of dolls by index, for glTF.
+
+    Returns:
+        Paths of the files.
+
+    Raises:
+        OutOfRange: the suffix is another one.
+        Unreadable: the file can not be written.
+
+    Example:
+        >>> scene = load_scene('drop')
+        >>> recorder = Recorder(scene)
+        >>> with Simulation(scene) as simulation:
+        ...     recorder.take(simulation)
+        >>> [path.name for path in save_recording(recorder.recording(), 'fall.glb')]
+        ['fall.glb']
+    """
     made = encoded_files(recording, path, skins)
     try:
         for file, content in made.items():
