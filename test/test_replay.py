@@ -74,7 +74,7 @@ def test_one_number_that_is_another_is_found_at_the_next_hash(tmp_path, replay, 
     push['force'][1] += 1e-9
     code, said, _ = replay(write_bag(tmp_path / 'bag', with_events(messages, changed)))
     assert code == 1
-    assert 'part after tick 20, at tick 30 at the latest' in said
+    assert 'differ after tick 20, at tick 30 at the latest' in said
     # The reset brings both to the same start: 160 to 200 are equal again, as was 0 to 20.
     assert '7 of 21 hashes equal' in said
 
@@ -83,7 +83,7 @@ def test_a_state_that_is_another_from_the_start_is_said(tmp_path, replay, messag
     changed = events(messages)
     changed[0]['state'] = '0' * 64
     code, said, _ = replay(write_bag(tmp_path / 'bag', with_events(messages, changed)))
-    assert code == 1 and 'part at tick 0' in said
+    assert code == 1 and 'differ at tick 0' in said
 
 
 @pytest.mark.parametrize('suffix', ['.mcap', '.db3'])

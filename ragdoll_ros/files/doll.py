@@ -5,6 +5,7 @@ import math
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from ..model.compound import Compound
 from ..model.errors import ModelError, OutOfRange
@@ -22,7 +23,7 @@ from ..model.rotation import IDENTITY
 from ..model.shapes import SHAPES, Part, Shape
 from ..model.swing import Link, Swing, strand
 from . import yaml_text
-from .building import build_each, entries, read_by_name, value_or_raise
+from .building import Made, build_each, entries, read_by_name, value_or_raise
 from .schema import schema_errors
 
 LARGEST_MASS_RATIO = 1e8
@@ -79,14 +80,16 @@ def build_doll(data: object, path: Path = Path('doll')) -> tuple[Ragdoll | None,
     joints = build_each(data, 'joints', _joint, found)
     swings = build_each(data, 'swings', _swing, found)
     riders = build_each(data, 'riders', lambda entry: SkeletonFrame(**entry), found)
-    names = [entry.get('name') for entry in entries(data, 'bones')]
-    edges = [(entry.get('parent'), entry.get('child')) for entry in entries(data, 'joints')]
+    names: list[Any] = [entry.get('name') for entry in entries(data, 'bones')]
+    edges: list[Any] = [(entry.get('parent'), entry.get('child'))
+                        for entry in entries(data, 'joints')]
     if all(isinstance(text, str) for text in [*names, *sum(edges, ())]):
         found += tree_errors(names, edges)
         for key in ('swings', 'riders'):
-            carried = [(entry.get('name'), entry.get('bone')) for entry in entries(data, key)]
-            if all(isinstance(text, str) for text in sum(carried, ())):
-                found += attachment_errors(key, names, carried)
+            attached: list[Any] = [(entry.get('name'), entry.get('bone'))
+                                   for entry in entries(data, key)]
+            if all(isinstance(text, str) for text in sum(attached, ())):
+                found += attachment_errors(key, names, attached)
         if not found:
             found += no_collision_errors(names, data.get('no_collision', ()))
             found += angle_name_errors(joints) + mass_errors(bones)
@@ -147,7 +150,8 @@ def _part(data: dict) -> Part:
 
 
 def _bone(data: dict) -> Bone:
-    fields, found = dict(data), []
+    fields = dict(data)
+    found: list[ModelError] = []
     moments = fields.pop('inertia', None)
     if 'shape' in data:
         return Bone(shape=_shape(fields.pop('shape')), moments=moments, **fields)
@@ -155,7 +159,7 @@ def _bone(data: dict) -> Bone:
     for error in found:
         raise error
     del fields['shapes']
-    return Bone(shape=Compound(parts), moments=moments, **fields)
+    return Bone(shape=Compound(tuple(parts)), moments=moments, **fields)
 
 
 def _joint(data: dict) -> Joint:
@@ -186,9 +190,8 @@ def _part_data(part: Part) -> dict:
 
 
 def _bone_data(bone: Bone) -> dict:
-    several = isinstance(bone.shape, Compound)
-    shape = {'shapes': [_part_data(part) for part in bone.shape.parts]} if several else {
-        'shape': _shape_data(bone.shape)}
+    shape = ({'shapes': [_part_data(part) for part in bone.shape.parts]}
+             if isinstance(bone.shape, Compound) else {'shape': _shape_data(bone.shape)})
     data = {'name': bone.name, **shape, 'mass': bone.mass, 'position': list(bone.position)}
     if bone.moments is not None:
         data['inertia'] = list(bone.moments)
@@ -210,7 +213,7 @@ def _rider_data(rider: SkeletonFrame) -> dict:
 
 
 def _joint_data(joint: Joint) -> dict:
-    data = {'parent': joint.parent, 'child': joint.child, 'kind': joint.kind,
+    data: dict[str, Any] = {'parent': joint.parent, 'child': joint.child, 'kind': joint.kind,
             'anchor': list(joint.anchor)}
     if joint.axes:
         data['axes'] = [list(axis) for axis in joint.axes]
@@ -250,7 +253,7 @@ def _link_data(link: Link) -> dict:
     return data
 
 
-def _at(where: str, make: Callable[..., object], fields: dict) -> object:
+def _at(where: str, make: Callable[..., Made], fields: dict) -> Made:
     try:
         return make(**fields)
     except ModelError as error:

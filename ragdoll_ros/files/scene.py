@@ -4,6 +4,7 @@ from __future__ import annotations
 import functools
 import re
 from pathlib import Path
+from typing import Any
 
 from ..model.errors import ModelError, OutOfRange
 from ..model.ragdoll import Ragdoll
@@ -67,7 +68,7 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
     found = schema_errors('scene', data)
     if not isinstance(data, dict):
         return None, found
-    placements = []
+    placements: list[Any] = []
     entries = data.get('dolls')
     # A doll that many entries share, by name or by alias, is built once.
     named = functools.cache(lambda name: _named_doll(name, path))
@@ -113,7 +114,7 @@ def scene_data(scene: Scene, folder: Path | None = None) -> dict:
     Placements that share a doll share its data, which YAML writes once.
     """
     dolls: dict[int, dict] = {}
-    data = {'name': scene.name, 'gravity': list(scene.gravity), 'step': scene.step,
+    data: dict[str, Any] = {'name': scene.name, 'gravity': list(scene.gravity), 'step': scene.step,
             'pace': scene.pace, 'self_collision': scene.self_collision,
             'material': dict(vars(scene.material)), 'ground': None, 'dolls': []}
     if scene.ground is not None:

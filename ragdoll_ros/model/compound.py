@@ -12,7 +12,7 @@ from .errors import set_fields
 from .pose import Pose
 from .rotation import IDENTITY
 from .shapes import Part
-from .vectors import Vector, floats
+from .vectors import Vector, floats, vector
 
 TOLERANCE = 1e-5
 """Largest offset of the centre of mass over the largest half extent, and largest product of inertia
@@ -58,7 +58,7 @@ class Compound:
     @property
     def half_extents(self) -> Vector:
         """Half edges (3,) m of its bounding box centred at the origin."""
-        return floats(np.maximum(self.support(np.eye(3)), self.support(-np.eye(3))))
+        return vector(np.maximum(self.support(np.eye(3)), self.support(-np.eye(3))))
 
     @property
     def support_terms(self) -> tuple[float, ...]:
@@ -68,7 +68,7 @@ class Compound:
     @property
     def primitives(self) -> tuple[Part, ...]:
         """Those of all parts, to draw."""
-        return tuple(Part(piece.shape, *part.pose.compose(piece.pose))
+        return tuple(Part.at(piece.shape, part.pose.compose(piece.pose))
                      for part in self.parts for piece in part.shape.primitives)
 
     def support(self, direction: np.ndarray) -> np.ndarray:
@@ -89,7 +89,7 @@ class Compound:
 
     def inertia(self, mass: float) -> Vector:
         """Moments (3,) kg m^2 about the axes through the origin."""
-        return floats(np.diag(self.inertia_matrix(mass)))
+        return vector(np.diag(self.inertia_matrix(mass)))
 
     def signed_distance(self, points: np.ndarray) -> np.ndarray:
         """Minimum over the parts, (p,) m, at points (p, 3); inside, a lower bound of the depth."""
@@ -112,7 +112,7 @@ class Compound:
 
     def in_frame(self, pose: Pose) -> Compound:
         """The same solid in the axes of the frame at ``pose``."""
-        return Compound(tuple(Part(part.shape, *pose.relative(part.pose)) for part in self.parts))
+        return Compound(tuple(Part.at(part.shape, pose.relative(part.pose)) for part in self.parts))
 
     def check_principal(self) -> None:
         """Raise OffCentre or NotPrincipal unless origin and axes are the principal ones."""
@@ -125,7 +125,7 @@ class Compound:
         products = matrix[np.triu_indices(3, 1)]
         if not np.abs(products).max() <= TOLERANCE * matrix.diagonal().max():
             turn = floats(self.principal_pose().orientation.round(9) + 0.0)
-            raise errors.NotPrincipal('shapes', floats(f'{x:.3g}' for x in products), (
+            raise errors.NotPrincipal('shapes', floats(float(f'{x:.3g}') for x in products), (
                 'no products of inertia xy, xz, yz for 1 kg, or an inertia given: the principal '
                 f'axes are turned by {list(turn)}'))
 

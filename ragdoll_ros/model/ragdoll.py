@@ -11,6 +11,7 @@ import os
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from .pose import Pose
 from .rotation import IDENTITY
 from .shapes import Shape
 from .swing import Swing
-from .vectors import Quaternion, Vector, finite_floats, floats, unit_vector
+from .vectors import Quaternion, Vector, finite_floats, unit_vector, vector
 
 Limits = tuple[float, float]
 
@@ -83,7 +84,8 @@ class Bone:
             for part in self.color:
                 errors.check_range('color', part, 0, 1)
         if self.moments is not None:
-            set_fields(self, moments=_checked_moments(finite_floats('inertia', self.moments)))
+            moments = vector(finite_floats('inertia', self.moments))
+            set_fields(self, moments=_checked_moments(moments))
         elif isinstance(self.shape, Compound):
             self.shape.check_principal()
 
@@ -320,7 +322,8 @@ class Ragdoll:
     @property
     def mass_centre(self) -> np.ndarray:
         """Centre of mass (3,) m, doll's frame, bind pose."""
-        return sum(bone.mass * np.array(bone.position) for bone in self.bones) / self.mass
+        moments = [bone.mass * np.array(bone.position) for bone in self.bones]
+        return np.asarray(sum(moments)) / self.mass
 
     @property
     def excluded_pairs(self) -> frozenset[frozenset[str]]:
@@ -362,7 +365,7 @@ class Ragdoll:
             below[joint.parent].append(joint)
         return below
 
-    def replace_bone(self, name: str, **changes: object) -> Ragdoll:
+    def replace_bone(self, name: str, **changes: Any) -> Ragdoll:
         """A copy with fields of one bone replaced. Raises UnknownBone."""
         self.bone(name)
         bones = tuple(dataclasses.replace(bone, **changes) if bone.name == name else bone
@@ -374,7 +377,7 @@ class Ragdoll:
         bones = tuple(dataclasses.replace(bone, name=rename(bone.name)) for bone in self.bones)
         joints = tuple(dataclasses.replace(joint, parent=rename(joint.parent),
                                            child=rename(joint.child)) for joint in self.joints)
-        pairs = tuple(tuple(map(rename, pair)) for pair in self.no_collision)
+        pairs = tuple((rename(first), rename(second)) for first, second in self.no_collision)
         return dataclasses.replace(self, bones=bones, joints=joints, no_collision=pairs)
 
 
@@ -478,10 +481,10 @@ def _checked_moments(moments: Vector) -> Vector:
     others = tuple(sum(moments[:axis] + moments[axis + 1:]) for axis in range(3))
     if any(moment > most * (1 + 1e-6) for moment, most in zip(moments, others, strict=True)):
         raise errors.OutOfRange('inertia', moments, 'each at most the sum of the other two')
-    return tuple(map(min, moments, others))
+    return vector(map(min, moments, others))
 
 
-def _rounded_limits(pair: Limits | None) -> Limits | None:
+def _rounded_limits(pair: Limits | None) -> Any:
     if pair is None:
         return None
-    return floats(math.radians(round(math.degrees(angle), 9)) for angle in pair)
+    return tuple(math.radians(round(math.degrees(angle), 9)) for angle in pair)

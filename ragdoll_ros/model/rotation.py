@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .angle import sine_and_cosine
 
@@ -34,18 +35,18 @@ def _table(terms: list[tuple[tuple[int, int, int], ...]]) -> np.ndarray:
 _HAMILTON = _hamilton()
 
 
-def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def multiply(a: ArrayLike, b: ArrayLike) -> np.ndarray:
     """Hamilton product a * b: the rotation b, then a."""
     products = np.asarray(a, float)[..., :, None] * np.asarray(b, float)[..., None, :]
     return products.reshape(*products.shape[:-2], 16) @ _HAMILTON
 
 
-def inverse(q: np.ndarray) -> np.ndarray:
+def inverse(q: ArrayLike) -> np.ndarray:
     """Inverse of unit quaternions."""
     return np.asarray(q, float) * (-1.0, -1.0, -1.0, 1.0)
 
 
-def normalized(q: np.ndarray) -> np.ndarray:
+def normalized(q: ArrayLike) -> np.ndarray:
     """Quaternions or vectors scaled to length one."""
     q = np.asarray(q, float)
     return q / np.linalg.norm(q, axis=-1, keepdims=True)
@@ -66,7 +67,7 @@ def _products_to_matrix() -> np.ndarray:
 _PRODUCTS = _products_to_matrix()
 
 
-def matrix(q: np.ndarray) -> np.ndarray:
+def matrix(q: ArrayLike) -> np.ndarray:
     """Rotation matrices (..., 3, 3) of unit quaternions.
 
     By einsum, whose order of summation is fixed; that of BLAS depends on the processor.
@@ -76,12 +77,12 @@ def matrix(q: np.ndarray) -> np.ndarray:
     return np.einsum('...i,ij->...j', products, _PRODUCTS).reshape(*q.shape[:-1], 3, 3)
 
 
-def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def rotate(q: ArrayLike, v: ArrayLike) -> np.ndarray:
     """Vectors v from the body's axes to the outer axes."""
     return np.einsum('...ij,...j->...i', matrix(q), np.asarray(v, float))
 
 
-def from_matrix(r: np.ndarray) -> np.ndarray:
+def from_matrix(r: ArrayLike) -> np.ndarray:
     """Unit quaternion (4,) of one rotation matrix (3, 3); w >= 0.
 
     Starts from the largest component, for accuracy (Shepperd 1978).
@@ -100,20 +101,20 @@ def from_matrix(r: np.ndarray) -> np.ndarray:
     return q if q[3] >= 0 else -q
 
 
-def from_axis_angle(axis: np.ndarray, angle: float) -> np.ndarray:
+def from_axis_angle(axis: ArrayLike, angle: float) -> np.ndarray:
     """Unit quaternion (4,) of a rotation by ``angle`` rad about ``axis``, right-handed."""
     sine, cosine = sine_and_cosine(angle / 2)
     return np.append(normalized(axis) * sine, cosine)
 
 
-def from_rotation_vector(vectors: np.ndarray) -> np.ndarray:
+def from_rotation_vector(vectors: ArrayLike) -> np.ndarray:
     """Unit quaternions (..., 4) of rotation vectors (..., 3) in rad."""
     vectors = np.asarray(vectors, float)
     half = np.linalg.norm(vectors, axis=-1, keepdims=True) / 2
     return np.concatenate([np.sinc(half / np.pi) / 2 * vectors, np.cos(half)], axis=-1)
 
 
-def mean_rotation_matrix(vector: np.ndarray) -> np.ndarray:
+def mean_rotation_matrix(vector: ArrayLike) -> np.ndarray:
     """Mean (3, 3) of the rotation matrices of s r, s from 0 to 1, for a rotation vector r (3,).
 
     The left Jacobian of SO(3): 1 + (1 - cos a)/a^2 [r] + (a - sin a)/a^3 [r]^2, a = |r|.
@@ -127,7 +128,7 @@ def mean_rotation_matrix(vector: np.ndarray) -> np.ndarray:
             + (angle - math.sin(angle)) / angle ** 3 * across @ across)
 
 
-def rotation_vector(q: np.ndarray) -> np.ndarray:
+def rotation_vector(q: ArrayLike) -> np.ndarray:
     """Rotation vectors (..., 3) in rad, at most pi long, of unit quaternions (..., 4)."""
     q = np.asarray(q, float)
     q = np.where(q[..., 3:] < 0, -q, q)
@@ -144,7 +145,7 @@ def from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
     return q
 
 
-def to_rpy(q: np.ndarray) -> tuple[float, float, float]:
+def to_rpy(q: ArrayLike) -> tuple[float, float, float]:
     """Fixed-axis roll, pitch, yaw in rad of one quaternion, exact at pitch = 90 degrees too.
 
     Roll is computed after yaw is removed, so that the two are consistent at the singularity.
@@ -165,14 +166,14 @@ def from_euler_xyz(x: float, y: float, z: float) -> np.ndarray:
     return q
 
 
-def to_euler_xyz(q: np.ndarray) -> tuple[float, float, float]:
+def to_euler_xyz(q: ArrayLike) -> tuple[float, float, float]:
     """Intrinsic Euler angles x, y, z in rad of one quaternion: R = Rx Ry Rz."""
     r = matrix(q)
     return (math.atan2(-r[1, 2], r[2, 2]), math.asin(max(-1.0, min(1.0, r[0, 2]))),
             math.atan2(-r[0, 1], r[0, 0]))
 
 
-def euler_xyz_rates(angles: np.ndarray, spin: np.ndarray) -> np.ndarray:
+def euler_xyz_rates(angles: ArrayLike, spin: ArrayLike) -> np.ndarray:
     """Rates (3,) rad/s of intrinsic Euler angles at the angular velocity ``spin`` (3,) rad/s in
     body axes; singular where the second angle is 90 degrees.
     """
@@ -183,14 +184,14 @@ def euler_xyz_rates(angles: np.ndarray, spin: np.ndarray) -> np.ndarray:
                      spin[2] - first_rate * math.sin(second)])
 
 
-def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def angle_between(a: ArrayLike, b: ArrayLike) -> np.ndarray:
     """Geodesic distance of unit quaternions in rad, 0 to pi; q and -q are the same rotation."""
     difference = multiply(inverse(a), b)
     sin = np.linalg.norm(difference[..., :3], axis=-1)
     return 2 * np.arctan2(sin, np.abs(difference[..., 3]))
 
 
-def shortest_arc(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def shortest_arc(a: ArrayLike, b: ArrayLike) -> np.ndarray:
     """Quaternion (4,) of the smallest rotation from the direction of a to that of b."""
     a, b = normalized(a), normalized(b)
     q = np.append(np.cross(a, b), 1 + a @ b)

@@ -16,7 +16,7 @@ from . import errors
 from .errors import set_fields
 from .pose import Pose
 from .rotation import IDENTITY
-from .vectors import Quaternion, Vector, finite_floats, floats, unit_vector
+from .vectors import Quaternion, Vector, finite_floats, unit_vector, vector
 
 SEGMENTS = 20
 """Vertices of a circle in a mesh."""
@@ -34,6 +34,7 @@ class Solid:
     """
 
     kind: ClassVar[str]
+    support_terms: property
 
     @property
     def parts(self) -> tuple[Part, ...]:
@@ -77,6 +78,12 @@ class Part:
         if not isinstance(self.shape, Solid):
             raise errors.WrongForm('shape', self.shape, 'one of ' + ', '.join(SHAPES))
 
+    @classmethod
+    def at(cls, shape: Shape, pose: Pose) -> Part:
+        """A shape at a pose in the compound's axes."""
+        x, y, z, w = map(float, pose.orientation)
+        return cls(shape, vector(pose.position), (x, y, z, w))
+
     @property
     def is_centred(self) -> bool:
         """Whether its pose is the identity."""
@@ -90,7 +97,7 @@ class Part:
     @property
     def size(self) -> Vector:
         """(3,) m, edges of its bounding box."""
-        return floats(2 * half for half in self.shape.half_extents)
+        return vector(2 * half for half in self.shape.half_extents)
 
     @property
     def pose(self) -> Pose:
@@ -177,7 +184,7 @@ class Box(Solid):
 
     @property
     def half_extents(self) -> Vector:
-        return floats(edge / 2 for edge in self.size)
+        return vector(edge / 2 for edge in self.size)
 
     @property
     def support_terms(self) -> tuple[float, ...]:

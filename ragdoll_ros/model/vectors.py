@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from . import errors
 
@@ -10,9 +10,15 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 
-def floats(values: object) -> tuple[float, ...]:
+def floats(values: Iterable[float]) -> tuple[float, ...]:
     """A tuple of floats."""
     return tuple(float(value) for value in values)
+
+
+def vector(values: Iterable[float]) -> Vector:
+    """A tuple of three floats."""
+    x, y, z = map(float, values)
+    return x, y, z
 
 
 def finite_floats(path: str, values: object, count: int = 3) -> tuple[float, ...]:

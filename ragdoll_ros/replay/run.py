@@ -1,4 +1,4 @@
-"""A run as its bag tells it: events in their order, and the scenes that they are of."""
+"""A run read from a bag: its events in order and its scenes."""
 from __future__ import annotations
 
 import json
@@ -17,7 +17,7 @@ RECORD = 'ros2 bag record /ragdoll/events /ragdoll/scene'
 
 @dataclass(frozen=True)
 class Event:
-    """What took effect after ``tick`` ticks; ``number`` counts the node's events."""
+    """An event after ``tick`` ticks; ``number`` counts the node's events."""
 
     number: int
     tick: int
@@ -26,23 +26,23 @@ class Event:
 
     @property
     def is_start(self) -> bool:
-        """Whether the state after it is known by the scene alone."""
+        """Whether the state after it follows from the scene alone."""
         return self.kind in ('start', 'reset')
 
 
 @dataclass(frozen=True)
 class ReplayedRun:
-    """What a node did and what acted on it."""
+    """Events, scenes and versions of a node's run."""
 
     node: str
     events: tuple[Event, ...]
     scenes: dict[str, Scene]
-    """By the SHA-256 of their text, as events name them."""
+    """By the SHA-256 of their text, as in events."""
     versions: tuple[str, ...]
-    """What computed it; more than one where nodes of several versions ran in turn."""
+    """Versions that computed it; several if nodes of different versions ran in turn."""
 
     def scene(self, event: Event) -> Scene:
-        """The scene of a start; WrongForm if the bag has another one."""
+        """The scene of a start event. Raises WrongForm if the bag lacks it."""
         digest = event.fields.get('scene')
         if digest not in self.scenes:
             held = ', '.join(f'{scene.name} ({each[:8]})' for each, scene in self.scenes.items())
@@ -54,7 +54,7 @@ class ReplayedRun:
 
 
 def read_run(path: Path, node: str | None, warn: Callable[[str], None]) -> ReplayedRun:
-    """The run of a ``node`` in a bag; of the one that is in it, if not said. RagdollError."""
+    """The run of a ``node`` in a bag, by default its only one. Raises a RagdollError."""
     found: dict[tuple[str, str], list[str]] = {}
     for topic, kind, data in read_messages(path, warn):
         name, _, last = topic.rpartition('/')
@@ -77,7 +77,7 @@ def read_run(path: Path, node: str | None, warn: Callable[[str], None]) -> Repla
 
 
 def _event(index: int, text: str) -> Event:
-    """From a line of JSON; WrongForm for what is none."""
+    """An event from JSON. Raises WrongForm."""
     try:
         fields = json.loads(text)
         number, tick, kind = (fields.pop(key) for key in ('number', 'tick', 'kind'))
