@@ -128,7 +128,7 @@ def _wrong_imus(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
         except ModelError as error:
             yield error.at(where)
         if mount['name'] in names:
-            yield errors.DuplicateName(f'{where}.name', mount['name'], 'a name of its own')
+            yield errors.DuplicateName(f'{where}.name', mount['name'], 'a unique name')
         names.append(mount['name'])
 
 

@@ -32,8 +32,8 @@ def read_messages(path: Path, warn: Callable[[str], None]) -> Messages:
         except errors.ModelError:
             raise
         except Exception as error:  # truncated data can raise anything
-            warn(f'{file} breaks off ({str(error) or type(error).__name__}): '
-                 'what stands before that is read')
+            warn(f'{file} is truncated ({str(error) or type(error).__name__}): '
+                 'it is read up to there')
 
 
 def _files(path: Path) -> list[Path]:

@@ -14,34 +14,17 @@ from ..model.scene import SECOND
 
 STRING, POSE_ARRAY = 'std_msgs/msg/String', 'geometry_msgs/msg/PoseArray'
 
-_SEPARATOR = '=' * 80
+_POSE_ARRAY_TYPES = (
+    ('std_msgs/Header', 'builtin_interfaces/Time stamp\nstring frame_id\n'),
+    ('builtin_interfaces/Time', 'int32 sec\nuint32 nanosec\n'),
+    ('geometry_msgs/Pose', 'geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n'),
+    ('geometry_msgs/Point', 'float64 x\nfloat64 y\nfloat64 z\n'),
+    ('geometry_msgs/Quaternion', 'float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n'))
 
-DEFINITIONS = {STRING: 'string data', POSE_ARRAY: f"""std_msgs/Header header
-geometry_msgs/Pose[] poses
-{_SEPARATOR}
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-{_SEPARATOR}
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-{_SEPARATOR}
-MSG: geometry_msgs/Pose
-geometry_msgs/Point position
-geometry_msgs/Quaternion orientation
-{_SEPARATOR}
-MSG: geometry_msgs/Point
-float64 x
-float64 y
-float64 z
-{_SEPARATOR}
-MSG: geometry_msgs/Quaternion
-float64 x
-float64 y
-float64 z
-float64 w
-"""}
+DEFINITIONS = {
+    STRING: 'string data',
+    POSE_ARRAY: 'std_msgs/Header header\ngeometry_msgs/Pose[] poses\n' + ''.join(
+        f'{"=" * 80}\nMSG: {name}\n{fields}' for name, fields in _POSE_ARRAY_TYPES)}
 """Message definitions for MCAP schemas."""
 
 _HEADER = b'\0\1\0\0'

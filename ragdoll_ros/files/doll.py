@@ -192,17 +192,13 @@ def _part_data(part: Part) -> dict:
 def _bone_data(bone: Bone) -> dict:
     shape = ({'shapes': [_part_data(part) for part in bone.shape.parts]}
              if isinstance(bone.shape, Compound) else {'shape': _shape_data(bone.shape)})
-    data = {'name': bone.name, **shape, 'mass': bone.mass, 'position': list(bone.position)}
-    if bone.moments is not None:
-        data['inertia'] = list(bone.moments)
-    if bone.orientation != IDENTITY:
-        data['orientation'] = list(bone.orientation)
-    for key in ('friction', 'rolling_friction', 'restitution'):
-        if getattr(bone, key) is not None:
-            data[key] = getattr(bone, key)
-    if bone.color is not None:
-        data['color'] = list(bone.color)
-    return data
+    optional = {'inertia': bone.moments,
+                'orientation': None if bone.orientation == IDENTITY else bone.orientation,
+                'friction': bone.friction, 'rolling_friction': bone.rolling_friction,
+                'restitution': bone.restitution, 'color': bone.color}
+    return {'name': bone.name, **shape, 'mass': bone.mass, 'position': list(bone.position),
+            **{key: list(value) if isinstance(value, tuple) else value
+               for key, value in optional.items() if value is not None}}
 
 
 def _rider_data(rider: SkeletonFrame) -> dict:

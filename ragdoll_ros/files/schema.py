@@ -38,8 +38,8 @@ def _wrong(error: jsonschema.ValidationError) -> object:
     return ', '.join(str(key) for key in error.instance if key not in error.schema['properties'])
 
 
-KINDS = {'array': 'a list', 'object': 'a mapping', 'string': 'a text', 'number': 'a number',
-         'integer': 'a whole number', 'boolean': 'true or false', 'null': 'nothing'}
+KINDS = {'array': 'a list', 'object': 'a mapping', 'string': 'a string', 'number': 'a number',
+         'integer': 'an integer', 'boolean': 'true or false', 'null': 'nothing'}
 """JSON Schema's types in words."""
 
 

@@ -10,6 +10,7 @@ its men and women together.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 SEXES = ('female', 'male')
 
@@ -83,38 +84,18 @@ ANKLE_HEIGHT = 0.039
 """Height of the ankle joint above the sole over the standing height: Drillis and Contini
 1966 (Body Segment Parameters, New York University, Report 1163.03)."""
 
+BODY = SimpleNamespace(
+    # circumferences
+    head=570.04, neck=375.44, chest=1022.10, waist=914.50, buttock=1020.08, thigh=622.20,
+    lower_thigh=406.48, calf=386.04, ankle=224.89, biceps=340.93, forearm=295.01, wrist=169.00,
+    hand=203.86,
+    # lengths
+    chest_breadth=282.86, chest_depth=251.74, waist_breadth=317.75, waist_depth=229.67,
+    hip_breadth=348.39, buttock_depth=241.62, foot_breadth=98.87, hand_length=189.29,
+    hand_breadth=84.95)
+"""Body dimensions, mm: means of ANSUR II, whose mean height (m) and mass (kg) are:"""
 
-@dataclass(frozen=True)
-class BodyDimensions:
-    """Body dimensions, mm: means of ANSUR II, whose mean height and mass are HEIGHT and MASS."""
-
-    head: float = 570.04
-    neck: float = 375.44
-    chest: float = 1022.10
-    waist: float = 914.50
-    buttock: float = 1020.08
-    thigh: float = 622.20
-    lower_thigh: float = 406.48
-    calf: float = 386.04
-    ankle: float = 224.89
-    biceps: float = 340.93
-    forearm: float = 295.01
-    wrist: float = 169.00
-    """Circumferences."""
-    chest_breadth: float = 282.86
-    chest_depth: float = 251.74
-    waist_breadth: float = 317.75
-    waist_depth: float = 229.67
-    hip_breadth: float = 348.39
-    buttock_depth: float = 241.62
-    foot_breadth: float = 98.87
-    hand_length: float = 189.29
-    hand_breadth: float = 84.95
-    hand: float = 203.86
-    """The hand's circumference."""
-
-
-BODY, HEIGHT, MASS = BodyDimensions(), 1.71441, 79.709
+HEIGHT, MASS = 1.71441, 79.709
 
 
 def mass_fractions(sex: str) -> dict[str, float]:

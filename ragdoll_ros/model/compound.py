@@ -26,10 +26,7 @@ class Compound:
     A Bone without ``moments`` wants the origin at the centre of mass and principal axes.
 
     Args:
-        parts: at least one Part, each in the compound's axes.
-
-    Raises:
-        WrongForm: no parts.
+        parts: at least one Part in the compound's axes, else it raises WrongForm.
 
     Example:
         >>> dumbbell = Compound((Part(Sphere(0.1), (0, 0, 0.3)), Part(Sphere(0.1), (0, 0, -0.3))))

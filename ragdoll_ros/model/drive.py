@@ -58,7 +58,7 @@ class Drive:
                 continue
             set_fields(self, **{key: finite_floats(key, getattr(self, key))})
             if math.hypot(*getattr(self, key)) > MAX_SPEED:
-                raise errors.OutOfRange(key, getattr(self, key), f'at most {MAX_SPEED:g} long')
+                raise errors.OutOfRange(key, getattr(self, key), f'a norm of at most {MAX_SPEED:g}')
         for key in ('force_per_speed', 'torque_per_speed', 'most_force', 'most_torque'):
             errors.check_range(key, getattr(self, key), 0, MAX_LOAD)
         check_times(self.duration, self.start)

@@ -60,7 +60,7 @@ class Push:
             set_fields(self, **{key: finite_floats(key, getattr(self, key))})
         for key in ('force', 'torque'):
             if math.hypot(*getattr(self, key)) > MAX_LOAD:
-                raise errors.OutOfRange(key, getattr(self, key), f'at most {MAX_LOAD:g} long')
+                raise errors.OutOfRange(key, getattr(self, key), f'a norm of at most {MAX_LOAD:g}')
         check_times(self.duration, self.start)
 
     def arrow(self, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:

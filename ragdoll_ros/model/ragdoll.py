@@ -43,9 +43,8 @@ class Bone:
         mass: kg.
         position: (3,) m, the centre of mass in the doll's frame, bind pose.
         orientation: quaternion x, y, z, w, bone's axes (principal axes of inertia) to doll's.
-        friction: Coulomb's coefficient; None: the scene's material's.
-        rolling_friction: lever arm, m; None: the material's.
-        restitution: 0 to 1; None: the material's.
+        friction, rolling_friction, restitution: Coulomb's coefficient, lever arm in m, ratio of
+            speeds from 0 to 1; None: those of the scene's material.
         color: red, green, blue, opacity, 0 to 1.
         moments: (3,) kg m^2, principal moments about the centre of mass along the bone's axes;
             None: those of a uniform solid of its shape.
@@ -294,8 +293,8 @@ class Ragdoll:
         edges = [(joint.parent, joint.child) for joint in self.joints]
         found = tree_errors(names, edges)
         for key in ('swings', 'riders'):
-            carried = [(each.name, each.bone) for each in getattr(self, key)]
-            found += attachment_errors(key, names, carried)
+            attached = [(each.name, each.bone) for each in getattr(self, key)]
+            found += attachment_errors(key, names, attached)
         found += no_collision_errors(names, self.no_collision)
         found += angle_name_errors(self.joints)
         for error in found:
@@ -388,7 +387,7 @@ def tree_errors(names: list[str], edges: list[tuple[str, str]]) -> list[errors.M
         found.append(errors.Detached('bones', names, 'at least one bone'))
     for index, name in enumerate(names):
         if name in names[:index]:
-            found.append(errors.DuplicateName(f'bones[{index}].name', name, 'a name of its own'))
+            found.append(errors.DuplicateName(f'bones[{index}].name', name, 'a unique name'))
     parent_of: dict[str, str] = {}
     for index, (parent, child) in enumerate(edges):
         for end, name in (('parent', parent), ('child', child)):
@@ -397,29 +396,29 @@ def tree_errors(names: list[str], edges: list[tuple[str, str]]) -> list[errors.M
                 found.append(errors.UnknownBone(f'joints[{index}].{end}', name, expected))
         if child in parent_of:
             found.append(errors.ConnectedTwice(
-                f'joints[{index}].child', child, 'a bone that has no parent yet'))
+                f'joints[{index}].child', child, 'a bone without another parent'))
         elif _is_ancestor(parent_of, parent, child):
             found.append(errors.JointCycle(
-                f'joints[{index}]', f'{parent} -> {child}', 'joints that close no ring'))
+                f'joints[{index}]', f'{parent} -> {child}', 'joints without a loop'))
         else:
             parent_of[child] = parent
     roots = [name for name in dict.fromkeys(names) if name not in parent_of]
     if len(roots) > 1 and not found:
-        found.append(errors.Detached('joints', roots, 'one bone alone without a parent'))
+        found.append(errors.Detached('joints', roots, 'exactly one bone without a parent'))
     return found
 
 
 def attachment_errors(key: str, names: list[str],
-                   carried: list[tuple[str, str]]) -> list[errors.ModelError]:
+                   attached: list[tuple[str, str]]) -> list[errors.ModelError]:
     """Errors of what is attached to bones, pairs (name, bone): unknown bones, equal names."""
     found: list[errors.ModelError] = []
     known, seen = set(names), set()
-    for index, (name, bone) in enumerate(carried):
+    for index, (name, bone) in enumerate(attached):
         if bone not in known:
             expected = errors.one_of(names, bone)
             found.append(errors.UnknownBone(f'{key}[{index}].bone', bone, expected))
         if name in seen:
-            found.append(errors.DuplicateName(f'{key}[{index}].name', name, 'a name of its own'))
+            found.append(errors.DuplicateName(f'{key}[{index}].name', name, 'a unique name'))
         seen.add(name)
     return found
 
@@ -442,7 +441,7 @@ def angle_name_errors(joints: Sequence[Joint]) -> list[errors.ModelError]:
     found: list[errors.ModelError] = []
     seen: set[str] = set()
     for index, joint in enumerate(joints):
-        found += [errors.DuplicateName(f'joints[{index}].names', name, 'a name of its own')
+        found += [errors.DuplicateName(f'joints[{index}].names', name, 'a unique name')
                   for name in joint.angle_names if name in seen]
         seen.update(joint.angle_names)
     return found

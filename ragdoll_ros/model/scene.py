@@ -64,14 +64,11 @@ class Material:
 
 @dataclass(frozen=True)
 class Ground:
-    """The half space below the plane normal . p = offset.
+    """The half space below the plane normal . p = offset. Raises NotUnit, NotFinite, WrongForm.
 
     Args:
         normal: (3,), out of the ground, world frame; normalised.
         offset: m, distance of the plane from the origin along the normal.
-
-    Raises:
-        NotUnit, NotFinite, WrongForm: for a normal of length zero, NaN, infinity.
 
     Example:
         >>> Ground(normal=(0, 0, 2)).normal
@@ -88,7 +85,7 @@ class Ground:
 
 @dataclass(frozen=True)
 class Placement:
-    """A doll in a scene with its initial pose and velocity, world frame, in the bind pose.
+    """A doll in a scene, in its bind pose, with its initial pose and velocity in the world frame.
 
     Args:
         doll: the Ragdoll.
@@ -169,7 +166,7 @@ class Scene:
         names = [placement.name for placement in self.dolls]
         for index, name in enumerate(names):
             if name in names[:index]:
-                raise errors.DuplicateName(f'dolls[{index}].name', name, 'a name of its own')
+                raise errors.DuplicateName(f'dolls[{index}].name', name, 'a unique name')
 
     @cached_property
     def bones(self) -> tuple[Bone, ...]:

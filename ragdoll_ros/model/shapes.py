@@ -53,15 +53,12 @@ class Solid:
 
 @dataclass(frozen=True)
 class Part:
-    """One primitive shape of a Compound, at its pose in the compound's axes.
+    """A primitive shape of a Compound at a pose. Raises WrongForm, NotFinite, NotUnit.
 
     Args:
         shape: a Sphere, Box, Cylinder or Capsule.
         position: (3,) m, its centre.
         orientation: quaternion x, y, z, w, part's axes to compound's axes; normalised.
-
-    Raises:
-        WrongForm, NotFinite, NotUnit: for a field that is none of these.
 
     Example:
         >>> Part(Sphere(0.1), position=(0, 0, 0.2)).size
@@ -113,13 +110,10 @@ def _as_parts(shape: Shape) -> tuple[Part, ...]:
 
 @dataclass(frozen=True)
 class Sphere(Solid):
-    """A solid sphere.
+    """A solid sphere. Raises NotPositive, NotFinite.
 
     Args:
         radius: m.
-
-    Raises:
-        NotPositive, NotFinite: for the radius.
 
     Example:
         >>> round(Sphere(0.1).volume, 6)
@@ -158,13 +152,10 @@ class Sphere(Solid):
 
 @dataclass(frozen=True)
 class Box(Solid):
-    """A solid box.
+    """A solid box. Raises NotPositive, NotFinite, WrongForm.
 
     Args:
         size: (3,) m, full edges along its x, y and z.
-
-    Raises:
-        NotPositive, NotFinite, WrongForm: for the size.
 
     Example:
         >>> Box((0.2, 0.3, 0.5)).half_extents
@@ -207,14 +198,11 @@ class Box(Solid):
 
 @dataclass(frozen=True)
 class Cylinder(Solid):
-    """A solid cylinder along its own z.
+    """A solid cylinder along its own z. Raises NotPositive, NotFinite.
 
     Args:
         radius: m.
         length: m, from face to face.
-
-    Raises:
-        NotPositive, NotFinite: for the radius or the length.
 
     Example:
         >>> Cylinder(radius=0.1, length=0.4).half_extents
@@ -256,14 +244,11 @@ class Cylinder(Solid):
 
 @dataclass(frozen=True)
 class Capsule(Solid):
-    """A solid cylinder along its own z with a hemisphere on each end.
+    """A solid cylinder along its own z with hemispheres. Raises NotPositive, NotFinite.
 
     Args:
         radius: m.
         length: m, of the cylinder; the whole is length + 2 radius long, as in MuJoCo and SDF.
-
-    Raises:
-        NotPositive, NotFinite: for the radius or the length.
 
     Example:
         >>> Capsule(radius=0.125, length=0.5).half_extents

@@ -28,11 +28,8 @@ class Riders:
 
     Example:
         >>> scene = load_scene('drop')
-        >>> riders = Riders(scene)
         >>> with Simulation(scene) as simulation:
-        ...     positions, orientations = riders.poses(simulation.state)
-        >>> len(positions) == len(riders.names)
-        True
+        ...     positions, orientations = Riders(scene).poses(simulation.state)
     """
 
     def __init__(self, scene: Scene) -> None:

@@ -94,14 +94,11 @@ class Recorder:
         scene: of all the poses.
 
     Example:
-        >>> scene = load_scene('drop')
-        >>> recorder = Recorder(scene)
-        >>> with Simulation(scene) as simulation:
-        ...     for _ in range(3):
-        ...         recorder.take(simulation)
-        ...         state = simulation.advance()
-        >>> recorder.recording().times
-        array([0.  , 0.01, 0.02])
+        >>> recorder = Recorder(load_scene('drop'))
+        >>> with Simulation(recorder.scene) as simulation:
+        ...     recorder.take(simulation)
+        >>> recorder.recording().positions.shape
+        (1, 10, 3)
     """
 
     def __init__(self, scene: Scene) -> None:

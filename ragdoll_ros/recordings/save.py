@@ -1,16 +1,35 @@
 """Writing a recording in the format of the file's suffix."""
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Callable, Mapping
 from pathlib import Path
+
+import numpy as np
 
 from ..model import errors
 from ..model.skin import Skin
 from .bvh_file import bvh_text
-from .csv_file import csv_text
 from .gltf.gltf_file import gltf_bytes
 from .mcap_file import recording_bytes
 from .recording import Recording
+
+COLUMNS = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
+"""Columns of a bone, after its name and a dot: centre of mass, m; orientation."""
+
+
+def csv_text(recording: Recording) -> str:
+    """CSV (RFC 4180, Unix line ends): ``time`` in s, then COLUMNS of each bone. Exact."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator='\n')
+    writer.writerow(['time', *(f'{name}.{part}' for name in recording.scene.bone_names
+                               for part in COLUMNS)])
+    poses = np.concatenate([recording.positions, recording.orientations], axis=2)
+    writer.writerows([time, *row] for time, row in zip(
+        recording.times.tolist(), poses.reshape(len(poses), -1).tolist(), strict=True))
+    return stream.getvalue()
+
 
 FORMATS: dict[str, Callable[[Recording, Mapping[int, Skin]], bytes]] = {
     '.mcap': lambda recording, skins: recording_bytes(recording),
@@ -57,9 +76,8 @@ def save_recording(recording: Recording, path: str | Path,
         Unreadable: the file can not be written.
 
     Example:
-        >>> scene = load_scene('drop')
-        >>> recorder = Recorder(scene)
-        >>> with Simulation(scene) as simulation:
+        >>> recorder = Recorder(load_scene('drop'))
+        >>> with Simulation(recorder.scene) as simulation:
         ...     recorder.take(simulation)
         >>> [path.name for path in save_recording(recorder.recording(), 'fall.glb')]
         ['fall.glb']

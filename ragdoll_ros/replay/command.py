@@ -6,17 +6,19 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from ..files.bag import read_messages
 from ..files.run_scene import versions
 from ..fit.skin import skins_of
 from ..model import errors
+from ..model.scene import SECOND
 from ..physics.accuracy import ACCURACIES
 from ..physics.engine.registry import ENGINES
 from ..physics.simulation import Simulation
 from ..recordings.mcap_file import load_recording
 from ..recordings.recording import Recorder, Recording
 from ..recordings.save import check_format, save_recording
-from .comparison import Comparison
 from .player import Player
 from .run import ReplayedRun, read_run
 
@@ -28,6 +30,9 @@ EXAMPLE = """examples:
 """
 
 NO_ROS = "--publish needs ROS 2: source it, or pip install 'ragdoll_ros[ros]'"
+
+THRESHOLDS = (1e-12, 1e-9, 1e-6, 1e-3, 1e-2, 1e-1, 1.0)
+"""m, thresholds of the largest distance between a bone in one run and in the other."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -139,6 +144,35 @@ def compare(run: ReplayedRun, engine: str | None, accuracy: str | None) -> int:
     print(f'As recorded beside {" ".join(filter(None, (engine, accuracy)))}:')
     print('\n'.join(comparison.lines()))
     return 0
+
+
+class Comparison:
+    """Compares two runs tick by tick."""
+
+    def __init__(self) -> None:
+        self._rows: list[str] = []
+        self._last = self._farthest = ''
+        self._max_gap = -1.0
+
+    def add(self, tick: int, one: Simulation, other: Simulation) -> None:
+        """Compare both after the same tick."""
+        gaps = np.linalg.norm(one.state.positions - other.state.positions, axis=1)
+        index = int(gaps.argmax())
+        gap = float(gaps[index])
+        bone = one.scene.bone_names[index]
+        self._last = f'{gap:.3g} m ({bone}) at tick {tick}'
+        while len(self._rows) < len(THRESHOLDS) and gap > THRESHOLDS[len(self._rows)]:
+            self._rows.append(f'{THRESHOLDS[len(self._rows)]:11.0e} m {tick:9d} '
+                              f'{one.time / SECOND:10.2f} s  {bone}')
+        if gap > self._max_gap:
+            self._max_gap, self._farthest = gap, self._last
+
+    def lines(self) -> list[str]:
+        """The result as a table."""
+        head = ' apart by more   at tick   simulated  bone'
+        never = f'never apart by more than {THRESHOLDS[0]:.0e} m'
+        rows = [head, *self._rows] if self._rows else [never]
+        return [*rows, f'farthest: {self._farthest}', f'at the end: {self._last}']
 
 
 class FirstSceneRecorder:

@@ -19,7 +19,7 @@ def add_bone(scene: Scene, parent: str, name: str) -> Scene:
     if not NAME.fullmatch(name):
         raise errors.WrongForm('name', name, 'text without / and control characters')
     if any(bone.name == name for bone in placement.doll.bones):
-        raise errors.DuplicateName('name', name, 'a name of its own')
+        raise errors.DuplicateName('name', name, 'a unique name')
     outward = outward_from(joint_of(scene, parent), above)
     reach = float(above.shape.support(
         rotation.rotate(rotation.inverse(above.orientation), outward)))
