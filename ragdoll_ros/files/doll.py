@@ -210,7 +210,7 @@ def _rider_data(rider: SkeletonFrame) -> dict:
 
 def _joint_data(joint: Joint) -> dict:
     data: dict[str, Any] = {'parent': joint.parent, 'child': joint.child, 'kind': joint.kind,
-            'anchor': list(joint.anchor)}
+                            'anchor': list(joint.anchor)}
     if joint.axes:
         data['axes'] = [list(axis) for axis in joint.axes]
         data['limits_deg'] = [pair and [round(math.degrees(angle), 9) for angle in pair]

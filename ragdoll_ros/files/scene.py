@@ -104,7 +104,7 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
     plain = {key: data[key] for key in ('gravity', 'step', 'pace', 'self_collision')
              if key in data}
     scene = try_build(found, '', Scene, data.get('name', path.stem), tuple(placements),
-                     **parts, **plain)
+                      **parts, **plain)
     return scene, found
 
 
@@ -114,9 +114,10 @@ def scene_data(scene: Scene, folder: Path | None = None) -> dict:
     Placements that share a doll share its data, which YAML writes once.
     """
     dolls: dict[int, dict] = {}
-    data: dict[str, Any] = {'name': scene.name, 'gravity': list(scene.gravity), 'step': scene.step,
-            'pace': scene.pace, 'self_collision': scene.self_collision,
-            'material': dict(vars(scene.material)), 'ground': None, 'dolls': []}
+    data: dict[str, Any] = {
+        'name': scene.name, 'gravity': list(scene.gravity), 'step': scene.step,
+        'pace': scene.pace, 'self_collision': scene.self_collision,
+        'material': dict(vars(scene.material)), 'ground': None, 'dolls': []}
     if scene.ground is not None:
         data['ground'] = {'normal': list(scene.ground.normal), 'offset': scene.ground.offset}
     for placement in scene.dolls:

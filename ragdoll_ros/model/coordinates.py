@@ -124,7 +124,7 @@ class DofLayout:
         rates = coordinates.v[self._rates]
         for own, at, spin in self._free_angles:
             rates[own] = rotation.euler_xyz_rates(rotation.to_euler_xyz(coordinates.q[at]),
-                                            coordinates.v[spin])
+                                                  coordinates.v[spin])
         return rates
 
     def limit_violations(self, q: np.ndarray) -> np.ndarray:

@@ -409,7 +409,7 @@ def tree_errors(names: list[str], edges: list[tuple[str, str]]) -> list[errors.M
 
 
 def attachment_errors(key: str, names: list[str],
-                   attached: list[tuple[str, str]]) -> list[errors.ModelError]:
+                      attached: list[tuple[str, str]]) -> list[errors.ModelError]:
     """Errors of what is attached to bones, pairs (name, bone): unknown bones, equal names."""
     found: list[errors.ModelError] = []
     known, seen = set(names), set()

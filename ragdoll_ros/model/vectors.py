@@ -34,7 +34,7 @@ def finite_floats(path: str, values: object, count: int = 3) -> tuple[float, ...
 
 
 def unit_vector(path: str, values: object, expected: str = 'a direction, not zero',
-         count: int = 3) -> tuple[float, ...]:
+                count: int = 3) -> tuple[float, ...]:
     """``count`` floats scaled to length one. Raises NotUnit for zero, WrongForm, NotFinite."""
     values = finite_floats(path, values, count)
     length = math.hypot(*values)

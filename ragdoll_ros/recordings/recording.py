@@ -74,7 +74,7 @@ class Recording:
         orientations = (1 - share) * begin.orientations + share * near[:, None] * end.orientations
         rods = None if begin.rods is None else (1 - share) * begin.rods + share * end.rods
         return RecordedPose((1 - share) * begin.positions + share * end.positions,
-                    rotation.normalized(orientations), rods)
+                            rotation.normalized(orientations), rods)
 
     def pose(self, index: int) -> RecordedPose:
         """Pose at ``times[index]``."""
@@ -129,7 +129,7 @@ class Recorder:
         """Add the current poses of a simulation."""
         state, swings = simulation.state, simulation.swings
         self.add(simulation.time / SECOND, RecordedPose(state.positions, state.orientations,
-                                                None if swings is None else swings.rods))
+                                                        None if swings is None else swings.rods))
 
     def recording(self) -> Recording:
         """The recording so far. Raises OutOfRange if it is empty."""

@@ -46,7 +46,7 @@ def check_format(path: Path) -> None:
 
 
 def encoded_files(recording: Recording, path: str | Path,
-             skins: Mapping[int, Skin] = {}) -> dict[Path, bytes]:
+                  skins: Mapping[int, Skin] = {}) -> dict[Path, bytes]:
     """Contents of the files that save_recording writes, by path. Raises OutOfRange."""
     path = Path(path)
     check_format(path)

@@ -73,7 +73,7 @@ def read_run(path: Path, node: str | None, warn: Callable[[str], None]) -> Repla
     texts = found.get((name, 'scene'), [])
     read = {scene_digest(text): read_run_scene(text) for text in texts}
     return ReplayedRun(name, events, {digest: scene for digest, (scene, _) in read.items()},
-               tuple(sorted({versions for _, versions in read.values()})))
+                       tuple(sorted({versions for _, versions in read.values()})))
 
 
 def _event(index: int, text: str) -> Event:

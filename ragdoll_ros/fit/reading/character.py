@@ -149,7 +149,7 @@ def _appearance(file: GltfFile, skins: Skins, axes: np.ndarray,
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 1e-30)
     return Appearance(np.nan_to_num(normals), skins.uvs, numbers[skins.meshes],
-                 tuple(materials.entries), tuple(materials.textures))
+                      tuple(materials.entries), tuple(materials.textures))
 
 
 def _springs(file: GltfFile, nodes: Nodes, skins: Skins, place: dict[int, int],

@@ -33,8 +33,8 @@ def mean_load(load: AppliedWrench, before: State, after: State) -> tuple[np.ndar
     """Force (3,) N and torque (3,) N m in world axes; of a local load over a steady turn."""
     if not load.local:
         return load.force, load.torque
-    turn = rotation.mean_rotation_matrix(_turned(load.bone, before,
-                                         after)) @ before.rotation_matrices[load.bone]
+    turn = rotation.mean_rotation_matrix(
+        _turned(load.bone, before, after)) @ before.rotation_matrices[load.bone]
     return turn @ load.force, turn @ load.torque
 
 
