@@ -31,7 +31,7 @@ DISTRIBUTIONS = {'yaml': 'pyyaml', 'mpl_toolkits': 'matplotlib', 'DracoPy': 'dra
                  'mcap_ros2': 'mcap-ros2-support'}
 """Where a package on PyPI is called otherwise than its module."""
 
-ROBOT = ('model', 'files', 'physics', 'ros')
+ROBOT = ('model', 'files', 'physics', 'realtime', 'ros')
 """Rooms that run on a robot, with OPTIONAL modules or without."""
 OPTIONAL = {'mujoco', 'mcap'}
 NUMBAS = {'llvmlite'}
@@ -259,7 +259,7 @@ def test_every_program_is_an_executable():
     """A node, a teleop or a command.py without its line in setup.py would never be installed."""
     programs = {'.'.join(path.relative_to(ROOT).with_suffix('').parts)
                 for name in ('node', 'teleop', 'command')
-                for path in ROOT.glob(f'ragdoll_ros/*/{name}.py')}
+                for path in ROOT.glob(f'ragdoll_ros/**/{name}.py')}
     assert {place.split(':')[0] for place in EXECUTABLES.values()} == programs
 
 

@@ -79,7 +79,7 @@ def test_the_tip_of_a_push_s_arrow_is_where_it_attacks(local):
         push = Push(name, (300.0, -400.0, 0.0), point=(0.01, 0.02, 0.1), local=local)
         markers = Markers(simulation.scene, 'world')
         arrow = heard(markers.message(0, state, [push])).markers[-1]
-        assert (arrow.type, arrow.action) == (Marker.ARROW_LENGTH, Marker.ADD)
+        assert (arrow.type, arrow.action) == (Marker.ARROW, Marker.ADD)
         turn = np.array([arrow.pose.orientation.x, arrow.pose.orientation.y,
                          arrow.pose.orientation.z, arrow.pose.orientation.w])
         tail = np.array([arrow.pose.position.x, arrow.pose.position.y, arrow.pose.position.z])
