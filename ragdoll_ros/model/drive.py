@@ -27,10 +27,8 @@ class Drive:
         bone: its name in Scene.bone_names.
         velocity: (3,) m/s, target of the centre of mass, world axes; None: no force.
         angular_velocity: (3,) rad/s, target, world axes; None: no torque.
-        force_per_speed: N/(m/s), gain; the force acts at the centre of mass.
-        torque_per_speed: N m/(rad/s), gain.
-        most_force: N, limit of the force's magnitude.
-        most_torque: N m, limit of the torque's magnitude.
+        force_per_speed, most_force: N/(m/s), gain, and N, limit; at the centre of mass.
+        torque_per_speed, most_torque: N m/(rad/s), gain, and N m, limit.
         duration: s of simulated time.
         start: s of simulated time; None: when it is given to Simulation.push.
 

@@ -31,8 +31,7 @@ class Push:
 
     Args:
         bone: its name in Scene.bone_names.
-        force: (3,) N, world axes.
-        torque: (3,) N m, world axes.
+        force, torque: (3,) N, (3,) N m, world axes.
         point: (3,) m, where the force acts, from the bone's centre of mass along the world's axes
             as it starts; the point moves with the bone.
         duration: s of simulated time.

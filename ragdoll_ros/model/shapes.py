@@ -201,8 +201,7 @@ class Cylinder(Solid):
     """A solid cylinder along its own z. Raises NotPositive, NotFinite.
 
     Args:
-        radius: m.
-        length: m, from face to face.
+        radius, length: m; the length is from face to face.
 
     Example:
         >>> Cylinder(radius=0.1, length=0.4).half_extents
