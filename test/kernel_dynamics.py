@@ -114,6 +114,6 @@ class KernelDynamics:
         return GeneralizedState(q, self._turned(q, v, lambda turns: turns))
 
     def _turned(self, q, v, way):
-        v, spins = v.copy(), self._layout.root_spins
+        v, spins = v.copy(), self._layout.root_angular_velocities
         v[spins] = rotation.rotate(way(q[self._layout.root_orientations]), v[spins])
         return v

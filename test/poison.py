@@ -20,7 +20,7 @@ def poison(simulation, kind, dolls=slice(0, 1)):
     engine = simulation._engine
     array, place, spoilt, reason = POISONS[kind]
     if simulation.engine_name == 'rigid':
-        owns = {'q': engine.layout.own_q, 'v': engine.layout.own_v}[array][dolls]
+        owns = {'q': engine.layout.doll_q, 'v': engine.layout.doll_v}[array][dolls]
         for own in owns:
             numbers = getattr(engine._clusters, array)[own]
             numbers[place] = spoilt(numbers[place])

@@ -57,7 +57,7 @@ def time_to_slow(doll, state, names):
     axis = rotation.rotate(rotation.multiply(state.orientations[first], rotation.inverse(
         pose.orientation)), joint_axes(joint)[-1])
     anchor = state.positions[first] + rotation.rotate(
-        state.orientations[first], pose.inward(np.reshape(joint.anchor, (1, 3)))[0])
+        state.orientations[first], pose.apply_inverse(np.reshape(joint.anchor, (1, 3)))[0])
     masses = np.array([bone.mass for bone in bones])
     across = state.positions[rows] - anchor
     across = across - np.outer(across @ axis, axis)
@@ -80,7 +80,7 @@ def gaps(doll, state):
     for joint in doll.joints:
         for name in (joint.parent, joint.child):
             k = [bone.name for bone in doll.bones].index(name)
-            at = doll.bones[k].pose.inward(np.reshape(joint.anchor, (1, 3)))[0]
+            at = doll.bones[k].pose.apply_inverse(np.reshape(joint.anchor, (1, 3)))[0]
             places.append(state.positions[k] + rotation.rotate(state.orientations[k], at))
     places = np.reshape(places, (-1, 2, 3))
     return np.linalg.norm(places[:, 0] - places[:, 1], axis=1)

@@ -20,7 +20,7 @@ NEAR = 0.03
 
 def triangles_of(shape, pose=HERE):
     corners, triangles = shape.mesh()
-    return pose.outward(corners)[triangles]
+    return pose.apply(corners)[triangles]
 
 
 def stl(triangles):

@@ -178,7 +178,7 @@ def test_a_link_without_a_mass_gives_its_shapes_to_what_carries_it(tmp_path):
     assert [bone.name for bone in doll.bones] == ['a']
     assert [part.shape for part in doll.root.shape.parts] == [Box((0.1, 0.1, 0.1))] * 2
     # Two cubes, 0.2 m apart, reach from -0.05 to 0.25 m.
-    ends = doll.root.position[2] + np.array([-1, 1]) * doll.root.shape.reach(
+    ends = doll.root.position[2] + np.array([-1, 1]) * doll.root.shape.support(
         np.array([[0, 0, -1], [0, 0, 1]]))
     assert ends == pytest.approx([-0.05, 0.25])
 
@@ -303,7 +303,7 @@ def test_mass_centre_and_inertia_are_those_of_the_link_and_what_it_carries(tmp_p
     part, = bone.shape.parts
     assert part.shape == Box((0.2, 0.1, 0.3))
     directions = np.concatenate([np.eye(3), -np.eye(3)])
-    reach = directions @ bone.position + bone.shape.reach(directions @ turn)
+    reach = directions @ bone.position + bone.shape.support(directions @ turn)
     assert reach == pytest.approx([0.1, 0.05, 0.15] * 2)
 
 

@@ -19,8 +19,8 @@ def deepest(first, second):
 
     Rays through the faces of a mesh would be another; points of both meshes do for convex bodies.
     """
-    points = [bone.pose.outward(bone.shape.mesh()[0]) for bone in (first, second)]
-    return max(-float(bone.shape.signed_distance(bone.pose.inward(other)).min())
+    points = [bone.pose.apply(bone.shape.mesh()[0]) for bone in (first, second)]
+    return max(-float(bone.shape.signed_distance(bone.pose.apply_inverse(other)).min())
                for bone, other in ((first, points[1]), (second, points[0])))
 
 
@@ -60,12 +60,12 @@ def test_bodies_without_a_joint_are_separate_or_excluded_from_collision(name):
     doll = fit_rigs.fitted(name).doll
     for i, first in enumerate(doll.bones):
         for second in doll.bones[:i]:
-            if frozenset((first.name, second.name)) not in doll.never_collide:
+            if frozenset((first.name, second.name)) not in doll.excluded_pairs:
                 assert deepest(first, second) <= 0.001 + 1e-9, (first.name, second.name)
 
 
 def test_two_thighs_of_a_person_meet_and_so_collide():
     doll = wild_rigs.fitted('feet_of_nothing-smooth').doll
     thighs = frozenset(f'{wild_rigs.M}{side}UpLeg' for side in ('Left', 'Right'))
-    assert thighs not in doll.never_collide
+    assert thighs not in doll.excluded_pairs
     assert isinstance(doll.bone(min(thighs)), Bone)

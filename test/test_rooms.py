@@ -92,7 +92,7 @@ def broken_arrows(edges: Edges) -> list[str]:
     found = []
     for name, target in edges:
         room, other = name.partition('.')[0], target.partition('.')[0]
-        if target.startswith(':') or room == other or room in ('', 'riders') or target == '':
+        if target.startswith(':') or room == other or room == '' or target == '':
             continue
         tied = name.startswith(('viewer.sources.node', 'replay.published')) and other == 'ros'
         if not tied and other not in ARROWS.get(room, set()):
@@ -137,7 +137,7 @@ def test_rooms_are_those_of_the_plan():
     rooms = {path.name for path in PACKAGE.iterdir() if path.is_dir() and path.name != '__pycache__'
              and any(path.rglob('*.py'))}
     assert rooms == set(ARROWS)
-    assert {path.name for path in PACKAGE.glob('*.py')} == {'__init__.py', 'riders.py'}
+    assert {path.name for path in PACKAGE.glob('*.py')} == {'__init__.py'}
 
 
 @pytest.mark.parametrize('room', ['physics', 'ros', 'accuracy'])

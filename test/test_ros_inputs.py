@@ -7,7 +7,7 @@ import pytest
 from geometry_msgs.msg import Twist, Vector3, Wrench, WrenchStamped
 from std_msgs.msg import Header
 
-from ragdoll_ros.model.vectors import shortened
+from ragdoll_ros.model.vectors import clamp_norm
 from ragdoll_ros.ros.inputs.subscriptions import TORQUE_ARM
 
 HUGE = 1.7e308
@@ -43,7 +43,7 @@ def inputs(node):
 
 @pytest.mark.parametrize('values', [(3, 4, 0), (HUGE, HUGE, -HUGE), (5e-324, 0, 0), (1e300, 1, 0)])
 def test_a_shortened_vector_keeps_its_direction_and_is_as_long_as_it_may(values):
-    result, _ = shortened(values, 10.0)
+    result, _ = clamp_norm(values, 10.0)
     largest = max(map(abs, values))
     length = math.hypot(*result)
     wanted = math.hypot(*(value / largest for value in values)) * largest

@@ -9,7 +9,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import rotation
-from ragdoll_ros.model.push import ARROW, Push
+from ragdoll_ros.model.push import ARROW_LENGTH, Push
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.physics.simulation import Simulation
@@ -41,7 +41,7 @@ def test_markers_fill_the_shape_of_a_bone(lone):
                     if marker.action == Marker.ADD], axis=0)
     turn, centre = lone.state.orientations[0], lone.state.positions[0]
     inner = rotation.rotate(rotation.inverse(turn), directions)
-    expected = directions @ centre + lone.scene.bones[0].shape.reach(inner)
+    expected = directions @ centre + lone.scene.bones[0].shape.support(inner)
     np.testing.assert_allclose(reach, expected, atol=1e-12)
 
 
@@ -54,7 +54,7 @@ def test_ghosts_to_drag_fill_the_shape_of_a_bone_too(lone):
         scale = ghost.scale
         scale.x, scale.y, scale.z = scale.x / SCALE, scale.y / SCALE, scale.z / SCALE
     reach = np.max([_support(ghost, directions) for ghost in ghosts], axis=0)
-    np.testing.assert_allclose(reach, lone.scene.bones[0].shape.reach(directions), atol=1e-12)
+    np.testing.assert_allclose(reach, lone.scene.bones[0].shape.support(directions), atol=1e-12)
 
 
 def _support(marker, directions):
@@ -88,7 +88,7 @@ def test_the_tip_of_a_push_s_arrow_is_where_it_attacks(local):
         if local:
             point = rotation.rotate(state.orientations[bone], point)
         np.testing.assert_allclose(tip, state.positions[bone] + point, atol=1e-12)
-        assert arrow.scale.x == pytest.approx(ARROW * 0.5 ** 0.5)
+        assert arrow.scale.x == pytest.approx(ARROW_LENGTH * 0.5 ** 0.5)
         gone = heard(markers.serialize(1, state, [])).markers[-1]
         assert (gone.ns, gone.id, gone.action) == (arrow.ns, arrow.id, Marker.DELETE)
         assert all(marker.action == Marker.ADD

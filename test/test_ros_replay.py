@@ -269,5 +269,5 @@ def test_a_node_that_is_killed_leaves_a_run_that_is_repeated(peer, log, tmp_path
     torn.write_bytes(file.read_bytes()[:file.stat().st_size // 2])
     code, said, warned = replayed(capsys, torn)
     equal, torn_of = said.split(' repeated, ')[1].split(' hashes')[0].split(' of ')
-    assert code == 0 and 'breaks off' in warned and equal == torn_of
+    assert code == 0 and 'is truncated' in warned and equal == torn_of
     assert 10 < int(torn_of) < int(of)

@@ -177,7 +177,7 @@ class Measure:
         for index, bone in enumerate(self.scene.bones):
             inward = rotation.rotate(rotation.inverse(trajectory.orientations[:, index]), -normal)
             height = trajectory.positions[:, index] @ normal - ground.offset
-            deepest = max(deepest, float((bone.shape.reach(inward) - height).max()))
+            deepest = max(deepest, float((bone.shape.support(inward) - height).max()))
         return deepest
 
     def settling_time(self, trajectory: Trajectory) -> float:
@@ -191,7 +191,7 @@ class Measure:
     def _end(self, placement: Placement, name: str, anchor: tuple[float, float, float]) -> End:
         bone = placement.doll.bone(name)
         return (self.scene.bone_index(self.scene.qualified(placement, name)),
-                bone.pose.inward(anchor), rotation.inverse(bone.orientation))
+                bone.pose.apply_inverse(anchor), rotation.inverse(bone.orientation))
 
 
 def compare(trajectory: Trajectory, truth: Trajectory) -> dict[str, float]:

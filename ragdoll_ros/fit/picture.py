@@ -98,7 +98,7 @@ def _arc(axis: np.ndarray, pointer: np.ndarray, limits: tuple[float, float]) -> 
 
 def _triangles(bone: Bone) -> np.ndarray:
     corners, triangles = bone.shape.mesh()
-    return bone.pose.outward(corners)[triangles]
+    return bone.pose.apply(corners)[triangles]
 
 
 def _draw_solids(axes: object, solids: list[tuple[np.ndarray, np.ndarray]], alpha: float) -> None:

@@ -248,6 +248,6 @@ def _body_fit(character: Character, group: BodyGroup, fitted: FittedShape, axes:
     bone = Bone(group.name, _rounded(fitted.shape), mass, np.round(fitted.centre, DECIMALS) + 0.0,
                 np.round(rotation.from_matrix(axes.frame), 12) + 0.0)
     points = character.vertices[group.vertices[group.vertices < len(character.vertices)]]
-    off = bone.shape.signed_distance(bone.pose.inward(points))
+    off = bone.shape.signed_distance(bone.pose.apply_inverse(points))
     return BodyFit(bone, tuple(character.bone_names[b] for b in group.bones), group.role,
                    len(points), int(np.count_nonzero(off <= TOLERANCE)), axes)

@@ -43,7 +43,7 @@ def skin_of(doll: Ragdoll) -> Skin | None:
     np.add.at(weights, (rows, slots[character.bones]), character.weights)
     weights[weights.sum(axis=1) == 0, 0] = 1
     return Skin(character.vertices, character.triangles, bones, weights,
-                *_bind_poses(doll, character, bones), character.paint)
+                *_bind_poses(doll, character, bones), character.appearance)
 
 
 def skins_of(scene: Scene, warn: Callable[[str], None]) -> dict[int, Skin]:

@@ -7,9 +7,10 @@ what is left of it (see anthropometry.py). Shapes do not weigh: they are what to
 from __future__ import annotations
 
 from ..model import errors
-from ..model.anthropometry import PERCENTILES, SAMPLES, SEXES, Segment, shares
+from ..model.anthropometry import PERCENTILES, SAMPLES, SEXES, Segment, mass_fractions
 from ..model.compound import Compound
 from ..model.ragdoll import Bone, Ragdoll
+from ..model.vectors import vector
 from .joints import joints
 from .places import Places, places
 from .shapes import outline
@@ -34,15 +35,29 @@ def standard(sex: str, percentile: int = 50) -> tuple[float, float]:
 
 
 def person(height: float, mass: float, sex: str, name: str = 'person') -> Ragdoll:
-    """The doll of a person of ``height`` m and ``mass`` kg; ``sex``: 'female' or 'male'.
+    """The doll of an adult, standing, by de Leva's anthropometric tables.
 
-    Raises OutOfRange for what is outside HEIGHTS, MASSES or SEXES.
+    Args:
+        height: m, 1.0 to 2.1.
+        mass: kg, 15 to 160.
+        sex: 'female' or 'male'.
+        name: of the doll.
+
+    Returns:
+        A doll of 16 bones, soles on z = 0.
+
+    Raises:
+        OutOfRange: for a height, mass or sex outside these.
+
+    Example:
+        >>> len(person(1.75, 70, 'female').bones)
+        16
     """
     errors.check_range('height', height, *HEIGHTS)
     errors.check_range('mass', mass, *MASSES)
     _check_sex(sex)
     at = places(height, mass, sex)
-    sample, share = SAMPLES[sex], shares(sex)
+    sample, share = SAMPLES[sex], mass_fractions(sex)
     bones = []
     for bone, part in at.segments:
         segment = sample.segments[part]
@@ -58,7 +73,7 @@ def _bone(name: str, part: str, segment: Segment, length: float, mass: float, at
     if part == 'foot':
         radii = segment.longitudinal, segment.transverse, segment.sagittal
     return Bone(name, Compound(shapes), mass, centre, color=COLORS.get(part, TROUSERS),
-                moments=tuple(mass * (radius * length) ** 2 for radius in radii))
+                moments=vector(mass * (radius * length) ** 2 for radius in radii))
 
 
 def _check_sex(sex: str) -> None:

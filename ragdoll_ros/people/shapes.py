@@ -1,7 +1,7 @@
 """What a segment of a person touches with: simple shapes from lengths and circumferences."""
 from __future__ import annotations
 
-from ..model.anthropometry import GIRTH, TRUNK
+from ..model.anthropometry import BODY, TRUNK
 from ..model.shapes import Box, Capsule, Part
 from ..model.vectors import Vector
 from .places import HEEL, Places, radius, trunk_sides
@@ -19,15 +19,15 @@ def outline(bone: str, part: str, centre: float, at: Places) -> tuple[tuple[Part
     x, y, z = at.proximal(bone)
     if part == 'foot':
         length = at.lengths['foot']
-        size = (length, GIRTH.foot_breadth / 1000 * at.tall, at.ankle)
+        size = (length, BODY.foot_breadth / 1000 * at.tall, at.ankle)
         behind = length / 2 - centre
         return (Part(Box(size), (behind, 0, 0)),), (centre - HEEL * length, y, z / 2)
     place = (x, y, z - centre)
     if part == 'head':
         return _head(at, centre), place
     if part == 'hand':
-        length, breadth = GIRTH.hand_length / 1000 * at.tall, GIRTH.hand_breadth / 1000 * at.tall
-        thickness = GIRTH.hand / 2000 * at.tall - breadth
+        length, breadth = BODY.hand_length / 1000 * at.tall, BODY.hand_breadth / 1000 * at.tall
+        thickness = BODY.hand / 2000 * at.tall - breadth
         box = Box((thickness, breadth, length))
         return (Part(box, (0, 0, centre - length / 2)),), place
     length = at.lengths[part]
@@ -39,8 +39,8 @@ def outline(bone: str, part: str, centre: float, at: Places) -> tuple[tuple[Part
 
 def _limb(part: str, length: float, wide: float, centre: float) -> Part:
     """A capsule that goes half a radius beyond both joints, but not beyond the ankle."""
-    girths = {'upper_arm': (GIRTH.biceps,), 'forearm': (GIRTH.forearm, GIRTH.wrist),
-              'thigh': (GIRTH.thigh, GIRTH.lower_thigh), 'shin': (GIRTH.calf, GIRTH.ankle)}[part]
+    girths = {'upper_arm': (BODY.biceps,), 'forearm': (BODY.forearm, BODY.wrist),
+              'thigh': (BODY.thigh, BODY.lower_thigh), 'shin': (BODY.calf, BODY.ankle)}[part]
     thick = radius(sum(girths) / len(girths), wide)
     above, below = thick / 2, 0.0 if part == 'shin' else thick / 2
     whole = max(length + above + below - 2 * thick, LEAST * length) + 2 * thick
@@ -49,8 +49,8 @@ def _limb(part: str, length: float, wide: float, centre: float) -> Part:
 
 def _head(at: Places, centre: float) -> tuple[Part, ...]:
     """The skull from the vertex to the mid-gonion's height, and the neck below it."""
-    thick, length = radius(GIRTH.head, at.tall), at.lengths['head']
+    thick, length = radius(BODY.head, at.tall), at.lengths['head']
     skull = Capsule(min(thick, 0.49 * length), length - 2 * min(thick, 0.49 * length))
-    neck = Capsule(radius(GIRTH.neck, at.tall), max(at.neck, LEAST * length))
+    neck = Capsule(radius(BODY.neck, at.tall), max(at.neck, LEAST * length))
     return (Part(skull, (0, 0, centre - length / 2)),
             Part(neck, (0, 0, centre - length - at.neck / 2)))

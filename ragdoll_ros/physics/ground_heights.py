@@ -45,7 +45,7 @@ def _parts(doll: Ragdoll) -> tuple[np.ndarray, ...]:
     """
     parts = [(index, part) for index, bone in enumerate(doll.bones) for part in bone.shape.parts]
     return (np.array([index for index, _ in parts]),
-            np.array([part.shape.support for _, part in parts]),
+            np.array([part.shape.support_terms for _, part in parts]),
             np.array([part.position for _, part in parts]),
             rotation.matrix([part.orientation for _, part in parts]))
 
@@ -60,11 +60,11 @@ class JointGap:
             for joint in placement.doll.joints:
                 pair = [placement.doll.bone(name) for name in (joint.parent, joint.child)]
                 bones.append([index[bone.name] for bone in pair])
-                points.append([bone.pose.inward(joint.anchor) for bone in pair])
+                points.append([bone.pose.apply_inverse(joint.anchor) for bone in pair])
         self._bones = np.array(bones, int).reshape(-1, 2)
         self._points = np.array(points).reshape(-1, 2, 3)
 
     def gaps(self, state: State) -> np.ndarray:
         """Distances (j,) m between anchors, in the dolls' order of joints."""
-        seen = state.poses(self._bones).outward(self._points)
+        seen = state.poses(self._bones).apply(self._points)
         return np.linalg.norm(seen[:, 0] - seen[:, 1], axis=-1)

@@ -386,7 +386,7 @@ class Simulation:
             **engine.measures(),
             'joint_gap_m': float(self._gap.gaps(self.state).max(initial=0.0)),
             'limit_overshoot_rad': max(0.0, float(
-                engine.layout.past_limits(self.coordinates.q).max(initial=0.0))),
+                engine.layout.limit_violations(self.coordinates.q).max(initial=0.0))),
             'sinking_m': max(0.0, -float(self._heights(self.state).min())),
             'asleep': self.asleep}
 

@@ -1,4 +1,4 @@
-"""A run on the topics of a node `ragdoll`, by the clock on the wall."""
+"""A run published in real time on the topics of a node `ragdoll`."""
 from __future__ import annotations
 
 import time
@@ -20,9 +20,9 @@ BONE_NAMES = 'bone_names'
 
 
 def publish(steps: Iterator[Simulation], pace: float, arguments: list[str]) -> int:
-    """Publish each of the ``steps``, ``pace`` s of them in each s on the wall, until they end.
+    """Publish the ``steps`` at the real-time factor ``pace`` until they end; the exit code.
 
-    ``arguments`` are those for ROS, from --ros-args on. The exit code.
+    ``arguments`` are ROS's, from --ros-args on.
     """
     def spin() -> int:
         with rclpy_context(arguments):
@@ -37,7 +37,7 @@ def publish(steps: Iterator[Simulation], pace: float, arguments: list[str]) -> i
 
 
 class PublishedRun(Node):
-    """Publishes what the node did whose run it was, with the stamps of now."""
+    """Publishes the topics of the recorded node, stamped with the current time."""
 
     def __init__(self, steps: Iterator[Simulation], pace: float) -> None:
         super().__init__('ragdoll')

@@ -11,7 +11,7 @@ import subprocess
 import sys
 from collections import Counter
 
-from ...files.repeat import repeated
+from ...files.repeat import repeated_placements
 from ...files.scene import load_scene
 from ...model.push import Push
 from ...model.scene import Placement, Scene
@@ -29,10 +29,10 @@ def sixty() -> Scene:
     """
     drop = load_scene('drop')
     doll = drop.dolls[0].doll
-    lying = repeated(
+    lying = repeated_placements(
         Placement(doll, 'doll', (0.0, 0.0, 0.12), (0.0, 1.0, 0.0, 1.0)),
         {'count': 50, 'grid': (2.5, 2.5, 0.0), 'columns': (10, 5), 'turned': 'yaw', 'seed': 1})
-    falling = repeated(
+    falling = repeated_placements(
         Placement(doll, 'falling', (1.0, 0.0, 0.8), spin=(0.2, 0.3, 0.0)),
         {'count': 9, 'grid': (7.5, 5.0, 0.5), 'columns': (3, 3)})
     lone = Placement(doll, 'lone', (-20.0, 0.0, 0.0), spin=(0.2, 0.3, 0.0))

@@ -129,7 +129,7 @@ def simulated(scene: Scene, scale: BoneDepth, **how: object) -> Outcome:
     """The outcome by an engine of the package; ``how`` goes to Simulation."""
     with Simulation(scene, **how) as simulation:
         return watched(scene, scale, simulation.advance, lambda: float(
-            simulation._engine.layout.past_limits(simulation.coordinates.q).max()))
+            simulation._engine.layout.limit_violations(simulation.coordinates.q).max()))
 
 
 def pile() -> None:

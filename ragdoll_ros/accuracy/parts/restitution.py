@@ -74,7 +74,7 @@ def counted(restitution: float) -> list[float]:
 def dropped(shape: Shape, restitution: float, flights: list[float], tick: float) -> Trial:
     """A body let go level, 1 m above the ground."""
     doll = Ragdoll('body', (Bone('body', shape, 1.0, (0.0, 0.0, 0.0)),))
-    up = float(shape.reach(np.array((0.0, 0.0, -1.0))))
+    up = float(shape.support(np.array((0.0, 0.0, -1.0))))
     scene = Scene('bounce', (Placement(doll, position=(0.0, 0.0, up + HEIGHT)),), Ground(),
                   Material(0.0, 0.0, restitution), step=tick)
     return Trial(scene, (math.ceil(flights[-1] / tick) + 1) * tick)
@@ -86,7 +86,7 @@ def apex_shares(trajectory: Trajectory, shape: Shape, flights: list[float],
 
     Flights between two ticks are not seen.
     """
-    up = float(shape.reach(np.array((0.0, 0.0, -1.0))))
+    up = float(shape.support(np.array((0.0, 0.0, -1.0))))
     height = (trajectory.positions[:, 0, 2] - up
               + trajectory.linear_velocities[:, 0, 2] ** 2 / (2 * GRAVITY))
     shares = []

@@ -20,12 +20,12 @@ def interior_points(shape: Shape) -> np.ndarray:
 
 def sample_points(bone: Bone) -> np.ndarray:
     """Points (p, 3) m on the surface and in the interior of a body, doll's frame."""
-    return bone.pose.outward(np.concatenate([bone.shape.mesh()[0], interior_points(bone.shape)]))
+    return bone.pose.apply(np.concatenate([bone.shape.mesh()[0], interior_points(bone.shape)]))
 
 
 def penetration_depth(bone: Bone, points: np.ndarray) -> np.ndarray:
     """Penetration depth (p,) m of points (p, 3) m, doll's frame; negative outside the body."""
-    return -bone.shape.signed_distance(bone.pose.inward(points))
+    return -bone.shape.signed_distance(bone.pose.apply_inverse(points))
 
 
 def overlapping_pairs(bones: tuple[Bone, ...]) -> list[tuple[str, str]]:
@@ -47,7 +47,7 @@ def overlapping_pairs(bones: tuple[Bone, ...]) -> list[tuple[str, str]]:
 def colliding_overlaps(doll: Ragdoll) -> tuple[tuple[str, str], ...]:
     """Names of the overlapping pairs of bodies whose collision the doll does not exclude."""
     return tuple(pair for pair in overlapping_pairs(doll.bones)
-                 if frozenset(pair) not in doll.never_collide)
+                 if frozenset(pair) not in doll.excluded_pairs)
 
 
 def covered(bones: tuple[Bone, ...], points: np.ndarray, tolerance: float) -> np.ndarray:
@@ -62,7 +62,7 @@ def overlap_share(bones: tuple[Bone, ...]) -> float:
     """Fraction of the bodies' total volume, 0 to 1, that lies inside another body."""
     whole = shared = 0.0
     for bone in bones:
-        points = bone.pose.outward(interior_points(bone.shape))
+        points = bone.pose.apply(interior_points(bone.shape))
         others = tuple(other for other in bones if other is not bone)
         share = float(np.mean(covered(others, points, 0.0))) if others else 0.0
         whole += bone.shape.volume

@@ -58,7 +58,7 @@ def trim_overlaps(groups: list[BodyGroup], fits: list[FittedShape],
 
 def _reaches_joints(bone: Bone, anchors: np.ndarray) -> bool:
     """Whether a body still reaches the anchors (k, 3) of its joints."""
-    distances = relative_distance(bone.shape, bone.pose.inward(anchors))
+    distances = relative_distance(bone.shape, bone.pose.apply_inverse(anchors))
     return bool((distances <= ANCHOR_TOLERANCE).all())
 
 
@@ -96,14 +96,14 @@ def _penetration(first: Bone, second: Bone) -> tuple[float, np.ndarray]:
 def _support(bone: Bone, directions: np.ndarray) -> np.ndarray:
     """Support function (k,) m of a body about its centre; directions (k, 3), doll's frame."""
     back = rotation.inverse(np.array(bone.orientation))
-    return bone.shape.reach(rotation.rotate(back, directions))
+    return bone.shape.support(rotation.rotate(back, directions))
 
 
 def _cut(bone: Bone, direction: np.ndarray, depth: float) -> Bone:
     """The body cut by ``depth`` m on the side of a unit direction (3,); the far side stays."""
     local = rotation.rotate(rotation.inverse(np.array(bone.orientation)), direction)
     shape, centre = _shrink(bone.shape, local, depth)
-    return dataclasses.replace(bone, shape=shape, position=bone.pose.outward(centre[None])[0])
+    return dataclasses.replace(bone, shape=shape, position=bone.pose.apply(centre[None])[0])
 
 
 def _shrink(shape: Shape, direction: np.ndarray, depth: float) -> tuple[Shape, np.ndarray]:

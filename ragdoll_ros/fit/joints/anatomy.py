@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import rotation
-from ...model.ragdoll import LARGEST_SWING, Joint, Limits
+from ...model.ragdoll import MAX_SWING, Joint, Limits
 from .neutral import FOOT_SLOPE, NeutralDirections
 
 MAX_ELEVATION = math.radians(60)
@@ -82,7 +82,7 @@ def human_joint(parent: str, child: str, role: str, side: int, anchor: np.ndarra
     if twist is None:
         return Joint(parent, child, 'universal', anchor, (axis, np.cross(in_plane, axis)),
                      (first, second))
-    second = tuple(max(-LARGEST_SWING, min(LARGEST_SWING, angle)) for angle in second)
+    second = tuple(max(-MAX_SWING, min(MAX_SWING, angle)) for angle in second)
     return Joint(parent, child, 'ball', anchor, (in_plane, axis), (first, second, twist))
 
 

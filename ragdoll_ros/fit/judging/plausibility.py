@@ -74,7 +74,7 @@ def find_implausible_masses(doll: Ragdoll, roles: Sequence[str | None],
 def extent(doll: Ragdoll) -> float:
     """Longest edge of the doll's bounding box in the bind pose, m."""
     directions = np.concatenate([np.eye(3), -np.eye(3)])
-    reaches = [directions @ np.array(bone.position) + bone.shape.reach(rotation.rotate(
+    reaches = [directions @ np.array(bone.position) + bone.shape.support(rotation.rotate(
         rotation.inverse(np.array(bone.orientation)), directions)) for bone in doll.bones]
     furthest = np.max(reaches, axis=0)
     return float((furthest[:3] + furthest[3:]).max())

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...model import errors, rotation
 from ...model.ragdoll import WORLD
-from ...model.skin import Paint
+from ...model.skin import Appearance
 from ..roles.names import plain_name, side_of
 from .draco import decompress
 from .gltf_file import GltfFile
@@ -54,7 +54,7 @@ class Character:
     """Warnings: what could not be imported as it is in the file."""
     springs: tuple[SpringBone, ...] = ()
     """Spring bones; their points are in m, the character's frame."""
-    paint: Paint | None = None
+    appearance: Appearance | None = None
     """Appearance of the surface; None where the file has neither materials nor normals."""
 
     @functools.cached_property
@@ -131,16 +131,17 @@ def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) 
     parents = tuple(_parent_bone(node, nodes.parents, place) for node in joints)
     metres = metres_per_unit(names, parents, positions, vertices, notes) if scale is None else scale
     springs = _springs(file, nodes, skins, place, metres * axes, notes)
-    paint = _paint(file, skins, axes, notes)
+    appearance = _read_appearance(file, skins, axes, notes)
     stem = _bone_names([file.path.stem])[0]
     return Character(
         stem, names, parents,
         positions * metres, np.stack([_nearest_rotation(matrix) for matrix in linear]),
         vertices * metres, skins.triangles, lookup[skins.nodes], skins.weights, metres,
-        tuple(notes), springs, paint)
+        tuple(notes), springs, appearance)
 
 
-def _paint(file: GltfFile, skins: Skins, axes: np.ndarray, notes: list[str]) -> Paint | None:
+def _read_appearance(file: GltfFile, skins: Skins, axes: np.ndarray,
+                     notes: list[str]) -> Appearance | None:
     """Appearance of the surface; ``axes`` (3, 3) rotate normals to the character's frame."""
     materials = Materials(file, notes)
     numbers = np.array([materials.number(each) for each in skins.materials], int)
@@ -149,8 +150,8 @@ def _paint(file: GltfFile, skins: Skins, axes: np.ndarray, notes: list[str]) -> 
     normals = skins.normals @ axes.T
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 1e-30)
-    return Paint(np.nan_to_num(normals), skins.uvs, numbers[skins.meshes],
-                 tuple(materials.entries), tuple(materials.textures))
+    return Appearance(np.nan_to_num(normals), skins.uvs, numbers[skins.meshes],
+                      tuple(materials.entries), tuple(materials.textures))
 
 
 def _springs(file: GltfFile, nodes: Nodes, skins: Skins, place: dict[int, int],

@@ -27,7 +27,7 @@ MAX_VERTICES = 500_000
 
 
 @dataclass(frozen=True)
-class Appearance:
+class PrimitiveAppearance:
     """Normals (v, 3) and texture coordinates (v, 2) of a mesh, zero where missing; material."""
 
     normals: np.ndarray
@@ -58,7 +58,7 @@ class Skins:
     notes: list[str] = field(default_factory=list)
 
     def add(self, vertices: np.ndarray, triangles: np.ndarray, nodes: np.ndarray,
-            weights: np.ndarray, appearance: Appearance) -> None:
+            weights: np.ndarray, appearance: PrimitiveAppearance) -> None:
         """Append a mesh; ``triangles`` index its own vertices. OutOfRange for too many vertices."""
         base, width = len(self.vertices), max(nodes.shape[1], self.nodes.shape[1])
         if base + len(vertices) > MAX_VERTICES:
@@ -211,7 +211,7 @@ def _add_primitive(file: GltfFile, skins: Skins, primitive: dict, joints: np.nda
               replace(appearance, normals=normals))
 
 
-def read_appearance(file: GltfFile, primitive: dict, points: int, where: str) -> Appearance:
+def read_appearance(file: GltfFile, primitive: dict, points: int, where: str) -> PrimitiveAppearance:
     """Appearance of a primitive with so many ``points``; broken attributes count as missing."""
     found = []
     for name, kind, width in (('NORMAL', 'VEC3', 3), ('TEXCOORD_0', 'VEC2', 2)):
@@ -222,7 +222,7 @@ def read_appearance(file: GltfFile, primitive: dict, points: int, where: str) ->
             if read.shape == values.shape:
                 values = np.clip(read, -1e6, 1e6)
         found.append(values)
-    return Appearance(*found, primitive.get('material'))
+    return PrimitiveAppearance(*found, primitive.get('material'))
 
 
 def _skin_vertices(points: np.ndarray, slots: np.ndarray, weights: np.ndarray,

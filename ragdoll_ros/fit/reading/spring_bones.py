@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...model import errors
-from ...model.swing import LENGTHS
+from ...model.swing import LENGTH_RANGE
 from .gltf_file import GltfFile, get_container, get_objects
 from .nodes import Nodes
 
@@ -101,10 +101,10 @@ def with_points(spring: SpringBone, nodes: Nodes,
 def drop_short_segments(spring: SpringBone, notes: list[str]) -> SpringBone:
     """The spring (points in m) with the ends of segments too short for a swing merged."""
     lengths = np.linalg.norm(np.diff(spring.points, axis=0), axis=1)
-    long = lengths >= LENGTHS[0]
+    long = lengths >= LENGTH_RANGE[0]
     if long.all():
         return spring
-    notes.append(f'spring {spring.name} has segments below {1000 * LENGTHS[0]:g} mm: ignored')
+    notes.append(f'spring {spring.name} has segments below {1000 * LENGTH_RANGE[0]:g} mm: ignored')
     joints = tuple(joint for joint, keep in zip(spring.joints, long, strict=True) if keep)
     return replace(spring, points=spring.points[np.concatenate([[True], long])], joints=joints)
 

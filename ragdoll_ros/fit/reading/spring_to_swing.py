@@ -22,7 +22,7 @@ import math
 
 import numpy as np
 
-from ...model.swing import LARGEST_SHARE, MOST_DAMPED, Link, Swing
+from ...model.swing import MAX_DAMPING, MAX_GRAVITY, Link, Swing
 from .spring_bones import SpringBone, SpringJoint
 
 FRAME_RATE = 60.0
@@ -54,13 +54,13 @@ def swing_from_spring(spring: SpringBone, bone: str, metres: float) -> tuple[Swi
     shares = [joint.gravity / max(joint.stiffness, MIN_STIFFNESS / metres) * stiff * reach
               for joint, (stiff, _), reach in zip(spring.joints, rates, reaches, strict=True)]
     target = float(np.mean(shares)) / GRAVITY
-    share = min(max(target, -LARGEST_SHARE), LARGEST_SHARE)
+    share = min(max(target, -MAX_GRAVITY), MAX_GRAVITY)
     links = []
     for index, (stiff, damping) in enumerate(rates):
         natural_rate = math.sqrt(stiff + abs(share) * GRAVITY / reaches[index])
         links.append(Link(_round(lengths[index]), _round(masses[index]),
                           _round(distal[index][0] * stiff),
-                          _round(min(damping / (2 * natural_rate), MOST_DAMPED)),
+                          _round(min(damping / (2 * natural_rate), MAX_DAMPING)),
                           tuple(steps[index] / lengths[index])))
     root = tuple(round(float(x), 10) for x in spring.points[0])
     swing = Swing(spring.name, bone, root, links[0].direction, tuple(links), _round(share))

@@ -23,9 +23,9 @@ def subset_character(character: Character, own: np.ndarray) -> Character:
     moved = character.weights.any(axis=1)
     used = np.where(moved, theirs.any(axis=1), own[0])
     triangles = used[character.triangles].all(axis=1)
-    paint = character.paint and replace(
-        character.paint, normals=character.paint.normals[used], uvs=character.paint.uvs[used],
-        numbers=character.paint.numbers[triangles])
+    look = character.appearance
+    appearance = look and replace(look, normals=look.normals[used], uvs=look.uvs[used],
+                                  material_indices=look.material_indices[triangles])
     chosen = np.flatnonzero(own)
     springs = tuple(replace(spring, carrier=int(place[spring.carrier]),
                             bones=tuple(int(place[bone]) for bone in spring.bones if own[bone]))
@@ -38,17 +38,18 @@ def subset_character(character: Character, own: np.ndarray) -> Character:
         vertices=character.vertices[used],
         triangles=(np.cumsum(used) - 1)[character.triangles[triangles]],
         bones=np.where(theirs, place[character.bones], 0)[used],
-        weights=np.where(theirs, character.weights, 0.0)[used], springs=springs, paint=paint)
+        weights=np.where(theirs, character.weights, 0.0)[used], springs=springs,
+        appearance=appearance)
 
 
 def to_frame(character: Character, frame: Pose) -> Character:
     """The character in another frame, whose pose in the current one is ``frame``; z stays up."""
     back = rotation.inverse(frame.orientation)
-    paint = character.paint and replace(
-        character.paint, normals=rotation.rotate(back, character.paint.normals))
+    appearance = character.appearance and replace(
+        character.appearance, normals=rotation.rotate(back, character.appearance.normals))
     return replace(
-        character, positions=frame.inward(character.positions),
+        character, positions=frame.apply_inverse(character.positions),
         orientations=rotation.multiply(back, character.orientations),
-        vertices=frame.inward(character.vertices), paint=paint,
-        springs=tuple(replace(spring, points=frame.inward(spring.points))
+        vertices=frame.apply_inverse(character.vertices), appearance=appearance,
+        springs=tuple(replace(spring, points=frame.apply_inverse(spring.points))
                       for spring in character.springs))

@@ -95,8 +95,8 @@ def make_bone(name: str, shapes: Sequence[PlacedShape], link: UrdfLink, frame: P
     if len(shapes) == 1:
         bone = Bone(name, shapes[0][0], mass, *frame.compose(shapes[0][1]))
     else:
-        pose = axes.compose(whole.seen_from(axes).principal_pose())
-        bone = Bone(name, whole.seen_from(pose), mass, *pose)
+        pose = axes.compose(whole.in_frame(axes).principal_pose())
+        bone = Bone(name, whole.in_frame(pose), mass, *pose)
     if _is_physical(link):
         return _with_inertia(bone, whole, axes, *_combine_inertias([(link, frame), *merged]))
     if link.inertia is not None:
@@ -121,7 +121,7 @@ def _with_inertia(bone: Bone, whole: Compound, axes: Pose, centre: np.ndarray,
     moments = np.diag(_rotate_inertia(inertia, pose.orientation))
     if same_centre and rotation.angle_between(pose.orientation, bone.orientation) < ROUNDING:
         return dataclasses.replace(bone, moments=moments)
-    return dataclasses.replace(bone, shape=whole.seen_from(pose), position=pose.position,
+    return dataclasses.replace(bone, shape=whole.in_frame(pose), position=pose.position,
                                orientation=pose.orientation, moments=moments)
 
 

@@ -13,11 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ...files.urdf_text import urdf_text
-from ...files.urdf_tree import LARGEST_TEXT, UrdfJoint, UrdfTree, parse_urdf
+from ...files.urdf_tree import LARGEST_TEXT, UrdfJoint, UrdfTree, decode_urdf, parse_urdf
 from ...model import errors, rotation
 from ...model.pose import Pose
-from ...model.ragdoll import LARGEST_SWING, WORLD, Bone, Joint, Ragdoll, SkeletonFrame
+from ...model.ragdoll import MAX_SWING, WORLD, Bone, Joint, Ragdoll, SkeletonFrame
 from ..roles.names import plain_name
 from .link_bodies import LinkMeshes, link_shapes, make_bone
 
@@ -48,7 +47,7 @@ def read_urdf(path: str | Path) -> tuple[Ragdoll, tuple[str, ...]]:
             raise errors.Unreadable('', there, 'a URDF file')
         if path.stat().st_size > LARGEST_TEXT:
             raise errors.Unreadable('', path.stat().st_size, f'at most {LARGEST_TEXT} bytes')
-        doll, notes = _doll(parse_urdf(urdf_text(path.read_bytes())), path.parent)
+        doll, notes = _doll(parse_urdf(decode_urdf(path.read_bytes())), path.parent)
         return doll, tuple(notes)
     except errors.ModelError as error:
         raise errors.ModelErrors(str(path), [error]) from None
@@ -190,7 +189,7 @@ def _swing_twist_limits(limits: list) -> tuple:
             return None
         return -min(widest, most), min(widest, most)
 
-    return symmetric(limits[:-1], LARGEST_SWING), symmetric(limits[-1:], 2 * math.pi)
+    return symmetric(limits[:-1], MAX_SWING), symmetric(limits[-1:], 2 * math.pi)
 
 
 def _frames(poses: dict[str, Pose], carriers: dict[str, str], names: dict[str, str],

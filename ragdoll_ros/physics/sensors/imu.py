@@ -18,7 +18,7 @@ from ...model import errors, rotation
 from ...model.errors import set_fields
 from ...model.rotation import IDENTITY
 from ...model.state import State
-from ...model.vectors import Quaternion, Vector, finite, unit
+from ...model.vectors import Quaternion, Vector, finite_floats, unit_vector
 from ..rigid_body import cross
 
 SMALL = 1e-4
@@ -34,8 +34,8 @@ class ImuMount:
     orientation: Quaternion = IDENTITY
 
     def __post_init__(self) -> None:
-        set_fields(self, position=finite('position', self.position),
-                   orientation=unit('orientation', self.orientation, count=4))
+        set_fields(self, position=finite_floats('position', self.position),
+                   orientation=unit_vector('orientation', self.orientation, count=4))
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,8 @@ class ImuErrors:
     range: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        set_fields(self, bias=finite('bias', self.bias, 6), range=finite('range', self.range, 2))
+        set_fields(self, bias=finite_floats('bias', self.bias, 6),
+                   range=finite_floats('range', self.range, 2))
         for key, value in (('noise_acceleration', self.noise_acceleration),
                            ('noise_rate', self.noise_rate), ('range', min(self.range))):
             errors.check_range(key, value, 0.0, 1e6)

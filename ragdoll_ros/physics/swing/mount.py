@@ -31,7 +31,7 @@ class SwingMount:
     def on(cls, swing: Swing, bone: Bone, index: int, name: str = '') -> SwingMount:
         """Mount a swing on a doll's bone with this index in the state."""
         back = rotation.inverse(np.array(bone.orientation))
-        return cls(swing, index, name or swing.name, bone.pose.inward(swing.root),
+        return cls(swing, index, name or swing.name, bone.pose.apply_inverse(swing.root),
                    rotation.rotate(back, np.array(swing.directions())))
 
     @property

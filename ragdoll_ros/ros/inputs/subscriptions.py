@@ -11,11 +11,11 @@ from geometry_msgs.msg import Twist, Vector3, Wrench, WrenchStamped
 from rclpy.node import Node
 
 from ...model import errors
-from ...model.drive import FASTEST, MOST_FORCE, MOST_TORQUE, Drive
+from ...model.drive import MAX_FORCE, MAX_SPEED, MAX_TORQUE, Drive
 from ...model.push import Push
 from ...model.ragdoll import WORLD
 from ...model.scene import Scene
-from ...model.vectors import Vector, shortened
+from ...model.vectors import Vector, clamp_norm
 from ..parameters.node_settings import NodeSettings
 from .input_counts import InputCounts
 
@@ -63,7 +63,7 @@ class PushSubscriptions:
         """
         settings = self.settings
         try:
-            linear, angular = (self._limited('cmd_vel', name, vector, FASTEST, 'the limit')
+            linear, angular = (self._limited('cmd_vel', name, vector, MAX_SPEED, 'the limit')
                                for name, vector in (('linear', message.linear),
                                                     ('angular', message.angular)))
             if any(linear) or any(angular):
@@ -71,8 +71,8 @@ class PushSubscriptions:
                     settings.pushed_bone, linear if any(linear) else None,
                     angular if any(angular) else None,
                     settings.force_per_speed, settings.torque_per_speed,
-                    min(MOST_FORCE, settings.max_force),
-                    min(MOST_TORQUE, settings.max_force * TORQUE_ARM),
+                    min(MAX_FORCE, settings.max_force),
+                    min(MAX_TORQUE, settings.max_force * TORQUE_ARM),
                     duration=settings.cmd_vel_timeout), 'cmd_vel')
             else:
                 self.simulation.release('cmd_vel')
@@ -112,7 +112,7 @@ class PushSubscriptions:
         """The vector, shortened to ``limit``. NotFinite if the message is not finite."""
         values = (vector.x, vector.y, vector.z)
         errors.check_finite(name, values)
-        result, length = shortened(values, limit)
+        result, length = clamp_norm(values, limit)
         if length > limit:
             self._counts.clamp(source, f'{name} of {length:g} to {limit_name}, {limit:g}')
         return result

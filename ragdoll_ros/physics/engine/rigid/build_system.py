@@ -219,7 +219,7 @@ def _within_dolls(scene: Scene) -> np.ndarray:
     apart = set()
     for own, placement in zip(scene.bone_slices, scene.dolls, strict=True):
         place = {bone.name: own.start + k for k, bone in enumerate(placement.doll.bones)}
-        apart |= {frozenset(place[name] for name in pair) for pair in placement.doll.never_collide}
+        apart |= {frozenset(place[name] for name in pair) for pair in placement.doll.excluded_pairs}
     doll = scene.doll_of_bone[owner]
     found = [(a, b) for d in range(len(scene.dolls))
              for members in [np.flatnonzero(doll == d)]

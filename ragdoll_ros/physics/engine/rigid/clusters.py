@@ -71,8 +71,8 @@ class Clusters:
     def __init__(self, scene: Scene, layout: DofLayout, workers: int) -> None:
         self._scene = scene
         self._systems = _systems(scene)
-        self._q = [np.arange(own.start, own.stop) for own in layout.own_q]
-        self._v = [np.arange(own.start, own.stop) for own in layout.own_v]
+        self._q = [np.arange(own.start, own.stop) for own in layout.doll_q]
+        self._v = [np.arange(own.start, own.stop) for own in layout.doll_v]
         self._doll_of_v = np.repeat(np.arange(len(self._v)), list(map(len, self._v)))
         self._bones = [np.arange(own.start, own.stop) for own in scene.bone_slices]
         self._workspaces: dict[int, list[Workspace]] = {}

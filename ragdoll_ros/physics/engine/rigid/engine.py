@@ -44,7 +44,7 @@ class RigidEngine:
         self._clusters = Clusters(scene, self.layout, workers)
         self._broad_phase = BroadPhase(scene, self._clusters.reach())
         self._heights = GroundHeights(scene)
-        self._spins = self.layout.root_spins
+        self._spins = self.layout.root_angular_velocities
         self.sleeping = np.zeros(len(scene.dolls), bool)
         self._initial_overlaps = [np.full(len(own), OVERLAPPING)
                                   for own in self._clusters.excluded(OVERLAPPING)]

@@ -17,7 +17,7 @@ from ....files.urdf import to_urdf
 from ....model import errors, rotation
 from ....model.coordinates import GeneralizedState
 from ....model.ragdoll import Bone, Ragdoll
-from ....model.scene import Placement, Scene, grip
+from ....model.scene import Placement, Scene, finite_friction
 from ....model.state import State
 from ...accuracy import Accuracy
 from ...rigid_body import damping_rate
@@ -137,7 +137,7 @@ class _World:
         order = [links[bone.name] for bone in doll.bones]
         for bone, link in zip(doll.bones, order, strict=True):
             self._set_material(body, link, bone)
-        for pair in doll.never_collide:
+        for pair in doll.excluded_pairs:
             pybullet.setCollisionFilterPair(body, body, *(links[name] for name in pair), 0,
                                             physicsClientId=self._client)
         return _Doll(body, order, [link for link in order if link >= 0], order.index(-1),
@@ -160,7 +160,7 @@ class _World:
         friction it adds each body's coefficient times the other's sliding friction.
         """
         friction, rolling, restitution = self.scene.material.on(bone)
-        sliding = math.sqrt(grip(friction))
+        sliding = math.sqrt(finite_friction(friction))
         pybullet.changeDynamics(
             body, link, lateralFriction=sliding,
             rollingFriction=rolling / (2 * sliding) if sliding else 0.0, spinningFriction=0,
@@ -214,7 +214,7 @@ class BulletEngine(SubsteppedEngine):
 
     def _check_sizes(self) -> None:
         """Raise OutOfRange for dolls with more coordinates than PyBullet returns."""
-        for placement, own in zip(self.scene.dolls, self.layout.own_q, strict=True):
+        for placement, own in zip(self.scene.dolls, self.layout.doll_q, strict=True):
             count = own.stop - own.start
             if count > MOST_COORDINATES:
                 raise errors.OutOfRange(

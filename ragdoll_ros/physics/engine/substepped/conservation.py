@@ -61,7 +61,7 @@ class ConservationProjection:
             spin, q[layout.root_positions] - last.centre)
         q[layout.root_positions[air]] += (centre - last.centre)[air]
         v[layout.root_velocities[air]] += velocity[air]
-        v[layout.root_spins[air]] += spin[air]
+        v[layout.root_angular_velocities[air]] += spin[air]
         return GeneralizedState(q, v)
 
     def groups(self, pairs: set[tuple[int, int]]) -> np.ndarray:
@@ -120,13 +120,13 @@ class ConservationProjection:
         ``rigid``: new linear and angular velocity of the locked doll, (3,) each, and the current.
         """
         layout = self._layout
-        root, turn = layout.root_velocities[doll], layout.root_spins[doll]
+        root, turn = layout.root_velocities[doll], layout.root_angular_velocities[doll]
         arm = q[layout.root_positions[doll]] - centre
         velocity, spin, velocity_now, spin_now = rigid
         v[root] = velocity + cross(spin, arm) + scale * (
             v[root] - velocity_now - cross(spin_now, arm))
         v[turn] = spin + scale * (v[turn] - spin_now)
-        v[turn[-1] + 1:layout.own_v[doll].stop] *= scale
+        v[turn[-1] + 1:layout.doll_v[doll].stop] *= scale
 
 
 def _speed_factor(energy: float, taken: float) -> float:

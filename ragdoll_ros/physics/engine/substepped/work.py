@@ -33,8 +33,8 @@ def mean_wrench(load: AppliedWrench, before: State, after: State) -> tuple[np.nd
     """Mean force (3,) N and torque (3,) N m, world frame; a local load turns at a constant rate."""
     if not load.local:
         return load.force, load.torque
-    turn = rotation.mean_of_turn(_turned(load.bone, before,
-                                         after)) @ before.rotation_matrices[load.bone]
+    turn = rotation.mean_rotation_matrix(
+        _turned(load.bone, before, after)) @ before.rotation_matrices[load.bone]
     return turn @ load.force, turn @ load.torque
 
 

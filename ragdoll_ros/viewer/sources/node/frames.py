@@ -132,7 +132,7 @@ class RemoteFrames:
         self._pushes.time = (stamp - zero) / SECOND * pace
         masses, rods = self._values.get('swings'), None
         if masses is not None and len(masses) == self._rods.count:
-            rods = self._rods.between(masses, state)
+            rods = self._rods.ends(masses, state)
         return Frame(scene, self._pushes.time, state, self._pushes.pushes,
                      self._hands.held(scene, state), rods, self._values.get('contacts'),
                      self._values.get('angles'))
