@@ -211,7 +211,8 @@ def _add_primitive(file: GltfFile, skins: Skins, primitive: dict, joints: np.nda
               replace(appearance, normals=normals))
 
 
-def read_appearance(file: GltfFile, primitive: dict, points: int, where: str) -> PrimitiveAppearance:
+def read_appearance(file: GltfFile, primitive: dict, points: int,
+                    where: str) -> PrimitiveAppearance:
     """Appearance of a primitive with so many ``points``; broken attributes count as missing."""
     found = []
     for name, kind, width in (('NORMAL', 'VEC3', 3), ('TEXCOORD_0', 'VEC2', 2)):
