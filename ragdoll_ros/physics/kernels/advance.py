@@ -30,11 +30,12 @@ from __future__ import annotations
 
 import math
 
+import numba
 import numpy as np
 
 from .cluster_state import CLUSTER_STATE, ClusterState
 from .compiling.bundle import bundle_at
-from .compiling.decorators import JOBS, REAL, compiled, entry
+from .compiling.decorators import REAL, compiled, entry
 from .contact.gaps import enable_separated_pairs, update_kinematics_and_gaps
 from .dynamics.kinematics import (
     Kinematics,
@@ -60,6 +61,11 @@ LONGEST_FLIGHT = 0.05
 MAX_IMPACTS = 200
 """Impacts of one doll in one tick, over the cube of the number of dolls in the cluster: from then
 on no time of impact is sought, so that many dolls do not cost their square."""
+
+JOB = np.dtype([('system', np.int64), ('workspace', np.int64), ('cluster', np.int64)])
+"""Addresses of the bundles of a cluster: its system, a workspace, and its state."""
+
+JOBS = numba.from_dtype(JOB)[::1]
 
 system_at, workspace_at, cluster_state_at = (bundle_at(SYSTEM), bundle_at(WORKSPACE),
                                              bundle_at(CLUSTER_STATE))
@@ -115,7 +121,7 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
     q, v, dense, stats = cluster.q, cluster.v, cluster.dense_step[0], ws.stats[0]
     time, impacts = 0.0, 0
     max_impacts = MAX_IMPACTS // len(ws.step.external) ** 3
-    flies = s.flight_enabled[0] > 0 and len(cluster.springs) == 0
+    flight_possible = s.flight_enabled[0] > 0 and len(cluster.springs) == 0
     separated = enable_separated_pairs(s, ws, ws.step.end, q, v)
     if separated:
         dense.valid = dense.first_rate_known = 0
@@ -126,7 +132,7 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
         left, seek = duration - time, impacts < max_impacts
         if not dense.valid and not stats.gaps_current:
             refresh_gaps(s, ws, cluster)
-        if not dense.valid and flies and seek:
+        if not dense.valid and flight_possible and seek:
             try_flight(s, ws, cluster, left, nominal, tolerance)
         if dense.valid:
             gone, touched = follow_dense_step(s, ws, cluster, left)
@@ -134,7 +140,7 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
             if touched:
                 refresh_gaps(s, ws, cluster)
         else:
-            if not flies or not seek:
+            if not flight_possible or not seek:
                 refresh_gaps(s, ws, cluster)
             h = left / max(1, math.ceil(left / nominal - 1e-9))
             gone, touched = step_to_impact(s, ws, cluster, h, time, nominal, seek)
@@ -152,9 +158,10 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
 def advance(jobs: np.ndarray, duration: float, step: float, tolerance: float) -> None:
     """Advance clusters by ``duration`` s, each by itself, and enter their bone states and sums.
 
-    ``jobs`` (k, 3): addresses of the bundles of a cluster's system, workspace and state. ``step``:
-    length of a contact step, s; ``tolerance``: error of a step of flight, m or rad.
+    ``jobs`` (k,): JOB of each. ``step``: length of a contact step, s; ``tolerance``: error of a
+    step of flight, m or rad.
     """
     for k in range(len(jobs)):
-        advance_cluster(system_at(jobs[k, 0]), workspace_at(jobs[k, 1]),
-                        cluster_state_at(jobs[k, 2]), duration, step, tolerance)
+        job = jobs[k]
+        advance_cluster(system_at(job.system), workspace_at(job.workspace),
+                        cluster_state_at(job.cluster), duration, step, tolerance)

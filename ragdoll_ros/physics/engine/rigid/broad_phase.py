@@ -36,19 +36,20 @@ class BroadPhase:
         ``moving`` (d,). ``states`` (n, 13) of all bones; ``clusters`` (d,): number of each doll's.
         """
         ahead *= IMPACT_SPEEDUP
-        centers, drifts = (self._mean(states[:, own]) for own in (slice(0, 3), slice(7, 10)))
-        radii = self._bone_spheres(states, drifts, ahead)
+        centers, mean_velocities = (self._mean(states[:, own])
+                                    for own in (slice(0, 3), slice(7, 10)))
+        radii = self._bone_spheres(states, mean_velocities, ahead)
         away = _length(states[:, :3] - np.repeat(centers, self._counts, axis=0))
         wide = np.maximum.reduceat(away + radii, self._first, axis=1)
         deflected = self._deflected(states, radii[1], clusters)
-        a, b = _sweep(centers, _sweep_radii(wide, ahead * drifts, deflected))
+        a, b = _sweep(centers, _sweep_radii(wide, ahead * mean_velocities, deflected))
         near = moving[a] | moving[b]
         if not near.any():
             return NO_PAIRS
         a, b = a[near], b[near]
         frame = (deflected[a] | deflected[b]).astype(int)
         """(k,) speeds count relative to: 0 each other, 1 the ground."""
-        closing = np.where(frame, 0.0, ahead * _length(drifts[a] - drifts[b]))
+        closing = np.where(frame, 0.0, ahead * _length(mean_velocities[a] - mean_velocities[b]))
         near = _length(centers[a] - centers[b]) < wide[frame, a] + wide[frame, b] + closing
         a, b, frame, closing = a[near], b[near], frame[near, None], closing[near]
         if len(a):
@@ -64,11 +65,12 @@ class BroadPhase:
         """Means (d, 3) over the bones of each doll."""
         return np.add.reduceat(values, self._first) / self._counts[:, None]
 
-    def _bone_spheres(self, states: np.ndarray, drifts: np.ndarray, ahead: float) -> np.ndarray:
-        """Radii (2, n) m of spheres that contain the bones for ``ahead`` s, relative to the mean
-        velocities ``drifts`` (d, 3) m/s of their dolls, and to the ground.
+    def _bone_spheres(self, states: np.ndarray, mean_velocities: np.ndarray,
+                      ahead: float) -> np.ndarray:
+        """Radii (2, n) m of spheres that contain the bones for ``ahead`` s, relative to the
+        ``mean_velocities`` (d, 3) m/s of their dolls, and to the ground.
         """
-        own = states[:, 7:10] - np.repeat(drifts, self._counts, axis=0)
+        own = states[:, 7:10] - np.repeat(mean_velocities, self._counts, axis=0)
         turning = self._reach * _length(states[:, 10:13])
         return np.array([self._reach + ahead * (_length(velocities) + turning) + MARGIN / 2
                          for velocities in (own, states[:, 7:10])])

@@ -128,29 +128,29 @@ def join_systems(systems: Sequence[System], pairs: np.ndarray) -> System:
         flight_enabled=np.array([min(part.flight_enabled[0] for part in parts)]))
 
 
-def pairs_between(scene: Scene, couples: np.ndarray) -> np.ndarray:
+def pairs_between(scene: Scene, geom_pairs: np.ndarray) -> np.ndarray:
     """Pairs of geoms (p, 2) with the law of their contact."""
     laws = np.array([scene.material.on(bone) for bone in scene.bones
                      for _ in bone.shape.parts]).reshape(-1, 3)
-    pairs = np.zeros(len(couples), GEOM_PAIR)
-    if len(couples):
-        pairs['a'], pairs['b'] = couples.T
-        law = contact_law(laws[couples[:, 0]], laws[couples[:, 1]])
+    pairs = np.zeros(len(geom_pairs), GEOM_PAIR)
+    if len(geom_pairs):
+        pairs['a'], pairs['b'] = geom_pairs.T
+        law = contact_law(laws[geom_pairs[:, 0]], laws[geom_pairs[:, 1]])
         pairs['friction'], pairs['rolling_friction'], pairs['restitution'] = law.T
     return pairs
 
 
 def contact_law(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Laws (..., 3) between two materials (..., 3): geometric means of frictions and restitutions,
-    the mean of the lever arms; friction without limit leaves it to the other.
+    """Laws (..., 3) between two materials (..., 3): geometric means of friction and restitution,
+    the mean of rolling friction; friction without limit leaves it to the other.
     """
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    low, high = np.minimum(a[..., 0], b[..., 0]), np.maximum(a[..., 0], b[..., 0])
+    (friction_a, rolling_a, restitution_a), (friction_b, rolling_b, restitution_b) = (
+        np.moveaxis(law, -1, 0) for law in (a, b))
+    low, high = np.minimum(friction_a, friction_b), np.maximum(friction_a, friction_b)
     mean = np.sqrt(np.minimum(low, NO_SLIP) * np.minimum(high, NO_SLIP))
-    out[..., 0] = np.where(np.isfinite(high), mean, np.minimum(low, NO_SLIP))
-    out[..., 1] = (a[..., 1] + b[..., 1]) / 2
-    out[..., 2] = np.sqrt(a[..., 2] * b[..., 2])
-    return out
+    friction = np.where(np.isfinite(high), mean, np.minimum(low, NO_SLIP))
+    return np.stack([friction, (rolling_a + rolling_b) / 2,
+                     np.sqrt(restitution_a * restitution_b)], axis=-1)
 
 
 def _dofs(tree: np.ndarray, count: int) -> dict[str, np.ndarray]:
@@ -216,13 +216,14 @@ def _within_dolls(scene: Scene) -> np.ndarray:
     if not scene.self_collision:
         return np.zeros((0, 2), np.int64)
     owner = np.repeat(np.arange(len(scene.bones)), [len(b.shape.parts) for b in scene.bones])
-    apart = set()
+    excluded = set()
     for own, placement in zip(scene.bone_slices, scene.dolls, strict=True):
         place = {bone.name: own.start + k for k, bone in enumerate(placement.doll.bones)}
-        apart |= {frozenset(place[name] for name in pair) for pair in placement.doll.excluded_pairs}
+        excluded |= {frozenset(place[name] for name in pair)
+                     for pair in placement.doll.excluded_pairs}
     doll = scene.doll_of_bone[owner]
     found = [(a, b) for d in range(len(scene.dolls))
              for members in [np.flatnonzero(doll == d)]
              for n, a in enumerate(members) for b in members[n + 1:]
-             if owner[a] != owner[b] and frozenset((owner[a], owner[b])) not in apart]
+             if owner[a] != owner[b] and frozenset((owner[a], owner[b])) not in excluded]
     return np.array(found, np.int64).reshape(-1, 2)

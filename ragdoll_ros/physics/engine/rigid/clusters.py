@@ -53,10 +53,10 @@ class Cluster:
     bundles: list[list[np.ndarray]]
     """Rows that bind system, state, and a workspace for each thread; see compiling/bundle.py."""
 
-    def addresses(self, worker: int) -> list[int]:
-        """Addresses of its bundles, for compiled code."""
+    def job(self, worker: int) -> tuple[int, int, int]:
+        """JOB of the kernels on one of the threads."""
         system, state, *workspaces = (rows[0].ctypes.data for rows in self.bundles)
-        return [system, workspaces[worker % len(workspaces)], state]
+        return system, workspaces[worker % len(workspaces)], state
 
     def set_loads(self, loads: np.ndarray, springs: np.ndarray) -> None:
         """Let these act from now on; a step of flight that is under way ends."""
@@ -279,9 +279,9 @@ class Clusters:
         self.pairs = np.concatenate([NO_PAIRS, *(cluster.pairs for cluster in self._several)])
         """(k, 2) of dolls that may touch, of all clusters."""
         self._pair_numbers = self._numbers(self.pairs)
-        self._jobs = np.array([[cluster.addresses(worker) for cluster in clusters]
-                               for worker in range(self._workers)], np.int64)
-        """(workers, k, 3)"""
+        self._jobs = np.array([[cluster.job(worker) for cluster in clusters]
+                               for worker in range(self._workers)], kernels.JOB)
+        """(workers, k)"""
 
     def _advance_parallel(self, jobs: np.ndarray, duration: float, accuracy: Accuracy,
                           sleeping: np.ndarray) -> None:

@@ -89,8 +89,8 @@ class RigidEngine:
         """Put all dolls there and begin; see Engine."""
         clusters, q, v = self._clusters, self._clusters.q, self._clusters.v
         q[:], v[:] = coordinates.q, coordinates.v
-        turns = rotation.inverse(q[self.layout.root_orientations])
-        v[self._spins] = rotation.rotate(turns, v[self._spins])
+        orientations = rotation.inverse(q[self.layout.root_orientations])
+        v[self._spins] = rotation.rotate(orientations, v[self._spins])
         clusters.stats[:] = 0
         clusters.separate()
         self.sleeping[:] = False
@@ -105,13 +105,13 @@ class RigidEngine:
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
                 drives: Drives = ()) -> None:
         """Go on by ``duration`` s; see Engine."""
-        clusters, acting = self._clusters, (wrenches, springs, drives)
-        self._last_start = clusters.q.copy(), clusters.v.copy(), duration, acting
+        clusters, actions = self._clusters, (wrenches, springs, drives)
+        self._last_start = clusters.q.copy(), clusters.v.copy(), duration, actions
         of_doll = self.cluster_of_doll
         for acts in (*wrenches, *springs, *drives):
             self.sleeping[of_doll == of_doll[self.scene.doll_of_bone[acts.bone]]] = False
         self._update_clusters(duration)
-        self._advance(duration, acting, self.accuracy)
+        self._advance(duration, actions, self.accuracy)
 
     def put_to_sleep(self, dolls: np.ndarray) -> None:
         """Bring dolls (d,) to rest where they are; the energy that is left is lost for good."""
@@ -162,8 +162,8 @@ class RigidEngine:
 
     def restore(self, snapshot: tuple) -> None:
         """Go back to a snapshot."""
-        kept, self.sleeping[:], self._age, self._start_energy = snapshot
-        self._clusters.restore(kept)
+        saved, self.sleeping[:], self._age, self._start_energy = snapshot
+        self._clusters.restore(saved)
         self._last_start = None
         self._update_state()
 
@@ -176,8 +176,8 @@ class RigidEngine:
 
     def restore_checkpoint(self, checkpoint: tuple) -> None:
         """Go on from a checkpoint; see Engine."""
-        kept, self.sleeping[:], self._start_energy = checkpoint
-        self._clusters.restore_checkpoint(kept)
+        saved, self.sleeping[:], self._start_energy = checkpoint
+        self._clusters.restore_checkpoint(saved)
         self._age = MAX_AGE
         self._last_start = None
         self._refresh()
@@ -213,10 +213,10 @@ class RigidEngine:
         return self._broad_phase.pairs(self._clusters.bone_states, ahead, ~self.sleeping,
                                        self.cluster_of_doll)
 
-    def _advance(self, duration: float, acting: tuple[Wrenches, Springs, Drives],
+    def _advance(self, duration: float, actions: tuple[Wrenches, Springs, Drives],
                  accuracy: Accuracy) -> None:
         """Advance all clusters that do not rest."""
-        acted = self._act(acting) if any(acting) else ()
+        acted = self._act(actions) if any(actions) else ()
         self._clusters.advance(duration, accuracy, self.sleeping)
         for cluster in acted:
             cluster.set_loads(NO_LOADS, NO_SPRINGS)
@@ -227,10 +227,10 @@ class RigidEngine:
         self._state = State.of(self._clusters.bone_states.copy())
         self._doll_totals = DollTotals.of(self._clusters.sums.view(float).reshape(-1, 20).copy())
 
-    def _act(self, acting: tuple[Wrenches, Springs, Drives]) -> list[Cluster]:
+    def _act(self, actions: tuple[Wrenches, Springs, Drives]) -> list[Cluster]:
         """Let loads and springs act on their clusters, which are returned."""
         acts: dict[int, tuple[list, list, list]] = {}
-        for kind, given in enumerate(acting):
+        for kind, given in enumerate(actions):
             for one in given:
                 place = int(self._clusters.of_doll[self.scene.doll_of_bone[one.bone]])
                 acts.setdefault(place, ([], [], []))[kind].append(one)
@@ -281,7 +281,7 @@ class RigidEngine:
         """
         if self._last_start is None:
             return 0.0
-        q, v, duration, acting = self._last_start
+        q, v, duration, actions = self._last_start
         finer = dataclasses.replace(self.accuracy, step=FINER * self.accuracy.step,
                                     flight_error=self.accuracy.flight_error / 100)
         here, there = self.save(), self.state.positions
@@ -289,7 +289,7 @@ class RigidEngine:
         clusters.q[:], clusters.v[:] = q, v
         clusters.gather_state()
         clusters.invalidate()
-        self._advance(duration, acting, finer)
+        self._advance(duration, actions, finer)
         missed = np.linalg.norm(self.state.positions - there, axis=1).max()
         start = self._last_start
         self.restore(here)

@@ -37,13 +37,13 @@ def closest_parameter(shape: Shape, p: Vec3, u: Vec3, half: float) -> float:
     if shape.kind >= BOX:
         return _find_minimum(shape, p, u, half)
     # Ericson 5.1.9 for two segments given by their midpoints
-    along, across, other = dot(p, u), u[0] * u[0] + u[1] * u[1], 0.0
+    projection, across, other = dot(p, u), u[0] * u[0] + u[1] * u[1], 0.0
     if shape.kind == CAPSULE:
         end = shape.size[1]
-        t = (u[2] * p[2] - along) / across if across > 1e-16 else 0.0
+        t = (u[2] * p[2] - projection) / across if across > 1e-16 else 0.0
         t = min(max(t, -half), half)
         other = min(max(p[2] + t * u[2], -end), end)
-    return min(max(u[2] * other - along, -half), half)
+    return min(max(u[2] * other - projection, -half), half)
 
 
 @compiled

@@ -137,15 +137,15 @@ def _clip_edges(a: Shape, b: Shape, n: Vec3, points: np.ndarray) -> int:
             PARALLEL_EDGES_SINE * PARALLEL_EDGES_SINE * uu * vv):
         return 0
     height = dot(offset, n)
-    along = dot(offset, v) - height * other_rise
+    rise_offset = dot(offset, v) - height * other_rise
     # a's points offset + t u are above b's at (along + t uv) / vv of v
-    ends = (vv - along) / uv, (-vv - along) / uv
+    ends = (vv - rise_offset) / uv, (-vv - rise_offset) / uv
     lo, hi = max(min(ends[0], ends[1]), -1.0), min(max(ends[0], ends[1]), 1.0)
     if lo > hi:
         return 0
     for k in range(2):
         t = lo if k == 0 else hi
-        gap = height + t * rise - (along + t * uv) / vv * other_rise
+        gap = height + t * rise - (rise_offset + t * uv) / vv * other_rise
         put(points[k].point, add_scaled(
             add_scaled(add(other, offset), t, u), -(gap / 2), n))
         points[k].gap, points[k].feature_id = gap, k

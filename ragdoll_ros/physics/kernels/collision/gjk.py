@@ -66,18 +66,18 @@ def _nearest(simplex: np.ndarray, count: int) -> tuple[int, Vec3]:
     """
     if count == 1:
         return 1, vec(simplex[0].point)
-    last = count - 1
+    newest = count - 1
     if count == 2:
-        square, point, kept = _nearest_on_segment(simplex, last - 1, last)
+        square, point, subset = _nearest_on_segment(simplex, newest - 1, newest)
     else:
-        square, point, kept = _nearest_on_triangle(simplex, last - 2, last - 1, last)
+        square, point, subset = _nearest_on_triangle(simplex, newest - 2, newest - 1, newest)
     for k in range(1, count - 1 if count == 4 else 1):
-        found, other, these = _nearest_on_triangle(simplex, last - 3, k, last)
+        found, other, these = _nearest_on_triangle(simplex, newest - 3, k, newest)
         if found < square:
-            square, point, kept = found, other, these
+            square, point, subset = found, other, these
     number = 0
     for k in range(count):
-        if kept & (1 << k):
+        if subset & (1 << k):
             put(simplex[number].point, vec(simplex[k].point))
             put(simplex[number].support, vec(simplex[k].support))
             number += 1
@@ -88,16 +88,16 @@ def _nearest(simplex: np.ndarray, count: int) -> tuple[int, Vec3]:
 def _nearest_on_segment(simplex: np.ndarray, i: int, j: int) -> Nearest:
     a = vec(simplex[i].point)
     edge = sub(vec(simplex[j].point), a)
-    along, square = -dot(a, edge), dot(edge, edge)
-    kept = (1 << i) | (1 << j)
-    if along <= 0:
-        t, kept = 0.0, 1 << i
-    elif along >= square:
-        t, kept = 1.0, 1 << j
+    t, square = -dot(a, edge), dot(edge, edge)
+    subset = (1 << i) | (1 << j)
+    if t <= 0:
+        t, subset = 0.0, 1 << i
+    elif t >= square:
+        t, subset = 1.0, 1 << j
     else:
-        t = along / square
+        t /= square
     point = add_scaled(a, t, edge)
-    return dot(point, point), point, kept
+    return dot(point, point), point, subset
 
 
 @compiled

@@ -68,5 +68,5 @@ def _swap(a: np.record, b: np.record) -> None:
 
 @compiled
 def _squared_distance(a: np.record, b: np.record) -> float:
-    apart = sub(vec(a.point), vec(b.point))
-    return dot(apart, apart)
+    difference = sub(vec(a.point), vec(b.point))
+    return dot(difference, difference)

@@ -106,8 +106,8 @@ def refine_axis(a: Shape, b: Shape, c: Vec3, start: Axis) -> Axis:
         if found > s:
             s, axis = found, n
     for _ in range(20):
-        apart = add_scaled(c, max(gap - s, 0.0), axis)
-        count, n = closest_direction(a, b, apart, 1.0, FINE_TOLERANCE, simplex, count, axis)
+        offset = add_scaled(c, max(gap - s, 0.0), axis)
+        count, n = closest_direction(a, b, offset, 1.0, FINE_TOLERANCE, simplex, count, axis)
         found = separation_along(a, b, c, n)
         if found <= s:
             break

@@ -13,7 +13,7 @@ from numba.core.compiler_machinery import LoweringPass, PassManager, register_pa
 from numba.core.typed_passes import NativeLowering
 
 
-class Part(JITCodeLibrary):
+class CalledCode(JITCodeLibrary):
     """The code of a function that only other compiled code calls."""
 
     _linked: ModuleRef | None = None
@@ -31,7 +31,7 @@ class Part(JITCodeLibrary):
             self._enter_called(called)
             self._linked = self._own().clone()
             for library in reversed(called):
-                module = library._own() if isinstance(library, Part) else (
+                module = library._own() if isinstance(library, CalledCode) else (
                     library._get_module_for_linking())
                 self._linked.link_in(module, preserve=True)
         return self._linked
@@ -43,7 +43,7 @@ class Part(JITCodeLibrary):
         """Enter all that is called, each after all that it calls itself."""
         for library in self._linking_libraries:
             if library not in called:
-                if isinstance(library, Part):
+                if isinstance(library, CalledCode):
                     library._enter_called(called)
                 called[library] = None
 
@@ -52,7 +52,7 @@ class Part(JITCodeLibrary):
         return 0
 
     @property
-    def codegen(self) -> Part:
+    def codegen(self) -> CalledCode:
         """Whom numba asks to set_env()."""
         return self
 
@@ -70,7 +70,7 @@ class _BeginPart(LoweringPass):
         super().__init__()
 
     def run_pass(self, state: object) -> bool:
-        state.library = Part(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library = CalledCode(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         return True
 

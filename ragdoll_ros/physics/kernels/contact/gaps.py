@@ -218,15 +218,15 @@ def pair_gap(s: System, k: int, kin: Kinematics) -> float:
     bounding spheres or their extents along the line of their centers.
     """
     i, j = s.pairs[k].a, s.pairs[k].b
-    way = sub(vec(kin.geom_positions[i]), vec(kin.geom_positions[j]))
-    length = norm(way)
+    direction = sub(vec(kin.geom_positions[i]), vec(kin.geom_positions[j]))
+    length = norm(direction)
     far = length - (s.geoms[i].bounding_radius + s.geoms[j].bounding_radius)
     if far > NEAR:
         return far
     a, b = placed_shape(s, kin, i), placed_shape(s, kin, j)
     if length > NEAR:
-        way = divide(way, length)
-        far = length - extent(a, way) - extent(b, way)
+        direction = divide(direction, length)
+        far = length - extent(a, direction) - extent(b, direction)
         if far > NEAR:
             return far
     return separation(a, b, NEAR)

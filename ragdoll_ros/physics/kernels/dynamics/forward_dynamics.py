@@ -137,8 +137,8 @@ def aba_backward(body: np.record, i: int, v: np.ndarray, kin: Kinematics, dyn: D
     w, u = vec(carrier), linear(carrier)
     for d in range(body.dof_count - 1, -1, -1):
         dof = body.v_start + d
-        axis, drift, pull, rate = kin.motion_subspaces[dof], dyn.bias_accelerations[dof], dyn.U[
-            dof], v[dof]
+        axis, drift, U = kin.motion_subspaces[dof], dyn.bias_accelerations[dof], dyn.U[dof]
+        rate = v[dof]
         s, t = scale(rate, vec(axis)), scale(rate, linear(axis))
         if not body.has_quaternion:
             w, u = sub(w, s), sub(u, t)
@@ -148,17 +148,17 @@ def aba_backward(body: np.record, i: int, v: np.ndarray, kin: Kinematics, dyn: D
             value = 0.0
             for k in range(6):
                 value += inertia[j, k] * axis[k]
-            pull[j] = value
+            U[j] = value
             own += value * axis[j]
             force -= axis[j] * bias[j]
         inverse = 1 / own
         dyn.D_inverse[dof], dyn.u[dof] = inverse, force
         for j in range(6):
-            share = pull[j] * inverse
+            share = U[j] * inverse
             for k in range(j, 6):
-                inertia[j, k] = inertia[k, j] = inertia[j, k] - share * pull[k]
+                inertia[j, k] = inertia[k, j] = inertia[j, k] - share * U[k]
         for j in range(6):
-            value = bias[j] + pull[j] * inverse * force
+            value = bias[j] + U[j] * inverse * force
             for k in range(6):
                 value += inertia[j, k] * drift[k]
             bias[j] = value
@@ -175,11 +175,11 @@ def aba_forward(body: np.record, i: int, kin: Kinematics, dyn: Dynamics, out: np
     for k in range(6):
         acceleration[k] = dyn.bias_forces[body.parent, k]
     for dof in range(body.v_start, body.v_start + body.dof_count):
-        axis, drift, pull = kin.motion_subspaces[dof], dyn.bias_accelerations[dof], dyn.U[dof]
+        axis, drift, U = kin.motion_subspaces[dof], dyn.bias_accelerations[dof], dyn.U[dof]
         left = dyn.u[dof]
         for k in range(6):
             acceleration[k] += drift[k]
-            left -= pull[k] * acceleration[k]
+            left -= U[k] * acceleration[k]
         out[dof] = left * dyn.D_inverse[dof]
         for k in range(6):
             acceleration[k] += axis[k] * out[dof]

@@ -145,10 +145,10 @@ def find_first_contact(s: System, ws: Workspace, cluster: ClusterState) -> None:
         if least <= CLOSED:
             step.event_time = time
             return
-        free = time_without_contact(s, ws, kin, q, v, gaps, acceleration, relative,
+        safe = time_without_contact(s, ws, kin, q, v, gaps, acceleration, relative,
                                     cluster.end_rates)
         before = time
-        time += max(free, 1e-9)
+        time += max(safe, 1e-9)
         if time >= step.length:
             if before >= step.length:
                 return

@@ -83,10 +83,10 @@ def contacts_separate(s: System, ws: Workspace, cluster: ClusterState, m: int) -
                 return False
             continue
         point, normal = vec(c.point), vec(c.normal)
-        apart = normal_velocity(s, kin, q, c.body_a, point, normal)
+        speed = normal_velocity(s, kin, q, c.body_a, point, normal)
         if c.body_b >= 0:
-            apart -= normal_velocity(s, kin, q, c.body_b, point, normal)
-        if apart < SEPARATION_SPEED:
+            speed -= normal_velocity(s, kin, q, c.body_b, point, normal)
+        if speed < SEPARATION_SPEED:
             return False
     if leaning:
         state_derivative(s.tree, s.gravity, cluster.loads, q, v, kin, ws.step.dynamics,

@@ -114,14 +114,14 @@ def factor_rows(W: np.ndarray, n: int, places: np.ndarray, start: int, count: in
 
 
 @compiled
-def append_column(W: np.ndarray, U: np.ndarray, n: int, places: np.ndarray, last: int) -> None:
+def append_column(W: np.ndarray, U: np.ndarray, n: int, places: np.ndarray, end: int) -> None:
     """Enter the column of the last row into the rows of the factor above it."""
-    at = places[last] * n
-    for k in range(last):
+    at = places[end] * n
+    for k in range(end):
         s = W[at + places[k]]
         for i in range(k):
-            s -= U[i * n + k] * U[i * n + last]
-        U[k * n + last] = s / U[k * n + k]
+            s -= U[i * n + k] * U[i * n + end]
+        U[k * n + end] = s / U[k * n + k]
 
 
 @compiled

@@ -151,23 +151,23 @@ def sweep_to_tolerance(ws: Workspace, m: int, n: int, b: np.ndarray,
     sweeps. island.z is Y^T p at the end.
     """
     island = ws.island
-    z, z_was, z_way = island.z, island.z_previous, island.z_direction
-    was, way = island.row_impulses, island.row_direction
+    z, z_previous, z_direction = island.z, island.z_previous, island.z_direction
+    previous, direction = island.row_impulses, island.row_direction
     for j in range(len(z)):
-        z[j] = z_way[j] = 0.0
+        z[j] = z_direction[j] = 0.0
     for i in range(n):
-        way[i] = 0.0
+        direction[i] = 0.0
     for k in range(m):
         member = island.members[k]
         for e in range(member.kind):
-            begun, p[member.row + e] = p[member.row + e], 0.0
-            change_impulse(ws, k, e, begun, p)
+            impulse, p[member.row + e] = p[member.row + e], 0.0
+            change_impulse(ws, k, e, impulse, p)
     worst, done, before = 0.0, 0, 0.0
     for _ in range(MAX_SWEEPS):
         for i in range(n):
-            was[i] = p[i]
+            previous[i] = p[i]
         for j in range(len(z)):
-            z_was[j] = z[j]
+            z_previous[j] = z[j]
         worst = sweep_large_island(ws, m, b, p)
         done += 1
         if worst <= TOLERANCE or done == MAX_SWEEPS:
@@ -177,19 +177,19 @@ def sweep_to_tolerance(ws: Workspace, m: int, n: int, b: np.ndarray,
             member, block = island.members[k], island.blocks[k]
             for e in range(member.kind):
                 row = member.row + e
-                square += (p[row] - was[row]) ** 2 * block[e, e]
+                square += (p[row] - previous[row]) ** 2 * block[e, e]
         share = square / before if before > 0 else 0.0
         before = square
         if share > 1:
             share = 0.0
         for i in range(n):
-            step = p[i] - was[i]
-            p[i] += share * way[i]
-            way[i] = share * way[i] + step
+            step = p[i] - previous[i]
+            p[i] += share * direction[i]
+            direction[i] = share * direction[i] + step
         for j in range(len(z)):
-            step = z[j] - z_was[j]
-            z[j] += share * z_way[j]
-            z_way[j] = share * z_way[j] + step
+            step = z[j] - z_previous[j]
+            z[j] += share * z_direction[j]
+            z_direction[j] = share * z_direction[j] + step
     return worst, done
 
 

@@ -59,9 +59,9 @@ def linearize(island: Island, m: int, n: int, p: np.ndarray, proximal: float) ->
     """Enter the Jacobian of alart_curnier(), with the share ``proximal`` of W's diagonal added to
     W, into island.G, flat (n * n), and the right-hand side of a step into island.direction.
     """
-    W, G, u, way = island.W, island.G, island.velocity, island.direction
+    W, G, u, direction = island.W, island.G, island.velocity, island.direction
     for i in range(n):
-        way[i] = -island.residual[i]
+        direction[i] = -island.residual[i]
     for c in range(m):
         member = island.members[c]
         a = member.row
@@ -70,7 +70,7 @@ def linearize(island: Island, m: int, n: int, p: np.ndarray, proximal: float) ->
         active = push > 0
         write_velocity_row(W, G, n, a, active, proximal)
         if not active:
-            way[a] = -p[a]
+            direction[a] = -p[a]
         for k in range(1, member.kind, 2):
             i = a + k
             own_t = max(W[i * n + i], W[(i + 1) * n + i + 1])
@@ -82,7 +82,7 @@ def linearize(island: Island, m: int, n: int, p: np.ndarray, proximal: float) ->
                 for e in range(i, i + 2):
                     write_velocity_row(W, G, n, e, active or sticks, proximal)
                     if not active and not sticks:
-                        way[e] = -p[e]
+                        direction[e] = -p[e]
                 continue
             y1, z1, share = y / size, z / size, most / size
             for e in range(2):
@@ -182,7 +182,7 @@ def solve_reduced(G: np.ndarray, n: int, x: np.ndarray, places: np.ndarray,
 def newton(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray, tolerance: float,
            proximal: float) -> float:
     """Take Newton steps from p on. p becomes the best found; returns its largest residual, m/s."""
-    way, keep = island.direction, island.best
+    direction, keep = island.direction, island.best
     best, late = math.inf, 0
     for turn in range(MAX_STEPS + 1):
         worst = alart_curnier(island, m, n, b, p)
@@ -194,15 +194,15 @@ def newton(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray, toleran
         if best <= tolerance or late > PATIENCE or turn == MAX_STEPS:
             break
         linearize(island, m, n, p, proximal)
-        if not solve_reduced(island.G, n, way, island.places, island.active):
+        if not solve_reduced(island.G, n, direction, island.places, island.active):
             break
         total = 0.0
         for i in range(n):
-            total += way[i]
+            total += direction[i]
         if not math.isfinite(total):
             break
         for i in range(n):
-            p[i] += way[i]
+            p[i] += direction[i]
     if best < math.inf:
         for i in range(n):
             p[i] = keep[i]

@@ -14,9 +14,9 @@ MAX_ITERATIONS = 50
 
 
 @compiled
-def solve_one_contact(W: np.ndarray, n: int, a: int, c: Vec3, last: Vec3, mu: float) -> Vec3:
+def solve_one_contact(W: np.ndarray, n: int, a: int, c: Vec3, guess: Vec3, mu: float) -> Vec3:
     """Impulse of the contact whose rows of W (flat, n a row) begin at a, and whose velocity without
-    it is c. ``last``: an impulse to start from.
+    it is c. ``guess``: an impulse to start from.
 
     A sliding contact has u_t = -d p_t with a drag d > 0, and u_n = 0: linear for given d. Sought
     is the d at which |p_t| = mu p_n. It exists, as d = 0 gives more (else the contact would stick)
@@ -27,7 +27,7 @@ def solve_one_contact(W: np.ndarray, n: int, a: int, c: Vec3, last: Vec3, mu: fl
     w00, w01, w02 = W[at], W[at + 1], W[at + 2]
     w11, w12, w22 = W[at + n + 1], W[at + n + 2], W[at + 2 * n + 2]
     c0, c1, c2 = c
-    x, y, z = last
+    x, y, z = guess
     if mu <= 0.0:
         return max(0.0, -c0 / w00), 0.0, 0.0
     d0, d1, d2 = w11 * w22 - w12 * w12, w02 * w12 - w01 * w22, w01 * w12 - w02 * w11

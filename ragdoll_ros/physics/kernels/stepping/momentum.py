@@ -153,12 +153,12 @@ def conserve_momentum(s: System, ws: Workspace, h: float, q: np.ndarray, v: np.n
         impulse, momentum, center = vec(external.impulse), vec(old.momentum), vec(new.center)
         weight = mass * g[0] * h, mass * g[1] * h, mass * g[2] * h
         due = add(add(momentum, impulse), weight)
-        way, twice = scale(h, add(momentum, due)), 2 * mass
-        place = add(vec(old.center), divide(way, twice))
+        travel, twice = scale(h, add(momentum, due)), 2 * mass
+        place = add(vec(old.center), divide(travel, twice))
         mean = add(vec(old.center), place)
         mean = mean[0] / 2, mean[1] / 2, mean[2] / 2
-        shift = sub(place, vec(external.center) if external.touches_other else center)
-        moved = sub(add(center, shift), place)
+        displacement = sub(place, vec(external.center) if external.touches_other else center)
+        moved = sub(add(center, displacement), place)
         spin = sub(sub(sub(add(vec(old.angular_momentum), vec(external.moment)),
                            cross(mean, impulse)), cross(moved, due)), vec(new.angular_momentum))
         spin = locked_angular_velocity(ws, new, spin)
@@ -169,7 +169,7 @@ def conserve_momentum(s: System, ws: Workspace, h: float, q: np.ndarray, v: np.n
         for k in range(3):
             v[dof + k] += change[k]
             v[dof + 3 + k] += turn[k]
-            q[at + k] += shift[k]
+            q[at + k] += displacement[k]
 
 
 @compiled

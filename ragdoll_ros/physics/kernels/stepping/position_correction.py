@@ -41,14 +41,14 @@ def limit_correction_energy(s: System, ws: Workspace, m: int, correction: np.nda
     share of the internal kinetic energy. Deep penetrations into the ground or past a limit are
     corrected whatever the energy; what the motion does not pay is booked.
     """
-    deep, scalars = False, ws.step.scalars[0]
+    is_deep, scalars = False, ws.step.scalars[0]
     for i in range(m):
         c = ws.contacts.found[i]
-        deep |= c.body_b < 0 and c.gap < -(BEYOND_LIMIT if c.kind == LIMIT else DEEP_PENETRATION)
+        is_deep |= c.body_b < 0 and c.gap < -(BEYOND_LIMIT if c.kind == LIMIT else DEEP_PENETRATION)
     paid = PAID_SHARE * max(0.0, internal_kinetic_energy(s, ws))
     if scalars.correction_energy <= paid:
         return
-    if deep:
+    if is_deep:
         ws.stats[0].work_position_correction += scalars.correction_energy - paid
     else:
         share = paid / scalars.correction_energy
@@ -86,10 +86,10 @@ def clip_to_joint_limits(s: System, q: np.ndarray, correction: np.ndarray) -> No
         if s.body_doll[s.dof_body[limit.dof]] != doll:
             scale_doll(s, doll, share, correction)
             share, doll = 1.0, s.body_doll[s.dof_body[limit.dof]]
-        way = correction[limit.dof]
-        room = q[limit.q] - limit.lower if way < 0 else limit.upper - q[limit.q]
-        if room > 0 and abs(way) > room:
-            share = min(share, room / abs(way))
+        wanted = correction[limit.dof]
+        room = q[limit.q] - limit.lower if wanted < 0 else limit.upper - q[limit.q]
+        if room > 0 and abs(wanted) > room:
+            share = min(share, room / abs(wanted))
     scale_doll(s, doll, share, correction)
 
 

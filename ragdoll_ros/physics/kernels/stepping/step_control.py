@@ -143,9 +143,9 @@ def clear_contact_accelerations(cluster: ClusterState) -> None:
 @compiled
 def penetrates_unseen(s: System, ws: Workspace) -> bool:
     """Whether something met in the step just taken that ends deep within the other."""
-    deep = min(UNSEEN, UNSEEN_EACH * len(ws.step.external))
+    max_depth = min(UNSEEN, UNSEEN_EACH * len(ws.step.external))
     for j in range(len(ws.gaps)):
-        most = UNSEEN_TURN if is_joint_limit_gap(s, ws.gaps, j) else deep
+        most = UNSEEN_TURN if is_joint_limit_gap(s, ws.gaps, j) else max_depth
         if ws.contacts.gaps_active[j] > TOUCHING and ws.contacts.gaps_end[j] < -most:
             return True
     return False
