@@ -97,7 +97,7 @@ def train(falls: list[Fall], others: list[Fall]) -> RandomForestClassifier:
 
 
 def says(forest: RandomForestClassifier, fall: Fall) -> bool:
-    """Whether any window is classified as a fall: for falls, one that ends soon after the impact."""
+    """Whether a window is classified as a fall: for falls, one that ends after the impact."""
     rows, ends = windows(fall)
     used = told(fall, ends) if fall.phases.impact is not None else np.ones(len(ends), bool)
     return bool(used.any()) and bool(forest.predict(rows[used]).any())
