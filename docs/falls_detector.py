@@ -67,7 +67,7 @@ def let_down(recipe: Recipe, number: int) -> Fall:
 
 
 def windows(fall: Fall) -> tuple[np.ndarray, np.ndarray]:
-    """Features (w, 12) of all windows, and the frames (w,) after their ends."""
+    """Features (w, 12) of all windows, and the frames (w,) after their last ones."""
     samples = worn_samples(fall, 0)
     sizes = np.stack([np.linalg.norm(samples[:, :3], axis=1),
                       np.linalg.norm(samples[:, 3:], axis=1), samples[:, 2]], axis=1)
@@ -104,7 +104,7 @@ def says(forest: RandomForestClassifier, fall: Fall) -> bool:
 
 
 def jolts(fall: Fall, limit: float = 3 * 9.8) -> bool:
-    """The threshold rule: more than 3 g."""
+    """The plain rule: more than 3 g."""
     return bool((np.linalg.norm(worn_samples(fall, 0)[:, :3], axis=1) > limit).any())
 
 
