@@ -23,14 +23,14 @@ VENV_FLAGS := --system-site-packages
 endif
 
 .PHONY: help run test pictures lint slow soak bench hard report colcon users-versions clean
-help: ## this list
+help: ## list of all targets
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 22
 
-run: $(COMPILED) ## the doll falls, arrow keys push it; SCENE=crowd: another scene
+run: $(COMPILED) ## start node and page; arrow keys push; SCENE=crowd for another scene
 	@$(BIN)/python -m ragdoll_ros.ros.run $(SCENE)
 
 # A file's tests stay together: those of one ROS domain, and those that time, go one by one.
-test: $(COMPILED) chromium ## the tests, two and a half minutes on two cores
+test: $(COMPILED) chromium ## all tests except the slow ones
 	@$(BIN)/python -m pytest -n 3 --dist loadfile
 
 # For the tests of the page: of Playwright only the driver comes from PyPI. Where there is none to
@@ -44,20 +44,20 @@ chromium:
 	  { $(AS_ROOT) apt-get update && $(AS_ROOT) apt-get install --yes --no-install-recommends \
 	  chromium; } >/dev/null 2>&1 || echo 'That needs root and Debian: apt-get install chromium' >&2; }
 
-pictures: $(COMPILED) chromium ## pictures of the page, into docs/
+pictures: $(COMPILED) chromium ## draw the pictures of the page, into docs/
 	@$(BIN)/python docs/viewer.py docs
 
 lint: $(READY) ## ruff, and mypy on the public names
 	@$(BIN)/python -m ruff check .
 	@$(BIN)/python -m mypy
 
-slow: $(COMPILED) ## the tests that take minutes
+slow: $(COMPILED) ## the slow tests: those that take minutes or measure time
 	@$(BIN)/python -m pytest -m slow
 
-soak: $(COMPILED) ## 864 000 ticks, pushed, set back, with other scenes: nothing may grow; 25 min
+soak: $(COMPILED) ## 864 000 ticks with pushes, resets, changes of scene: nothing may grow; 25 min
 	@$(BIN)/python -m ragdoll_ros.ros.tools.soak
 
-bench: $(COMPILED) ## cost of a tick and of its parts, of crowds, swings, people, the page, 30 min
+bench: $(COMPILED) ## cost of ticks and their parts, crowds, swings, people and the page; 30 min
 	@$(BIN)/python -m ragdoll_ros.ros.tools.bench
 	@$(BIN)/python -m ragdoll_ros.ros.tools.crowd_bench
 	@$(BIN)/python -m ragdoll_ros.accuracy.crowds
@@ -65,7 +65,7 @@ bench: $(COMPILED) ## cost of a tick and of its parts, of crowds, swings, people
 	@$(BIN)/python test/fit_cost.py
 	@$(BIN)/python test/page_cost.py
 
-report: $(COMPILED) ## accuracy against independent references, into docs/, 40 min
+report: $(COMPILED) ## accuracy report against independent references, into docs/; 40 min
 	@$(BIN)/python -m ragdoll_ros.accuracy.report.command --out docs
 
 hard: $(COMPILED) ## hard cases, each with its rule, as a table
@@ -82,10 +82,10 @@ colcon: $(VENV)/colcon ## build and test as in a ROS workspace
 	  --return-code-on-test-failure
 	@$(COLCON) test-result --test-result-base $(WORKSPACE)/build --verbose
 
-users-versions: ## the tests with Ubuntu 24.04's versions; builds PyBullet from source, 6 to 9 min
+users-versions: ## tests with Ubuntu 24.04's versions; builds PyBullet from source, 6 to 9 min
 	@sh test/users_versions.sh $(if $(filter python3,$(PYTHON)),python3.12,$(PYTHON))
 
-clean: ## remove all that was made, .venv included
+clean: ## remove everything that was built, including .venv
 	rm -rf $(VENV) build install log dist *.egg-info .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 

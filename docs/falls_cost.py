@@ -1,4 +1,4 @@
-"""What a fall of 3 s costs at each accuracy, where that goes, and what MuJoCo's rollout takes.
+"""CPU time of a fall of 3 s at each accuracy, by parts, and of MuJoCo's rollout.
 
 python docs/falls_cost.py [--falls 40] [--recipe faint]
 """
@@ -26,7 +26,7 @@ PARTS = ('machine code', 'the rest of ticks', 'frames', 'set up', 'Parquet')
 
 
 class Clock:
-    """Seconds of the processor that functions took, by their labels."""
+    """CPU time of functions, s, by label."""
 
     def __init__(self) -> None:
         self.spent: dict[str, float] = defaultdict(float)
@@ -43,7 +43,7 @@ class Clock:
 
 
 def watch(clock: Clock) -> None:
-    """Time the parts of a fall from now on."""
+    """Measure the parts of a fall from now on."""
     clusters.kernels = SimpleNamespace(
         advance=clock.timed('machine code', clusters.kernels.advance))
     falls.Guard.advance = clock.timed('ticks', falls.Guard.advance)
@@ -51,7 +51,7 @@ def watch(clock: Clock) -> None:
 
 
 def parts_of(recipe: Recipe, count: int, clock: Clock) -> list[float]:
-    """Milliseconds a fall in each of PARTS."""
+    """Milliseconds per fall of each of PARTS."""
     list(falls.generate(recipe, range(2)))
     clock.spent.clear()
     began = time.process_time()
@@ -67,7 +67,7 @@ def parts_of(recipe: Recipe, count: int, clock: Clock) -> list[float]:
 
 
 def mujocos(recipe: Recipe, count: int, accuracy: str, threads: int) -> float:
-    """Milliseconds a fall of the same starts by MuJoCo's rollout, every step kept."""
+    """Milliseconds per fall of MuJoCo's rollout from the same starts, all steps kept."""
     models, states = [], []
     step = 0.01 / ACCURACIES[accuracy].substeps
     for number in range(count):
@@ -98,7 +98,7 @@ def main() -> None:
     print('| accuracy | ' + ' | '.join(PARTS) + ' | all, ms a fall | MuJoCo, ms a fall |')
     print('| --- ' * (len(PARTS) + 3) + '|')
     for accuracy in ACCURACIES:
-        # MuJoCo's engine here holds no joints: all are limp from the start.
+        # The engine mujoco has no joint springs: all joints are limp from the start.
         recipe = recipe_of({**given.data, 'accuracy': accuracy, 'limp': []})
         parts = parts_of(recipe, options.falls, clock)
         theirs = mujocos(recipe, options.falls, accuracy, 1)

@@ -3,8 +3,8 @@
 python docs/falls_detector.py [--falls 40]
 
 A sensor at the low back, 100 Hz. Falls are those of config/faint.yaml and config/shove.yaml; what
-is no fall is the same people let down by two hands, at chest and pelvis, to sit or to lie. Windows
-of 0.5 s are told apart by a random forest. Needs scikit-learn.
+is no fall is the same people lowered by two hands, at chest and pelvis, to sit or to lie. A random
+forest classifies windows of 0.5 s. Needs scikit-learn.
 """
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from ragdoll_ros.falls.start import start_of
 from ragdoll_ros.physics.simulation import Simulation
 
 WINDOW, STRIDE, AFTER = 50, 10, 30
-"""Frames of a window, from one to the next, and after an impact in which a fall is to be told."""
+"""Frames of a window, between windows, and after an impact within which to detect a fall."""
 
 
 def worn(name: str, seed: int, **changes: object) -> Recipe:
-    """A recipe of config/, cut off after 2 s; other falls by each seed."""
+    """A recipe of config/, limited to 2 s; each seed gives other falls."""
     return recipe_of({**load_recipe(name).data, 'seed': seed, 'duration': 2.0, **changes})
 
 
 def let_down(recipe: Recipe, number: int) -> Fall:
-    """The start of a fall, but two hands hold chest and pelvis and let them down in 0.8 to 1.5 s.
+    """The start of a fall, but two hands hold chest and pelvis and lower them in 0.8 to 1.5 s.
 
-    Even numbers sit: the chest stays above. Odd ones lie: it is laid backwards. The hands go
-    with the least jerk (Flash and Hogan, J Neurosci 1985).
+    Even numbers sit: the chest stays up. Odd ones lie: it is laid backwards. The hands move
+    with minimum jerk (Flash and Hogan, J Neurosci 1985).
     """
     start = start_of(recipe, number)
     rng = np.random.default_rng([recipe.data['seed'], number])
@@ -85,7 +85,7 @@ def told(fall: Fall, ends: np.ndarray) -> np.ndarray:
 
 
 def train(falls: list[Fall], others: list[Fall]) -> RandomForestClassifier:
-    """On windows that tell a fall, and on those of what is none."""
+    """Train on windows of falls after their impacts, and on windows of no fall."""
     features, labels = [], []
     for fall in [*falls, *others]:
         rows, ends = windows(fall)
@@ -97,7 +97,7 @@ def train(falls: list[Fall], others: list[Fall]) -> RandomForestClassifier:
 
 
 def says(forest: RandomForestClassifier, fall: Fall) -> bool:
-    """Whether any window is taken for a fall: of falls, any that ends soon after the impact."""
+    """Whether a window is classified as a fall: for falls, one that ends after the impact."""
     rows, ends = windows(fall)
     used = told(fall, ends) if fall.phases.impact is not None else np.ones(len(ends), bool)
     return bool(used.any()) and bool(forest.predict(rows[used]).any())

@@ -18,15 +18,15 @@ from ragdoll_ros.model.scene import SECOND
 from ragdoll_ros.physics.simulation import Simulation
 
 TIMES = (0.0, 0.28, 0.32, 0.36, 0.42, 0.50, 0.60, 0.75, 0.90, 3.00)
-"""s, the pictures; each also shows the tail's way in the 0.12 s before."""
+"""Times of the pictures, s; each also shows the motion of the tail in the 0.12 s before."""
 WAY = 12
-"""Ticks of the way shown."""
+"""Ticks of that motion."""
 CAMERA = np.array([-1.0, -0.9, 0.3])
-"""Direction from the doll to the eye, world frame; the picture is orthographic."""
+"""Direction from the doll to the camera, world frame; the projection is orthographic."""
 
 
 def screen(points: np.ndarray) -> np.ndarray:
-    """Points (..., 3) m of the world as right, up and toward the eye."""
+    """Points (..., 3) m from the world frame to right, up and towards the camera."""
     toward = CAMERA / np.linalg.norm(CAMERA)
     right = np.cross([0, 0, 1], toward)
     right /= np.linalg.norm(right)
@@ -42,7 +42,7 @@ def outline(half_extents: np.ndarray, round_: bool) -> np.ndarray:
 
 
 def draw(axes: plt.Axes, simulation: Simulation, way: list[np.ndarray]) -> None:
-    """Draw the doll as outlines from back to front, the tail as a line, its way fading."""
+    """Draw the doll as outlines from back to front, the tail as a line, its motion fading."""
     state, swings = simulation.state, simulation.swings
     for bone, place, turn in zip(simulation.scene.bones, state.positions, state.orientations,
                                  strict=True):
@@ -65,7 +65,7 @@ def draw(axes: plt.Axes, simulation: Simulation, way: list[np.ndarray]) -> None:
 
 
 def main(path: Path) -> None:
-    """Run the fall and draw it at TIMES."""
+    """Simulate the fall and draw it at TIMES."""
     figure, panels = plt.subplots(2, len(TIMES) // 2, figsize=(13, 6.8), layout='tight')
     way: list[np.ndarray] = []
     with Simulation(load_scene('ponytail')) as simulation:

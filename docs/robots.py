@@ -1,8 +1,8 @@
-"""The table of robots in docs/robots.md: what `ragdoll_fit` makes of every URDF of some packages.
+"""Write docs/robots.md: the results of `ragdoll_fit` for every URDF of some packages.
 
 python docs/robots.py pybullet_data=FOLDER example-robot-data=FOLDER ... > docs/robots.md
 
-Standard error tells of each robot that is still awake which body moves, and how fast.
+Standard error names the fastest body of each robot that is still awake, and its speed.
 """
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from ragdoll_ros.model.scene import above_ground
 from ragdoll_ros.physics.simulation import Simulation
 
 LONGEST = 10.0
-"""Simulated seconds that a robot falls and lies."""
+"""Duration of each simulation, s."""
 
 MANY = 500
-"""Files beside each other from which on they share a row."""
+"""Number of files in one folder from which they share a row."""
 
 HEAD = """# Robots that were fitted
 
@@ -57,7 +57,7 @@ def main(arguments: list[str]) -> None:
 
 
 def lines(paths: list[Path], folder: Path) -> Iterator[str]:
-    """A row for each file, one for all where they are many."""
+    """A row for each file, or one row for MANY."""
     if len(paths) < MANY:
         for path in paths:
             yield f'| {path.relative_to(folder)} | {row(path)} |'
@@ -75,7 +75,7 @@ def lines(paths: list[Path], folder: Path) -> Iterator[str]:
 
 
 def row(path: Path) -> str:
-    """What became of one file."""
+    """The row of one file."""
     try:
         doll, notes = read_urdf(path)
     except RagdollError as error:
@@ -90,7 +90,7 @@ def row(path: Path) -> str:
 
 
 def fall(doll: Ragdoll) -> str:
-    """Milliseconds a tick in the first second, and when it slept; or why it does not run."""
+    """Milliseconds per tick in the first second, and time of sleep; or why it does not run."""
     spent = 0.0
     try:
         with contextlib.closing(Simulation(above_ground(doll))) as simulation:

@@ -1,4 +1,4 @@
-"""Draws docs/rooms.png: the rooms of the package and who imports whom, read from the code.
+"""Draw docs/rooms.png: the rooms of the package and the imports between them, read from the code.
 
 python docs/rooms.py
 """
@@ -29,7 +29,7 @@ WIDE, HIGH, MIDDLE = 2.9, 0.62, 0.4
 
 
 def arrows() -> Counter:
-    """Number of imports from each room (or its subfolder ``sources``) to each other."""
+    """Number of imports from each room to each other."""
     found: Counter = Counter()
     for name, target in imports(PACKAGE):
         rooms = name.partition('.')[0], target.partition('.')[0]
@@ -39,14 +39,14 @@ def arrows() -> Counter:
 
 
 def floors(edges: Counter) -> dict[str, int]:
-    """Floor of each room: one above the highest that it imports."""
+    """Level of each room: one above the highest that it imports."""
     def floor(room: str) -> int:
         return max((1 + floor(target) for source, target in edges if source == room), default=0)
     return {room: floor(room) for room in IDEAS}
 
 
 def draw(path: Path) -> None:
-    """Draw the rooms, floor by floor; what all above it import is a floor that they stand on."""
+    """Draw the rooms by level; a room that all rooms above import is drawn as a full row."""
     edges = arrows()
     level = floors(edges)
     files = Counter(name.partition('.')[0] for name in modules(PACKAGE))

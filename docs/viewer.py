@@ -1,4 +1,4 @@
-"""Takes the pictures of the viewer's page, docs/viewer_*.png, in headless Chromium.
+"""Take the pictures of the viewer's page, docs/viewer_*.png, in headless Chromium.
 
 make pictures, or python docs/viewer.py FOLDER
 """
@@ -44,7 +44,7 @@ def look(view: browser.View, away: float, high: float, at: float, azimuth: float
 
 @contextlib.contextmanager
 def page(context: browser.BrowserContext, scene: str) -> Iterator[browser.View]:
-    """Open a page on a scene, paused at its start, without viser's word on slow drawing."""
+    """Open a page on a scene, paused at its start, without viser's warning on slow drawing."""
     with browser.serving('--port', '0', '--scene', scene, '--folder', tempfile.gettempdir()) as url:
         view = browser.View(context, url)
         view.page.locator('.mantine-Notification-closeButton').click()
@@ -59,7 +59,7 @@ def page(context: browser.BrowserContext, scene: str) -> Iterator[browser.View]:
 
 
 def shot(view: browser.View) -> bytes:
-    """What the page shows, as PNG, once its pictures have come to rest."""
+    """Screenshot of the page, PNG, once its content is still."""
     last = b''
     while (picture := view.page.screenshot()) != last:
         last = picture
@@ -68,7 +68,7 @@ def shot(view: browser.View) -> bytes:
 
 
 def step(view: browser.View, ticks: int) -> None:
-    """Go on by some ticks."""
+    """Advance by some ticks."""
     for _ in range(ticks):
         view.key('n')
 
@@ -119,7 +119,7 @@ def edit(context: browser.BrowserContext, folder: Path) -> None:
 
 
 def skin(context: browser.BrowserContext, folder: Path) -> None:
-    """A fitted character, its bones of glass about its skin, pushed aside."""
+    """A fitted character with transparent bones around its skin, pushed aside."""
     with tempfile.TemporaryDirectory() as inbox:
         rig, doll = Path(inbox, 'mannequin.glb'), Path(inbox, 'mannequin.yaml')
         rig.write_bytes(fit_rigs.mannequin().glb())

@@ -30,8 +30,8 @@ OLD_NAMES = {
         'Course Room up last heft flies Given borne meets along begun Tally handed pushed lifted '
         'lasted stalls Record Work turns moves drifts pulls times turned look way part_pairs '
         'within narrow bent between step_or_touch give_back pay settle move_freely free meet '
-        'take_over respond ask thrown deep follow_curve rest_locked hold_energy give take_out lag stiffen '
-        'pull weaken shift',
+        'take_over respond ask thrown deep follow_curve rest_locked hold_energy give take_out '
+        'lag stiffen pull weaken shift',
     'physics': 'Courses Neighbours couples _spread_out _meet _go _look _departure _designed acting '
         'hush Hold Holds AppliedHold RecordedSimulation worn',
     'ros': 'Glance told worn written namesakes followed glance tally rescue run_log session heard '
