@@ -12,20 +12,24 @@ import matplotlib
 
 matplotlib.use('Agg')
 import matplotlib.pyplot as plt
+import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / 'test'))
 from test_rooms import PACKAGE, imports, modules  # noqa: E402
 
 IDEAS = {'model': 'what a scene is', 'files': 'model as text and back',
-         'physics': 'how a scene moves', 'fit': 'a character becomes a doll',
+         'physics': 'how a scene moves', 'realtime': 'wall clock, arrow keys',
+         'fit': 'a character becomes a doll',
          'ros': 'topics, parameters, services', 'viewer': 'the page in the browser',
-         'recordings': 'poses over time, as files', 'replay': 'a recorded run again',
-         'people': 'measured people', 'falls': 'data sets of falls',
+         'recordings': 'poses over time, as files', 'replay': 'runs repeated to the bit',
+         'people': 'dolls of people', 'falls': 'data sets of falls',
          'accuracy': 'the report and its references'}
-COLUMNS = {'replay': -2.8, 'viewer': 0.4, 'ros': -6.0, 'recordings': -2.8, 'fit': 0.4, 'falls': 3.6,
-           'accuracy': 6.8, 'physics': -1.2, 'people': 5.0}
-WIDE, HIGH, MIDDLE = 2.9, 0.62, 0.4
+COLUMNS = {'replay': 0.4, 'viewer': -4.4, 'ros': -6.0, 'recordings': -2.5, 'fit': 1.0, 'falls': 4.2,
+           'accuracy': 7.4, 'realtime': -6.0, 'physics': 1.0, 'people': 5.8}
+UNDER = ('model', 'files')
+"""Rooms that are drawn as full rows, without arrows to them."""
+WIDE, HIGH, MIDDLE = 3.1, 0.62, 0.75
 
 
 def arrows() -> Counter:
@@ -42,7 +46,7 @@ def floors(edges: Counter) -> dict[str, int]:
     """Level of each room: one above the highest that it imports."""
     def floor(room: str) -> int:
         return max((1 + floor(target) for source, target in edges if source == room), default=0)
-    return {room: floor(room) for room in IDEAS}
+    return {room: floor(room) if room in UNDER else max(2, floor(room)) for room in IDEAS}
 
 
 def draw(path: Path) -> None:
@@ -50,29 +54,31 @@ def draw(path: Path) -> None:
     edges = arrows()
     level = floors(edges)
     files = Counter(name.partition('.')[0] for name in modules(PACKAGE))
-    under = [room for room in IDEAS if all((other, room) in edges for other in IDEAS
-                                           if level[other] > level[room])]
-    under = [room for room in under if sum(level[o] == level[room] for o in IDEAS) == 1][:2]
     figure, axes = plt.subplots(figsize=(14, 6))
     places = {}
     for height in sorted(set(level.values())):
         for room in [room for room in IDEAS if level[room] == height]:
             x, y = COLUMNS.get(room, MIDDLE), 1.2 * height
-            places[room], wide = (x, y), 15.8 if room in under else WIDE
+            places[room], wide = (x, y), 16.4 if room in UNDER else WIDE
             axes.add_patch(plt.Rectangle((x - wide / 2, y - HIGH / 2), wide, HIGH, zorder=3,
                                          fc='#dde8f4', ec='#3b5b7c'))
             axes.text(x, y + 0.1, f'{room}/', ha='center', va='center', weight='bold', zorder=4)
             axes.text(x, y - 0.15, f'{IDEAS[room]}, {files[room]} files', ha='center',
                       va='center', size=7.5, zorder=4)
     for (source, target), count in edges.items():
-        if target in under:
+        if target in UNDER:
             continue
         (x, y), (u, v) = places[source], places[target]
-        axes.annotate('', (u + 0.25 * (x - u), v + HIGH / 2), (x + 0.25 * (u - x), y - HIGH / 2),
-                      arrowprops={'arrowstyle': '-|>', 'color': '0.35', 'lw': 1.2, 'shrinkA': 0,
-                                  'shrinkB': 0})
-        axes.text((x + u) / 2 + 0.1, (y + v) / 2, str(count), size=7.5, color='0.35')
-    axes.set_xlim(-7.6, 8.4)
+        reach = 0.45 * WIDE
+        x, u = x + np.clip((u - x) / 4, -reach, reach), u + np.clip((x - u) / 4, -reach, reach)
+        axes.annotate('', (u, v + HIGH / 2), (x, y - HIGH / 2), zorder=1, arrowprops={
+            'arrowstyle': '-|>', 'color': '0.35', 'lw': 1.2, 'shrinkA': 0, 'shrinkB': 0})
+        fall = y - v - HIGH
+        share = (0.12 if y - v < 1.5 else fall - 0.3) / fall
+        axes.text(x + share * (u - x), y - HIGH / 2 - share * fall, str(count), size=7.5,
+                  color='0.25', ha='center', va='center', zorder=2,
+                  bbox={'fc': 'white', 'ec': 'none', 'pad': 0.8})
+    axes.set_xlim(-7.6, 9.0)
     axes.set_ylim(-0.5, 1.2 * max(level.values()) + 0.5)
     axes.axis('off')
     figure.savefig(path, dpi=110, bbox_inches='tight')
