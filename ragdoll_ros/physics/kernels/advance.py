@@ -37,14 +37,8 @@ from .cluster_state import CLUSTER_STATE, ClusterState
 from .compiling.bundle import bundle_at
 from .compiling.decorators import REAL, compiled, entry
 from .contact.gaps import enable_separated_pairs, update_kinematics_and_gaps
-from .dynamics.kinematics import (
-    Kinematics,
-    forward_kinematics,
-    inertial_frame,
-    put_quat,
-    root_position,
-    velocity_at,
-)
+from .dynamics.kinematics import (Kinematics, forward_kinematics, inertial_frame, put_quat,
+                                  root_position, velocity_at)
 from .flight.dense_step import begin_dense_step
 from .flight.first_contact import find_first_contact
 from .flight.flight import can_fly, follow_dense_step

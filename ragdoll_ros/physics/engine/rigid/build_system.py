@@ -12,14 +12,7 @@ from ....model.ragdoll import Joint, Ragdoll, joint_axes
 from ....model.scene import Scene
 from ...kernels.collision.shapes import SHAPE_KIND
 from ...kernels.dynamics.body import BODY
-from ...kernels.system import (
-    GEOM,
-    GEOM_PAIR,
-    JOINT_LIMIT,
-    NO_SLIP,
-    System,
-    coordinate_count,
-)
+from ...kernels.system import (GEOM, GEOM_PAIR, JOINT_LIMIT, NO_SLIP, System, coordinate_count)
 from ...rigid_body import damping_rate
 
 MAX_FLIGHT_DAMPING = 1000.0

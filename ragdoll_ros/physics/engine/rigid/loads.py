@@ -6,14 +6,8 @@ import math
 import numpy as np
 
 from ....model.scene import Scene
-from ...kernels.dynamics.loads import (
-    ANGULAR_DRIVE,
-    GRAB,
-    JOINT_SPRING,
-    LINEAR_DRIVE,
-    LOAD,
-    SPRING,
-)
+from ...kernels.dynamics.loads import (ANGULAR_DRIVE, GRAB, JOINT_SPRING, LINEAR_DRIVE, LOAD,
+                                       SPRING)
 from ..protocol import AppliedDrive, AppliedJointSpring, Drives, Spring, Springs, Wrenches
 
 NO_LOADS = np.zeros(0, LOAD)

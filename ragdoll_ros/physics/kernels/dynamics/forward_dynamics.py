@@ -11,27 +11,10 @@ import numpy as np
 
 from ..compiling.decorators import compiled, inlined
 from ..maths.cholesky import solve
-from ..maths.vectors import (
-    add,
-    add_scaled,
-    cross,
-    quat,
-    quat_mul,
-    quat_rotate_inverse,
-    quat_to_matrix,
-    scale,
-    sub,
-    vec,
-)
-from .kinematics import (
-    Kinematics,
-    forward_kinematics,
-    inertial_frame,
-    linear,
-    point_of_body,
-    put_spatial,
-    root_orientation,
-)
+from ..maths.vectors import (add, add_scaled, cross, quat, quat_mul, quat_rotate_inverse,
+                             quat_to_matrix, scale, sub, vec)
+from .kinematics import (Kinematics, forward_kinematics, inertial_frame, linear, point_of_body,
+                         put_spatial, root_orientation)
 from .loads import load_in_world
 
 COMPOSITE_INERTIA = np.dtype([('mass', float), ('moment', float, 3), ('inertia', float, 6)],

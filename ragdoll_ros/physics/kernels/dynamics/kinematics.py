@@ -14,18 +14,8 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..maths.transcendental import sine_and_cosine
-from ..maths.vectors import (
-    Quat,
-    Vec3,
-    add,
-    cross,
-    put,
-    quat,
-    quat_mul,
-    quat_rotate,
-    quat_to_matrix,
-    vec,
-)
+from ..maths.vectors import (Quat, Vec3, add, cross, put, quat, quat_mul, quat_rotate,
+                             quat_to_matrix, vec)
 
 Kinematics = collections.namedtuple(
     'Kinematics', 'orientations positions spatial_velocities motion_subspaces inertias '

@@ -8,14 +8,8 @@ import numpy as np
 from ..cluster_state import ClusterState
 from ..collision.narrow_phase import collide
 from ..compiling.decorators import compiled
-from ..contact.gaps import (
-    FAR,
-    NEAR,
-    TOUCHING,
-    ground_point,
-    placed_shape,
-    update_kinematics_and_gaps,
-)
+from ..contact.gaps import (FAR, NEAR, TOUCHING, ground_point, placed_shape,
+                            update_kinematics_and_gaps)
 from ..contact.jacobian import root_of
 from ..dynamics.kinematics import Kinematics, body_velocity, velocity_at
 from ..maths.vectors import Vec3, dot, norm, sub, vec

@@ -17,25 +17,15 @@ from ..contact.gaps import TOUCHING, update_kinematics_and_gaps
 from ..contact.jacobian import contact_velocities
 from ..contact_kind import LIMIT
 from ..dynamics.bias_forces import bias_forces
-from ..dynamics.kinematics import (
-    forward_kinematics,
-    integrate_positions,
-    place_geoms,
-    root_motion_subspaces,
-    rotate_inertias,
-    update_velocities,
-)
+from ..dynamics.kinematics import (forward_kinematics, integrate_positions, place_geoms,
+                                   root_motion_subspaces, rotate_inertias, update_velocities)
 from ..dynamics.mass_matrix import factor_ltl, mass_matrix, solve_lower, solve_upper
 from ..impulses.solve_contacts import solve_contacts
 from ..system import NO_SLIP, System
 from ..workspace import Workspace
 from .momentum import add_contact_impulses, conserve_momentum, sum_dolls
-from .position_correction import (
-    clip_to_joint_limits,
-    correction_energy,
-    enter_correction_bounds,
-    limit_correction_energy,
-)
+from .position_correction import (clip_to_joint_limits, correction_energy, enter_correction_bounds,
+                                  limit_correction_energy)
 from .springs import add_implicit_stiffness, add_spring_force, saturate_springs, theta_weight
 from .warm_start import warm_start
 from .work import account_work, load_potential

@@ -6,12 +6,8 @@ import numpy as np
 from ..compiling.decorators import compiled
 from ..contact.find_contacts import find_contacts
 from ..contact.gaps import TOUCHING
-from ..dynamics.kinematics import (
-    forward_kinematics,
-    place_geoms,
-    root_motion_subspaces,
-    rotate_inertias,
-)
+from ..dynamics.kinematics import (forward_kinematics, place_geoms, root_motion_subspaces,
+                                   rotate_inertias)
 from ..dynamics.mass_matrix import factor_ltl, mass_matrix
 from ..impulses.solve_contacts import solve_contacts
 from ..system import System

@@ -14,28 +14,11 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..contact_kind import LIMIT, ROLLING
-from ..dynamics.kinematics import (
-    Kinematics,
-    inertia_times,
-    root_orientation,
-    root_position,
-    rotate_inertias,
-    velocity_at,
-)
+from ..dynamics.kinematics import (Kinematics, inertia_times, root_orientation, root_position,
+                                   rotate_inertias, velocity_at)
 from ..maths.cholesky import solve
-from ..maths.vectors import (
-    Vec3,
-    add,
-    add_scaled,
-    cross,
-    divide,
-    dot,
-    put,
-    quat_rotate_inverse,
-    scale,
-    sub,
-    vec,
-)
+from ..maths.vectors import (Vec3, add, add_scaled, cross, divide, dot, put, quat_rotate_inverse,
+                             scale, sub, vec)
 from ..system import System
 from ..workspace import Workspace
 

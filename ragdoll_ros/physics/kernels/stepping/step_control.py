@@ -10,24 +10,12 @@ from ..compiling.decorators import compiled
 from ..contact.gaps import BEYOND_LIMIT, TOUCHING, is_joint_limit_gap
 from ..system import System
 from ..workspace import Workspace
-from .contact_step import (
-    MAX_PENETRATION,
-    STEP_TOLERANCE,
-    begin_contact_step,
-    contact_step,
-    finish_step,
-)
+from .contact_step import (MAX_PENETRATION, STEP_TOLERANCE, begin_contact_step, contact_step,
+                           finish_step)
 from .momentum import REMOVABLE, internal_kinetic_energy, remove_energy, total_energy
 from .position_correction import PAID_SHARE
-from .time_of_impact import (
-    OVERSHOT,
-    impacts_at_end,
-    is_fast_impact,
-    next_trial_step,
-    open_bracket,
-    step_to_joint_limit,
-    update_bracket,
-)
+from .time_of_impact import (OVERSHOT, impacts_at_end, is_fast_impact, next_trial_step,
+                             open_bracket, step_to_joint_limit, update_bracket)
 from .warm_start import jam_threshold
 
 MAX_TRIES = 20

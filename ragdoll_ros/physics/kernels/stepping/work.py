@@ -4,14 +4,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..dynamics.kinematics import (
-    Kinematics,
-    forward_kinematics,
-    point_of_body,
-    root_motion_subspaces,
-    root_position,
-    velocity_at,
-)
+from ..dynamics.kinematics import (Kinematics, forward_kinematics, point_of_body,
+                                   root_motion_subspaces, root_position, velocity_at)
 from ..dynamics.loads import ANGULAR_DRIVE, GRAB, JOINT_SPRING, load_in_world
 from ..maths.vectors import add, dot, put, scale, vec
 from ..system import System
