@@ -1,4 +1,4 @@
-"""A line on stderr that says how many falls are done, how fast, and how long the rest takes."""
+"""Progress of a run on stderr: falls done, falls per second, time left."""
 from __future__ import annotations
 
 import sys
@@ -6,26 +6,26 @@ import time
 
 from .manifest import Manifest
 
-QUIET = 15.0
-"""s between lines where stderr is no terminal."""
+LOG_INTERVAL = 15.0
+"""s between lines if stderr is no terminal."""
 
 
-class Progress:
-    """Of a run of ``count`` falls."""
+class ProgressLine:
+    """Progress of a run of ``count`` falls; on a terminal one line that is rewritten."""
 
     def __init__(self, count: int) -> None:
         self._count, self._new = count, 0
-        self._began = self._said = time.monotonic()
+        self._began = self._printed = time.monotonic()
         self._terminal = sys.stderr.isatty()
 
-    def tell(self, manifest: Manifest, new: int) -> None:
-        """Note that ``new`` falls more are done."""
+    def update(self, manifest: Manifest, new: int) -> None:
+        """Count ``new`` more falls and print."""
         self._new += new
         now = time.monotonic()
         if self._terminal:
             sys.stderr.write(f'\r{self._text(manifest, now):78}')
-        elif now - self._said > QUIET:
-            self._said = now
+        elif now - self._printed > LOG_INTERVAL:
+            self._printed = now
             sys.stderr.write(self._text(manifest, now) + '\n')
         sys.stderr.flush()
 
@@ -36,7 +36,7 @@ class Progress:
 
     @property
     def seconds(self) -> float:
-        """Since the beginning."""
+        """Time since the beginning, s."""
         return time.monotonic() - self._began
 
     def _text(self, manifest: Manifest, now: float) -> str:

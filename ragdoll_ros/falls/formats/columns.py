@@ -1,4 +1,4 @@
-"""What is recorded of a fall's frames, as columns of numbers with names."""
+"""The recorded quantities of a fall's frames as named columns of numbers."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..fall import Fall
-from ..imu_samples import NAMES, by_frames
+from ..imu_samples import NAMES, samples_by_frame
 from ..recipe import Recipe
 
 POSE = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
@@ -15,7 +15,7 @@ VELOCITY = ('vx', 'vy', 'vz', 'wx', 'wy', 'wz')
 
 @dataclass(frozen=True)
 class Column:
-    """One quantity of all frames: ``values`` (t, m), float or bool, ``names`` of its m numbers."""
+    """One quantity in t frames: ``values`` (t, m), float or bool, with ``names`` of m numbers."""
 
     name: str
     values: np.ndarray
@@ -23,7 +23,7 @@ class Column:
 
 
 def columns(recipe: Recipe, fall: Fall) -> list[Column]:
-    """What the recipe records of a fall; nothing of what its doll has not, such as joints."""
+    """Columns that the recipe records of a fall, without those that its doll lacks."""
     bones, angles = fall.scene.bone_names, fall.scene.angle_names
     frames = len(fall.times)
     made = {
@@ -31,10 +31,10 @@ def columns(recipe: Recipe, fall: Fall) -> list[Column]:
         'velocities': (fall.states[:, :, 7:], _each(bones, VELOCITY)),
         'angles': (fall.angles, angles), 'rates': (fall.rates, angles),
         'touching': (fall.touching, bones)}
-    return [Column(what, made[what][0].reshape(frames, -1), tuple(made[what][1]))
-            for what in recipe.what if made[what][1]] + [
-                Column(f'imu.{mount["name"]}', by_frames(fall, imu).reshape(frames, -1),
-                       _samples(recipe))
+    return [Column(name, made[name][0].reshape(frames, -1), tuple(made[name][1]))
+            for name in recipe.recorded if made[name][1]] + [
+                Column(f'imu.{mount["name"]}', samples_by_frame(fall, imu).reshape(frames, -1),
+                       _sample_names(recipe))
                 for imu, mount in enumerate(recipe.imus)]
 
 
@@ -42,8 +42,8 @@ def _each(bones: tuple[str, ...], parts: tuple[str, ...]) -> list[str]:
     return [f'{bone}.{part}' for bone in bones for part in parts]
 
 
-def _samples(recipe: Recipe) -> tuple[str, ...]:
-    """Names of a sensor's numbers in a frame, with their places where it has several samples."""
-    if recipe.parts == 1:
+def _sample_names(recipe: Recipe) -> tuple[str, ...]:
+    """Names of a sensor's numbers in a frame, numbered if it has several samples."""
+    if recipe.samples_per_frame == 1:
         return NAMES
-    return tuple(f'{name}_{part}' for part in range(recipe.parts) for name in NAMES)
+    return tuple(f'{name}_{sample}' for sample in range(recipe.samples_per_frame) for name in NAMES)
