@@ -17,7 +17,7 @@ from ragdoll_ros.accuracy.crowds.depth import BoneDepth
 def course(**placed):
     drop = load_scene('drop')
     scene = dataclasses.replace(drop, dolls=(dataclasses.replace(drop.dolls[0], **placed),))
-    return pile.simulated(scene, BoneDepth(scene), engine='rigid', accuracy='draft')
+    return pile.run_pile(scene, BoneDepth(scene), engine='rigid', accuracy='draft')
 
 
 def test_a_doll_that_lies_down_is_asleep_from_when_it_is():

@@ -168,8 +168,8 @@ def test_pybullet_without_restitution_comes_to_the_same(name, bound):
 
     Bounces are left out: PyBullet's do not converge.
     """
-    from ragdoll_ros.accuracy.measure import compare
     from ragdoll_ros.accuracy.methods import bullet, run
+    from ragdoll_ros.accuracy.metrics import compare
     motion = next(motion for motion in planar_doll.planar_motions() if motion.name == name)
     truth = motion.truth(motion.trial.times())
     coarse, fine = (compare(run(bullet(count), motion.trial).trajectory, truth)['position_worst_m']

@@ -10,13 +10,13 @@ pytest.importorskip('mujoco')
 
 from ragdoll_ros.accuracy.cases.contact_cases import two_dolls
 from ragdoll_ros.accuracy.cases.fuzzed import fuzzed
-from ragdoll_ros.accuracy.measure import Measure
 from ragdoll_ros.accuracy.methods import bullet, by_name, core, reference, run
-from ragdoll_ros.accuracy.parts import convergence, drops, estimate, restitution
+from ragdoll_ros.accuracy.metrics import Metrics
+from ragdoll_ros.accuracy.parts import convergence, drop_statistics, error_estimate, restitution
 from ragdoll_ros.accuracy.references.closed_forms import bounce_times
-from ragdoll_ros.accuracy.report.ground_plots import STYLES, draw_convergence, draw_drops
-from ragdoll_ros.accuracy.report.ground_sections import CONVERGENCE, DROPS, PIECES, RESTITUTION
-from ragdoll_ros.accuracy.results import goals
+from ragdoll_ros.accuracy.report.contact_plots import STYLES, draw_convergence, draw_drops
+from ragdoll_ros.accuracy.report.contact_sections import CONVERGENCE, DROPS, PIECES, RESTITUTION
+from ragdoll_ros.accuracy.results import criteria
 from ragdoll_ros.accuracy.trajectory import Trajectory
 from ragdoll_ros.model.ragdoll import JOINT_KINDS
 from ragdoll_ros.model.shapes import SHAPES
@@ -25,13 +25,13 @@ from ragdoll_ros.model.shapes import SHAPES
 def cloud(method, values, population='random'):
     """A chunk of drops whose every quantity takes these values."""
     return {'population': population, 'method': method, 'label': method, 'drops': len(values),
-            'values': {key: list(values) for key in drops.QUANTITIES}}
+            'values': {key: list(values) for key in drop_statistics.QUANTITIES}}
 
 
 def test_clouds_are_told_apart_by_their_distribution_not_their_order():
     """The same numbers in other chunks: p = 1; moved by three standard deviations: p near 0."""
     draws = np.random.default_rng(1).normal(size=60)
-    rows = drops.merged([cloud('truth', draws[:40]), cloud('same', draws[30:]),
+    rows = drop_statistics.merged([cloud('truth', draws[:40]), cloud('same', draws[30:]),
                          cloud('truth', draws[40:]), cloud('same', draws[:30]),
                          cloud('other', draws + 3)])
     truth, same, other = rows
@@ -45,8 +45,8 @@ def test_clouds_are_told_apart_by_their_distribution_not_their_order():
 
 
 def test_what_has_not_settled_counts_as_settling_at_the_end():
-    never, = drops.merged([cloud('truth', [math.inf, 1.0])])
-    assert never['settled_s_mean'] == pytest.approx((drops.DURATION + 1) / 2)
+    never, = drop_statistics.merged([cloud('truth', [math.inf, 1.0])])
+    assert never['settled_s_mean'] == pytest.approx((drop_statistics.DURATION + 1) / 2)
 
 
 @pytest.mark.parametrize('wrong', [0.0, 0.01])
@@ -88,7 +88,7 @@ def test_semi_implicit_euler_shows_its_order_on_a_slope():
 
 
 def promised(figures):
-    return {row['goal']: row['held'] for row in goals.goals(figures)}
+    return {row['criterion']: row['met'] for row in criteria.criteria(figures)}
 
 
 def test_promises_about_pieces_hold_for_error_and_price():
@@ -118,7 +118,7 @@ def test_promises_about_restitution_and_energy_hold_or_not():
     assert held['apexes of single bodies, e = 0.5 to 0.5, normal'] is True
     assert held['apexes of single bodies, e = 0.5 to 0.5, exact'] is False
     assert '| normal | ball | 0.5000 |' in RESTITUTION.tables(rows)[0]
-    clouds = drops.merged([cloud('truth', (0.5, 0.6, 0.7), 'default, tilted'),
+    clouds = drop_statistics.merged([cloud('truth', (0.5, 0.6, 0.7), 'default, tilted'),
                            cloud('ours-draft', (0.51, 0.6, 0.7), 'default, tilted'),
                            cloud('ours-normal', (0.91, 0.92, 0.93), 'default, tilted')])
     held = promised({'drops': clouds})
@@ -128,10 +128,11 @@ def test_promises_about_restitution_and_energy_hold_or_not():
 
 def test_ticks_at_rounding_level_do_not_count_as_estimated(monkeypatch):
     """A flight whose errors are all rounding is no proof of the estimate."""
-    monkeypatch.setattr(estimate, 'NOISE', 1.0)
-    row, = estimate.measure('draft', ('flight_gentle',))
+    monkeypatch.setattr(error_estimate, 'NOISE', 1.0)
+    row, = error_estimate.measure('draft', ('flight_gentle',))
     assert row['ticks'] == 0 and row['rounding'] + row['distrusted'] == 28
-    assert not [entry for entry in goals.goals({'estimate': [row]}) if 'estimate' in entry['goal']]
+    assert not [entry for entry in criteria.criteria({'estimate': [row]})
+                if 'estimate' in entry['criterion']]
 
 
 def test_methods_are_found_by_their_names():
@@ -158,7 +159,7 @@ def test_dolls_that_collide_meet_and_one_alone_keeps_its_momentum():
     """The measure itself: the pair's flight before they meet loses nothing."""
     trial = two_dolls(6.0)
     early = dataclasses.replace(trial, duration=0.1)
-    assert Measure(trial.scene).momentum_drift(early, run(bullet(4), early).trajectory) < 1e-9
+    assert Metrics(trial.scene).momentum_drift(early, run(bullet(4), early).trajectory) < 1e-9
     moved = run(bullet(4), trial).trajectory
     assert np.abs(moved.angular_velocities[-1]).max() > 0.5
 
@@ -171,7 +172,7 @@ def test_pictures_show_a_line_for_each_engine_and_each_cloud():
              'steps_s': [1e-2, 5e-3], 'errors': [1e-3, 0.0]} for label in STYLES]
     figure = draw_convergence({'convergence': rows}, plt)
     assert len(figure.axes[0].lines) == len(STYLES) + 1
-    clouds = drops.merged([cloud('truth', [0.1, 0.2]), cloud('other', [0.3, math.inf])])
+    clouds = drop_statistics.merged([cloud('truth', [0.1, 0.2]), cloud('other', [0.3, math.inf])])
     figure = draw_drops({'drops': clouds}, plt)
     # of two drops one has no value: its line ends at a half
     assert [line.get_ydata()[-1] for line in figure.axes[0].lines] == [1.0, 0.5]

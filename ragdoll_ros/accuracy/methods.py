@@ -18,14 +18,14 @@ from ..physics.engine.protocol import Engine
 from ..physics.engine.substepped.bullet import BulletEngine
 from ..physics.engine.substepped.mujoco import MujocoEngine
 from ..physics.simulation import Simulation
-from . import fineness
+from . import step_sizes
 from .cases.trial import Trial
 from .quickstart import STEP as QUICKSTART_STEP
 from .quickstart import Quickstart
 from .trajectory import Trajectory
 
 
-class Run(Protocol):
+class MethodRun(Protocol):
     """A trial under way; a Simulation is one."""
 
     @property
@@ -46,7 +46,7 @@ class Method:
     name: str
     label: str
     family: str
-    begin: Callable[[Trial], Run]
+    begin: Callable[[Trial], MethodRun]
     substeps: int = 0
     tick: float | None = None
     """Its own tick in s; None: the trial's."""
@@ -75,7 +75,7 @@ class _FixedSteps:
     def __init__(self, trial: Trial, substeps: int, make: Callable[..., Engine]) -> None:
         self._trial = trial
         self._tick, self._count = trial.scene.step, 0
-        self._engine = make(trial.scene, fineness.of_step(self._tick / substeps))
+        self._engine = make(trial.scene, step_sizes.fixed_steps(self._tick / substeps))
         if trial.start is not None:
             self._engine.place(trial.start)
 
@@ -94,7 +94,7 @@ class _FixedSteps:
         self._engine.close()
 
 
-def simulated(trial: Trial, accuracy: str | Accuracy, engine: str = 'auto') -> Simulation:
+def start_simulation(trial: Trial, accuracy: str | Accuracy, engine: str = 'auto') -> Simulation:
     """A trial's simulation, as the node runs it."""
     simulation = Simulation(trial.scene, accuracy=accuracy, engine=engine)
     if trial.start is not None:
@@ -134,13 +134,13 @@ def ours(accuracy: str | Accuracy, name: str | None = None, engine: str = 'auto'
     name = name or f'ours-{accuracy}'
     order = kernels.ORDER if engine == 'auto' and kernels.ready() else 1
     return Method(name, name.replace('-', ' '), 'ours', functools.partial(
-        simulated, accuracy=accuracy, engine=engine), order=order)
+        start_simulation, accuracy=accuracy, engine=engine), order=order)
 
 
 def core(step: float) -> Method:
     """The engine that solves impacts where they happen, with steps of ``step`` s."""
     return Method(f'core-{step:g}', f'core, steps of {step * 1e6:g} µs', 'core', functools.partial(
-        simulated, accuracy=fineness.of_step(step), engine=fineness.CORE))
+        start_simulation, accuracy=step_sizes.fixed_steps(step), engine=step_sizes.RIGID))
 
 
 def reference(parts: int) -> Method:
@@ -148,7 +148,7 @@ def reference(parts: int) -> Method:
 
     PyBullet at 128 substeps until there is a core; the label says which one it was.
     """
-    return core(fineness.core_step() / parts) if fineness.has_core() else bullet(128)
+    return core(step_sizes.contact_step() / parts) if step_sizes.has_rigid_engine() else bullet(128)
 
 
 def quickstart() -> Method:

@@ -17,7 +17,7 @@ SINKING = 1e-3
 
 
 @dataclass(frozen=True)
-class Rule:
+class Requirements:
     """What must hold, on top of: no NaN, no energy from nothing, no gaps, no stop.
 
     None: no bound. Bounds in m scale with the doll where it is larger than the default one.
@@ -31,11 +31,11 @@ class Rule:
     """Whether all bones must be slower than 0.05 m/s (times the root of the scale) at the end."""
     lift_m: float = 0.0
     """How far the ground may lift the doll out of itself: that energy is the start's own."""
-    exit_m_s: float | None = None
+    max_speed_m_s: float | None = None
     """Fastest any bone may ever be."""
-    momentum: float | None = None
+    max_momentum_drift: float | None = None
     """Share of the momentum and of the angular momentum that may be lost in the air."""
-    stays_m: float | None = None
+    max_displacement_m: float | None = None
     """How far any bone may be from its start at the end."""
 
 
@@ -45,7 +45,7 @@ class HardCase:
 
     name: str
     make: Callable[[], Trial]
-    rule: Rule = Rule()
+    rule: Requirements = Requirements()
     scale: float = 1.0
     """Size of the doll over that of the default one."""
     reason: str = ''

@@ -12,7 +12,7 @@ from ...model.ragdoll import Bone, Joint, Ragdoll
 from ...model.shapes import Box, Capsule, Cylinder, Sphere
 from . import starts
 from .contact_cases import contact_cases
-from .hard_case import HardCase, Rule, drop
+from .hard_case import HardCase, Requirements, drop
 from .trial import Trial, posed
 
 
@@ -21,7 +21,7 @@ def hard_cases() -> list[HardCase]:
     return [
         HardCase('flat and tiny bodies, inertia 1e-9', lambda: drop(_flat_and_tiny(), 0.3)),
         HardCase('start 0.2 m inside the floor', _inside_floor,
-                 Rule(sinking_m=None, lift_m=0.2, exit_m_s=6.0)),
+                 Requirements(sinking_m=None, lift_m=0.2, max_speed_m_s=6.0)),
         HardCase('start in a self-overlap', _self_overlap),
         HardCase('start outside the limits', lambda: _longer(starts.trial('start outside', 0), 16)),
         HardCase('limits of 2°', lambda: drop(_narrow(math.radians(2)))),
@@ -31,7 +31,7 @@ def hard_cases() -> list[HardCase]:
         HardCase('hits the ground at 100 m/s', lambda: drop(
             load_doll('doll'), 1.0, 20.0, velocity=(20.0, 0.0, -100.0))),
         HardCase('2 kN for 3 s', lambda: _pulled(2e3)),
-        HardCase('20 kN for 3 s', lambda: _pulled(2e4), Rule(rest=False),
+        HardCase('20 kN for 3 s', lambda: _pulled(2e4), Requirements(rest=False),
                  reason='the torso comes near 1000 m/s; bones that are driven into each other '
                         'there are given back half of their depth in each step.'),
         HardCase('wrung by 300 N m for 3 s', _wrung),

@@ -18,7 +18,7 @@ from ...model.coordinates import GeneralizedState
 from ...model.push import Push
 from ...model.scene import Placement, Scene, height
 from ..references.articulated import Articulated
-from .trial import Trial, angle_limits, angle_places, inner_angles, posed
+from .trial import Trial, angle_indices, angle_limits, inner_angles, posed
 
 SETTLING = 2.0
 """s simulated after the first touch."""
@@ -64,7 +64,7 @@ def _drop(fall: float) -> Callable[[np.random.Generator], Trial]:
 def _slam(rng: np.random.Generator) -> Trial:
     """Every joint flung toward one of its limits at 10 to 20 rad/s."""
     doll = drop().dolls[0].doll
-    rates = {name: rng.choice((-1, 1)) * rng.uniform(10, 20) for name in angle_places(doll)}
+    rates = {name: rng.choice((-1, 1)) * rng.uniform(10, 20) for name in angle_indices(doll)}
     return _let_go(rng, 0.4, inner_angles(doll, rng), rates)
 
 

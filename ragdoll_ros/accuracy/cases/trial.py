@@ -53,7 +53,7 @@ def posed(placement: Placement, angles: dict[str, float] | None = None,
     tree = Articulated(doll)
     q, v = tree.bind(placement.position, placement.orientation), np.zeros(tree.nv)
     v[:3], v[3:6] = placement.root_velocity(), placement.spin
-    where = angle_places(doll)
+    where = angle_indices(doll)
     for name, angle in (angles or {}).items():
         q[7 + where[name]] = angle
     for name, rate in (rates or {}).items():
@@ -61,7 +61,7 @@ def posed(placement: Placement, angles: dict[str, float] | None = None,
     return GeneralizedState(q, v)
 
 
-def angle_places(doll: Ragdoll) -> dict[str, int]:
+def angle_indices(doll: Ragdoll) -> dict[str, int]:
     """Place of each joint angle behind the root's coordinates, for dolls without free balls."""
     names = [name for joint in doll.joints_depth_first() for name in joint.angle_names]
     return {name: place for place, name in enumerate(names)}

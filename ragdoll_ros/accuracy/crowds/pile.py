@@ -125,7 +125,7 @@ def enter_depths(outcome: Outcome, heights: GroundHeights, scale: BoneDepth, sta
     outcome.sunk = max(outcome.sunk, -float(heights(state).min()))
 
 
-def simulated(scene: Scene, scale: BoneDepth, **how: object) -> Outcome:
+def run_pile(scene: Scene, scale: BoneDepth, **how: object) -> Outcome:
     """The outcome by an engine of the package; ``how`` goes to Simulation."""
     with Simulation(scene, **how) as simulation:
         return watched(scene, scale, simulation.advance, lambda: float(
@@ -138,9 +138,9 @@ def pile() -> None:
     scale = BoneDepth(scene)
     print(f'\n{len(scene.dolls)} dolls dropped into a heap, {DURATION:g} s\n{HEAD}')
     for accuracy, workers in itertools.product(('draft', 'normal'), (1, 2)):
-        outcome = simulated(scene, scale, engine='rigid', accuracy=accuracy, workers=workers)
+        outcome = run_pile(scene, scale, engine='rigid', accuracy=accuracy, workers=workers)
         print(f'{f"rigid {accuracy}, workers {workers}":30}{outcome.row()}', flush=True)
     for engine, name in ((MujocoEngine, 'MuJoCo'), (RungeKutta, 'MuJoCo by RK4'),
                          (BulletEngine, 'PyBullet')):
-        outcome = simulated(scene, scale, engine=engine, accuracy='draft')
+        outcome = run_pile(scene, scale, engine=engine, accuracy='draft')
         print(f'{name + ", 4 substeps":30}{outcome.row()}', flush=True)

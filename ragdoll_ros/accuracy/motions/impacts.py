@@ -14,7 +14,7 @@ from ...model.shapes import Box, Cylinder, Shape, Sphere
 from ..cases.trial import Trial
 from ..references import impacts, sliding_disc
 from ..trajectory import Trajectory
-from .motion import Motion, orientations_about
+from .motion import ReferenceMotion, orientations_about
 
 GRAVITY = 9.8
 PITCH = (0.0, 1.0, 0.0)
@@ -22,7 +22,7 @@ ROD = (0.02, 0.2, 1.0)
 """m, edges of the rods: thin across the plane that they move in."""
 
 
-def impact_motions() -> list[Motion]:
+def impact_motions() -> list[ReferenceMotion]:
     """All motions in which something is struck, or stands on an edge or a face."""
     return [rocking_block(), falling_rod(), *(dropped_rod(*rod) for rod in (
         ('rod_frictionless', 'without friction', 0.5, 0.0), ('rod_sticks', 'that sticks', 0.5, 2.0),
@@ -39,7 +39,7 @@ def _body(shape: Shape, material: Material, position: tuple[float, float, float]
 
 
 def _on_edge(name: str, title: str, reference: str, size: tuple[float, float, float], start: float,
-             duration: float, rocks: bool) -> Motion:
+             duration: float, rocks: bool) -> ReferenceMotion:
     """A box let go on one lower edge, leaning by ``start`` rad; friction without limit."""
     half_width, half_height = size[0] / 2, size[2] / 2
 
@@ -52,8 +52,8 @@ def _on_edge(name: str, title: str, reference: str, size: tuple[float, float, fl
     scene = _body(Box(size), Material(restitution=0.0), tuple(centre),
                   rotation.from_axis_angle(PITCH, start))
     extra = functools.partial(_peaks, truth) if rocks else lambda _: {}
-    return Motion(name, title, reference, Trial(scene, duration), truth, 'angle_worst_rad',
-                  in_air=False, extra=extra)
+    return ReferenceMotion(name, title, reference, Trial(scene, duration), truth, 'angle_worst_rad',
+                           in_air=False, extra=extra)
 
 
 def _peaks(truth: Callable[[np.ndarray], Trajectory], found: Trajectory) -> dict[str, float]:
@@ -69,19 +69,19 @@ def pitches(trajectory: Trajectory) -> np.ndarray:
     return 2 * np.arctan2(y, w)
 
 
-def rocking_block() -> Motion:
+def rocking_block() -> ReferenceMotion:
     """A slender block that rocks from edge to edge, from 5 degrees."""
     return _on_edge('rocking_block', 'Block that rocks from 5°, 3 s', 'Housner 1963',
                     (0.2, 0.4, 0.8), math.radians(5), 3.0, True)
 
 
-def falling_rod() -> Motion:
+def falling_rod() -> ReferenceMotion:
     """A rod that stands on its edge and falls over, up to 60 degrees."""
     return _on_edge('falling_rod', 'Rod that falls over, from 5° to 60°', 'a pendulum, upside down',
                     ROD, math.radians(5), 0.98, False)
 
 
-def dropped_rod(name: str, title: str, restitution: float, friction: float) -> Motion:
+def dropped_rod(name: str, title: str, restitution: float, friction: float) -> ReferenceMotion:
     """A rod dropped by 0.2 m at 30 degrees, thrown forwards: its lower edge strikes once."""
     lean, drop, speed = math.radians(30), 0.2, 0.5
     arm = rotation.rotate(rotation.from_axis_angle(PITCH, lean),
@@ -105,11 +105,11 @@ def dropped_rod(name: str, title: str, restitution: float, friction: float) -> M
     scene = _body(Box(ROD), Material(friction=friction, restitution=restitution),
                   (0.0, 0.0, height), rotation.from_axis_angle(PITCH, lean),
                   velocity=(speed, 0.0, 0.0))
-    return Motion(name, f'Dropped rod {title}, e = {restitution:g}, µ = {friction:g}',
-                  "Newton's and Coulomb's laws", Trial(scene, 0.3), truth, in_air=False)
+    return ReferenceMotion(name, f'Dropped rod {title}, e = {restitution:g}, µ = {friction:g}',
+                           "Newton's and Coulomb's laws", Trial(scene, 0.3), truth, in_air=False)
 
 
-def spinning_disc() -> Motion:
+def spinning_disc() -> ReferenceMotion:
     """A disc that spins on its face until friction stops it."""
     radius, thick, rate, friction = 0.2, 0.05, 10.0, 0.3
 
@@ -119,11 +119,11 @@ def spinning_disc() -> Motion:
                                    orientations_about((0.0, 0.0, 1.0), angles[:, None]))
     scene = _body(Cylinder(radius, thick), Material(friction=friction, restitution=0.0),
                   (0.0, 0.0, thick / 2), spin=(0.0, 0.0, rate))
-    return Motion('spinning_disc', 'Disc that spins on its face, µ = 0.3, 0.7 s',
+    return ReferenceMotion('spinning_disc', 'Disc that spins on its face, µ = 0.3, 0.7 s',
                   'torque 2/3 µ m g r', Trial(scene, 0.7), truth, 'angle_worst_rad', in_air=False)
 
 
-def thin_disc() -> Motion:
+def thin_disc() -> ReferenceMotion:
     """A disc of 2 mm that slides and spins on its face; so thin that it is evenly pressed."""
     radius, thick, speed, rate, friction = 0.2, 0.002, 1.0, 10.0, 0.3
 
@@ -134,12 +134,12 @@ def thin_disc() -> Motion:
                                    orientations_about((0.0, 0.0, 1.0), angles[:, None]))
     scene = _body(Cylinder(radius, thick), Material(friction=friction, restitution=0.0),
                   (0.0, 0.0, thick / 2), velocity=(speed, 0.0, 0.0), spin=(0.0, 0.0, rate))
-    return Motion('thin_disc', 'Disc that slides and spins on its face, µ = 0.3, 0.7 s',
-                  'Coulomb over an even pressure, Farkas 2003', Trial(scene, 0.7), truth,
-                  in_air=False)
+    return ReferenceMotion('thin_disc', 'Disc that slides and spins on its face, µ = 0.3, 0.7 s',
+                           'Coulomb over an even pressure, Farkas 2003', Trial(scene, 0.7), truth,
+                           in_air=False)
 
 
-def balls(name: str, title: str, masses: tuple[float, ...], restitution: float) -> Motion:
+def balls(name: str, title: str, masses: tuple[float, ...], restitution: float) -> ReferenceMotion:
     """Balls in a row in the air, without gravity; the first comes at 2 m/s and strikes."""
     radius, gap, speed = 0.1, 0.05, 2.0
     starts = [index * (2 * radius + gap) for index in range(len(masses))]
@@ -156,4 +156,5 @@ def balls(name: str, title: str, masses: tuple[float, ...], restitution: float) 
         for index, (mass, start, velocity) in enumerate(zip(masses, starts, speeds, strict=True)))
     scene = Scene(name, placements, None, Material(friction=0.0, restitution=restitution),
                   gravity=(0.0, 0.0, 0.0))
-    return Motion(name, title, "Newton's law, momentum", Trial(scene, 0.5), truth, in_air=False)
+    return ReferenceMotion(name, title, "Newton's law, momentum", Trial(scene, 0.5), truth,
+                           in_air=False)

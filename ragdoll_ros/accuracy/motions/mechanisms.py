@@ -18,7 +18,7 @@ from ..cases.trial import Trial, posed
 from ..references.closed_forms import pendulum_angle
 from ..references.integration import integrate
 from ..trajectory import Trajectory
-from .motion import Motion, alone, orientations_about
+from .motion import ReferenceMotion, airborne_scene, orientations_about
 
 PIVOT = 1e12
 """kg"""
@@ -34,7 +34,7 @@ OMEGA = math.sqrt(MASS * GRAVITY * LENGTH / MOMENT)
 """rad/s of small swings"""
 
 
-def mechanism_motions() -> list[Motion]:
+def mechanism_motions() -> list[ReferenceMotion]:
     """All pendulums."""
     return [swing('pendulum_small', 'Pendulum, 5°, 2 s', math.radians(5)),
             swing('pendulum_large', 'Pendulum, 120°, 2 s', math.radians(120)),
@@ -43,14 +43,14 @@ def mechanism_motions() -> list[Motion]:
             damped('damped_over', 'over-damped (ζ = 3)', 3.0)]
 
 
-def swing(name: str, title: str, amplitude: float) -> Motion:
+def swing(name: str, title: str, amplitude: float) -> ReferenceMotion:
     """A pendulum let go at ``amplitude`` rad."""
     def angle(times: np.ndarray) -> np.ndarray:
         return pendulum_angle(amplitude, OMEGA, times)
     return _pendulum(name, title, 'elliptic functions', amplitude, 0.0, angle)
 
 
-def damped(name: str, title: str, ratio: float) -> Motion:
+def damped(name: str, title: str, ratio: float) -> ReferenceMotion:
     """A pendulum of 30 degrees whose hinge is damped: gravity is its spring."""
     def angle(times: np.ndarray) -> np.ndarray:
         def rate(t: float, y: np.ndarray) -> tuple[float, float]:
@@ -61,13 +61,13 @@ def damped(name: str, title: str, ratio: float) -> Motion:
 
 
 def _pendulum(name: str, title: str, reference: str, amplitude: float, damping: float,
-              angle: object) -> Motion:
+              angle: object) -> ReferenceMotion:
     bones = (Bone('pivot', Sphere(100.0), PIVOT, (0.0, 0.0, 0.0)),
              Bone('bob', ROD, MASS, (0.0, 0.0, -LENGTH)))
     hinge = Joint('pivot', 'bob', 'hinge', (0.0, 0.0, 0.0), ((0.0, 1.0, 0.0),), damping=damping)
     doll = Ragdoll(name, bones, (hinge,))
     weight = Push('bob', (0.0, 0.0, -MASS * GRAVITY), start=0.0, duration=2.0)
-    trial = Trial(alone(doll, (0.0, 0.0, 0.0)), 2.0,
+    trial = Trial(airborne_scene(doll, (0.0, 0.0, 0.0)), 2.0,
                   posed(Placement(doll), {'bob': amplitude}), (weight,))
 
     def truth(times: np.ndarray) -> Trajectory:
@@ -76,4 +76,4 @@ def _pendulum(name: str, title: str, reference: str, amplitude: float, damping: 
         positions = np.stack([0 * bob, bob], axis=1)
         return Trajectory.of_poses(times, positions, orientations_about(
             (0.0, 1.0, 0.0), np.stack([0 * phi, phi], axis=1)))
-    return Motion(name, title, reference, trial, truth, 'angle_worst_rad', in_air=False)
+    return ReferenceMotion(name, title, reference, trial, truth, 'angle_worst_rad', in_air=False)

@@ -15,7 +15,7 @@ from ..trajectory import Trajectory
 
 
 @dataclass(frozen=True)
-class Motion:
+class ReferenceMotion:
     """A trial whose exact course is known."""
 
     name: str
@@ -50,7 +50,7 @@ def without_damping(doll: Ragdoll) -> Ragdoll:
         dataclasses.replace(joint, damping=0.0) for joint in doll.joints))
 
 
-def alone(doll: Ragdoll, gravity: tuple[float, float, float] = (0.0, 0.0, -9.8),
-          **placed: object) -> Scene:
+def airborne_scene(doll: Ragdoll, gravity: tuple[float, float, float] = (0.0, 0.0, -9.8),
+                   **placed: object) -> Scene:
     """A scene of one doll in the air, whose bones pass through each other."""
     return Scene(doll.name, (Placement(doll, **placed),), gravity=gravity, self_collision=False)

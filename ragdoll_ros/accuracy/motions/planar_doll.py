@@ -11,7 +11,7 @@ from ..cases.trial import Trial, posed
 from ..references import event_driven
 from ..references.planar_rods import PlanarRods
 from ..trajectory import Trajectory
-from .motion import Motion, orientations_about
+from .motion import ReferenceMotion, orientations_about
 
 PITCH = (0.0, 1.0, 0.0)
 NAMES = ('torso', 'left_arm', 'right_arm', 'left_leg', 'right_leg')
@@ -29,7 +29,7 @@ FALLING, CLEARANCE = (0.5, -2.0), 0.02
 """m/s, x and z, and m below the lowest end."""
 
 
-def planar_motions() -> list[Motion]:
+def planar_motions() -> list[ReferenceMotion]:
     """The doll on ice, sliding and sticking, bouncing or not, for as long as the truth is known.
 
     Two rods' ends that stick at once can share their friction in many ways: the last one ends
@@ -69,7 +69,8 @@ def beginning() -> np.ndarray:
     return y
 
 
-def planar_doll(name: str, friction: float, restitution: float, duration: float = 0.5) -> Motion:
+def planar_doll(name: str, friction: float, restitution: float,
+                duration: float = 0.5) -> ReferenceMotion:
     """A throw onto the ground from 2 cm above it."""
     doll, rods = five_rods(), figure(friction, restitution)
     material = Material(friction, 0.0, restitution, rods.restitution_speed)
@@ -80,8 +81,9 @@ def planar_doll(name: str, friction: float, restitution: float, duration: float 
         upright = np.insert(rods.centres(found), 1, 0.0, axis=2)
         return Trajectory.of_poses(times, upright, orientations_about(PITCH, found[:, 2:7]))
     title = f'Planar doll of five rods, e = {restitution:g}, µ = {friction:g}, {duration:g} s'
-    return Motion(name, title, 'Lagrange, events located, impacts by their modes; DOP853 at 1e-12',
-                  Trial(scene, duration, _start(doll)), truth, in_air=False)
+    return ReferenceMotion(
+        name, title, 'Lagrange, events located, impacts by their modes; DOP853 at 1e-12',
+        Trial(scene, duration, _start(doll)), truth, in_air=False)
 
 
 def _start(doll: Ragdoll) -> GeneralizedState:

@@ -7,15 +7,15 @@ import math
 from ...physics.accuracy import ACCURACIES
 from ..cases.contact_cases import COLLISIONS, two_dolls
 from ..crowds.depth import BoneDepth
-from ..measure import Measure
 from ..methods import by_name, run
-from ..results.runner import Job, Options, Row
+from ..metrics import Metrics
+from ..results.runner import Job, Row, RunOptions
 
 NAME = 'collisions'
 OTHERS = ('bullet-4', 'bullet-10', 'mujoco-implicitfast-4', 'mujoco-implicitfast-10')
 
 
-def jobs(options: Options) -> list[Job]:
+def jobs(options: RunOptions) -> list[Job]:
     """One job for each method."""
     names = [*(f'ours-{accuracy}' for accuracy in ACCURACIES),
              *(OTHERS[1:2] if options.quick else OTHERS)]
@@ -28,7 +28,7 @@ def measure(name: str) -> list[Row]:
     method, rows = by_name(name), []
     for speed in COLLISIONS:
         trial = two_dolls(speed)
-        moved, scales = run(method, trial).trajectory, Measure(trial.scene)
+        moved, scales = run(method, trial).trajectory, Metrics(trial.scene)
         row: Row = {'method': name, 'label': method.label, 'speed_m_s': speed}
         rows.append(row | (dict.fromkeys(FIGURES, math.inf) if not moved.finite else {
             'momentum_drift': scales.momentum_drift(trial, moved),

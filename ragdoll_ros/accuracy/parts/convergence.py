@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import functools
 
-from .. import fineness
-from ..measure import compare
+from .. import step_sizes
 from ..methods import Method, bullet, core, mujoco, run
+from ..metrics import compare
 from ..motions.contact import contact_motions
 from ..motions.impacts import impact_motions
 from ..motions.planar_doll import planar_motions
-from ..results.runner import Job, Options, Row
+from ..results.runner import Job, Row, RunOptions
 from .orders import slope
-from .precision import motions
+from .work_precision import motions
 
 NAME = 'convergence'
 HALVINGS = 6
@@ -27,7 +27,7 @@ FLOOR = 1e-11
 """m or rad: errors below are the reference's, or rounding's."""
 
 
-def jobs(options: Options) -> list[Job]:
+def jobs(options: RunOptions) -> list[Job]:
     """One job for each motion with contacts."""
     names = [motion.name for make in (contact_motions, impact_motions, planar_motions)
              for motion in make()]
@@ -45,8 +45,8 @@ def families(halvings: int) -> dict[str, list[Method]]:
     counts = [2 ** k for k in range(halvings + 1)]
     found = {'PyBullet': [*map(bullet, counts)],
              'MuJoCo implicitfast': [mujoco('implicitfast', count) for count in counts]}
-    if fineness.has_core():
-        first = fineness.core_step('draft')
+    if step_sizes.has_rigid_engine():
+        first = step_sizes.contact_step('draft')
         return {'core': [core(first / count) for count in counts], **found}
     return found
 
@@ -67,5 +67,5 @@ def measure(motion_name: str, halvings: int) -> list[Row]:
 
 
 def _step(method: Method) -> float:
-    return fineness.TICK / method.substeps if method.substeps else float(
+    return step_sizes.TICK / method.substeps if method.substeps else float(
         method.name.removeprefix('core-'))

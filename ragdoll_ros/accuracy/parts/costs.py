@@ -12,13 +12,13 @@ from ...files.scene import load_scene
 from ...model.ragdoll import Ragdoll
 from ...model.scene import Placement, Scene
 from ...physics.simulation import Simulation
-from ..results.runner import Job, Options, Row
+from ..results.runner import Job, Row, RunOptions
 
 NAME = 'costs'
 TICKS = 100
 
 
-def jobs(options: Options) -> list[Job]:
+def jobs(options: RunOptions) -> list[Job]:
     """One timed job: the scenes are compared with each other."""
     repeats = 2 if options.quick else 7
     return [Job(NAME, 'what a scene costs', functools.partial(

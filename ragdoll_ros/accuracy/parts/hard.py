@@ -14,14 +14,14 @@ from ...model.scene import Placement
 from ...model.shapes import Sphere
 from ...physics.simulation import Simulation
 from ..cases.fuzzed import fuzzed
-from ..cases.hard_case import SINKING, HardCase, Rule
+from ..cases.hard_case import SINKING, HardCase, Requirements
 from ..cases.hard_cases import hard_cases
 from ..cases.trial import Trial
 from ..crowds.depth import BoneDepth
-from ..measure import Measure
 from ..methods import by_name, run
-from ..results.goals import EXCESS
-from ..results.runner import Job, Options, Row
+from ..metrics import Metrics
+from ..results.criteria import EXCESS
+from ..results.runner import Job, Row, RunOptions
 from ..trajectory import Trajectory
 
 NAME = 'hard'
@@ -35,14 +35,14 @@ GAP, REST = 1e-3, 0.05
 FUZZED, CHUNK, HANG = 200, 10, 5.0
 """Random scenes, as many in a job, and the CPU seconds from which a tick counts as hanging."""
 
-LOOSE = Rule(sinking_m=None, depth_m=None, overshoot_rad=None, rest=False)
+LOOSE = Requirements(sinking_m=None, depth_m=None, overshoot_rad=None, rest=False)
 """For random scenes: no stop, no hang, no NaN, no gap."""
 
 QUICK_CASES = ('mass ratio 1:100', 'start in a self-overlap', 'limits of 2°', 'scale 0.01',
                'hits the ground at 100 m/s', 'spin 20 rad/s', 'limit slams')
 
 
-def jobs(options: Options, accuracy: str = 'normal') -> list[Job]:
+def jobs(options: RunOptions, accuracy: str = 'normal') -> list[Job]:
     """Every case at a setting, and beside it PyBullet at N = 10."""
     made = []
     for case in hard_cases():
@@ -91,12 +91,12 @@ def fuzz(method_name: str, first: int, end: int) -> list[Row]:
 
 def figures(case: HardCase, trial: Trial, trajectory: Trajectory) -> Row:
     """Figures the rules are about; names end in their units."""
-    measure = Measure(trial.scene)
+    measure = Metrics(trial.scene)
     speeds = np.linalg.norm(trajectory.linear_velocities, axis=-1).max(axis=1)
     lift = (sum(bone.mass for bone in trial.scene.bones) * case.rule.lift_m
             * float(np.linalg.norm(trial.scene.gravity)))
     moved = np.linalg.norm(trajectory.positions[-1] - trajectory.positions[0], axis=-1)
-    inside, depth = BoneDepth(trial.scene).since_apart(measure.since_back(trajectory))
+    inside, depth = BoneDepth(trial.scene).since_apart(measure.after_limit_recovery(trajectory))
     return {'excess': measure.energy_excess(trial, inside, lift),
             'depth_m': depth if case.rule.depth_m else None,
             'gap_m': measure.joint_gap(trajectory), 'overshoot_rad': measure.overshoot(inside),
@@ -118,8 +118,9 @@ def violations(case: HardCase, row: Row) -> list[str]:
               ('sinking_m', rule.sinking_m and rule.sinking_m * size, 'sinking'),
               ('depth_m', rule.depth_m and rule.depth_m * size, 'bone in bone'),
               ('end_sinking_m', rule.sinking_m and SINKING * size, 'stays sunk'),
-              ('momentum', rule.momentum, 'momentum'), ('moved_m', rule.stays_m, 'does not stay'),
-              ('fastest_m_s', rule.exit_m_s, 'speed'),
+              ('momentum', rule.max_momentum_drift, 'momentum'),
+              ('moved_m', rule.max_displacement_m, 'does not stay'),
+              ('fastest_m_s', rule.max_speed_m_s, 'speed'),
               ('end_m_s', REST * math.sqrt(size) if rule.rest else None, 'not at rest'))
     for key, bound, text in bounds:
         if bound is not None and not row[key] <= bound:

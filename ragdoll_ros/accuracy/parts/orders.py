@@ -10,10 +10,10 @@ import numpy as np
 
 from ...physics import kernels
 from ...physics.accuracy import ACCURACIES
-from ..measure import compare
 from ..methods import Method, bullet, mujoco, ours, run
-from ..results.runner import Job, Options, Row
-from .precision import motions
+from ..metrics import compare
+from ..results.runner import Job, Row, RunOptions
+from .work_precision import motions
 
 NAME = 'orders'
 TICKS = (0.02, 0.01, 0.005, 0.0025, 0.00125)
@@ -42,7 +42,7 @@ def methods() -> list[Method]:
             *(mujoco(name, 1) for name in ('euler', 'implicitfast', 'rk4'))]
 
 
-def jobs(options: Options) -> list[Job]:
+def jobs(options: RunOptions) -> list[Job]:
     """One job for each motion."""
     names = MOTIONS[:2] if options.quick else MOTIONS
     return [Job(NAME, f'orders, {name}', functools.partial(measure_all, name), weight=3.0)

@@ -14,7 +14,7 @@ from ...physics.accuracy import ACCURACIES
 from ..cases.trial import Trial
 from ..methods import by_name, run
 from ..references.closed_forms import bounce_times
-from ..results.runner import Job, Options, Row
+from ..results.runner import Job, Row, RunOptions
 from ..trajectory import Trajectory
 
 NAME = 'restitution'
@@ -35,7 +35,7 @@ their names count."""
 OTHERS = ('bullet-4', 'bullet-10', 'bullet-100', 'mujoco-implicitfast-10')
 
 
-def jobs(options: Options) -> list[Job]:
+def jobs(options: RunOptions) -> list[Job]:
     """One job for each method."""
     names = [*(f'ours-{accuracy}' for accuracy in ACCURACIES),
              *(OTHERS[1:2] if options.quick else OTHERS)]

@@ -20,7 +20,7 @@ from ...model.swing import Link, Swing
 from ...physics.swing.mount import Mount
 from ...physics.swing.swings import Swings
 from ..references.closed_forms import pendulum_angle
-from ..results.runner import Job, Options, Row
+from ..results.runner import Job, Row, RunOptions
 
 NAME = 'swing'
 RATES = (15, 30, 60, 120, 240)
@@ -31,7 +31,7 @@ START = math.radians(60)
 STILL = State(np.zeros((1, 3)), np.array([rotation.IDENTITY]), *np.zeros((2, 1, 3)))
 
 
-def jobs(options: Options) -> list[Job]:
+def jobs(options: RunOptions) -> list[Job]:
     """One job."""
     return [Job(NAME, 'swings', functools.partial(measure), 2.0)]
 

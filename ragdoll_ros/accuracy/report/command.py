@@ -9,30 +9,31 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..parts import (
-    classes,
     collisions,
     convergence,
     costs,
-    drop,
-    drops,
-    estimate,
-    faints,
+    drop_statistics,
+    energy,
+    error_estimate,
+    fainting_falls,
     hard,
     orders,
-    pieces,
-    precision,
     restitution,
+    short_segments,
+    start_classes,
     swing,
+    work_precision,
 )
 from ..results import figures
-from ..results.runner import Job, Options, run_jobs
+from ..results.runner import Job, RunOptions, run_jobs
 from .plots import draw_all
 from .sections import markdown
 
-PARTS = {'precision': precision, 'orders': orders, 'restitution': restitution,
-         'convergence': convergence, 'pieces': pieces, 'drop': drop, 'drops': drops,
-         'classes': classes, 'collisions': collisions, 'hard': hard,
-         'costs': costs, 'estimate': estimate, 'swing': swing, 'faints': faints}
+PARTS = {'precision': work_precision, 'orders': orders, 'restitution': restitution,
+         'convergence': convergence, 'pieces': short_segments, 'drop': energy,
+         'drops': drop_statistics, 'classes': start_classes, 'collisions': collisions,
+         'hard': hard, 'costs': costs, 'estimate': error_estimate, 'swing': swing,
+         'faints': fainting_falls}
 """Modules by the names that --case takes: each says by jobs() what it has to run."""
 
 NEEDED = ('scipy', 'matplotlib', 'mujoco')
@@ -103,10 +104,10 @@ def measured(options: argparse.Namespace) -> dict:
     if options.starts < 1:
         raise WrongCall(f'--starts {options.starts}: expected 1 or more')
     began = time.monotonic()
-    rows = run_jobs(chosen(options.case, Options(options.quick, options.starts)))
-    for part, join in ((classes.NAME, classes.merged), (drops.NAME, drops.merged)):
-        if part in rows:
-            rows[part] = join(rows[part])
+    rows = run_jobs(chosen(options.case, RunOptions(options.quick, options.starts)))
+    for part in (start_classes, drop_statistics):
+        if part.NAME in rows:
+            rows[part.NAME] = part.merged(rows[part.NAME])
     words = ['ragdoll_report', *(['--quick'] if options.quick else []),
              *(f'--case {name}' for name in options.case),
              *([f'--starts {options.starts}'] if options.starts != 100 else [])]
@@ -123,7 +124,7 @@ def write(folder: Path) -> None:
     sys.stdout.write(f'{page} and {len(pictures)} pictures\n')
 
 
-def chosen(names: Sequence[str], options: Options) -> list[Job]:
+def chosen(names: Sequence[str], options: RunOptions) -> list[Job]:
     """All jobs, or those of the parts and motions named; WrongCall for a name that is none."""
     jobs = [(part, job) for part, module in PARTS.items() for job in module.jobs(options)]
     for name in names:
@@ -138,7 +139,7 @@ def chosen(names: Sequence[str], options: Options) -> list[Job]:
 
 def labels() -> list[str]:
     """Names that --case takes."""
-    return [*PARTS, *precision.motions()]
+    return [*PARTS, *work_precision.motions()]
 
 
 if __name__ == '__main__':

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from ...physics.accuracy import ACCURACIES
 from ..cases.hard_cases import hard_cases
 from ..parts import hard
-from ..results.runner import Options, run_jobs
+from ..results.runner import RunOptions, run_jobs
 from .sections import HARD
 
 
@@ -20,7 +20,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--case', default='', help='only cases whose name holds this text')
     parser.add_argument('--accuracy', default='normal', choices=list(ACCURACIES))
     options = parser.parse_args(arguments)
-    jobs = [job for job in hard.jobs(Options(), options.accuracy)
+    jobs = [job for job in hard.jobs(RunOptions(), options.accuracy)
             if options.case in job.label and 'bullet' not in job.label]
     if not jobs:
         names = ', '.join([*(case.name for case in hard_cases()), hard.RESTING])

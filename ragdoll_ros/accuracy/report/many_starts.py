@@ -9,9 +9,9 @@ from pathlib import Path
 
 from ...physics.accuracy import ACCURACIES
 from ..cases.starts import CLASSES
-from ..parts import classes
+from ..parts import start_classes
 from ..results import figures
-from ..results.goals import goals
+from ..results.criteria import criteria
 from ..results.runner import run_jobs
 from .command import write
 
@@ -42,15 +42,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     data = measured(options.starts, options.accuracy or ['normal'])
     figures.save(data, folder)
     write(folder)
-    return 0 if all(row['held'] for row in goals(data['figures'])) else 1
+    return 0 if all(row['met'] for row in criteria(data['figures'])) else 1
 
 
 def measured(starts: int, settings: Sequence[str]) -> dict:
     """What the JSON holds, from running the starts at the settings."""
     began = time.monotonic()
     rows = run_jobs([job for setting in settings for name in CLASSES
-                     for job in classes.chunks(name, f'ours-{setting}', starts)])
-    rows[classes.NAME] = classes.merged(rows[classes.NAME])
+                     for job in start_classes.chunks(name, f'ours-{setting}', starts)])
+    rows[start_classes.NAME] = start_classes.merged(rows[start_classes.NAME])
     words = ' '.join(f'--accuracy {setting}' for setting in settings)
     command = f'python -m ragdoll_ros.accuracy.report.many_starts {words} --starts {starts}'
     return {'about': figures.about(command, time.monotonic() - began, False, starts),

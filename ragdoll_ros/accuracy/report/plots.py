@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..results.criteria import EXCESS
 from ..results.figures import Figures, Row, number, sound
-from ..results.goals import EXCESS
-from .faint_plots import draw_directions, draw_faints
-from .ground_plots import draw_convergence, draw_drops
+from .contact_plots import draw_convergence, draw_drops
+from .fall_plots import draw_fainting_falls, draw_fall_directions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,10 +43,10 @@ def draw_all(figures: Figures, folder: Path) -> dict[str, str]:
                          'figure.dpi': 110, 'axes.titlesize': 11, 'legend.frameon': False})
     made = {}
     for name, draw in (('energy', draw_energy), ('precision', draw_precision),
-                       ('pieces', draw_pieces), ('drop', draw_drop), ('classes', draw_classes),
+                       ('pieces', draw_segments), ('drop', draw_drop), ('classes', draw_classes),
                        ('orders', draw_orders), ('estimate', draw_estimate),
                        ('convergence', draw_convergence), ('drops', draw_drops),
-                       ('faints', draw_faints), ('faint_directions', draw_directions)):
+                       ('faints', draw_fainting_falls), ('faint_directions', draw_fall_directions)):
         figure = draw(figures, plt)
         if figure is None:
             continue
@@ -128,7 +128,7 @@ def draw_precision(figures: Figures, plt: object) -> object:
     return figure
 
 
-def draw_pieces(figures: Figures, plt: object) -> object:
+def draw_segments(figures: Figures, plt: object) -> object:
     """The same for short pieces through contacts."""
     rows = [row for row in sound(figures.get('pieces', ())) if 'reference' in row]
     if not rows:

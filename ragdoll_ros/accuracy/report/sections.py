@@ -2,12 +2,11 @@
 from __future__ import annotations
 
 from ..cases.hard_cases import hard_cases
-from ..parts.faints import faint_tables
+from ..parts.fainting_falls import falls_tables
+from ..results.criteria import ROUNDING, criteria
 from ..results.figures import Row, number
-from ..results.goals import ROUNDING, goals
-from ..results.section import Section
-from ..results.tables import table
-from . import ground_sections
+from ..results.markdown import Section, table
+from . import contact_sections
 
 MOTION_COLUMNS = (
     ('label', 'method', '{}'), ('cpu_s_per_s', 'CPU ms/s', 'ms'),
@@ -80,9 +79,9 @@ SECTIONS = (
                 ('order', 'measured', '{:.2f}'), ('order_finest', 'between the finest', '{:.2f}'),
                 ('points', 'points', '{}')),
             below=(('orders', 'Error over the tick'),)),
-    ground_sections.RESTITUTION, ground_sections.CONVERGENCE,
-    ground_sections.PIECES,
-    ground_sections.DROPS, ground_sections.COLLISIONS,
+    contact_sections.RESTITUTION, contact_sections.CONVERGENCE,
+    contact_sections.PIECES,
+    contact_sections.DROPS, contact_sections.COLLISIONS,
     Section('classes', 'Nine classes of starts',
             'Energy excess is the largest rise of E - work above its running minimum, over '
             'max(E0 + work); over 1e-5 counts as bad. What starts outside its limits counts from '
@@ -122,7 +121,7 @@ SECTIONS = (
     Section('faints', 'Faints beside real falls',
             'People stand, lean by up to 5° in any direction, and go limp part by part in any '
             'order: what comes of it without a muscle. Real people try to stay up and put their '
-            'hands out: [what that means](people.md#beside-real-falls).', body=faint_tables,
+            'hands out: [what that means](people.md#beside-real-falls).', body=falls_tables,
             below=(('faints', 'Speeds at impact, and time to it'),
                    ('faint_directions', 'Speeds at impact by direction'))))
 
@@ -134,7 +133,7 @@ def markdown(data: dict, pictures: dict[str, str]) -> str:
     """
     figures = data['figures']
     blocks = head(data['about'])
-    promises = goals(figures)
+    promises = criteria(figures)
     if promises:
         blocks += ['## What was promised, what came out', table(promises, (
             ('goal', 'promise', '{}'), ('wanted', 'wanted', '{}'), ('found', 'found', '{}'),

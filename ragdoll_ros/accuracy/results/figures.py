@@ -7,10 +7,11 @@ import json
 import math
 import os
 import platform
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from ...physics import kernels
+from ...physics.accuracy import ACCURACIES
 
 FILE = 'accuracy.json'
 
@@ -59,6 +60,21 @@ def number(value: object) -> float:
 def sound(rows: Iterable[Row]) -> list[Row]:
     """The rows of jobs that did not fail."""
     return [row for row in rows if 'failed' not in row]
+
+
+def criterion(goal: str, wanted: str, found: str, held: bool) -> Row:
+    """The row of one promise."""
+    return {'goal': goal, 'wanted': wanted, 'found': found, 'held': held}
+
+
+def by_setting(figures: Figures, part: str, keep: Callable[[Row], bool] = lambda row: True,
+               ) -> Iterator[tuple[str, list[Row]]]:
+    """Each of our settings and its rows of a part, where there are any."""
+    for accuracy in ACCURACIES:
+        rows = [row for row in figures.get(part, ())
+                if row.get('method') == f'ours-{accuracy}' and keep(row)]
+        if rows:
+            yield accuracy, rows
 
 
 def _line(value: object) -> str:

@@ -4,21 +4,22 @@ from __future__ import annotations
 import concurrent.futures
 import multiprocessing
 import os
+import sys
 import tempfile
+import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ...physics.engine.substepped.mujoco import silence_warnings
 from .figures import Row
-from .progress import Progress
 
 WORKERS = 2
 """Processes; PyBullet never releases the GIL, so more cores need more of them."""
 
 
 @dataclass(frozen=True)
-class Options:
+class RunOptions:
     """How much to run. ``starts`` of each class at each of our settings; quick: 2."""
 
     quick: bool = False
@@ -39,7 +40,7 @@ class Job:
 
 def run_jobs(jobs: Sequence[Job]) -> dict[str, list[Row]]:
     """Each part's rows in the order of its jobs; a job that fails gives a row that says so."""
-    progress = Progress(sum(job.weight / (1 if job.timed else WORKERS) for job in jobs))
+    progress = ProgressBar(sum(job.weight / (1 if job.timed else WORKERS) for job in jobs))
     results: dict[int, list[Row]] = {}
     together = [index for index, job in enumerate(jobs) if not job.timed]
     # spawn: a forked copy of a process that holds PyBullet clients is in no defined state
@@ -77,3 +78,46 @@ def prepare() -> None:
     """Keep MuJoCo's warnings about diverging runs off the terminal: the figures tell of them."""
     silence_warnings()
     os.chdir(tempfile.gettempdir())
+
+
+class ProgressBar:
+    """Counts finished pieces of ``total`` weight; a bar on a terminal, else a line now and then."""
+
+    WIDTH = 30
+    QUIET = 15.0
+    """s between lines where stderr is no terminal."""
+
+    def __init__(self, total: float) -> None:
+        self._total = max(total, 1e-9)
+        self._done = 0.0
+        self._began = self._said = time.monotonic()
+        self._terminal = sys.stderr.isatty()
+
+    def advance(self, weight: float, label: str) -> None:
+        """Note that a piece of ``weight`` is done."""
+        self._done += weight
+        now = time.monotonic()
+        if self._terminal:
+            filled = round(self.WIDTH * self._share)
+            bar = '#' * filled + '.' * (self.WIDTH - filled)
+            sys.stderr.write(f'\r[{bar}] {self._text(now)} {label[:40]:40}')
+            sys.stderr.flush()
+        elif now - self._said > self.QUIET:
+            self._said = now
+            sys.stderr.write(f'{self._text(now)} {label}\n')
+            sys.stderr.flush()
+
+    def close(self) -> None:
+        """End the line."""
+        if self._terminal:
+            sys.stderr.write('\n')
+
+    @property
+    def _share(self) -> float:
+        return min(1.0, self._done / self._total)
+
+    def _text(self, now: float) -> str:
+        gone = now - self._began
+        left = gone * (1 / self._share - 1) if self._share > 0.02 else None
+        rest = '' if left is None else f', about {left:.0f} s left'
+        return f'{self._share:4.0%} {gone:.0f} s{rest}'

@@ -16,9 +16,9 @@ from ...model import rotation
 from ...physics.accuracy import ACCURACIES
 from ..cases import starts
 from ..cases.trial import Trial
-from ..measure import Measure
 from ..methods import by_name, reference, run
-from ..results.runner import Job, Options, Row
+from ..metrics import Metrics
+from ..results.runner import Job, Row, RunOptions
 from ..trajectory import Trajectory
 
 NAME = 'drops'
@@ -56,7 +56,7 @@ COUNTS = {'random': 300, 'default, tilted': 30}
 QUICK_COUNTS = {'random': 4}
 
 
-def jobs(options: Options) -> list[Job]:
+def jobs(options: RunOptions) -> list[Job]:
     """Jobs of CHUNK drops by each method; the reference, which takes longest, first."""
     counts = QUICK_COUNTS if options.quick else COUNTS
     names = [reference(PARTS).name, *(f'ours-{accuracy}' for accuracy in ACCURACIES),
@@ -84,7 +84,7 @@ def measure(population: str, name: str, first: int, end: int) -> list[Row]:
 
 def quantities(trial: Trial, trajectory: Trajectory) -> dict[str, float]:
     """Shares of energy left, how far the centre of mass went and the bones lie apart (rms)."""
-    measure = Measure(trial.scene)
+    measure = Metrics(trial.scene)
     masses = np.array([bone.mass for bone in trial.scene.bones])
     energy = measure.energy(trajectory)
     centres = np.einsum('n,tnd->td', masses, trajectory.positions) / masses.sum()
@@ -111,11 +111,11 @@ def merged(rows: list[Row]) -> list[Row]:
     clouds: dict[str, Row] = {}
     for row in found.values():
         if 'failed' not in row:
-            row |= told_apart(row, clouds.setdefault(row['population'], row))
+            row |= compare_with_reference(row, clouds.setdefault(row['population'], row))
     return list(found.values())
 
 
-def told_apart(row: Row, truth: Row) -> Row:
+def compare_with_reference(row: Row, truth: Row) -> Row:
     """Mean, its standard error, and p of Kolmogorov and Smirnov for each quantity.
 
     ``off``: how many standard errors of their difference the means lie apart. What has not settled

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...physics.accuracy import ACCURACIES
-from .figures import Figures, Row, number, sound
-from .ground_goals import ground_goals
-from .promise import by_setting, promise
+from .contact_criteria import contact_criteria
+from .figures import Figures, Row, by_setting, criterion, number, sound
 
 ROUNDING = 1e-12
 """m or rad: errors below count as none on the front, and the page says so."""
@@ -63,12 +62,12 @@ BOUNDS = (
           'to 1e-9', '{:.1e}', lambda row: 'momentum_drift' in row))
 
 
-def goals(figures: Figures) -> list[Row]:
+def criteria(figures: Figures) -> list[Row]:
     """One row for each promise that this run has figures for: what, wanted, found, held."""
     rows = [*_energy(figures), *_cost(figures)]
     for bound in BOUNDS:
         rows += _largest(bound, figures)
-    for goal in (ground_goals, _hard, _estimate, _costs_fall, _orders, _front):
+    for goal in (contact_criteria, _hard, _estimate, _costs_fall, _orders, _front):
         rows += goal(figures)
     return rows
 
@@ -81,16 +80,16 @@ def _largest(bound: Bound, figures: Figures) -> Iterator[Row]:
         largest = bound.factor * float(np.max([
             number(row[key]) for row in rows for key in bound.keys if key in row]))
         most = bound.most[accuracy]
-        yield promise(f'{bound.goal}, {accuracy}', bound.wanted.format(most),
-                      bound.found.format(largest), largest <= most)
+        yield criterion(f'{bound.goal}, {accuracy}', bound.wanted.format(most),
+                        bound.found.format(largest), largest <= most)
 
 
 def _energy(figures: Figures) -> Iterator[Row]:
     for accuracy, rows in by_setting(figures, 'classes', _follows_on):
         bad, starts = (sum(row[key] for row in rows) for key in ('bad', 'starts'))
         worst = max(number(row['worst_excess']) for row in rows)
-        yield promise(f'energy excess in every start, {accuracy}', 'at most 1e-5',
-                      f'{bad} of {starts} bad, worst {worst:.1e}', not bad and worst <= EXCESS)
+        yield criterion(f'energy excess in every start, {accuracy}', 'at most 1e-5',
+                        f'{bad} of {starts} bad, worst {worst:.1e}', not bad and worst <= EXCESS)
 
 
 def _cost(figures: Figures) -> Iterator[Row]:
@@ -100,26 +99,26 @@ def _cost(figures: Figures) -> Iterator[Row]:
         return
     for accuracy, rows in by_setting(figures, 'ratios'):
         ratio, most = sum(number(row['cpu_s']) for row in rows) / base, RATIOS[accuracy]
-        yield promise(f'CPU over PyBullet N = 10, {accuracy}', f'at most {most:g}', f'{ratio:.2f}',
-                      ratio <= most)
+        yield criterion(f'CPU over PyBullet N = 10, {accuracy}', f'at most {most:g}',
+                        f'{ratio:.2f}', ratio <= most)
 
 
 def _hard(figures: Figures) -> Iterator[Row]:
     rows = [row for row in figures.get('hard', ()) if row.get('method') == 'ours-normal']
     failing = ', '.join(row['case'] for row in rows if not row['passed'])
     if rows:
-        yield promise('hard cases at normal', f'all {len(rows)}',
-                      f'{sum(row["passed"] for row in rows)} hold'
-                      + (f'; not: {failing}' if failing else ''), not failing)
+        yield criterion('hard cases at normal', f'all {len(rows)}',
+                        f'{sum(row["passed"] for row in rows)} hold'
+                        + (f'; not: {failing}' if failing else ''), not failing)
 
 
 def _estimate(figures: Figures) -> Iterator[Row]:
     for row in figures.get('estimate', ()):
         share = number(row.get('within_3'))
         if row.get('ticks') and 'rounding' in row:
-            yield promise(f'live estimate within a factor 3, {row.get("label")}',
-                          '90 % of flight ticks beyond rounding',
-                          f'{share:.0%} of {row.get("ticks")}', share >= 0.9)
+            yield criterion(f'live estimate within a factor 3, {row.get("label")}',
+                            '90 % of flight ticks beyond rounding',
+                            f'{share:.0%} of {row.get("ticks")}', share >= 0.9)
 
 
 def _costs_fall(figures: Figures) -> Iterator[Row]:
@@ -127,8 +126,8 @@ def _costs_fall(figures: Figures) -> Iterator[Row]:
     # timing on a shared machine is good to a tenth
     rising = sum(later > 1.1 * earlier for earlier, later in itertools.pairwise(costs))
     if costs:
-        yield promise('a scene that needs less costs less', 'falls from row to row',
-                      f'rises {rising} times' if rising else 'falls', not rising)
+        yield criterion('a scene that needs less costs less', 'falls from row to row',
+                        f'rises {rising} times' if rising else 'falls', not rising)
 
 
 def _orders(figures: Figures) -> Iterator[Row]:
@@ -136,7 +135,7 @@ def _orders(figures: Figures) -> Iterator[Row]:
     off = [f'{row["method"]} {number(row["order"]):.2f} ({row["motion"]})' for row in rows
            if not abs(number(row['order']) - row['theory']) <= 0.2]
     if rows:
-        yield promise('orders', 'within 0.2 of theory', ', '.join(off) or 'all are', not off)
+        yield criterion('orders', 'within 0.2 of theory', ', '.join(off) or 'all are', not off)
 
 
 def _front(figures: Figures) -> Iterator[Row]:
@@ -150,9 +149,9 @@ def _front(figures: Figures) -> Iterator[Row]:
                 motions.append(row['motion'])
     count = len({row['motion'] for row in rows})
     for method, motions in beaten.items():
-        yield promise(f'on the front of speed and error, {method}', f'in all {count} motions',
-                      f'beaten in {len(motions)}: {", ".join(motions)}' if motions else 'yes',
-                      not motions)
+        yield criterion(f'on the front of speed and error, {method}', f'in all {count} motions',
+                        f'beaten in {len(motions)}: {", ".join(motions)}' if motions else 'yes',
+                        not motions)
 
 
 def _beats(other: Row, ours: Row) -> bool:

@@ -1,7 +1,7 @@
-"""Faints from standing beside real falls: what a body without muscles can claim, and what not.
+"""Fainting falls from standing, compared with published figures of real falls.
 
-People stand, lean a little, held by their joints; then ankles, knees, hips and trunk go limp, one
-after the other in any order, the arms with the first of them.
+People stand and lean a little, their joints held by springs; then the springs of ankles, knees,
+hips and trunk are released one after the other in random order, those of the arms with the first.
 """
 from __future__ import annotations
 
@@ -18,49 +18,45 @@ from ...model.coordinates import GeneralizedState
 from ...model.ragdoll import Ragdoll
 from ...model.scene import SECOND, Material, Placement, Scene
 from ...people import person, standing
+from ...people.fall_phases import ONSET_DURATION, bone_impacts, find_phases, part_impact
 from ...people.real_falls import DESCENT, IMPACT_SPEEDS, SHARE_THAT_HITS, Known
-from ...physics.engine.protocol import GROUND
 from ...physics.ground_heights import GroundHeights
 from ...physics.simulation import Simulation
 from ..results.figures import Row
-from ..results.runner import Job, Options
-from ..results.tables import table
+from ..results.markdown import table
+from ..results.runner import Job, RunOptions
 
 NAME = 'faints'
 COUNT, QUICK_COUNT, CHUNK = 1000, 4, 20
 DURATION, STEP = 2.5, 0.01
-"""s of each from when the first joint goes limp, and between two looks."""
+"""s of each fall from the first joint release, and of a tick."""
 
-LIES = 0.3
-"""m/s below which all bones are when a faint is over: what touches later hardly hits."""
+LYING_SPEED = 0.3
+"""m/s: a fall ends when the pelvis has hit and all bones are slower; later contacts hardly hit."""
 
-LEAN, APART = math.radians(5), 0.15
-"""rad that people lean by at the most; s between one part's going limp and the next's at most."""
+MAX_LEAN, MAX_DELAY = math.radians(5), 0.15
+"""Largest initial lean, rad; largest time between two joint releases, s."""
 
-ONSET = 0.1
-"""m/s of the centre of mass downwards from which on one falls."""
-
-PARTS = {'ankles': ('ankle',), 'knees': ('knee',), 'hips': ('hip',),
+JOINT_GROUPS = {'ankles': ('ankle',), 'knees': ('knee',), 'hips': ('hip',),
          'trunk': ('waist', 'chest', 'head')}
-HITS = {'pelvis': ('pelvis',), 'head': ('head',), 'hand': ('left_hand', 'right_hand')}
-"""Bones whose touch of the ground is a part's; of hands the first one's."""
+FEET = ('left_foot', 'right_foot')
 
 
 @dataclasses.dataclass(frozen=True)
-class Faint:
-    """Who stands how, and when which joints go limp."""
+class FaintingStart:
+    """Initial conditions of a fainting fall."""
 
     scene: Scene
     lean: np.ndarray
-    """(4,) turn of the whole person about the soles."""
-    limp: tuple[tuple[float, str], ...]
-    """s and part, in that order."""
+    """(4,) rotation of the whole person about the soles."""
+    releases: tuple[tuple[float, str], ...]
+    """Times, s, and names of the joint groups that are released, in order of time."""
     towards: float
-    """rad, that the lean is from forwards to the left."""
+    """Direction of the lean, rad from forwards to the left."""
 
 
-def faint(number: int) -> Faint:
-    """The start of a number."""
+def fainting_start(number: int) -> FaintingStart:
+    """Start ``number``, from a random generator seeded by it."""
     random = np.random.Generator(np.random.Philox(key=[17, number]))
     sex = SEXES[number % 2]
     (low, _), (height, mass), (high, _) = (PERCENTILES[sex][p] for p in (5, 50, 95))
@@ -69,18 +65,18 @@ def faint(number: int) -> Faint:
     doll = person(size, heavy, sex)
     towards = float(random.uniform(-math.pi, math.pi))
     lean = rotation.from_axis_angle((-math.sin(towards), math.cos(towards), 0.0),
-                                    float(random.uniform(0.01, LEAN)))
-    instants = np.cumsum([0.0, *random.uniform(0, APART, len(PARTS) - 1)])
-    order = [list(PARTS)[index] for index in random.permutation(len(PARTS))]
+                                    float(random.uniform(0.01, MAX_LEAN)))
+    instants = np.cumsum([0.0, *random.uniform(0, MAX_DELAY, len(JOINT_GROUPS) - 1)])
+    order = [list(JOINT_GROUPS)[index] for index in random.permutation(len(JOINT_GROUPS))]
     placed = Placement(doll, orientation=tuple(lean), position=(0, 0, 1))
     scene = dataclasses.replace(
         load_scene('woman_faints'), dolls=(placed,), step=STEP,
         material=Material(float(random.uniform(0.4, 0.8)), restitution=0.0))
-    return Faint(scene, lean, tuple(zip(instants.tolist(), order, strict=True)), towards)
+    return FaintingStart(scene, lean, tuple(zip(instants.tolist(), order, strict=True)), towards)
 
 
-def jobs(options: Options) -> list[Job]:
-    """CHUNK faints each."""
+def jobs(options: RunOptions) -> list[Job]:
+    """Jobs of CHUNK falls each."""
     count = QUICK_COUNT if options.quick else COUNT
     return [Job(NAME, f'faints from {first}', functools.partial(
         measure, first, min(first + CHUNK, count)), 0.3 * CHUNK)
@@ -88,43 +84,45 @@ def jobs(options: Options) -> list[Job]:
 
 
 def measure(first: int, end: int) -> list[Row]:
-    """What the faints first ... end - 1 came to, one row."""
-    found = [fallen(faint(number)) for number in range(first, end)]
+    """One row with the values of the falls first ... end - 1."""
+    found = [fall_values(fainting_start(number)) for number in range(first, end)]
     return [{'faints': end - first, 'values': {key: [row[key] for row in found]
                                                for key in found[0]}}]
 
 
-def fallen(start: Faint) -> dict[str, float]:
-    """Vertical speeds at impact, m/s, and s from onset to the pelvis' impact; NaN where none is."""
-    bones = {part: [start.scene.bone_index(name) for name in names]
-             for part, names in HITS.items()}
-    masses = np.array([bone.mass for bone in start.scene.bones])
-    speeds, onset, descent, limp = {}, None, math.nan, list(start.limp)
+def fall_values(start: FaintingStart) -> dict[str, float]:
+    """Vertical speeds at impact, m/s, and descent time, s; NaN for parts that do not hit."""
+    states, touching = simulate(start)
+    phases = find_phases(start.scene, states, touching, FEET, round(ONSET_DURATION / STEP))
+    frames, velocities = bone_impacts(states, touching)
+    impacts = {part: part_impact(part, start.scene.bone_names, frames, -velocities[:, 2])
+               for part in IMPACT_SPEEDS}
+    onset = math.nan if phases.onset is None else phases.onset
+    return {**{part: float(speed) for part, (_, speed) in impacts.items()},
+            'descent': float(impacts['pelvis'][0] - onset) * STEP, 'towards': start.towards}
+
+
+def simulate(start: FaintingStart) -> tuple[np.ndarray, np.ndarray]:
+    """States (t, n, 13) and ground contacts (t, n) of a fall, in ticks of STEP."""
+    states, touching, releases = [], [], list(start.releases)
+    pelvis = start.scene.bone_index('pelvis')
     with Simulation(start.scene, accuracy='draft', engine='rigid') as simulation:
         _stand(simulation, start)
-        while simulation.time < DURATION * SECOND:
-            while limp and limp[0][0] * SECOND <= simulation.time:
-                simulation.go_limp(_angles(start.scene.dolls[0].doll, limp.pop(0)[1]))
-            falling = -simulation.state.linear_velocities[:, 2]
-            if onset is None and falling @ masses / masses.sum() > ONSET:
-                onset = simulation.time
-            elif onset is not None and 'pelvis' in speeds and (
-                    np.linalg.norm(simulation.state.linear_velocities, axis=1).max() < LIES):
-                break
+        while True:
+            state = simulation.state
+            states.append(state.rows)
+            touching.append(simulation.bones_on_ground)
+            lies = any(flags[pelvis] for flags in touching) and (
+                np.linalg.norm(state.linear_velocities, axis=1).max() < LYING_SPEED)
+            if lies or simulation.time >= DURATION * SECOND:
+                return np.array(states), np.array(touching)
+            while releases and releases[0][0] * SECOND <= simulation.time:
+                simulation.go_limp(_angles(start.scene.dolls[0].doll, releases.pop(0)[1]))
             simulation.advance()
-            contacts = simulation.contacts
-            for bone in contacts.a[contacts.b == GROUND]:
-                part = next((part for part, own in bones.items() if bone in own), None)
-                if part and part not in speeds:
-                    speeds[part] = float(falling[bone])
-                    if part == 'pelvis' and onset is not None:
-                        descent = (simulation.time - onset) / SECOND
-    return {**{part: speeds.get(part, math.nan) for part in HITS}, 'descent': descent,
-            'towards': start.towards}
 
 
-def _stand(simulation: Simulation, start: Faint) -> None:
-    """Put soles flat on the ground, the person leaning over them, and hold all joints."""
+def _stand(simulation: Simulation, start: FaintingStart) -> None:
+    """Place the leaning person with flat soles on the ground and hold all joints."""
     x, y, z = rotation.rotate(rotation.inverse(start.lean), np.array([0.0, 0.0, 1.0]))
     here = simulation.coordinates
     q, doll = here.q.copy(), simulation.scene.dolls[0].doll
@@ -140,21 +138,21 @@ def _stand(simulation: Simulation, start: Faint) -> None:
         simulation.hold(name, *spring)
 
 
-def _angles(doll: Ragdoll, part: str) -> list[str]:
-    """Joint angles of a part; arms go with whichever is first, and stay limp."""
-    ends = (*PARTS[part], 'shoulder', 'elbow', 'wrist')
+def _angles(doll: Ragdoll, group: str) -> list[str]:
+    """Joint angles of a group and of the arms, which are released with the first group."""
+    ends = (*JOINT_GROUPS[group], 'shoulder', 'elbow', 'wrist')
     return [name for joint in doll.joints for name in joint.angle_names if name.endswith(ends)]
 
 
 def joined(rows: list[Row]) -> dict[str, np.ndarray]:
-    """All faints' values."""
+    """Values of all falls, by quantity."""
     return {key: np.array([np.nan if value is None else float(value)
                            for row in rows for value in row['values'][key]])
             for key in rows[0]['values']}
 
 
-def faint_tables(rows: list[Row]) -> list[str]:
-    """Means beside those of real falls, in their standard deviations; shares that hit."""
+def falls_tables(rows: list[Row]) -> list[str]:
+    """Means and shares that hit, with those of real falls; differences in their deviations."""
     values = joined(rows)
     count = len(values['descent'])
 

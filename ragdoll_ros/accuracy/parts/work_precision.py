@@ -5,15 +5,15 @@ import functools
 
 import numpy as np
 
-from ..measure import Measure, compare
 from ..methods import Method, Result, by_name, every_method, median_run
+from ..metrics import Metrics, compare
 from ..motions.contact import contact_motions
 from ..motions.flight import flight_motions
 from ..motions.impacts import impact_motions
 from ..motions.mechanisms import mechanism_motions
-from ..motions.motion import Motion
+from ..motions.motion import ReferenceMotion
 from ..motions.planar_doll import planar_motions
-from ..results.runner import Job, Options, Row
+from ..results.runner import Job, Row, RunOptions
 from ..trajectory import Trajectory
 
 NAME = 'precision'
@@ -21,7 +21,7 @@ QUICK_MOTIONS = ('free_fall', 'projectile', 'pendulum_large', 'tumbling_box', 'f
                  'flight_fast', 'bounce', 'rod_slides', 'rocking_block')
 
 
-def jobs(options: Options) -> list[Job]:
+def jobs(options: RunOptions) -> list[Job]:
     """One timed job for each motion."""
     names = [motion.name for motion in motions().values()
              if not options.quick or motion.name in QUICK_MOTIONS]
@@ -34,7 +34,7 @@ def jobs(options: Options) -> list[Job]:
 
 
 @functools.cache
-def motions() -> dict[str, Motion]:
+def motions() -> dict[str, ReferenceMotion]:
     """All motions by name, simple ones first, built once in each process."""
     return {motion.name: motion
             for motion in (*flight_motions(), *mechanism_motions(), *contact_motions(),
@@ -54,10 +54,10 @@ def measure_all(motion_name: str, method_names: list[str], repeats: int) -> list
     return rows
 
 
-def figures(motion: Motion, method: Method, result: Result, truth: Trajectory) -> Row:
+def figures(motion: ReferenceMotion, method: Method, result: Result, truth: Trajectory) -> Row:
     """All figures of one motion by one method; None where one makes no sense."""
     trajectory, trial = result.trajectory, motion.trial
-    measure = Measure(trial.scene)
+    measure = Metrics(trial.scene)
     row: Row = {'motion': motion.name, 'title': motion.title, 'reference': motion.reference,
                 'yardstick': motion.yardstick, 'method': method.name, 'label': method.label,
                 'family': method.family, 'substeps': method.substeps,

@@ -4,13 +4,13 @@ from __future__ import annotations
 import numpy as np
 
 from ...people.real_falls import DESCENT, IMPACT_SPEEDS, Known
-from ..parts.faints import joined
+from ..parts.fainting_falls import joined
 from ..results.figures import Figures, sound
 
 BLUE, ORANGE = '#1f5fbf', '#e69f00'
 
 
-def draw_faints(figures: Figures, plt: object) -> object:
+def draw_fainting_falls(figures: Figures, plt: object) -> object:
     """How many faints hit how fast, and after how long; bands: real falls, mean and SD."""
     rows = sound(figures.get('faints', ()))
     if not rows:
@@ -29,7 +29,7 @@ def draw_faints(figures: Figures, plt: object) -> object:
     return figure
 
 
-def draw_directions(figures: Figures, plt: object) -> object:
+def draw_fall_directions(figures: Figures, plt: object) -> object:
     """Speeds at impact over the direction of the lean."""
     rows = sound(figures.get('faints', ()))
     if not rows:

@@ -11,10 +11,10 @@ from ...physics.accuracy import ACCURACIES
 from ..cases.starts import CLASSES, trial
 from ..cases.trial import Trial
 from ..crowds.depth import BoneDepth
-from ..measure import Measure
 from ..methods import Result, bullet, by_name, ours, run
-from ..results.goals import EXCESS
-from ..results.runner import Job, Options, Row
+from ..metrics import Metrics
+from ..results.criteria import EXCESS
+from ..results.runner import Job, Row, RunOptions
 from ..trajectory import Trajectory
 
 NAME = 'classes'
@@ -40,7 +40,7 @@ OTHERS = ('quickstart', f'bullet-{BASELINE}', f'bullet-{CHEAPER}', 'bullet-20',
 
 QUICK_CLASSES = ('push .1 to 3 s', 'spin 20 rad/s', 'drop 2 m', 'start outside')
 
-def jobs(options: Options) -> list[Job]:
+def jobs(options: RunOptions) -> list[Job]:
     """Our settings and the others on all classes; the CPU ratios."""
     made = []
     for name in CLASSES:
@@ -91,8 +91,8 @@ def worst(start: Trial, trajectory: Trajectory) -> dict[str, float]:
     """
     if not trajectory.finite:
         return dict.fromkeys(WORST, math.inf) | {'settled_s': math.inf}
-    measure = Measure(start.scene)
-    inside, depth = BoneDepth(start.scene).since_apart(measure.since_back(trajectory))
+    measure = Metrics(start.scene)
+    inside, depth = BoneDepth(start.scene).since_apart(measure.after_limit_recovery(trajectory))
     return {'excess': measure.energy_excess(start, inside),
             'overshoot_rad': measure.overshoot(inside), 'sinking_m': measure.sinking(trajectory),
             'depth_m': depth,

@@ -2,8 +2,7 @@
 from __future__ import annotations
 
 from ..results.figures import Row, number
-from ..results.section import Section
-from ..results.tables import table
+from ..results.markdown import Section, table
 
 
 def convergence_tables(rows: list[Row]) -> list[str]:
@@ -55,7 +54,7 @@ CONVERGENCE = Section(
     above=(('convergence', 'Error over step, motion by motion'),))
 
 
-def pieces_table(rows: list[Row]) -> list[str]:
+def segments_table(rows: list[Row]) -> list[str]:
     """Errors of short pieces, and CPU over that of PyBullet at N = 10 on the same ones."""
     base = next((number(row['cpu_s_per_s']) for row in rows if row['method'] == 'bullet-10'), None)
     lines = [{**row, 'ratio': base and number(row['cpu_s_per_s']) / base} for row in rows]
@@ -75,7 +74,7 @@ PIECES = Section(
     'pieces', 'Through contacts: short pieces',
     '0.1 s each, begun at instants of the default drop, with self-collision (after Erez, Tassa '
     'and Todorov, ICRA 2015), all against one reference. The last two columns are no errors: each '
-    'engine against itself at its finest.', body=pieces_table,
+    'engine against itself at its finest.', body=segments_table,
     below=(('pieces', 'Error over CPU time through contacts'),))
 
 

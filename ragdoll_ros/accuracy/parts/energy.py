@@ -10,16 +10,16 @@ from ...files.scene import load_scene
 from ...model import rotation
 from ...model.scene import Placement
 from ..cases.trial import Trial, posed
-from ..measure import Measure
 from ..methods import bullet, mujoco, ours, quickstart, run
-from ..motions.motion import alone, without_damping, without_limits
-from ..results.runner import Job, Options, Row
+from ..metrics import Metrics
+from ..motions.motion import airborne_scene, without_damping, without_limits
+from ..results.runner import Job, Row, RunOptions
 
 NAME = 'energy'
 COST = 'real_time'
 
 
-def jobs(options: Options) -> list[Job]:
+def jobs(options: RunOptions) -> list[Job]:
     """Energy over time by three methods; the drop's tick costs."""
     made = [Job(NAME, f'energy, {scene}', functools.partial(energies, scene), 3)
             for scene in ('drop', 'spin')]
@@ -37,7 +37,8 @@ def spinning() -> Trial:
     """A doll that nothing touches or brakes, spun at 10 rad/s: its energy cannot change."""
     placed = {'spin': tuple(10 * rotation.normalized(np.array((1.0, 2.0, 2.0))))}
     doll = without_limits(without_damping(load_doll('doll')))
-    return Trial(alone(doll, (0.0, 0.0, 0.0), **placed), 3.0, posed(Placement(doll, **placed)))
+    return Trial(airborne_scene(doll, (0.0, 0.0, 0.0), **placed), 3.0,
+                 posed(Placement(doll, **placed)))
 
 
 def energies(scene: str) -> list[Row]:
@@ -45,7 +46,7 @@ def energies(scene: str) -> list[Row]:
     trial, rows = {'drop': falling, 'spin': spinning}[scene](), []
     for method in (quickstart(), bullet(1), ours('normal')):
         trajectory = run(method, trial).trajectory
-        energy = Measure(trial.scene).energy(trajectory)
+        energy = Metrics(trial.scene).energy(trajectory)
         rows.append({'scene': scene, 'method': method.name, 'label': method.label,
                      'time_s': trajectory.times.tolist(), 'energy': (energy / energy[0]).tolist()})
     return rows

@@ -9,10 +9,10 @@ import functools
 
 import numpy as np
 
-from ..methods import simulated
+from ..methods import start_simulation
 from ..references.articulated import Articulated
-from ..results.runner import Job, Options, Row
-from .precision import motions
+from ..results.runner import Job, Row, RunOptions
+from .work_precision import motions
 
 NAME = 'estimate'
 MOTIONS = ('flight_gentle', 'flight_fast', 'flight_long')
@@ -22,7 +22,7 @@ NOISE = 3e-14
 FACTOR of it tell nothing, and do not count."""
 
 
-def jobs(options: Options) -> list[Job]:
+def jobs(options: RunOptions) -> list[Job]:
     """One job for each setting."""
     names = MOTIONS[:2] if options.quick else MOTIONS
     return [Job(NAME, f'live estimate, {accuracy}', functools.partial(measure, accuracy, names),
@@ -35,7 +35,7 @@ def measure(accuracy: str, names: tuple[str, ...]) -> list[Row]:
     for name in names:
         trial = motions()[name].trial
         tree = Articulated(trial.scene.dolls[0].doll, trial.scene.gravity)
-        simulation, tick = simulated(trial, accuracy), trial.scene.step
+        simulation, tick = start_simulation(trial, accuracy), trial.scene.step
         for _ in range(round(trial.duration / tick)):
             before = simulation.coordinates
             truth = tree.trajectory(before.q, before.v, (0.0, tick)).positions[-1]

@@ -16,9 +16,9 @@ from ...files.scene import load_scene
 from ...model.coordinates import GeneralizedState
 from ...physics.accuracy import ACCURACIES
 from ..cases.trial import Trial
-from ..measure import Measure, compare
-from ..methods import Method, bullet, by_name, mujoco, reference, run, simulated
-from ..results.runner import Job, Options, Row
+from ..methods import Method, bullet, by_name, mujoco, reference, run, start_simulation
+from ..metrics import Metrics, compare
+from ..results.runner import Job, Row, RunOptions
 from ..trajectory import Trajectory
 
 NAME = 'pieces'
@@ -33,7 +33,7 @@ FIRST, LAST = 0.25, 1.3
 """s: instants between which pieces begin: from just before the first touch until it lies still."""
 
 
-def jobs(options: Options) -> list[Job]:
+def jobs(options: RunOptions) -> list[Job]:
     """One timed job for each method."""
     count = 6 if options.quick else 60
     fixed = (4, 10) if options.quick else (1, 2, 4, 10, 16, 32)
@@ -49,7 +49,7 @@ def beginnings(count: int) -> list[Trial]:
     scene, found = load_scene('drop'), []
     wanted = np.rint(np.linspace(FIRST, LAST, count) / scene.step).astype(int)
     states = {}
-    with simulated(Trial(scene, LAST), 'exact') as simulation:
+    with start_simulation(Trial(scene, LAST), 'exact') as simulation:
         for tick in range(wanted[-1] + 1):
             here = simulation.coordinates
             states[tick] = GeneralizedState(here.q.copy(), here.v.copy())
@@ -78,7 +78,7 @@ def measure(name: str, count: int) -> list[Row]:
             beginnings(count), truths(reference(PARTS).name, count),
             truths(finest(method.family).name, count), strict=True):
         result = run(method, trial)
-        scales, error = Measure(trial.scene), compare(result.trajectory, truth)
+        scales, error = Metrics(trial.scene), compare(result.trajectory, truth)
         found.append((error['position_worst_m'], error['angle_worst_rad'],
                       compare(result.trajectory, itself)['position_worst_m'],
                       scales.joint_gap(result.trajectory), scales.sinking(result.trajectory)))

@@ -24,11 +24,11 @@ REST_SPEED = 0.01
 """m/s: slower than this, for good, counts as settled."""
 
 
-BACK = math.radians(0.2)
+RECOVERED = math.radians(0.2)
 """rad past a limit from which a joint counts as back."""
 
 
-class Measure:
+class Metrics:
     """Yardsticks of one scene."""
 
     def __init__(self, scene: Scene) -> None:
@@ -162,10 +162,11 @@ class Measure:
         angles = self.joint_angles(trajectory)
         return np.maximum(angles - upper, lower - angles).max(axis=1).clip(min=0.0)
 
-    def since_back(self, trajectory: Trajectory) -> Trajectory:
+    def after_limit_recovery(self, trajectory: Trajectory) -> Trajectory:
         """What comes after all joints that start past their limits are back; all, if never."""
         past = self.overshoots(trajectory)
-        back = int(np.argmax(past <= BACK)) if past[0] > BACK and (past <= BACK).any() else 0
+        inside = past <= RECOVERED
+        back = int(np.argmax(inside)) if not inside[0] and inside.any() else 0
         return trajectory.part(slice(back, None))
 
     def sinking(self, trajectory: Trajectory) -> float:

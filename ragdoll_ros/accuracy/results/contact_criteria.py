@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .figures import Figures, Row, number, sound
-from .promise import by_setting, promise
+from .figures import Figures, Row, by_setting, criterion, number, sound
 
 CLOSED_FORMS = ('bounce', 'bounce_0.1', 'bounce_0.9', 'bounce_1', 'rod_frictionless', 'rod_sticks',
                 'rod_slides', 'two_balls', 'three_balls')
@@ -26,7 +25,7 @@ STANDARD_ERRORS = 2.0
 """By which mean energies of drops may differ from the reference's."""
 
 
-def ground_goals(figures: Figures) -> Iterator[Row]:
+def contact_criteria(figures: Figures) -> Iterator[Row]:
     """One row for each promise that this run has figures for."""
     for goal in (_restitution, _closed_forms, _rocking, _pieces, _nearer_and_cheaper, _drops,
                  _collisions, _rest):
@@ -37,9 +36,9 @@ def _restitution(figures: Figures) -> Iterator[Row]:
     for accuracy, rows in by_setting(figures, 'restitution'):
         worst = float(np.max([number(row['worst']) for row in rows]))
         apexes = sum(row['seen'] for row in rows)
-        yield promise(f'apexes of single bodies, {_span(rows)}, {accuracy}',
-                      f'within {APEX:g} of themselves', f'{apexes} seen, worst {worst:.1e}',
-                      worst <= APEX)
+        yield criterion(f'apexes of single bodies, {_span(rows)}, {accuracy}',
+                        f'within {APEX:g} of themselves', f'{apexes} seen, worst {worst:.1e}',
+                        worst <= APEX)
 
 
 def _span(rows: list[Row]) -> str:
@@ -52,16 +51,16 @@ def _closed_forms(figures: Figures) -> Iterator[Row]:
                                      lambda row: row['motion'] in CLOSED_FORMS):
         errors = {row['motion']: number(row['position_worst_m']) for row in rows}
         name = max(errors, key=lambda motion: np.nan_to_num(errors[motion], nan=math.inf))
-        yield promise(f'impacts that have a formula, {accuracy}', f'within {FORMULA:g} m',
-                      f'{len(errors)} motions, worst {errors[name]:.1e} m ({name})',
-                      errors[name] <= FORMULA)
+        yield criterion(f'impacts that have a formula, {accuracy}', f'within {FORMULA:g} m',
+                        f'{len(errors)} motions, worst {errors[name]:.1e} m ({name})',
+                        errors[name] <= FORMULA)
 
 
 def _rocking(figures: Figures) -> Iterator[Row]:
     for accuracy, rows in by_setting(figures, 'precision', lambda row: 'peak_9_error' in row):
         error = number(rows[0]['peak_9_error'])
-        yield promise(f'ninth peak of a rocking block, {accuracy}', f'within {PEAK:.0%} of Housner',
-                      f'{error:.1%} off', error <= PEAK)
+        yield criterion(f'ninth peak of a rocking block, {accuracy}',
+                        f'within {PEAK:.0%} of Housner', f'{error:.1%} off', error <= PEAK)
 
 
 def _pieces(figures: Figures) -> Iterator[Row]:
@@ -69,14 +68,14 @@ def _pieces(figures: Figures) -> Iterator[Row]:
     for accuracy, rows in by_setting(figures, 'pieces', lambda row: 'reference' in row):
         median, most, ratio = PIECES[accuracy]
         found = 1e3 * number(rows[0]['position_median_m']), 1e3 * number(rows[0]['position_p90_m'])
-        yield promise(f'pieces through contacts, {accuracy}',
-                      f'median at most {median:g} mm, 90 % at most {most:g} mm',
-                      f'{found[0]:.2f} mm, {found[1]:.2f} mm',
-                      found[0] <= median and found[1] <= most)
+        yield criterion(f'pieces through contacts, {accuracy}',
+                        f'median at most {median:g} mm, 90 % at most {most:g} mm',
+                        f'{found[0]:.2f} mm, {found[1]:.2f} mm',
+                        found[0] <= median and found[1] <= most)
         if base:
             over = number(rows[0]['cpu_s_per_s']) / base
-            yield promise(f'CPU of pieces over PyBullet N = 10, {accuracy}', f'at most {ratio:g}',
-                          f'{over:.2f}', over <= ratio)
+            yield criterion(f'CPU of pieces over PyBullet N = 10, {accuracy}', f'at most {ratio:g}',
+                            f'{over:.2f}', over <= ratio)
 
 
 def _cpu(figures: Figures, method: str) -> float | None:
@@ -92,8 +91,8 @@ def _nearer_and_cheaper(figures: Figures) -> Iterator[Row]:
         ours = [number(rows[0][key]) for key in ('cpu_s_per_s', 'own_median_m')]
         better = [row['label'] for row in others if number(row['cpu_s_per_s']) < ours[0]
                   and number(row['own_median_m']) < ours[1]]
-        yield promise(f'no engine is cheaper and nearer its own limit, {accuracy}', 'none',
-                      ', '.join(better) or 'none', not better)
+        yield criterion(f'no engine is cheaper and nearer its own limit, {accuracy}', 'none',
+                        ', '.join(better) or 'none', not better)
 
 
 def _drops(figures: Figures) -> Iterator[Row]:
@@ -103,9 +102,9 @@ def _drops(figures: Figures) -> Iterator[Row]:
                if key.startswith('energy') and key.endswith('_off')}
         told = ', '.join(f'{value:.1f} at {key.removeprefix("energy_")}'
                          for key, value in off.items())
-        yield promise(f'energies of {rows[0]["drops"]} default drops, {accuracy}',
-                      f'within {STANDARD_ERRORS:g} standard errors of the reference', told,
-                      max(off.values()) <= STANDARD_ERRORS)
+        yield criterion(f'energies of {rows[0]["drops"]} default drops, {accuracy}',
+                        f'within {STANDARD_ERRORS:g} standard errors of the reference', told,
+                        max(off.values()) <= STANDARD_ERRORS)
 
 
 def _collisions(figures: Figures) -> Iterator[Row]:
@@ -113,13 +112,13 @@ def _collisions(figures: Figures) -> Iterator[Row]:
         lost = float(np.max([number(row[key]) for row in rows
                              for key in ('momentum_drift', 'angular_momentum_drift')]))
         depth = 1e3 * float(np.max([number(row['depth_m']) for row in rows]))
-        yield promise(f'dolls that collide in the air, {accuracy}',
-                      f'momenta kept to {KEPT:g}, bone in bone at most {DEPTH:g} mm',
-                      f'{lost:.0e}, {depth:.2f} mm', lost <= KEPT and depth <= DEPTH)
+        yield criterion(f'dolls that collide in the air, {accuracy}',
+                        f'momenta kept to {KEPT:g}, bone in bone at most {DEPTH:g} mm',
+                        f'{lost:.0e}, {depth:.2f} mm', lost <= KEPT and depth <= DEPTH)
 
 
 def _rest(figures: Figures) -> Iterator[Row]:
     for accuracy, rows in by_setting(figures, 'classes', lambda row: 'restless' in row):
         restless, starts = (sum(row[key] for row in rows) for key in ('restless', 'starts'))
-        yield promise(f'asleep 15 s after every start, {accuracy}', 'all',
-                      f'{starts - restless} of {starts}', not restless)
+        yield criterion(f'asleep 15 s after every start, {accuracy}', 'all',
+                        f'{starts - restless} of {starts}', not restless)

@@ -11,7 +11,7 @@ from ..physics.engine.registry import resolve_engine
 TICK = 0.01
 """s in which substeps are counted."""
 
-CORE = 'rigid'
+RIGID = 'rigid'
 """Name of the engine that solves impacts where they happen."""
 
 LEAST_FLIGHT_ERROR = 1e-13
@@ -19,21 +19,21 @@ LEAST_FLIGHT_ERROR = 1e-13
 
 
 @functools.cache
-def has_core() -> bool:
+def has_rigid_engine() -> bool:
     """Whether the engine that all others are compared with is there and can be made."""
     try:
-        resolve_engine(CORE)
+        resolve_engine(RIGID)
     except (RagdollError, ImportError):
         return False
     return True
 
 
-def core_step(setting: str = 'normal') -> float:
+def contact_step(setting: str = 'normal') -> float:
     """Longest step, s, of the core at a setting while something touches."""
     return ACCURACIES[setting].step
 
 
-def of_step(step: float) -> Accuracy:
+def fixed_steps(step: float) -> Accuracy:
     """An accuracy of steps of ``step`` s, of whatever engine, without what would hide their errors:
     no account of energy, no sleep.
     """
