@@ -15,7 +15,7 @@ from ragdoll_ros.accuracy.metrics import Metrics
 from ragdoll_ros.accuracy.parts import convergence, drop_statistics, error_estimate, restitution
 from ragdoll_ros.accuracy.references.closed_forms import bounce_times
 from ragdoll_ros.accuracy.report.contact_plots import STYLES, draw_convergence, draw_drops
-from ragdoll_ros.accuracy.report.contact_sections import CONVERGENCE, DROPS, PIECES, RESTITUTION
+from ragdoll_ros.accuracy.report.contact_sections import CONVERGENCE, DROPS, RESTITUTION, SEGMENTS
 from ragdoll_ros.accuracy.results import criteria
 from ragdoll_ros.accuracy.trajectory import Trajectory
 from ragdoll_ros.model.ragdoll import JOINT_KINDS
@@ -52,7 +52,7 @@ def test_what_has_not_settled_counts_as_settling_at_the_end():
 @pytest.mark.parametrize('wrong', [0.0, 0.01])
 def test_apexes_come_from_height_and_speed_in_the_middle_of_a_flight(wrong):
     """Parabolas of e = 0.5 in ticks of 2 ms; those of a restitution 1 % too large show it."""
-    shape, flights = restitution.BODIES['ball'], restitution.counted(0.5)
+    shape, flights = restitution.BODIES['ball'], restitution.impact_times(0.5)
     found = 0.5 * (1 + wrong)
     impacts = bounce_times(1.0, found, 9.8, len(flights))
     times = np.arange(0, flights[-1], restitution.FINE_TICK)
@@ -73,8 +73,8 @@ def test_apexes_come_from_height_and_speed_in_the_middle_of_a_flight(wrong):
 
 def test_flights_count_down_to_the_slowest_approach():
     """v0 = 4.43 m/s: 0.5^6 of it is above 0.05 m/s, 0.5^7 below."""
-    assert len(restitution.counted(0.5)) == 8
-    assert len(restitution.counted(1.0)) == restitution.MOST + 1
+    assert len(restitution.impact_times(0.5)) == 8
+    assert len(restitution.impact_times(1.0)) == restitution.MAX_FLIGHTS + 1
 
 
 def test_semi_implicit_euler_shows_its_order_on_a_slope():
@@ -87,43 +87,44 @@ def test_semi_implicit_euler_shows_its_order_on_a_slope():
     assert 'h/32' in page and 'PyBullet' in page
 
 
-def promised(figures):
+def criteria_met(figures):
     return {row['criterion']: row['met'] for row in criteria.criteria(figures)}
 
 
-def test_promises_about_pieces_hold_for_error_and_price():
-    def piece(method, family, cpu, error, own):
+def test_criteria_of_segments_are_met_or_not():
+    def segment(method, family, cpu, error, own):
         return {'method': method, 'label': method, 'family': family, 'cpu_s_per_s': cpu,
                 'position_median_m': error, 'position_p90_m': 5 * error, 'own_median_m': own,
                 'reference': 'fine'}
-    rows = [piece('ours-normal', 'ours', 9.0, 0.3e-3, 0.3e-3),
-            piece('ours-exact', 'ours', 35.0, 0.3e-3, 0.3e-3),
-            piece('bullet-10', 'PyBullet', 10.0, 6e-3, 0.2e-3)]
-    held = promised({'pieces': rows})
-    assert held['pieces through contacts, normal'] is True
-    assert held['pieces through contacts, exact'] is False
-    assert held['CPU of pieces over PyBullet N = 10, normal'] is True
-    assert held['CPU of pieces over PyBullet N = 10, exact'] is False
-    assert held['no engine is cheaper and nearer its own limit, normal'] is True
-    assert held['no engine is cheaper and nearer its own limit, exact'] is False
-    assert '| 0.90 |' in PIECES.tables(rows)[1]
+    rows = [segment('ours-normal', 'ours', 9.0, 0.3e-3, 0.3e-3),
+            segment('ours-exact', 'ours', 35.0, 0.3e-3, 0.3e-3),
+            segment('bullet-10', 'PyBullet', 10.0, 6e-3, 0.2e-3)]
+    met = criteria_met({'pieces': rows})
+    assert met['short segments through contacts, normal'] is True
+    assert met['short segments through contacts, exact'] is False
+    assert met['CPU of segments over PyBullet N = 10, normal'] is True
+    assert met['CPU of segments over PyBullet N = 10, exact'] is False
+    assert met['no engine is faster and closer to its own limit, normal'] is True
+    assert met['no engine is faster and closer to its own limit, exact'] is False
+    assert '| 0.90 |' in SEGMENTS.tables(rows)[1]
 
 
-def test_promises_about_restitution_and_energy_hold_or_not():
+def test_criteria_of_restitution_and_energy_are_met_or_not():
     def body(accuracy, worst):
         return {'method': f'ours-{accuracy}', 'label': accuracy, 'body': 'ball', 'restitution': 0.5,
                 'flights': 7, 'seen': 7, 'worst': worst, 'found': 0.5}
     rows = [body('normal', 1e-9), body('exact', math.nan)]
-    held = promised({'restitution': rows})
-    assert held['apexes of single bodies, e = 0.5 to 0.5, normal'] is True
-    assert held['apexes of single bodies, e = 0.5 to 0.5, exact'] is False
+    met = criteria_met({'restitution': rows})
+    assert met['apexes of single bodies, e = 0.5 to 0.5, normal'] is True
+    assert met['apexes of single bodies, e = 0.5 to 0.5, exact'] is False
     assert '| normal | ball | 0.5000 |' in RESTITUTION.tables(rows)[0]
-    clouds = drop_statistics.merged([cloud('truth', (0.5, 0.6, 0.7), 'default, tilted'),
-                           cloud('ours-draft', (0.51, 0.6, 0.7), 'default, tilted'),
-                           cloud('ours-normal', (0.91, 0.92, 0.93), 'default, tilted')])
-    held = promised({'drops': clouds})
-    assert held['energies of 3 default drops, draft'] is True
-    assert held['energies of 3 default drops, normal'] is False
+    clouds = drop_statistics.merged([
+        cloud('truth', (0.5, 0.6, 0.7), 'default, tilted'),
+        cloud('ours-draft', (0.51, 0.6, 0.7), 'default, tilted'),
+        cloud('ours-normal', (0.91, 0.92, 0.93), 'default, tilted')])
+    met = criteria_met({'drops': clouds})
+    assert met['energies of 3 default drops, draft'] is True
+    assert met['energies of 3 default drops, normal'] is False
 
 
 def test_ticks_at_rounding_level_do_not_count_as_estimated(monkeypatch):

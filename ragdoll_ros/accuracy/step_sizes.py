@@ -1,4 +1,4 @@
-"""How fine an engine steps, as one number: the length of its steps."""
+"""Engines driven with a fixed step size, for convergence studies."""
 from __future__ import annotations
 
 import dataclasses
@@ -9,18 +9,18 @@ from ..physics.accuracy import ACCURACIES, NORMAL, Accuracy
 from ..physics.engine.registry import resolve_engine
 
 TICK = 0.01
-"""s in which substeps are counted."""
+"""s: substeps are counted per tick of this length."""
 
 RIGID = 'rigid'
-"""Name of the engine that solves impacts where they happen."""
+"""Name of this package's own engine, which solves impacts at their time of impact."""
 
-LEAST_FLIGHT_ERROR = 1e-13
-"""m or rad; below it a flight's estimate is rounding."""
+MIN_FLIGHT_ERROR = 1e-13
+"""m or rad: smaller error estimates in flight are rounding."""
 
 
 @functools.cache
 def has_rigid_engine() -> bool:
-    """Whether the engine that all others are compared with is there and can be made."""
+    """Whether the rigid engine can be created here."""
     try:
         resolve_engine(RIGID)
     except (RagdollError, ImportError):
@@ -29,13 +29,13 @@ def has_rigid_engine() -> bool:
 
 
 def contact_step(setting: str = 'normal') -> float:
-    """Longest step, s, of the core at a setting while something touches."""
+    """Largest step, s, of the rigid engine at a setting while in contact."""
     return ACCURACIES[setting].step
 
 
 def fixed_steps(step: float) -> Accuracy:
-    """An accuracy of steps of ``step`` s, of whatever engine, without what would hide their errors:
-    no account of energy, no sleep.
+    """Accuracy with steps of ``step`` s for any engine, without energy correction and sleep, which
+    would hide errors.
     """
     return dataclasses.replace(NORMAL, step=step, substeps=TICK / step, energy=False, sleep=False,
-                               flight_error=LEAST_FLIGHT_ERROR)
+                               flight_error=MIN_FLIGHT_ERROR)

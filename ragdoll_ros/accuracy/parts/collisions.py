@@ -1,4 +1,4 @@
-"""Two dolls that collide in the air: their momentum together, and how deep bones get in bones."""
+"""Two dolls that collide in the air: conservation of momentum, and penetration of bones."""
 from __future__ import annotations
 
 import functools
@@ -24,17 +24,17 @@ def jobs(options: RunOptions) -> list[Job]:
 
 
 def measure(name: str) -> list[Row]:
-    """One row for each speed of approach."""
+    """One row for each approach speed."""
     method, rows = by_name(name), []
     for speed in COLLISIONS:
         trial = two_dolls(speed)
-        moved, scales = run(method, trial).trajectory, Metrics(trial.scene)
+        moved, metrics = run(method, trial).trajectory, Metrics(trial.scene)
         row: Row = {'method': name, 'label': method.label, 'speed_m_s': speed}
         rows.append(row | (dict.fromkeys(FIGURES, math.inf) if not moved.finite else {
-            'momentum_drift': scales.momentum_drift(trial, moved),
-            'angular_momentum_drift': scales.angular_momentum_drift(moved),
+            'momentum_drift': metrics.momentum_drift(trial, moved),
+            'angular_momentum_drift': metrics.angular_momentum_drift(moved),
             'depth_m': BoneDepth(trial.scene).deepest(moved),
-            'energy_excess': scales.energy_excess(trial, moved)}))
+            'energy_excess': metrics.energy_excess(trial, moved)}))
     return rows
 
 

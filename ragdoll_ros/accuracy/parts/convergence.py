@@ -1,8 +1,7 @@
-"""Error against step on the motions with contacts: whether an engine comes to the truth at all.
+"""Error against step size on motions with contacts: whether an engine converges to the truth.
 
-An engine that comes ever nearer to its own finest run may still come to something else: a
-restitution that was not asked for, a contact that gives way. So the difference to its own finest
-run stands only beside the error.
+Self-convergence proves less: an engine may converge to another restitution or to compliant
+contacts. So the difference to its own finest run is only given in addition.
 """
 from __future__ import annotations
 
@@ -20,11 +19,11 @@ from .work_precision import motions
 
 NAME = 'convergence'
 HALVINGS = 6
-"""Steps from h down to h / 64."""
+"""Step sizes from h down to h / 64."""
 
 QUICK_MOTIONS = ('bounce', 'rod_slides', 'rocking_block', 'planar_ice')
 FLOOR = 1e-11
-"""m or rad: errors below are the reference's, or rounding's."""
+"""m or rad: smaller errors are those of the reference, or rounding."""
 
 
 def jobs(options: RunOptions) -> list[Job]:
@@ -38,9 +37,9 @@ def jobs(options: RunOptions) -> list[Job]:
 
 
 def families(halvings: int) -> dict[str, list[Method]]:
-    """The engines there are, each with ever halved steps, the coarsest first.
+    """Engines with successively halved steps, the coarsest first.
 
-    The core begins at draft's step, the others at one substep a tick.
+    The rigid engine begins at the step of `draft`, the others at one substep per tick.
     """
     counts = [2 ** k for k in range(halvings + 1)]
     found = {'PyBullet': [*map(bullet, counts)],
@@ -52,7 +51,7 @@ def families(halvings: int) -> dict[str, list[Method]]:
 
 
 def measure(motion_name: str, halvings: int) -> list[Row]:
-    """Errors of a motion at all steps: against the truth, and against the engine's own finest."""
+    """Errors of a motion at all step sizes, against the truth and the engine's finest run."""
     motion, rows = motions()[motion_name], []
     truth = motion.truth(motion.trial.times())
     for family, methods in families(halvings).items():

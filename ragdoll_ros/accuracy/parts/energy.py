@@ -1,4 +1,4 @@
-"""The default drop and a free spin: energy over time, cost in real time."""
+"""Energy over time of the default drop and of a free spin; tick costs of the drop."""
 from __future__ import annotations
 
 import functools
@@ -20,7 +20,7 @@ COST = 'real_time'
 
 
 def jobs(options: RunOptions) -> list[Job]:
-    """Energy over time by three methods; the drop's tick costs."""
+    """Jobs of energy over time and of the drop's tick costs."""
     made = [Job(NAME, f'energy, {scene}', functools.partial(energies, scene), 3)
             for scene in ('drop', 'spin')]
     made.append(Job(COST, 'the default drop in real time', functools.partial(
@@ -34,7 +34,7 @@ def falling() -> Trial:
 
 
 def spinning() -> Trial:
-    """A doll that nothing touches or brakes, spun at 10 rad/s: its energy cannot change."""
+    """A doll spun at 10 rad/s without contacts and damping: its energy is constant."""
     placed = {'spin': tuple(10 * rotation.normalized(np.array((1.0, 2.0, 2.0))))}
     doll = without_limits(without_damping(load_doll('doll')))
     return Trial(airborne_scene(doll, (0.0, 0.0, 0.0), **placed), 3.0,
@@ -42,7 +42,7 @@ def spinning() -> Trial:
 
 
 def energies(scene: str) -> list[Row]:
-    """Energy as a share of that at the start, at every tick."""
+    """Energy relative to that at the start, at every tick, by three methods."""
     trial, rows = {'drop': falling, 'spin': spinning}[scene](), []
     for method in (quickstart(), bullet(1), ours('normal')):
         trajectory = run(method, trial).trajectory
@@ -53,7 +53,7 @@ def energies(scene: str) -> list[Row]:
 
 
 def tick_costs(repeats: int) -> list[Row]:
-    """Cost of the ticks of the default drop, 3 s."""
+    """Tick costs of the default drop, 3 s."""
     rows, trial = [], falling()
     for method in (*map(ours, ('draft', 'normal', 'exact')), bullet(10), bullet(4),
                    bullet(1), quickstart(), mujoco('implicitfast', 10),

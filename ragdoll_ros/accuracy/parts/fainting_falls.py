@@ -164,12 +164,13 @@ def falls_tables(rows: list[Row]) -> list[str]:
 
     lines = [line(f'vertical speed at impact, {part}, m/s', values[part], known)
              for part, known in IMPACT_SPEEDS.items()]
-    lines.append(line('from onset to the impact of the pelvis, s', values['descent'], DESCENT))
+    lines.append(line('descent, from onset to impact of the pelvis, s', values['descent'],
+                      DESCENT))
     shares = [{'what': part, 'mean': float(np.isfinite(values[part]).mean()), 'real': share,
                'source': source} for part, (share, source) in SHARE_THAT_HITS.items()]
-    return [f'{count} faints.', table(lines, (
+    return [f'{count} falls.', table(lines, (
         ('what', 'what', '{}'), ('mean', 'mean', '{:.2f}'), ('deviation', 'SD', '{:.2f}'),
-        ('of', 'faints with it', '{}'), ('real', 'real falls', '{}'),
-        ('off', 'off, in their SD', '{:+.1f}'), ('source', 'whose', '{}'))),
-        table(shares, (('what', 'hits the ground', '{}'), ('mean', 'share of faints', '{:.2f}'),
-                       ('real', 'of real falls', '{:.2f}'), ('source', 'whose', '{}')))]
+        ('of', 'falls with it', '{}'), ('real', 'real falls', '{}'),
+        ('off', 'difference, in their SD', '{:+.1f}'), ('source', 'source', '{}'))),
+        table(shares, (('what', 'hits the ground', '{}'), ('mean', 'share of falls', '{:.2f}'),
+                       ('real', 'of real falls', '{:.2f}'), ('source', 'source', '{}')))]

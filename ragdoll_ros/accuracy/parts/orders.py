@@ -1,4 +1,4 @@
-"""The order of each method: how fast its error goes to zero with the tick."""
+"""Order of convergence of each method: slope of the error over the tick."""
 from __future__ import annotations
 
 import dataclasses
@@ -19,25 +19,25 @@ NAME = 'orders'
 TICKS = (0.02, 0.01, 0.005, 0.0025, 0.00125)
 FEW_TICKS = {'pendulum_large': (10, 16, 20), 'flight_gentle': (2, 4, 5, 7),
              'flight_long': (16, 20, 25, 32, 40, 50, 64)}
-"""Ticks to a whole motion for order 8, at which its errors are small but not yet rounding: each a
-whole number of nanoseconds long."""
+"""Ticks per motion for order 8, at which errors are small but above rounding; each tick is a
+whole number of nanoseconds."""
 
 MOTIONS = ('pendulum_large', 'flight_gentle', 'flight_long')
 FLOOR = 1e-11
-"""Errors below are the reference's or rounding's (a pendulum's root gives way by 2e-11 m)."""
+"""Smaller errors are those of the reference or rounding (a pendulum's root moves by 2e-11 m)."""
 
 LOW_FLOOR = 2e-14
-"""The same for what lies above the reference's and the root's share at few ticks."""
+"""The same for order 8 at few ticks."""
 
 CEILING = 0.3
-"""Errors above it are no longer small: theory says nothing about them."""
+"""Larger errors are not in the asymptotic range."""
 
 
 def methods() -> list[Method]:
-    """One method of each family, a single step to a tick where we have the choice."""
+    """One method of each family, with one step per tick where this can be set."""
     mine = [ours(dataclasses.replace(setting, flight_error=math.inf), f'ours-{name}')
             for name, setting in ACCURACIES.items()]
-    # compiled, the settings differ in the steps alone
+    # Compiled, the accuracies differ in the step size alone.
     return [*(mine[-1:] if kernels.ready() else mine), bullet(1),
             *(mujoco(name, 1) for name in ('euler', 'implicitfast', 'rk4'))]
 
@@ -54,7 +54,7 @@ def measure_all(motion_name: str) -> list[Row]:
     motion, rows = motions()[motion_name], []
     few = tuple(motion.trial.duration / count for count in FEW_TICKS[motion_name])
     truths = {tick: motion.truth(motion.trial.with_tick(tick).times()) for tick in TICKS + few}
-    # what cannot touch itself is not looked at between ticks
+    # Without self-collision a flight is one step per tick.
     scene = dataclasses.replace(motion.trial.scene, self_collision=False)
     trial = dataclasses.replace(motion.trial, scene=scene)
     for method in methods():
@@ -71,10 +71,10 @@ def measure_all(motion_name: str) -> list[Row]:
 
 
 def slope(ticks: tuple[float, ...], errors: list[float], floor: float) -> dict[str, object]:
-    """Order by least squares on the logarithms of all errors that tell of the method.
+    """Order by least squares on the logarithms of the errors in the asymptotic range.
 
-    Runs from the coarsest tick down to the first error at the floor; needs three points. Beside
-    it, the steepness between the two finest ticks.
+    From the coarsest tick down to the first error at the floor; needs three points. Also the slope
+    between the two finest ticks.
     """
     usable = [(tick, error) for tick, error in zip(ticks, errors, strict=True)
               if math.isfinite(error) and error < CEILING]

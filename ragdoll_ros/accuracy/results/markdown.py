@@ -15,20 +15,20 @@ FACTORS = {'deg': (180 / math.pi, '{:.2g}'), 'mm': (1e3, '{:.2g}'), '%': (100.0,
 
 
 def table(rows: Iterable[Row], columns: Sequence[Column]) -> str:
-    """Rows as a Markdown table; what a row lacks is left empty, a failed job says so."""
+    """Rows as a Markdown table; missing figures are left empty, failed jobs show their error."""
     lines = ['| ' + ' | '.join(head for _, head, _ in columns) + ' |',
              '|' + '|'.join(' --- ' for _ in columns) + '|']
     for row in rows:
         if 'failed' in row:
             lines.append(f'| {row["job"]} | **failed**: {row["failed"]} ({row["at"]}) |')
             continue
-        cells = [shown(row.get(key), form) for key, _, form in columns]
+        cells = [formatted(row.get(key), form) for key, _, form in columns]
         lines.append('| ' + ' | '.join(cells) + ' |')
     return '\n'.join(lines)
 
 
-def shown(value: object, form: str = '{:.2g}') -> str:
-    """One figure as text; infinity (also as JSON's text) is what a run that exploded has."""
+def formatted(value: object, form: str = '{:.2g}') -> str:
+    """A figure as text; infinity, also as JSON's text 'inf', stands for a diverged run."""
     if value is None:
         return ''
     if isinstance(value, bool):
@@ -48,22 +48,22 @@ def shown(value: object, form: str = '{:.2g}') -> str:
 
 @dataclass(frozen=True)
 class Section:
-    """A heading, with what stands under it where there are rows of ``part``."""
+    """A heading with text, tables and pictures, shown if there are rows of ``part``."""
 
     part: str
     title: str
     """May name the ``{starts}`` of the first row."""
     intro: str = ''
     columns: Sequence[Column] = ()
-    """Of the rows as they are; none where ``body`` writes them otherwise."""
+    """Columns of a table of all rows; empty if there is a ``body``."""
     body: Callable[[list[Row]], list[str]] | None = None
-    """What stands for the rows that did not fail."""
+    """Returns the blocks for the rows that did not fail."""
     above: Sequence[tuple[str, str]] = ()
     """Pictures before the rows: name and description."""
     below: Sequence[tuple[str, str]] = ()
 
     def blocks(self, rows: list[Row], pictures: dict[str, str]) -> list[str]:
-        """Markdown blocks, which empty lines part; ``pictures`` are files by names."""
+        """Markdown blocks, to be separated by empty lines; ``pictures`` are files by names."""
         shown = [[f'![{text}]({pictures[name]})' for name, text in group if name in pictures]
                  for group in (self.above, self.below)]
         title = self.title.format(starts=rows[0].get('starts', ''))
@@ -71,7 +71,7 @@ class Section:
                 *shown[1]]
 
     def tables(self, rows: list[Row]) -> list[str]:
-        """The blocks of the rows alone; jobs that failed say so."""
+        """Blocks of the rows alone, with a table of failed jobs."""
         if self.body is None:
             return [table(rows, self.columns)] if self.columns else []
         good, failed = sound(rows), [row for row in rows if 'failed' in row]
