@@ -137,7 +137,7 @@ def test_contacts_with_friction_keep_every_law(seed):
 @pytest.mark.parametrize(('friction', 'restitution'), [(0.0, 0.5), (0.3, 0.0), (0.8, 0.5)])
 def test_a_doll_keeps_its_energy_between_touches_and_never_gains(friction, restitution):
     """Rises are rounding; without friction nothing pushes it along the ground."""
-    figure, start = planar_doll.figure(friction, restitution), planar_doll.beginning()
+    figure, start = planar_doll.figure(friction, restitution), planar_doll.initial_rows()
     rows = event_driven.rows(figure, start, np.linspace(0, 0.3, 301))
     energy = figure.energy(rows)
     assert np.diff(energy).max() < 1e-9 * energy[0]

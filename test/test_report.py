@@ -23,8 +23,7 @@ from ragdoll_ros.accuracy.motions.flight import free_fall, gentle_flight, tumbli
 from ragdoll_ros.accuracy.motions.mechanisms import OMEGA, swing
 from ragdoll_ros.accuracy.parts import orders, start_classes
 from ragdoll_ros.accuracy.parts.hard import violations
-from ragdoll_ros.accuracy.references.articulated import Articulated
-from ragdoll_ros.accuracy.references.rigid_body import torque_free_rotation
+from ragdoll_ros.accuracy.references.articulated import Articulated, torque_free_rotation
 from ragdoll_ros.accuracy.report import command, hard, many_starts, plots
 from ragdoll_ros.accuracy.report.sections import markdown
 from ragdoll_ros.accuracy.results import criteria, figures

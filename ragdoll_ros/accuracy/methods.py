@@ -41,9 +41,7 @@ class MethodRun(Protocol):
 
 @dataclass(frozen=True)
 class Method:
-    """An engine with settings. ``family`` groups the points of a line in plots; ``substeps`` is per
-    tick, 0 if adaptive.
-    """
+    """An engine with settings; ``family`` is its line in plots, ``substeps`` 0 if adaptive."""
 
     name: str
     label: str

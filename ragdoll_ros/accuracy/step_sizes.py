@@ -34,8 +34,6 @@ def contact_step(setting: str = 'normal') -> float:
 
 
 def fixed_steps(step: float) -> Accuracy:
-    """Accuracy with steps of ``step`` s for any engine, without energy correction and sleep, which
-    would hide errors.
-    """
+    """Accuracy with steps of ``step`` s, without energy correction and sleep, which hide errors."""
     return dataclasses.replace(NORMAL, step=step, substeps=TICK / step, energy=False, sleep=False,
                                flight_error=MIN_FLIGHT_ERROR)

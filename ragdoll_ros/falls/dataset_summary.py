@@ -23,11 +23,9 @@ class DatasetSummary:
     recipe: Recipe
     bones: list[str]
     onsets: np.ndarray
-    """(f,) s from the start."""
     impacts: np.ndarray
-    """(f,) s from the start to first contact."""
     rests: np.ndarray
-    """(f,) s from the start."""
+    """(f,) s from the start to onset, first contact and rest."""
     directions: np.ndarray
     """(f,) degrees, as Fall.direction."""
     impact_times: np.ndarray

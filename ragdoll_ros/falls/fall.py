@@ -27,8 +27,7 @@ class Fall:
     times: np.ndarray
     """(t,) s from the start."""
     states: np.ndarray
-    """(t, n, 13): position m, orientation x, y, z, w, linear m/s and angular rad/s velocity of
-    each bone, as State.rows."""
+    """(t, n, 13) as State.rows: position m, orientation xyzw, velocity m/s, rad/s of each bone."""
     angles: np.ndarray
     """(t, k) rad, in the order of Scene.angle_names."""
     rates: np.ndarray
@@ -40,8 +39,7 @@ class Fall:
     samples_per_frame: int
     """Sensor samples in each frame."""
     imu_states: np.ndarray
-    """((t - 1) samples_per_frame + 1, w, 13) as ``states``: of the bones that carry the sensors, at
-    the sample times."""
+    """((t - 1) samples_per_frame + 1, w, 13) as ``states``: sensors' bones at each sample."""
     valid: int
     """Number of frames before a failure; all of them if there was none."""
     failure: str
@@ -73,14 +71,12 @@ class Fall:
 
     @property
     def impact_frames(self) -> np.ndarray:
-        """(n,) frame in which each bone first touches the ground; NaN as in impact_velocities."""
+        """(n,) frame in which each bone first touches the ground; NaN if never or at once."""
         return self._impacts[0]
 
     @property
     def impact_velocities(self) -> np.ndarray:
-        """(n, 3) m/s: velocity of each bone's centre of mass in the last frame before it first
-        touches the ground; NaN for bones that never touch it or touch it from the start.
-        """
+        """(n, 3) m/s of the centres of mass, in the frame before impact_frames."""
         return self._impacts[1]
 
     @cached_property

@@ -37,8 +37,7 @@ RECORD = {'rate': RATE, 'what': ['poses', 'velocities', 'angles', 'touching'], '
 PHASES = {'onset_speed': ONSET_SPEED, 'rest_speed': REST_SPEED}
 
 DRAWN = ('seed', 'who', 'start', 'pushes', 'limp', 'ground')
-"""Keys that determine the draws. Recipes that agree in these have the same falls, whatever their
-accuracy, duration and recorded quantities."""
+"""Keys that determine the draws: recipes that agree in these have the same falls."""
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,7 @@
 """Phases of a fall and impacts of its body parts, computed from its frames alone.
 
-One definition for data sets of falls and for the report, comparable with Choi et al. 2015: the
-descent lasts from the onset of the fall to the impact of the pelvis, the speed at impact is the
-vertical speed before the first contact with the ground.
+As in Choi et al. 2015, the descent lasts from the onset of the fall to the impact of the pelvis;
+speeds at impact are vertical, before the first contact with the ground.
 """
 from __future__ import annotations
 
@@ -14,11 +13,8 @@ import numpy as np
 from ..model.scene import Scene
 from .real_falls import bones_of
 
-ONSET_SPEED, REST_SPEED = 0.1, 0.05
-"""Default thresholds, m/s."""
-
-ONSET_DURATION = 0.1
-"""s for which the centre of mass must descend: a knee that yields a little is no onset."""
+ONSET_SPEED, ONSET_DURATION, REST_SPEED = 0.1, 0.1, 0.05
+"""m/s, s, m/s: default thresholds. A knee that yields for a shorter time is no onset."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +46,7 @@ def find_phases(scene: Scene, states: np.ndarray, touching: np.ndarray, feet: Se
     sinks = sinking[:impact] > onset_speed
     onset = next((frame for frame in np.flatnonzero(sinks).tolist()
                   if sinks[frame:frame + onset_frames].all()), impact)
-    moves = np.flatnonzero(
-        (np.linalg.norm(states[:, :, 7:10], axis=2) > rest_speed).any(axis=1))
+    moves = np.flatnonzero((np.linalg.norm(states[:, :, 7:10], axis=2) > rest_speed).any(axis=1))
     rest = int(moves[-1]) + 1 if len(moves) else 0
     return Phases(onset, impact, max(rest, impact) if rest < len(states) else None)
 
@@ -72,10 +67,9 @@ def bone_impacts(states: np.ndarray, touching: np.ndarray) -> tuple[np.ndarray, 
 
 def part_impact(part: str, names: Sequence[str], frames: np.ndarray,
                 speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Impact of a body part ('pelvis', 'head', 'hand') in each of (...) falls of n bones.
+    """Frame and speed (...) at which a body part, as 'pelvis', first hits; NaN if never.
 
-    ``frames`` and ``speeds`` (..., n) are those of all bones. Returns frame and speed (...) of the
-    bone of this part that touches first; NaN where none does.
+    ``frames`` and ``speeds`` (..., n) are those of the bones ``names`` in (...) falls.
     """
     bones = bones_of(part, list(names))
     if not bones:

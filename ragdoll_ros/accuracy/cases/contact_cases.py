@@ -104,8 +104,7 @@ def _jammed() -> Trial:
     placement = dataclasses.replace(scene.dolls[0], doll=dataclasses.replace(doll, joints=joints))
     scene = dataclasses.replace(scene, dolls=(placement,))
     start = starts.lifted(scene, posed(placement, angles), 0.2)
-    return Trial(scene, 12.0, start, (Push('torso', (0.0, 0.0, -1000.0), start=1.0,
-                                           duration=2.0),))
+    return Trial(scene, 12.0, start, (Push('torso', (0.0, 0.0, -1000.0), start=1.0, duration=2.0),))
 
 
 def _on_friction(friction: float) -> Trial:

@@ -65,8 +65,7 @@ def _shape(rng: np.random.Generator) -> Shape:
             Capsule(sizes[0], 2 * sizes[1]))[rng.integers(4)]
 
 
-def _joint(rng: np.random.Generator, parent: str, child: str,
-           anchor: tuple[float, ...]) -> Joint:
+def _joint(rng: np.random.Generator, parent: str, child: str, anchor: tuple[float, ...]) -> Joint:
     kind = JOINT_KINDS[str(rng.choice(list(JOINT_KINDS)))]
     axes = [tuple(axis) for axis in np.linalg.qr(rng.normal(size=(3, 3)))[0][:kind.axes]]
     reach = [float(angle) for angle in rng.uniform(0.1, 1.4, kind.limits)]

@@ -1,4 +1,4 @@
-"""Motions in the air: falls, throws, a tumbling box, chains, the doll itself."""
+"""Reference motions in flight: falls, throws, a tumbling box, chains, the doll."""
 from __future__ import annotations
 
 import dataclasses
@@ -15,10 +15,9 @@ from ...model.ragdoll import Bone, Joint, Ragdoll
 from ...model.scene import Placement, Scene
 from ...model.shapes import Box
 from ..cases.trial import Trial, angle_indices, inner_angles, posed
-from ..references.articulated import Articulated
+from ..references.articulated import Articulated, torque_free_rotation
 from ..references.closed_forms import fall
 from ..references.planar_chain import PlanarChain
-from ..references.rigid_body import torque_free_rotation
 from ..trajectory import Trajectory
 from .motion import ReferenceMotion, airborne_scene, orientations_about, without_limits
 
@@ -27,23 +26,23 @@ GENTLE = {'velocity': (1.0, 0.5, 2.0), 'spin': (0.5, -0.5, 1.0)}
 
 
 def flight_motions() -> list[ReferenceMotion]:
-    """All motions in the air."""
+    """All reference motions in flight."""
     return [free_fall(), projectile(), first_touch(), tumbling_box(),
             *map(chain, (2, 5, 10)), gentle_flight(), long_flight(), fast_flight(), pushed_flight()]
 
 
 def free_fall() -> ReferenceMotion:
-    """The doll let fall without a ground: as a whole, no joint moves."""
+    """The doll in free fall from rest: no joint moves."""
     return _rigid_fall('free_fall', 'Free fall, 1 s', _thrown((0.0, 0.0, 0.0)))
 
 
 def projectile() -> ReferenceMotion:
-    """The doll thrown, not rotating."""
+    """The doll thrown without rotation."""
     return _rigid_fall('projectile', 'Throw without spin, 1 s', _thrown((3.0, 1.0, 4.0)))
 
 
 def first_touch() -> ReferenceMotion:
-    """The default scene, its doll not turning, up to just before the feet touch, at 0.2857 s."""
+    """The default drop without spin, up to just before the first contact at 0.2857 s."""
     scene = load_scene('drop')
     even = dataclasses.replace(scene.dolls[0], spin=(0.0, 0.0, 0.0))
     return _rigid_fall('drop_to_touch', 'The default drop, even, up to the first touch, 0.28 s',
@@ -67,7 +66,7 @@ def _rigid_fall(name: str, title: str, scene: Scene, duration: float = 1.0,
 
 
 def tumbling_box() -> ReferenceMotion:
-    """A box with moments 1 : 2 : 3 rotating about its middle axis, which is unstable."""
+    """A box with moments 1 : 2 : 3 rotating about its intermediate axis, which is unstable."""
     bone = Bone('box', Box((0.2 * math.sqrt(2), 0.2, 0.002)), 1.0, (0.0, 0.0, 0.0))
     omega = (0.05, 8.0, 0.05)
     scene = airborne_scene(Ragdoll('box', (bone,)), (0.0, 0.0, 0.0), spin=omega)
@@ -81,7 +80,7 @@ def tumbling_box() -> ReferenceMotion:
 
 
 def chain(links: int, length: float = 0.2, mass: float = 1.0) -> ReferenceMotion:
-    """A chain of rods thrown in a plane, coiling up; nothing holds it."""
+    """A free chain of rods that moves in a plane and coils up."""
     rods = tuple(Bone(f'rod_{i}', Box((length, 0.04, 0.03)), mass, (i * length, 0.0, 0.0))
                  for i in range(links))
     joints = tuple(Joint(f'rod_{i - 1}', f'rod_{i}', 'hinge', ((i - 0.5) * length, 0.0, 0.0),
@@ -105,7 +104,7 @@ def chain(links: int, length: float = 0.2, mass: float = 1.0) -> ReferenceMotion
 
 
 def gentle_flight() -> ReferenceMotion:
-    """The default doll, limbs moving a little, for as long as the default drop flies."""
+    """The default doll with slowly moving limbs, for the flight time of the default drop."""
     doll = load_doll('doll')
     placement = Placement(doll, **GENTLE)
     trial = Trial(Scene('gentle', (placement,)), 0.28,
@@ -115,13 +114,13 @@ def gentle_flight() -> ReferenceMotion:
 
 
 def long_flight() -> ReferenceMotion:
-    """The same for 2 s, limits off."""
+    """The same for 2 s without limits."""
     return _without_limits('flight_long', 'The doll in gentle flight, 2 s, limits off', 2.0,
                            speed=1.0, seed=1, **GENTLE)
 
 
 def fast_flight() -> ReferenceMotion:
-    """Spun at 20 rad/s, limbs at some 5 rad/s, limits off."""
+    """The doll spinning at 20 rad/s, limbs at up to 5 rad/s, without limits."""
     return _without_limits('flight_fast', 'The doll spun at 20 rad/s, 0.28 s, limits off', 0.28,
                            speed=5.0, seed=2,
                            spin=tuple(20 * rotation.normalized(np.array((1.0, 2.0, 2.0)))))
@@ -137,7 +136,7 @@ def _without_limits(name: str, title: str, duration: float, speed: float, seed: 
 
 
 def pushed_flight() -> ReferenceMotion:
-    """2000 N on the torso for 0.1 s in the air, limits off."""
+    """2000 N on the torso for 0.1 s in flight, without limits."""
     doll = without_limits(load_doll('doll'))
     push = Push('torso', (-2000.0, 0.0, 1.0), start=0.05, duration=0.1)
     trial = Trial(airborne_scene(doll), 0.3, posed(Placement(doll)), (push,))
@@ -146,14 +145,14 @@ def pushed_flight() -> ReferenceMotion:
 
 
 def _inside_limits(doll: Ragdoll, speed: float, seed: int) -> tuple[dict, dict]:
-    """Angles (rad) in the inner two fifths of their ranges, and rates of up to ``speed`` rad/s."""
+    """Random joint angles, rad, inside their ranges, and rates of up to ``speed`` rad/s."""
     rng = np.random.default_rng(seed)
     return inner_angles(doll, rng), {name: rng.uniform(-speed, speed)
                                      for name in angle_indices(doll)}
 
 
 def _articulated(trial: Trial) -> object:
-    """Truth from the equations of motion, with the trial's pushes."""
+    """Solution of the equations of motion with the trial's pushes."""
     start: GeneralizedState = trial.start
     tree = Articulated(trial.scene.dolls[0].doll, trial.scene.gravity)
     breaks = sorted({time for push in trial.pushes

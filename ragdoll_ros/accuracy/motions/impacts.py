@@ -1,4 +1,4 @@
-"""Impacts and edges whose motion is known: struck, rocking, tipping over, spinning on its face."""
+"""Reference motions with impacts, and on edges and faces: rocking, tipping, spinning."""
 from __future__ import annotations
 
 import functools
@@ -19,11 +19,11 @@ from .motion import ReferenceMotion, orientations_about
 GRAVITY = 9.8
 PITCH = (0.0, 1.0, 0.0)
 ROD = (0.02, 0.2, 1.0)
-"""m, edges of the rods: thin across the plane that they move in."""
+"""Size of the rods, m: thin across their plane of motion."""
 
 
 def impact_motions() -> list[ReferenceMotion]:
-    """All motions in which something is struck, or stands on an edge or a face."""
+    """All reference motions with impacts, or on an edge or a face."""
     return [rocking_block(), falling_rod(), *(dropped_rod(*rod) for rod in (
         ('rod_frictionless', 'without friction', 0.5, 0.0), ('rod_sticks', 'that sticks', 0.5, 2.0),
         ('rod_slides', 'that slides', 0.5, 0.1))), spinning_disc(), thin_disc(),
@@ -40,7 +40,7 @@ def _body(shape: Shape, material: Material, position: tuple[float, float, float]
 
 def _on_edge(name: str, title: str, reference: str, size: tuple[float, float, float], start: float,
              duration: float, rocks: bool) -> ReferenceMotion:
-    """A box let go on one lower edge, leaning by ``start`` rad; friction without limit."""
+    """A box released on a lower edge, tilted by ``start`` rad; infinite friction."""
     half_width, half_height = size[0] / 2, size[2] / 2
 
     def truth(times: np.ndarray) -> Trajectory:
@@ -57,7 +57,7 @@ def _on_edge(name: str, title: str, reference: str, size: tuple[float, float, fl
 
 
 def _peaks(truth: Callable[[np.ndarray], Trajectory], found: Trajectory) -> dict[str, float]:
-    """Relative error of the ninth peak of a block that rocks."""
+    """Relative error of the ninth peak of a rocking block."""
     exact, peaks = impacts.peaks(pitches(truth(found.times))), impacts.peaks(pitches(found))
     error = abs(peaks[8] / exact[8] - 1) if len(peaks) > 8 else math.inf
     return {'peak_9_error': float(error)}
@@ -70,19 +70,19 @@ def pitches(trajectory: Trajectory) -> np.ndarray:
 
 
 def rocking_block() -> ReferenceMotion:
-    """A slender block that rocks from edge to edge, from 5 degrees."""
+    """A slender block that rocks from edge to edge, released at 5 degrees."""
     return _on_edge('rocking_block', 'Block that rocks from 5°, 3 s', 'Housner 1963',
                     (0.2, 0.4, 0.8), math.radians(5), 3.0, True)
 
 
 def falling_rod() -> ReferenceMotion:
-    """A rod that stands on its edge and falls over, up to 60 degrees."""
+    """A rod that tips over its edge, up to 60 degrees."""
     return _on_edge('falling_rod', 'Rod that falls over, from 5° to 60°', 'a pendulum, upside down',
                     ROD, math.radians(5), 0.98, False)
 
 
 def dropped_rod(name: str, title: str, restitution: float, friction: float) -> ReferenceMotion:
-    """A rod dropped by 0.2 m at 30 degrees, thrown forwards: its lower edge strikes once."""
+    """A rod dropped by 0.2 m at 30 degrees, moving forwards: its lower edge strikes once."""
     lean, drop, speed = math.radians(30), 0.2, 0.5
     arm = rotation.rotate(rotation.from_axis_angle(PITCH, lean),
                           np.array((ROD[0] / 2, 0.0, -ROD[2] / 2)))
@@ -124,7 +124,7 @@ def spinning_disc() -> ReferenceMotion:
 
 
 def thin_disc() -> ReferenceMotion:
-    """A disc of 2 mm that slides and spins on its face; so thin that it is evenly pressed."""
+    """A disc that slides and spins on its face; at 2 mm the pressure is uniform."""
     radius, thick, speed, rate, friction = 0.2, 0.002, 1.0, 10.0, 0.3
 
     def truth(times: np.ndarray) -> Trajectory:
@@ -140,7 +140,7 @@ def thin_disc() -> ReferenceMotion:
 
 
 def balls(name: str, title: str, masses: tuple[float, ...], restitution: float) -> ReferenceMotion:
-    """Balls in a row in the air, without gravity; the first comes at 2 m/s and strikes."""
+    """Balls in a row without gravity; the first one strikes at 2 m/s."""
     radius, gap, speed = 0.1, 0.05, 2.0
     starts = [index * (2 * radius + gap) for index in range(len(masses))]
     speeds = [speed, *[0.0] * (len(masses) - 1)]

@@ -1,8 +1,7 @@
-"""One hinge under gravity: pendulums, small, large and damped.
+"""Pendulums: small, large and damped.
 
-A doll's root is free, so a pendulum hangs on a root of a million million kg. Gravity is off, and
-a steady push of the bob's own weight acts on its centre instead: for the bob the same, while the
-root, 100 m wide, stays where it is to 2e-11 m and does not turn.
+A doll's root is free, so the pivot is a root of 1e12 kg and 100 m radius. Gravity is off; instead a
+constant push of the bob's weight acts on its centre, so that the pivot moves by only 2e-11 m.
 """
 from __future__ import annotations
 
@@ -31,7 +30,7 @@ MOMENT = ROD.inertia(MASS)[1] + MASS * LENGTH ** 2
 """kg m^2 about the hinge"""
 
 OMEGA = math.sqrt(MASS * GRAVITY * LENGTH / MOMENT)
-"""rad/s of small swings"""
+"""rad/s of small oscillations"""
 
 
 def mechanism_motions() -> list[ReferenceMotion]:
@@ -44,14 +43,14 @@ def mechanism_motions() -> list[ReferenceMotion]:
 
 
 def swing(name: str, title: str, amplitude: float) -> ReferenceMotion:
-    """A pendulum let go at ``amplitude`` rad."""
+    """A pendulum released at ``amplitude`` rad."""
     def angle(times: np.ndarray) -> np.ndarray:
         return pendulum_angle(amplitude, OMEGA, times)
     return _pendulum(name, title, 'elliptic functions', amplitude, 0.0, angle)
 
 
 def damped(name: str, title: str, ratio: float) -> ReferenceMotion:
-    """A pendulum of 30 degrees whose hinge is damped: gravity is its spring."""
+    """A pendulum with a damped hinge released at 30 degrees, with a damping ratio."""
     def angle(times: np.ndarray) -> np.ndarray:
         def rate(t: float, y: np.ndarray) -> tuple[float, float]:
             return y[1], -OMEGA ** 2 * math.sin(y[0]) - 2 * ratio * OMEGA * y[1]

@@ -101,8 +101,6 @@ def _asleep() -> np.ndarray:
 SCENES: tuple[tuple[str, Callable[[], np.ndarray]], ...] = (
     ('falling onto the ground, the second after the first touch', _impact),
     ('lying on the ground, on all bones, kept awake', _lying),
-    ('in flight, 100 m over the ground', _flight_over_ground),
-    ('in flight, no ground', _flight),
+    ('in flight, 100 m over the ground', _flight_over_ground), ('in flight, no ground', _flight),
     ('in flight, no ground, no self-collision', _flight_without_self_collision),
-    ('one bone in flight, no ground', _one_bone),
-    ('asleep on the ground', _asleep))
+    ('one bone in flight, no ground', _one_bone), ('asleep on the ground', _asleep))

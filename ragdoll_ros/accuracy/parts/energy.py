@@ -63,6 +63,5 @@ def tick_costs(repeats: int) -> list[Row]:
         rows.append({'method': method.name, 'label': method.label, 'tick_s': tick,
                      'cpu_s_per_s': float(costs.sum() / trial.duration),
                      'p50_s': float(np.median(costs)), 'p99_s': float(np.percentile(costs, 99)),
-                     'worst_s': float(costs.max()),
-                     'over_budget': float((costs > tick).mean())})
+                     'worst_s': float(costs.max()), 'over_budget': float((costs > tick).mean())})
     return rows

@@ -164,8 +164,7 @@ def falls_tables(rows: list[Row]) -> list[str]:
 
     lines = [line(f'vertical speed at impact, {part}, m/s', values[part], known)
              for part, known in IMPACT_SPEEDS.items()]
-    lines.append(line('descent, from onset to impact of the pelvis, s', values['descent'],
-                      DESCENT))
+    lines.append(line('descent, from onset to impact of the pelvis, s', values['descent'], DESCENT))
     shares = [{'what': part, 'mean': float(np.isfinite(values[part]).mean()), 'real': share,
                'source': source} for part, (share, source) in SHARE_THAT_HITS.items()]
     return [f'{count} falls.', table(lines, (

@@ -97,7 +97,8 @@ def figures(case: HardCase, trial: Trial, trajectory: Trajectory) -> Row:
     lift = (sum(bone.mass for bone in trial.scene.bones) * case.requirements.lift_m
             * float(np.linalg.norm(trial.scene.gravity)))
     moved = np.linalg.norm(trajectory.positions[-1] - trajectory.positions[0], axis=-1)
-    inside, depth = BoneDepth(trial.scene).since_apart(metrics.after_limit_recovery(trajectory))
+    recovered = metrics.after_limit_recovery(trajectory)
+    inside, depth = BoneDepth(trial.scene).after_separation(recovered)
     return {'excess': metrics.energy_excess(trial, inside, lift),
             'depth_m': depth if case.requirements.depth_m else None,
             'gap_m': metrics.joint_gap(trajectory), 'overshoot_rad': metrics.overshoot(inside),

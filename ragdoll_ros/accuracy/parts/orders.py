@@ -19,8 +19,7 @@ NAME = 'orders'
 TICKS = (0.02, 0.01, 0.005, 0.0025, 0.00125)
 FEW_TICKS = {'pendulum_large': (10, 16, 20), 'flight_gentle': (2, 4, 5, 7),
              'flight_long': (16, 20, 25, 32, 40, 50, 64)}
-"""Ticks per motion for order 8, at which errors are small but above rounding; each tick is a
-whole number of nanoseconds."""
+"""Ticks per motion for order 8: errors above rounding, whole numbers of ns per tick."""
 
 MOTIONS = ('pendulum_large', 'flight_gentle', 'flight_long')
 FLOOR = 1e-11
@@ -65,8 +64,7 @@ def measure_all(motion_name: str) -> list[Row]:
             errors.append(compare(result.trajectory, truths[tick])[motion.yardstick])
         rows.append({'motion': motion_name, 'title': motion.title, 'method': method.name,
                      'label': method.label.removesuffix(', N = 1'), 'theory': method.order,
-                     'ticks_s': list(ticks), 'errors': errors,
-                     **slope(ticks, errors, floor)})
+                     'ticks_s': list(ticks), 'errors': errors, **slope(ticks, errors, floor)})
     return rows
 
 

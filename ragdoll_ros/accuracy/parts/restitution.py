@@ -55,8 +55,7 @@ def measure(name: str, bodies: tuple[str, ...], restitutions: tuple[float, ...])
                         FINE_TICK if method.family in ('ours', 'core') else TICK)
         shares = apex_shares(run(method, trial).trajectory, BODIES[body], flights, restitution)
         rows.append({'method': name, 'label': method.label, 'body': body,
-                     'restitution': restitution, 'flights': len(flights) - 1,
-                     'seen': len(shares),
+                     'restitution': restitution, 'flights': len(flights) - 1, 'seen': len(shares),
                      'worst': max((abs(share - 1) for share in shares), default=math.nan),
                      'found': restitution * math.sqrt(max(0.0, shares[0])) if shares else math.nan})
     return rows

@@ -72,8 +72,7 @@ def measure_class(class_name: str, method_name: str, first: int, end: int) -> li
         whole = dataclasses.replace(start, duration=start.duration + RESTING)
         result = run(method, whole if method.family == 'ours' else start)
         found.append({'number': number, 'cpu_s': float(result.costs[:ticks].sum()),
-                      'simulated_s': start.duration,
-                      'restless': restless(result),
+                      'simulated_s': start.duration, 'restless': restless(result),
                       **worst(start, result.trajectory.part(slice(ticks + 1)))})
     return [gathered(class_name, method_name, found)]
 
@@ -87,13 +86,12 @@ def restless(result: Result) -> bool:
 
 
 def worst(start: Trial, trajectory: Trajectory) -> dict[str, float]:
-    """Worst figures of a trajectory. If joints start past their limits or bones overlap, most of
-    them count from the recovery of all: its energy is accounted for by the engine.
-    """
+    """Worst figures of a trajectory, most of them after the recovery of limits and overlaps."""
     if not trajectory.finite:
         return dict.fromkeys(WORST, math.inf) | {'settled_s': math.inf}
     metrics = Metrics(start.scene)
-    inside, depth = BoneDepth(start.scene).since_apart(metrics.after_limit_recovery(trajectory))
+    recovered = metrics.after_limit_recovery(trajectory)
+    inside, depth = BoneDepth(start.scene).after_separation(recovered)
     return {'excess': metrics.energy_excess(start, inside),
             'overshoot_rad': metrics.overshoot(inside),
             'sinking_m': metrics.penetration(trajectory), 'depth_m': depth,

@@ -136,8 +136,7 @@ def draw_segments(figures: Figures, plt: object) -> object:
         return None
     figure, axes = plt.subplots(figsize=(7.5, 4.2))
     _work_precision(axes, rows, 'position_median_m')
-    axes.set_title('Segments of 0.1 s through contacts, against one reference',
-                   loc='left')
+    axes.set_title('Segments of 0.1 s through contacts, against one reference', loc='left')
     axes.legend(fontsize=9)
     return figure
 

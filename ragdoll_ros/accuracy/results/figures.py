@@ -28,8 +28,7 @@ def about(command: str, seconds: float, quick: bool, starts: int) -> dict[str, o
             'command': command, 'quick': quick, 'starts': starts, 'seconds': round(seconds, 1),
             'machine': _processor(), 'cores': os.cpu_count(),
             'system': f'{platform.system()} {platform.machine()}',
-            'python': platform.python_version(),
-            'engine': 'rigid' if kernels.ready() else 'bullet',
+            'python': platform.python_version(), 'engine': 'rigid' if kernels.ready() else 'bullet',
             'versions': {name: _version(name) for name in
                          ('ragdoll_ros', 'pybullet', 'mujoco', 'numpy', 'scipy', 'numba')}}
 

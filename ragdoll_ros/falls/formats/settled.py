@@ -16,8 +16,7 @@ from ..recipe import Recipe
 
 PART, WHOLE = 'settled/shard_{shard:06d}.npz', 'settled.npz'
 ALIKE = np.radians(5.0)
-"""Largest difference, rad, of any joint angle and of gravity's direction in the root's axes, up to
-which two states count as equal."""
+"""Tolerance, rad, of joint angles and of the direction of gravity, of equal states."""
 
 
 def shard_files(recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, bytes]:
