@@ -1,4 +1,4 @@
-"""The report's yardsticks on motions whose figures are known."""
+"""Metrics of the report on motions with known figures."""
 import dataclasses
 import functools
 import math

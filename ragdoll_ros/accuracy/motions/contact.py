@@ -58,8 +58,8 @@ def bounce(restitution: float = 0.5, height: float = 1.0, bounces: int = 3) -> R
     duration = round(impacts[bounces] - 0.01, 2)
     name = 'bounce' if restitution == 0.5 else f'bounce_{restitution:g}'
     return ReferenceMotion(name, f'Ball that bounces {bounces} times, e = {restitution:g}',
-                           'parabolas, heights e²ⁿ h', Trial(scene, duration), truth, in_air=False,
-                           extra=apexes)
+                           'parabolas, heights e²ⁿ h', Trial(scene, duration), truth,
+                           in_flight=False, extra=apexes)
 
 
 def _apex(times: np.ndarray, heights: np.ndarray) -> float:
@@ -97,7 +97,7 @@ def incline(name: str, title: str, friction: float, slope: float = math.radians(
                                    np.tile(orientation, (len(times), 1, 1)))
     where = 'of 20°' if tilted else 'on a slope of 20°'
     return ReferenceMotion(name, f'{title} {where}, µ = {friction:g}, 1 s', "Coulomb's law",
-                           Trial(scene, 1.0), truth, in_air=False)
+                           Trial(scene, 1.0), truth, in_flight=False)
 
 
 def rolling_ball(name: str = 'rolling_ball', title: str = 'Ball that slides, then rolls',
@@ -117,4 +117,4 @@ def rolling_ball(name: str = 'rolling_ball', title: str = 'Ball that slides, the
             times, positions, orientations_about((0.0, 1.0, 0.0), angles[:, None]))
     start = posed(scene.dolls[0])
     return ReferenceMotion(name, f'{title}, µ = {friction:g}, 1.5 s', reference,
-                           Trial(scene, 1.5, start), truth, in_air=False)
+                           Trial(scene, 1.5, start), truth, in_flight=False)

@@ -53,7 +53,7 @@ def _on_edge(name: str, title: str, reference: str, size: tuple[float, float, fl
                   rotation.from_axis_angle(PITCH, start))
     extra = functools.partial(_peaks, truth) if rocks else lambda _: {}
     return ReferenceMotion(name, title, reference, Trial(scene, duration), truth, 'angle_worst_rad',
-                           in_air=False, extra=extra)
+                           in_flight=False, extra=extra)
 
 
 def _peaks(truth: Callable[[np.ndarray], Trajectory], found: Trajectory) -> dict[str, float]:
@@ -106,7 +106,7 @@ def dropped_rod(name: str, title: str, restitution: float, friction: float) -> R
                   (0.0, 0.0, height), rotation.from_axis_angle(PITCH, lean),
                   velocity=(speed, 0.0, 0.0))
     return ReferenceMotion(name, f'Dropped rod {title}, e = {restitution:g}, µ = {friction:g}',
-                           "Newton's and Coulomb's laws", Trial(scene, 0.3), truth, in_air=False)
+                           "Newton's and Coulomb's laws", Trial(scene, 0.3), truth, in_flight=False)
 
 
 def spinning_disc() -> ReferenceMotion:
@@ -120,7 +120,8 @@ def spinning_disc() -> ReferenceMotion:
     scene = _body(Cylinder(radius, thick), Material(friction=friction, restitution=0.0),
                   (0.0, 0.0, thick / 2), spin=(0.0, 0.0, rate))
     return ReferenceMotion('spinning_disc', 'Disc that spins on its face, µ = 0.3, 0.7 s',
-                  'torque 2/3 µ m g r', Trial(scene, 0.7), truth, 'angle_worst_rad', in_air=False)
+                           'torque 2/3 µ m g r', Trial(scene, 0.7), truth, 'angle_worst_rad',
+                           in_flight=False)
 
 
 def thin_disc() -> ReferenceMotion:
@@ -136,7 +137,7 @@ def thin_disc() -> ReferenceMotion:
                   (0.0, 0.0, thick / 2), velocity=(speed, 0.0, 0.0), spin=(0.0, 0.0, rate))
     return ReferenceMotion('thin_disc', 'Disc that slides and spins on its face, µ = 0.3, 0.7 s',
                            'Coulomb over an even pressure, Farkas 2003', Trial(scene, 0.7), truth,
-                           in_air=False)
+                           in_flight=False)
 
 
 def balls(name: str, title: str, masses: tuple[float, ...], restitution: float) -> ReferenceMotion:
@@ -157,4 +158,4 @@ def balls(name: str, title: str, masses: tuple[float, ...], restitution: float) 
     scene = Scene(name, placements, None, Material(friction=0.0, restitution=restitution),
                   gravity=(0.0, 0.0, 0.0))
     return ReferenceMotion(name, title, "Newton's law, momentum", Trial(scene, 0.5), truth,
-                           in_air=False)
+                           in_flight=False)

@@ -75,4 +75,4 @@ def _pendulum(name: str, title: str, reference: str, amplitude: float, damping: 
         positions = np.stack([0 * bob, bob], axis=1)
         return Trajectory.of_poses(times, positions, orientations_about(
             (0.0, 1.0, 0.0), np.stack([0 * phi, phi], axis=1)))
-    return ReferenceMotion(name, title, reference, trial, truth, 'angle_worst_rad', in_air=False)
+    return ReferenceMotion(name, title, reference, trial, truth, 'angle_worst_rad', in_flight=False)

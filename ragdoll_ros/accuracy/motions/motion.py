@@ -25,9 +25,9 @@ class ReferenceMotion:
     trial: Trial
     truth: Callable[[np.ndarray], Trajectory]
     """The exact solution at instants (t,) s."""
-    yardstick: str = 'position_worst_m'
+    error_key: str = 'position_worst_m'
     """The error that is plotted, a key of metrics.compare."""
-    in_air: bool = True
+    in_flight: bool = True
     """Whether there are no contacts, so that momentum is conserved."""
     extra: Callable[[Trajectory], dict[str, float]] = lambda _: {}
     """Returns additional figures of this motion."""

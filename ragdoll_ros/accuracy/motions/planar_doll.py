@@ -82,7 +82,7 @@ def planar_doll(name: str, friction: float, restitution: float,
     title = f'Planar doll of five rods, e = {restitution:g}, µ = {friction:g}, {duration:g} s'
     return ReferenceMotion(
         name, title, 'Lagrange, events located, impacts by their modes; DOP853 at 1e-12',
-        Trial(scene, duration, _start(doll)), truth, in_air=False)
+        Trial(scene, duration, _start(doll)), truth, in_flight=False)
 
 
 def _start(doll: Ragdoll) -> GeneralizedState:

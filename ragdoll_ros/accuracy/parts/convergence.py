@@ -57,10 +57,10 @@ def measure(motion_name: str, halvings: int) -> list[Row]:
     for family, methods in families(halvings).items():
         steps = [_step(method) for method in methods]
         found = [run(method, motion.trial).trajectory for method in methods]
-        errors, own = ([compare(trajectory, exact)[motion.yardstick] for trajectory in found]
+        errors, own = ([compare(trajectory, exact)[motion.error_key] for trajectory in found]
                        for exact in (truth, found[-1]))
         rows.append({'motion': motion_name, 'title': motion.title, 'label': family,
-                     'yardstick': motion.yardstick, 'steps_s': steps, 'errors': errors,
+                     'yardstick': motion.error_key, 'steps_s': steps, 'errors': errors,
                      'own': own[:-1], **slope(tuple(steps), errors, FLOOR)})
     return rows
 

@@ -61,7 +61,7 @@ def measure_all(motion_name: str) -> list[Row]:
         ticks, floor = (few, LOW_FLOOR) if high else (TICKS, FLOOR)
         for tick in ticks:
             result = run(method, trial.with_tick(tick))
-            errors.append(compare(result.trajectory, truths[tick])[motion.yardstick])
+            errors.append(compare(result.trajectory, truths[tick])[motion.error_key])
         rows.append({'motion': motion_name, 'title': motion.title, 'method': method.name,
                      'label': method.label.removesuffix(', N = 1'), 'theory': method.order,
                      'ticks_s': list(ticks), 'errors': errors, **slope(ticks, errors, floor)})

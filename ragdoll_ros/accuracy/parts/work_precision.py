@@ -59,7 +59,7 @@ def figures(motion: ReferenceMotion, method: Method, result: Result, truth: Traj
     trajectory, trial = result.trajectory, motion.trial
     metrics = Metrics(trial.scene)
     row: Row = {'motion': motion.name, 'title': motion.title, 'reference': motion.reference,
-                'yardstick': motion.yardstick, 'method': method.name, 'label': method.label,
+                'yardstick': motion.error_key, 'method': method.name, 'label': method.label,
                 'family': method.family, 'substeps': method.substeps,
                 'cpu_s_per_s': result.cpu_s_per_s,
                 'tick_p99_s': float(np.percentile(result.costs, 99)),
@@ -69,7 +69,7 @@ def figures(motion: ReferenceMotion, method: Method, result: Result, truth: Traj
     row['limit_overshoot_rad'] = metrics.overshoot(trajectory)
     if trial.scene.ground is not None:
         row['sinking_m'] = metrics.penetration(trajectory)
-    if motion.in_air:
+    if motion.in_flight:
         row['momentum_drift'] = metrics.momentum_drift(trial, trajectory)
         if not trial.pushes:
             row['angular_momentum_drift'] = metrics.angular_momentum_drift(trajectory)

@@ -224,9 +224,9 @@ def draw_estimate(figures: Figures, plt: object) -> object:
     return figure
 
 
-def _work_precision(axes: Axes, rows: Sequence[Row], yardstick: str) -> None:
+def _work_precision(axes: Axes, rows: Sequence[Row], error_key: str) -> None:
     """A work-precision plot: a line for each family, the Pareto front, the real-time line."""
-    points = [(row['family'], number(row['cpu_s_per_s']), number(row[yardstick]))
+    points = [(row['family'], number(row['cpu_s_per_s']), number(row[error_key]))
               for row in rows]
     points = [(family, x, max(y, SMALLEST)) for family, x, y in points
               if math.isfinite(y) and y < 1e3]
@@ -241,20 +241,20 @@ def _work_precision(axes: Axes, rows: Sequence[Row], yardstick: str) -> None:
     axes.step(*zip(*front, strict=True), where='post', color='black', lw=0.7, ls='--', zorder=1,
               label='Pareto front')
     axes.set(xscale='log', yscale='log', xlim=CPU_RANGE, xlabel='CPU s per simulated s',
-             ylabel=AXIS_LABELS[yardstick])
-    _name_settings(axes, [row for row in rows if row['family'] == 'ours'], yardstick)
+             ylabel=AXIS_LABELS[error_key])
+    _name_settings(axes, [row for row in rows if row['family'] == 'ours'], error_key)
     axes.grid(True, which='major', lw=0.3)
     axes.axvline(1.0, color=RED, lw=1)
     axes.annotate('real time', (1.0, 0.02), xycoords=('data', 'axes fraction'), color=RED,
                   fontsize=8, ha='right', va='bottom', rotation=90)
 
 
-def _name_settings(axes: Axes, rows: Sequence[Row], yardstick: str) -> None:
+def _name_settings(axes: Axes, rows: Sequence[Row], error_key: str) -> None:
     """Label the accuracies' points; points of equal height share one label."""
     low, high = np.log10(axes.get_ylim())
     groups: list[list[tuple[float, float, str]]] = []
     for row in rows:
-        height = math.log10(max(number(row[yardstick]), SMALLEST))
+        height = math.log10(max(number(row[error_key]), SMALLEST))
         point = (number(row['cpu_s_per_s']), height, row['label'].removeprefix('ours '))
         if groups and abs(groups[-1][0][1] - height) < LINE * (high - low):
             groups[-1].append(point)
