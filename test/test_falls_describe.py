@@ -42,6 +42,11 @@ def test_page_says_what_the_falls_say(thrown, folder, capsys):
     page = (folder / 'README.md').read_text()
     falls = list(generate(thrown, range(COUNT)))
     assert f'{COUNT} falls of 1 s at 100 Hz' in page and '| fall forwards | 100.0% |' in page
+    torso = falls[0].scene.bone_index('torso')
+    descents = np.array([fall.touching[:, torso].argmax() - fall.phases.onset for fall in falls
+                         if fall.touching[:, torso].any()]) / 100
+    assert len(descents)
+    assert f'| {descents.mean():.2f} ± {descents.std():.2f} | 0.58 ± 0.26 |' in page
     for name in ('head', 'torso', 'left_thigh'):
         speeds = np.array([-fall.impact_velocities[fall.scene.bone_index(name), 2]
                            for fall in falls])

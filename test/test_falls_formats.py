@@ -93,6 +93,9 @@ def test_lerobots_episodes_tasks_and_statistics(shoved, written):
         assert (row['onset'], row['impact'], row['rest']) == (
             fall.phases.onset, fall.phases.impact, fall.phases.rest)
         assert json.loads(row['drawn']) == fall.drawn and row['tasks'] == ['shove']
+        assert row['impact_frames'] == [
+            next((k for k in range(1, 120) if fall.touching[:k + 1, bone].tolist()
+                  == [False] * k + [True]), None) for bone in range(10)]
     tasks = pandas.read_parquet(folder / 'meta/tasks.parquet')
     assert tasks.loc['shove', 'task_index'] == 0
     stats = json.loads((folder / 'meta/stats.json').read_text())
