@@ -47,8 +47,9 @@ chromium:
 pictures: $(COMPILED) chromium ## pictures of the page, into docs/
 	@$(BIN)/python docs/viewer.py docs
 
-lint: $(READY) ## ruff
+lint: $(READY) ## ruff, and mypy on the public names
 	@$(BIN)/python -m ruff check .
+	@$(BIN)/python -m mypy
 
 slow: $(COMPILED) ## the tests that take minutes
 	@$(BIN)/python -m pytest -m slow

@@ -70,6 +70,7 @@ setup(
     maintainer_email='maintainers@users.noreply.github.com',
     python_requires='>=3.10',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
+    package_data={NAME: ['py.typed']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
@@ -91,7 +92,7 @@ setup(
         'ray': ['ray'],
         'test': ['pytest', 'pytest-xdist', 'ruff', 'setuptools', 'wheel', 'yourdfpy', 'rosbags',
                  'pandas', 'playwright', 'pygltflib', 'bvhio', 'nbclient', 'nbformat', 'ipykernel',
-                 'rtree', 'mannequin-x; python_version >= "3.11"'],
+                 'mypy', 'rtree', 'mannequin-x; python_version >= "3.11"'],
         'colcon': ['colcon-core', 'colcon-ros', 'colcon-python-setup-py',
                    'colcon-common-extensions', 'setuptools<80'],
     },

@@ -46,7 +46,7 @@ def let_down(recipe: Recipe, number: int) -> Fall:
         length = np.linalg.norm(poses['chest'].position - poses['pelvis'].position)
         held = {bone: pose.position for bone, pose in poses.items()}
         seat = np.array([*held['pelvis'][:2], 0.2])
-        back = poses['pelvis'].outward(np.array([-length, 0, 0])) - held['pelvis']
+        back = poses['pelvis'].apply(np.array([-length, 0, 0])) - held['pelvis']
         goals = {'pelvis': seat,
                  'chest': seat + ((0, 0, length) if number % 2 == 0 else back * (1, 1, 0))}
         for bone in goals:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ragdoll_ros.fit.judging.doubts import find_doubts
+from ragdoll_ros.fit.judging.plausibility import find_implausible
 from ragdoll_ros.fit.judging.verdict import judge
 from ragdoll_ros.fit.robots.robot import read_urdf
 from ragdoll_ros.model.errors import RagdollError
@@ -84,7 +84,7 @@ def row(path: Path) -> str:
         loads = 'PyBullet loads it' if done.returncode == 0 else 'PyBullet does not load it'
         said = str(getattr(error, 'errors', [error])[0]).replace('|', '/')
         return f'refused: {said} ({loads}) | | | | | |'
-    warnings = len(notes) + len(find_doubts(doll))
+    warnings = len(notes) + len(find_implausible(doll))
     return (f'{doll.root.name} | {len(doll.bones)} | {doll.mass:.4g} | {warnings or ""} | '
             f'{judge(doll, measured=True).word} | {fall(doll)}')
 

@@ -1,33 +1,61 @@
-"""A passive ragdoll: scenes and dolls as data, a simulation that moves them, errors with it.
+"""A passive ragdoll: scenes and dolls as data, a simulation of them, and its errors.
 
-The names below are all that most programs need. Each is imported when it is first asked for, so
-that what reads a scene loads no engine.
+The public names are imported on first access, so that a program that reads a scene loads no engine.
 """
 from __future__ import annotations
 
 import importlib
+from typing import TYPE_CHECKING
 
-_HOMES = {
+if TYPE_CHECKING:
+    from .files.doll import load_doll as load_doll
+    from .files.doll import save_doll as save_doll
+    from .files.scene import load_scene as load_scene
+    from .files.scene import save_scene as save_scene
+    from .model.compound import Compound as Compound
+    from .model.drive import Drive as Drive
+    from .model.errors import RagdollError as RagdollError
+    from .model.push import Push as Push
+    from .model.ragdoll import Bone as Bone
+    from .model.ragdoll import Joint as Joint
+    from .model.ragdoll import Ragdoll as Ragdoll
+    from .model.scene import Ground as Ground
+    from .model.scene import Placement as Placement
+    from .model.scene import Scene as Scene
+    from .model.shapes import Box as Box
+    from .model.shapes import Capsule as Capsule
+    from .model.shapes import Cylinder as Cylinder
+    from .model.shapes import Part as Part
+    from .model.shapes import Sphere as Sphere
+    from .model.skeleton import Riders as Riders
+    from .model.state import State as State
+    from .people.person import person as person
+    from .physics.simulation import Simulation as Simulation
+    from .recordings.recording import Recorder as Recorder
+    from .recordings.save import save_recording as save_recording
+
+_MODULES = {
     'Bone': 'model.ragdoll', 'Box': 'model.shapes', 'Capsule': 'model.shapes',
     'Compound': 'model.compound', 'Cylinder': 'model.shapes', 'Drive': 'model.drive',
     'Ground': 'model.scene', 'Joint': 'model.ragdoll', 'Part': 'model.shapes',
-    'Placement': 'model.scene',
-    'Push': 'model.push', 'Ragdoll': 'model.ragdoll', 'RagdollError': 'model.errors',
-    'Recorder': 'recordings.recording',
+    'Placement': 'model.scene', 'Push': 'model.push', 'Ragdoll': 'model.ragdoll',
+    'RagdollError': 'model.errors', 'Recorder': 'recordings.recording', 'Riders': 'model.skeleton',
     'Scene': 'model.scene', 'Simulation': 'physics.simulation', 'Sphere': 'model.shapes',
     'State': 'model.state', 'load_doll': 'files.doll', 'load_scene': 'files.scene',
     'person': 'people.person', 'save_doll': 'files.doll', 'save_scene': 'files.scene',
     'save_recording': 'recordings.save'}
-__all__ = list(_HOMES)
+"""The module that defines each public name; the static imports above are for type checkers."""
+__all__ = list(_MODULES)
 
 
-def __getattr__(name: str) -> object:
-    if name not in _HOMES:
-        raise AttributeError(f'ragdoll_ros has no {name!r}, but: {", ".join(_HOMES)}')
-    value = getattr(importlib.import_module(f'.{_HOMES[name]}', __name__), name)
-    globals()[name] = value
-    return value
+if not TYPE_CHECKING:  # else every misspelt name would be an object to a type checker
+    def __getattr__(name: str) -> object:
+        if name not in _MODULES:
+            raise AttributeError(f'ragdoll_ros has no {name!r}, but: {", ".join(_MODULES)}')
+        value = getattr(importlib.import_module(f'.{_MODULES[name]}', __name__), name)
+        globals()[name] = value
+        return value
 
 
 def __dir__() -> list[str]:
-    return [*globals(), *_HOMES]
+    return [*globals(), *_MODULES]

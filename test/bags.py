@@ -10,7 +10,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from ragdoll_ros.files.run_scene import run_scene_text, scene_digest
 from ragdoll_ros.model.scene import SECOND
-from ragdoll_ros.physics.logged_simulation import RecordedSimulation, state_digest
+from ragdoll_ros.physics.logged_simulation import LoggedSimulation, state_digest
 
 STORAGE = {'.mcap': StoragePlugin.MCAP, '.db3': StoragePlugin.SQLITE3}
 
@@ -70,8 +70,8 @@ def messages_of_a_run(scene, ticks, act, hashed=10, engine='auto', node='/ragdol
         begin = {'scene': scene_digest(text)} if kind in ('start', 'reset') else {}
         events.append({'number': len(events), 'tick': tick, 'kind': kind, **begin, **fields})
 
-    with RecordedSimulation(scene, engine=engine) as simulation:
-        simulation.tell = tell
+    with LoggedSimulation(scene, engine=engine) as simulation:
+        simulation.on_event = tell
         tell('start', {**simulation.conditions, 'state': state_digest(simulation.state)})
         for tick in range(ticks):
             act(simulation, tick)

@@ -18,7 +18,7 @@ def bullet_acceleration(engine, coordinates, wrenches=()):
     PyBullet's step takes v to v + a h with a from where the step begins, so the quotient is exact
     but for rounding. It holds where nothing touches and no limit is reached.
     """
-    engine.place(coordinates)
+    engine.set_coordinates(coordinates)
     engine.advance(PROBE, wrenches)
     return (engine.coordinates.v - coordinates.v) / PROBE
 
@@ -35,7 +35,7 @@ def unlimited(scene):
 
 def mujoco_acceleration(engine, coordinates, wrenches=()):
     """Rates of change of ``coordinates.v`` by a MujocoEngine in the air: MuJoCo's own."""
-    engine.place(coordinates)
+    engine.set_coordinates(coordinates)
     engine._apply(wrenches)
     engine._mujoco.mj_forward(engine._model, engine._data)
     engine._data.xfrc_applied[:] = 0

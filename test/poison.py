@@ -20,14 +20,14 @@ def poison(simulation, kind, dolls=slice(0, 1)):
     engine = simulation._engine
     array, place, spoilt, reason = POISONS[kind]
     if simulation.engine_name == 'rigid':
-        owns = {'q': engine.layout.own_q, 'v': engine.layout.own_v}[array][dolls]
+        owns = {'q': engine.layout.doll_q, 'v': engine.layout.doll_v}[array][dolls]
         for own in owns:
             numbers = getattr(engine._clusters, array)[own]
             numbers[place] = spoilt(numbers[place])
-        engine._clusters.gather()
-        engine._clusters.forget()  # a path of flight that is under way would write over it
+        engine._clusters.gather_state()
+        engine._clusters.invalidate()  # a step of flight that is under way would write over it
     else:
         here = {'q': engine.coordinates.q.copy(), 'v': engine.coordinates.v.copy()}
         here[array][place] = spoilt(here[array][place])
-        engine._put(GeneralizedState(**here))
+        engine._set_state(GeneralizedState(**here))
     return reason

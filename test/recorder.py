@@ -14,7 +14,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
-from ragdoll_ros.ros.rclpy_context import ros_session
+from ragdoll_ros.ros.process.rclpy_context import rclpy_context
 
 PAST = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 TOPICS = ('/ragdoll/scene', '/ragdoll/events')
@@ -22,7 +22,7 @@ TOPICS = ('/ragdoll/scene', '/ragdoll/events')
 
 def main() -> None:
     """Record until SIGINT or SIGTERM."""
-    with BagWriter(Path(sys.argv[1])) as bag, ros_session([]):
+    with BagWriter(Path(sys.argv[1])) as bag, rclpy_context([]):
         node = Node('recorder')
         for topic in TOPICS:
             node.create_subscription(String, topic, lambda message, topic=topic: take(

@@ -11,7 +11,7 @@ from ragdoll_ros.model import errors, rotation
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.scene import Ground, Material, Placement, Scene
 from ragdoll_ros.model.shapes import Box, Sphere
-from ragdoll_ros.physics.engine.protocol import GROUND, AppliedWrench, pressed
+from ragdoll_ros.physics.engine.protocol import GROUND, AppliedWrench, allowed_penetration
 from ragdoll_ros.physics.engine.substepped.bullet import BulletEngine
 
 
@@ -69,10 +69,10 @@ def test_a_wrench_is_in_newtons(mass, local):
 @pytest.mark.parametrize(('dolls', 'overlap', 'touch'), [(1, .5, True), (1, 1.5, False),
                                                          (2, .5, True), (2, 1.5, True)])
 def test_bones_of_one_doll_that_overlap_at_the_start_do_not_collide(dolls, overlap, touch):
-    """By more than pressed(); what overlaps by less rests on each other, and so do other dolls."""
+    """Beyond allowed_penetration(); with less they rest on each other, as do those of two dolls."""
     ball = Sphere(.1)
     alone = Ragdoll('alone', (Bone('a', ball, 1.0, (0, 0, 0)),))
-    depth = overlap * pressed(Scene('alone', (Placement(alone),)))
+    depth = overlap * allowed_penetration(Scene('alone', (Placement(alone),)))
     bones = (Bone('a', ball, 1.0, (0, 0, 0)), Bone('b', ball, 1.0, (0, .5, 0)),
              Bone('c', ball, 1.0, (.2 - depth, 0, 0)))
     joints = (Joint('a', 'b', 'hinge', (0, .3, 0), ((0, 0, 1),)),

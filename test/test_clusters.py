@@ -98,7 +98,7 @@ def test_dolls_that_meet_in_the_air_keep_momentum_as_they_meet_and_part():
         first, groups = sums(), set()
         for _ in range(120):
             simulation.advance()
-            groups.add(tuple(simulation._engine.groups.tolist()))
+            groups.add(tuple(simulation._engine.cluster_of_doll.tolist()))
         last = sums()
     total = sum(one.momentum for one in first)
     assert sum(one.momentum for one in last) == pytest.approx(total, abs=1e-9)
@@ -120,7 +120,7 @@ def test_each_doll_sleeps_and_wakes_by_itself():
     crowd = dataclasses.replace(crowd, dolls=(*falling[:2], far, high))
     first, second, third, above = crowd.bone_slices
     with Simulation(crowd, engine='rigid') as simulation:
-        resting = simulation._engine.resting
+        resting = simulation._engine.sleeping
 
         def advance_until(met):
             end = simulation.time + 20e9
@@ -202,7 +202,7 @@ def test_a_push_on_one_of_two_that_sleep_on_each_other_acts_at_once(wait):
             while not simulation.asleep:
                 simulation.advance()
                 assert simulation.time < 60e9
-            if len(set(engine.groups.tolist())) > 1:
+            if len(set(engine.cluster_of_doll.tolist())) > 1:
                 continue  # they do not lie on each other
             engine._age = wait
             simulation.push(Push('doll_1/torso', (0.0, 0.0, 30.0 * mass), duration=0.05))

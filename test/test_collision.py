@@ -12,30 +12,31 @@ from scipy.spatial.transform import Rotation
 pytest.importorskip('numba')
 import numba
 
-from ragdoll_ros.physics.kernels.collision.pair import (
+from ragdoll_ros.physics.kernels.collision.narrow_phase import collide, separation
+from ragdoll_ros.physics.kernels.collision.shapes import (
     BOX,
     CAPSULE,
     CYLINDER,
-    POINT,
+    SHAPE_KIND,
     SPHERE,
-    collide,
-    separation,
+    Shape,
 )
+from ragdoll_ros.physics.kernels.system import CONTACT_POINT, MAX_MANIFOLD_POINTS
 
 KINDS = (SPHERE, CAPSULE, BOX, CYLINDER)
 PAIRS = list(itertools.combinations_with_replacement(KINDS, 2))
-NAMES = {SPHERE: 'sphere', CAPSULE: 'capsule', BOX: 'box', CYLINDER: 'cylinder'}
+NAMES = {kind: name for name, kind in SHAPE_KIND.items()}
 TURNED = Rotation.from_rotvec([.3, -.5, .7])
 
 
 @numba.njit
-def _collide(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb, margin, out):
-    return collide(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb, margin, out)
+def _collide(a, b, margin, out):
+    return collide(a, b, margin, out)
 
 
 @numba.njit
-def _separation(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb):
-    return separation(kind_a, size_a, pa, ra, kind_b, size_b, pb, rb, math.inf)
+def _separation(a, b):
+    return separation(a, b, math.inf)
 
 
 class Body:
@@ -45,8 +46,9 @@ class Body:
         self.turn = turn or Rotation.identity()
 
     @property
-    def parts(self):
-        return self.kind, self.size, self.centre, np.ascontiguousarray(self.turn.as_matrix())
+    def shape(self):
+        return Shape(self.kind, tuple(self.size), tuple(map(float, self.centre)),
+                     np.ascontiguousarray(self.turn.as_matrix()))
 
     def moved(self, way, spin=(0, 0, 0)):
         return Body(self.kind, self.size, self.centre + way,
@@ -60,15 +62,17 @@ class Body:
 
 
 def gap(a, b):
-    return _separation(*a.parts, *b.parts)
+    return _separation(a.shape, b.shape)
 
 
 def contacts(a, b, margin=1e-3):
-    out = np.full((8, POINT), np.nan)
-    found = out[:_collide(*a.parts, *b.parts, margin, out)]
-    assert np.isfinite(found).all()
-    assert np.linalg.norm(found[:, 3:6], axis=1) == pytest.approx(1, abs=1e-12)
-    assert len(set(found[:, 7])) == len(found) and (found[:, 7] >= 0).all()
+    out = np.zeros(MAX_MANIFOLD_POINTS, CONTACT_POINT)
+    out['point'] = out['normal'] = out['gap'] = np.nan
+    out['feature_id'] = -1
+    found = out[:_collide(a.shape, b.shape, margin, out)]
+    assert all(np.isfinite(found[name]).all() for name in ('point', 'normal', 'gap'))
+    assert np.linalg.norm(found['normal'], axis=1) == pytest.approx(1, abs=1e-12)
+    assert len(set(found['feature_id'])) == len(found) and (found['feature_id'] >= 0).all()
     return found
 
 
@@ -88,8 +92,8 @@ def touching(rng, kind_a, kind_b, wanted=0.0):
 
 def places(found):
     """Points in an order of their own."""
-    rows = np.round(found[:, :3], 7) + 0.0
-    return found[np.lexsort(rows.T)][:, :3]
+    rows = np.round(found['point'], 7) + 0.0
+    return found[np.lexsort(rows.T)]['point']
 
 
 class Peer:
@@ -140,7 +144,7 @@ def test_the_deepest_contact_is_as_deep_as_the_bodies(pair):
     off = []
     for _ in range(300):
         a, b = touching(rng, *pair, rng.uniform(-1e-4, 1e-4))
-        off.append(abs(contacts(a, b)[:, 6].min() - gap(a, b)))
+        off.append(abs(contacts(a, b)['gap'].min() - gap(a, b)))
     assert np.quantile(off, .98) < 1e-9 and max(off) < 4.3e-6
 
 
@@ -151,10 +155,10 @@ def test_swapped_bodies_have_the_same_contacts(pair):
         a, b = touching(rng, *pair, -1e-5)
         one, other = contacts(a, b), contacts(b, a)
         assert gap(a, b) == pytest.approx(gap(b, a), abs=1e-9)
-        deep, same = one[one[:, 6].argmin()], other[other[:, 6].argmin()]
+        deep, same = one[one['gap'].argmin()], other[other['gap'].argmin()]
         # a contact is found along a curved rim within some 1e-6 of its radius
-        assert same[:3] == pytest.approx(deep[:3], abs=1e-5)
-        assert same[3:6] == pytest.approx(-deep[3:6], abs=2e-5)
+        assert same['point'] == pytest.approx(deep['point'], abs=1e-5)
+        assert same['normal'] == pytest.approx(-deep['normal'], abs=2e-5)
 
 
 @pytest.mark.parametrize('pair', PAIRS)
@@ -165,9 +169,9 @@ def test_where_the_bodies_are_seen_from_changes_nothing(pair):
         c, d = a.seen(TURNED, way), b.seen(TURNED, way)
         assert gap(c, d) == pytest.approx(gap(a, b), abs=1e-9)
         one, other = contacts(a, b), contacts(c, d)
-        one, other = one[one[:, 6].argmin()], other[other[:, 6].argmin()]
-        assert other[:3] == pytest.approx(TURNED.apply(one[:3]) + way, abs=1e-5)
-        assert other[3:6] == pytest.approx(TURNED.apply(one[3:6]), abs=2e-5)
+        one, other = one[one['gap'].argmin()], other[other['gap'].argmin()]
+        assert other['point'] == pytest.approx(TURNED.apply(one['point']) + way, abs=1e-5)
+        assert other['normal'] == pytest.approx(TURNED.apply(one['normal']), abs=2e-5)
 
 
 @pytest.mark.parametrize('pair', PAIRS)
@@ -179,8 +183,8 @@ def test_the_gap_changes_by_the_velocity_along_the_normal(pair):
         v, w = rng.normal(size=3), rng.normal(size=3)
         rate = (gap(a.moved(v * h, w * h), b) - gap(a.moved(-v * h, -w * h), b)) / (2 * h)
         found = contacts(a, b)
-        deep = found[found[:, 6].argmin()]
-        off.append(abs(rate - a.velocity(v, w, deep[:3]) @ deep[3:6]))
+        deep = found[found['gap'].argmin()]
+        off.append(abs(rate - a.velocity(v, w, deep['point']) @ deep['normal']))
     # where another feature is about to take over within 1e-6 s the rate has a corner
     assert np.quantile(off, .95) < 1e-3, np.sort(off)[-10:]
 
@@ -222,8 +226,8 @@ def test_along_the_normal_overlapped_bodies_come_apart(pair):
             found = contacts(a, b, 0)
             if not len(found):
                 break
-            deep = found[found[:, 6].argmin()]
-            a = a.moved(deep[3:6] * (1e-9 - deep[6]))
+            deep = found[found['gap'].argmin()]
+            a = a.moved(deep['normal'] * (1e-9 - deep['gap']))
         assert gap(a, b) > 0
 
 
@@ -237,8 +241,8 @@ def test_a_box_on_a_box_of_its_size_stands_on_four_corners(depth):
     found = contacts(Body(BOX, [.1, .1, .1], [0, 0, .2 - depth]), Body(BOX, [.1, .1, .1]))
     assert np.sort(places(found), axis=0) == pytest.approx(
         np.sort(np.array(square(.1, .1 - depth / 2)), axis=0), abs=1e-12)
-    assert found[:, 3:6] == pytest.approx(np.tile([0, 0, 1], (4, 1)))
-    assert found[:, 6] == pytest.approx(-depth, abs=1e-12)
+    assert found['normal'] == pytest.approx(np.tile([0, 0, 1], (4, 1)))
+    assert found['gap'] == pytest.approx(-depth, abs=1e-12)
 
 
 def test_a_tilt_of_rounding_leaves_four_corners_and_their_names():
@@ -246,8 +250,8 @@ def test_a_tilt_of_rounding_leaves_four_corners_and_their_names():
     for _ in range(200):
         tilt = Rotation.from_rotvec(rng.normal(size=3) * 10.0 ** -rng.integers(6, 17))
         found = contacts(Body(BOX, [.1, .1, .1], [.03, .02, .2], tilt), Body(BOX, [.1, .1, .1]))
-        assert len(found) == 4 and found[:, 5] == pytest.approx(1, abs=1e-9)
-        names.add(tuple(np.sort(found[:, 7])))
+        assert len(found) == 4 and found['normal'][:, 2] == pytest.approx(1, abs=1e-9)
+        names.add(tuple(np.sort(found['feature_id'])))
     assert len(names) <= 2      # one for each of the faces that may be the reference
 
 
@@ -257,7 +261,8 @@ def test_a_turned_box_on_a_box_stands_on_an_octagon():
     assert len(found) == 8
     # corners of the octagon within both squares are at .1 and .1 (sqrt 2 - 1)
     near = .1 * (math.sqrt(2) - 1)
-    assert np.sort(np.abs(found[:, :2]), axis=1) == pytest.approx(np.tile([near, .1], (8, 1)))
+    assert np.sort(np.abs(found['point'][:, :2]), axis=1) == pytest.approx(
+        np.tile([near, .1], (8, 1)))
 
 
 def test_a_box_on_its_edge_touches_at_two_points():
@@ -266,7 +271,8 @@ def test_a_box_on_its_edge_touches_at_two_points():
     assert places(contacts(a, Body(BOX, [.5, .5, .1]))) == pytest.approx(
         np.array([[.05, -.2, .1], [.05, .2, .1]]))
     # and where the edge stands out over the face it ends with the face
-    assert np.sort(contacts(a, Body(BOX, [.5, .15, .1]))[:, 1]) == pytest.approx([-.15, .15])
+    found = contacts(a, Body(BOX, [.5, .15, .1]))
+    assert np.sort(found['point'][:, 1]) == pytest.approx([-.15, .15])
 
 
 def test_edges_that_cross_touch_where_they_cross():
@@ -274,8 +280,8 @@ def test_edges_that_cross_touch_where_they_cross():
              Rotation.from_euler('y', math.pi / 4))
     b = Body(BOX, [.3, .1, .1], [0, 0, 0], Rotation.from_euler('x', math.pi / 4))
     found = contacts(a, b)
-    assert found[:, :7] == pytest.approx(np.array(
-        [[.02, 0, .1 * math.sqrt(2) - 5e-5, 0, 0, 1, -1e-4]]), abs=1e-12)
+    assert np.column_stack([found['point'], found['normal'], found['gap']]) == pytest.approx(
+        np.array([[.02, 0, .1 * math.sqrt(2) - 5e-5, 0, 0, 1, -1e-4]]), abs=1e-12)
 
 
 @pytest.mark.parametrize('kind', [CAPSULE, CYLINDER])
@@ -290,30 +296,30 @@ def test_what_lies_on_a_box_touches_at_two_points(kind):
     # one end up by less than the margin: both are told, each with its gap
     tilted = a.moved([0, 0, 0], [0, -1e-3, 0])
     found = contacts(tilted, Body(BOX, [.5, .5, .1]))
-    assert np.sort(found[:, 6]) == pytest.approx([-1e-5 - 2e-4, -1e-5 + 2e-4], abs=1e-6)
+    assert np.sort(found['gap']) == pytest.approx([-1e-5 - 2e-4, -1e-5 + 2e-4], abs=1e-6)
 
 
 @pytest.mark.parametrize('kinds', list(itertools.product([CAPSULE, CYLINDER], repeat=2)))
 def test_side_by_side_they_touch_at_two_points(kinds):
     a, b = Body(kinds[0], [.05, .2], [.09999, 0, .1]), Body(kinds[1], [.05, .3])
-    assert np.sort(contacts(a, b)[:, 2]) == pytest.approx([-.1, .3])
-    assert contacts(a, b)[:, 3] == pytest.approx(1)
+    assert np.sort(contacts(a, b)['point'][:, 2]) == pytest.approx([-.1, .3])
+    assert contacts(a, b)['normal'][:, 0] == pytest.approx(1)
     across = Body(kinds[0], [.05, .2], [.1, .02, .1], Rotation.from_euler('x', math.pi / 2))
-    assert contacts(across, b)[:, :3] == pytest.approx(np.array([[.05, 0, .1]]), abs=1e-9)
+    assert contacts(across, b)['point'] == pytest.approx(np.array([[.05, 0, .1]]), abs=1e-9)
 
 
 def test_a_cylinder_stands_on_its_rim():
     a = Body(CYLINDER, [.1, .2], [.02, 0, .3])
-    found = contacts(a, Body(BOX, [.5, .5, .1]))
-    assert len(found) == 8 and np.ptp(found[:, 2]) < 1e-12
-    angles = np.sort(np.arctan2(found[:, 1], found[:, 0] - .02))
-    assert np.hypot(found[:, 0] - .02, found[:, 1]) == pytest.approx(.1)
+    x, y, z = contacts(a, Body(BOX, [.5, .5, .1]))['point'].T
+    assert len(z) == 8 and np.ptp(z) < 1e-12
+    angles = np.sort(np.arctan2(y, x - .02))
+    assert np.hypot(x - .02, y) == pytest.approx(.1)
     assert np.diff(angles) == pytest.approx(math.pi / 4)
     # on a smaller box: the box's corners, which all lie under the disc
     assert len(contacts(a, Body(BOX, [.05, .05, .1]))) == 4
     # on another cylinder: as much as the smaller has
-    found = contacts(a, Body(CYLINDER, [.3, .1]))
-    assert np.hypot(found[:, 0] - .02, found[:, 1]) == pytest.approx(.1) and len(found) == 8
+    x, y, _ = contacts(a, Body(CYLINDER, [.3, .1]))['point'].T
+    assert np.hypot(x - .02, y) == pytest.approx(.1) and len(x) == 8
 
 
 @pytest.mark.parametrize('degrees', [1e-5, .01, 1, 30, 80])
@@ -325,16 +331,16 @@ def test_a_tilted_cylinder_stands_where_its_rim_is_lowest(degrees):
         high = .2 * math.cos(tilt) + .1 * math.sin(tilt)
         a = Body(CYLINDER, [.1, .2], [0, 0, .1 + high], turn)
         found = contacts(a, Body(BOX, [.9, .9, .1]), 1e-7)
-        deep = found[found[:, 6].argmin()]
+        deep = found[found['gap'].argmin()]
         down = turn.inv().apply([0, 0, -1])
         rim = [.1 * down[0] / math.sin(tilt), .1 * down[1] / math.sin(tilt), -.2]
-        assert deep[:3] == pytest.approx(a.centre + turn.apply(rim), abs=1e-9)
-        assert abs(deep[6]) < 1e-12
+        assert deep['point'] == pytest.approx(a.centre + turn.apply(rim), abs=1e-9)
+        assert abs(deep['gap']) < 1e-12
 
 
 def test_contacts_keep_their_names_while_a_box_slides():
     names = {tuple(np.sort(contacts(Body(BOX, [.1, .1, .1], [.01 * k, .05, .2], Rotation.from_euler(
-        'z', .3)), Body(BOX, [.5, .5, .1]))[:, 7])) for k in range(30)}
+        'z', .3)), Body(BOX, [.5, .5, .1]))['feature_id'])) for k in range(30)}
     assert len(names) == 1
 
 

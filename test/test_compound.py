@@ -81,7 +81,7 @@ def test_what_is_off_its_centre_or_axes_is_refused_and_told_what_would_be_right(
     with pytest.raises(errors.NotPrincipal) as caught:
         alone(centred)
     told = caught.value.expected.split('[')[1].strip(']').split(',')
-    turned = centred.seen_from(Pose(orientation=np.array(told, float)))
+    turned = centred.in_frame(Pose(orientation=np.array(told, float)))
     moments = alone(turned).bones[0].inertia
     # What is told has nine digits.
     assert sorted(moments) == pytest.approx(np.linalg.eigvalsh(centred.inertia_matrix(2.0)),

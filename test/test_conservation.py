@@ -16,11 +16,11 @@ from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Ground, Placement, Scene
 from ragdoll_ros.model.shapes import Sphere
 from ragdoll_ros.model.state import State
+from ragdoll_ros.physics.engine.doll_totals import DollSums
 from ragdoll_ros.physics.engine.protocol import AppliedWrench
 from ragdoll_ros.physics.engine.substepped.bullet import BulletEngine
 from ragdoll_ros.physics.engine.substepped.conservation import ConservationProjection
-from ragdoll_ros.physics.engine.substepped.doll_sums import DollSums
-from ragdoll_ros.physics.engine.substepped.energy_account import Account
+from ragdoll_ros.physics.engine.substepped.energy_account import EnergyAccount
 from ragdoll_ros.physics.ground_heights import GroundHeights
 from ragdoll_ros.physics.simulation import Simulation
 
@@ -89,9 +89,9 @@ def test_surplus_energy_is_taken_from_the_joints_first(scene, joints, touched):
     if joints == 'still':
         start.v[6:] = 0.0
     projection, state = projection_of(scene), whole(scene, start)
-    before, account = conserved(scene, state), Account.opened(np.zeros(1))
+    before, account = conserved(scene, state), EnergyAccount.opened(np.zeros(1))
     after = conserved(scene, whole(scene, projection.without_surplus(
-        start, DollSums(scene).motion(state), np.array([2.0]), np.array([touched]), account)))
+        start, DollSums(scene).totals(state), np.array([2.0]), np.array([touched]), account)))
     assert after.energy == pytest.approx(before.energy - 2.0, abs=1e-9)
     assert account.taken == pytest.approx(2.0, abs=1e-9)
     left = 1.0
@@ -109,11 +109,11 @@ def test_what_is_lost_is_lost_and_work_is_added():
     """The surplus is what is above the lowest energy so far and the work since, but 0.05 %."""
     scene, state = SCENES['doll'], random_state(SCENES['doll'], 1)
     projection = projection_of(scene)
-    motion, apart = DollSums(scene).motion(state), projection.groups(set())
-    account = Account.opened(motion.energy)
+    motion, apart = DollSums(scene).totals(state), projection.groups(set())
+    account = EnergyAccount.opened(motion.energy)
     begun = projection.surplus(account, motion, apart)
     assert -1e-3 * (motion.kinetic + 55 * 9.8) < begun < 0
-    lower = DollSums(scene).motion(state)
+    lower = DollSums(scene).totals(state)
     lower.energy[:] -= 100.0
     projection.close_step(account, lower, apart)
     assert projection.surplus(account, motion, apart) == pytest.approx(begun + 100.0, abs=1e-9)
@@ -124,8 +124,8 @@ def test_what_is_lost_is_lost_and_work_is_added():
 def test_dolls_that_touch_share_what_is_too_much_by_their_energies():
     """A light one loses as large a share of its motion as a heavy one."""
     projection = projection_of(MANY)
-    motion = DollSums(MANY).motion(random_state(MANY, 1))
-    account = Account.opened(motion.energy - (50, 0, 0))
+    motion = DollSums(MANY).totals(random_state(MANY, 1))
+    account = EnergyAccount.opened(motion.energy - (50, 0, 0))
     pair = projection.surplus(account, motion, projection.groups({(0, 2)}))
     alone = projection.surplus(account, motion, projection.groups(set()))
     assert pair[1] == pytest.approx(alone[1]) and pair[1] < 0

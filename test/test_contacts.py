@@ -55,12 +55,12 @@ def test_what_sleeps_on_each_other_goes_on_touching_while_others_move():
         engine = simulation._engine
         for _ in range(100):
             simulation.advance()
-            if engine.resting[:2].all():
-                assert engine.groups[0] == engine.groups[1]
+            if engine.sleeping[:2].all():
+                assert engine.cluster_of_doll[0] == engine.cluster_of_doll[1]
                 found = simulation.contacts
                 pairs = set(zip(found.a.tolist(), found.b.tolist(), strict=True))
                 assert (1, 0) in pairs or (0, 1) in pairs
-        assert engine.resting[:2].all() and not engine.resting[3]
+        assert engine.sleeping[:2].all() and not engine.sleeping[3]
 
 
 @pytest.mark.parametrize('engine', ['rigid', 'bullet'])

@@ -52,7 +52,7 @@ def turned(engine, angles_deg):
     names = scene.angle_names
     for name, angle in angles_deg.items():
         q[7 + names.index(name)] = math.radians(angle)
-    engine.place(GeneralizedState(q, np.zeros_like(base.v)))
+    engine.set_coordinates(GeneralizedState(q, np.zeros_like(base.v)))
     return engine.state
 
 

@@ -11,7 +11,7 @@ from conserved import conserved
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import errors
-from ragdoll_ros.model.drive import FASTEST, MOST_FORCE, MOST_TORQUE, Drive
+from ragdoll_ros.model.drive import MAX_FORCE, MAX_SPEED, MAX_TORQUE, Drive
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Placement, Scene, above_ground
 from ragdoll_ros.model.shapes import Box, Sphere
@@ -226,13 +226,13 @@ def test_the_same_drive_gives_the_same_bits_and_reset_ends_it():
 def test_a_drive_shows_the_push_that_it_is_at_rest():
     push = Drive('torso', (0.0, 0.1, 0.0), (0.0, 0.0, 5.0), force_per_speed=1000.0).at_rest
     assert push.force == pytest.approx((0, 100, 0))
-    assert push.torque == pytest.approx((0, 0, MOST_TORQUE))
-    assert Drive('torso', (9.0, 0.0, 0.0)).at_rest.force == pytest.approx((MOST_FORCE, 0, 0))
+    assert push.torque == pytest.approx((0, 0, MAX_TORQUE))
+    assert Drive('torso', (9.0, 0.0, 0.0)).at_rest.force == pytest.approx((MAX_FORCE, 0, 0))
 
 
 @pytest.mark.parametrize('changes', [
     {'velocity': (math.nan, 0, 0)}, {'angular_velocity': (0, math.inf, 0)},
-    {'velocity': (2 * FASTEST, 0, 0)}, {'force_per_speed': -1.0}, {'most_torque': math.nan},
+    {'velocity': (2 * MAX_SPEED, 0, 0)}, {'force_per_speed': -1.0}, {'most_torque': math.nan},
     {'duration': 0}])
 def test_a_drive_that_is_rubbish_cannot_be_made(changes):
     with pytest.raises(errors.ModelError, match=next(iter(changes))):

@@ -64,7 +64,7 @@ def test_bones_are_where_jacobians_and_the_engine_see_them(scene, seed, far):
     placed = random_coordinates(scene, seed, far=far)
     state = KernelDynamics(scene).state(placed)
     engine = BulletEngine(scene, PLAIN)
-    engine.place(placed)
+    engine.set_coordinates(placed)
     bounds = (max(1e-14, far * 1e-15), 1e-14, 1e-13, 1e-13)
     assert np.less(apart(state, truth(scene, placed)), bounds).all()
     assert np.less(apart(state, engine.state), bounds).all()

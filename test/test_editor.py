@@ -406,7 +406,7 @@ def test_bones_come_and_go(desk):
     desk.editor.add_bone(' hat ')
     assert desk.editor.bone == 'hat' and 'hat' in desk.editor.scene.bone_names
     desk.editor.add_bone('hat')
-    assert 'a name of its own' in desk.panel.said.content
+    assert 'a unique name' in desk.panel.said.content
     desk.editor.remove_limb()
     assert desk.editor.scene == DROP and desk.editor.bone is None
     desk.editor.undo()

@@ -146,7 +146,7 @@ def test_another_shape_fills_the_same_box(name, kind):
     bone, before = bone_of(scene, name), bone_of(DROP, name)
     assert bone.shape.kind == kind and bone.mass == before.mass
     assert bone.position == before.position
-    reach = [each.shape.reach(rotation.rotate(rotation.inverse(each.orientation), np.eye(3)))
+    reach = [each.shape.support(rotation.rotate(rotation.inverse(each.orientation), np.eye(3)))
              for each in (bone, before)]
     if kind == 'sphere':
         assert np.prod(reach[0]) == pytest.approx(np.prod(reach[1]), rel=1e-9)
@@ -312,7 +312,7 @@ def test_several_shapes_have_a_mirror_image():
     here, there = bone_of(scene, 'left_shin'), bone_of(scene, 'right_shin')
     assert there.moments == here.moments
     directions = rotation.normalized(np.random.default_rng(0).normal(size=(50, 3)))
-    reach = [bone.shape.reach(rotation.rotate(rotation.inverse(bone.orientation), seen))
+    reach = [bone.shape.support(rotation.rotate(rotation.inverse(bone.orientation), seen))
              for bone, seen in ((here, directions), (there, directions * (1, -1, 1)))]
     assert reach[0] == pytest.approx(reach[1], abs=1e-12)
     assert mirror.mirrored(scene, 'right_shin') == scene

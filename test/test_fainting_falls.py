@@ -46,7 +46,7 @@ def test_people_lean_over_flat_soles_as_told(number):
         assert math.atan2(up[1], up[0]) == pytest.approx(start.towards)
         # The centre of mass, half a metre above the ankles or more, is leant by sin(lean) of that.
         joints = {joint.child: joint for joint in scene.dolls[0].doll.joints}
-        ankles = np.mean([state.poses(scene.bone_index(f'{side}_shin')).outward(np.subtract(
+        ankles = np.mean([state.poses(scene.bone_index(f'{side}_shin')).apply(np.subtract(
             joints[f'{side}_foot'].anchor, scene.dolls[0].doll.bone(f'{side}_shin').position))
             for side in ('left', 'right')], axis=0)
         leant = (masses @ state.positions / masses.sum() - ankles)[:2] @ up[:2]

@@ -135,8 +135,8 @@ def test_free_balls_take_their_angles():
     q = layout.with_joint_angles(np.array([0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1.0]),
                                  np.array([0.3, -0.4, 1.2]))
     np.testing.assert_allclose(layout.joint_angles(q), [0.3, -0.4, 1.2], atol=1e-12)
-    turns = rotation.from_xyz(0.3, -0.4, 1.2)
-    np.testing.assert_allclose(rotation.to_xyz(turns), [0.3, -0.4, 1.2], atol=1e-12)
+    turns = rotation.from_euler_xyz(0.3, -0.4, 1.2)
+    np.testing.assert_allclose(rotation.to_euler_xyz(turns), [0.3, -0.4, 1.2], atol=1e-12)
 
 
 def test_tumbled_dolls_are_turned_evenly():

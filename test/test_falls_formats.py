@@ -21,7 +21,7 @@ from ragdoll_ros.files.urdf import to_urdf
 from ragdoll_ros.fit.command import main as fit
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.errors import OutOfRange, WrongForm
-from ragdoll_ros.physics.sensors.imu import Mount, imu_samples
+from ragdoll_ros.physics.sensors.imu import ImuMount, imu_samples
 
 parquet = pytest.importorskip('pyarrow.parquet')
 pandas = pytest.importorskip('pandas')
@@ -299,7 +299,7 @@ def test_a_sensors_flaws_are_added_to_what_it_should_read():
                 {'name': f'a{k}', 'bone': 'ball', **own} for k, own in enumerate(sensors)]}),
             [number]))
         read = [fall_samples(fall, k)[1:] for k in range(len(sensors))]
-        true = imu_samples(fall.imu_states[:, 0], Mount('ball'), 0.001, fall.scene.gravity)
+        true = imu_samples(fall.imu_states[:, 0], ImuMount('ball'), 0.001, fall.scene.gravity)
         return [samples - true for samples in read]
 
     many = np.concatenate([noise_of(k, [flawed])[0] for k in range(25)]) - flawed['bias']

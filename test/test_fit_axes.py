@@ -3,9 +3,9 @@ import numpy as np
 import pytest
 from specimens import SPECIMENS
 
-from ragdoll_ros.fit.bodies.overlap import filling
-from ragdoll_ros.fit.shapes.axes import STANDS_OUT, fit_axes, spread
-from ragdoll_ros.fit.shapes.shapes import MAKERS, fit_best, fit_shape
+from ragdoll_ros.fit.bodies.overlap import interior_points
+from ragdoll_ros.fit.shapes.axes import MIN_ELONGATION, fit_axes, principal_components
+from ragdoll_ros.fit.shapes.fitting import CANDIDATES, fit_best, fit_shape
 from ragdoll_ros.model.shapes import SHAPES
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -45,7 +45,7 @@ def test_the_principal_axis_agrees_with_an_independent_solver(seed):
     assert angle < 1e-6
     assert axes.frame[:, 2] @ UP >= 0
     ordered = np.sort(np.sqrt(values))[::-1]
-    assert axes.distinct == pytest.approx(1 - ordered[1] / ordered[0], abs=1e-9)
+    assert axes.elongation == pytest.approx(1 - ordered[1] / ordered[0], abs=1e-9)
     assert np.allclose(axes.frame.T @ axes.frame, np.eye(3), atol=1e-12)
     assert np.linalg.det(axes.frame) == pytest.approx(1)
 
@@ -71,7 +71,7 @@ def test_a_ball_falls_back_to_the_bone():
     direction = np.array([0.6, 0.0, 0.8])
     axes = fit_axes(points, areas, direction)
     assert not axes.principal
-    assert axes.distinct < STANDS_OUT
+    assert axes.elongation < MIN_ELONGATION
     assert np.allclose(axes.frame[:, 2], direction)
 
 
@@ -91,7 +91,7 @@ def test_degenerate_clusters_have_axes_and_every_shape(name, weights, orientatio
     axes = fit_axes(points, areas, UP, orientation)
     assert np.allclose(axes.frame.T @ axes.frame, np.eye(3), atol=1e-12)
     assert np.linalg.det(axes.frame) == pytest.approx(1)
-    for kind in MAKERS:
+    for kind in CANDIDATES:
         fitted = fit_shape(points @ axes.frame, kind, 0.01, 0.01)
         assert min(fitted.shape.half_extents) >= 0.005 - 1e-12
         # In the middle of the points, which are their own mirror image or few; none are at 0.
@@ -102,7 +102,7 @@ def test_degenerate_clusters_have_axes_and_every_shape(name, weights, orientatio
 
 
 def test_no_points_have_no_spread():
-    deviations, vectors = spread(np.zeros((0, 3)), np.zeros(0))
+    deviations, vectors = principal_components(np.zeros((0, 3)), np.zeros(0))
     assert (deviations == 0).all()
     assert (vectors == np.eye(3)).all()
 
@@ -117,7 +117,7 @@ def test_distance_against_the_nearest_of_many_surface_points(solid):
     nearest = np.linalg.norm(points[:, None] - skin[None], axis=2).min(axis=1)
     # The mesh of 20 corners a circle cuts 1.2 % off the radius; between samples lie 2 cm.
     assert np.abs(np.abs(solid.signed_distance(points)) - nearest).max() < 0.025
-    assert (solid.signed_distance(filling(solid)) <= 0).all()
+    assert (solid.signed_distance(interior_points(solid)) <= 0).all()
     assert np.abs(solid.signed_distance(corners)).max() < 1e-9
 
 
@@ -132,4 +132,4 @@ def test_a_solid_is_recognised_by_its_skin(solid):
     assert np.allclose(fitted.centre, (1, 2, 3), atol=0.02)
     # Up to a twentieth of the skin may stay outside, so the fit may be a little smaller.
     assert fitted.shape.volume == pytest.approx(solid.volume, rel=0.15)
-    assert fitted.share >= 0.95
+    assert fitted.coverage >= 0.95

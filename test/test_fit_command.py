@@ -135,7 +135,7 @@ def test_options_of_a_fit_are_refused_where_nothing_is_fitted(capsys, name, opti
 @pytest.mark.parametrize(('name', 'why'), [
     ('no_such.glb', 'no such file'), ('no_such.urdf', 'no such file'),
     ('folder.glb', 'not a regular file'), ('folder.urdf', 'not a regular file')])
-def test_what_is_no_file_is_told_so(tmp_path, capsys, name, why):
+def test_what_is_no_file_is_refused_with_the_reason(tmp_path, capsys, name, why):
     (tmp_path / 'folder.glb').mkdir()
     (tmp_path / 'folder.urdf').mkdir()
     assert main([str(tmp_path / name)]) == 2

@@ -59,9 +59,9 @@ def test_knees_hocks_elbows_and_wrists(tmp_path, points, names):
             low, high = joint.limits[0]
             # It straightens from where it is bound, and folds far.
             assert low <= 0 and high > 1.2
-    guessed = [note for note in fit.notes if 'no name and no bend' in note]
+    guessed = [note for note in fit.notes if 'neither name nor bend' in note]
     if names == 'unknown' and points is STRAIGHT:
-        assert 'Lefte' in guessed[0] and 'as legs in their place do' in guessed[0]
+        assert 'Lefte' in guessed[0] and 'that of legs in their place' in guessed[0]
     elif points is STRAIGHT:
         assert guessed == []
     assert judge(fit.doll, fit, falls=False).word == 'good'
@@ -77,9 +77,9 @@ def test_a_hock_that_folds_the_other_way_is_not_good(tmp_path):
     assert 'Leftf: a limb that goes 3' in str(verdict) and 'past straight' in str(verdict)
 
 
-def test_limbs_that_nothing_tells_of_are_told():
+def test_limbs_without_name_or_bend_get_a_note():
     notes = fit_rigs.fitted('star').notes
-    assert any('ball joints are taken' in note for note in notes)
+    assert any('ball joints are used' in note for note in notes)
 
 
 def test_legs_of_a_spider_fold_in_their_own_planes():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fit_rigs import Rig, limb
 
-from ragdoll_ros.fit.pipeline import Options, fit_character
+from ragdoll_ros.fit.pipeline import FitOptions, fit_character
 from ragdoll_ros.fit.reading.character import read_character
 from ragdoll_ros.model import errors
 from ragdoll_ros.model.scene import above_ground
@@ -63,8 +63,8 @@ def test_ears_of_one_bone_are_part_of_the_head(tmp_path):
 
 def test_fingers_stay_with_smallest_0():
     character = fit_rigs.fitted('unreal').character
-    kept = fit_character(character, Options(smallest=0))
-    assert sum(body.role == 'finger' for body in kept.bodies) == 30
+    forced = fit_character(character, FitOptions(smallest=0))
+    assert sum(body.role == 'finger' for body in forced.bodies) == 30
     assert not any(body.role == 'finger' for body in fit_rigs.fitted('unreal').bodies)
 
 
@@ -76,7 +76,7 @@ def test_fingers_stay_with_smallest_0():
 def test_bones_that_are_named_are_bodies(keep, fingers):
     """By their names and by patterns; all others are as without."""
     plain = fit_rigs.fitted('unreal')
-    made = fit_character(plain.character, Options(keep=keep))
+    made = fit_character(plain.character, FitOptions(keep=keep))
     own = {bone.name for bone in plain.doll.bones}
     assert {bone.name for bone in made.doll.bones} == own | fingers
     assert made.doll.mass == pytest.approx(plain.doll.mass, rel=1e-9)
@@ -90,7 +90,7 @@ def test_bones_that_are_named_are_bodies(keep, fingers):
 
 @pytest.mark.parametrize('name', ['hair', 'strand'])
 def test_a_strand_that_is_named_is_bodies_and_no_swing(tmp_path, name):
-    made = fit(hairy(name), tmp_path, Options(keep=(f'{name}7_*',)))
+    made = fit(hairy(name), tmp_path, FitOptions(keep=(f'{name}7_*',)))
     own = [bone.name for bone in made.doll.bones if bone.name.startswith(name)]
     assert sorted(own) == [f'{name}7_{k}' for k in range(5)]
     assert len(made.doll.swings) == 39
@@ -101,18 +101,18 @@ def test_a_strand_that_is_named_is_bodies_and_no_swing(tmp_path, name):
     ('index_1_l', errors.UnknownBone, 'keep.*index_1_l.*index_01_l'),
     ('*Thumbs*', errors.UnknownBone, r'keep.*Thumbs.*thumb_0'),
     ('pole', errors.WrongForm, 'keep.*pole.*moves 4 vertices or more')])
-def test_what_cannot_be_kept_is_refused(tmp_path, keep, kind, words):
+def test_a_bone_that_cannot_be_forced_is_refused(tmp_path, keep, kind, words):
     character = fit_rigs.fitted('unreal').character
     with_pole = replace(
         character, bone_names=(*character.bone_names, 'pole'), parents=(*character.parents, 0),
         positions=np.vstack([character.positions, (1, 0, 0)]),
         orientations=np.vstack([character.orientations, (0, 0, 0, 1)]))
     with pytest.raises(kind, match=words):
-        fit_character(with_pole, Options(keep=(keep,)))
+        fit_character(with_pole, FitOptions(keep=(keep,)))
 
 
 def test_what_would_not_run_is_refused(tmp_path):
     with pytest.raises(errors.OutOfRange, match=r'smallest.*222 bodies are more than 200'):
-        fit(hairy('strand'), tmp_path, Options(smallest=0.001))
+        fit(hairy('strand'), tmp_path, FitOptions(smallest=0.001))
     with pytest.raises(errors.OutOfRange, match=r'keep.*fewer, for 220 bodies are more than 200'):
-        fit(hairy('strand'), tmp_path, Options(keep=('strand*',)))
+        fit(hairy('strand'), tmp_path, FitOptions(keep=('strand*',)))

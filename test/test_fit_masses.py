@@ -8,7 +8,7 @@ import pytest
 from fit_rigs import RIGS, fitted
 
 from ragdoll_ros.fit.bodies.skin_volume import skin_volumes
-from ragdoll_ros.fit.pipeline import Options, fit_character
+from ragdoll_ros.fit.pipeline import FitOptions, fit_character
 from ragdoll_ros.fit.reading.character import Character, read_character
 
 DE_LEVA = {'head': 6.94, 'trunk': 43.46, 'upper_arm': 5.42, 'forearm': 3.24, 'hand': 1.22,
@@ -104,7 +104,7 @@ def people(tmp_path_factory):
 @pytest.mark.parametrize(('masses', 'within'), [('proportions', 0.2), ('best', 0.35)])
 def test_a_persons_shares_are_de_levas(people, masses, within):
     for name, character in people.items():
-        fit = fit_character(character, Options(masses=masses))
+        fit = fit_character(character, FitOptions(masses=masses))
         assert fit.doll.mass == pytest.approx(1000 * character.volume(), rel=0.15)
         for part, share in shares(fit).items():
             assert share == pytest.approx(DE_LEVA[part], rel=within), (name, part)
@@ -113,17 +113,17 @@ def test_a_persons_shares_are_de_levas(people, masses, within):
 def test_what_is_no_person_follows_its_skin():
     """Hips that hold four legs, and a head far ahead of them: no man's shares."""
     character = fitted('four_legs').character
-    by_skin = fit_character(character, Options(masses='volume'))
+    by_skin = fit_character(character, FitOptions(masses='volume'))
     assert [bone.mass for bone in fitted('four_legs').doll.bones] == [
         bone.mass for bone in by_skin.doll.bones]
 
 
-def test_a_skin_that_tells_no_volume_is_told():
+def test_a_skin_without_volume_gets_a_note():
     """Every triangle twice, once inside out: no volume at all."""
     character = fitted('two_bones').character
     both = np.concatenate([character.triangles, character.triangles[:, ::-1]])
     fit = fit_character(dataclasses.replace(character, triangles=both))
     note, = fit.notes
-    assert 'and the bodies 5.34 l: it is open, or several; masses follow the bodies' in note
+    assert 'the bodies 5.34 l: the skin is open or layered, so masses follow the volumes' in note
     assert fit.doll.mass == pytest.approx(1000 * sum(b.shape.volume for b in fit.doll.bones),
                                           rel=1e-6)

@@ -20,7 +20,7 @@ NEAR = 0.03
 
 def triangles_of(shape, pose=HERE):
     corners, triangles = shape.mesh()
-    return pose.outward(corners)[triangles]
+    return pose.apply(corners)[triangles]
 
 
 def stl(triangles):
@@ -130,7 +130,7 @@ def test_a_mesh_that_cannot_be_read_is_named_and_the_inertia_counts(tmp_path, ca
         (tmp_path / name).write_bytes(BROKEN[name])
     inertia = '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/>'
     doll, notes = robot(tmp_path, (name, ''), inertia=inertia)
-    assert notes[0].startswith(f'a: the mesh {name} is left out: ')
+    assert notes[0].startswith(f'a: the mesh {name} is ignored: ')
     assert doll.root.inertia == pytest.approx((0.1, 0.1, 0.1))
     assert capfd.readouterr() == ('', '')
 

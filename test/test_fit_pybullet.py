@@ -16,11 +16,11 @@ FEW = ('a1/a1.urdf', 'bicycle/bike.urdf', 'humanoid/humanoid.urdf', 'kuka_iiwa/m
 
 REFUSED = {'biped/biped2d_pybullet.urdf': "'-1.57.'",
            'husky/husky.urdf': 'expand a xacro first',
-           'plane_implicit.urdf': 'a <plane> is left out',
+           'plane_implicit.urdf': 'a <plane> is ignored',
            'quadruped/microtaur/microtaur.urdf': 'expected 3 finite numbers',
            'racecar/racecar_differential.urdf': "'1 1 1 1'",
            'torus_deform.urdf': 'at least one link',
-           'toys/concave_box.urdf': 'a <cdf> is left out'}
+           'toys/concave_box.urdf': 'a <cdf> is ignored'}
 """What is refused, and what the sentence says of it."""
 
 

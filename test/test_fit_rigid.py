@@ -48,7 +48,7 @@ def test_a_robot_of_rigid_parts(tmp_path, pivots):
     fit = fit_character(character)
     names = [bone.name for bone in PERSON.bones]
     assert sorted(character.bone_names) == sorted(names)
-    assert any('22 meshes are taken for rigid parts' in note for note in fit.notes)
+    assert any('22 meshes become rigid parts' in note for note in fit.notes)
     above = {bone.name: PERSON.bones[bone.parent].name for bone in PERSON.bones if bone.parent >= 0}
     held = {body.bone.name: set(body.bones) for body in fit.bodies}
     assert len(held) >= 18
@@ -92,13 +92,13 @@ def test_a_helmet_is_part_of_the_head(tmp_path, mirrored):
     assert after.shape.volume > 1.5 * before.shape.volume
 
 
-def test_a_mesh_on_no_bone_is_left_out_and_told(tmp_path):
+def test_a_mesh_on_no_bone_is_ignored_with_a_note(tmp_path):
     made = fit_rigs.document(PERSON)
     helmet(made)
     made.data['nodes'].append({'name': 'floor', 'mesh': 1})
     made.data['scenes'][0]['nodes'].append(len(made.data['nodes']) - 1)
     character = read(made, tmp_path)
-    assert '1 mesh without a skin and on no bone left out' in character.notes
+    assert '1 mesh without a skin and a bone ignored' in character.notes
 
 
 def test_one_mesh_without_a_skin_is_no_character(tmp_path):

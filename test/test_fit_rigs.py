@@ -7,8 +7,8 @@ import pytest
 from fit_rigs import RIGS, fitted
 
 from ragdoll_ros.fit.bodies.overlap import covered
-from ragdoll_ros.fit.judging.doubts import find_doubts
-from ragdoll_ros.fit.pipeline import Options, fit_character
+from ragdoll_ros.fit.judging.plausibility import find_implausible
+from ragdoll_ros.fit.pipeline import FitOptions, fit_character
 from ragdoll_ros.fit.reading.character import read_character
 
 HUMANOIDS = ('mixamo', 'unreal', 'vrm', 'cmu', 'makehuman', 'unnamed', 'z_up', 'scaled_nodes')
@@ -45,7 +45,7 @@ def test_every_rig_gives_a_sound_doll(name):
     # as the bodies do.
     volumes = fit.character.volume(), sum(bone.shape.volume for bone in bodies)
     assert any(fit.doll.mass == pytest.approx(1000 * volume, rel=1e-6) for volume in volumes)
-    assert find_doubts(fit.doll) == []
+    assert find_implausible(fit.doll) == []
     inside = covered(bodies, fit.character.vertices, 0.01)
     assert inside.mean() > 0.9
 
@@ -93,7 +93,7 @@ def test_mirrored_limbs_get_mirrored_bodies(name):
 @pytest.mark.parametrize('orientation', ['bone', 'principal'])
 def test_every_shape_and_orientation_by_choice(shape, orientation):
     character = fitted('four_legs').character
-    fit = fit_character(character, Options(shape=shape, orientation=orientation))
+    fit = fit_character(character, FitOptions(shape=shape, orientation=orientation))
     assert {bone.shape.kind for bone in fit.doll.bones} == {shape}
     if orientation == 'bone':
         assert not any(body.axes.principal for body in fit.bodies)
@@ -102,15 +102,15 @@ def test_every_shape_and_orientation_by_choice(shape, orientation):
 
 def test_options_for_mass_size_and_weight():
     character = fitted('mixamo').character
-    fit = fit_character(character, Options(mass=70, masses='proportions'))
+    fit = fit_character(character, FitOptions(mass=70, masses='proportions'))
     assert fit.doll.mass == pytest.approx(70, rel=1e-8)
     masses = {body.role: body.bone.mass for body in fit.bodies}
     # De Leva's man: a thigh is 14.16 %, a shin 4.33 % of the whole.
     assert masses['thigh'] / masses['shin'] == pytest.approx(14.16 / 4.33, rel=1e-6)
-    many = fit_character(character, Options(smallest=0.001)).doll
-    few = fit_character(character, Options(smallest=0.3)).doll
+    many = fit_character(character, FitOptions(smallest=0.001)).doll
+    few = fit_character(character, FitOptions(smallest=0.3)).doll
     assert len(few.bones) < len(fit.doll.bones) < len(many.bones)
-    wide = fit_character(character, Options(share=0.1))
+    wide = fit_character(character, FitOptions(weight=0.1))
     assert sum(b.vertices for b in wide.bodies) > sum(b.vertices for b in fit.bodies)
 
 
@@ -132,12 +132,12 @@ def test_another_skeleton_is_jointed_where_it_touches():
     assert (first.parent, first.kind) == ('mixamorig:Head', 'ball')
 
 
-def test_another_skeleton_that_touches_nothing_is_tied_and_told(tmp_path):
+def test_another_skeleton_that_touches_nothing_is_fixed_with_a_note(tmp_path):
     far = [dataclasses.replace(bone, head=(*bone.head[:2], bone.head[2] - 1),
                                tail=(*bone.tail[:2], bone.tail[2] - 1))
            if bone.name.startswith('whip') else bone for bone in RIGS['two_skeletons'].bones]
     fit = fit_character(read_character(fit_rigs.write(fit_rigs.Rig('far', far), tmp_path)))
-    assert any('no bone joins whip0' in note for note in fit.notes)
+    assert any('no bone connects whip0' in note for note in fit.notes)
     assert next(joint for joint in fit.doll.joints if joint.child == 'whip0').kind == 'fixed'
 
 
@@ -150,4 +150,4 @@ def test_the_mannequin(tmp_path):
     assert len(fit.character.vertices) == 24256
     assert covered(fit.doll.bones, fit.character.vertices, 0.01).mean() >= 0.9
     assert sum(bone.shape.volume for bone in fit.doll.bones) <= 1.6 * fit.character.volume()
-    assert find_doubts(fit.doll) == []
+    assert find_implausible(fit.doll) == []

@@ -117,21 +117,21 @@ def test_joint_kinds(tmp_path, kind, expected, limits):
     assert doll.joints[0].anchor == (0, 0, 1)
 
 
-def test_dry_friction_is_named_and_left_out(tmp_path):
+def test_dry_friction_is_ignored_with_a_note(tmp_path):
     resists = '<dynamics damping="0.5" friction="2"/>'
     doll, notes = read(tmp_path, link('a'), link('b'), link('c'), link('d'),
                        joint('b', inside=resists), joint('c', inside=resists),
                        joint('d', inside='<dynamics damping="0.5" friction="0"/>'))
     [note] = notes
-    assert note.startswith('to_b, to_c: dry friction') and 'left out' in note
+    assert note.startswith('to_b, to_c: dry friction') and 'ignored' in note
     assert [each.damping for each in doll.joints] == [0.5] * 3
 
 
-def test_how_links_touch_in_pybullet_is_named_and_left_out(tmp_path):
+def test_contact_properties_of_pybullet_are_ignored_with_a_note(tmp_path):
     rubber = '<contact><lateral_friction value="2"/></contact></link>'
     soles = [link(name).replace('</link>', rubber) for name in 'ac']
     _, [note] = read(tmp_path, soles[0], link('b'), soles[1], joint('b'), joint('c'))
-    assert note.startswith('a, c: ') and '<contact>' in note and 'left out' in note
+    assert note.startswith('a, c: ') and '<contact>' in note and 'ignored' in note
 
 
 def test_a_link_without_a_shape_rides_and_gives_its_mass(tmp_path):
@@ -155,7 +155,7 @@ def test_a_bare_root_gives_way_to_its_child(tmp_path):
 def test_two_branches_of_a_bare_root_stay_one_doll(tmp_path):
     doll, notes = read(tmp_path, link('base', '', 0), link('a'), link('b'),
                        joint('a', 'base', xyz='0 1 0'), joint('b', 'base', xyz='0 -1 0'))
-    assert notes == ('to_a: nothing with a shape above it: left out',)
+    assert notes == ('to_a: no link above it has a shape: ignored',)
     assert [(j.parent, j.child, j.kind) for j in doll.joints] == [('a', 'b', 'hinge')]
 
 
@@ -178,7 +178,7 @@ def test_a_link_without_a_mass_gives_its_shapes_to_what_carries_it(tmp_path):
     assert [bone.name for bone in doll.bones] == ['a']
     assert [part.shape for part in doll.root.shape.parts] == [Box((0.1, 0.1, 0.1))] * 2
     # Two cubes, 0.2 m apart, reach from -0.05 to 0.25 m.
-    ends = doll.root.position[2] + np.array([-1, 1]) * doll.root.shape.reach(
+    ends = doll.root.position[2] + np.array([-1, 1]) * doll.root.shape.support(
         np.array([[0, 0, -1], [0, 0, 1]]))
     assert ends == pytest.approx([-0.05, 0.25])
 
@@ -189,17 +189,17 @@ def test_what_is_only_seen_is_a_body_where_nothing_has_a_mass(tmp_path):
     assert len(read(tmp_path, link('a'), seen, joint('b'))[0].bones) == 1
 
 
-def test_a_joint_that_mimics_turns_by_itself_and_is_named(tmp_path):
+def test_a_mimic_joint_becomes_independent_with_a_note(tmp_path):
     doll, notes = read(tmp_path, link('a'), link('b'), link('c'), joint('b'),
                        joint('c', inside='<mimic joint="to_b" multiplier="2"/>'))
     assert [j.kind for j in doll.joints] == ['hinge', 'hinge']
-    assert notes == ('to_c: mimics to_b: in the doll it turns by itself',)
+    assert notes == ('to_c: mimics to_b: becomes an independent joint',)
 
 
-def test_a_shape_of_no_size_is_left_out_and_named(tmp_path):
+def test_a_shape_of_no_size_is_ignored_with_a_note(tmp_path):
     doll, notes = read(tmp_path, link('a'), link('b', '<sphere radius="0"/>', 0),
                        joint('b', kind='fixed'))
-    assert len(doll.bones) == 1 and notes == ('b: a <sphere> of no size is left out',)
+    assert len(doll.bones) == 1 and notes == ('b: a <sphere> of no size is ignored',)
 
 
 def test_hinges_apart_keep_the_first_and_say_so(tmp_path):
@@ -225,7 +225,7 @@ def test_zero_outside_the_limits_starts_at_the_nearest_angle(tmp_path):
 
 
 def test_a_world_with_a_shape_is_a_bone_of_another_name(tmp_path):
-    """Its frame keeps the name: as a rider, which no push is told by."""
+    """Its frame keeps the name: as a rider, which pushes do not refer to."""
     doll, _ = read(tmp_path, link('world'), link('b'), joint('b', 'world'))
     assert [bone.name for bone in doll.bones] == ['world_', 'b']
     assert [(rider.name, rider.bone) for rider in doll.riders] == [('world', 'world_'), ('b', 'b')]
@@ -303,12 +303,12 @@ def test_mass_centre_and_inertia_are_those_of_the_link_and_what_it_carries(tmp_p
     part, = bone.shape.parts
     assert part.shape == Box((0.2, 0.1, 0.3))
     directions = np.concatenate([np.eye(3), -np.eye(3)])
-    reach = directions @ bone.position + bone.shape.reach(directions @ turn)
+    reach = directions @ bone.position + bone.shape.support(directions @ turn)
     assert reach == pytest.approx([0.1, 0.05, 0.15] * 2)
 
 
 @pytest.mark.parametrize('inertia', [(0, 0, 0, 0, 0, 0), (1, 1, 3, 0, 0, 0), (-1, 1, 1, 0, 0, 0)])
-def test_an_inertia_that_no_body_has_is_told_and_left_out(tmp_path, inertia):
+def test_an_unphysical_inertia_is_ignored_with_a_note(tmp_path, inertia):
     shape = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
     doll, notes = read(tmp_path, massive('a', inertia, shape=shape))
     assert doll.root.moments is None and 'no body has its inertia' in notes[0]
@@ -324,7 +324,7 @@ def test_what_is_only_a_mesh_becomes_the_box_of_the_same_inertia(tmp_path):
     assert sorted(doll.root.shape.size) == pytest.approx([0.1, 0.2, 0.4])
     assert sorted(doll.root.inertia) == pytest.approx(sorted((x, y, z)))
     assert np.allclose(doll.root.position, (0, 0, 0.5))
-    assert 'a.stl is left out: no such file' in notes[0]
+    assert 'a.stl is ignored: no such file' in notes[0]
     assert 'box of the same inertia' in notes[1]
     # What no box as dense as matter could have: a cube of water's size.
     doll, notes = read(tmp_path, mesh.replace(f'ixx="{x}"', 'ixx="1"').replace(

@@ -1,4 +1,4 @@
-"""The unit of a file: a person's height tells it, of anything else that it is not too long."""
+"""Length unit of a file: from a person's height, else from the largest plausible extent."""
 import numpy as np
 import pytest
 from fit_rigs import fitted

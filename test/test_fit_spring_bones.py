@@ -8,14 +8,14 @@ from ragdoll_ros.files.doll import load_doll, save_doll
 from ragdoll_ros.fit.command import main
 from ragdoll_ros.fit.pipeline import fit_character
 from ragdoll_ros.fit.reading.character import read_character
-from ragdoll_ros.fit.reading.spring_bones import Rod, Spring
-from ragdoll_ros.fit.reading.spring_recipe import swing_of
+from ragdoll_ros.fit.reading.spring_bones import SpringBone, SpringJoint
+from ragdoll_ros.fit.reading.spring_to_swing import swing_from_spring
 from ragdoll_ros.fit.report import fit_report
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.scene import above_ground
 from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.physics.swing.mount import Mount
+from ragdoll_ros.physics.swing.mount import SwingMount
 from ragdoll_ros.physics.swing.swings import Swings
 
 POINTS = [(0, 1.7, -.1), (0, 1.68, -.25), (.05, 1.5, -.3), (.05, 1.25, -.3)]
@@ -78,7 +78,7 @@ def test_the_ponytail_hangs_from_the_head(fit):
     assert len(swing.links) == 3
     check_chain(swing, POINTS)
     assert not {'tail0', 'tail1', 'tail2'} & {bone.name for bone in fit.doll.bones}
-    assert 'springs of the character that became swings: 1, with 3 links' in fit_report(fit)
+    assert 'spring bones that became swings: 1, with 3 links' in fit_report(fit)
 
 
 def test_the_head_is_no_larger_for_it(fit):
@@ -144,18 +144,18 @@ def vrm_frames(rod, length, angle, gravity_way, count):
 
 def still(swing):
     frame = State(np.zeros((1, 3)), np.array([rotation.IDENTITY]), *np.zeros((2, 1, 3)))
-    mount = Mount(swing, 0, swing.name, np.zeros(3), np.array(swing.directions()))
+    mount = SwingMount(swing, 0, swing.name, np.zeros(3), np.array(swing.directions()))
     return Swings([mount], (0, 0, -9.8), lambda time: frame)
 
 
 def single(rod, length=.12):
-    spring = Spring('s', (0, 1), (rod,), np.array([[0.0, 0, 0], [length, 0, 0]]))
-    return swing_of(spring, 'b', 1.0)[0]
+    spring = SpringBone('s', (0, 1), (rod,), np.array([[0.0, 0, 0], [length, 0, 0]]))
+    return swing_from_spring(spring, 'b', 1.0)[0]
 
 
 @pytest.mark.parametrize(('stiffness', 'drag'), [(1, .4), (4, .1), (.3, .7), (1, .05)])
 def test_it_moves_as_vrm_at_60_frames(stiffness, drag):
-    rod = Rod(stiffness, 0.0, drag)
+    rod = SpringJoint(stiffness, 0.0, drag)
     expected = vrm_frames(rod, .12, .02, (0, 0), 40)
     swings = still(single(rod))
     # The recipe's second frame is its first step from rest: it starts with the speed of the roots.
@@ -181,7 +181,7 @@ def start_rate(angles):
 @pytest.mark.parametrize(('stiffness', 'gravity'), [(1, .1), (4, 1.0), (2, .5)])
 def test_it_sags_as_far_as_vrm(stiffness, gravity):
     """A level rod comes to rest where stiffness sin(a) = gravity cos(a)."""
-    rod = Rod(stiffness, gravity, .5)
+    rod = SpringJoint(stiffness, gravity, .5)
     # What is left of the way there shrinks by a third a frame or more: 180 of them leave nothing.
     expected = vrm_frames(rod, .12, 0.0, (0, -1), 180)[-1]
     swings = still(single(rod))
@@ -241,7 +241,7 @@ def test_broken_springs_end_in_one_sentence(tmp_path, capsys, name):
     assert 'extensions.VRM' in error
 
 
-def test_a_spring_of_one_node_is_left_out_with_a_note(tmp_path):
+def test_a_spring_of_one_node_is_ignored_with_a_note(tmp_path):
     change = set_all([{'joints': [{'node': FIRST}]}], 'VRMC_springBone', 'springs')
     fit = fit_character(read_character(written(tmp_path, change)))
     assert not fit.doll.swings

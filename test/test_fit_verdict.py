@@ -8,7 +8,7 @@ import pytest
 from fit_rigs import RIGS, fitted
 
 from ragdoll_ros.files.doll import load_doll
-from ragdoll_ros.fit.judging.trial import find_in_a_fall
+from ragdoll_ros.fit.judging.drop_test import run_drop_test
 from ragdoll_ros.fit.judging.verdict import judge
 from ragdoll_ros.fit.pipeline import fit_character
 from ragdoll_ros.fit.reading.character import read_character
@@ -156,7 +156,7 @@ def test_falls_call_no_right_doll_wrong():
     (rooted_in_a_limb, 'the root is mixamorig:LeftForeArm, a bone of the limbs'),
     (heavy_end, 'LeftHand has 10 times the mass of mixamorig:RightHand'),
     (end_of_another_kind, 'LeftHand has a fixed joint, and mixamorig:RightHand a universal one'),
-    (half_uncovered, 'holds [0-9]+ % of its skin'),
+    (half_uncovered, 'covers [0-9]+ % of its skin'),
     (one_knee_the_other_way, 'the ranges of .* differ by 135 degrees'),
     (a_giants_mass, '220 kg: [67][0-9] kg/m'),
     (heavy_head, "head has .* % of the mass, where a person's has 6.94 %")])
@@ -199,11 +199,11 @@ def test_a_robot_may_be_of_steel():
                      for measured in (False, True)) == words
 
 
-def test_a_joint_past_its_limits_is_told_by_a_fall():
+def test_the_drop_test_finds_a_joint_past_its_limits():
     """Bound 57 degrees outside its range."""
     doll = fitted('mixamo').doll
-    assert find_in_a_fall(doll, 1.8) == []
+    assert run_drop_test(doll, 1.8) == []
     foot = joint_of(doll, 'mixamorig:LeftFoot')
     twin = with_joint(doll, foot.child, limits=((1.0, 1.2), foot.limits[1]))
-    finding, = find_in_a_fall(twin, 1.8)
+    finding, = run_drop_test(twin, 1.8)
     assert '57 degrees past its limits' in finding.sentence and finding.wrong

@@ -6,7 +6,7 @@ from wild_rigs import WILD, fitted
 
 def distance_off(bone, point):
     """How far a point is outside a body, of the body's longest extent."""
-    off = float(bone.shape.signed_distance(bone.pose.inward(np.reshape(point, (1, 3))))[0])
+    off = float(bone.shape.signed_distance(bone.pose.apply_inverse(np.reshape(point, (1, 3))))[0])
     return max(off, 0) / (2 * max(bone.shape.half_extents))
 
 

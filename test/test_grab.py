@@ -17,11 +17,11 @@ from ragdoll_ros.model.shapes import Box, Sphere
 from ragdoll_ros.physics.accuracy import NORMAL
 from ragdoll_ros.physics.actions.grab import (
     FREQUENCY,
-    LARGEST_ACCELERATION,
-    LARGEST_PULL,
-    MOST_HANDS,
+    MAX_ACCELERATION,
+    MAX_FORCE,
+    MAX_HANDS,
 )
-from ragdoll_ros.physics.engine.substepped.doll_sums import DollSums
+from ragdoll_ros.physics.engine.doll_totals import DollSums
 from ragdoll_ros.physics.engine.substepped.explicit_springs import mobility
 from ragdoll_ros.physics.simulation import Simulation
 
@@ -106,8 +106,8 @@ def test_a_hand_pulls_no_harder_than_it_may():
             state = simulation.advance()
     momentum = conserved(FLIGHT, state).momentum
     # The bone gives way askew, and the pull is askew by some 2 degrees to make up for it.
-    assert momentum == pytest.approx((LARGEST_PULL * 0.2, 0, 0), abs=0.05 * LARGEST_PULL * 0.2)
-    assert 0.995 < np.linalg.norm(momentum) / (LARGEST_PULL * 0.2) <= 1 + 1e-9
+    assert momentum == pytest.approx((MAX_FORCE * 0.2, 0, 0), abs=0.05 * MAX_FORCE * 0.2)
+    assert 0.995 < np.linalg.norm(momentum) / (MAX_FORCE * 0.2) <= 1 + 1e-9
 
 
 def test_a_light_doll_is_pulled_gently():
@@ -116,7 +116,7 @@ def test_a_light_doll_is_pulled_gently():
         simulation.drag('hand', (5, 0, 0), 0.0)
         for _ in range(10):
             state = simulation.advance()
-    assert state.linear_velocities[0, 0] == pytest.approx(LARGEST_ACCELERATION * 0.1, rel=1e-6)
+    assert state.linear_velocities[0, 0] == pytest.approx(MAX_ACCELERATION * 0.1, rel=1e-6)
 
 
 def test_mobility_is_that_of_a_rigid_body():
@@ -282,17 +282,17 @@ def swung(hands):
 
 def test_many_hands_at_one_point_do_not_quarrel():
     """They hold it as one that is stronger."""
-    assert np.linalg.norm(swung(MOST_HANDS)) <= np.linalg.norm(swung(1))
+    assert np.linalg.norm(swung(MAX_HANDS)) <= np.linalg.norm(swung(1))
 
 
 def test_more_hands_than_there_may_be_are_refused():
     with Simulation(DROP) as simulation:
-        for number in range(MOST_HANDS):
+        for number in range(MAX_HANDS):
             simulation.grab(f'hand {number}', 'torso')
         with pytest.raises(errors.OutOfRange, match='hands'):
             simulation.grab('one more', 'head')
         simulation.grab('hand 3', 'head')
-        assert len(simulation.grabs) == MOST_HANDS
+        assert len(simulation.grabs) == MAX_HANDS
 
 
 def test_a_doll_that_sleeps_wakes_and_is_lifted():

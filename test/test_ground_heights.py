@@ -66,8 +66,8 @@ def test_a_hammer_on_its_head_and_on_its_handle():
 
 def test_equal_dolls_share_what_is_read_of_them(monkeypatch):
     """However many there are, each of a doll's shapes is read once."""
-    read, support = [], Sphere.support
-    monkeypatch.setattr(Sphere, 'support', property(
+    read, support = [], Sphere.support_terms
+    monkeypatch.setattr(Sphere, 'support_terms', property(
         lambda shape: (read.append(shape), support.fget(shape))[1]))
     doll = Ragdoll('ball', (Bone('ball', Sphere(0.1), 1.0, (0, 0, 0)),))
     scene = scene_of(doll, ground=LEVEL)

@@ -69,7 +69,7 @@ def test_one_bad_doll_of_a_crowd_is_found():
         guard, found = Guard(simulation), 0
         for tick in range(150):
             doll = tick % 10
-            if tick % 15 == 7 and not simulation._engine.resting[doll]:
+            if tick % 15 == 7 and not simulation._engine.sleeping[doll]:
                 poison(simulation, 'a NaN of speed', slice(doll, doll + 1))
                 assert guard.advance() is not None
                 found += 1

@@ -12,7 +12,7 @@ from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Ground, Placement, Scene
 from ragdoll_ros.model.shapes import Box
-from ragdoll_ros.physics.sensors.imu import Flaws, Mount, sensor_motion, trail_samples
+from ragdoll_ros.physics.sensors.imu import ImuErrors, ImuMount, sensor_motion, tick_samples
 from ragdoll_ros.physics.simulation import Simulation
 
 G = 9.8
@@ -34,8 +34,8 @@ def samples_of(simulation, mount, ticks):
     rows, read = [simulation.state.rows[bone]], []
     for _ in range(ticks):
         simulation.advance()
-        read.append(trail_samples(simulation.trail, bone, mount, simulation.step, scene.gravity))
-        rows += [state.rows[bone] for state in simulation.trail[1:]]
+        read.append(tick_samples(simulation.substates, bone, mount, simulation.step, scene.gravity))
+        rows += [state.rows[bone] for state in simulation.substates[1:]]
     return np.concatenate(read), np.array(rows)
 
 
@@ -44,10 +44,10 @@ def test_at_rest_it_reads_g_upwards():
     scene = dataclasses.replace(arm(), ground=Ground((0, 0, 1), 0.0), dolls=(
         dataclasses.replace(doll, position=(0, 0, 0.05)),))
     with Simulation(scene) as simulation:
-        read, _ = samples_of(simulation, Mount('bar'), 50)
+        read, _ = samples_of(simulation, ImuMount('bar'), 50)
         assert read == pytest.approx(np.tile([0, 0, G, 0, 0, 0], (50, 1)), abs=1e-6)
         # Turned by 0.6 rad about y, its x points down: gravity's reaction is -sin, cos.
-        read, _ = samples_of(simulation, Mount('bar', (0.1, 0, 0), TILTED), 5)
+        read, _ = samples_of(simulation, ImuMount('bar', (0.1, 0, 0), TILTED), 5)
         assert read[-1] == pytest.approx(
             [-G * math.sin(0.6), 0, G * math.cos(0.6), 0, 0, 0], abs=1e-6)
 
@@ -55,9 +55,9 @@ def test_at_rest_it_reads_g_upwards():
 @pytest.mark.parametrize('parts', [1, 10])
 def test_in_free_fall_it_reads_nothing(parts):
     with Simulation(arm(velocity=(1, 2, 3))) as simulation:
-        simulation.parts = parts
+        simulation.samples_per_tick = parts
         for place in PLACES:
-            read, _ = samples_of(simulation, Mount('bar', place), 30)
+            read, _ = samples_of(simulation, ImuMount('bar', place), 30)
             assert np.abs(read).max() < 1e-6
 
 
@@ -65,8 +65,8 @@ def test_in_free_fall_it_reads_nothing(parts):
 def test_a_spinning_arm_in_flight_reads_the_centripetal_term(place):
     rate = 5.0
     with Simulation(arm(spin=(0, 0, rate))) as simulation:
-        simulation.parts = 10
-        read, _ = samples_of(simulation, Mount('bar', place, (0, 0, 0, 1)), 30)
+        simulation.samples_per_tick = 10
+        read, _ = samples_of(simulation, ImuMount('bar', place, (0, 0, 0, 1)), 30)
     x, y, _ = place
     expected = [-rate ** 2 * x, -rate ** 2 * y, 0, 0, 0, rate]
     assert np.abs(read - expected).max() < 1e-6
@@ -79,9 +79,9 @@ def test_an_arm_that_spins_up_reads_the_centripetal_and_the_euler_term(place):
     """
     growth, scene = 2.0, arm(spin=(0, 0, 1.0))
     with Simulation(scene) as simulation:
-        simulation.parts = 10
+        simulation.samples_per_tick = 10
         simulation.push(Push('bar', torque=(0, 0, growth * scene.bones[0].inertia[2]), duration=1))
-        read, _ = samples_of(simulation, Mount('bar', place), 50)
+        read, _ = samples_of(simulation, ImuMount('bar', place), 50)
     speed = 1.0 + growth * (np.arange(500) + 0.5) * 1e-3
     x, y, _ = place
     expected = np.zeros((500, 6))
@@ -107,9 +107,9 @@ def integrated(read, step, position, orientation, velocity):
 
 def test_a_train_of_samples_gives_a_flight_of_a_second_back():
     scene = dataclasses.replace(load_scene('flight'), gravity=(0, 0, -G))
-    mount = Mount('left_forearm', (0.02, 0.05, -0.01), (0.5, 0.5, 0.5, 0.5))
+    mount = ImuMount('left_forearm', (0.02, 0.05, -0.01), (0.5, 0.5, 0.5, 0.5))
     with Simulation(scene) as simulation:
-        simulation.parts = 10
+        simulation.samples_per_tick = 10
         simulation.push(Push('left_forearm', force=(60, -40, 80), torque=(1, 2, -1)))
         read, rows = samples_of(simulation, mount, 100)
     where, turns, velocities = sensor_motion(rows, mount)
@@ -128,8 +128,8 @@ def test_an_impact_gives_all_that_it_changed_at_any_rate():
         scene = dataclasses.replace(arm(), ground=Ground((0, 0, 1), 0.0), dolls=(
             dataclasses.replace(doll, position=(0, 0, 0.3)),))
         with Simulation(scene) as simulation:
-            simulation.parts = parts
-            read, rows = samples_of(simulation, Mount('bar'), 60)
+            simulation.samples_per_tick = parts
+            read, rows = samples_of(simulation, ImuMount('bar'), 60)
             step = simulation.step / parts
             sums.append(read[:, 2].sum() * step)
             assert sums[-1] == pytest.approx(rows[-1, 9] - rows[0, 9] + G * 0.6, abs=1e-9)
@@ -145,13 +145,14 @@ def test_the_tick_is_the_same_whether_anybody_reads():
             for _ in range(80):
                 simulation.advance()
                 if listens:
-                    trail_samples(simulation.trail, 1, Mount('head'), simulation.step, (0, 0, -G))
+                    tick_samples(simulation.substates, 1, ImuMount('head'), simulation.step,
+                                 (0, 0, -G))
             rows.append(simulation.state.rows)
     assert (rows[0] == rows[1]).all()
 
 
 def test_noise_bias_and_range():
-    flaws = Flaws(0.05, 0.01, bias=(1, 0, 0, 0, 0, 0.5))
+    flaws = ImuErrors(0.05, 0.01, bias=(1, 0, 0, 0, 0, 0.5))
     true = np.tile([0, 0, G, 0, 0, 0], (100_000, 1))
     read = flaws(true, np.random.default_rng(7)) - true
     # Of 300 000 values a variance is known to 0.26 %, a mean to 0.06 % of the deviation.
@@ -160,16 +161,16 @@ def test_noise_bias_and_range():
     assert read.mean(axis=0) == pytest.approx([1, 0, 0, 0, 0, 0.5], abs=1e-3)
     again = flaws(true, np.random.default_rng(7)) - true
     assert (read == again).all()
-    clipped = Flaws(range=(5.0, 0.0))(np.array([[1, -9, G, 8, 0, 0]]), np.random.default_rng(0))
+    clipped = ImuErrors(range=(5.0, 0.0))(np.array([[1, -9, G, 8, 0, 0]]), np.random.default_rng(0))
     assert clipped.tolist() == [[1, -5, 5, 8, 0, 0]]
-    assert (Flaws()(true, np.random.default_rng(0)) == true).all()
+    assert (ImuErrors()(true, np.random.default_rng(0)) == true).all()
 
 
 def test_wrong_numbers_are_refused():
     for wrong in ({'noise_rate': -1.0}, {'bias': (0, 0, math.nan, 0, 0, 0)}, {'range': (-1, 0)}):
         with pytest.raises(errors.ModelError):
-            Flaws(**wrong)
+            ImuErrors(**wrong)
     with pytest.raises(errors.ModelError):
-        Mount('head', orientation=(0, 0, 0, 0))
-    with Simulation(arm()) as simulation, pytest.raises(errors.OutOfRange, match='parts'):
-        simulation.parts = 0
+        ImuMount('head', orientation=(0, 0, 0, 0))
+    with Simulation(arm()) as simulation, pytest.raises(errors.OutOfRange, match='samples_per'):
+        simulation.samples_per_tick = 0

@@ -20,7 +20,7 @@ from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.scene import Ground, Placement, Scene
 from ragdoll_ros.model.shapes import Box, Sphere
-from ragdoll_ros.physics.engine.substepped.doll_sums import DollSums
+from ragdoll_ros.physics.engine.doll_totals import DollSums
 
 DOLL = without_damping(load_doll('doll'))
 
@@ -42,7 +42,7 @@ def test_energy_and_momentum_are_those_of_the_mechanics_module():
     """What the simulation steers itself by, judged by sums written apart: to rounding."""
     scene, _, moved = moving_doll()
     metrics, mechanics = Metrics(scene), DollSums(scene)
-    motions = [mechanics.motion(moved.at(i)) for i in range(len(moved.times))]
+    motions = [mechanics.totals(moved.at(i)) for i in range(len(moved.times))]
     for own, theirs in (
             (metrics.energy(moved), [motion.energy[0] for motion in motions]),
             (metrics.momentum(moved), [motion.momentum[0] for motion in motions]),

@@ -39,7 +39,7 @@ def test_poses_and_velocities_are_those_of_the_tree(engine, doll, seed):
     """Forward kinematics of three independent programs; 1e-7 rad is the root of rounding."""
     simulated = engine(flying(doll), PLAIN)
     placed = random_coordinates(flying(doll), seed, bend=.4)
-    simulated.place(placed)
+    simulated.set_coordinates(placed)
     back = simulated.coordinates
     sign = np.sign(back.q[3:7] @ placed.q[3:7])
     back.q[3:7] *= sign
@@ -89,7 +89,7 @@ def test_a_ball_rests_on_a_tilted_ground_and_tells_of_it():
                   Material(restitution=0), gravity=-9.8 * normal)
     engine = MujocoEngine(scene, NORMAL)
     engine.advance(1.0)
-    assert engine.grounded().all()
+    assert engine.dolls_on_ground().all()
     found = engine.contacts()
     assert (found.a, found.b) == ([0], [GROUND])
     assert found.normals == pytest.approx(normal[None], abs=1e-9)
@@ -147,7 +147,7 @@ def test_a_limit_holds_a_swinging_bone():
     start = engine.coordinates
     elbow = Scene('slam', (Placement(doll),)).angle_names.index('left_forearm')
     start.v[6 + elbow] = 5.0
-    engine.place(start)
+    engine.set_coordinates(start)
     worst = max(_stepped(engine).coordinates.q[7 + elbow] for _ in range(200))
     assert 0 < worst < np.radians(10)
 

@@ -12,7 +12,7 @@ from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Ground, Material, Placement, Scene
 from ragdoll_ros.model.shapes import Box, Sphere
-from ragdoll_ros.physics.actions.push_queue import MOST_PUSHES
+from ragdoll_ros.physics.actions.push_queue import MAX_PUSHES
 from ragdoll_ros.physics.simulation import Simulation
 
 DROP, FLIGHT = load_scene('drop'), load_scene('flight')
@@ -215,9 +215,9 @@ def test_pushes_on_nothing_in_the_past_or_too_many_are_refused():
         simulation.advance()
         with pytest.raises(errors.OutOfRange):
             simulation.push(Push('torso', start=0.0))
-        for _ in range(MOST_PUSHES):
+        for _ in range(MAX_PUSHES):
             simulation.push(Push('torso', duration=1))
-        with pytest.raises(errors.OutOfRange, match=str(MOST_PUSHES)):
+        with pytest.raises(errors.OutOfRange, match=str(MAX_PUSHES)):
             simulation.push(Push('torso'))
 
 

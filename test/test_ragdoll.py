@@ -53,8 +53,8 @@ def test_volume_and_inertia_are_those_of_the_uniform_solid(shape):
     for axis in (*np.eye(3), np.array([1, 2, -3]) / math.sqrt(14)):
         farthest = (points[inside] @ axis).max()
         # Random points come within 2 % of the surface, and never beyond it.
-        assert farthest <= shape.reach(axis) + 1e-12
-        assert shape.reach(axis) == pytest.approx(farthest, rel=0.06)
+        assert farthest <= shape.support(axis) + 1e-12
+        assert shape.support(axis) == pytest.approx(farthest, rel=0.06)
 
 
 @pytest.mark.parametrize(('make', 'error'), [

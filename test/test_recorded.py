@@ -17,15 +17,17 @@ from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.scene import Ground
 from ragdoll_ros.physics.accuracy import NORMAL, Accuracy
 from ragdoll_ros.physics.logged_simulation import (
-    RecordedSimulation,
+    LoggedSimulation,
     accuracy_from,
-    repeat,
+    apply_event,
     state_digest,
 )
 from ragdoll_ros.physics.simulation import Simulation
 
-QUIET = {'checkpoint', 'advance', 'measures', 'close', 'swings', 'contacts', 'coordinates'}
-"""Public names of Simulation that change nothing, or only by the ticks that are counted."""
+QUIET = {'checkpoint', 'advance', 'measures', 'close', 'swings', 'contacts', 'coordinates',
+         'starts', 'parts', 'trail'}
+"""Public names of Simulation that change nothing, or only by the ticks that are counted, and its
+deprecated names, which lead to new ones."""
 
 
 def disturb_more(simulation, tick):
@@ -50,7 +52,7 @@ def disturb_more(simulation, tick):
     elif tick == 55 and simulation.engine_name == 'rigid':
         simulation.go_limp(['left_shin'])
     elif tick == 175:
-        simulation.parts = 3
+        simulation.samples_per_tick = 3
     elif tick == 180:
         simulation.reset()
 
@@ -58,8 +60,9 @@ def disturb_more(simulation, tick):
 def recorded_run(scene, engine, ticks):
     """Digests of all states, and all acts as lines of JSON, each with its tick."""
     lines, digests = [], []
-    with RecordedSimulation(scene, engine=engine) as simulation:
-        simulation.tell = lambda name, given: lines.append(json.dumps([len(digests), name, given]))
+    with LoggedSimulation(scene, engine=engine) as simulation:
+        simulation.on_event = lambda name, given: lines.append(
+            json.dumps([len(digests), name, given]))
         for tick in range(ticks):
             disturb_more(simulation, tick)
             digests.append(state_digest(simulation.advance()))
@@ -78,7 +81,7 @@ def test_the_same_acts_give_the_same_bits(engine):
     with Simulation(again, engine=engine) as simulation:
         for tick, digest in enumerate(digests):
             for _, name, arguments in [act for act in acts if act[0] == tick]:
-                repeat(simulation, name, arguments)
+                apply_event(simulation, name, arguments)
             assert state_digest(simulation.advance()) == digest, tick
 
 
@@ -86,7 +89,7 @@ def test_every_way_to_act_is_told():
     """A method that is added to Simulation must be told, or stand among the quiet ones."""
     ways = {name for name, value in vars(Simulation).items() if not name.startswith('_') and (
         callable(value) or getattr(value, 'fset', None))}
-    assert ways - QUIET == {name for name in vars(RecordedSimulation) if name in ways}
+    assert ways - QUIET == {name for name in vars(LoggedSimulation) if name in ways}
 
 
 def test_a_digest_is_that_of_the_rows_of_doubles():
@@ -99,8 +102,8 @@ def test_a_digest_is_that_of_the_rows_of_doubles():
 
 def test_what_ends_no_push_is_not_told():
     told = []
-    with RecordedSimulation(load_scene('flight')) as simulation:
-        simulation.tell = lambda name, given: told.append(name)
+    with LoggedSimulation(load_scene('flight')) as simulation:
+        simulation.on_event = lambda name, given: told.append(name)
         simulation.release('keys')
         simulation.push(Push('head', (1, 0, 0)), 'keys')
         simulation.release('keys')
@@ -109,8 +112,8 @@ def test_what_ends_no_push_is_not_told():
 
 def test_what_is_refused_is_not_told():
     told = []
-    with RecordedSimulation(load_scene('flight')) as simulation:
-        simulation.tell = lambda name, given: told.append(name)
+    with LoggedSimulation(load_scene('flight')) as simulation:
+        simulation.on_event = lambda name, given: told.append(name)
         with pytest.raises(errors.UnknownBone):
             simulation.push(Push('tail', (1, 0, 0)))
         with pytest.raises(errors.OutOfRange):
@@ -126,7 +129,7 @@ def test_what_is_refused_is_not_told():
     ('accuracy', {'step': 'a'}), ('place', {'q': [], 'v': []})])
 def test_what_is_no_act_is_refused_by_name(name, arguments):
     with Simulation(load_scene('flight')) as simulation, pytest.raises(errors.ModelError) as caught:
-        repeat(simulation, name, arguments)
+        apply_event(simulation, name, arguments)
     assert 'expected' in str(caught.value)
 
 

@@ -17,11 +17,10 @@ from ragdoll_ros.model.scene import SECOND, Placement, above_ground
 from ragdoll_ros.model.shapes import Capsule
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.bvh_file import bvh_text
-from ragdoll_ros.recordings.csv_file import csv_text
 from ragdoll_ros.recordings.gltf.gltf_file import gltf_bytes
-from ragdoll_ros.recordings.gltf.vertex_normals import creased
-from ragdoll_ros.recordings.recording import Pose, Recorder
-from ragdoll_ros.recordings.save import FORMATS, save_recording
+from ragdoll_ros.recordings.gltf.vertex_normals import crease_normals
+from ragdoll_ros.recordings.recording import RecordedPose, Recorder
+from ragdoll_ros.recordings.save import FORMATS, csv_text, save_recording
 
 TICKS = 80
 LOOKED_AT = (0, 13, 41, TICKS - 1)
@@ -35,7 +34,8 @@ def moved(scene, ticks=TICKS, force=(600.0, 300.0, 0.0)):
         simulation.push(Push(scene.bone_names[0], force, duration=0.2))
         for _ in range(ticks):
             state = simulation.advance()
-            recorder.add(simulation.time / SECOND, Pose(state.positions, state.orientations))
+            recorder.add(simulation.time / SECOND,
+                         RecordedPose(state.positions, state.orientations))
             states.append(state)
     return recorder.recording(), states
 
@@ -63,8 +63,8 @@ def joint_places(scene, state):
         index = {bone.name: k for k, bone in enumerate(placement.doll.bones, part.start)}
         for joint in placement.doll.joints:
             bone = placement.doll.bone(joint.child)
-            local = bone.pose.inward(np.array(joint.anchor))
-            places.append(state.poses(index[joint.child]).outward(local))
+            local = bone.pose.apply_inverse(np.array(joint.anchor))
+            places.append(state.poses(index[joint.child]).apply(local))
             names.append((placement.name, joint.child))
     return names, np.array(places)
 
@@ -116,7 +116,7 @@ def test_gltf_has_every_joint_within_a_micrometre(run):
             matrix = placed.graph.get(node)[0]
             bone = dolls[doll].bone(child)
             anchor = next(joint.anchor for joint in dolls[doll].joints if joint.child == child)
-            local = bone.pose.inward(np.array(anchor))[[1, 2, 0]]
+            local = bone.pose.apply_inverse(np.array(anchor))[[1, 2, 0]]
             read = to_ros(matrix[:3, :3] @ local + matrix[:3, 3])
             assert np.linalg.norm(read - place) < 1e-6, (child, key)
 
@@ -136,7 +136,7 @@ def test_gltf_has_the_bones_shapes_in_their_places(run):
 def _box(bone, position, orientation):
     """Corners of the box around a bone, along the world's axes."""
     back = rotation.inverse(orientation)
-    reach = [bone.shape.reach(rotation.rotate(back, sign * axis)) for sign in (-1, 1)
+    reach = [bone.shape.support(rotation.rotate(back, sign * axis)) for sign in (-1, 1)
              for axis in np.eye(3)]
     return position - reach[:3], position + reach[3:]
 
@@ -224,7 +224,7 @@ def test_bvh_of_uneven_times_goes_evenly():
     for time in (0.0, 0.01, 0.04, 0.05):
         places = np.zeros((count, 3))
         places[:, 0] = time
-        recorder.add(time, Pose(places, np.tile((0, 0, 0, 1.0), (count, 1))))
+        recorder.add(time, RecordedPose(places, np.tile((0, 0, 0, 1.0), (count, 1))))
     rows = bvh_text(recorder.recording()).splitlines()[-4:]
     read = [float(row.split()[2]) / 100 for row in rows]  # forward is +Z
     assert read == pytest.approx([0, 0.05 / 3, 0.1 / 3, 0.05], abs=1e-9)
@@ -247,7 +247,7 @@ def test_csv_reads_back_to_the_bit(run):
 def test_normals_of_a_capsule_point_away_from_its_axis():
     """Radially on its barrel, from the ends' centres on its balls: to half a face's 9 degrees."""
     shape = Capsule(0.1, 0.4)
-    places, normals = creased(*shape.mesh())
+    places, normals = crease_normals(*shape.mesh())
     axis = places.copy()
     axis[:, :2] = 0
     axis[:, 2] = np.clip(places[:, 2], -0.2, 0.2)

@@ -74,7 +74,7 @@ def test_one_number_that_is_another_is_found_at_the_next_hash(tmp_path, replay, 
     push['force'][1] += 1e-9
     code, said, _ = replay(write_bag(tmp_path / 'bag', with_events(messages, changed)))
     assert code == 1
-    assert 'part after tick 20, at tick 30 at the latest' in said
+    assert 'differ after tick 20, at tick 30 at the latest' in said
     # The reset brings both to the same start: 160 to 200 are equal again, as was 0 to 20.
     assert '7 of 21 hashes equal' in said
 
@@ -83,7 +83,7 @@ def test_a_state_that_is_another_from_the_start_is_said(tmp_path, replay, messag
     changed = events(messages)
     changed[0]['state'] = '0' * 64
     code, said, _ = replay(write_bag(tmp_path / 'bag', with_events(messages, changed)))
-    assert code == 1 and 'part at tick 0' in said
+    assert code == 1 and 'differ at tick 0' in said
 
 
 @pytest.mark.parametrize('suffix', ['.mcap', '.db3'])
@@ -96,7 +96,7 @@ def test_a_torn_file_is_read_up_to_the_tear(tmp_path, replay, messages, suffix):
         torn.write_bytes(whole[:len(whole) * tenth // 10])
         code, said, warned = replay(torn)
         if code == 0:
-            assert 'breaks off' in warned
+            assert 'is truncated' in warned
             count, of = said.split(' repeated, ')[1].split(' hashes')[0].split(' of ')
             assert count == of
             read.append(int(count))
@@ -124,7 +124,7 @@ def test_chunks_that_are_compressed_are_read_up_to_the_last_whole_one(tmp_path, 
     whole = path.read_bytes()
     path.write_bytes(whole[:len(whole) // 2])
     code, said, warned = replay(path)
-    assert code == 0 and 'breaks off' in warned and '0 of 0' not in said
+    assert code == 0 and 'is truncated' in warned and '0 of 0' not in said
 
 
 def test_damage_within_a_file_is_no_traceback(tmp_path, replay, messages):
@@ -134,7 +134,7 @@ def test_damage_within_a_file_is_no_traceback(tmp_path, replay, messages):
     data[middle:middle + 40] = b'\xff' * 40
     file.write_bytes(data)
     code, _, warned = replay(file)
-    assert code in (0, 2) and ('breaks off' in warned or 'expected' in warned)
+    assert code in (0, 2) and ('is truncated' in warned or 'expected' in warned)
 
 
 def test_the_scene_of_another_run_is_no_scene_of_this_one(tmp_path, replay, messages):

@@ -8,7 +8,7 @@ from sensor_msgs.msg import Imu
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model.errors import RagdollError
-from ragdoll_ros.physics.sensors.imu import Mount, trail_samples
+from ragdoll_ros.physics.sensors.imu import ImuMount, tick_samples
 from ragdoll_ros.physics.simulation import Simulation
 
 SCENE = {'scene': 'woman_faints', 'publish_clock': True}
@@ -31,7 +31,7 @@ def heard(node, peer, ticks, bone='head'):
     node.reset()
     for _ in range(ticks):
         node.tick()
-    peer.wait(lambda: len(got) >= ticks * node.simulation.parts)
+    peer.wait(lambda: len(got) >= ticks * node.simulation.samples_per_tick)
     read, stamps = zip(*(numbers(message) for _, message in got), strict=True)
     return np.array(read), stamps, got[0][1]
 
@@ -40,14 +40,14 @@ def test_samples_are_those_of_the_library(make_node, peer):
     node = make_node(**SCENE, imus=['head 0.1 0 0.05 0 0 1.5'], imu_rate=1000.0)
     read, stamps, first = heard(node, peer, 5)
     scene = load_scene('woman_faints')
-    mount = Mount('head', (0.1, 0, 0.05), (0, 0, np.sin(0.75), np.cos(0.75)))
+    mount = ImuMount('head', (0.1, 0, 0.05), (0, 0, np.sin(0.75), np.cos(0.75)))
     expected = []
     with Simulation(scene) as simulation:
-        simulation.parts = 10
+        simulation.samples_per_tick = 10
         for _ in range(5):
             simulation.advance()
-            expected.append(trail_samples(simulation.trail, scene.bone_index('head'), mount,
-                                          simulation.step, scene.gravity))
+            expected.append(tick_samples(simulation.substates, scene.bone_index('head'), mount,
+                                         simulation.step, scene.gravity))
     assert np.abs(read - np.concatenate(expected)).max() < 1e-12
     assert stamps == tuple(1_000_000 * number for number in range(1, 51))
     assert first.header.frame_id == 'head_imu'
@@ -79,10 +79,10 @@ def test_sensors_are_put_on_and_off_live(make_node, peer):
     assert not any('/imu/' in topic for topic in topics)
     done = node.set_parameters_atomically([
         Parameter('imus', value=['pelvis', 'left_forearm']), Parameter('imu_rate', value=200.0)])
-    assert done.successful and node.simulation.parts == 2
+    assert done.successful and node.simulation.samples_per_tick == 2
     assert len(heard(node, peer, 3, 'left_forearm')[0]) == 6
     node.set_parameters_atomically([Parameter('imus', value=[''])])
-    assert node.simulation.parts == 1
+    assert node.simulation.samples_per_tick == 1
     assert not [p for p in node.publishers if '/imu/' in p.topic_name]
 
 

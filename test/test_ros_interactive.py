@@ -20,7 +20,7 @@ from visualization_msgs.srv import GetInteractiveMarkers
 
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.scene import SECOND
-from ragdoll_ros.ros import interactive
+from ragdoll_ros.ros.inputs import interactive_marker_server
 
 HERE = Pose(position=Point(x=0.0, y=0.0, z=1.0), orientation=Quaternion(w=1.0))
 
@@ -118,7 +118,7 @@ def test_a_drag_takes_the_point_under_the_mouse_and_the_bone_follows(node, peer,
     assert node.simulation.time - start < 0.3 * SECOND
     client.release()
     peer.wait(lambda: not node.simulation.grabs)
-    assert node.tally.refused == {}
+    assert node.input_counts.refused == {}
 
 
 def test_a_still_marker_is_dragged_by_its_pose_alone(node, peer, client):
@@ -150,7 +150,7 @@ def test_two_clients_drag_two_bones_and_two_rviz_are_not_taken_for_one(node, pee
 
 def test_a_client_that_is_gone_lets_go_and_one_that_only_rests_does_not(
         node, peer, client, monkeypatch):
-    monkeypatch.setattr(interactive, 'VANISHED', SECOND // 2)
+    monkeypatch.setattr(interactive_marker_server, 'CLIENT_TIMEOUT', SECOND // 2)
     resting = RvizClient(peer, client_id='resting')
     resting.start()
     client.press('head')
@@ -187,9 +187,9 @@ def test_a_reset_lets_go_and_the_drag_that_goes_on_moves_nothing(node, peer, cli
     client.move(0.0, 0.0, 5.0)
     client.release()
     client.send(marker_name='head', header=Header(frame_id='world'), event_type=99)
-    peer.wait(lambda: node.tally.refused)
-    assert 'event_type' in node.tally.reason, 'the last one, and the first that is refused'
-    assert node.simulation.grabs == () and node.tally.refused.total() == 1
+    peer.wait(lambda: node.input_counts.refused)
+    assert 'event_type' in node.input_counts.last_reason, 'the last, and the first refused'
+    assert node.simulation.grabs == () and node.input_counts.refused.total() == 1
 
 
 @pytest.mark.parametrize('frame, name, kind, change, word', [
@@ -206,9 +206,9 @@ def test_a_reset_lets_go_and_the_drag_that_goes_on_moves_nothing(node, peer, cli
 def test_rubbish_is_refused_and_counted(node, peer, client, frame, name, kind, change, word):
     fields = {'pose': HERE, **change}
     client.send(header=Header(frame_id=frame), marker_name=name, event_type=kind, **fields)
-    peer.wait(lambda: node.tally.refused)
-    assert node.tally.refused == {'~/interactive/feedback': 1}
-    assert word in node.tally.reason
+    peer.wait(lambda: node.input_counts.refused)
+    assert node.input_counts.refused == {'~/interactive/feedback': 1}
+    assert word in node.input_counts.last_reason
     assert node.simulation.grabs == ()
 
 
@@ -230,12 +230,12 @@ def test_a_flood_of_clients_is_held_off(node, peer, client):
             client.press('head')
         for _ in range(200):
             peer.executor_.spin_once(timeout_sec=0.01)
-            if node.tally.refused['~/interactive/feedback']:
+            if node.input_counts.refused['~/interactive/feedback']:
                 return True
         return False
 
     peer.wait(refused)
-    assert 'hands' in node.tally.reason
+    assert 'hands' in node.input_counts.last_reason
     client.client_id = 'client 0'
     client.release()
 

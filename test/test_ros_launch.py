@@ -64,7 +64,7 @@ def test_all_topics_of_the_configuration_of_rviz_go_into_the_namespace(make_node
     displays = yaml.safe_load(text)['Visualization Manager']['Displays']
     topics = {topic['Value'] for display in displays for key, topic in display.items()
               if key in ('Topic', 'Description Topic')}
-    below = {f'/ragdoll/{name}' for name in constant('SHOWN')}
+    below = {f'/ragdoll/{name}' for name in constant('RVIZ_TOPICS')}
     assert topics - {'/robot_description'} <= below
     offered = {name for name, _ in make_node().get_topic_names_and_types()} | {
         name for name, _ in make_node().get_service_names_and_types()}

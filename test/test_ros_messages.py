@@ -1,4 +1,4 @@
-"""Markers and handles against the bones."""
+"""Markers and interactive markers against the bones."""
 from __future__ import annotations
 
 import numpy as np
@@ -9,13 +9,13 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import rotation
-from ragdoll_ros.model.push import ARROW, Push
+from ragdoll_ros.model.push import ARROW_LENGTH, Push
 from ragdoll_ros.model.ragdoll import Bone, Ragdoll
 from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.ros.glance import Glance
-from ragdoll_ros.ros.messages.interactive_markers import GROWTH, Handles
-from ragdoll_ros.ros.messages.markers import Markers
+from ragdoll_ros.ros.messages.interactive_markers import SCALE, InteractiveMarkers
+from ragdoll_ros.ros.messages.markers import SceneMarkers
+from ragdoll_ros.ros.ticker import PollThrottle
 
 
 @pytest.fixture(params=SPECIMENS)
@@ -34,27 +34,27 @@ def heard(data):
 
 def test_markers_fill_the_shape_of_a_bone(lone):
     """The markers' farthest points along any direction are those of the bone's own shape."""
-    array = heard(Markers(lone.scene, 'map').message(7, lone.state, ()))
+    array = heard(SceneMarkers(lone.scene, 'map').serialize(7, lone.state, ()))
     assert {marker.header.frame_id for marker in array.markers} == {'map'}
     directions = rotation.normalized(np.random.default_rng(3).normal(size=(50, 3)))
     reach = np.max([_support(marker, directions) for marker in array.markers
                     if marker.action == Marker.ADD], axis=0)
     turn, centre = lone.state.orientations[0], lone.state.positions[0]
     inner = rotation.rotate(rotation.inverse(turn), directions)
-    expected = directions @ centre + lone.scene.bones[0].shape.reach(inner)
+    expected = directions @ centre + lone.scene.bones[0].shape.support(inner)
     np.testing.assert_allclose(reach, expected, atol=1e-12)
 
 
 def test_ghosts_to_drag_fill_the_shape_of_a_bone_too(lone):
-    """In the bone's own frame, each part larger by GROWTH about its own middle."""
-    handles = Handles(lone.scene, 'map', '/ragdoll')
+    """In the bone's own frame, each part larger by SCALE about its own middle."""
+    handles = InteractiveMarkers(lone.scene, 'map', '/ragdoll')
     directions = rotation.normalized(np.random.default_rng(4).normal(size=(50, 3)))
-    ghosts = handles.markers(lone.state)[0].controls[0].markers
+    ghosts = handles.at(lone.state)[0].controls[0].markers
     for ghost in ghosts:
         scale = ghost.scale
-        scale.x, scale.y, scale.z = scale.x / GROWTH, scale.y / GROWTH, scale.z / GROWTH
+        scale.x, scale.y, scale.z = scale.x / SCALE, scale.y / SCALE, scale.z / SCALE
     reach = np.max([_support(ghost, directions) for ghost in ghosts], axis=0)
-    np.testing.assert_allclose(reach, lone.scene.bones[0].shape.reach(directions), atol=1e-12)
+    np.testing.assert_allclose(reach, lone.scene.bones[0].shape.support(directions), atol=1e-12)
 
 
 def _support(marker, directions):
@@ -77,8 +77,8 @@ def test_the_tip_of_a_push_s_arrow_is_where_it_attacks(local):
         state, name = simulation.state, 'left_shin'
         bone = simulation.scene.bone_index(name)
         push = Push(name, (300.0, -400.0, 0.0), point=(0.01, 0.02, 0.1), local=local)
-        markers = Markers(simulation.scene, 'world')
-        arrow = heard(markers.message(0, state, [push])).markers[-1]
+        markers = SceneMarkers(simulation.scene, 'world')
+        arrow = heard(markers.serialize(0, state, [push])).markers[-1]
         assert (arrow.type, arrow.action) == (Marker.ARROW, Marker.ADD)
         turn = np.array([arrow.pose.orientation.x, arrow.pose.orientation.y,
                          arrow.pose.orientation.z, arrow.pose.orientation.w])
@@ -88,16 +88,16 @@ def test_the_tip_of_a_push_s_arrow_is_where_it_attacks(local):
         if local:
             point = rotation.rotate(state.orientations[bone], point)
         np.testing.assert_allclose(tip, state.positions[bone] + point, atol=1e-12)
-        assert arrow.scale.x == pytest.approx(ARROW * 0.5 ** 0.5)
-        gone = heard(markers.message(1, state, [])).markers[-1]
+        assert arrow.scale.x == pytest.approx(ARROW_LENGTH * 0.5 ** 0.5)
+        gone = heard(markers.serialize(1, state, [])).markers[-1]
         assert (gone.ns, gone.id, gone.action) == (arrow.ns, arrow.id, Marker.DELETE)
         assert all(marker.action == Marker.ADD
-                   for marker in heard(markers.message(2, state, [])).markers)
+                   for marker in heard(markers.serialize(2, state, [])).markers)
 
 
 def test_each_marker_is_its_own():
     with Simulation(load_scene('crowd')) as simulation:
-        array = heard(Markers(simulation.scene, 'world').message(0, simulation.state, ()))
+        array = heard(SceneMarkers(simulation.scene, 'world').serialize(0, simulation.state, ()))
         keys = [(marker.ns, marker.id) for marker in array.markers
                 if marker.action == Marker.ADD]
         assert len(set(keys)) == len(keys) == len(simulation.scene.bone_names)
@@ -120,11 +120,11 @@ def test_another_scene_leaves_nothing_of_the_last_one():
     screen = {}
     for name in ('crowd', 'ponytail', 'drop'):
         with Simulation(load_scene(name)) as simulation:
-            markers = Markers(simulation.scene, 'world')
+            markers = SceneMarkers(simulation.scene, 'world')
             push = Push(simulation.scene.bone_names[0], (100.0, 0.0, 0.0))
             swings = simulation.swings if name == 'ponytail' else None
             for pushes in ([], [push]):
-                array = heard(markers.message(0, simulation.state, pushes, swings))
+                array = heard(markers.serialize(0, simulation.state, pushes, swings))
                 shown(screen, array)
             assert {name for name, _ in screen} - {'push', 'swings'} == set(
                 simulation.scene.bone_names)
@@ -141,23 +141,23 @@ def test_the_benchmark_times_all_parts(ros, monkeypatch):
     costs = bench.row(node, load_scene('drop'), 'draft', 0)
     node.destroy_node()
     assert set(costs) == {
-        'simulation', 'checked', 'conversion', 'messages', 'bare engine', 'bare publish'}
+        'simulation', 'guarded', 'conversion', 'messages', 'base engine', 'base publish'}
     assert min(costs.values()) > 0
 
 
-def looks_of(glance, period, wakes):
-    """Whether a glance is open before each wake of a timer and, after it, still is."""
+def looks_of(throttle, period, wakes):
+    """Whether a throttle is open before each wake of a timer and, after it, still is."""
     found = []
     for wake in range(1, wakes + 1):
-        before = glance.is_open
-        glance.wake(wake * period)
-        found.append((before, glance.is_open))
+        before = throttle.is_open
+        throttle.wake(wake * period)
+        found.append((before, throttle.is_open))
     return found
 
 
-def test_a_glance_is_open_now_and_then_and_always_where_wakes_are_rare():
+def test_a_throttle_is_open_now_and_then_and_always_where_wakes_are_rare():
     """What is gathered in time is also gone through, though the timer comes first."""
-    often = looks_of(Glance(50), 10, 40)
+    often = looks_of(PollThrottle(50), 10, 40)
     assert 2 * 40 // 5 <= sum(before for before, _ in often) <= 2 * 40 // 4
     assert sum(before and after for before, after in often) >= 40 // 6
-    assert all(before and after for before, after in looks_of(Glance(50), 60, 40))
+    assert all(before and after for before, after in looks_of(PollThrottle(50), 60, 40))

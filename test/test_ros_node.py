@@ -49,9 +49,9 @@ def script(tick):
     if rest or not 1 <= number <= 20:
         return None
     strength = 100.0 * number
-    return (('take_force', wrench(strength)),
-            ('take_velocity', Twist(linear=Vector3(y=number / 10))),
-            ('take_push', WrenchStamped(header=Header(frame_id='left_shin'),
+    return (('on_force', wrench(strength)),
+            ('on_cmd_vel', Twist(linear=Vector3(y=number / 10))),
+            ('on_push', WrenchStamped(header=Header(frame_id='left_shin'),
                                         wrench=wrench(z=strength))))[number % 3]
 
 
@@ -70,9 +70,9 @@ def plain(ticks):
     with Simulation(load_scene('drop')) as simulation:
         for tick in range(ticks):
             message = script(tick)
-            if message and message[0] == 'take_force':
+            if message and message[0] == 'on_force':
                 simulation.push(Push('torso', (message[1].force.x, 0, 0)), 'a')
-            elif message and message[0] == 'take_velocity':
+            elif message and message[0] == 'on_cmd_vel':
                 velocity = (0, message[1].linear.y, 0)
                 simulation.push(Drive('torso', velocity, duration=0.6), 'b')
             elif message:
@@ -127,7 +127,7 @@ def test_a_step_is_one_tick_and_takes_a_pause(make_node, peer):
 
 def test_a_reset_goes_back_to_the_start_and_stays_paused(paused):
     start = digest([paused.simulation.state])
-    paused.inputs.take_force(wrench(2000.0))
+    paused.inputs.on_force(wrench(2000.0))
     for _ in range(5):
         paused.tick()
     paused.reset()
@@ -143,7 +143,7 @@ def momentum(simulation):
 
 def test_a_push_lasts_its_simulated_time_also_across_a_pause(paused):
     """2000 N for 0.1 s is 200 N s, whatever happens on the wall; given while paused."""
-    paused.inputs.take_force(wrench(2000.0))
+    paused.inputs.on_force(wrench(2000.0))
     for _ in range(4):
         paused.tick()
     paused.pause(False)
@@ -155,8 +155,8 @@ def test_a_push_lasts_its_simulated_time_also_across_a_pause(paused):
 
 
 @pytest.mark.parametrize(('take', 'message', 'expected'), [
-    ('take_force', wrench(1000.0), 13.7),
-    ('take_velocity', Twist(linear=Vector3(y=900.0)), 50.2)])
+    ('on_force', wrench(1000.0), 13.7),
+    ('on_cmd_vel', Twist(linear=Vector3(y=900.0)), 50.2)])
 def test_a_timeout_between_two_ticks_is_kept_exactly(make_node, take, message, expected):
     """A drive far from its velocity pushes with its most, 2000 N; it turns by some 1e-5 as the
     bone's own velocity does.
@@ -171,7 +171,7 @@ def test_a_timeout_between_two_ticks_is_kept_exactly(make_node, take, message, e
 def test_messages_in_a_row_push_without_a_gap(paused):
     """Sent every 5 ticks, held for 10: as one push of 25 and 10 more ticks."""
     for _ in range(6):
-        paused.inputs.take_force(wrench(100.0))
+        paused.inputs.on_force(wrench(100.0))
         for _ in range(5):
             paused.tick()
     for _ in range(10):
@@ -307,7 +307,7 @@ def test_what_nobody_hears_is_not_made_and_who_comes_later_hears_it(make_node, p
     node = make_node(scene='crowd')
     for _ in range(3):
         node.tick()
-    assert not set(vars(node._outputs._layouts)) & {'poses', 'state', 'joints', 'markers'}
+    assert not set(vars(node._outputs._templates)) & {'poses', 'state', 'joints', 'markers'}
     node.pause(True)
     late = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     poses = peer.collect(PoseArray, 'ragdoll/poses', late)

@@ -26,12 +26,12 @@ from ragdoll_ros.model.errors import ModelErrors, RagdollError
 from ragdoll_ros.physics.accuracy import EXACT
 from ragdoll_ros.ros.node import RagdollNode
 from ragdoll_ros.ros.outputs import LATCHED
-from ragdoll_ros.ros.parameters import SPECS, Settings
+from ragdoll_ros.ros.parameters.node_settings import SPECS, NodeSettings
 
 LATCHED_LOG = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
-RANGES = {name: spec.metadata['span'] for name, spec in SPECS.items()
-          if spec.metadata['span'] and isinstance(spec.default, float)}
+RANGES = {name: spec.metadata['range'] for name, spec in SPECS.items()
+          if spec.metadata['range'] and isinstance(spec.default, float)}
 
 
 def put(node, **values):
@@ -83,7 +83,7 @@ def test_a_number_may_be_at_its_ends_and_not_beyond(node, name):
         result = put(node, **{name: float(number)})
         assert not result.successful and name in result.reason
     assert getattr(node.settings, name) == value(node, name) == upper
-    assert node.tally.refused['parameters'] == len(bad)
+    assert node.input_counts.refused['parameters'] == len(bad)
 
 
 def test_whole_numbers_are_numbers(make_node):
@@ -128,7 +128,7 @@ def test_two_nodes_of_one_name_are_told_of(make_node, peer):
 def test_the_start_is_told_in_one_line(make_node, peer):
     said = rosout(peer, make_node(scene='crowd', accuracy='draft', engine='bullet'))
     peer.wait(lambda: ('scene crowd: 10 dolls of 100 bones, engine bullet, accuracy draft; poses '
-                       'are on /ragdoll/poses, how it goes on /diagnostics') in said())
+                       'on /ragdoll/poses, status on /diagnostics') in said())
 
 
 def dump(peer, path):
@@ -176,7 +176,7 @@ def test_workers_are_a_number_of_threads_or_all_cores(node):
     for count, bad in enumerate((-1, 65), start=1):
         result = put(node, workers=bad)
         assert not result.successful and 'workers' in result.reason
-        assert node.tally.refused['parameters'] == count
+        assert node.input_counts.refused['parameters'] == count
     assert node.settings.workers == 1
 
 
@@ -188,7 +188,7 @@ def test_a_wrong_type_is_refused_and_counted(node, name):
     for count, other in enumerate(wrong, start=1):
         result = put(node, **{name: other})
         assert not result.successful and result.reason
-        assert node.tally.refused['parameters'] == count
+        assert node.input_counts.refused['parameters'] == count
     assert value(node, name) == before
 
 
@@ -330,5 +330,5 @@ def test_a_broken_scene_ends_the_start_with_all_its_faults(make_node, broken_sce
 
 
 def test_the_defaults_are_those_of_the_default_scene(node):
-    assert dataclasses.replace(Settings(), pushed_bone='torso') == node.settings
+    assert dataclasses.replace(NodeSettings(), pushed_bone='torso') == node.settings
     assert node.describe_parameter('rate').type == ParameterType.PARAMETER_DOUBLE

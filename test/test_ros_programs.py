@@ -42,7 +42,7 @@ def test_a_wrong_start_ends_with_2_and_a_reason(ros, broken_scene):
              (('node', '--ros-args', '-p', 'rate'), ['rate']),
              (('node', '--ros-args', '-p', f'scene:={path}'), words),
              (('run', str(path)), words),
-             (('teleop',), ['terminal'])]
+             (('teleop.teleop',), ['terminal'])]
     for (arguments, words), process in [(case, start(*case[0])) for case in cases]:
         _, errors = process.communicate(timeout=PATIENCE)
         assert process.returncode == 2, arguments
@@ -61,7 +61,7 @@ def test_help_has_an_example_and_a_wrong_option_is_named(capsys, program, option
 
 def line(push):
     """The live line with this push."""
-    return rf'pace [01]\.\d\d  \d+\.\d s  push {push}  tick \d+\.\d\d ms  torso .* m \d+\.\d m/s'
+    return rf'RTF [01]\.\d\d  \d+\.\d s  push {push}  tick \d+\.\d\d ms  torso .* m \d+\.\d m/s'
 
 
 def test_run_shows_a_live_line_and_the_arrows_push(ros):
@@ -88,7 +88,7 @@ def test_run_shows_a_live_line_and_the_arrows_push(ros):
 def test_without_a_terminal_the_line_is_logged_each_second(ros):
     process = start('run', '--ros-args', '-r', '__ns:=/logged', '-p', 'real_time_factor:=0.5')
     lines = []
-    while not re.match(r'pace 0\.\d\d  \d', lines[-1] if lines else ''):
+    while not re.match(r'RTF 0\.\d\d  \d', lines[-1] if lines else ''):
         assert len(lines) < 20
         lines.append(process.stdout.readline())
     code, _ = end(process, signal.SIGTERM)

@@ -24,7 +24,7 @@ from ragdoll_ros.files.run_scene import read_run_scene, scene_digest
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.physics.logged_simulation import state_digest
 from ragdoll_ros.replay.command import main
-from ragdoll_ros.ros.event_log import HASHED
+from ragdoll_ros.ros.event_log import HASH_INTERVAL
 
 EVENTS, SCENE = '/ragdoll/events', '/ragdoll/scene'
 
@@ -44,9 +44,9 @@ def feedback(bone, kind, position=(0.0, 0.0, 0.0)):
 def push(node, number):
     """Push by each input in turn, with numbers that no short decimal gives."""
     force = vector(300 * math.sin(number), 300 * math.cos(number), 1 / (number + 1))
-    (lambda: node.inputs.take_force(Wrench(force=force)),
-     lambda: node.inputs.take_velocity(Twist(linear=vector(0.1 * math.sin(number)))),
-     lambda: node.inputs.take_push(WrenchStamped(
+    (lambda: node.inputs.on_force(Wrench(force=force)),
+     lambda: node.inputs.on_cmd_vel(Twist(linear=vector(0.1 * math.sin(number)))),
+     lambda: node.inputs.on_push(WrenchStamped(
          header=Header(frame_id='left_shin'), wrench=Wrench(force=force))))[number % 3]()
 
 
@@ -92,13 +92,13 @@ def test_a_run_with_all_that_can_act_is_repeated_to_the_bit(make_node, peer, log
         if tick % 20 == 0:
             push(node, tick // 20)
         if tick == 90:
-            node.interactive.take(feedback('head', InteractiveMarkerFeedback.MOUSE_DOWN,
+            node.interactive.on_feedback(feedback('head', InteractiveMarkerFeedback.MOUSE_DOWN,
                                            (0.1, 0.2, 0.3)))
         elif tick in (95, 105):
-            node.interactive.take(feedback('head', InteractiveMarkerFeedback.POSE_UPDATE,
+            node.interactive.on_feedback(feedback('head', InteractiveMarkerFeedback.POSE_UPDATE,
                                            (0.1, 1 / tick, 1.5)))
         elif tick == 130:
-            node.interactive.take(feedback('head', InteractiveMarkerFeedback.MOUSE_UP))
+            node.interactive.on_feedback(feedback('head', InteractiveMarkerFeedback.MOUSE_UP))
         elif tick == 150:
             node.set_parameters([Parameter('rate', value=120.0),
                                  Parameter('accuracy', value='draft')])
@@ -123,8 +123,8 @@ def test_a_run_with_all_that_can_act_is_repeated_to_the_bit(make_node, peer, log
 def test_events_tell_what_took_effect_and_when(make_node, peer, log):
     node = make_node(scene='flight', max_force=100.0)
     node.tick()
-    node.inputs.take_force(Wrench(force=vector(300)))
-    node.inputs.take_force(Wrench(force=vector(math.nan)))
+    node.inputs.on_force(Wrench(force=vector(300)))
+    node.inputs.on_force(Wrench(force=vector(math.nan)))
     node.pause(True)
     node.tick()
     node.set_parameters([Parameter('push_timeout', value=0.25)])
@@ -154,7 +154,7 @@ def test_nothing_is_hashed_while_nobody_listens(make_node, monkeypatch):
     """Counted where it is made: the digest of a state."""
     node, made = make_node(scene='flight'), []
     monkeypatch.setattr('ragdoll_ros.ros.event_log.state_digest', lambda state: made.append(state))
-    for _ in range(2 * HASHED):
+    for _ in range(2 * HASH_INTERVAL):
         node.tick()
     assert made == []
 
@@ -182,7 +182,7 @@ def test_bad_ticks_are_told_as_going_back_and_three_as_a_start(
 def test_a_run_is_published_again(make_node, peer, log, tmp_path, nothing_runs_on):
     node = make_node()
     peer.wait_heard(node, EVENTS, SCENE)
-    for number in range(HASHED):
+    for number in range(HASH_INTERVAL):
         if number % 30 == 0:
             push(node, number)
         node.tick()
@@ -269,5 +269,5 @@ def test_a_node_that_is_killed_leaves_a_run_that_is_repeated(peer, log, tmp_path
     torn.write_bytes(file.read_bytes()[:file.stat().st_size // 2])
     code, said, warned = replayed(capsys, torn)
     equal, torn_of = said.split(' repeated, ')[1].split(' hashes')[0].split(' of ')
-    assert code == 0 and 'breaks off' in warned and equal == torn_of
+    assert code == 0 and 'is truncated' in warned and equal == torn_of
     assert 10 < int(torn_of) < int(of)

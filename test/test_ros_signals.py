@@ -15,8 +15,8 @@ from peer import PATIENCE, start
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
-from ragdoll_ros.ros.event_log import PAST
-from ragdoll_ros.ros.signals import end_unbroken, ended_by_signals
+from ragdoll_ros.ros.event_log import EVENTS_QOS
+from ragdoll_ros.ros.process.signals import run_uninterrupted, run_until_signal
 
 pytestmark = pytest.mark.usefixtures('nothing_runs_on')
 
@@ -125,7 +125,7 @@ def test_ten_signals_into_resets(ros, peer):
     """
     draw, cut = random.Random(3), 0
     for _ in range(10):
-        begun = peer.collect(String, 'ragdoll/events', PAST)
+        begun = peer.collect(String, 'ragdoll/events', EVENTS_QOS)
         process = start('node', '--ros-args', '-p', 'scene:=field', compiled=True)
         peer.call(SetBool, 'ragdoll/pause', SetBool.Request(data=True))
         peer.wait(lambda begun=begun: begun)
@@ -167,7 +167,7 @@ def test_a_first_signal_does_not_cut_short_the_end():
         said.append('ended')
 
     try:
-        assert ended_by_signals(lambda: end_unbroken(end) or 0) == 0
+        assert run_until_signal(lambda: run_uninterrupted(end) or 0) == 0
     finally:
         for number, handler in stood.items():
             signal.signal(number, handler)

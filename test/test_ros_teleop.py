@@ -13,7 +13,7 @@ from screen import Screen
 from sensor_msgs.msg import MultiDOFJointState
 
 from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.ros.teleop.find_node import Followed
+from ragdoll_ros.ros.teleop.find_node import NodeFinder
 
 pytestmark = pytest.mark.usefixtures('nothing_runs_on')
 MASSES = np.array([bone.mass for bone in load_scene('flight').bones])
@@ -98,7 +98,7 @@ def test_a_tap_gives_a_metre_a_second_to_a_node_of_any_name(peer, where):
     peer.wait(lambda: states)
     process, terminal = start_on_terminal('teleop.teleop')
     screen = Screen(terminal)
-    screen.wait(r'pace \d')
+    screen.wait(r'RTF \d')
     speeds = [0.0]
 
     def tapped():
@@ -121,9 +121,9 @@ def test_of_several_nodes_a_user_says_which(peer):
               'scene:=flight')
     sent = peer.collect(Wrench, '/two/other/force')
     peer.wait(lambda: all(peer.count_publishers(f'/two/{name}/poses') for name in ('one', 'other')))
-    followed = Followed(peer, '')
+    finder = NodeFinder(peer, '')
     # Of a busy machine's nodes some are found later than others.
-    peer.wait(lambda: not followed.look() and '/two/one, /two/other' in followed.problem)
+    peer.wait(lambda: not finder.update() and '/two/one, /two/other' in finder.problem)
     _, terminal = start_on_terminal('teleop.teleop', 'two/other')
     screen = Screen(terminal)
 

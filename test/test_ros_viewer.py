@@ -27,7 +27,7 @@ from ragdoll_ros.files.urdf import scene_to_urdf
 from ragdoll_ros.model.errors import RagdollError
 from ragdoll_ros.model.shapes import Sphere
 from ragdoll_ros.ros.messages.convert import to_pose_array
-from ragdoll_ros.ros.messages.serialized import poses_in
+from ragdoll_ros.ros.messages.serialized import deserialize_pose_array
 from ragdoll_ros.viewer.sources.node import source as remote_source
 from ragdoll_ros.viewer.sources.node.scene import scene_of_node
 from ragdoll_ros.viewer.sources.node.source import Remote
@@ -97,7 +97,8 @@ def seen(remote, name='drop'):
 @pytest.mark.parametrize('count', [0, 1, 10, 333])
 def test_poses_read_from_bytes_are_what_was_serialized(frame, count):
     poses = np.random.default_rng(1).normal(size=(count, 7))
-    stamp, found = poses_in(serialize_message(to_pose_array(frame, 7_000_000_009, poses)))
+    data = serialize_message(to_pose_array(frame, 7_000_000_009, poses))
+    stamp, found = deserialize_pose_array(data)
     assert stamp == 7_000_000_009 and np.array_equal(found, poses)
 
 
@@ -107,7 +108,7 @@ def test_bytes_that_are_no_poses_are_a_value_error():
     for wrong in (b'', b'\x00\x01\x00\x00', data[:-8], b'\x00\x00' + data[2:],
                   data[:12] + b'\xff\xff\xff\xff' + data[16:]):
         with pytest.raises(ValueError):
-            poses_in(wrong)
+            deserialize_pose_array(wrong)
 
 
 def test_the_viewer_leaves_at_a_signal(no_node):

@@ -40,11 +40,11 @@ def test_a_urdf_reads_back_to_the_same_surface(shape):
     """As one shape or as several: the farthest point along any direction is the same."""
     link = parse_urdf(to_urdf(alone(shape).dolls[0].doll)).links['bone']
     directions = rotation.normalized(np.random.default_rng(0).normal(size=(50, 3)))
-    found = np.max([directions @ pose.position + part.reach(
+    found = np.max([directions @ pose.position + part.support(
         rotation.rotate(rotation.inverse(pose.orientation), directions))
         for part, pose in link.shapes], axis=0)
     back = rotation.inverse(np.array(TURN))
-    assert found == pytest.approx(shape.reach(rotation.rotate(back, directions)), abs=1e-9)
+    assert found == pytest.approx(shape.support(rotation.rotate(back, directions)), abs=1e-9)
 
 
 @pytest.mark.parametrize('engine', ['bullet', 'mujoco'])
@@ -52,23 +52,24 @@ def test_it_comes_to_lie_on_its_surface(shape, engine):
     """Dropped by 1 cm: after 3 s its lowest point is at the ground, to 5 mm."""
     if engine == 'mujoco':
         pytest.importorskip('mujoco')
-    lowest = shape.reach(rotation.rotate(rotation.inverse(np.array(TURN)), np.array((0, 0, -1.0))))
+    down = rotation.rotate(rotation.inverse(np.array(TURN)), np.array((0, 0, -1.0)))
+    lowest = shape.support(down)
     scene = alone(shape, position=(0, 0, float(lowest) + 0.01))
     with Simulation(scene, engine=engine) as simulation:
         for _ in range(300):
             state = simulation.advance()
     down = rotation.rotate(rotation.inverse(state.orientations[0]), np.array((0, 0, -1.0)))
-    assert state.positions[0, 2] - shape.reach(down) == pytest.approx(0, abs=5e-3)
+    assert state.positions[0, 2] - shape.support(down) == pytest.approx(0, abs=5e-3)
 
 
 def test_its_primitives_reach_as_far_as_it_does(shape):
     """What is drawn, box, cylinder and sphere alone, fills the shape's own surface."""
     directions = rotation.normalized(np.random.default_rng(2).normal(size=(50, 3)))
     assert {part.kind for part in shape.primitives} <= {'box', 'cylinder', 'sphere'}
-    found = np.max([directions @ np.array(part.position) + part.shape.reach(
+    found = np.max([directions @ np.array(part.position) + part.shape.support(
         rotation.rotate(rotation.inverse(part.orientation), directions))
         for part in shape.primitives], axis=0)
-    assert found == pytest.approx(shape.reach(directions), abs=1e-12)
+    assert found == pytest.approx(shape.support(directions), abs=1e-12)
 
 
 def test_the_editor_makes_each_kind_of_each_other(shape):

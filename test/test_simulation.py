@@ -1,5 +1,6 @@
 """A simulation as a whole: free fall, repetition to the bit, rest, where it is put, engines."""
 import dataclasses
+import doctest
 import hashlib
 import math
 import os
@@ -15,6 +16,7 @@ from ragdoll_ros.model.coordinates import GeneralizedState
 from ragdoll_ros.model.push import Push
 from ragdoll_ros.model.scene import height
 from ragdoll_ros.physics import kernels
+from ragdoll_ros.physics import simulation as module
 from ragdoll_ros.physics.simulation import Simulation
 
 DROP, FLIGHT = load_scene('drop'), load_scene('flight')
@@ -215,3 +217,27 @@ def test_every_engine_starts_where_the_scene_says_and_falls(engine):
 def test_an_unknown_engine_is_named():
     with pytest.raises(errors.OutOfRange, match=r'steam.*rigid'):
         Simulation(FLIGHT, engine='steam')
+
+
+def test_examples_of_the_docstrings_run():
+    with Simulation(DROP) as simulation:
+        result = doctest.testmod(module, extraglobs={'simulation': simulation, 'Push': Push})
+    assert result.attempted > 10 and not result.failed
+
+
+@pytest.mark.parametrize(('old', 'new'), [
+    ('starts', 'reset_count'), ('parts', 'samples_per_tick'), ('trail', 'substates')])
+def test_a_deprecated_name_leads_to_the_new_one(old, new):
+    with Simulation(FLIGHT) as simulation:
+        simulation.samples_per_tick = 3
+        simulation.advance()
+        with pytest.warns(DeprecationWarning, match=new):
+            assert getattr(simulation, old) is getattr(simulation, new)
+
+
+def test_deprecated_parts_can_be_set():
+    with Simulation(FLIGHT) as simulation:
+        with pytest.warns(DeprecationWarning, match='samples_per_tick'):
+            simulation.parts = 4
+        simulation.advance()
+        assert simulation.samples_per_tick == 4 and len(simulation.substates) == 5

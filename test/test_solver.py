@@ -1,25 +1,37 @@
 """Impulses against Signorini's and Coulomb's laws: of one contact by itself, of many that stick."""
 from __future__ import annotations
 
+import collections
+
 import numpy as np
 import pytest
 
 numba = pytest.importorskip('numba')
 
 from ragdoll_ros.physics.kernels.impulses.active_set import solve_active_set  # noqa: E402
-from ragdoll_ros.physics.kernels.impulses.one_contact import one_contact  # noqa: E402
+from ragdoll_ros.physics.kernels.impulses.one_contact import solve_one_contact  # noqa: E402
+from ragdoll_ros.physics.kernels.workspace import MEMBER  # noqa: E402
+
+Island = collections.namedtuple('Island', 'members W G velocity active places is_normal')
+"""What of an island the active set method reads and writes."""
 
 
 @numba.njit
 def _one_contact(ease, c, last, mu):
-    return one_contact(ease, 3, 0, c[0], c[1], c[2], last[0], last[1], last[2], mu)
+    return solve_one_contact(ease, 3, 0, (c[0], c[1], c[2]), (last[0], last[1], last[2]), mu)
 
 
 @numba.njit
+def _solve(island, b, p, tolerance):
+    return solve_active_set(island, len(island.members), len(b), b, p, tolerance)
+
+
 def _active_set(kinds, rows, mu, ease, b, p, tolerance):
-    n = len(b)
-    return solve_active_set(kinds, rows, mu, len(kinds), n, ease, b, p, tolerance,
-                            np.zeros((9, 2 * n)), np.zeros(n * n))
+    n, members = len(b), np.zeros(len(kinds), MEMBER)
+    members['kind'], members['row'], members['friction'] = kinds, rows, mu
+    island = Island(members, ease, np.zeros(n * n), np.zeros(n), np.zeros(n),
+                    np.zeros(n + 1, np.int64), np.zeros(n, np.int64))
+    return _solve(island, b, p, tolerance)
 
 
 def breach(ease, c, p, mu):

@@ -48,7 +48,7 @@ def started(scene, degrees=0.0, rate=0.0):
     engine = RigidEngine(scene, NORMAL)
     q, v = engine.coordinates.q.copy(), engine.coordinates.v.copy()
     q[-1], v[-1] = math.radians(degrees), rate
-    engine.place(GeneralizedState(q, v))
+    engine.set_coordinates(GeneralizedState(q, v))
     return engine
 
 
@@ -68,7 +68,7 @@ def test_energy_never_rises_in_a_fall(name, number):
     """Above its least so far: steps' own errors are taken out, solving them leaves some 1e-10."""
     fall = trial(name, number)
     engine = RigidEngine(fall.scene, NORMAL)
-    engine.place(fall.start)
+    engine.set_coordinates(fall.start)
     energies = [conserved(fall.scene, engine.state).energy]
     for _ in range(round(fall.duration / fall.scene.step)):
         engine.advance(fall.scene.step)
@@ -131,7 +131,7 @@ def test_joints_come_back_in_free_fall_without_moving_the_whole(spin):
     scene, engine = fall.scene, RigidEngine(fall.scene, NORMAL)
     v = fall.start.v.copy()
     v[3:6] = spin
-    engine.place(GeneralizedState(fall.start.q, v))
+    engine.set_coordinates(GeneralizedState(fall.start.q, v))
     first, gravity, time = conserved(scene, engine.state), np.array(scene.gravity), 0.0
     limited, (lower, upper), outside = engine.layout.limited[0], engine.layout.limits, []
     while lowest(scene, engine.state) > 0.06:  # no bone comes down at 6 m/s yet
@@ -157,7 +157,7 @@ def test_bones_that_begin_in_each_other_are_brought_apart(seed):
     doll, rng = load_doll('doll'), np.random.default_rng(seed)
     scene = Scene('free', (Placement(doll),), None, gravity=(0, 0, 0))
     engine, scales = RigidEngine(scene, NORMAL), BoneDepth(scene)
-    engine.place(posed(scene.dolls[0], {name: rng.uniform(*pair)
+    engine.set_coordinates(posed(scene.dolls[0], {name: rng.uniform(*pair)
                                         for name, pair in angle_limits(doll).items()}))
     first = conserved(scene, engine.state)
     assert scales.depths(engine.state.positions, engine.state.orientations).max() > 0.05

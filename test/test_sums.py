@@ -5,7 +5,7 @@ import pytest
 from conserved import conserved
 from samples import SCENES, random_state
 
-from ragdoll_ros.physics.engine.substepped.doll_sums import DollSums
+from ragdoll_ros.physics.engine.doll_totals import DollSums
 
 
 @pytest.mark.parametrize('seed', range(3))
@@ -13,7 +13,7 @@ from ragdoll_ros.physics.engine.substepped.doll_sums import DollSums
 def test_sums_are_those_of_the_definition(scene, seed):
     """To rounding: 1e-16 of terms of up to 1e4, some hundred of them."""
     state = random_state(scene, seed)
-    found = DollSums(scene).motion(state)
+    found = DollSums(scene).totals(state)
     for doll in range(len(scene.dolls)):
         right = conserved(scene, state, doll)
         for name in ('energy', 'kinetic', 'centre', 'momentum', 'angular_momentum', 'inertia'):

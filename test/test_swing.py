@@ -17,8 +17,8 @@ from ragdoll_ros.model.state import State
 from ragdoll_ros.model.swing import Link, Swing, strand
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.physics.swing.bench import tick_cost
-from ragdoll_ros.physics.swing.mount import Mount
-from ragdoll_ros.physics.swing.swings import Swings, _parts
+from ragdoll_ros.physics.swing.mount import SwingMount
+from ragdoll_ros.physics.swing.swings import Swings, _substep_count
 from ragdoll_ros.physics.swing.track import Track, between
 
 G = 9.8
@@ -28,7 +28,7 @@ DOWN = (0, 0, -G)
 def mounted(links, mode='spring', direction=(1, 0, 0), root=(0, 0, 0), name='swing', **fields):
     links = links if isinstance(links, (tuple, list)) else (links,)
     swing = Swing(name, 'bone', root, direction, links, mode=mode, **fields)
-    return Mount.on(swing, Bone('bone', Sphere(0.1), 1, (0, 0, 0)), 0)
+    return SwingMount.on(swing, Bone('bone', Sphere(0.1), 1, (0, 0, 0)), 0)
 
 
 def still(_):
@@ -140,7 +140,7 @@ def test_a_shaken_strand_does_not_depend_on_the_frame_rate():
         swings = Swings([mount], DOWN, track)
         places = []
         for index in range(round(0.8 * rate) + 1):
-            track.tell(index / rate, shaken(index / rate))
+            track.add(index / rate, shaken(index / rate))
             state = swings.evaluate(index / rate)
             if index * 5 % rate == 0:
                 places.append(state.positions)
@@ -250,7 +250,7 @@ def test_extremes_stay_bounded(kind, rate):
     energies = []
     for index in range(round(rate * (0.6 if rate == 1000 else 3)) + 1):
         frame = event(kind, index / rate)
-        track.tell(index / rate, frame)
+        track.add(index / rate, frame)
         state = swings.evaluate(index / rate)
         np.testing.assert_allclose(np.linalg.norm(state.orientations, axis=1), 1, atol=1e-9)
         lengths = np.linalg.norm(state.positions - state.roots, axis=1)
@@ -283,7 +283,7 @@ def test_chains_stay_bounded_through_extremes(damping):
     swings = Swings(swinging, DOWN, track)
     most = math.pi / swings.step
     for index in range(121):
-        track.tell(index / 60, event('both', index / 60))
+        track.add(index / 60, event('both', index / 60))
         state = swings.evaluate(index / 60)
         rods = np.linalg.norm(state.positions - state.roots, axis=1)
         np.testing.assert_allclose(rods, np.tile(np.repeat(lengths, 4), 9), rtol=0, atol=1e-9)
@@ -458,6 +458,6 @@ def test_no_other_thread_works_on_after_the_forces_of_a_crowd():
     forces = np.ones((2, 3, 4000))
     others = time.thread_time() - time.process_time()
     for _ in range(30):
-        assert _parts((forces[0], forces[1]), 1e-3) == 1
+        assert _substep_count((forces[0], forces[1]), 1e-3) == 1
         time.sleep(0.005)  # what does nothing takes none of a processor's time
     assert others + time.process_time() - time.thread_time() < 0.03, 's, of 0.15'

@@ -12,7 +12,7 @@ from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.model.shapes import Sphere
 from ragdoll_ros.model.state import State
 from ragdoll_ros.model.swing import Link, Swing, strand
-from ragdoll_ros.physics.swing.mount import mounts
+from ragdoll_ros.physics.swing.mount import mount_swings
 from ragdoll_ros.physics.swing.swings import Swings
 
 TURN = rotation.from_rpy(0.3, 0.2, 0.1)
@@ -52,7 +52,7 @@ def test_roots_and_directions_are_given_in_the_dolls_frame():
     position, orientation = placement.bone_pose(HEAD)
     zero = np.zeros((1, 3))
     start = State(position[None], orientation[None], zero, zero)
-    state = Swings(mounts(scene), scene.gravity, lambda t: start).evaluate(0)
+    state = Swings(mount_swings(scene), scene.gravity, lambda t: start).evaluate(0)
     np.testing.assert_allclose(state.roots, [[5.1, 0.2, 1.1]], atol=1e-12)
     np.testing.assert_allclose(state.positions, [[5.1, 0.2, 0.6]], atol=1e-12)
     np.testing.assert_allclose(state.orientations, orientation[None], atol=1e-12)

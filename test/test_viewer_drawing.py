@@ -77,7 +77,7 @@ def test_what_is_drawn_of_a_bone_reaches_as_far_as_its_shape(shape):
     directions = rotation.normalized(rng.normal(size=(50, 3)))
     found = (np.concatenate(points) @ directions.T).max(axis=0)
     back = rotation.inverse(state.orientations[0])
-    expected = directions @ state.positions[0] + shape.reach(rotation.rotate(back, directions))
+    expected = directions @ state.positions[0] + shape.support(rotation.rotate(back, directions))
     assert found == pytest.approx(expected, abs=3.5e-3)
 
 
@@ -255,7 +255,7 @@ def test_rods_from_masses_alone_are_the_simulations():
         rods = Rods(scene)
         assert rods.count == 8
         expected = np.stack([swings.roots, swings.positions], axis=1)
-        assert np.abs(rods.between(swings.positions, state) - expected).max() < 1e-9
+        assert np.abs(rods.ends(swings.positions, state) - expected).max() < 1e-9
 
 
 def test_the_pointer_keeps_its_distance():

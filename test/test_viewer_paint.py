@@ -182,10 +182,11 @@ def test_a_page_without_a_server_has_them_too(run, tmp_path):
 
 def test_materials_and_images_are_read_as_they_are(run, tmp_path):
     _, skin = run
-    paint = skin.paint
-    assert len(paint.materials) == len(paint.textures) == 2
-    assert all(texture.image.startswith(b'\x89PNG') for texture in paint.textures)
-    assert set(paint.numbers) == {0, 1} and paint.uvs.shape == (len(skin.vertices), 2)
+    appearance = skin.appearance
+    assert len(appearance.materials) == len(appearance.textures) == 2
+    assert all(texture.image.startswith(b'\x89PNG') for texture in appearance.textures)
+    assert set(appearance.material_indices) == {0, 1}
+    assert appearance.uvs.shape == (len(skin.vertices), 2)
 
 
 def test_broken_looks_refuse_no_character(tmp_path):
@@ -201,4 +202,4 @@ def test_broken_looks_refuse_no_character(tmp_path):
         path.write_bytes(content.replace(one, other, 1))
         character = read_character(path)
         np.testing.assert_array_equal(character.vertices, sound.vertices)
-        assert len(character.paint.materials) == 2
+        assert len(character.appearance.materials) == 2

@@ -12,7 +12,7 @@ from ragdoll_ros.model.scene import SECOND
 from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.mcap_file import load_recording, recording_bytes
-from ragdoll_ros.recordings.recording import Pose, Recorder, Recording
+from ragdoll_ros.recordings.recording import RecordedPose, Recorder, Recording
 
 UNTURNED = np.tile((0, 0, 0, 1.0), (10, 1))
 
@@ -30,7 +30,7 @@ def run():
                 state = simulation.advance()
                 tail = simulation.swings
                 rods = np.stack([tail.roots, tail.positions], axis=1)
-                pose = Pose(state.positions, state.orientations, rods)
+                pose = RecordedPose(state.positions, state.orientations, rods)
                 recorder.add(simulation.time / SECOND, pose)
                 states.append(state)
     return recorder.recording(), states
@@ -67,7 +67,7 @@ def test_time_goes_on_over_a_reset(run):
 def test_same_instant_again_is_left_out():
     recorder = Recorder(load_scene('drop'))
     for time in (5.0, 5.0, 5.5, 5.5):
-        recorder.add(time, Pose(np.zeros((10, 3)), UNTURNED))
+        recorder.add(time, RecordedPose(np.zeros((10, 3)), UNTURNED))
     assert recorder.recording().times.tolist() == [0, 0.5]
     assert (len(recorder), recorder.duration) == (2, 0.5)
 
@@ -122,7 +122,7 @@ def test_of_a_torn_file_the_whole_instants_are_read(run, written, capsys):
     file = next((written.parent / 'bag').glob('*.mcap'))
     file.write_bytes(file.read_bytes()[:file.stat().st_size // 2])
     read = load_recording(file)
-    assert 10 < len(read) < len(recording) and 'breaks off' in capsys.readouterr().err
+    assert 10 < len(read) < len(recording) and 'is truncated' in capsys.readouterr().err
     np.testing.assert_array_equal(read.positions, recording.positions[:len(read)])
 
 

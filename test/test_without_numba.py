@@ -14,11 +14,11 @@ FALL = """
 import dataclasses
 import numpy as np
 from ragdoll_ros import Push, Simulation, load_scene
-from ragdoll_ros.physics.engine.substepped.doll_sums import DollSums
+from ragdoll_ros.physics.engine.doll_totals import DollSums
 scene = load_scene('flight')
 spun = dataclasses.replace(scene.dolls[0], spin=(3.0, 20.0, 5.0))
 with Simulation(dataclasses.replace(scene, dolls=(spun,))) as simulation:
-    begun = DollSums(simulation.scene).motion(simulation.state).energy[0]
+    begun = DollSums(simulation.scene).totals(simulation.state).energy[0]
     simulation.push(Push('torso', force=(100, 0, 50), duration=0.05))
     for _ in range(10):
         state = simulation.advance()

@@ -77,7 +77,7 @@ class _FixedSteps:
         self._tick, self._count = trial.scene.step, 0
         self._engine = make(trial.scene, step_sizes.fixed_steps(self._tick / substeps))
         if trial.start is not None:
-            self._engine.place(trial.start)
+            self._engine.set_coordinates(trial.start)
 
     @property
     def state(self) -> State:

@@ -176,7 +176,7 @@ class Metrics:
         for index, bone in enumerate(self.scene.bones):
             inward = rotation.rotate(rotation.inverse(trajectory.orientations[:, index]), -normal)
             height = trajectory.positions[:, index] @ normal - ground.offset
-            deepest = max(deepest, float((bone.shape.reach(inward) - height).max()))
+            deepest = max(deepest, float((bone.shape.support(inward) - height).max()))
         return deepest
 
     def settling_time(self, trajectory: Trajectory) -> float:
@@ -190,7 +190,7 @@ class Metrics:
     def _end(self, placement: Placement, name: str, anchor: tuple[float, float, float]) -> JointEnd:
         bone = placement.doll.bone(name)
         return (self.scene.bone_index(self.scene.qualified(placement, name)),
-                bone.pose.inward(anchor), rotation.inverse(bone.orientation))
+                bone.pose.apply_inverse(anchor), rotation.inverse(bone.orientation))
 
 
 def compare(trajectory: Trajectory, truth: Trajectory) -> dict[str, float]:

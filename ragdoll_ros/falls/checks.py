@@ -4,14 +4,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from ..files.building import any_under
+from ..files.building import has_error_under
 from ..model import errors
 from ..model.errors import ModelError
 from ..model.ragdoll import Ragdoll
 from ..model.rotation import IDENTITY
-from ..model.vectors import finite, unit
+from ..model.vectors import finite_floats, unit_vector
 from ..people.person import HEIGHTS, MASSES
-from ..physics.simulation import MOST_PARTS
+from ..physics.simulation import MAX_SAMPLES_PER_TICK
 from .distribution import choices, distribution_errors, support
 from .imu_samples import flaws_of
 
@@ -34,14 +34,14 @@ RANGES = {
 
 def value_errors(data: dict, dolls: list[Ragdoll], found: list[ModelError]) -> list[ModelError]:
     """Errors of the data beside those ``found`` so far; ``dolls`` are those it names."""
-    more = [error for key, part in data.items() if not any_under(found, key)
+    more = [error for key, part in data.items() if not has_error_under(found, key)
             for error in distribution_errors(part, key)]
     more += list(_out_of_range(data, [*found, *more]))
     more += list(_wrong_people(data, [*found, *more]))
     more += list(_wrong_limp(data, [*found, *more]))
     more += list(_wrong_rate(data, [*found, *more]))
     more += list(_wrong_imus(data, [*found, *more]))
-    if dolls and not any(any_under([*found, *more], key)
+    if dolls and not any(has_error_under([*found, *more], key)
                          for key in ('feet', 'start', 'pushes', 'limp', 'record')):
         more += _unknown_names(data, dolls)
     return more
@@ -49,8 +49,9 @@ def value_errors(data: dict, dolls: list[Ragdoll], found: list[ModelError]) -> l
 
 def checked_mount(mount: dict) -> dict:
     """Position m and unit quaternion of an IMU on its bone; NotFinite, NotUnit."""
-    return {'position': list(finite('position', mount.get('position', (0, 0, 0)))),
-            'orientation': list(unit('orientation', mount.get('orientation', IDENTITY), count=4))}
+    return {'position': list(finite_floats('position', mount.get('position', (0, 0, 0)))),
+            'orientation': list(unit_vector('orientation', mount.get('orientation', IDENTITY),
+                                            count=4))}
 
 
 def names_of(doll: Ragdoll) -> tuple:
@@ -66,7 +67,7 @@ def _out_of_range(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
     """Values or distributions that leave their RANGES."""
     for key, bounds in RANGES.items():
         for path, value in _values(data, key):
-            if any_under(found, path) or isinstance(value, (str, bool)):
+            if has_error_under(found, path) or isinstance(value, (str, bool)):
                 continue
             low, high = support(value)
             if not bounds[0] <= low <= high <= bounds[1]:
@@ -89,7 +90,7 @@ def _values(data: object, key: str, path: str = '') -> Iterator[tuple[str, objec
 def _wrong_people(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
     """Groups of people whose masses would leave MASSES."""
     for path, group in _values(data, 'who.people'):
-        if not any_under(found, path) and isinstance(group, dict):
+        if not has_error_under(found, path) and isinstance(group, dict):
             ends = [support(group['bmi'])[end] * support(group['height'])[end] ** 2
                     for end in (0, 1)]
             if not MASSES[0] <= ends[0] <= ends[1] <= MASSES[1]:
@@ -107,16 +108,16 @@ def _wrong_limp(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
 def _wrong_rate(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
     """A sensor rate that is no multiple of the frame rate."""
     record = data.get('record')
-    if not any_under(found, 'record') and isinstance(record, dict) and 'imu_rate' in record:
+    if not has_error_under(found, 'record') and isinstance(record, dict) and 'imu_rate' in record:
         rate, fast = record.get('rate', RATE), record['imu_rate']
-        if fast % rate or not 1 <= fast // rate <= MOST_PARTS:
+        if fast % rate or not 1 <= fast // rate <= MAX_SAMPLES_PER_TICK:
             yield errors.OutOfRange('record.imu_rate', fast,
-                                    f'1 to {MOST_PARTS} times the rate, {rate}')
+                                    f'1 to {MAX_SAMPLES_PER_TICK} times the rate, {rate}')
 
 
 def _wrong_imus(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
     """IMUs with equal names, or with an invalid position, orientation or flaw."""
-    if any_under(found, 'record'):
+    if has_error_under(found, 'record'):
         return
     names = []
     for index, mount in enumerate(data.get('record', {}).get('imus', ())):

@@ -5,7 +5,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from ..physics.sensors.imu import Flaws, Mount, imu_samples, sensor_motion
+from ..physics.sensors.imu import ImuErrors, ImuMount, imu_samples, sensor_motion
 from .fall import Fall
 
 NAMES = ('ax', 'ay', 'az', 'wx', 'wy', 'wz')
@@ -41,12 +41,12 @@ def sensor_orientations(fall: Fall, imu: int) -> np.ndarray:
     return sensor_motion(fall.imu_states[:, imu], mount_of(fall, imu))[1]
 
 
-def flaws_of(sensor: dict) -> Flaws:
+def flaws_of(sensor: dict) -> ImuErrors:
     """Noise, bias and range of a recipe's sensor; NotFinite, OutOfRange."""
-    return Flaws(**{field.name: sensor[field.name] for field in fields(Flaws)
-                    if field.name in sensor})
+    return ImuErrors(**{field.name: sensor[field.name] for field in fields(ImuErrors)
+                        if field.name in sensor})
 
 
-def mount_of(fall: Fall, imu: int) -> Mount:
+def mount_of(fall: Fall, imu: int) -> ImuMount:
     """Bone, position and orientation of the sensor."""
-    return Mount(**{key: fall.imus[imu][key] for key in ('bone', 'position', 'orientation')})
+    return ImuMount(**{key: fall.imus[imu][key] for key in ('bone', 'position', 'orientation')})

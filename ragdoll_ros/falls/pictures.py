@@ -131,7 +131,7 @@ def _outlines(fall: Fall, frame: int, along: np.ndarray) -> list[np.ndarray]:
     made = []
     for bone in order:
         corners, _ = fall.scene.bones[bone].shape.mesh()
-        points = state.poses(int(bone)).outward(corners)
+        points = state.poses(int(bone)).apply(corners)
         made.append(hull(np.column_stack([points @ along, points[:, 2]])))
     return made
 

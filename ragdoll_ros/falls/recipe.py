@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..files import yaml_text
-from ..files.building import raise_or_give, read_named
+from ..files.building import read_by_name, value_or_raise
 from ..files.config import find
 from ..files.doll import build_doll, doll_data
 from ..files.schema import schema_errors
@@ -74,7 +74,7 @@ class Recipe:
 
     @property
     def imus(self) -> list[dict]:
-        """Inertial sensors: name, bone, position m and orientation on the bone, fields of Flaws."""
+        """Inertial sensors: name, bone, position m and orientation on the bone, of ImuErrors."""
         return self.data['record']['imus']
 
     @cached_property
@@ -116,13 +116,13 @@ class Recipe:
 
 def load_recipe(name: str | Path) -> Recipe:
     """Read a recipe by its path or its name in config/; ModelErrors lists every error."""
-    data, path = read_named(str(name))
-    return raise_or_give(path, *build_recipe(data, path))
+    data, path = read_by_name(str(name))
+    return value_or_raise(path, *build_recipe(data, path))
 
 
 def recipe_of(data: dict) -> Recipe:
     """The recipe with this complete ``data``."""
-    dolls = [raise_or_give(Path('recipe'), *build_doll(doll))
+    dolls = [value_or_raise(Path('recipe'), *build_doll(doll))
              for doll in data['who'].get('dolls', ())] or [person(*standard('female'), 'female')]
     return Recipe(data['name'], data, tuple(dolls))
 

@@ -33,7 +33,7 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
             failure = ''
         except RagdollError as error:
             failure = str(error)
-        simulation.parts = recipe.samples_per_frame
+        simulation.samples_per_tick = recipe.samples_per_frame
         guard, limp = Guard(simulation), list(start.limp)
         while frames.valid < recipe.frames and not failure:
             frames.add(simulation)
@@ -77,7 +77,8 @@ class _Recorder:
         self.angles[at], self.rates[at] = simulation.joint_angles, simulation.joint_rates
         if self._imu_bones:
             last = at * self._per_frame
-            for back, state in enumerate(simulation.trail[:0:-1] if at else simulation.trail):
+            substates = simulation.substates
+            for back, state in enumerate(substates[:0:-1] if at else substates):
                 self.imu_states[last - back] = state.rows[self._imu_bones]
         self.valid += 1
 

@@ -1,1 +1,1 @@
-"""The model as text and back: YAML with its schema, URDF, MJCF."""
+"""Files of the model: YAML with JSON schemas, URDF, MJCF; messages of bags."""

@@ -1,7 +1,7 @@
-"""Messages in a rosbag2 recording, MCAP or SQLite, whole or torn.
+"""Messages of a rosbag2 recording, MCAP or SQLite, also of a truncated file.
 
-Of a torn file all is read that is whole: of MCAP every record before the tear, also within a chunk
-that is not compressed; of SQLite every row on a page that is there.
+Of a truncated MCAP file every complete record is read, also within an uncompressed chunk; of SQLite
+every row on a complete page.
 """
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from ..model import errors
 NO_MCAP = "MCAP files need mcap: pip install 'ragdoll_ros[replay]'"
 
 Messages = Iterator[tuple[str, str, bytes]]
-"""Topics, types and contents in CDR, in the order in which they were recorded."""
+"""(topic, type, CDR data), in recorded order."""
 
 
 def read_messages(path: Path, warn: Callable[[str], None]) -> Messages:
-    """All messages of a recording: a folder of rosbag2, or one of its files.
+    """All messages of a recording: a rosbag2 folder, or one of its files.
 
-    ``warn`` is told where a file breaks off. Unreadable for what is no recording.
+    ``warn`` gets a text if a file is truncated. Raises Unreadable if there is no recording.
     """
     for file in _files(path):
         read = _read_mcap if file.suffix == '.mcap' else _read_sqlite
@@ -31,13 +31,13 @@ def read_messages(path: Path, warn: Callable[[str], None]) -> Messages:
             yield from read(file)
         except errors.ModelError:
             raise
-        except Exception as error:  # whatever torn bytes are to who reads them
-            warn(f'{file} breaks off ({str(error) or type(error).__name__}): '
-                 'what stands before that is read')
+        except Exception as error:  # truncated data can raise anything
+            warn(f'{file} is truncated ({str(error) or type(error).__name__}): '
+                 'it is read up to there')
 
 
 def _files(path: Path) -> list[Path]:
-    """Files of a recording, the first first: their names end in numbers."""
+    """Files of a recording in the order of the numbers in their names."""
     found = [path] if path.is_file() else list(path.glob('*')) if path.is_dir() else []
     found = [file for file in found if file.suffix in ('.mcap', '.db3')]
     if not found:
@@ -49,7 +49,7 @@ def _files(path: Path) -> list[Path]:
 def _read_sqlite(file: Path) -> Messages:
     connection = sqlite3.connect(f'{file.resolve().as_uri()}?mode=ro', uri=True)
     try:
-        # Else SQLite refuses a file that is shorter than its first page says.
+        # Lets SQLite open a file that is shorter than its header says.
         connection.execute('PRAGMA writable_schema = ON')
         yield from connection.execute(
             'SELECT topics.name, topics.type, messages.data FROM messages JOIN topics '
@@ -76,7 +76,7 @@ def _read_mcap(file: Path) -> Messages:
 
 
 def _records(stream: BinaryIO, in_chunk: bool = False) -> Iterator[object]:
-    """Records of a file, or of what is there of a chunk's content; EndOfFile where it is torn."""
+    """Records of a file or a chunk. Raises EndOfFile where it is truncated."""
     from mcap.exceptions import EndOfFile
     from mcap.records import Chunk
     from mcap.stream_reader import StreamReader, breakup_chunk
@@ -90,12 +90,12 @@ def _records(stream: BinaryIO, in_chunk: bool = False) -> Iterator[object]:
                 yield record
     except EndOfFile:
         stream.seek(end)
-        yield from _records_of_torn(stream)
+        yield from _records_of_truncated(stream)
         raise
 
 
-def _records_of_torn(stream: BinaryIO) -> Iterator[object]:
-    """What is whole in the record at which a file ends too early."""
+def _records_of_truncated(stream: BinaryIO) -> Iterator[object]:
+    """Complete records in the truncated last record."""
     from mcap.data_stream import ReadDataStream
     from mcap.exceptions import EndOfFile
     from mcap.opcode import Opcode

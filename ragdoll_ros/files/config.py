@@ -1,4 +1,4 @@
-"""Where the shipped scenes, dolls and schemas are, and how one is found by its name."""
+"""Location of the shipped scenes, dolls and schemas, and look-up by name."""
 from __future__ import annotations
 
 import os
@@ -9,7 +9,7 @@ from ..model import errors
 
 
 def config_folder() -> Path:
-    """Folder of the shipped scenes: the checkout's, else the ROS prefix's, else the package's."""
+    """config/ of the checkout, else of the ROS prefix, else of the package."""
     package = Path(__file__).resolve().parents[1]
     candidates = [package.parent / 'config'] if (package.parent / 'package.xml').exists() else []
     prefixes = filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))
@@ -26,7 +26,7 @@ def scene_names() -> list[str]:
 
 
 def find(name: str, beside: Path | None = None) -> Path:
-    """Path of a file given by its path (also from ``beside``) or by its name in config/."""
+    """Path of a file given by path (also relative to ``beside``) or by name in config/."""
     choices = [Path(os.path.expanduser(name))]
     if beside is not None:
         choices.insert(0, beside / name)

@@ -1,13 +1,11 @@
-"""Dolls as YAML files: read, checked with all errors at once, written.
-
-The form is that of config/doll.schema.json.
-"""
+"""Dolls as YAML files (config/doll.schema.json): reading with all errors at once, writing."""
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from ..model.compound import Compound
 from ..model.errors import ModelError, OutOfRange
@@ -16,55 +14,85 @@ from ..model.ragdoll import (
     Joint,
     Ragdoll,
     SkeletonFrame,
-    angle_errors,
-    carried_errors,
-    pair_errors,
+    angle_name_errors,
+    attachment_errors,
+    no_collision_errors,
     tree_errors,
 )
 from ..model.rotation import IDENTITY
 from ..model.shapes import SHAPES, Part, Shape
+from ..model.swing import Link, Swing, strand
 from . import yaml_text
-from .building import build_each, entries, raise_or_give, read_named
+from .building import Made, build_each, entries, read_by_name, value_or_raise
 from .schema import schema_errors
-from .swing import swing_data, swing_from
 
 LARGEST_MASS_RATIO = 1e8
-"""Heaviest to lightest bone of a file: real robots have up to 6.1e7, and at 2e8 a tick takes a
-second, as an impact's equations have 16 digits."""
+"""Largest ratio of two masses in a file. Robots have up to 6.1e7; at 2e8 a tick takes a second, as
+the equations of an impact are ill-conditioned."""
 
 
 def load_doll(name: str) -> Ragdoll:
-    """Read a doll's file; ModelErrors with all that is wrong in it."""
-    data, path = read_named(name)
-    return raise_or_give(path, *build_doll(data, path))
+    """Read a doll from a YAML file.
+
+    Args:
+        name: path, or name of a shipped doll in config/.
+
+    Returns:
+        The doll.
+
+    Raises:
+        ModelErrors: all errors of the file, each with its path, its value, what is expected.
+
+    Example:
+        >>> load_doll('doll').mass
+        55.0
+    """
+    data, path = read_by_name(name)
+    return value_or_raise(path, *build_doll(data, path))
 
 
 def save_doll(doll: Ragdoll, path: str | Path, head: str = '') -> None:
-    """Write a doll; load_doll gives an equal one back."""
+    """Write a doll to a YAML file, from which load_doll reads an equal one.
+
+    Args:
+        doll: the doll; the path of its ``model`` is written relative to the file.
+        path: of the file.
+        head: text of a comment at its top.
+
+    Raises:
+        OSError: the file can not be written.
+
+    Example:
+        >>> save_doll(load_doll('doll'), 'copy.yaml')
+        >>> load_doll('copy.yaml') == load_doll('doll')
+        True
+    """
     text = yaml_text.to_text(doll_data(doll, Path(path).parent), 'doll', head)
     Path(path).write_text(text, encoding='utf-8')
 
 
 def build_doll(data: object, path: Path = Path('doll')) -> tuple[Ragdoll | None, list[ModelError]]:
-    """Make a doll from what the YAML file at ``path`` holds: the doll, or None and every error."""
+    """Build a doll from the data of the YAML file at ``path``; else None and every error."""
     found = schema_errors('doll', data)
     if not isinstance(data, dict):
         return None, found
     bones = build_each(data, 'bones', _bone, found)
     joints = build_each(data, 'joints', _joint, found)
-    swings = build_each(data, 'swings', swing_from, found)
+    swings = build_each(data, 'swings', _swing, found)
     riders = build_each(data, 'riders', lambda entry: SkeletonFrame(**entry), found)
-    names = [entry.get('name') for entry in entries(data, 'bones')]
-    edges = [(entry.get('parent'), entry.get('child')) for entry in entries(data, 'joints')]
+    names: list[Any] = [entry.get('name') for entry in entries(data, 'bones')]
+    edges: list[Any] = [(entry.get('parent'), entry.get('child'))
+                        for entry in entries(data, 'joints')]
     if all(isinstance(text, str) for text in [*names, *sum(edges, ())]):
         found += tree_errors(names, edges)
         for key in ('swings', 'riders'):
-            carried = [(entry.get('name'), entry.get('bone')) for entry in entries(data, key)]
-            if all(isinstance(text, str) for text in sum(carried, ())):
-                found += carried_errors(key, names, carried)
+            attached: list[Any] = [(entry.get('name'), entry.get('bone'))
+                                   for entry in entries(data, key)]
+            if all(isinstance(text, str) for text in sum(attached, ())):
+                found += attachment_errors(key, names, attached)
         if not found:
-            found += pair_errors(names, data.get('no_collision', ()))
-            found += angle_errors(joints) + mass_errors(bones)
+            found += no_collision_errors(names, data.get('no_collision', ()))
+            found += angle_name_errors(joints) + mass_errors(bones)
     if found:
         return None, found
     model = str(path.parent / data['model']) if 'model' in data else None
@@ -73,34 +101,34 @@ def build_doll(data: object, path: Path = Path('doll')) -> tuple[Ragdoll | None,
 
 
 def doll_data(doll: Ragdoll, folder: Path | None = None) -> dict:
-    """A doll as plain lists and numbers, the form of doll.schema.json.
+    """A doll as lists and numbers in the form of doll.schema.json.
 
-    The path of its character is written as seen from ``folder``, if given.
+    The path of its character is made relative to ``folder``, if given.
     """
     data = {'name': doll.name, 'bones': [_bone_data(bone) for bone in doll.bones],
             'joints': [_joint_data(joint) for joint in doll.joints]}
     if doll.no_collision:
         data['no_collision'] = [list(pair) for pair in doll.no_collision]
     if doll.swings:
-        data['swings'] = [swing_data(swing) for swing in doll.swings]
+        data['swings'] = [_swing_data(swing) for swing in doll.swings]
     if doll.riders:
         data['riders'] = [_rider_data(rider) for rider in doll.riders]
     if doll.model is not None:
-        data['model'] = doll.model if folder is None else _seen_from(folder, doll.model)
+        data['model'] = doll.model if folder is None else _relative_path(folder, doll.model)
     return data
 
 
-def _seen_from(folder: Path, model: str) -> str:
-    """Path of a character as it stands in a file of ``folder``: with slashes, relative."""
+def _relative_path(folder: Path, model: str) -> str:
+    """Path of a character relative to ``folder``, with slashes."""
     try:
         return Path(os.path.relpath(model, folder)).as_posix()
     except ValueError:
-        # Another drive has no way there.
+        # It is on another drive.
         return model
 
 
 def mass_errors(bones: Sequence[Bone]) -> list[ModelError]:
-    """The heaviest bone, where a tick of the doll would take seconds."""
+    """Error of the heaviest bone, if the ratio of masses exceeds LARGEST_MASS_RATIO."""
     lightest, heaviest = (choose(bones, key=lambda bone: bone.mass) for choose in (min, max))
     if heaviest.mass <= LARGEST_MASS_RATIO * lightest.mass:
         return []
@@ -122,7 +150,8 @@ def _part(data: dict) -> Part:
 
 
 def _bone(data: dict) -> Bone:
-    fields, found = dict(data), []
+    fields = dict(data)
+    found: list[ModelError] = []
     moments = fields.pop('inertia', None)
     if 'shape' in data:
         return Bone(shape=_shape(fields.pop('shape')), moments=moments, **fields)
@@ -130,7 +159,7 @@ def _bone(data: dict) -> Bone:
     for error in found:
         raise error
     del fields['shapes']
-    return Bone(shape=Compound(parts), moments=moments, **fields)
+    return Bone(shape=Compound(tuple(parts)), moments=moments, **fields)
 
 
 def _joint(data: dict) -> Joint:
@@ -161,20 +190,15 @@ def _part_data(part: Part) -> dict:
 
 
 def _bone_data(bone: Bone) -> dict:
-    several = isinstance(bone.shape, Compound)
-    shape = {'shapes': [_part_data(part) for part in bone.shape.parts]} if several else {
-        'shape': _shape_data(bone.shape)}
-    data = {'name': bone.name, **shape, 'mass': bone.mass, 'position': list(bone.position)}
-    if bone.moments is not None:
-        data['inertia'] = list(bone.moments)
-    if bone.orientation != IDENTITY:
-        data['orientation'] = list(bone.orientation)
-    for key in ('friction', 'rolling_friction', 'restitution'):
-        if getattr(bone, key) is not None:
-            data[key] = getattr(bone, key)
-    if bone.color is not None:
-        data['color'] = list(bone.color)
-    return data
+    shape = ({'shapes': [_part_data(part) for part in bone.shape.parts]}
+             if isinstance(bone.shape, Compound) else {'shape': _shape_data(bone.shape)})
+    optional = {'inertia': bone.moments,
+                'orientation': None if bone.orientation == IDENTITY else bone.orientation,
+                'friction': bone.friction, 'rolling_friction': bone.rolling_friction,
+                'restitution': bone.restitution, 'color': bone.color}
+    return {'name': bone.name, **shape, 'mass': bone.mass, 'position': list(bone.position),
+            **{key: list(value) if isinstance(value, tuple) else value
+               for key, value in optional.items() if value is not None}}
 
 
 def _rider_data(rider: SkeletonFrame) -> dict:
@@ -185,8 +209,8 @@ def _rider_data(rider: SkeletonFrame) -> dict:
 
 
 def _joint_data(joint: Joint) -> dict:
-    data = {'parent': joint.parent, 'child': joint.child, 'kind': joint.kind,
-            'anchor': list(joint.anchor)}
+    data: dict[str, Any] = {'parent': joint.parent, 'child': joint.child, 'kind': joint.kind,
+                            'anchor': list(joint.anchor)}
     if joint.axes:
         data['axes'] = [list(axis) for axis in joint.axes]
         data['limits_deg'] = [pair and [round(math.degrees(angle), 9) for angle in pair]
@@ -196,3 +220,37 @@ def _joint_data(joint: Joint) -> dict:
     if joint.names:
         data['names'] = list(joint.names)
     return data
+
+
+def _swing(data: dict) -> Swing:
+    """Build a swing from a file's data. Raises a ModelError with its path."""
+    fields = dict(data)
+    if 'strand' in fields:
+        links = _at('strand', strand, fields.pop('strand'))
+    else:
+        links = tuple(_at(f'links[{index}]', Link, entry)
+                      for index, entry in enumerate(fields.pop('links')))
+    return Swing(links=links, **fields)
+
+
+def _swing_data(swing: Swing) -> dict:
+    data = {'name': swing.name, 'bone': swing.bone, 'root': list(swing.root),
+            'direction': list(swing.direction), 'gravity': swing.gravity, 'mode': swing.mode}
+    if any(swing.velocity):
+        data['velocity'] = list(swing.velocity)
+    data['links'] = [_link_data(link) for link in swing.links]
+    return data
+
+
+def _link_data(link: Link) -> dict:
+    data = {key: getattr(link, key) for key in ('length', 'mass', 'stiffness', 'damping')}
+    if link.direction is not None:
+        data['direction'] = list(link.direction)
+    return data
+
+
+def _at(where: str, make: Callable[..., Made], fields: dict) -> Made:
+    try:
+        return make(**fields)
+    except ModelError as error:
+        raise error.at(where) from None

@@ -1,14 +1,12 @@
-"""A scene as an MJCF text for MuJoCo: the same bodies, joints, limits, damping and ground.
+"""A scene as MJCF for MuJoCo: the same bodies, joints, limits, damping and ground.
 
-A body's frame is that of its bone: origin at the centre of mass, the shape's own axes. MuJoCo
-writes quaternions w, x, y, z. Two hinges in one body turn one after the other, the second axis
-carried along by the first: just what `universal` means.
-
-What MuJoCo cannot say and what stands there instead:
+A body's frame is its bone's: centre of mass and the shape's axes. MuJoCo's quaternions are w, x, y,
+z. Several hinges of one body act in series, the second axis fixed after the first: a universal
+joint. Approximations:
 - a ball joint with limits is three hinges, as in urdf.py;
-- restitution is a spring and a damper in the contact, so it is met only by small steps;
-- friction is finite; a pair has the larger of the two, so each bone gets what it has with the
-  ground, and the ground none.
+- restitution is a spring and a damper in the contact, and needs small steps;
+- friction is finite; MuJoCo takes the larger of a pair, so each bone has the combined coefficient
+  with the ground, and the ground zero.
 """
 from __future__ import annotations
 
@@ -21,19 +19,18 @@ import numpy as np
 from ..model import rotation
 from ..model.pose import Pose
 from ..model.ragdoll import Bone, Joint, joint_axes
-from ..model.scene import Placement, Scene, grip
+from ..model.scene import Placement, Scene, finite_friction
 from ..model.shapes import Part, Shape
 
 CONTACT_TIME = 0.02
-"""Time constant of a contact, s: MuJoCo's default; who knows the step sets one that goes with it.
-"""
+"""s, time constant of a contact, MuJoCo's default; the engine sets one for its step."""
 
 
-def to_mjcf(scene: Scene, apart: Collection[frozenset[str]] = ()) -> str:
+def to_mjcf(scene: Scene, excluded: Collection[frozenset[str]] = ()) -> str:
     """Write a scene as MJCF.
 
-    ``apart`` lists further pairs of bones (names as in scene.bone_names) that must not collide,
-    beside the pairs of which the dolls say so: those that overlap at the start.
+    ``excluded`` are pairs of bones (scene.bone_names) that do not collide, as they overlap at the
+    start, beside the dolls' own pairs.
     """
     root = ET.Element('mujoco', model=scene.name)
     ET.SubElement(root, 'compiler', angle='radian', autolimits='true', inertiafromgeom='false')
@@ -45,18 +42,18 @@ def to_mjcf(scene: Scene, apart: Collection[frozenset[str]] = ()) -> str:
     for placement in scene.dolls:
         _add_doll(world, scene, placement)
     contact = ET.SubElement(root, 'contact')
-    for index, (a, b) in enumerate(sorted(map(sorted, {*_never_collide(scene), *apart}))):
+    for index, (a, b) in enumerate(sorted(map(sorted, {*_excluded_pairs(scene), *excluded}))):
         ET.SubElement(contact, 'exclude', name=f'apart_{index}', body1=a, body2=b)
     ET.indent(root)
     return ET.tostring(root, encoding='unicode') + '\n'
 
 
 def damping_ratio(restitution: float) -> float:
-    """Damping ratio of a spring and damper that throw a mass back with ``restitution``.
+    """Damping ratio z of a spring and damper with a coefficient of ``restitution``.
 
-    Contacts only push: the mass is let go where the force, not the way, is zero again, which leaves
-    e = exp(-z / s (pi - atan(2 z s / (1 - 2 z^2)))), s = sqrt(1 - z^2), of the speed (Schwager and
-    Poeschel, Granular Matter 9, 2007). Less than the exp(-2) of the critically damped is not had.
+    The contact ends when its force, not its penetration, is zero:
+    e = exp(-z / s (pi - atan(2 z s / (1 - 2 z^2)))), s = sqrt(1 - z^2) (Schwager and Poeschel,
+    Granular Matter 9, 2007). The least e is exp(-2), at critical damping.
     """
     low, high = 0.0, 1.0
     for _ in range(50):
@@ -68,9 +65,9 @@ def damping_ratio(restitution: float) -> float:
     return max(0.01, high)
 
 
-def _never_collide(scene: Scene) -> set[frozenset[str]]:
+def _excluded_pairs(scene: Scene) -> set[frozenset[str]]:
     return {frozenset(scene.qualified(placement, name) for name in pair)
-            for placement in scene.dolls for pair in placement.doll.never_collide}
+            for placement in scene.dolls for pair in placement.doll.excluded_pairs}
 
 
 def _add_ground(world: ET.Element, scene: Scene) -> None:
@@ -82,7 +79,7 @@ def _add_ground(world: ET.Element, scene: Scene) -> None:
 
 
 def _add_doll(world: ET.Element, scene: Scene, placement: Placement) -> None:
-    """Nest the bodies of one doll as its joints do."""
+    """Add the bodies of one doll, nested along its joints."""
     doll = placement.doll
     made = {doll.root.name: _add_bone(world, scene, placement, doll.root,
                                       placement.bone_pose(doll.root))}
@@ -105,19 +102,19 @@ def _add_bone(parent: ET.Element, scene: Scene, placement: Placement, bone: Bone
                          quat=_quaternion(pose.orientation))
     ET.SubElement(body, 'inertial', pos='0 0 0', mass=repr(bone.mass),
                   diaginertia=_text(bone.inertia))
-    # bit 0: meets the ground and, with self-collision, each other; bit 1: meets the ground only
+    # bit 0: collides with the ground and, with self_collision, with bones; bit 1: ground only
     mask = '1' if scene.self_collision else '2'
     for number, part in enumerate(bone.shape.parts, 1):
-        # No bone has a slash in its own name.
+        # A bone's own name has no slash.
         ET.SubElement(body, 'geom', name=name if number == 1 else f'{name}/{number}',
-                      type=part.kind, size=_text(_size(part.shape)), **_placed(part),
+                      type=part.kind, size=_text(_size(part.shape)), **_pose_attributes(part),
                       contype=mask, conaffinity='1' if scene.self_collision else '0',
                       **_material(scene, bone))
     return body
 
 
-def _placed(part: Part) -> dict[str, str]:
-    """Where a part stands in its body; nothing where that is the body's own frame."""
+def _pose_attributes(part: Part) -> dict[str, str]:
+    """Attributes of a part's pose in its body; none for the identity."""
     return {} if part.is_centred else {'pos': _text(part.position),
                                        'quat': _quaternion(part.orientation)}
 
@@ -125,7 +122,7 @@ def _placed(part: Part) -> dict[str, str]:
 def _joints(joint: Joint, child: Bone) -> Iterable[dict[str, str]]:
     """Attributes of one element for each axis, in the child's frame; none for a fixed joint."""
     back = rotation.inverse(child.orientation)
-    place = {'pos': _text(child.pose.inward(joint.anchor)), 'damping': repr(joint.damping)}
+    place = {'pos': _text(child.pose.apply_inverse(joint.anchor)), 'damping': repr(joint.damping)}
     if joint.is_free_ball:
         yield {'name': joint.child, 'type': 'ball', **place}
         return
@@ -137,7 +134,7 @@ def _joints(joint: Joint, child: Bone) -> Iterable[dict[str, str]]:
 
 
 def _size(shape: Shape) -> tuple[float, ...]:
-    """Sizes as MuJoCo wants them: halves, and of what is round about z one radius alone."""
+    """Sizes in MuJoCo's form: half lengths, and one radius."""
     if shape.kind == 'box':
         return shape.half_extents
     return tuple(size / (2 if key == 'length' else 1) for key, size in vars(shape).items())
@@ -146,7 +143,7 @@ def _size(shape: Shape) -> tuple[float, ...]:
 def _material(scene: Scene, bone: Bone | None) -> dict[str, str]:
     """Friction and restitution of a bone, or of the ground."""
     friction, rolling, restitution = scene.material.on(bone)
-    friction = math.sqrt(grip(friction) * grip(scene.material.friction))
+    friction = math.sqrt(finite_friction(friction) * finite_friction(scene.material.friction))
     if bone is None:
         friction = rolling = 0.0
     restitution = math.sqrt(restitution * scene.material.restitution)

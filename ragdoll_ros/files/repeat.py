@@ -1,4 +1,4 @@
-"""`repeat:` of a doll in a scene's file: the same doll many times, on a grid, strewn, or both."""
+"""`repeat:` of a doll in a scene's file: copies on a grid, scattered, or both."""
 from __future__ import annotations
 
 import dataclasses
@@ -10,14 +10,13 @@ from ..model import rotation
 from ..model.scene import Placement
 
 
-def repeated(first: Placement, repeat: dict) -> list[Placement]:
-    """Copies of a placement, named ``name_1`` on; see scene.schema.json for ``repeat``.
+def repeated_placements(first: Placement, repeat: dict) -> list[Placement]:
+    """Copies of a placement, named ``name_1`` on; ``repeat`` as in scene.schema.json.
 
-    The grid grows from the first's place along x, then y, then z; each copy is then moved by up to
-    half of ``spread`` along each axis. The same seed gives the same copies.
-
-    What is turned by any turn turns about its frame's origin; by ``yaw``, about the vertical
-    through its centre of mass, by up to half a turn.
+    The grid starts at the first's position and fills x, then y, then z; each copy is then moved by
+    up to half of ``spread`` along each axis. The same seed gives the same copies. ``turned: yaw``
+    rotates by up to 180 degrees about the vertical through the centre of mass, any other by a
+    random rotation about the origin of the doll's frame.
     """
     count, rng = int(repeat['count']), np.random.default_rng(int(repeat.get('seed', 0)))
     columns = repeat.get('columns') or [math.ceil(math.sqrt(count))] * 2
@@ -30,7 +29,7 @@ def repeated(first: Placement, repeat: dict) -> list[Placement]:
         place = np.array(first.position) + cell * grid + spread * rng.uniform(-0.5, 0.5, 3)
         turn = first.orientation
         if repeat.get('turned') == 'yaw':
-            place, turn = _turned_about_the_vertical(first, place, rng.uniform(0, math.pi))
+            place, turn = _yawed(first, place, rng.uniform(0, math.pi))
         elif repeat.get('turned'):
             turn = tuple(rotation.normalized(rng.normal(size=4)))
         copies.append(dataclasses.replace(first, name=f'{first.name}_{k + 1}',
@@ -38,10 +37,10 @@ def repeated(first: Placement, repeat: dict) -> list[Placement]:
     return copies
 
 
-def _turned_about_the_vertical(first: Placement, place: np.ndarray,
-                               angle: float) -> tuple[np.ndarray, tuple[float, ...]]:
-    """Where a copy's frame stands, (3,) m, and its orientation: turned by ``angle`` rad about z
-    through its centre of mass, which stays where it is with the frame at ``place``.
+def _yawed(first: Placement, place: np.ndarray,
+           angle: float) -> tuple[np.ndarray, tuple[float, ...]]:
+    """Position (3,) m and orientation of a copy, rotated by ``angle`` rad about the vertical
+    through its centre of mass; before, its frame is at ``place``.
     """
     turn = rotation.from_axis_angle((0.0, 0.0, 1.0), angle)
     arm = rotation.rotate(first.orientation, first.doll.mass_centre)

@@ -1,50 +1,76 @@
-"""Scenes as YAML files: found, read, checked with all errors at once, written.
-
-The form is that of config/scene.schema.json.
-"""
+"""Scenes as YAML files (config/scene.schema.json): reading with all errors at once, writing."""
 from __future__ import annotations
 
 import functools
 import re
 from pathlib import Path
+from typing import Any
 
 from ..model.errors import ModelError, OutOfRange
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Ground, Material, Placement, Scene, above_ground
 from . import config, yaml_text
-from .building import any_under, attempt, raise_or_give, read_named
+from .building import has_error_under, read_by_name, try_build, value_or_raise
 from .doll import build_doll, doll_data
-from .repeat import repeated
+from .repeat import repeated_placements
 from .schema import schema_errors
 
 MOST_DOLLS = 1000
 
 
 def load_scene(name: str) -> Scene:
-    """Read a scene, or a doll (then above level ground); ModelErrors with all that is wrong."""
-    return scene_from(*read_named(name))
+    """Read a scene from a YAML file.
+
+    Args:
+        name: path, or name of a shipped scene or doll in config/.
+
+    Returns:
+        The scene; of a doll's file, that doll 0.4 m above level ground.
+
+    Raises:
+        ModelErrors: all errors of the file, each with its path, its value, what is expected.
+
+    Example:
+        >>> load_scene('drop').bone_names[0]
+        'torso'
+    """
+    return scene_from_data(*read_by_name(name))
 
 
-def scene_from(data: object, path: Path) -> Scene:
-    """Make a scene from what a YAML file at ``path`` holds, a scene or a doll; see load_scene."""
+def scene_from_data(data: object, path: Path) -> Scene:
+    """Build a scene from the data of a scene's or a doll's file. Raises ModelErrors."""
     if isinstance(data, dict) and 'bones' in data:
-        return above_ground(raise_or_give(path, *build_doll(data, path)))
-    return raise_or_give(path, *build_scene(data, path))
+        return above_ground(value_or_raise(path, *build_doll(data, path)))
+    return value_or_raise(path, *build_scene(data, path))
 
 
 def save_scene(scene: Scene, path: str | Path, head: str = '') -> None:
-    """Write a scene with its dolls in it; load_scene gives an equal one back."""
+    """Write a scene with its dolls to a YAML file, from which load_scene reads an equal one.
+
+    Args:
+        scene: the scene; paths of its dolls' ``model`` are written relative to the file.
+        path: of the file.
+        head: text of a comment at its top.
+
+    Raises:
+        OSError: the file can not be written.
+
+    Example:
+        >>> save_scene(load_scene('drop'), 'copy.yaml')
+        >>> load_scene('copy.yaml') == load_scene('drop')
+        True
+    """
     Path(path).write_text(scene_text(scene, Path(path).parent, head), encoding='utf-8')
 
 
 def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError]]:
-    """Make a scene from what a YAML file holds: the scene, or None and every error."""
+    """Build a scene from the data of a scene's file; else None and every error."""
     found = schema_errors('scene', data)
     if not isinstance(data, dict):
         return None, found
-    placements = []
+    placements: list[Any] = []
     entries = data.get('dolls')
-    # A crowd's is read once, also where it stands in the file itself, with aliases for the others.
+    # A doll that many entries share, by name or by alias, is built once.
     named = functools.cache(lambda name: _named_doll(name, path))
     inline: dict[int, tuple] = {}
     for index, entry in enumerate(entries if isinstance(entries, list) else ()):
@@ -59,38 +85,39 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
         else:
             doll, more = named(source) if isinstance(source, str) else (None, [])
         found += [error.at(f'{where}.doll') for error in more]
-        if doll is not None and not any_under(found, where):
+        if doll is not None and not has_error_under(found, where):
             doll, more = _with_swings(doll, entry, path)
             found += [error.at(where) for error in more]
-        if doll is not None and not any_under(found, where):
+        if doll is not None and not has_error_under(found, where):
             fields = {'position', 'orientation', 'velocity', 'spin', 'name'} & set(entry)
-            first = attempt(found, where, Placement, doll, **{key: entry[key] for key in fields})
-            placements += repeated(first, entry['repeat']) if first and 'repeat' in entry else [
-                first]
+            first = try_build(found, where, Placement, doll, **{key: entry[key] for key in fields})
+            placements += repeated_placements(first, entry['repeat']) if (
+                first and 'repeat' in entry) else [first]
     if len(placements) > MOST_DOLLS:
         found.append(OutOfRange('dolls', len(placements), f'at most {MOST_DOLLS} in all'))
     parts = {}
     for key, part in (('ground', Ground), ('material', Material)):
-        if isinstance(data.get(key), dict) and not any_under(found, key):
-            parts[key] = attempt(found, key, part, **data[key])
+        if isinstance(data.get(key), dict) and not has_error_under(found, key):
+            parts[key] = try_build(found, key, part, **data[key])
     if found:
         return None, found
     plain = {key: data[key] for key in ('gravity', 'step', 'pace', 'self_collision')
              if key in data}
-    scene = attempt(found, '', Scene, data.get('name', path.stem), tuple(placements),
-                     **parts, **plain)
+    scene = try_build(found, '', Scene, data.get('name', path.stem), tuple(placements),
+                      **parts, **plain)
     return scene, found
 
 
 def scene_data(scene: Scene, folder: Path | None = None) -> dict:
-    """A scene as plain lists and numbers, the form of scene.schema.json; see doll_data.
+    """A scene as lists and numbers in the form of scene.schema.json; see doll_data.
 
-    Where placements share a doll, so do their entries: YAML writes it once.
+    Placements that share a doll share its data, which YAML writes once.
     """
     dolls: dict[int, dict] = {}
-    data = {'name': scene.name, 'gravity': list(scene.gravity), 'step': scene.step,
-            'pace': scene.pace, 'self_collision': scene.self_collision,
-            'material': dict(vars(scene.material)), 'ground': None, 'dolls': []}
+    data: dict[str, Any] = {
+        'name': scene.name, 'gravity': list(scene.gravity), 'step': scene.step,
+        'pace': scene.pace, 'self_collision': scene.self_collision,
+        'material': dict(vars(scene.material)), 'ground': None, 'dolls': []}
     if scene.ground is not None:
         data['ground'] = {'normal': list(scene.ground.normal), 'offset': scene.ground.offset}
     for placement in scene.dolls:
@@ -104,12 +131,12 @@ def scene_data(scene: Scene, folder: Path | None = None) -> dict:
 
 
 def scene_text(scene: Scene, folder: Path, head: str = '') -> str:
-    """What save_scene writes into a file of ``folder``."""
+    """YAML of a scene for a file in ``folder``."""
     return yaml_text.to_text(scene_data(scene, folder), 'scene', head)
 
 
 def _named_doll(name: str, path: Path) -> tuple[Ragdoll | None, list[ModelError]]:
-    """Make the doll a scene names; errors of another file carry its name."""
+    """Build the doll of another file; its errors have the file's name."""
     try:
         file = config.find(name, beside=path.parent)
         doll, found = build_doll(yaml_text.read(file), file)
@@ -119,7 +146,7 @@ def _named_doll(name: str, path: Path) -> tuple[Ragdoll | None, list[ModelError]
 
 
 def _with_swings(doll: Ragdoll, entry: dict, path: Path) -> tuple[Ragdoll | None, list[ModelError]]:
-    """The doll with the swings that its place in the scene adds to its own."""
+    """The doll with the swings of its scene's entry added to its own."""
     if not entry.get('swings'):
         return doll, []
     own = len(doll.swings)

@@ -1,4 +1,4 @@
-"""The JSON schemas of scenes and dolls: what in a file's data is not as they say."""
+"""Validation of a file's data against the JSON schemas of scenes and dolls."""
 from __future__ import annotations
 
 import functools
@@ -15,11 +15,11 @@ _NAMED = {'exclusiveMinimum': errors.NotPositive, 'minimum': errors.OutOfRange,
 
 
 def schema_errors(schema: str, data: object) -> list[ModelError]:
-    """Find all that the schema ``schema`` ('scene' or 'doll') has against the data."""
+    """All violations of the schema ``schema`` ('scene' or 'doll')."""
     found = []
     for error in _validator(schema).iter_errors(data):
         if error.validator == 'oneOf' and not isinstance(error.instance, dict):
-            # That it is no mapping is told already.
+            # An error of its type is reported already.
             continue
         path = ''
         for part in error.absolute_path:
@@ -30,7 +30,7 @@ def schema_errors(schema: str, data: object) -> list[ModelError]:
 
 
 def _wrong(error: jsonschema.ValidationError) -> object:
-    """What is wrong at the place of an error: of a mapping, its keys, or those that none has."""
+    """The wrong value of an error; of a mapping, its keys or the unknown ones."""
     if error.validator == 'oneOf':
         return ', '.join(map(str, error.instance))
     if error.validator != 'additionalProperties':
@@ -38,13 +38,13 @@ def _wrong(error: jsonschema.ValidationError) -> object:
     return ', '.join(str(key) for key in error.instance if key not in error.schema['properties'])
 
 
-KINDS = {'array': 'a list', 'object': 'a mapping', 'string': 'a text', 'number': 'a number',
-         'integer': 'a whole number', 'boolean': 'true or false', 'null': 'nothing'}
-"""JSON Schema's types in the words of YAML."""
+KINDS = {'array': 'a list', 'object': 'a mapping', 'string': 'a string', 'number': 'a number',
+         'integer': 'an integer', 'boolean': 'true or false', 'null': 'nothing'}
+"""JSON Schema's types in words."""
 
 
 def _expected(error: jsonschema.ValidationError) -> str:
-    """Say in words what the schema asks for at the place of an error."""
+    """What the schema expects instead, in words."""
     about = error.schema.get('description', '')
     if error.validator == 'required':
         missing = [key for key in error.validator_value if key not in error.instance]

@@ -1,15 +1,14 @@
-"""Ragdoll to URDF text.
+"""Ragdoll to URDF.
 
-Every link's frame has the doll's axes in the bind pose and its origin in the joint's anchor
-(the root's: in its centre of mass); a ball joint's link is turned so that z is the twist axis.
-URDF has no universal and no ball joint: they become hinges in a row with links between, which
-are named child/1, child/2. A joint bears the name of the angle it measures.
+A link's frame has the doll's axes in the bind pose and its origin at the joint's anchor (the
+root's: at its centre of mass); of a ball joint's link z is the twist axis. URDF has no universal
+or ball joint: they are revolute joints in series with links child/1, child/2 between them. A joint
+has the name of its angle.
 
-Two dialects: 'ros' is what urdfdom reads; 'bullet' has capsules, links of no mass, and for a
-ball joint without limits its spherical joint (whose own limits hardly hold: measured, it passes
-0.5 rad by 2 rad). PyBullet counts that joint's turn in the frame of the child's inertia, so a
-link of no mass with the joint's frame takes it, and the child is fixed to that. Limits of effort
-and of velocity are zero there, where no motor is meant.
+Dialects: 'ros' is what urdfdom reads; 'bullet' has capsules, massless links, and PyBullet's
+spherical joint for a ball joint without limits (its own limits do not hold: measured, 2 rad past
+0.5 rad). PyBullet measures that joint in the frame of the child's inertia, so it has a massless
+link in the joint's frame, to which the child is fixed. Effort and velocity are zero: no motor.
 """
 from __future__ import annotations
 
@@ -25,27 +24,27 @@ from ..model.shapes import Shape
 
 UNLIMITED = 'continuous'
 
-STRENGTH = 'effort="1000.0" velocity="100.0"'
-"""N m and rad/s that URDF wants with limits, and that joints of dolls do not reach: nothing in the
-doll keeps them, and planners and drivers of joints take zeros for joints that can not move."""
+EFFORT_AND_VELOCITY = 'effort="1000.0" velocity="100.0"'
+"""N m and rad/s, which URDF requires with limits; beyond what the joints of dolls reach. Planners
+take zero for a joint that can not move."""
 
-OWNER = '\0'
-"""Stands for a doll's own name in the tree that equal dolls share: XML allows no such character."""
+DOLL_NAME = '\0'
+"""Placeholder for the doll's name in a text that equal dolls share; not allowed in XML."""
 
 ESCAPES = str.maketrans({'&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;',
                          '\t': '&#9;', '\n': '&#10;', '\r': '&#13;'})
 
 
 def to_urdf(doll: Ragdoll, dialect: str = 'ros') -> str:
-    """Write a doll as URDF; angles in rad, lengths in m, masses in kg."""
+    """A doll as URDF; rad, m, kg."""
     return _document(doll.name, _tree(doll, dialect))
 
 
 def scene_to_urdf(scene: Scene, frame: str = WORLD) -> str:
-    """Write all dolls of a scene in ROS's dialect, under the bone names of the scene.
+    """All dolls of a scene as one URDF in ROS's dialect, with the scene's bone names.
 
-    One doll stands for itself; several hang on a link named as the world's ``frame`` by floating
-    joints, each where its root is at the start, for URDF knows one tree only.
+    Several dolls are connected by floating joints to a link named ``frame``, each at its root's
+    initial pose.
     """
     if len(scene.dolls) == 1:
         return to_urdf(scene.dolls[0].doll)
@@ -53,7 +52,7 @@ def scene_to_urdf(scene: Scene, frame: str = WORLD) -> str:
     for placement in scene.dolls:
         doll = placement.doll
         if id(doll) not in trees:
-            trees[id(doll)] = doll.root, '\n'.join(_tree(doll.renamed(OWNER.__add__), 'ros'))
+            trees[id(doll)] = doll.root, '\n'.join(_tree(doll.renamed(DOLL_NAME.__add__), 'ros'))
         root, tree = trees[id(doll)]
         name = _quoted(scene.qualified(placement, root.name))
         position, _ = placement.bone_pose(root)
@@ -61,12 +60,12 @@ def scene_to_urdf(scene: Scene, frame: str = WORLD) -> str:
                   f'    <parent link={_quoted(frame)}/>',
                   f'    <child link={name}/>',
                   f'    {_origin(position, np.array(placement.orientation))}', '  </joint>',
-                  tree.replace(OWNER, scene.qualified(placement, '').translate(ESCAPES))]
+                  tree.replace(DOLL_NAME, scene.qualified(placement, '').translate(ESCAPES))]
     return _document(scene.name, lines)
 
 
 def link_frames(doll: Ragdoll) -> dict[str, Pose]:
-    """Frame of each bone's link, in the doll's frame in the bind pose."""
+    """Pose of each bone's link frame in the doll's frame, bind pose."""
     frames = {doll.root.name: Pose(np.array(doll.root.position))}
     for joint in doll.joints:
         frames[joint.child] = Pose(np.array(joint.anchor), joint_frame(joint))
@@ -74,12 +73,12 @@ def link_frames(doll: Ragdoll) -> dict[str, Pose]:
 
 
 def link_axes(joint: Joint) -> np.ndarray:
-    """Axes (dof, 3) of a joint's angles, in the frame of its child's link."""
+    """Axes (dof, 3) of a joint's angles in the frame of its child's link."""
     return np.eye(3) if joint.kind == 'ball' else np.array(joint.axes).reshape(-1, 3)
 
 
 def link_names(child: str, count: int) -> list[str]:
-    """Links of a joint that is ``count`` joints in a row: those between, then the child's."""
+    """Names of the links of ``count`` joints in series; the last is the child's."""
     return [*(f'{child}/{index}' for index in range(1, count)), child]
 
 
@@ -124,44 +123,44 @@ def _link(bone: Bone, frame: Pose, dialect: str) -> list[str]:
 
 
 def _geometries(bone: Bone, pose: Pose, dialect: str) -> Iterator[tuple[Pose, str]]:
-    """Poses and XML of what makes up a bone's shape."""
+    """Pose and XML of each geometry of a bone."""
     for part in bone.shape.parts:
         place = pose if part.is_centred else pose.compose(part.pose)
         if part.kind == 'capsule' and dialect == 'ros':
-            # URDF has none: a cylinder between two balls.
+            # urdfdom has no capsule: a cylinder and two spheres.
             for piece in part.shape.primitives:
-                yield Pose(place.outward(piece.position), place.orientation), _geometry(piece.shape)
+                yield Pose(place.apply(piece.position), place.orientation), _geometry(piece.shape)
         else:
             yield place, _geometry(part.shape)
 
 
 def _geometry(shape: Shape) -> str:
-    """URDF calls shapes and their sizes as we do."""
+    """XML of a shape, whose names of kinds and sizes are URDF's."""
     sizes = ' '.join(f'{key}={_numbers(value) if key == "size" else _quoted(repr(value))}'
                      for key, value in vars(shape).items())
     return f'<geometry><{shape.kind} {sizes}/></geometry>'
 
 
 def _joint(joint: Joint, frames: dict[str, Pose], dialect: str) -> list[str]:
-    """Write a joint and, where it has several axes, the links between."""
+    """Lines of a joint and of the links between its axes."""
     place = frames[joint.parent].relative(frames[joint.child])
     if joint.kind == 'fixed':
-        return _row(joint, [(joint.child, 'fixed', None, None)], place, dialect)
+        return _serial_joints(joint, [(joint.child, 'fixed', None, None)], place, dialect)
     if joint.is_free_ball and dialect == 'bullet':
         row = [(joint.child, 'spherical', (0, 0, 1), None),
                (f'{joint.child}/fixed', 'fixed', None, None)]
-        return _row(joint, row, place, dialect)
-    strength = STRENGTH if dialect == 'ros' else 'effort="0" velocity="0"'
+        return _serial_joints(joint, row, place, dialect)
+    motor = EFFORT_AND_VELOCITY if dialect == 'ros' else 'effort="0" velocity="0"'
     row = []
     for name, axis, pair in zip(joint.angle_names, link_axes(joint), joint.angle_limits,
                                 strict=True):
-        limit = pair and f'<limit lower="{pair[0]!r}" upper="{pair[1]!r}" {strength}/>'
+        limit = pair and f'<limit lower="{pair[0]!r}" upper="{pair[1]!r}" {motor}/>'
         row.append((name, 'revolute' if pair else UNLIMITED, axis, limit))
-    return _row(joint, row, place, dialect)
+    return _serial_joints(joint, row, place, dialect)
 
 
-def _row(joint: Joint, row: list, place: Pose, dialect: str) -> list[str]:
-    """Write joints one behind the other; only the first one is displaced."""
+def _serial_joints(joint: Joint, row: list, place: Pose, dialect: str) -> list[str]:
+    """Lines of joints in series; only the first has an offset."""
     lines, parent = [], joint.parent
     links = link_names(joint.child, len(row))
     for index, (child, (name, kind, axis, limit)) in enumerate(zip(links, row, strict=True)):
@@ -189,5 +188,5 @@ def _row(joint: Joint, row: list, place: Pose, dialect: str) -> list[str]:
 
 
 def _quoted(text: str) -> str:
-    """Write an attribute; xml.sax.saxutils could, but loads HTTP and TLS with every node."""
+    """A quoted attribute. xml.sax.saxutils would import HTTP and TLS into every node."""
     return f'"{text.translate(ESCAPES)}"'

@@ -1,10 +1,10 @@
-"""A URDF as it stands: links with their shapes and masses, joints between, each in its place.
+"""URDF parser: links with shapes and inertias, joints, and forward kinematics.
 
-Poses are those of the frames, doll's frame (the root link's), at given joint angles. What is no
-part of the motion (transmissions, sensors, colours) is not read.
+Transmissions, sensors, colours and what else has no part in the motion are not read.
 """
 from __future__ import annotations
 
+import codecs
 import math
 from dataclasses import dataclass, field
 from xml.etree import ElementTree
@@ -23,7 +23,7 @@ JOINT_TYPES = ('revolute', 'continuous', 'fixed', 'prismatic', 'planar', 'floati
 
 @dataclass(frozen=True)
 class UrdfMesh:
-    """A mesh where it stands in a link: the name of its file as given, ``scale`` (3,), its pose."""
+    """A mesh of a link: its file as given, ``scale`` (3,), its pose in the link's frame."""
 
     file: str
     scale: tuple[float, ...]
@@ -32,7 +32,7 @@ class UrdfMesh:
 
 @dataclass
 class UrdfLink:
-    """``shapes`` with their poses in the link's frame; ``mass`` kg, zero where none is given."""
+    """A link: ``shapes`` with poses in its frame; ``mass`` kg, zero if none is given."""
 
     name: str
     mass: float = 0.0
@@ -42,16 +42,16 @@ class UrdfLink:
     shapes: list[tuple[Shape, Pose]] = field(default_factory=list)
     meshes: list[UrdfMesh] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
-    """What else it is described by, which no doll has: the tags."""
+    """Tags of geometries that no doll has."""
     collides: bool = False
-    """Whether its shapes and meshes are those of <collision>; else they are what is seen."""
+    """Whether its shapes and meshes are those of <collision>, else of <visual>."""
     has_contact: bool = False
-    """Whether PyBullet's <contact> says how it touches: its friction, its restitution."""
+    """Whether it has PyBullet's <contact>: friction, restitution."""
 
 
 @dataclass
 class UrdfJoint:
-    """``origin`` is the child's frame in the parent's at angle zero; ``axis`` in the child's."""
+    """A joint: ``origin`` is the child's frame in the parent's at zero, ``axis`` in the child's."""
 
     name: str
     kind: str
@@ -62,14 +62,14 @@ class UrdfJoint:
     limits: tuple[float, float] | None
     damping: float
     friction: float = 0.0
-    """N m (N where it slides), whatever the speed."""
+    """Coulomb friction, N m (N if prismatic)."""
     mimics: str | None = None
-    """Name of the joint that a gear or a tendon couples it to."""
+    """Name of the joint of its <mimic>."""
 
 
 @dataclass
 class UrdfTree:
-    """``joints`` by child."""
+    """Links by name and joints by child."""
 
     name: str
     links: dict[str, UrdfLink]
@@ -77,14 +77,14 @@ class UrdfTree:
 
     @property
     def order(self) -> list[str]:
-        """All links, each parent's before its children's."""
+        """All links, parents before children."""
         names = [name for name in self.links if name not in self.joints]
         for name in names:
             names += [child for child, joint in self.joints.items() if joint.parent == name]
         return names
 
     def poses(self, angles: dict[str, float]) -> dict[str, Pose]:
-        """Pose of every link's frame at joint angles (rad, by child; zero where not given)."""
+        """Pose of every link in the root's frame at joint angles (rad, by child, default zero)."""
         placed: dict[str, Pose] = {}
         for name in self.order:
             joint = self.joints.get(name)
@@ -98,7 +98,7 @@ class UrdfTree:
 
 
 def parse_urdf(text: str) -> UrdfTree:
-    """Read URDF; a ModelError where it is no URDF or its links form no tree."""
+    """Parse URDF. Raises a ModelError for what is no URDF or no tree."""
     if len(text) > LARGEST_TEXT:
         raise errors.Unreadable('', f'{len(text)} characters', f'at most {LARGEST_TEXT}')
     if '<!DOCTYPE' in text or '<!ENTITY' in text:
@@ -119,6 +119,30 @@ def parse_urdf(text: str) -> UrdfTree:
                     {joint.child: joint for joint in joints})
 
 
+def decode_urdf(data: bytes) -> str:
+    """Text of a URDF file without its XML declaration; line numbers are kept.
+
+    Accepts a byte order mark, Latin-1, lines before the XML declaration, NULs at the end.
+    """
+    text = _decoded(data).rstrip('\0 \t\r\n')
+    head, found, rest = text.partition('<?xml')
+    # XML allows nothing before a declaration; the text is decoded already.
+    if found and '<robot' not in head:
+        declaration, _, text = rest.partition('?>')
+        text = '\n' * (head + declaration).count('\n') + text
+    return text
+
+
+def _decoded(data: bytes) -> str:
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode('utf-16', errors='replace')
+    try:
+        return data.decode('utf-8-sig')
+    except UnicodeDecodeError:
+        # Every byte is a character of Latin-1; only names and comments can be wrong.
+        return data.decode('latin-1')
+
+
 def _link(element: ElementTree.Element) -> UrdfLink:
     link = UrdfLink(_text(element, 'name', 'link'))
     where = f'link {link.name}'
@@ -132,7 +156,7 @@ def _link(element: ElementTree.Element) -> UrdfLink:
     link.has_contact = element.find('contact') is not None
     collisions = element.findall('collision')
     link.collides = bool(collisions)
-    # Some describe only what is seen.
+    # Some links have visuals only.
     for part in collisions or element.findall('visual'):
         for geometry in part.findall('geometry/*')[:1]:
             _add_geometry(link, geometry, _pose(part, where), where)
@@ -140,7 +164,7 @@ def _link(element: ElementTree.Element) -> UrdfLink:
 
 
 def _add_geometry(link: UrdfLink, element: ElementTree.Element, pose: Pose, where: str) -> None:
-    """Add the shape or the mesh to the link; what is neither, or a point, to what is left out."""
+    """Add a shape or mesh to the link; its tag to ``left_out`` if it is neither, or has no size."""
     kind = element.tag
     if kind == 'mesh':
         scale = tuple(_vector(element, 'scale', where, (1, 1, 1)))
@@ -232,7 +256,7 @@ def _vector(element: ElementTree.Element, key: str, where: str,
 def _numbers(element: ElementTree.Element, key: str, length: int, where: str) -> np.ndarray:
     text = element.get(key, '')
     try:
-        # A comma between numbers is read over; a decimal one makes too many of them.
+        # A separating comma is accepted; a decimal comma gives too many numbers.
         numbers = np.array([float(word) for word in text.replace(',', ' ').split()])
     except ValueError:
         numbers = np.zeros(0)

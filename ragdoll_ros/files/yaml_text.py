@@ -1,4 +1,4 @@
-"""YAML to plain data and back: what is too large, too deep or none is refused with its place."""
+"""YAML to plain data and back, with limits on size and depth and the position of errors."""
 from __future__ import annotations
 
 import math
@@ -21,11 +21,11 @@ DEEPEST = 100
 
 
 class _Loader(getattr(yaml, 'CSafeLoader', yaml.SafeLoader)):
-    """YAML's safe loader, with 1e-3 read as a number (YAML 1.1 makes a text of it)."""
+    """The safe loader, which reads 1e-3 as a number, as YAML 1.2 does."""
 
 
 _Dumper = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
-"""As safe_dump's, three times as quick."""
+"""As safe_dump's, three times as fast."""
 
 _Loader.add_implicit_resolver(
     'tag:yaml.org,2002:float', re.compile(r'^[-+]?[0-9][0-9_]*[eE][-+]?[0-9]+$'),
@@ -33,7 +33,7 @@ _Loader.add_implicit_resolver(
 
 
 def _whole_number(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> float:
-    """Read an int; one that no float can hold is infinite, as 1e400 is, and refused as that."""
+    """An int; infinite if it exceeds a float, as 1e400 is, to be refused as such."""
     number = loader.construct_yaml_int(node)
     try:
         float(number)
@@ -46,7 +46,7 @@ _Loader.add_constructor('tag:yaml.org,2002:int', _whole_number)
 
 
 def read(path: Path) -> object:
-    """What a YAML file holds as plain data; Unreadable where it is none."""
+    """Data of a YAML file. Raises Unreadable."""
     if path.stat().st_size > LARGEST_FILE:
         raise errors.Unreadable('', f'{path.stat().st_size} bytes', f'at most {LARGEST_FILE}')
     try:
@@ -56,7 +56,7 @@ def read(path: Path) -> object:
 
 
 def parse(content: bytes) -> object:
-    """What a YAML file holds as plain data; Unreadable with the place where it is none."""
+    """Data of a YAML text. Raises Unreadable with the line and column."""
     if len(content) > LARGEST_FILE:
         raise errors.Unreadable('', f'{len(content)} bytes', f'at most {LARGEST_FILE}')
     try:
@@ -80,7 +80,7 @@ def _construct(text: str) -> object:
     loader = _Loader(text)
     try:
         node = loader.get_single_node()
-        # A few lines of aliases of aliases would fill the memory once they are followed.
+        # Nested aliases can expand a few lines beyond all memory ("billion laughs").
         if node is not None and _unfolded(node, {}) > LARGEST_CONTENT:
             raise errors.Unreadable('', 'aliases of aliases',
                                     f'at most {LARGEST_CONTENT} values once they are followed')
@@ -90,7 +90,7 @@ def _construct(text: str) -> object:
 
 
 def _check_depth(text: str) -> None:
-    """Refuse what is nested so deeply that libyaml's recursion would end the process."""
+    """Raise Unreadable for a nesting at which libyaml's recursion would crash the process."""
     depth = 0
     try:
         for event in yaml.parse(text, _Loader):
@@ -99,7 +99,7 @@ def _check_depth(text: str) -> None:
             if depth > DEEPEST:
                 raise _too_deep(event.start_mark)
     except yaml.MarkedYAMLError as error:
-        # PyYAML from 6.0.4 on has a limit in its scanner, which reads ahead of the events.
+        # From 6.0.4 on PyYAML's scanner, which is ahead of the events, has a limit too.
         if 'maximum nesting depth' in (error.problem or ''):
             raise _too_deep(error.problem_mark) from None
         raise
@@ -114,7 +114,7 @@ def _place(mark: yaml.Mark) -> str:
 
 
 def _unfolded(node: yaml.Node, sizes: dict[int, float]) -> float:
-    """Count what a node holds with each alias written out; without end for one inside itself."""
+    """Number of values of a node with aliases expanded; infinite for a recursive one."""
     if isinstance(node, yaml.ScalarNode):
         return 1
     if id(node) not in sizes:
@@ -126,7 +126,7 @@ def _unfolded(node: yaml.Node, sizes: dict[int, float]) -> float:
 
 
 def to_text(data: dict, schema: str, head: str) -> str:
-    """A file's text: its schema, ``head`` as a comment, then the data."""
+    """YAML text: its schema, ``head`` as a comment, the data."""
     lines = [f'# yaml-language-server: $schema={schema}.schema.json',
              '# Units: m, kg, s, degrees where a key ends in _deg. x forward, y left, z up.']
     lines += ['# ' + line if line else '#' for line in head.splitlines()]

@@ -1,1 +1,1 @@
-"""From a rigged, skinned character to a doll: read, group, fit, joint, weigh, report."""
+"""Ragdolls fitted to rigged, skinned characters and to robots, with a report and a verdict."""

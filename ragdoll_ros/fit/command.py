@@ -1,4 +1,4 @@
-"""ragdoll_fit: any rigged, skinned character, or a robot's URDF, becomes a doll."""
+"""Fit a ragdoll to a rigged, skinned character, or convert a robot's URDF to a ragdoll."""
 from __future__ import annotations
 
 import argparse
@@ -14,34 +14,34 @@ from ..model import errors
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Placement, all_above_ground
 from .judging.verdict import Verdict, judge
-from .pipeline import Fit, Options, fit_characters
+from .pipeline import Fit, FitOptions, fit_characters
 from .reading.character import read_character
 from .report import doll_report, fit_report
 from .robots.robot import read_urdf
 
-EXAMPLE = """\
+EPILOG = """\
 example:
   ragdoll_fit character.glb -o doll.yaml --picture doll.png
   ros2 run ragdoll_ros ragdoll_node --ros-args -p scene:=doll.yaml
 
-A .urdf becomes a doll too: a robot that goes limp. A .yaml of a doll, or
-of a scene, is checked and reported.
-Of several characters in one file each becomes a doll: DOLL.yaml is a scene of all, where they
-stood; a DOLL.urdf and an OUT.png have _1, _2 and so on before their suffix.
+A .urdf becomes a doll too: a robot without motor torques. A .yaml with a doll or a scene is
+checked and reported.
+If the file has several characters, each becomes a doll: DOLL.yaml is a scene with all of them in
+place; DOLL.urdf and OUT.png get _1, _2, ... before the suffix.
 The report ends with a verdict on the doll: good, doubtful or wrong.
-Exit code 0: done; 2: a file or an option is wrong; 3: --strict, and the doll is not good."""
+Exit code 0: success; 2: invalid file or option; 3: --strict, and the doll is not good."""
 
-PICTURES = ('.png', '.jpg', '.svg', '.pdf')
+PICTURE_SUFFIXES = ('.png', '.jpg', '.svg', '.pdf')
 
-DOLLS, ROBOTS = ('.yaml', '.yml'), ('.urdf', '.xml')
-"""Files that hold bodies already; every other one is a character, for which they are made."""
+DOLL_SUFFIXES, ROBOT_SUFFIXES = ('.yaml', '.yml'), ('.urdf', '.xml')
+"""Files that define bodies; for all other files, characters, bodies are fitted."""
 
-FITTING = ('mass', 'masses', 'scale', 'shape', 'orientation', 'weight', 'smallest', 'keep')
-"""Options that say how bodies are made."""
+FIT_ARGUMENTS = ('mass', 'masses', 'scale', 'shape', 'orientation', 'weight', 'smallest', 'keep')
+"""Options that apply to fitted bodies only."""
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command; exit code 0, 2 where a file or an option is wrong, 3 as --strict says."""
+    """Run the command; returns 0, 2 for an invalid file or option, 3 as --strict specifies."""
     parser = _parser()
     options = parser.parse_args(arguments)
     try:
@@ -58,46 +58,46 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        'ragdoll_fit', description=__doc__, epilog=EXAMPLE,
+        'ragdoll_fit', description=__doc__, epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('input', help='a .glb or .gltf with a skinned character, a .urdf, a .yaml')
-    parser.add_argument('-o', '--output', metavar='DOLL.yaml', help='where the doll goes')
+    parser.add_argument('-o', '--output', metavar='DOLL.yaml', help='write the doll to this file')
     parser.add_argument('--urdf', metavar='DOLL.urdf', help='write the doll as URDF too')
     parser.add_argument('--dialect', choices=('ros', 'bullet'), default='ros',
-                        help='of that URDF: PyBullet has capsules, and takes links of no mass '
-                        'as such only where they say so')
+                        help='of that URDF; bullet: with <capsule>, and with links without mass '
+                        'marked as PyBullet requires')
     parser.add_argument('--picture', metavar='OUT.png',
-                        help='draw skin, bodies, joints and their ranges side by side')
+                        help='draw skin, bodies, joints and joint ranges side by side')
     parser.add_argument('--mass', type=float, metavar='KG',
-                        help='of each whole doll (default: as much water as the skin holds)')
+                        help="mass of each doll (default: the skin's volume of water)")
     parser.add_argument('--masses', choices=('best', 'volume', 'proportions'), default='best',
-                        help="share the mass by the skin's volume, by a person's proportions, or "
-                        'by volume and for a person half way between (default)')
+                        help="distribute the mass by the skin's volume, by a person's proportions, "
+                        'or by volume and, for a person, their geometric mean (default)')
     parser.add_argument('--scale', type=float, metavar='M',
-                        help='metres to one unit of the file (default: 1, or a guess)')
+                        help='metres per unit of the file (default: 1, or an estimate)')
     parser.add_argument('--shape', default='best',
                         choices=('best', 'box', 'sphere', 'capsule', 'cylinder'),
-                        help='shape of all bodies (default: the smallest that fits, each)')
+                        help='shape of all bodies (default: for each the smallest that fits)')
     parser.add_argument('--orientation', choices=('principal', 'bone'), default='principal',
-                        help="z along a body's longest extent, or along its bone")
+                        help="z along a body's longest axis, or along its bone")
     parser.add_argument('--weight', type=float, metavar='SHARE',
-                        help='a vertex counts for every bone that moves it by this share or more '
-                        '(default: for the one that moves it most)')
+                        help='a vertex belongs to every bone with at least this skin weight '
+                        '(default: to the bone with the largest weight)')
     parser.add_argument('--smallest', type=float, metavar='M',
-                        help='bones with less skin than this are merged into their parents '
-                        '(default: 0.055 of the character; 0: none, fingers stay too)')
+                        help='merge bones with a smaller skin into their parents (default: 0.055 '
+                        'of the character; 0: merge none, keep fingers)')
     parser.add_argument('--keep', nargs='+', action='extend', default=[], metavar='BONE',
-                        help="bones that become bodies whatever their size: names as in the "
+                        help='bones that become bodies whatever their size: names as in the '
                         "report, or patterns such as '*Thumb*'")
     parser.add_argument('--strict', action='store_true',
-                        help='exit with 3 where the verdict is not good')
+                        help='exit with code 3 unless the verdict is good')
     return parser
 
 
 def _run(options: argparse.Namespace) -> list[Verdict]:
     path = Path(options.input)
-    made = _made(options, path)
-    verdicts = [judge(each.doll, fit, measured=path.suffix.lower() in ROBOTS)
+    made = _make_dolls(options, path)
+    verdicts = [judge(each.doll, fit, measured=path.suffix.lower() in ROBOT_SUFFIXES)
                 for each, fit, _ in made]
     report = '\n\n'.join(f'{text}\n{verdict}'
                          for (_, _, text), verdict in zip(made, verdicts, strict=True))
@@ -111,57 +111,57 @@ def _run(options: argparse.Namespace) -> list[Verdict]:
     for number, (placement, fit, _) in enumerate(made, 1):
         ending = f'_{number}' if len(made) > 1 else ''
         if options.urdf:
-            _ended(options.urdf, ending).write_text(to_urdf(placement.doll, options.dialect),
-                                                    encoding='utf-8')
+            _numbered(options.urdf, ending).write_text(to_urdf(placement.doll, options.dialect),
+                                                       encoding='utf-8')
         if options.picture:
             from .picture import draw
-            draw(placement.doll, fit.character if fit else None, _ended(options.picture, ending))
+            draw(placement.doll, fit.character if fit else None, _numbered(options.picture, ending))
     return verdicts
 
 
-def _made(options: argparse.Namespace, path: Path) -> list[tuple[Placement, Fit | None, str]]:
-    """Each doll in its place, how it was fitted where it was, and the report on it."""
-    if path.suffix.lower() in DOLLS:
-        return _loaded(options)
-    if path.suffix.lower() in ROBOTS:
+def _make_dolls(options: argparse.Namespace, path: Path) -> list[tuple[Placement, Fit | None, str]]:
+    """Each doll with its placement, its fit if it was fitted, and its report."""
+    if path.suffix.lower() in DOLL_SUFFIXES:
+        return _load_dolls(options)
+    if path.suffix.lower() in ROBOT_SUFFIXES:
         doll, notes = read_urdf(path)
         return [(Placement(doll), None, doll_report(doll, notes))]
-    fits = fit_characters(read_character(path, options.scale), Options(
+    fits = fit_characters(read_character(path, options.scale), FitOptions(
         options.shape, options.orientation, options.weight, options.smallest, options.mass,
         options.masses, tuple(options.keep)))
-    heads = _heads([fit.doll for fit in fits], 'character')
+    heads = _headings([fit.doll for fit in fits], 'character')
     return [(fit.placed(model=str(path)), fit, head + fit_report(fit))
             for fit, head in zip(fits, heads, strict=True)]
 
 
-def _loaded(options: argparse.Namespace) -> list[tuple[Placement, None, str]]:
-    """The doll in a YAML file, or each that differs of a scene, as _made gives them."""
+def _load_dolls(options: argparse.Namespace) -> list[tuple[Placement, None, str]]:
+    """The distinct dolls of a YAML file, a doll or a scene, as _make_dolls returns them."""
     dolls = list({id(each.doll): each.doll for each in load_scene(options.input).dolls}.values())
     if options.output and len(dolls) > 1:
         raise errors.WrongForm('--output', options.output,
                                f'one doll to write, and {options.input} holds {len(dolls)}')
-    heads = _heads(dolls, 'doll')
+    heads = _headings(dolls, 'doll')
     return [(Placement(doll), None, head + doll_report(doll))
             for doll, head in zip(dolls, heads, strict=True)]
 
 
-def _heads(dolls: Sequence[Ragdoll], kind: str) -> list[str]:
-    """Heads of their reports, where there is more than one."""
+def _headings(dolls: Sequence[Ragdoll], kind: str) -> list[str]:
+    """Headings of the reports, empty for a single doll."""
     return [f'{doll.name}, {kind} {number} of {len(dolls)}:\n' if len(dolls) > 1 else ''
             for number, doll in enumerate(dolls, 1)]
 
 
-def _ended(path: str, ending: str) -> Path:
-    """The path with an ending before its suffix."""
+def _numbered(path: str, ending: str) -> Path:
+    """The path with ``ending`` before its suffix."""
     return Path(path).with_stem(Path(path).stem + ending)
 
 
 def _check(options: argparse.Namespace, parser: argparse.ArgumentParser) -> None:
     suffix = Path(options.input).suffix.lower()
-    for key in FITTING if suffix in (*DOLLS, *ROBOTS) else ():
+    for key in FIT_ARGUMENTS if suffix in (*DOLL_SUFFIXES, *ROBOT_SUFFIXES) else ():
         if getattr(options, key) != parser.get_default(key):
             raise errors.WrongForm(f'--{key}', getattr(options, key),
-                                   f'a .glb or .gltf to fit: what a {suffix} says of bodies stays')
+                                   f'a .glb or .gltf to fit: a {suffix} defines its own bodies')
     for key in ('mass', 'scale'):
         if getattr(options, key) is not None:
             errors.check_positive(f'--{key}', getattr(options, key))
@@ -169,9 +169,9 @@ def _check(options: argparse.Namespace, parser: argparse.ArgumentParser) -> None
         errors.check_range('--smallest', options.smallest, 0, math.inf)
     if options.weight is not None:
         errors.check_range('--weight', options.weight, 0, 1)
-    if options.picture and Path(options.picture).suffix.lower() not in PICTURES:
+    if options.picture and Path(options.picture).suffix.lower() not in PICTURE_SUFFIXES:
         raise errors.WrongForm('--picture', options.picture,
-                               'a name that ends in ' + ', '.join(PICTURES))
+                               'a name that ends in ' + ', '.join(PICTURE_SUFFIXES))
 
 
 def _one_line(error: errors.RagdollError) -> str:

@@ -1,6 +1,6 @@
-"""From a character to a doll, step by step: cluster, group, shape, weigh, joint, carry.
+"""Fit of a doll to a character: cluster, group, fit shapes, weigh, joint, attach.
 
-Everything is in the bind pose and the doll's frame, which is the character's.
+All in the bind pose, in the doll's frame, which is the character's.
 """
 from __future__ import annotations
 
@@ -15,168 +15,168 @@ from ..model.pose import Pose
 from ..model.ragdoll import Bone, Ragdoll
 from ..model.scene import Placement
 from ..model.shapes import Shape
-from . import carried
+from . import attachments
 from .bodies.masses import share_mass
-from .bodies.overlap import colliding_pairs
-from .bodies.refine import refined
-from .bodies.trim import trimmed
-from .joints.folding import guesses
-from .joints.joints import damped, make_joint
+from .bodies.overlap import colliding_overlaps
+from .bodies.subdivide import subdivide
+from .bodies.trim import trim_overlaps
+from .joints.folding import note_guesses
+from .joints.make_joint import make_joint, with_damping
 from .reading.character import Character
-from .reading.spring_bones import Spring, without_short_rods
+from .reading.spring_bones import SpringBone, drop_short_segments
 from .roles.names import roles_of
 from .shapes.axes import Axes, fit_axes
-from .shapes.shapes import DECIMALS, TOLERANCE, Fitted, fit_best, fit_shape
+from .shapes.fitting import DECIMALS, TOLERANCE, FittedShape, fit_best, fit_shape
 from .skeleton.anchors import place_anchors
-from .skeleton.apart import find_characters
-from .skeleton.groups import Group, group_bones, partner, vertices_by_bone
-from .skeleton.kept import find_kept
+from .skeleton.forced_bodies import find_forced_bodies
+from .skeleton.groups import BodyGroup, group_bones, mirrored_group, vertices_by_bone
 from .skeleton.skin_tree import SkinTree, find_skin_tree
-from .skeleton.soft_chains import soft_chains, thinned
+from .skeleton.soft_chains import limit_bodies, soft_chains
+from .skeleton.split_characters import split_characters
 
-THINNEST = 0.01
-"""No body is thinner than this share of the whole character."""
+MIN_THICKNESS = 0.01
+"""Smallest thickness of a body, as a fraction of the character's extent."""
 
-
-MOST_ASKED_FOR = 200
-"""Bodies that a doll may have where the user says how small: a tick of it takes 0.2 s."""
+MAX_REQUESTED_BODIES = 200
+"""Bodies of a doll on request (``smallest``, ``keep``): a tick of so many takes 0.2 s."""
 
 
 @dataclass(frozen=True)
-class Options:
-    """What the user may choose."""
+class FitOptions:
+    """Options of a fit."""
 
     shape: str = 'best'
-    """Kind of all bodies' shapes; 'best': of each, the kind that holds its skin in least volume."""
+    """Shape kind of all bodies; 'best': for each body the kind with the smallest volume."""
     orientation: str = 'principal'
-    """z along the 'principal' axis where one stands out, or along the 'bone' always."""
-    share: float | None = None
-    """Skin weight from which on a vertex counts for a bone; None: the bone with the largest."""
+    """z of a body along its 'principal' axis if it is elongated, or always along the 'bone'."""
+    weight: float | None = None
+    """Skin weight from which on a vertex belongs to a bone; None: to the one with the largest."""
     smallest: float | None = None
-    """m; bones with a shorter cluster get no body. None: a share of the character."""
+    """m; bones with a shorter cluster get no body. None: a fraction of the character's extent."""
     mass: float | None = None
-    """kg, of the whole doll; None: as much water as the skin holds."""
+    """kg, of the whole doll; None: the skin's volume times the density of water."""
     masses: str = 'best'
-    """Mass shared by the skin's 'volume', by a person's 'proportions', or 'best'; see masses.py."""
+    """Mass distribution by skin 'volume', by a person's 'proportions', or 'best'; see masses.py."""
     keep: tuple[str, ...] = ()
-    """Names of bones, or patterns of them, that become bodies whatever their size."""
+    """Names or patterns of bones that become bodies whatever their size."""
 
 
 @dataclass(frozen=True)
 class BodyFit:
-    """How one body came about, and how good it is."""
+    """Fit of one body, and its quality."""
 
     bone: Bone
     bones: tuple[str, ...]
-    """Names of the character's bones that became it."""
+    """Names of the character's bones in it."""
     role: str | None
     vertices: int
-    """How many of the character's own vertices it stands for."""
+    """Number of the character's vertices that belong to it."""
     inside: int
-    """How many of these are within TOLERANCE of it or in it."""
+    """Number of these inside it, to within TOLERANCE."""
     axes: Axes
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A doll and how it came about; ``bodies`` in the order of the doll's bones."""
+    """A doll and how it was fitted; ``bodies`` are in the order of the doll's bones."""
 
     doll: Ragdoll
     character: Character
     bodies: tuple[BodyFit, ...]
     notes: tuple[str, ...]
-    """A sentence for each thing that could not be taken over as it is."""
+    """Warnings: what could not be imported as it is in the file, and what was assumed."""
     frame: Pose = field(default_factory=Pose)
-    """Where the doll's frame stands in its file's."""
+    """Pose of the doll's frame in its file's."""
 
     def placed(self, model: str | None = None) -> Placement:
-        """The doll where it stands in its file, whose path it names as its ``model``."""
+        """The doll at its pose in the file; ``model`` is the path of the file."""
         return Placement(replace(self.doll, model=model), position=self.frame.position,
                          orientation=self.frame.orientation)
 
 
-def fit_characters(character: Character, options: Options | None = None) -> list[Fit]:
-    """A doll of each character of a file, see apart.py, as fit_character makes it."""
-    options = options or Options()
+def fit_characters(character: Character, options: FitOptions | None = None) -> list[Fit]:
+    """Dolls of all characters of a file, as from fit_character; see split_characters.py."""
+    options = options or FitOptions()
     names = character.bone_names
-    kept = {names[bone] for bone in find_kept(character, options.keep, options.share)}
+    forced = {names[bone] for bone in find_forced_bodies(character, options.keep, options.weight)}
     fits = []
-    for each, frame in find_characters(character):
-        own = tuple(glob.escape(name) for name in each.bone_names if name in kept)
+    for each, frame in split_characters(character):
+        own = tuple(glob.escape(name) for name in each.bone_names if name in forced)
         fits.append(replace(fit_character(each, replace(options, keep=own)), frame=frame))
     return fits
 
 
-def fit_character(character: Character, options: Options | None = None) -> Fit:
-    """Doll of one character, in its bind pose; ModelError where an option is out of range."""
-    options = options or Options()
+def fit_character(character: Character, options: FitOptions | None = None) -> Fit:
+    """Doll of one character in its bind pose; raises a ModelError for an option out of range."""
+    options = options or FitOptions()
     given = character
-    character, groups, notes = _grouped(refined(given), options)
-    notes += _unmoved(character, len(given.vertices), groups)
-    directions = [_direction(character, groups, index) for index in range(len(groups))]
+    character, groups, notes = _group_character(subdivide(given), options)
+    notes += _note_unweighted(character, len(given.vertices), groups)
+    directions = [_bone_direction(character, groups, index) for index in range(len(groups))]
     areas = character.vertex_areas()
     axes = [fit_axes(character.vertices[group.vertices], areas[group.vertices], direction,
                      options.orientation)
             for group, direction in zip(groups, directions, strict=True)]
     frames = [own.frame for own in axes]
-    fits = trimmed(groups, place_anchors(
+    fits = trim_overlaps(groups, place_anchors(
         groups, _fit_shapes(character, groups, axes, options.shape), frames), frames)
     masses = share_mass(options.mass, options.masses, given, groups,
                         [fit.shape.volume for fit in fits], notes)
-    bodies = [_body(given, *parts) for parts in zip(groups, fits, axes, masses, strict=True)]
+    bodies = [_body_fit(given, *parts) for parts in zip(groups, fits, axes, masses, strict=True)]
     bones = [body.bone for body in bodies]
-    joints = [damped(make_joint(character, groups, index, directions[index]),
+    joints = [with_damping(make_joint(character, groups, index, directions[index]),
                      bones[group.parent], bones[index])
               for index, group in enumerate(groups) if group.parent >= 0]
-    notes += guesses(character, groups, directions)
-    notes += [f'no bone joins {group.name} to the rest: it is tied to {groups[group.parent].name}'
-              for group in groups if group.tied]
+    notes += note_guesses(character, groups, directions)
+    notes += [f'no bone connects {group.name} to the rest: a fixed joint attaches it to '
+              f'{groups[group.parent].name}'
+              for group in groups if group.fixed]
     carrier = {index: bone for group, bone in zip(groups, bones, strict=True)
                for index in group.bones}
-    swings = carried.swings(character, carrier, notes)
+    swings = attachments.swings(character, carrier, notes)
     doll = Ragdoll(character.name, tuple(bones), tuple(joints), swings,
-                   carried.skeleton_frames(character, carrier))
-    doll = replace(doll, no_collision=colliding_pairs(doll))
+                   attachments.skeleton_frames(character, carrier))
+    doll = replace(doll, no_collision=colliding_overlaps(doll))
     return Fit(doll, given, tuple(bodies), tuple(notes))
 
 
-def _grouped(character: Character,
-             options: Options) -> tuple[Character, list[Group], list[str]]:
-    """The character with all its springs, the groups of its bones, and what is to be told."""
-    kept = find_kept(character, options.keep, options.share)
-    character = replace(character, springs=tuple(_without_kept(character.springs, kept)))
+def _group_character(character: Character,
+                     options: FitOptions) -> tuple[Character, list[BodyGroup], list[str]]:
+    """The character with all its spring bones, the groups of its bones, and notes."""
+    forced = find_forced_bodies(character, options.keep, options.weight)
+    character = replace(character, springs=tuple(_without_forced(character.springs, forced)))
     swinging = frozenset(bone for spring in character.springs for bone in spring.bones)
-    clusters = vertices_by_bone(character, options.share, swinging)
+    clusters = vertices_by_bone(character, options.weight, swinging)
     tree = find_skin_tree(character, clusters, roles_of(character.bone_names, character.parents))
     roles = _roles_along(tree, character.bone_names)
-    springs = _without_kept(soft_chains(character, tree, roles, clusters), kept)
+    springs = _without_forced(soft_chains(character, tree, roles, clusters), forced)
     swinging |= {bone for spring in springs for bone in spring.bones}
-    groups = group_bones(character, roles, clusters, tree, options.smallest, swinging, kept)
+    groups = group_bones(character, roles, clusters, tree, options.smallest, swinging, forced)
     notes = list(character.notes)
     if options.smallest is None:
         before = len(groups)
-        groups, thin = thinned(character, groups, kept)
+        groups, thin = limit_bodies(character, groups, forced)
         springs += thin
         if thin:
             notes.append(f'{before} bodies are too many: the {len(thin)} thinnest branches became '
-                         'swings, which collide with nothing')
-    if len(groups) > MOST_ASKED_FOR:
+                         'swings, which do not collide')
+    if len(groups) > MAX_REQUESTED_BODIES:
         key, value, better = ('keep', options.keep, 'fewer') if options.smallest is None else (
             'smallest', options.smallest, 'a larger one')
         raise errors.OutOfRange(key, value, f'{better}, for {len(groups)} bodies are more than '
-                                f'{MOST_ASKED_FOR}')
-    springs = [without_short_rods(spring, notes) for spring in springs]
-    springs = [spring for spring in springs if spring.rods]
+                                f'{MAX_REQUESTED_BODIES}')
+    springs = [drop_short_segments(spring, notes) for spring in springs]
+    springs = [spring for spring in springs if spring.joints]
     return replace(character, springs=(*character.springs, *springs)), groups, notes
 
 
-def _without_kept(springs: Iterable[Spring], kept: frozenset[int]) -> list[Spring]:
-    """The springs none of whose bones is to be a body."""
-    return [spring for spring in springs if not kept & set(spring.bones)]
+def _without_forced(springs: Iterable[SpringBone], forced: frozenset[int]) -> list[SpringBone]:
+    """The spring bones that contain no forced body."""
+    return [spring for spring in springs if not forced & set(spring.bones)]
 
 
 def _roles_along(tree: SkinTree, names: tuple[str, ...]) -> tuple[str | None, ...]:
-    """Role of each bone by its name and its neighbours in the tree."""
+    """Role of each bone by its name and its neighbours in the skin tree."""
     order = tree.order
     place = {bone: index for index, bone in enumerate(order)}
     found = roles_of(tuple(names[bone] for bone in order),
@@ -187,21 +187,21 @@ def _roles_along(tree: SkinTree, names: tuple[str, ...]) -> tuple[str | None, ..
     return tuple(roles)
 
 
-def _unmoved(character: Character, given: int, groups: list[Group]) -> list[str]:
-    """Note on the vertices that no bone moves; where none is moved at all, the root takes them.
+def _note_unweighted(character: Character, given: int, groups: list[BodyGroup]) -> list[str]:
+    """Note on unweighted vertices; if all are, the root gets the whole skin.
 
-    Of the character's own vertices, which are the first ``given``.
+    Counted are the character's own vertices, the first ``given``.
     """
-    unmoved = int((character.weights[:given].sum(axis=1) == 0).sum())
-    if unmoved == given:
+    unweighted = int((character.weights[:given].sum(axis=1) == 0).sum())
+    if unweighted == given:
         root = next(group for group in groups if group.parent < 0)
         root.vertices = np.arange(len(character.vertices))
         return ['all weights are zero: the root takes the whole skin']
-    return [f'{unmoved} vertices have no weight: no body holds them'] if unmoved else []
+    return [f'{unweighted} vertices have no weight: no body covers them'] if unweighted else []
 
 
-def _direction(character: Character, groups: list[Group], index: int) -> np.ndarray:
-    """Unit direction (3,) of a group's bone: to its children's roots, else to its skin's mean."""
+def _bone_direction(character: Character, groups: list[BodyGroup], index: int) -> np.ndarray:
+    """Unit direction (3,) of a group's bone: to its children's anchors, else to its skin's mean."""
     group = groups[index]
     root = group.anchor
     points = character.vertices[group.vertices]
@@ -218,22 +218,22 @@ def _direction(character: Character, groups: list[Group], index: int) -> np.ndar
     return np.array([0.0, 0.0, 1.0])
 
 
-def _fit_shapes(character: Character, groups: list[Group], axes: list[Axes],
-                kind: str) -> list[Fitted]:
-    """Shape of each group, its centre in the doll's frame; left and right have the same kind."""
+def _fit_shapes(character: Character, groups: list[BodyGroup], axes: list[Axes],
+                kind: str) -> list[FittedShape]:
+    """Shape of each group, centred in the doll's frame; left and right are of the same kind."""
     extent = character.extent
-    sizes = (THINNEST * extent, min(TOLERANCE, 0.006 * extent))
+    sizes = (MIN_THICKNESS * extent, min(TOLERANCE, 0.006 * extent))
     clouds = [(character.vertices[group.vertices] if len(group.vertices)
                else character.positions[[group.bone]]) @ own.frame
               for group, own in zip(groups, axes, strict=True)]
-    fits: dict[int, Fitted] = {}
+    fits: dict[int, FittedShape] = {}
     for index, cloud in enumerate(clouds):
         if kind != 'best':
             fits[index] = fit_shape(cloud, kind, *sizes)
         elif index not in fits:
-            pair = sorted({index, partner(character, groups, index)})
+            pair = sorted({index, mirrored_group(character, groups, index)})
             fits.update(zip(pair, fit_best([clouds[k] for k in pair], *sizes), strict=True))
-    return [Fitted(fits[index].shape, own.frame @ fits[index].centre, fits[index].share)
+    return [FittedShape(fits[index].shape, own.frame @ fits[index].centre, fits[index].coverage)
             for index, own in enumerate(axes)]
 
 
@@ -243,10 +243,11 @@ def _rounded(shape: Shape) -> Shape:
                           for key, value in vars(shape).items()})
 
 
-def _body(character: Character, group: Group, fitted: Fitted, axes: Axes, mass: float) -> BodyFit:
+def _body_fit(character: Character, group: BodyGroup, fitted: FittedShape, axes: Axes,
+              mass: float) -> BodyFit:
     bone = Bone(group.name, _rounded(fitted.shape), mass, np.round(fitted.centre, DECIMALS) + 0.0,
                 np.round(rotation.from_matrix(axes.frame), 12) + 0.0)
     points = character.vertices[group.vertices[group.vertices < len(character.vertices)]]
-    off = bone.shape.signed_distance(bone.pose.inward(points))
+    off = bone.shape.signed_distance(bone.pose.apply_inverse(points))
     return BodyFit(bone, tuple(character.bone_names[b] for b in group.bones), group.role,
                    len(points), int(np.count_nonzero(off <= TOLERANCE)), axes)

@@ -1,6 +1,6 @@
-"""What was fitted and how well, as text: for the terminal and for the head of the doll's file.
+"""Report on a fit: bodies, quality and warnings, for the terminal and the head of the doll's file.
 
-What to think of it is in verdict.py.
+See judging/verdict.py for the verdict.
 """
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import textwrap
 from ..model.compound import Compound
 from ..model.ragdoll import Ragdoll
 from ..model.shapes import Shape
-from .bodies.overlap import colliding_pairs, covered, shared_volume
-from .judging.doubts import extent
+from .bodies.overlap import colliding_overlaps, covered, overlap_share
+from .judging.plausibility import extent
 from .pipeline import BodyFit, Fit
-from .shapes.shapes import TOLERANCE
+from .shapes.fitting import TOLERANCE
 
 
 def fit_report(fit: Fit) -> str:
-    """A line for each body, then the totals, then the warnings."""
+    """Table of the bodies, totals, and warnings."""
     bones, character = fit.doll.bones, fit.character
     inside = covered(bones, character.vertices, TOLERANCE)
     volume, skin = sum(bone.shape.volume for bone in bones), character.volume()
@@ -27,12 +27,12 @@ def fit_report(fit: Fit) -> str:
         f'{100 * inside.mean():.1f} % of {len(inside)} vertices inside a body or within 1 cm; '
         f'volume {1000 * volume:.4g} l' + (
             f", {volume / skin:.2f} of the skin's" if skin > 0 else '')
-        + f', {100 * shared_volume(bones):.0f} % of it shared',
+        + f', {100 * overlap_share(bones):.0f} % of it shared',
         *_swings(fit.doll), *_overlaps(fit.doll), *_warnings(fit.notes)])
 
 
 def doll_report(doll: Ragdoll, notes: tuple[str, ...] = ()) -> str:
-    """The same of a doll that was not fitted here, as far as it goes; ``notes`` are warnings."""
+    """The report on a doll that was not fitted here; ``notes`` become warnings."""
     return '\n'.join([
         *_table(doll, '', [''] * len(doll.bones)), '',
         f'{len(doll.bones)} bodies, {doll.mass:.4g} kg, {extent(doll):.3g} m',
@@ -40,7 +40,7 @@ def doll_report(doll: Ragdoll, notes: tuple[str, ...] = ()) -> str:
 
 
 def _table(doll: Ragdoll, title: str, columns: list[str]) -> list[str]:
-    """A head and a line for each body, with a column of one's own behind the name."""
+    """Header and a row for each body; ``columns`` follow the name."""
     width = max(4, *(len(bone.name) for bone in doll.bones))
     joints = {joint.child: joint.kind for joint in doll.joints}
     return [f'{"bone":{width}}  {title}{"shape":8} {"size, m":23} {"mass, kg":>9}  joint',
@@ -51,8 +51,8 @@ def _table(doll: Ragdoll, title: str, columns: list[str]) -> list[str]:
 
 def _quality(body: BodyFit) -> str:
     share = f'{100 * body.inside / body.vertices:5.1f}%' if body.vertices else '     -'
-    # A star marks a z that is the principal axis, not the bone's direction.
-    return (f'{body.vertices:8d} {share} {body.axes.distinct:.2f}'
+    # An asterisk: z is the principal axis instead of the bone's direction.
+    return (f'{body.vertices:8d} {share} {body.axes.elongation:.2f}'
             f'{"*" if body.axes.principal else " "}  ')
 
 
@@ -66,16 +66,16 @@ def _size(shape: Shape | Compound) -> str:
 
 def _swings(doll: Ragdoll) -> list[str]:
     count, links = len(doll.swings), sum(len(swing.links) for swing in doll.swings)
-    return [f'springs of the character that became swings: {count}, with {links} links; '
-            'no body holds their skin'] if count else []
+    return [f'spring bones that became swings: {count}, with {links} links; no body covers '
+            'their skin'] if count else []
 
 
 def _overlaps(doll: Ragdoll) -> list[str]:
-    pairs = [*doll.no_collision, *colliding_pairs(doll)]
+    pairs = [*doll.no_collision, *colliding_overlaps(doll)]
     if not pairs:
         return []
     listed = ', '.join(f'{first} and {second}' for first, second in pairs)
-    return textwrap.wrap(f'overlap in the bind pose, so do not collide: {listed}', 97,
+    return textwrap.wrap(f'overlap in the bind pose, excluded from collision: {listed}', 97,
                          subsequent_indent='  ', break_long_words=False)
 
 

@@ -1,9 +1,8 @@
-"""The skin of a fitted character, as its doll's bones move it.
+"""Skin of a fitted character, moved by its doll's bones.
 
-All riders that one bone carries move as one rigid thing, so that a page or a file needs no more
-than the bones that carry any: with T_b the bone's pose and W_b the sum of its riders' weights, a
-vertex v of the bind pose stands at sum of W_b T_b inv(T_b at the start) v (model/skeleton.py, added
-up by bone).
+All riders of a bone move as one rigid body, so a page or a file needs only the bones that carry
+riders: with the pose T_b of bone b and the sum W_b of its riders' weights, a vertex v of the bind
+pose is at sum of W_b T_b inv(T_b in the bind pose) v (model/skeleton.py, summed by bone).
 """
 from __future__ import annotations
 
@@ -20,21 +19,21 @@ from ..model.skeleton import Riders
 from ..model.skin import Skin
 from ..model.state import State
 from .reading.character import Character, read_character
-from .reading.part import part_of
+from .reading.subset import subset_character
 
-SCALE = 1e-3
-"""Share by which a skin's size may miss the doll's before it is read again in the doll's."""
+SCALE_TOLERANCE = 1e-3
+"""Relative difference of skin and doll from which on the skin is read again at the doll's scale."""
 
 
 def skin_of(doll: Ragdoll) -> Skin | None:
-    """Skin of a doll; None if it names no character, RagdollError if it does not fit."""
+    """Skin of a doll; None if it names no character. Raises RagdollError if they do not match."""
     if doll.model is None or not doll.riders:
         return None
-    character = _read(doll.model)
-    size = _size(doll, character)
-    if abs(size - 1) > SCALE:
-        character = _read(doll.model, character.scale * size)
-    character = _worn(doll, character)
+    character = _read_cached(doll.model)
+    ratio = _scale_ratio(doll, character)
+    if abs(ratio - 1) > SCALE_TOLERANCE:
+        character = _read_cached(doll.model, character.scale * ratio)
+    character = _own_character(doll, character)
     index = {bone.name: k for k, bone in enumerate(doll.bones)}
     carrier = {rider.name: index[rider.bone] for rider in doll.riders}
     carriers = np.array([carrier[name] for name in character.bone_names])
@@ -44,11 +43,11 @@ def skin_of(doll: Ragdoll) -> Skin | None:
     np.add.at(weights, (rows, slots[character.bones]), character.weights)
     weights[weights.sum(axis=1) == 0, 0] = 1
     return Skin(character.vertices, character.triangles, bones, weights,
-                *_bound(doll, character, bones), character.paint)
+                *_bind_poses(doll, character, bones), character.appearance)
 
 
 def skins_of(scene: Scene, warn: Callable[[str], None]) -> dict[int, Skin]:
-    """Skins of those dolls that have one, by their index; ``warn`` is told of those that fail."""
+    """Skins of the dolls that have one, by index; ``warn`` receives a sentence for each failure."""
     found: dict[int, Skin] = {}
     for index, placement in enumerate(scene.dolls):
         try:
@@ -61,25 +60,25 @@ def skins_of(scene: Scene, warn: Callable[[str], None]) -> dict[int, Skin]:
     return found
 
 
-def _read(path: str, scale: float | None = None) -> Character:
-    """Read a character once: an edited doll comes again and again with the same."""
+def _read_cached(path: str, scale: float | None = None) -> Character:
+    """Read a character, cached by path and modification time, for dolls that are being edited."""
     try:
         stat = os.stat(path)
     except (OSError, ValueError):
-        # Reading it says what is wrong.
+        # read_character raises the error with its reason.
         return read_character(path, scale)
-    return _read_once(path, scale, (stat.st_mtime_ns, stat.st_size))
+    return _read_unchanged(path, scale, (stat.st_mtime_ns, stat.st_size))
 
 
 @functools.lru_cache(maxsize=4)
-def _read_once(path: str, scale: float | None, _: tuple[int, int]) -> Character:
+def _read_unchanged(path: str, scale: float | None, _: tuple[int, int]) -> Character:
     return read_character(path, scale)
 
 
-def _worn(doll: Ragdoll, character: Character) -> Character:
-    """Of a file's characters the doll's own: that whose bones are the doll's riders.
+def _own_character(doll: Ragdoll, character: Character) -> Character:
+    """The character of the file whose bones are the doll's riders.
 
-    UnknownBone where other bones move its skin too, or where it has none.
+    Raises UnknownBone where other bones move its skin too, or where it has no skin.
     """
     riders = {rider.name for rider in doll.riders}
     own = np.array([name in riders for name in character.bone_names])
@@ -92,36 +91,37 @@ def _worn(doll: Ragdoll, character: Character) -> Character:
         missing = character.bones[foreign] if foreign.any() else np.flatnonzero(~own)
         raise errors.UnknownBone('riders', character.bone_names[missing[0]],
                                  f'a doll that was fitted to {doll.model}')
-    return part_of(character, own)
+    return subset_character(character, own)
 
 
-def _bound(doll: Ragdoll, character: Character, bones: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Poses of bodies from those of the character's bones that ride on them."""
-    place = {name: k for k, name in enumerate(character.bone_names)}
-    riders = {rider.bone: rider for rider in reversed(doll.riders) if rider.name in place}
+def _bind_poses(doll: Ragdoll, character: Character,
+                bones: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Bind poses of bodies (n, 3) m and (n, 4) xyzw, from the character's bones on them."""
+    index_of = {name: k for k, name in enumerate(character.bone_names)}
+    riders = {rider.bone: rider for rider in reversed(doll.riders) if rider.name in index_of}
     riders.update({rider.bone: rider for rider in doll.riders if rider.name == rider.bone})
-    carried = [riders[doll.bones[index].name] for index in bones]
-    back = rotation.inverse(np.array([rider.orientation for rider in carried]))
-    at = [place[rider.name] for rider in carried]
+    attached = [riders[doll.bones[index].name] for index in bones]
+    back = rotation.inverse(np.array([rider.orientation for rider in attached]))
+    at = [index_of[rider.name] for rider in attached]
     orientations = rotation.multiply(character.orientations[at], back)
-    local = np.array([rider.position for rider in carried])
+    local = np.array([rider.position for rider in attached])
     return character.positions[at] - rotation.rotate(orientations, local), orientations
 
 
-def _size(doll: Ragdoll, character: Character) -> float:
-    """How much longer the bones of the doll's riders are than the character's: most of them.
+def _scale_ratio(doll: Ragdoll, character: Character) -> float:
+    """Median ratio of the lengths of the doll's rider bones to the character's.
 
-    Not how far apart they stand: limbs may have been moved.
+    Of lengths, not of distances in space: the limbs of the doll may have been moved.
     """
     poses = State(np.array([bone.position for bone in doll.bones]),
                   np.array([bone.orientation for bone in doll.bones]),
                   *np.zeros((2, len(doll.bones), 3)))
     positions, _ = Riders(Scene('bind', (Placement(doll),))).poses(poses)
-    place = {rider.name: k for k, rider in enumerate(doll.riders)}
-    edges = np.array([(place[name], place[character.bone_names[up]], bone, up)
+    index_of = {rider.name: k for k, rider in enumerate(doll.riders)}
+    edges = np.array([(index_of[name], index_of[character.bone_names[up]], bone, up)
                       for bone, (name, up) in enumerate(zip(
                           character.bone_names, character.parents, strict=True))
-                      if up >= 0 and name in place and character.bone_names[up] in place])
+                      if up >= 0 and name in index_of and character.bone_names[up] in index_of])
     if not len(edges):
         return 1.0
     ours = np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1)

@@ -1,1 +1,1 @@
-"""What a scene is: frozen, checked data; no motion, no files, no engine."""
+"""Scenes and dolls as frozen, validated data; no motion, no files, no engine."""

@@ -1,46 +1,47 @@
-"""What people measure and weigh: segments of the body as shares of its mass, height and length.
+"""Anthropometric tables: segments of the body as fractions of its mass and of their length.
 
 Masses, centres, radii of gyration and lengths: de Leva 1996, J Biomech 29:1223, table 4, of 100
 men (1.741 m, 73.0 kg) and 15 women (1.735 m, 61.9 kg), young and fit. Limb segments go from joint
 centre to joint centre, the head from vertex to mid-gonion, the hand to the third metacarpal's
 head, the foot from heel to toe. Percentiles and breadths: ANSUR II, the survey of US soldiers of
-2012 (Gordon et al., NATICK/TR-15/007), so neither old nor general; breadths and circumferences are
-means over its men and women together.
+2012 (Gordon et al., NATICK/TR-15/007), so of fit adults; breadths and circumferences are means over
+its men and women together.
 """
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 SEXES = ('female', 'male')
 
 
 @dataclass(frozen=True)
 class Segment:
-    """A segment of one side; see the table that it is in for what it is of."""
+    """A segment of the body; limbs of one side."""
 
     mass: float
-    """Percent of the whole body's."""
+    """Percent of the body's."""
     length: float
-    """m, in the sample's mean person."""
+    """m, of the sample's mean person."""
     centre: float
-    """Centre of mass from the end nearer to the head, of the foot from the heel: share of the
+    """Distance of the centre of mass from the proximal end (the foot: from the heel), over the
     length."""
     sagittal: float
     transverse: float
     longitudinal: float
-    """Radii of gyration about the centre of mass as shares of the length: about the axis from back
-    to front, from side to side, and along the segment. A foot's are those of a foot that points
-    down: as one stands, its sagittal axis is the vertical."""
+    """Radii of gyration about the centre of mass over the length: about the axis from back to
+    front, from side to side, and along the segment. Of a foot that points down: in standing, its
+    sagittal axis is vertical."""
 
 
 @dataclass(frozen=True)
 class Sample:
-    """The mean of the people that a table is of."""
+    """The mean person of a table."""
 
     height: float
     """m"""
     segments: dict[str, Segment]
-    """By name; the limbs' are of one side."""
+    """By name."""
 
 
 MEN = Sample(1.741, {
@@ -71,54 +72,34 @@ WOMEN = Sample(1.735, {
 SAMPLES = {'female': WOMEN, 'male': MEN}
 
 TRUNK = ('chest', 'abdomen', 'pelvis')
-MIDDLE = ('head', *TRUNK)
-"""Segments that the body has one of; of the others it has two."""
+UNPAIRED = ('head', *TRUNK)
+"""Segments that the body has one of; it has two of the others."""
 
 PERCENTILES = {
     'female': {5: (1.525, 51.3), 50: (1.626, 66.8), 95: (1.740, 87.1)},
     'male': {5: (1.648, 64.4), 50: (1.755, 84.6), 95: (1.870, 110.7)}}
 """Height, m, and mass, kg, at percentiles of ANSUR II."""
 
-ANKLE = 0.039
-"""Height of the ankle's joint above the sole, share of the standing height: Drillis and Contini
+ANKLE_HEIGHT = 0.039
+"""Height of the ankle joint above the sole over the standing height: Drillis and Contini
 1966 (Body Segment Parameters, New York University, Report 1163.03)."""
 
+BODY = SimpleNamespace(
+    # circumferences
+    head=570.04, neck=375.44, chest=1022.10, waist=914.50, buttock=1020.08, thigh=622.20,
+    lower_thigh=406.48, calf=386.04, ankle=224.89, biceps=340.93, forearm=295.01, wrist=169.00,
+    hand=203.86,
+    # lengths
+    chest_breadth=282.86, chest_depth=251.74, waist_breadth=317.75, waist_depth=229.67,
+    hip_breadth=348.39, buttock_depth=241.62, foot_breadth=98.87, hand_length=189.29,
+    hand_breadth=84.95)
+"""Body dimensions, mm: means of ANSUR II, whose mean height (m) and mass (kg) are:"""
 
-@dataclass(frozen=True)
-class Girth:
-    """Lengths across a body, mm: means of ANSUR II, of people of HEIGHT and MASS in the mean."""
-
-    head: float = 570.04
-    neck: float = 375.44
-    chest: float = 1022.10
-    waist: float = 914.50
-    buttock: float = 1020.08
-    thigh: float = 622.20
-    lower_thigh: float = 406.48
-    calf: float = 386.04
-    ankle: float = 224.89
-    biceps: float = 340.93
-    forearm: float = 295.01
-    wrist: float = 169.00
-    """Circumferences."""
-    chest_breadth: float = 282.86
-    chest_depth: float = 251.74
-    waist_breadth: float = 317.75
-    waist_depth: float = 229.67
-    hip_breadth: float = 348.39
-    buttock_depth: float = 241.62
-    foot_breadth: float = 98.87
-    hand_length: float = 189.29
-    hand_breadth: float = 84.95
-    hand: float = 203.86
-    """The hand's circumference."""
+HEIGHT, MASS = 1.71441, 79.709
 
 
-GIRTH, HEIGHT, MASS = Girth(), 1.71441, 79.709
-
-
-def shares(sex: str) -> dict[str, float]:
-    """Share of the mass of each segment, of limbs one side's; all segments together make 1."""
+def mass_fractions(sex: str) -> dict[str, float]:
+    """Fraction of the body's mass of each segment, limbs of one side; the whole body is 1."""
     table = SAMPLES[sex].segments
-    whole = sum(part.mass * (1 if name in MIDDLE else 2) for name, part in table.items())
+    whole = sum(part.mass * (1 if name in UNPAIRED else 2) for name, part in table.items())
     return {name: part.mass / whole for name, part in table.items()}

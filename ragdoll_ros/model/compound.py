@@ -1,4 +1,4 @@
-"""A bone of several shapes, as the several collision elements of a link in URDF and SDF."""
+"""A shape of several primitives, as a link of several collision elements in URDF and SDF."""
 from __future__ import annotations
 
 import itertools
@@ -12,21 +12,26 @@ from .errors import set_fields
 from .pose import Pose
 from .rotation import IDENTITY
 from .shapes import Part
-from .vectors import Vector, floats
+from .vectors import Vector, floats, vector
 
 TOLERANCE = 1e-5
-"""Of the largest half extent, how far parts may be off their centre of mass, and of the largest
-moment, what a product of inertia may be: numbers written with six digits keep to it, and what the
-motion errs by it is as small."""
+"""Largest offset of the centre of mass over the largest half extent, and largest product of inertia
+over the largest moment. Numbers of six digits meet it; the error of the motion is as small."""
 
 
 @dataclass(frozen=True)
 class Compound:
-    """Simple shapes fixed to each other: a uniform solid, in which what overlaps counts twice.
+    """Primitive shapes fixed to each other. Uniform density; overlaps count twice.
 
-    It has the properties and methods of every Solid, in the axes that its ``parts`` are given in.
-    Those of a bone are its principal axes through its centre of mass (see check_principal), unless
-    the bone has an inertia of its own.
+    A Bone without ``moments`` wants the origin at the centre of mass and principal axes.
+
+    Args:
+        parts: at least one Part in the compound's axes, else it raises WrongForm.
+
+    Example:
+        >>> dumbbell = Compound((Part(Sphere(0.1), (0, 0, 0.3)), Part(Sphere(0.1), (0, 0, -0.3))))
+        >>> dumbbell.half_extents
+        (0.1, 0.1, 0.4)
     """
 
     parts: tuple[Part, ...]
@@ -39,75 +44,75 @@ class Compound:
 
     @property
     def volume(self) -> float:
-        """Sum of the parts', m^3."""
+        """Sum over the parts, m^3."""
         return sum(part.shape.volume for part in self.parts)
 
     @property
     def centroid(self) -> np.ndarray:
-        """Centre of mass (3,) m of the uniform solid."""
-        return self._shares() @ np.array([part.position for part in self.parts])
+        """Centre of mass (3,) m."""
+        return self._mass_fractions() @ np.array([part.position for part in self.parts])
 
     @property
     def half_extents(self) -> Vector:
-        """Half edges, m, of the smallest box about the origin that holds it."""
-        return floats(np.maximum(self.reach(np.eye(3)), self.reach(-np.eye(3))))
+        """Half edges (3,) m of its bounding box centred at the origin."""
+        return vector(np.maximum(self.support(np.eye(3)), self.support(-np.eye(3))))
 
     @property
-    def support(self) -> tuple[float, ...]:
-        """That of the box of its half extents: it reaches no farther."""
+    def support_terms(self) -> tuple[float, ...]:
+        """Terms of its bounding box, an upper bound."""
         return (*self.half_extents, 0.0, 0.0, 0.0)
 
     @property
     def primitives(self) -> tuple[Part, ...]:
-        """What it is drawn as: the primitives of all its parts."""
-        return tuple(Part(piece.shape, *part.pose.compose(piece.pose))
+        """Those of all parts, to draw."""
+        return tuple(Part.at(piece.shape, part.pose.compose(piece.pose))
                      for part in self.parts for piece in part.shape.primitives)
 
-    def reach(self, direction: np.ndarray) -> np.ndarray:
-        """How far (...,) m it extends along unit directions (..., 3): as its farthest part."""
+    def support(self, direction: np.ndarray) -> np.ndarray:
+        """Support function (...,) m along unit directions (..., 3): maximum over the parts."""
         direction = np.asarray(direction, float)
-        return np.max([direction @ np.array(part.position) + part.shape.reach(
+        return np.max([direction @ np.array(part.position) + part.shape.support(
             rotation.rotate(rotation.inverse(part.orientation), direction))
             for part in self.parts], axis=0)
 
     def inertia_matrix(self, mass: float) -> np.ndarray:
-        """Inertia (3, 3) kg m^2 about the origin: parts of one density, by Steiner's theorem."""
+        """Inertia (3, 3) kg m^2 about the origin, by the parallel axis theorem."""
         total = np.zeros((3, 3))
-        for part, share in zip(self.parts, mass * self._shares(), strict=True):
+        for part, share in zip(self.parts, mass * self._mass_fractions(), strict=True):
             axes, at = rotation.matrix(part.orientation), np.array(part.position)
             total += axes * part.shape.inertia(share) @ axes.T
             total += share * (at @ at * np.eye(3) - np.outer(at, at))
         return total
 
     def inertia(self, mass: float) -> Vector:
-        """Moments about the origin's axes, kg m^2."""
-        return floats(np.diag(self.inertia_matrix(mass)))
+        """Moments (3,) kg m^2 about the axes through the origin."""
+        return vector(np.diag(self.inertia_matrix(mass)))
 
     def signed_distance(self, points: np.ndarray) -> np.ndarray:
-        """(p,) m of points (p, 3) from its surface; inside, no less deep than in some part."""
-        return np.min([part.shape.signed_distance(part.pose.inward(points))
+        """Minimum over the parts, (p,) m, at points (p, 3); inside, a lower bound of the depth."""
+        return np.min([part.shape.signed_distance(part.pose.apply_inverse(points))
                        for part in self.parts], axis=0)
 
     def mesh(self) -> tuple[np.ndarray, np.ndarray]:
-        """Corners (p, 3) m and triangles (t, 3) of all parts."""
-        meshes = [(part.pose.outward(corners), triangles) for part in self.parts
-                  for corners, triangles in [part.shape.mesh()]]
-        starts = itertools.accumulate((len(corners) for corners, _ in meshes), initial=0)
-        return (np.concatenate([corners for corners, _ in meshes]),
+        """Vertices (p, 3) m and triangles (t, 3) of all parts."""
+        meshes = [(part.pose.apply(vertices), triangles) for part in self.parts
+                  for vertices, triangles in [part.shape.mesh()]]
+        starts = itertools.accumulate((len(vertices) for vertices, _ in meshes), initial=0)
+        return (np.concatenate([vertices for vertices, _ in meshes]),
                 np.concatenate([triangles + start
                                 for (_, triangles), start in zip(meshes, starts, strict=False)]))
 
     def principal_pose(self) -> Pose:
-        """Its centre of mass and its principal axes, those nearest to the axes it is given in."""
-        return Pose(self.centroid, principal_axes(self.seen_from(Pose(self.centroid))
+        """Centre of mass and principal axes, ordered to be nearest to the current axes."""
+        return Pose(self.centroid, principal_axes(self.in_frame(Pose(self.centroid))
                                                   .inertia_matrix(1.0)))
 
-    def seen_from(self, pose: Pose) -> Compound:
-        """The same solid in the axes of a frame that stands at ``pose``."""
-        return Compound(tuple(Part(part.shape, *pose.relative(part.pose)) for part in self.parts))
+    def in_frame(self, pose: Pose) -> Compound:
+        """The same solid in the axes of the frame at ``pose``."""
+        return Compound(tuple(Part.at(part.shape, pose.relative(part.pose)) for part in self.parts))
 
     def check_principal(self) -> None:
-        """Raise unless its origin is its centre of mass and its axes are principal ones."""
+        """Raise OffCentre or NotPrincipal unless origin and axes are the principal ones."""
         centroid, size = self.centroid, max(self.half_extents)
         if not np.abs(centroid).max() <= TOLERANCE * size:
             raise errors.OffCentre('shapes', floats(centroid.round(9) + 0.0), (
@@ -117,19 +122,19 @@ class Compound:
         products = matrix[np.triu_indices(3, 1)]
         if not np.abs(products).max() <= TOLERANCE * matrix.diagonal().max():
             turn = floats(self.principal_pose().orientation.round(9) + 0.0)
-            raise errors.NotPrincipal('shapes', floats(f'{x:.3g}' for x in products), (
+            raise errors.NotPrincipal('shapes', floats(float(f'{x:.3g}') for x in products), (
                 'no products of inertia xy, xz, yz for 1 kg, or an inertia given: the principal '
                 f'axes are turned by {list(turn)}'))
 
-    def _shares(self) -> np.ndarray:
-        """Share (p,) of each part in the mass."""
+    def _mass_fractions(self) -> np.ndarray:
+        """(p,), sum 1."""
         volumes = np.array([part.shape.volume for part in self.parts])
         return volumes / volumes.sum()
 
 
 def principal_axes(inertia: np.ndarray) -> np.ndarray:
-    """Orientation (4,) of an inertia's (3, 3) principal axes: of all ways to name and direct them
-    the one that is nearest to the axes that it is given in.
+    """Orientation (4,) of the principal axes of an inertia (3, 3), permuted and signed to be
+    nearest to the current axes.
     """
     if np.abs(inertia[np.triu_indices(3, 1)]).max() <= 1e-12 * inertia.diagonal().max():
         return np.array(IDENTITY)

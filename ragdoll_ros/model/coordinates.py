@@ -1,4 +1,4 @@
-"""Generalised coordinates of all dolls of a scene, and how they change in time."""
+"""Generalised coordinates q and velocities v of all dolls of a scene, and their layout."""
 from __future__ import annotations
 
 import math
@@ -15,13 +15,13 @@ UNLIMITED: Limits = (-math.inf, math.inf)
 
 @dataclass(frozen=True)
 class GeneralizedState:
-    """Coordinates and velocities of all dolls, one behind the other (Featherstone's q and q').
+    """Generalised coordinates and velocities of all dolls, concatenated (MuJoCo's qpos and qvel).
 
-    For each doll ``q`` holds the root's position (3) m and orientation (4), then the joints'
-    from root to leaf: one angle (rad) an axis, a quaternion (4) for a free ball joint, which
-    takes the child's vectors to the joint's frame. ``v`` holds the root's linear (3) m/s and
-    angular (3) rad/s velocity in the world frame, then the joints' rates (rad/s), a free ball
-    joint's three along the child's side of the joint's frame.
+    For each doll ``q`` has the root's position (3) m and orientation (4), then the joints' depth
+    first: an angle (rad) for each axis, or for a free ball joint a quaternion (4) from the child's
+    to the parent's side of the joint's frame. ``v`` has the root's linear (3) m/s and angular (3)
+    rad/s velocity in the world frame, then the joints' rates (rad/s), a free ball joint's three
+    along the child's side of the joint's frame.
     """
 
     q: np.ndarray
@@ -29,7 +29,7 @@ class GeneralizedState:
 
 
 class DofLayout:
-    """Where in q and v what stands, the joints of each doll depth first."""
+    """Indices into q and v, the joints of each doll depth first."""
 
     def __init__(self, dolls: Sequence[Ragdoll]) -> None:
         bounds: list[Limits] = []
@@ -40,11 +40,11 @@ class DofLayout:
         angles: list[int] = []
         rates: list[int] = []
         self._free_angles: list[tuple[slice, slice, slice]] = []
-        """Where among the joint angles, in q and in v each free ball joint stands."""
+        """Of each free ball joint: its slices of the joint angles, of q and of v."""
         v = 0
-        self.own_q: list[slice] = []
-        self.own_v: list[slice] = []
-        """What of q and of v is each doll's."""
+        self.doll_q: list[slice] = []
+        self.doll_v: list[slice] = []
+        """Each doll's slice of q and of v."""
         for doll in dolls:
             q, first_v, at = len(bounds), v, {}
             plain_q += range(q, q + 3)
@@ -69,66 +69,66 @@ class DofLayout:
                                               slice(begin, begin + 4), slice(first, first + 3)))
                 angles += range(begin, begin + joint.dof)
                 rates += range(first, first + joint.dof)
-            self.own_q.append(slice(q, len(bounds)))
-            self.own_v.append(slice(first_v, v))
+            self.doll_q.append(slice(q, len(bounds)))
+            self.doll_v.append(slice(first_v, v))
         self.sizes = (len(bounds), v)
-        """Numbers in q and in v."""
+        """Lengths of q and of v: nq, nv."""
         self._angles, self._rates = np.array(angles, int), np.array(rates, int)
-        """(k,) where in q each joint angle stands, and in v its rate, in the order of
+        """(k,) index in q of each joint angle, and in v of its rate, in the order of
         Scene.angle_names."""
-        self._plain = (np.array(plain_q), np.array(plain_v))
-        self._turning = self._indices(roots + balls)
-        self.root_orientations, self.root_spins = self._indices(roots)
+        self._scalars = (np.array(plain_q), np.array(plain_v))
+        self._quaternions = self._indices(roots + balls)
+        self.root_orientations, self.root_angular_velocities = self._indices(roots)
         self.root_positions = self.root_orientations[:, :1] - 3 + np.arange(3)
-        """(d, 4) and (d, 3): where in q each root's orientation and position stand."""
-        self.root_velocities = self.root_spins[:, :1] - 3 + np.arange(3)
-        """(d, 3) each: where in v each root's linear and angular velocity stand."""
+        """(d, 4) and (d, 3): indices in q of each root's orientation and position."""
+        self.root_velocities = self.root_angular_velocities[:, :1] - 3 + np.arange(3)
+        """(d, 3) each: indices in v of each root's linear and angular velocity."""
         low, high = np.array(bounds)[plain_q].T
         some = np.isfinite(low) | np.isfinite(high)
-        self.limited = (self._plain[0][some], self._plain[1][some])
-        """Where the limited angles stand in q and their rates in v."""
+        self.limited = (self._scalars[0][some], self._scalars[1][some])
+        """Indices in q of the limited angles, and in v of their rates."""
         self.limits = (low[some], high[some])
 
     def normalized(self, q: np.ndarray) -> np.ndarray:
-        """The same coordinates with every quaternion of length one."""
-        q, at = q.copy(), self._turning[0]
+        """A copy of q with unit quaternions."""
+        q, at = q.copy(), self._quaternions[0]
         q[at] = rotation.normalized(q[at])
         return q
 
     def check_orientations(self, q: np.ndarray) -> None:
         """Raise NotUnit for a quaternion of length zero."""
-        if (np.linalg.norm(q[self._turning[0]], axis=1) < 1e-9).any():
+        if (np.linalg.norm(q[self._quaternions[0]], axis=1) < 1e-9).any():
             raise errors.NotUnit('coordinates', 0.0, 'quaternions x, y, z, w, not zero')
 
     def joint_angles(self, q: np.ndarray) -> np.ndarray:
-        """All joint angles, rad, in the order of Scene.angle_names; of a free ball joint those
-        about x, then y, then z.
+        """All joint angles (k,) rad in the order of Scene.angle_names; a free ball joint's are
+        intrinsic Euler angles x, y, z.
         """
         angles = q[self._angles]
         for own, at, _ in self._free_angles:
-            angles[own] = rotation.to_xyz(q[at])
+            angles[own] = rotation.to_euler_xyz(q[at])
         return angles
 
     def with_joint_angles(self, q: np.ndarray, angles: np.ndarray) -> np.ndarray:
-        """The same coordinates with other joint angles, rad, in the order of Scene.angle_names."""
+        """A copy of q with joint angles (k,) rad in the order of Scene.angle_names."""
         q = q.copy()
         free = np.ones(len(angles), bool)
         for own, at, _ in self._free_angles:
             free[own] = False
-            q[at] = rotation.from_xyz(*angles[own])
+            q[at] = rotation.from_euler_xyz(*angles[own])
         q[self._angles[free]] = angles[free]
         return q
 
     def joint_rates(self, coordinates: GeneralizedState) -> np.ndarray:
-        """What joint_angles() changes by, rad/s."""
+        """Time derivatives (k,) rad/s of joint_angles()."""
         rates = coordinates.v[self._rates]
         for own, at, spin in self._free_angles:
-            rates[own] = rotation.xyz_rates(rotation.to_xyz(coordinates.q[at]),
-                                            coordinates.v[spin])
+            rates[own] = rotation.euler_xyz_rates(rotation.to_euler_xyz(coordinates.q[at]),
+                                                  coordinates.v[spin])
         return rates
 
-    def past_limits(self, q: np.ndarray) -> np.ndarray:
-        """Angles (k,) rad by which the limited joints are past their limits; negative inside."""
+    def limit_violations(self, q: np.ndarray) -> np.ndarray:
+        """Excess (k,) rad of the limited angles over their limits; negative inside."""
         angles = q[self.limited[0]]
         return np.maximum(angles - self.limits[1], self.limits[0] - angles)
 

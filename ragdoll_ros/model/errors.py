@@ -1,18 +1,19 @@
-"""What can be wrong with a model: one root, and a named error for each kind."""
+"""Errors of the package: one root class, and a subclass for each fault of a model."""
 from __future__ import annotations
 
 import bisect
 import dataclasses
 import math
 from collections.abc import Sequence
+from typing import Any
 
-LISTED = 40
-"""Names that an error lists; of more, those beside which the wrong one would stand."""
+MAX_LISTED_NAMES = 40
+"""Up to this many valid names are listed; of more, those next to the wrong one in the alphabet."""
 
 
 def one_of(names: Sequence[str], wrong: str) -> str:
-    """What is expected instead of a wrong name."""
-    if len(names) <= LISTED:
+    """Text that lists the valid names."""
+    if len(names) <= MAX_LISTED_NAMES:
         return 'one of ' + ', '.join(names)
     ordered = sorted(names)
     place = max(0, min(bisect.bisect(ordered, wrong) - 2, len(ordered) - 5))
@@ -20,11 +21,19 @@ def one_of(names: Sequence[str], wrong: str) -> str:
 
 
 class RagdollError(ValueError):
-    """Root of every error that this package raises on purpose."""
+    """Root of all errors that this package raises. A ValueError.
+
+    Example:
+        >>> try:
+        ...     Sphere(-1)
+        ... except RagdollError as error:
+        ...     print(error)
+        sphere: NotPositive: -1.0; expected above zero
+    """
 
 
 class ModelError(RagdollError):
-    """One wrong value: where it stands, what it is, what would be right."""
+    """One wrong value: its path in the model, the value, what is expected."""
 
     def __init__(self, path: str, value: object, expected: str) -> None:
         super().__init__(path, value, expected)
@@ -33,7 +42,7 @@ class ModelError(RagdollError):
         self.expected = expected
 
     def at(self, prefix: str) -> ModelError:
-        """The same error, seen from one level further out."""
+        """The same error with its path under ``prefix``."""
         joint = '' if not self.path or self.path.startswith('[') else '.'
         return type(self)(f'{prefix}{joint}{self.path}', self.value, self.expected)
 
@@ -45,11 +54,11 @@ class ModelError(RagdollError):
 
 
 class Closed(RagdollError):
-    """Something is asked of a simulation that was closed."""
+    """A simulation is used after close()."""
 
 
 class NotPositive(ModelError):
-    """A size, a mass or a duration that is not above zero."""
+    """A size, mass or duration that is not above zero."""
 
 
 class NotFinite(ModelError):
@@ -69,27 +78,27 @@ class LimitsReversed(ModelError):
 
 
 class WrongAxes(ModelError):
-    """A joint with another number of axes or limits than its kind has."""
+    """A joint whose axes or limits do not fit its kind."""
 
 
 class OffCentre(ModelError):
-    """Shapes of a bone whose centre of mass is not the bone's."""
+    """A compound shape whose centre of mass is not its origin."""
 
 
 class NotPrincipal(ModelError):
-    """Shapes of a bone whose principal axes of inertia are not the bone's."""
+    """A compound shape whose axes are not principal axes of inertia."""
 
 
 class UnknownJoint(ModelError):
-    """A name that no joint angle has."""
+    """No joint angle has the name."""
 
 
 class UnknownBone(ModelError):
-    """A name that no bone bears."""
+    """No bone has the name."""
 
 
 class DuplicateName(ModelError):
-    """A name that two things bear."""
+    """Two of a kind have the same name."""
 
 
 class ConnectedTwice(ModelError):
@@ -97,23 +106,23 @@ class ConnectedTwice(ModelError):
 
 
 class JointCycle(ModelError):
-    """Joints that close a ring."""
+    """Joints that form a loop."""
 
 
 class Detached(ModelError):
-    """A second bone without a parent: not one tree."""
+    """No bone, or several without a parent: not one tree."""
 
 
 class WrongForm(ModelError):
-    """A file whose structure is not what the schema says."""
+    """A structure other than the schema's, or a value of another form."""
 
 
 class Unreadable(ModelError):
-    """A file that is missing, is no YAML, or is no text."""
+    """A file that is missing or can not be parsed."""
 
 
 class ModelErrors(RagdollError):
-    """All errors of one file at once."""
+    """All errors of one file."""
 
     def __init__(self, file: str, errors: list[ModelError]) -> None:
         super().__init__(file, errors)
@@ -147,8 +156,8 @@ def check_range(path: str, value: float, lower: float, upper: float) -> None:
         raise OutOfRange(path, value, f'{lower:g} to {upper:g}')
 
 
-def set_fields(instance: object, **values: object) -> None:
-    """Set fields of a frozen dataclass while it is being made."""
+def set_fields(instance: Any, **values: object) -> None:
+    """Set fields of a frozen dataclass in its __post_init__."""
     names = {field.name for field in dataclasses.fields(instance)}
     for name, value in values.items():
         if name not in names:

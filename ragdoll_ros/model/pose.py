@@ -1,4 +1,4 @@
-"""Poses: where a frame stands in another one, as a bone's in the doll's, a doll's in the world."""
+"""Rigid transforms: the pose of a frame in its parent frame, as of a bone in the doll's frame."""
 from __future__ import annotations
 
 from typing import NamedTuple
@@ -9,26 +9,26 @@ from . import rotation
 
 
 class Pose(NamedTuple):
-    """``position`` (..., 3) m of the frame's origin, ``orientation`` (..., 4) of its axes."""
+    """``position`` (..., 3) m of the frame's origin, ``orientation`` (..., 4) x, y, z, w."""
 
     position: np.ndarray = np.zeros(3)
     orientation: np.ndarray = np.array(rotation.IDENTITY)
 
-    def outward(self, points: np.ndarray) -> np.ndarray:
-        """Points (..., 3) m of the frame, in the other one."""
+    def apply(self, points: np.ndarray) -> np.ndarray:
+        """Transform points (..., 3) m from the frame to its parent."""
         return self.position + rotation.rotate(self.orientation, points)
 
-    def inward(self, points: np.ndarray) -> np.ndarray:
-        """Points (..., 3) m of the other one, in the frame."""
+    def apply_inverse(self, points: np.ndarray) -> np.ndarray:
+        """Transform points (..., 3) m from the parent to the frame."""
         back = rotation.inverse(self.orientation)
         return rotation.rotate(back, np.subtract(points, self.position))
 
     def compose(self, inner: Pose) -> Pose:
-        """Pose in the other one of what stands at ``inner`` in the frame."""
-        return Pose(self.outward(inner.position),
+        """Pose in the parent of what has the pose ``inner`` in the frame."""
+        return Pose(self.apply(inner.position),
                     rotation.multiply(self.orientation, inner.orientation))
 
     def relative(self, pose: Pose) -> Pose:
-        """Pose in the frame of what stands at ``pose`` in the other one."""
+        """Pose in the frame of what has the ``pose`` in the parent."""
         back = rotation.inverse(self.orientation)
-        return Pose(self.inward(pose.position), rotation.multiply(back, pose.orientation))
+        return Pose(self.apply_inverse(pose.position), rotation.multiply(back, pose.orientation))

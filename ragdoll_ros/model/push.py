@@ -1,4 +1,4 @@
-"""Pushes: a force and a torque on a bone, at a point, from when, for how long."""
+"""Pushes: a constant force and torque on a bone for a time."""
 from __future__ import annotations
 
 import math
@@ -8,17 +8,17 @@ import numpy as np
 
 from . import errors, rotation
 from .errors import set_fields
-from .vectors import Vector, finite
+from .vectors import Vector, finite_floats
 
-LARGEST = 1e7
-"""N and N m: beyond it a push is refused, as no body that this package is for meets it."""
+MAX_LOAD = 1e7
+"""N and N m, largest force and torque of a push: far beyond what a body of this package meets."""
 
-ARROW = 0.5
-"""m: length of the arrow of a push of 1 kN; longer and shorter ones go by the square root."""
+ARROW_LENGTH = 0.5
+"""m, length of the arrow of 1 kN; others are in proportion to the square root of the force."""
 
 
 def check_times(duration: float, start: float | None) -> None:
-    """Check for how long, s, and from when on, s or None, something acts; see Push."""
+    """Check the duration (s) and start (s, or None) of a push or drive."""
     errors.check_positive('duration', duration)
     errors.check_range('duration', duration, 0, 1e6)
     if start is not None:
@@ -27,12 +27,23 @@ def check_times(duration: float, start: float | None) -> None:
 
 @dataclass(frozen=True)
 class Push:
-    """A steady ``force`` (N) and ``torque`` (N m) on one bone.
+    """A constant force and torque on one bone.
 
-    ``point`` (m) is where the force attacks, from the bone's centre of mass. With ``local``,
-    force, torque and point are given along the bone's own axes and turn with it; otherwise
-    force and torque are along the world's axes, and the point keeps to the bone all the same.
-    It acts for ``duration`` s of simulated time from ``start`` s (None: from the next instant).
+    Args:
+        bone: its name in Scene.bone_names.
+        force, torque: (3,) N, (3,) N m, world axes.
+        point: (3,) m, where the force acts, from the bone's centre of mass along the world's axes
+            as it starts; the point moves with the bone.
+        duration: s of simulated time.
+        start: s of simulated time; None: when it is given to Simulation.push.
+        local: whether force, torque and point are in the bone's axes and turn with it.
+
+    Raises:
+        OutOfRange, NotPositive, NotFinite, WrongForm: for its fields.
+
+    Example:
+        >>> Push('torso', force=(500, 0, 0), duration=0.2).force
+        (500.0, 0.0, 0.0)
     """
 
     bone: str
@@ -45,21 +56,21 @@ class Push:
 
     def __post_init__(self) -> None:
         for key in ('force', 'torque', 'point'):
-            set_fields(self, **{key: finite(key, getattr(self, key))})
+            set_fields(self, **{key: finite_floats(key, getattr(self, key))})
         for key in ('force', 'torque'):
-            if math.hypot(*getattr(self, key)) > LARGEST:
-                raise errors.OutOfRange(key, getattr(self, key), f'at most {LARGEST:g} long')
+            if math.hypot(*getattr(self, key)) > MAX_LOAD:
+                raise errors.OutOfRange(key, getattr(self, key), f'a norm of at most {MAX_LOAD:g}')
         check_times(self.duration, self.start)
 
     def arrow(self, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
-        """Tail and tip (2, 3) m, world frame, of an arrow that ends where the force attacks.
+        """Tail and tip (2, 3) m, world frame, of an arrow that ends where the force acts.
 
-        The bone's centre of mass is at ``position`` (3,) m, its axes at ``orientation`` (4,).
+        ``position`` (3,) m and ``orientation`` (4,) are the bone's pose.
         """
         force, point = np.array(self.force), np.array(self.point)
         if self.local:
             force, point = rotation.rotate(orientation, np.stack([force, point]))
         strength = float(np.linalg.norm(force))
-        length = ARROW * (strength / 1000) ** 0.5
+        length = ARROW_LENGTH * (strength / 1000) ** 0.5
         tip = position + point
         return np.stack([tip - force * (length / max(strength, 1e-300)), tip])

@@ -1,8 +1,7 @@
-"""What a doll is: bones with shapes and masses, joints between them, one tree.
+"""A doll: a kinematic tree of rigid bodies (bones) and joints. Frozen, validated data.
 
-Frozen data, no behaviour but validation. SI units, radians, REP 103: x forward, y left, z up.
-All positions, axes and orientations are given in the doll's frame in the bind pose, the pose
-in which every joint angle is zero. Quaternions are x, y, z, w.
+SI units, radians, REP 103: x forward, y left, z up. All positions, axes and orientations are in
+the doll's frame in the bind pose, where every joint angle is zero. Quaternions are x, y, z, w.
 """
 from __future__ import annotations
 
@@ -12,6 +11,7 @@ import os
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -22,25 +22,39 @@ from .pose import Pose
 from .rotation import IDENTITY
 from .shapes import Shape
 from .swing import Swing
-from .vectors import Quaternion, Vector, finite, floats, unit
+from .vectors import Quaternion, Vector, finite_floats, unit_vector, vector
 
 Limits = tuple[float, float]
 
 DEFAULT_COLOR = (0.5, 0.64, 0.82, 1.0)
-"""Red, green, blue, opacity of a bone that has no colour of its own."""
+"""Red, green, blue, opacity of a bone without a colour."""
 
 WORLD = 'world'
-"""Name of the frame that everything is in; no bone may bear it, for frames are told by names."""
+"""Name of the world frame; no bone may have it, as tf frames are named by bones."""
 
 
 @dataclass(frozen=True)
 class Bone:
-    """A rigid body of ``mass`` kg with its centre of mass at ``position``.
+    """A rigid body.
 
-    ``orientation`` turns the shape's own axes, which are its principal axes of inertia, into the
-    doll's. ``friction``, ``rolling_friction`` (m) and ``restitution`` override the scene's
-    material; None keeps it. ``color`` is red, green, blue, alpha from 0 to 1. ``moments`` are
-    those about the centre of mass along its axes, kg m^2; None: those of the uniform solid.
+    Args:
+        name: unique in its doll, not 'world'.
+        shape: a Box, Capsule, Compound, Cylinder or Sphere; its axes are the bone's.
+        mass: kg.
+        position: (3,) m, the centre of mass in the doll's frame, bind pose.
+        orientation: quaternion x, y, z, w, bone's axes (principal axes of inertia) to doll's.
+        friction, rolling_friction, restitution: Coulomb's coefficient, lever arm in m, ratio of
+            speeds from 0 to 1; None: those of the scene's material.
+        color: red, green, blue, opacity, 0 to 1.
+        moments: (3,) kg m^2, principal moments about the centre of mass along the bone's axes;
+            None: those of a uniform solid of its shape.
+
+    Raises:
+        ModelError: for a field out of its range, by a subclass that names the fault.
+
+    Example:
+        >>> Bone('head', Sphere(0.1), mass=5, position=(0, 0, 1.6)).position
+        (0.0, 0.0, 1.6)
     """
 
     name: str
@@ -55,8 +69,8 @@ class Bone:
     moments: Vector | None = None
 
     def __post_init__(self) -> None:
-        set_fields(self, mass=float(self.mass), position=finite('position', self.position),
-                   orientation=unit('orientation', self.orientation, count=4))
+        set_fields(self, mass=float(self.mass), position=finite_floats('position', self.position),
+                   orientation=unit_vector('orientation', self.orientation, count=4))
         if self.name == WORLD:
             raise errors.DuplicateName('name', self.name, "a name other than the world frame's")
         errors.check_positive('mass', self.mass)
@@ -65,32 +79,33 @@ class Bone:
             if getattr(self, key) is not None:
                 errors.check_range(key, getattr(self, key), 0, most)
         if self.color is not None:
-            set_fields(self, color=finite('color', self.color, 4))
+            set_fields(self, color=finite_floats('color', self.color, 4))
             for part in self.color:
                 errors.check_range('color', part, 0, 1)
         if self.moments is not None:
-            set_fields(self, moments=_moments(finite('inertia', self.moments)))
+            moments = vector(finite_floats('inertia', self.moments))
+            set_fields(self, moments=_checked_moments(moments))
         elif isinstance(self.shape, Compound):
             self.shape.check_principal()
 
     @property
     def pose(self) -> Pose:
-        """Of its centre of mass and its shape's axes, doll's frame, bind pose."""
+        """Pose in the doll's frame, bind pose."""
         return Pose(np.array(self.position), np.array(self.orientation))
 
     @property
     def inertia(self) -> Vector:
-        """Principal moments about the centre of mass along the shape's axes, kg m^2."""
+        """Principal moments (3,) kg m^2 about the centre of mass, given or of the shape."""
         return self.shape.inertia(self.mass) if self.moments is None else self.moments
 
 
-LARGEST_SWING = math.radians(85)
-"""Largest swing of a limited ball joint: at 90 degrees its three angles lose a freedom."""
+MAX_SWING = math.radians(85)
+"""rad, largest swing limit of a ball joint: at 90 degrees its Euler angles are singular."""
 
 
 @dataclass(frozen=True)
 class JointKind:
-    """How many axes a kind of joint names and how many pairs of limits it takes."""
+    """Numbers of axes, of pairs of limits and of degrees of freedom of a kind of joint."""
 
     name: str
     axes: int
@@ -107,22 +122,33 @@ JOINT_KINDS = {kind.name: kind for kind in (
 
 @dataclass(frozen=True)
 class Joint:
-    """What ties ``child`` to ``parent`` at ``anchor``.
-
-    An angle is that of the child relative to the parent, right-handed about its axis.
+    """A joint between two bones of a doll; angles are the child's relative to the parent.
 
     - hinge: one axis, one pair of limits.
-    - universal: the first axis is fixed in the parent, the second in the child; they turn in
-      that order and are perpendicular in the bind pose.
-    - ball: one axis, the twist axis; either free, or limited by a swing (-s, s) about each of
-      two axes across it (a pyramid, as in PhysX; s at most 85 degrees) and a twist (-t, t). Or two
-      axes, the twist axis and x across it, and three pairs of limits: about x, which is fixed in
-      the parent, about y = twist axis times x (85 degrees at the most), and the twist.
+    - universal: the first axis is fixed in the parent, the second in the child, perpendicular in
+      the bind pose; R = R(first) R(second).
+    - ball: one axis, the twist axis; free, or with limits (-s, s), s up to 85 degrees, about two
+      axes across it (a pyramid, as in PhysX) and a twist (-t, t). Or two axes, twist and x
+      across it, and three pairs of limits: about x, which is fixed in the parent, about
+      y = twist axis times x (up to 85 degrees), and the twist.
     - fixed: no axes.
 
-    ``limits`` in rad, None for a free axis; kept to 1e-9 degrees, so that files written in
-    degrees read back to the same bits. ``damping`` is in N m s/rad on each axis. ``names`` are
-    those of the joint's angles, one for each; without them they are called as the child.
+    Args:
+        parent, child: names of the bones.
+        kind: 'hinge', 'universal', 'ball' or 'fixed'.
+        anchor: (3,) m, doll's frame, bind pose.
+        axes: unit vectors (3,), doll's frame, bind pose; normalised. Angles are right-handed.
+        limits: pairs (lower, upper), rad, None for a free axis; rounded to 1e-9 degrees, so that
+            files in degrees read back to the same bits.
+        damping: N m s/rad on each axis.
+        names: of the angles; default the child's, with a suffix where there are several.
+
+    Raises:
+        WrongAxes, LimitsReversed, OutOfRange, WrongForm, NotUnit, NotFinite: for its fields.
+
+    Example:
+        >>> Joint('thigh', 'shin', 'hinge', (0, 0, 0.5), ((0, 1, 0),), ((0, 2.5),)).angle_names
+        ('shin',)
     """
 
     parent: str
@@ -140,9 +166,10 @@ class Joint:
         kind = JOINT_KINDS[self.kind]
         if self.kind == 'ball' and len(self.axes) == 2:
             kind = dataclasses.replace(kind, axes=2, limits=3)
-        set_fields(self, anchor=finite('anchor', self.anchor), damping=float(self.damping),
-                   axes=tuple(unit('axes', axis) for axis in self.axes), names=tuple(self.names),
-                   limits=tuple(_angles(pair) for pair in self.limits or (None,) * kind.limits))
+        set_fields(self, anchor=finite_floats('anchor', self.anchor), damping=float(self.damping),
+                   axes=tuple(unit_vector('axes', axis) for axis in self.axes),
+                   limits=tuple(map(_rounded_limits, self.limits or (None,) * kind.limits)),
+                   names=tuple(self.names))
         if len(self.axes) != kind.axes:
             raise errors.WrongAxes('axes', self.axes, f'{kind.axes} for a {self.kind} joint')
         if len(self.limits) != kind.limits:
@@ -167,13 +194,13 @@ class Joint:
             if max(map(abs, pair)) > 2 * math.pi:
                 raise errors.OutOfRange(path, pair, 'within one turn')
         if len(self.limits) == 3:
-            if self.limits[1] is None or max(map(abs, self.limits[1])) > LARGEST_SWING:
+            if self.limits[1] is None or max(map(abs, self.limits[1])) > MAX_SWING:
                 raise errors.OutOfRange('limits[1]', self.limits[1], 'a swing up to 85 degrees')
         elif self.kind == 'ball' and any(self.limits):
             self._check_ball(*self.limits)
 
     def _check_ball(self, swing: Limits | None, twist: Limits | None) -> None:
-        if swing is None or not 0 < swing[1] <= LARGEST_SWING:
+        if swing is None or not 0 < swing[1] <= MAX_SWING:
             raise errors.OutOfRange('limits[0]', swing, 'a swing up to 85 degrees, or no limits')
         for index, pair in enumerate((swing, twist)):
             if pair and (pair[0] != -pair[1] or pair[1] <= 0):
@@ -181,7 +208,7 @@ class Joint:
 
     @property
     def is_free_ball(self) -> bool:
-        """Whether a quaternion stands for its turn: a ball joint without limits."""
+        """Whether it is a ball joint without limits, whose coordinate is a quaternion."""
         return self.kind == 'ball' and not any(self.limits)
 
     @property
@@ -191,9 +218,7 @@ class Joint:
 
     @property
     def angle_names(self) -> tuple[str, ...]:
-        """Name of each joint angle: its own, else the child's, with a suffix where there are
-        several.
-        """
+        """Name of each joint angle; see ``names``."""
         if self.names:
             return self.names
         suffixes = {'universal': ('_1', '_2'), 'ball': ('_x', '_y', '_z')}
@@ -202,7 +227,7 @@ class Joint:
 
     @property
     def angle_limits(self) -> tuple[Limits | None, ...]:
-        """Limits of each angle of angle_names, rad; None where it is free."""
+        """Limits of each angle of angle_names, rad; None: free."""
         if self.kind == 'ball' and len(self.limits) == 2:
             swing, twist = self.limits
             return (swing, swing, twist)
@@ -211,12 +236,11 @@ class Joint:
 
 @dataclass(frozen=True)
 class SkeletonFrame:
-    """A bone of the skin's skeleton, fixed on the body that carries it.
+    """A frame of the skin's skeleton fixed to a bone of the doll: an entry of ``riders``.
 
-    ``bone`` names the carrying bone of the doll; ``position`` (m) and ``orientation`` are those
-    of the rider in that bone's own frame: its centre of mass and its shape's axes. Riders have
-    no mass and meet nothing; they are there so that a skin can follow (see riders.py). Their
-    names are their own: a rider may be called as the bone that carries it.
+    ``position`` (m) and ``orientation`` are in the frame of ``bone``: its centre of mass and its
+    axes. It has no mass and no shape; a skin follows it (see skeleton.py). Its name may be that
+    of a bone.
     """
 
     name: str
@@ -225,18 +249,31 @@ class SkeletonFrame:
     orientation: Quaternion = IDENTITY
 
     def __post_init__(self) -> None:
-        set_fields(self, position=finite('position', self.position),
-                   orientation=unit('orientation', self.orientation, count=4))
+        set_fields(self, position=finite_floats('position', self.position),
+                   orientation=unit_vector('orientation', self.orientation, count=4))
 
 
 @dataclass(frozen=True, repr=False)
 class Ragdoll:
-    """A tree of bones. ``bones`` fixes the order; one of them, the root, has no parent.
+    """A doll: a kinematic tree of bones and joints.
 
-    ``swings`` ride on bones and do not act back on them; ``riders`` are what else moves with the
-    bones, in the order of the skeleton they are of. ``model`` is the path of the character that
-    the riders are of, made absolute; nothing here opens it. ``no_collision`` are pairs of bones,
-    by name, that do not collide with each other, beside those that a joint connects.
+    Args:
+        name: of the doll.
+        bones: their order is that of all arrays; exactly one, the root, is no joint's child.
+        joints: one for each other bone.
+        swings: chains of point masses attached to bones (model/swing.py); they do not act back.
+        riders: frames of a skin's skeleton, attached to bones; see Riders.
+        model: path of the character that the riders are from; made absolute, not opened.
+        no_collision: pairs of names of bones that do not collide, beside jointed ones.
+
+    Raises:
+        DuplicateName, UnknownBone, ConnectedTwice, JointCycle, Detached, WrongForm: if it is no
+            tree or a name is wrong.
+
+    Example:
+        >>> ball = Ragdoll('ball', (Bone('ball', Sphere(0.1), mass=1, position=(0, 0, 0)),))
+        >>> ball
+        Ragdoll 'ball': 1 bones, 0 joints, 0 degrees of freedom, 1 kg
     """
 
     name: str
@@ -256,16 +293,16 @@ class Ragdoll:
         edges = [(joint.parent, joint.child) for joint in self.joints]
         found = tree_errors(names, edges)
         for key in ('swings', 'riders'):
-            carried = [(each.name, each.bone) for each in getattr(self, key)]
-            found += carried_errors(key, names, carried)
-        found += pair_errors(names, self.no_collision)
-        found += angle_errors(self.joints)
+            attached = [(each.name, each.bone) for each in getattr(self, key)]
+            found += attachment_errors(key, names, attached)
+        found += no_collision_errors(names, self.no_collision)
+        found += angle_name_errors(self.joints)
         for error in found:
             raise error
 
     @property
     def extent(self) -> float:
-        """Longest side, m, of the box around the doll as it is bound, along the world's axes."""
+        """Upper bound, m, of the longest edge of its bounding box in the bind pose."""
         positions = np.array([bone.position for bone in self.bones])
         largest = max(max(bone.shape.half_extents) for bone in self.bones)
         return float(np.ptp(positions, axis=0).max() + 2 * largest)
@@ -284,11 +321,12 @@ class Ragdoll:
     @property
     def mass_centre(self) -> np.ndarray:
         """Centre of mass (3,) m, doll's frame, bind pose."""
-        return sum(bone.mass * np.array(bone.position) for bone in self.bones) / self.mass
+        moments = [bone.mass * np.array(bone.position) for bone in self.bones]
+        return np.asarray(sum(moments)) / self.mass
 
     @property
-    def never_collide(self) -> frozenset[frozenset[str]]:
-        """Pairs of bones, by name, that pass through each other: jointed ones, ``no_collision``."""
+    def excluded_pairs(self) -> frozenset[frozenset[str]]:
+        """Pairs of names of bones that do not collide: jointed ones and ``no_collision``."""
         jointed = ((joint.parent, joint.child) for joint in self.joints)
         return frozenset(frozenset(pair) for pair in (*jointed, *self.no_collision))
 
@@ -297,7 +335,7 @@ class Ragdoll:
                 f'{sum(joint.dof for joint in self.joints)} degrees of freedom, {self.mass:.4g} kg')
 
     def bone(self, name: str) -> Bone:
-        """Find a bone by its name; UnknownBone if there is none."""
+        """The bone of a name. Raises UnknownBone."""
         for bone in self.bones:
             if bone.name == name:
                 return bone
@@ -312,7 +350,7 @@ class Ragdoll:
         return tuple(ordered)
 
     def joints_depth_first(self) -> tuple[Joint, ...]:
-        """All joints, each one's whole branch before the next, as engines count them."""
+        """All joints, depth first, as engines order them."""
         below = self._joints_below()
         ordered = below[self.root.name]
         for after, joint in enumerate(ordered, start=1):
@@ -320,36 +358,36 @@ class Ragdoll:
         return tuple(ordered)
 
     def _joints_below(self) -> defaultdict[str, list[Joint]]:
-        """The joints of each bone to its children."""
+        """Joints to the children of each bone."""
         below: defaultdict[str, list[Joint]] = defaultdict(list)
         for joint in self.joints:
             below[joint.parent].append(joint)
         return below
 
-    def replace_bone(self, name: str, **changes: object) -> Ragdoll:
-        """The same doll with one bone changed."""
+    def replace_bone(self, name: str, **changes: Any) -> Ragdoll:
+        """A copy with fields of one bone replaced. Raises UnknownBone."""
         self.bone(name)
         bones = tuple(dataclasses.replace(bone, **changes) if bone.name == name else bone
                       for bone in self.bones)
         return dataclasses.replace(self, bones=bones)
 
     def renamed(self, rename: Callable[[str], str]) -> Ragdoll:
-        """The same doll with every bone named anew."""
+        """A copy with every bone renamed."""
         bones = tuple(dataclasses.replace(bone, name=rename(bone.name)) for bone in self.bones)
         joints = tuple(dataclasses.replace(joint, parent=rename(joint.parent),
                                            child=rename(joint.child)) for joint in self.joints)
-        pairs = tuple(tuple(map(rename, pair)) for pair in self.no_collision)
+        pairs = tuple((rename(first), rename(second)) for first, second in self.no_collision)
         return dataclasses.replace(self, bones=bones, joints=joints, no_collision=pairs)
 
 
 def tree_errors(names: list[str], edges: list[tuple[str, str]]) -> list[errors.ModelError]:
-    """Find all that keeps (parent, child) edges from being one tree over the named bones."""
+    """Errors that keep (parent, child) edges from being one tree over the named bones."""
     found: list[errors.ModelError] = []
     if not names:
         found.append(errors.Detached('bones', names, 'at least one bone'))
     for index, name in enumerate(names):
         if name in names[:index]:
-            found.append(errors.DuplicateName(f'bones[{index}].name', name, 'a name of its own'))
+            found.append(errors.DuplicateName(f'bones[{index}].name', name, 'a unique name'))
     parent_of: dict[str, str] = {}
     for index, (parent, child) in enumerate(edges):
         for end, name in (('parent', parent), ('child', child)):
@@ -358,35 +396,36 @@ def tree_errors(names: list[str], edges: list[tuple[str, str]]) -> list[errors.M
                 found.append(errors.UnknownBone(f'joints[{index}].{end}', name, expected))
         if child in parent_of:
             found.append(errors.ConnectedTwice(
-                f'joints[{index}].child', child, 'a bone that has no parent yet'))
-        elif _reaches(parent_of, parent, child):
+                f'joints[{index}].child', child, 'a bone without another parent'))
+        elif _is_ancestor(parent_of, parent, child):
             found.append(errors.JointCycle(
-                f'joints[{index}]', f'{parent} -> {child}', 'joints that close no ring'))
+                f'joints[{index}]', f'{parent} -> {child}', 'joints without a loop'))
         else:
             parent_of[child] = parent
     roots = [name for name in dict.fromkeys(names) if name not in parent_of]
     if len(roots) > 1 and not found:
-        found.append(errors.Detached('joints', roots, 'one bone alone without a parent'))
+        found.append(errors.Detached('joints', roots, 'exactly one bone without a parent'))
     return found
 
 
-def carried_errors(key: str, names: list[str],
-                   carried: list[tuple[str, str]]) -> list[errors.ModelError]:
-    """Find what of (name, carrying bone) rides on no bone or shares a name."""
+def attachment_errors(key: str, names: list[str],
+                      attached: list[tuple[str, str]]) -> list[errors.ModelError]:
+    """Errors of what is attached to bones, pairs (name, bone): unknown bones, equal names."""
     found: list[errors.ModelError] = []
     known, seen = set(names), set()
-    for index, (name, bone) in enumerate(carried):
+    for index, (name, bone) in enumerate(attached):
         if bone not in known:
             expected = errors.one_of(names, bone)
             found.append(errors.UnknownBone(f'{key}[{index}].bone', bone, expected))
         if name in seen:
-            found.append(errors.DuplicateName(f'{key}[{index}].name', name, 'a name of its own'))
+            found.append(errors.DuplicateName(f'{key}[{index}].name', name, 'a unique name'))
         seen.add(name)
     return found
 
 
-def pair_errors(names: list[str], pairs: Sequence[Sequence[str]]) -> list[errors.ModelError]:
-    """Find what of pairs that do not collide is no pair of two bones."""
+def no_collision_errors(names: list[str],
+                        pairs: Sequence[Sequence[str]]) -> list[errors.ModelError]:
+    """Errors of pairs of ``no_collision`` that are not two bones."""
     found: list[errors.ModelError] = []
     for index, pair in enumerate(pairs):
         where = f'no_collision[{index}]'
@@ -397,19 +436,19 @@ def pair_errors(names: list[str], pairs: Sequence[Sequence[str]]) -> list[errors
     return found
 
 
-def angle_errors(joints: Sequence[Joint]) -> list[errors.ModelError]:
-    """Find joints whose angles are called as another's."""
+def angle_name_errors(joints: Sequence[Joint]) -> list[errors.ModelError]:
+    """Errors of joints that share a name of an angle."""
     found: list[errors.ModelError] = []
     seen: set[str] = set()
     for index, joint in enumerate(joints):
-        found += [errors.DuplicateName(f'joints[{index}].names', name, 'a name of its own')
+        found += [errors.DuplicateName(f'joints[{index}].names', name, 'a unique name')
                   for name in joint.angle_names if name in seen]
         seen.update(joint.angle_names)
     return found
 
 
 def joint_frame(joint: Joint) -> np.ndarray:
-    """Orientation (4,) of a joint's frame in the doll's: of a ball joint, z is the twist axis."""
+    """Orientation (4,) of a joint's frame in the doll's; of a ball joint z is the twist axis."""
     if joint.kind != 'ball':
         return np.array(rotation.IDENTITY)
     if len(joint.axes) == 2:
@@ -425,27 +464,26 @@ def joint_axes(joint: Joint) -> np.ndarray:
     return np.array(joint.axes).reshape(-1, 3)
 
 
-def _reaches(parent_of: dict[str, str], start: str, goal: str) -> bool:
+def _is_ancestor(parent_of: dict[str, str], start: str, goal: str) -> bool:
     """Whether ``goal`` is ``start`` itself or one of its ancestors."""
     while start != goal and start in parent_of:
         start = parent_of[start]
     return start == goal
 
 
-def _moments(moments: Vector) -> Vector:
-    """Principal moments that a body can have: each at most the sum of the other two.
+def _checked_moments(moments: Vector) -> Vector:
+    """Principal moments that fulfil the triangle inequality, with a tolerance of 1e-6.
 
-    Two make up the third of what is flat. What six digits have rounded beyond that is taken back,
-    as PyBullet takes such an inertia for zero and MuJoCo refuses it.
+    Rounding beyond it is removed: PyBullet takes such an inertia for zero, MuJoCo refuses it.
     """
     errors.check_positive('inertia', moments)
     others = tuple(sum(moments[:axis] + moments[axis + 1:]) for axis in range(3))
     if any(moment > most * (1 + 1e-6) for moment, most in zip(moments, others, strict=True)):
         raise errors.OutOfRange('inertia', moments, 'each at most the sum of the other two')
-    return tuple(map(min, moments, others))
+    return vector(map(min, moments, others))
 
 
-def _angles(pair: Limits | None) -> Limits | None:
+def _rounded_limits(pair: Limits | None) -> Any:
     if pair is None:
         return None
-    return floats(math.radians(round(math.degrees(angle), 9)) for angle in pair)
+    return tuple(math.radians(round(math.degrees(angle), 9)) for angle in pair)

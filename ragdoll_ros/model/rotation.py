@@ -1,13 +1,13 @@
-"""Rotations as this package writes them: unit quaternions in the order x, y, z, w (as in ROS).
+"""Rotations as unit quaternions x, y, z, w (as in ROS) that map body to world: v_world = R v_body.
 
-A rotation takes vectors of the body's frame to the frame the body is in: v_world = R v_body.
-All functions take stacked input: quaternions (..., 4), vectors (..., 3), matrices (..., 3, 3).
+Functions take stacked input: quaternions (..., 4), vectors (..., 3), matrices (..., 3, 3).
 """
 from __future__ import annotations
 
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .angle import sine_and_cosine
 
@@ -15,7 +15,7 @@ IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 
 def _hamilton() -> np.ndarray:
-    """Matrix (16, 4) that takes all products a_i b_j to the quaternion a * b."""
+    """Matrix (16, 4) from the products a_i b_j to the quaternion a * b."""
     x, y, z, w = range(4)
     terms = [((w, x, 1), (x, w, 1), (y, z, 1), (z, y, -1)),
              ((w, y, 1), (x, z, -1), (y, w, 1), (z, x, 1)),
@@ -35,25 +35,25 @@ def _table(terms: list[tuple[tuple[int, int, int], ...]]) -> np.ndarray:
 _HAMILTON = _hamilton()
 
 
-def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Hamilton product a * b: first b, then a."""
+def multiply(a: ArrayLike, b: ArrayLike) -> np.ndarray:
+    """Hamilton product a * b: the rotation b, then a."""
     products = np.asarray(a, float)[..., :, None] * np.asarray(b, float)[..., None, :]
     return products.reshape(*products.shape[:-2], 16) @ _HAMILTON
 
 
-def inverse(q: np.ndarray) -> np.ndarray:
+def inverse(q: ArrayLike) -> np.ndarray:
     """Inverse of unit quaternions."""
     return np.asarray(q, float) * (-1.0, -1.0, -1.0, 1.0)
 
 
-def normalized(q: np.ndarray) -> np.ndarray:
+def normalized(q: ArrayLike) -> np.ndarray:
     """Quaternions or vectors scaled to length one."""
     q = np.asarray(q, float)
     return q / np.linalg.norm(q, axis=-1, keepdims=True)
 
 
 def _products_to_matrix() -> np.ndarray:
-    """Matrix (16, 9) that takes all products q_i q_j to the entries of the rotation matrix."""
+    """Matrix (16, 9) from the products q_i q_j to the entries of the rotation matrix."""
     x, y, z, w = range(4)
     terms = [((x, x, 1), (y, y, -1), (z, z, -1), (w, w, 1)), ((x, y, 2), (z, w, -2)),
              ((x, z, 2), (y, w, 2)),
@@ -67,25 +67,25 @@ def _products_to_matrix() -> np.ndarray:
 _PRODUCTS = _products_to_matrix()
 
 
-def matrix(q: np.ndarray) -> np.ndarray:
+def matrix(q: ArrayLike) -> np.ndarray:
     """Rotation matrices (..., 3, 3) of unit quaternions.
 
-    By einsum, which sums in one order: BLAS has another one on each kind of processor.
+    By einsum, whose order of summation is fixed; that of BLAS depends on the processor.
     """
     q = np.asarray(q, float)
     products = (q[..., :, None] * q[..., None, :]).reshape(*q.shape[:-1], 16)
     return np.einsum('...i,ij->...j', products, _PRODUCTS).reshape(*q.shape[:-1], 3, 3)
 
 
-def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Vectors v of the body's frame, in the outer frame."""
+def rotate(q: ArrayLike, v: ArrayLike) -> np.ndarray:
+    """Vectors v from the body's axes to the outer axes."""
     return np.einsum('...ij,...j->...i', matrix(q), np.asarray(v, float))
 
 
-def from_matrix(r: np.ndarray) -> np.ndarray:
+def from_matrix(r: ArrayLike) -> np.ndarray:
     """Unit quaternion (4,) of one rotation matrix (3, 3); w >= 0.
 
-    Takes the largest component first, so that no root is taken of a small number (Shepperd 1978).
+    Starts from the largest component, for accuracy (Shepperd 1978).
     """
     r = np.asarray(r, float)
     trace = np.trace(r)
@@ -101,23 +101,23 @@ def from_matrix(r: np.ndarray) -> np.ndarray:
     return q if q[3] >= 0 else -q
 
 
-def from_axis_angle(axis: np.ndarray, angle: float) -> np.ndarray:
-    """Unit quaternion (4,) of a turn by ``angle`` rad about ``axis``, right-handed."""
+def from_axis_angle(axis: ArrayLike, angle: float) -> np.ndarray:
+    """Unit quaternion (4,) of a rotation by ``angle`` rad about ``axis``, right-handed."""
     sine, cosine = sine_and_cosine(angle / 2)
     return np.append(normalized(axis) * sine, cosine)
 
 
-def from_rotation_vector(vectors: np.ndarray) -> np.ndarray:
+def from_rotation_vector(vectors: ArrayLike) -> np.ndarray:
     """Unit quaternions (..., 4) of rotation vectors (..., 3) in rad."""
     vectors = np.asarray(vectors, float)
     half = np.linalg.norm(vectors, axis=-1, keepdims=True) / 2
     return np.concatenate([np.sinc(half / np.pi) / 2 * vectors, np.cos(half)], axis=-1)
 
 
-def mean_of_turn(vector: np.ndarray) -> np.ndarray:
-    """Mean (3, 3) of all rotation matrices on a steady way from none to a rotation vector (3,).
+def mean_rotation_matrix(vector: ArrayLike) -> np.ndarray:
+    """Mean (3, 3) of the rotation matrices of s r, s from 0 to 1, for a rotation vector r (3,).
 
-    1 + (1 - cos a) / a^2 [r] + (a - sin a) / a^3 [r]^2 for the vector r, a long, and [r] w = r x w.
+    The left Jacobian of SO(3): 1 + (1 - cos a)/a^2 [r] + (a - sin a)/a^3 [r]^2, a = |r|.
     """
     x, y, z = vector
     angle = math.hypot(x, y, z)
@@ -128,7 +128,7 @@ def mean_of_turn(vector: np.ndarray) -> np.ndarray:
             + (angle - math.sin(angle)) / angle ** 3 * across @ across)
 
 
-def rotation_vector(q: np.ndarray) -> np.ndarray:
+def rotation_vector(q: ArrayLike) -> np.ndarray:
     """Rotation vectors (..., 3) in rad, at most pi long, of unit quaternions (..., 4)."""
     q = np.asarray(q, float)
     q = np.where(q[..., 3:] < 0, -q, q)
@@ -145,11 +145,10 @@ def from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
     return q
 
 
-def to_rpy(q: np.ndarray) -> tuple[float, float, float]:
+def to_rpy(q: ArrayLike) -> tuple[float, float, float]:
     """Fixed-axis roll, pitch, yaw in rad of one quaternion, exact at pitch = 90 degrees too.
 
-    Roll is taken after yaw has been turned back, so that the two fit each other even where
-    each alone is undetermined.
+    Roll is computed after yaw is removed, so that the two are consistent at the singularity.
     """
     r = matrix(q)
     yaw = math.atan2(r[1, 0], r[0, 0])
@@ -159,24 +158,24 @@ def to_rpy(q: np.ndarray) -> tuple[float, float, float]:
     return roll, pitch, yaw
 
 
-def from_xyz(x: float, y: float, z: float) -> np.ndarray:
-    """Unit quaternion (4,) of turns in rad about x, then the new y, then the new z."""
+def from_euler_xyz(x: float, y: float, z: float) -> np.ndarray:
+    """Unit quaternion (4,) of intrinsic Euler angles x, y, z in rad: R = Rx Ry Rz."""
     q = np.array(IDENTITY)
     for axis, angle in zip(np.eye(3), (x, y, z), strict=True):
         q = multiply(q, from_axis_angle(axis, angle))
     return q
 
 
-def to_xyz(q: np.ndarray) -> tuple[float, float, float]:
-    """Angles in rad about x, then the new y, then the new z that make up one quaternion's turn."""
+def to_euler_xyz(q: ArrayLike) -> tuple[float, float, float]:
+    """Intrinsic Euler angles x, y, z in rad of one quaternion: R = Rx Ry Rz."""
     r = matrix(q)
     return (math.atan2(-r[1, 2], r[2, 2]), math.asin(max(-1.0, min(1.0, r[0, 2]))),
             math.atan2(-r[0, 1], r[0, 0]))
 
 
-def xyz_rates(angles: np.ndarray, spin: np.ndarray) -> np.ndarray:
-    """Rates (3,) rad/s of the angles of to_xyz while what they turn spins with ``spin`` (3,)
-    rad/s along its own axes; without bound as the second angle comes near a quarter turn.
+def euler_xyz_rates(angles: ArrayLike, spin: ArrayLike) -> np.ndarray:
+    """Rates (3,) rad/s of intrinsic Euler angles at the angular velocity ``spin`` (3,) rad/s in
+    body axes; singular where the second angle is 90 degrees.
     """
     _, second, third = angles
     sin, cos = math.sin(third), math.cos(third)
@@ -185,15 +184,15 @@ def xyz_rates(angles: np.ndarray, spin: np.ndarray) -> np.ndarray:
                      spin[2] - first_rate * math.sin(second)])
 
 
-def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Geodesic distance of unit quaternions in rad, 0 to pi; q and -q are the same turn."""
+def angle_between(a: ArrayLike, b: ArrayLike) -> np.ndarray:
+    """Geodesic distance of unit quaternions in rad, 0 to pi; q and -q are the same rotation."""
     difference = multiply(inverse(a), b)
     sin = np.linalg.norm(difference[..., :3], axis=-1)
     return 2 * np.arctan2(sin, np.abs(difference[..., 3]))
 
 
-def shortest_arc(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Quaternion (4,) of the smallest turn that takes the direction of a to that of b."""
+def shortest_arc(a: ArrayLike, b: ArrayLike) -> np.ndarray:
+    """Quaternion (4,) of the smallest rotation from the direction of a to that of b."""
     a, b = normalized(a), normalized(b)
     q = np.append(np.cross(a, b), 1 + a @ b)
     if np.linalg.norm(q) > 1e-8:

@@ -1,7 +1,7 @@
-"""What a scene needs: dolls and where they stand, ground, material, gravity, tick.
+"""A scene: dolls and their initial states, ground, material, gravity, tick. Frozen, validated data.
 
-Frozen data with validation; reading and writing files is in files/scene.py.
 SI units, world frame: x forward, y left, z up (REP 103). Quaternions are x, y, z, w.
+files/scene.py reads and writes it.
 """
 from __future__ import annotations
 
@@ -18,32 +18,31 @@ from .errors import set_fields
 from .pose import Pose
 from .ragdoll import Bone, Ragdoll
 from .rotation import IDENTITY
-from .vectors import Quaternion, Vector, finite, unit
+from .vectors import Quaternion, Vector, finite_floats, unit_vector
 
 SECOND = 1_000_000_000
-"""Nanoseconds in a second: time is counted in whole nanoseconds, as in ROS."""
+"""Nanoseconds in a second; time is an integer of nanoseconds, as in ROS."""
 
 STEP_RANGE = (0.0002, 0.2)
 """Shortest and longest tick, s."""
 
 NO_SLIP = 0.7
-"""Coefficient that stands for friction without limit in PyBullet and MuJoCo: no slip up to 35
-degrees. PyBullet's solver takes turns between a contact's normal and its friction, and where a
-larger one pulls the contact open (from 4/3 on for a rod, from less for a chain) they swing ever
-wider: at 10, and now and then at 0.8, a sliding contact bore nothing in every solution with an even
-number of turns."""
+"""Coefficient for unlimited friction in PyBullet and MuJoCo: no slip up to 35 degrees. PyBullet's
+solver alternates between normal and friction; where friction opens the contact (above 4/3 for a
+rod, less for a chain) the iteration diverges: at 10, and sometimes at 0.8, a sliding contact
+carried no load after an even number of iterations."""
 
 LARGEST_FRICTION = 10.0
-"""Coefficient that finite ones are capped at, as PyBullet does."""
+"""Upper bound of finite coefficients in PyBullet and MuJoCo, PyBullet's own."""
 
 
 @dataclass(frozen=True)
 class Material:
-    """Contact of everything with everything, unless a bone has its own.
+    """Contact parameters of all bones that have none of their own, and of the ground.
 
-    ``friction`` is Coulomb's coefficient (infinity: no slip; in PyBullet and MuJoCo NO_SLIP),
-    ``rolling_friction`` a lever arm in m, ``restitution`` the speed after over the speed
-    before a bounce, which acts above an approach speed of ``restitution_speed`` m/s.
+    ``friction`` is Coulomb's coefficient (infinity: no slip; NO_SLIP in PyBullet and MuJoCo),
+    ``rolling_friction`` a lever arm in m, ``restitution`` the speed of separation over the speed
+    of approach, applied above an approach speed of ``restitution_speed`` m/s.
     """
 
     friction: float = math.inf
@@ -58,29 +57,50 @@ class Material:
         errors.check_range('restitution_speed', self.restitution_speed, 0, 1e6)
 
     def on(self, bone: Bone | None) -> tuple[float, float, float]:
-        """Friction, rolling friction (m) and restitution of a bone, its own where it has them."""
+        """Friction, rolling friction (m) and restitution of a bone, or of the ground (None)."""
         return tuple(getattr(self, key) if getattr(bone, key, None) is None else getattr(bone, key)
                      for key in ('friction', 'rolling_friction', 'restitution'))
 
 
 @dataclass(frozen=True)
 class Ground:
-    """The plane of points p with normal . p = offset (m); the normal points out of the ground."""
+    """The half space below the plane normal . p = offset. Raises NotUnit, NotFinite, WrongForm.
+
+    Args:
+        normal: (3,), out of the ground, world frame; normalised.
+        offset: m, distance of the plane from the origin along the normal.
+
+    Example:
+        >>> Ground(normal=(0, 0, 2)).normal
+        (0.0, 0.0, 1.0)
+    """
 
     normal: Vector = (0.0, 0.0, 1.0)
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        set_fields(self, normal=unit('normal', self.normal), offset=float(self.offset))
+        set_fields(self, normal=unit_vector('normal', self.normal), offset=float(self.offset))
         errors.check_finite('offset', self.offset)
 
 
 @dataclass(frozen=True)
 class Placement:
-    """A doll in the world: where its frame stands, and how the doll moves at the start.
+    """A doll in a scene, in its bind pose, with its initial pose and velocity in the world frame.
 
-    ``velocity`` (m/s) is that of its centre of mass, ``spin`` (rad/s) turns it as one rigid
-    body about its centre of mass; both in the world frame.
+    Args:
+        doll: the Ragdoll.
+        name: unique in the scene; default the doll's.
+        position: (3,) m, of the doll's frame.
+        orientation: quaternion x, y, z, w, of the doll's frame; normalised.
+        velocity: (3,) m/s, of the doll's centre of mass.
+        spin: (3,) rad/s, angular velocity of the whole doll about its centre of mass.
+
+    Raises:
+        NotFinite, NotUnit, WrongForm: for a vector or quaternion that is none.
+
+    Example:
+        >>> Placement(load_doll('doll'), position=(0, 1, 0.5), spin=(0, 2, 0)).name
+        'doll'
     """
 
     doll: Ragdoll
@@ -92,26 +112,40 @@ class Placement:
 
     def __post_init__(self) -> None:
         for key in ('position', 'velocity', 'spin'):
-            set_fields(self, **{key: finite(key, getattr(self, key))})
-        set_fields(self, name=self.name or self.doll.name, orientation=unit(
+            set_fields(self, **{key: finite_floats(key, getattr(self, key))})
+        set_fields(self, name=self.name or self.doll.name, orientation=unit_vector(
             'orientation', self.orientation, 'a quaternion x, y, z, w, not zero', 4))
 
     def bone_pose(self, bone: Bone) -> Pose:
-        """Of a bone at the start, world frame."""
+        """Initial pose of a bone, world frame."""
         return Pose(np.array(self.position), np.array(self.orientation)).compose(bone.pose)
 
     def root_velocity(self) -> np.ndarray:
-        """Velocity (3,) m/s of the root's centre of mass at the start, world frame."""
+        """Initial velocity (3,) m/s of the root's centre of mass, world frame."""
         arm = rotation.rotate(self.orientation, self.doll.root.position - self.doll.mass_centre)
         return self.velocity + np.cross(self.spin, arm)
 
 
 @dataclass(frozen=True, repr=False)
 class Scene:
-    """All that a simulation needs to begin.
+    """Everything that a simulation starts from.
 
-    ``step`` is one tick in s, ``pace`` the seconds of the scene for each second on the wall,
-    ``gravity`` in m/s^2. No ground: nothing to fall on, and none in the engine.
+    Args:
+        name: of the scene.
+        dolls: at least one Placement, with different names.
+        ground: None: no ground.
+        material: contact parameters, by default no slip and restitution 0.5.
+        gravity: (3,) m/s^2, world frame.
+        step: one tick, s, 0.0002 to 0.2.
+        pace: real-time factor that the node starts with.
+        self_collision: whether the bones of a doll collide with each other.
+
+    Raises:
+        WrongForm, OutOfRange, NotPositive, NotFinite, DuplicateName: for its fields.
+
+    Example:
+        >>> Scene('fall', (Placement(load_doll('doll'), position=(0, 0, 0.4)),), Ground())
+        Scene 'fall': 'doll' of 10 bones; over the ground, tick 0.01 s
     """
 
     name: str
@@ -124,7 +158,7 @@ class Scene:
     self_collision: bool = True
 
     def __post_init__(self) -> None:
-        set_fields(self, dolls=tuple(self.dolls), gravity=finite('gravity', self.gravity))
+        set_fields(self, dolls=tuple(self.dolls), gravity=finite_floats('gravity', self.gravity))
         if not self.dolls:
             raise errors.WrongForm('dolls', (), 'at least one doll')
         errors.check_range('step', self.step, *STEP_RANGE)
@@ -132,34 +166,34 @@ class Scene:
         names = [placement.name for placement in self.dolls]
         for index, name in enumerate(names):
             if name in names[:index]:
-                raise errors.DuplicateName(f'dolls[{index}].name', name, 'a name of its own')
+                raise errors.DuplicateName(f'dolls[{index}].name', name, 'a unique name')
 
     @cached_property
     def bones(self) -> tuple[Bone, ...]:
-        """Every bone, doll by doll: the order of all arrays."""
+        """All bones, doll by doll: the order of all arrays."""
         return tuple(bone for placement in self.dolls for bone in placement.doll.bones)
 
     @cached_property
     def bone_names(self) -> tuple[str, ...]:
-        """Name of every bone; with several dolls, doll/bone."""
+        """Names of all bones; with several dolls, doll/bone."""
         return tuple(self.qualified(placement, bone.name)
                      for placement in self.dolls for bone in placement.doll.bones)
 
     @cached_property
     def bone_slices(self) -> tuple[slice, ...]:
-        """What of all bone arrays is each doll's, in the order of ``dolls``."""
+        """Each doll's range in arrays over bones, in the order of ``dolls``."""
         ends = list(itertools.accumulate(len(placement.doll.bones) for placement in self.dolls))
         return tuple(map(slice, [0, *ends[:-1]], ends))
 
     @cached_property
     def doll_of_bone(self) -> np.ndarray:
-        """(n,) index into ``dolls`` of each bone's doll."""
+        """(n,) index into ``dolls`` of each bone."""
         counts = [own.stop - own.start for own in self.bone_slices]
         return np.repeat(np.arange(len(counts)), counts)
 
     @cached_property
     def angle_names(self) -> tuple[str, ...]:
-        """Name of every joint angle, doll by doll, joint by joint as the doll lists them."""
+        """Names of all joint angles, doll by doll in the order of their joints."""
         return tuple(self.qualified(placement, name) for placement in self.dolls
                      for joint in placement.doll.joints for name in joint.angle_names)
 
@@ -170,11 +204,11 @@ class Scene:
         return f'Scene {self.name!r}: {dolls}; {ground}, tick {self.step:g} s'
 
     def qualified(self, placement: Placement, name: str) -> str:
-        """Name of a doll's bone or angle that is unique in the scene."""
+        """Name of a doll's bone or angle in the scene: prefixed where there are several dolls."""
         return name if len(self.dolls) == 1 else f'{placement.name}/{name}'
 
     def bone_index(self, name: str) -> int:
-        """Index of a bone in all arrays; UnknownBone if there is none of that name."""
+        """Index of a bone in all arrays. Raises UnknownBone."""
         try:
             return self.bone_names.index(name)
         except ValueError:
@@ -182,10 +216,10 @@ class Scene:
 
 
 def height(bone: Bone, position: np.ndarray, orientation: np.ndarray, ground: Ground) -> float:
-    """Distance of a bone's lowest point from the ground, m; negative inside it."""
+    """Distance of a bone's lowest point from the ground, m; negative if it penetrates."""
     normal = np.array(ground.normal)
     inward = rotation.rotate(rotation.inverse(orientation), -normal)
-    return float(position @ normal - ground.offset - bone.shape.reach(inward))
+    return float(position @ normal - ground.offset - bone.shape.support(inward))
 
 
 def above_ground(doll: Ragdoll, clearance: float = 0.4) -> Scene:
@@ -194,7 +228,7 @@ def above_ground(doll: Ragdoll, clearance: float = 0.4) -> Scene:
 
 
 def all_above_ground(name: str, placements: Sequence[Placement], clearance: float = 0.4) -> Scene:
-    """A scene of dolls as they are placed, over level ground, all lifted or lowered by the same.
+    """A scene of dolls over level ground, shifted together along z.
 
     The lowest point of all is ``clearance`` m above the ground.
     """
@@ -206,6 +240,6 @@ def all_above_ground(name: str, placements: Sequence[Placement], clearance: floa
         for placement in placements), ground)
 
 
-def grip(friction: float) -> float:
-    """The coefficient of friction that PyBullet and MuJoCo are to work with."""
+def finite_friction(friction: float) -> float:
+    """Coefficient of friction for PyBullet and MuJoCo."""
     return NO_SLIP if math.isinf(friction) else min(friction, LARGEST_FRICTION)

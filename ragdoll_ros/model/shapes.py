@@ -1,6 +1,6 @@
-"""Simple shapes of bones: sphere, box, cylinder, capsule; uniform solids in their own axes, in m.
+"""Primitive shapes of bones: sphere, box, cylinder, capsule. Uniform solids in their own axes, m.
 
-Several of them together are a Compound (compound.py).
+A bone of several shapes has a Compound (compound.py).
 """
 from __future__ import annotations
 
@@ -16,45 +16,53 @@ from . import errors
 from .errors import set_fields
 from .pose import Pose
 from .rotation import IDENTITY
-from .vectors import Quaternion, Vector, finite, floats, unit
+from .vectors import Quaternion, Vector, finite_floats, unit_vector, vector
 
 SEGMENTS = 20
-"""Corners of a circle in a mesh."""
+"""Vertices of a circle in a mesh."""
 
 
 class Solid:
-    """What the simple shapes have in common; a Compound has all of it too.
+    """Base of the primitive shapes; a Compound has the same properties and methods.
 
-    Each has besides, in its own axes:
-    - ``volume``, m^3, and ``half_extents``, m, half the size of its bounding box
-    - ``support``: six terms, m, of its support function; see support_distance
+    Each shape defines, in its own axes:
+    - ``volume``, m^3, and ``half_extents``, m, half the edges of its bounding box
+    - ``support_terms``: six terms, m, of its support function; see support_distance
     - ``inertia(mass)``: principal moments of the uniform solid about its centre, kg m^2
     - ``signed_distance(points)``: (p,) m of points (p, 3) from its surface, negative inside
-    - ``mesh()``: corners (p, 3) m, triangles (t, 3), counter-clockwise as seen from outside
+    - ``mesh()``: vertices (p, 3) m, triangles (t, 3), counter-clockwise seen from outside
     """
 
     kind: ClassVar[str]
+    support_terms: property
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """The simple shapes that it is for whatever collides with it: itself alone."""
-        return _by_itself(self)
+        """The shapes that collide: itself alone."""
+        return _as_parts(self)
 
     @property
     def primitives(self) -> tuple[Part, ...]:
-        """What it is drawn as: boxes, cylinders and spheres, as every viewer knows just these."""
-        return _by_itself(self)
+        """Boxes, cylinders and spheres to draw: every viewer has these."""
+        return _as_parts(self)
 
-    def reach(self, direction: np.ndarray) -> np.ndarray:
-        """How far (...,) m it extends along unit directions (..., 3) of its own axes."""
-        return support_distance(np.array(self.support), np.asarray(direction, float))
+    def support(self, direction: np.ndarray) -> np.ndarray:
+        """Support function (...,) m: its extent along unit directions (..., 3) in its own axes."""
+        return support_distance(np.array(self.support_terms), np.asarray(direction, float))
 
 
 @dataclass(frozen=True)
 class Part:
-    """A simple shape within another one: its centre at ``position`` m along that one's own axes.
+    """A primitive shape of a Compound at a pose. Raises WrongForm, NotFinite, NotUnit.
 
-    ``orientation`` turns the part's axes into those of the whole.
+    Args:
+        shape: a Sphere, Box, Cylinder or Capsule.
+        position: (3,) m, its centre.
+        orientation: quaternion x, y, z, w, part's axes to compound's axes; normalised.
+
+    Example:
+        >>> Part(Sphere(0.1), position=(0, 0, 0.2)).size
+        (0.2, 0.2, 0.2)
     """
 
     shape: Shape
@@ -62,41 +70,55 @@ class Part:
     orientation: Quaternion = IDENTITY
 
     def __post_init__(self) -> None:
-        set_fields(self, position=finite('position', self.position),
-                   orientation=unit('orientation', self.orientation, count=4))
+        set_fields(self, position=finite_floats('position', self.position),
+                   orientation=unit_vector('orientation', self.orientation, count=4))
         if not isinstance(self.shape, Solid):
             raise errors.WrongForm('shape', self.shape, 'one of ' + ', '.join(SHAPES))
 
+    @classmethod
+    def at(cls, shape: Shape, pose: Pose) -> Part:
+        """A shape at a pose in the compound's axes."""
+        x, y, z, w = map(float, pose.orientation)
+        return cls(shape, vector(pose.position), (x, y, z, w))
+
     @property
     def is_centred(self) -> bool:
-        """Whether its centre and axes are those of the whole."""
+        """Whether its pose is the identity."""
         return not any(self.position) and self.orientation == IDENTITY
 
     @property
     def kind(self) -> str:
-        """Its shape's."""
+        """Its shape's kind."""
         return self.shape.kind
 
     @property
     def size(self) -> Vector:
-        """Edges, or diameters and length, m."""
-        return floats(2 * half for half in self.shape.half_extents)
+        """(3,) m, edges of its bounding box."""
+        return vector(2 * half for half in self.shape.half_extents)
 
     @property
     def pose(self) -> Pose:
-        """Of its centre and axes, in those of the whole."""
+        """Pose in the compound's axes."""
         return Pose(np.array(self.position), np.array(self.orientation))
 
 
 @functools.lru_cache(4096)
-def _by_itself(shape: Shape) -> tuple[Part, ...]:
-    """Asked for many times while a simulation is built: a batch builds one for each fall."""
+def _as_parts(shape: Shape) -> tuple[Part, ...]:
+    """One part. Cached: a batch of simulations asks for the same shapes many times."""
     return (Part(shape),)
 
 
 @dataclass(frozen=True)
 class Sphere(Solid):
-    """A solid ball of ``radius`` m."""
+    """A solid sphere. Raises NotPositive, NotFinite.
+
+    Args:
+        radius: m.
+
+    Example:
+        >>> round(Sphere(0.1).volume, 6)
+        0.004189
+    """
 
     radius: float
     kind: ClassVar[str] = 'sphere'
@@ -114,7 +136,7 @@ class Sphere(Solid):
         return (self.radius,) * 3
 
     @property
-    def support(self) -> tuple[float, ...]:
+    def support_terms(self) -> tuple[float, ...]:
         return (0.0, 0.0, 0.0, 0.0, self.radius, 0.0)
 
     def inertia(self, mass: float) -> Vector:
@@ -130,13 +152,21 @@ class Sphere(Solid):
 
 @dataclass(frozen=True)
 class Box(Solid):
-    """A solid box with full edge lengths ``size`` m along its x, y and z."""
+    """A solid box. Raises NotPositive, NotFinite, WrongForm.
+
+    Args:
+        size: (3,) m, full edges along its x, y and z.
+
+    Example:
+        >>> Box((0.2, 0.3, 0.5)).half_extents
+        (0.1, 0.15, 0.25)
+    """
 
     size: Vector
     kind: ClassVar[str] = 'box'
 
     def __post_init__(self) -> None:
-        set_fields(self, size=finite('box', self.size))
+        set_fields(self, size=finite_floats('box', self.size))
         errors.check_positive('box', self.size)
 
     @property
@@ -145,10 +175,10 @@ class Box(Solid):
 
     @property
     def half_extents(self) -> Vector:
-        return floats(edge / 2 for edge in self.size)
+        return vector(edge / 2 for edge in self.size)
 
     @property
-    def support(self) -> tuple[float, ...]:
+    def support_terms(self) -> tuple[float, ...]:
         return (*self.half_extents, 0.0, 0.0, 0.0)
 
     def inertia(self, mass: float) -> Vector:
@@ -168,7 +198,15 @@ class Box(Solid):
 
 @dataclass(frozen=True)
 class Cylinder(Solid):
-    """A solid cylinder along its own z: ``radius`` and full ``length``, m."""
+    """A solid cylinder along its own z. Raises NotPositive, NotFinite.
+
+    Args:
+        radius, length: m; the length is from face to face.
+
+    Example:
+        >>> Cylinder(radius=0.1, length=0.4).half_extents
+        (0.1, 0.1, 0.2)
+    """
 
     radius: float
     length: float
@@ -187,7 +225,7 @@ class Cylinder(Solid):
         return (self.radius, self.radius, self.length / 2)
 
     @property
-    def support(self) -> tuple[float, ...]:
+    def support_terms(self) -> tuple[float, ...]:
         return (0.0, 0.0, 0.0, self.length / 2, 0.0, self.radius)
 
     def inertia(self, mass: float) -> Vector:
@@ -205,9 +243,15 @@ class Cylinder(Solid):
 
 @dataclass(frozen=True)
 class Capsule(Solid):
-    """A cylinder along its own z of ``length`` m between two half balls of ``radius`` m.
+    """A solid cylinder along its own z with hemispheres. Raises NotPositive, NotFinite.
 
-    The whole is length + 2 radius long, as in MuJoCo, PyBullet and SDF.
+    Args:
+        radius: m.
+        length: m, of the cylinder; the whole is length + 2 radius long, as in MuJoCo and SDF.
+
+    Example:
+        >>> Capsule(radius=0.125, length=0.5).half_extents
+        (0.125, 0.125, 0.375)
     """
 
     radius: float
@@ -227,12 +271,12 @@ class Capsule(Solid):
         return (self.radius, self.radius, self.length / 2 + self.radius)
 
     @property
-    def support(self) -> tuple[float, ...]:
+    def support_terms(self) -> tuple[float, ...]:
         return (0.0, 0.0, 0.0, self.length / 2, self.radius, 0.0)
 
     @property
     def primitives(self) -> tuple[Part, ...]:
-        """What it is drawn as: a cylinder between two balls."""
+        """A cylinder and two spheres."""
         end = self.length / 2
         return (Part(Cylinder(self.radius, self.length)),
                 *(Part(Sphere(self.radius), (0.0, 0.0, z)) for z in (end, -end)))
@@ -240,8 +284,8 @@ class Capsule(Solid):
     def inertia(self, mass: float) -> Vector:
         """Principal moments of the uniform solid about its centre, kg m^2.
 
-        The sum of a cylinder and two half balls, each half ball moved by Steiner's theorem
-        from the flat face to the end of the cylinder (centre of mass 3/8 r off the face).
+        Those of a cylinder and two hemispheres, each moved to the cylinder's end by the parallel
+        axis theorem (its centre of mass is 3/8 r from its face).
         """
         r, length = self.radius, self.length
         barrel = mass * length / (length + 4 / 3 * r)
@@ -266,24 +310,23 @@ Shape = Sphere | Box | Cylinder | Capsule
 SHAPES: dict[str, type] = {shape.kind: shape for shape in (Sphere, Box, Cylinder, Capsule)}
 SIZES = {kind: tuple(field.name for field in dataclasses.fields(shape))
          for kind, shape in SHAPES.items()}
-"""Names of the sizes of each kind of shape."""
+"""Names of each kind's sizes."""
 
 
-def support_distance(support: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Support function: how far (...,) m shapes extend along unit directions of their own axes.
+def support_distance(terms: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Support function (...,) m of shapes along unit directions (..., 3) in their own axes.
 
-    ``support`` (..., 6) m are half edges along x, y and z, half the length of an axis along z, a
-    radius all round and one across z; ``direction`` (..., 3).
+    ``terms`` (..., 6) m: half edges along x, y and z; half length of the axis along z; radius of
+    the sphere swept along it; radius of the disc across it.
     """
-    down = np.abs(direction)
-    across = np.sqrt(np.maximum(0, 1 - down[..., 2] ** 2))
-    edges, along, rounds, rims = (support[..., :3], support[..., 3], support[..., 4],
-                                  support[..., 5])
-    return (edges * down).sum(axis=-1) + along * down[..., 2] + rounds + rims * across
+    cosines = np.abs(direction)
+    sines = np.sqrt(np.maximum(0, 1 - cosines[..., 2] ** 2))
+    edges, along, sphere, disc = (terms[..., :3], terms[..., 3], terms[..., 4], terms[..., 5])
+    return (edges * cosines).sum(axis=-1) + along * cosines[..., 2] + sphere + disc * sines
 
 
 def _beyond_faces(beyond: np.ndarray) -> np.ndarray:
-    """Signed distance (p,) from how far beyond each pair of faces points are, (p, k)."""
+    """Signed distance (p,) m, given the distances (p, k) beyond k pairs of faces."""
     inside = np.minimum(beyond.max(axis=1), 0)
     return np.linalg.norm(np.maximum(beyond, 0), axis=1) + inside
 
@@ -293,7 +336,7 @@ def _half_circle() -> np.ndarray:
 
 
 def _revolved(radii: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Surface of revolution about z of a profile that runs upwards."""
+    """Mesh of the surface of revolution of a profile about z, from bottom to top."""
     turn = np.linspace(0, 2 * np.pi, SEGMENTS, endpoint=False)
     circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     rings = np.concatenate([radii[:, None, None] * circle,

@@ -1,4 +1,4 @@
-"""A doll's skin: what of it is seen, and which bones it follows."""
+"""A doll's skin: its surface and the weights of its bones."""
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 SKIN_COLOR = (0.8, 0.75, 0.69, 1.0)
-"""Of a skin that brings none."""
+"""Colour of a skin without materials."""
 
 
 @dataclass(frozen=True)
 class Texture:
-    """An image as its file has it, of a MIME ``kind``, and glTF's sampler for it."""
+    """An encoded image of MIME type ``kind`` and its glTF sampler."""
 
     image: bytes
     kind: str
@@ -19,17 +19,17 @@ class Texture:
 
 
 @dataclass(frozen=True)
-class Paint:
-    """What a skin's surface looks like; v vertices and t triangles are the skin's.
+class Appearance:
+    """Normals, texture coordinates and materials of a skin of v vertices and t triangles.
 
-    ``normals`` (v, 3) are unit vectors of the bind pose, zero where the file has none; ``uvs``
-    (v, 2) as in glTF. ``materials`` are glTF's (2.0, 5.19), whose textures are indices of
-    ``textures``; ``numbers`` (t,) say which each triangle has, -1: none.
+    ``normals`` (v, 3) are unit vectors in the bind pose, zero where the file has none; ``uvs``
+    (v, 2) are glTF's. ``materials`` are glTF's (2.0, 5.19), with indices into ``textures``;
+    ``material_indices`` (t,) are the triangles', -1: none.
     """
 
     normals: np.ndarray
     uvs: np.ndarray
-    numbers: np.ndarray
+    material_indices: np.ndarray
     materials: tuple[dict, ...] = ()
     textures: tuple[Texture, ...] = ()
 
@@ -38,10 +38,10 @@ class Paint:
 class Skin:
     """A doll's skin in its bind pose, doll's frame.
 
-    ``bones`` (b,) are the doll's bones that carry riders, ``weights`` (v, b) theirs. ``positions``
-    (b, 3) m and ``orientations`` (b, 4) are where these bones were when the skin was bound to
-    them: in the doll's bind pose, unless a limb has been moved with its skin since. Without
-    ``paint`` it is of one ``color``: red, green, blue, opacity.
+    ``bones`` (b,) are the doll's bones that have riders, ``weights`` (v, b) their skin weights.
+    ``positions`` (b, 3) m and ``orientations`` (b, 4) are the bones' poses that the skin is bound
+    in: the doll's bind pose, unless a limb was moved with its skin. Without ``appearance`` all of
+    it has the ``color`` red, green, blue, opacity.
     """
 
     vertices: np.ndarray
@@ -50,5 +50,5 @@ class Skin:
     weights: np.ndarray
     positions: np.ndarray
     orientations: np.ndarray
-    paint: Paint | None = None
+    appearance: Appearance | None = None
     color: tuple[float, float, float, float] = SKIN_COLOR

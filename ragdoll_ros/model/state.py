@@ -1,4 +1,4 @@
-"""What a simulation tells about its bones at one instant."""
+"""Poses and velocities of all bones at one instant."""
 from __future__ import annotations
 
 from functools import cached_property
@@ -10,10 +10,22 @@ from .pose import Pose
 
 
 class State:
-    """Poses and velocities of n bones, world frame, float64, in the scene's bone order.
+    """Poses and velocities of n bones, world frame, float64, in the order of Scene.bone_names.
 
-    A bone's pose is that of its centre of mass and of its shape's own axes, which are its
-    principal axes of inertia. Not to be changed once made: what is derived may be kept.
+    A bone's frame is its centre of mass and its principal axes of inertia. Do not write to the
+    arrays: derived quantities are cached.
+
+    Args:
+        positions: (n, 3) m, of the centres of mass.
+        orientations: (n, 4) unit quaternions x, y, z, w.
+        linear_velocities: (n, 3) m/s, of the centres of mass.
+        angular_velocities: (n, 3) rad/s.
+
+    Example:
+        >>> with Simulation(load_scene('drop')) as simulation:
+        ...     state = simulation.advance()
+        >>> state.positions.shape, state.orientations.shape
+        ((10, 3), (10, 4))
     """
 
     def __init__(self, positions: np.ndarray, orientations: np.ndarray,
@@ -24,24 +36,24 @@ class State:
 
     @classmethod
     def of(cls, rows: np.ndarray) -> State:
-        """From rows (n, 13) of position, orientation, linear and angular velocity, as they are."""
+        """From rows (n, 13), without a copy; see ``rows``."""
         state = cls.__new__(cls)
         state.rows = rows
         return state
 
     @property
     def positions(self) -> np.ndarray:
-        """(n, 3) m, of the centres of mass."""
+        """(n, 3) m, of the centres of mass, world frame."""
         return self.rows[:, 0:3]
 
     @property
     def orientations(self) -> np.ndarray:
-        """(n, 4) unit quaternions x, y, z, w."""
+        """(n, 4) unit quaternions x, y, z, w, bone's axes to world."""
         return self.rows[:, 3:7]
 
     @property
     def linear_velocities(self) -> np.ndarray:
-        """(n, 3) m/s, of the centres of mass."""
+        """(n, 3) m/s, of the centres of mass, world frame."""
         return self.rows[:, 7:10]
 
     @property
@@ -51,11 +63,11 @@ class State:
 
     @cached_property
     def rotation_matrices(self) -> np.ndarray:
-        """(n, 3, 3): v_world = R v_bone."""
+        """(n, 3, 3), v_world = R v_bone."""
         return rotation.matrix(self.orientations)
 
     def poses(self, bones: np.ndarray | int) -> Pose:
-        """Of some of the bones, an array of indices of any shape, or of one."""
+        """World poses of bones by index: an array of any shape, or one."""
         return Pose(self.positions[bones], self.orientations[bones])
 
     def __repr__(self) -> str:

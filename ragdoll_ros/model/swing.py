@@ -1,20 +1,15 @@
-"""What a swing is: a chain of point masses on massless rods, rooted at a point of a bone.
+"""A swing: a chain of point masses on massless rods, attached to a point of a bone.
 
-Frozen data, no behaviour but validation. SI units. As everywhere in a doll, points and
-directions are given in the doll's frame in the bind pose.
+Frozen, validated data. SI units; points and directions are in the doll's frame, bind pose.
 
-- ``stiffness`` k, N m/rad: the torque on a link is k times the angle between it and its rest
-  direction, along the shortest way back. The rest direction of the first link is fixed in the
-  bone, that of each further one in the link before it.
-- ``damping`` zeta, a ratio: the torque against turning relative to the same frame is
-  2 zeta J sqrt(k/J + share g/reach) times the rate, with J and reach as in swings.py (m l^2
-  and l for a single mass). 1 is critical where gravity pulls along the rest direction, and
-  more than critical elsewhere; 0 loses nothing.
-- ``gravity``: the share of the scene's gravity that acts, 1 as on a real mass, 0 for none;
-  negative values rise.
+- ``stiffness`` k, N m/rad: the torque on a link is k times the angle to its rest direction. The
+  first link's rest direction is fixed in the bone, each further one's in the link before it.
+- ``damping`` zeta, a ratio: the torque is -2 zeta J sqrt(k/J + gravity g/reach) times the angular
+  rate relative to the same frame, with J and reach as in swings.py (m l^2 and l for a single
+  mass). 1 is critical where gravity acts along the rest direction, overdamped elsewhere.
+- ``gravity``: factor of the scene's gravity; 0 for none, negative values rise.
 
-The bone's own motion always acts in full: a mass keeps its place in the world until its rod,
-its spring and gravity move it.
+The masses have full inertia in the world frame: the bone's motion acts on them.
 """
 from __future__ import annotations
 
@@ -22,22 +17,22 @@ from dataclasses import dataclass
 
 from . import errors
 from .errors import set_fields
-from .vectors import Vector, finite, unit
+from .vectors import Vector, finite_floats, unit_vector
 
 MODES = ('spring', 'pendulum', 'free')
-LENGTHS = (1e-3, 1e3)
-"""Shortest and longest rod, m: the shortest still swings slowly enough to be resolved."""
-MASSES = (1e-9, 1e6)
-STIFFEST = 1e15
-MOST_DAMPED = 1e4
-LARGEST_SHARE = 10.0
+LENGTH_RANGE = (1e-3, 1e3)
+"""m; the motion of the shortest is still resolved."""
+MASS_RANGE = (1e-9, 1e6)
+MAX_STIFFNESS = 1e15
+MAX_DAMPING = 1e4
+MAX_GRAVITY = 10.0
 
 
 @dataclass(frozen=True)
 class Link:
     """A massless rod of ``length`` m with a point ``mass`` (kg) at its end.
 
-    ``direction`` is where it points at rest (doll's frame, bind pose); None: as its swing's.
+    ``direction`` is its rest direction (doll's frame, bind pose); None: its swing's.
     """
 
     length: float
@@ -49,21 +44,21 @@ class Link:
     def __post_init__(self) -> None:
         set_fields(self, **{key: float(getattr(self, key))
                             for key in ('length', 'mass', 'stiffness', 'damping')})
-        errors.check_range('length', self.length, *LENGTHS)
-        errors.check_range('mass', self.mass, *MASSES)
-        errors.check_range('stiffness', self.stiffness, 0, STIFFEST)
-        errors.check_range('damping', self.damping, 0, MOST_DAMPED)
+        errors.check_range('length', self.length, *LENGTH_RANGE)
+        errors.check_range('mass', self.mass, *MASS_RANGE)
+        errors.check_range('stiffness', self.stiffness, 0, MAX_STIFFNESS)
+        errors.check_range('damping', self.damping, 0, MAX_DAMPING)
         if self.direction is not None:
-            set_fields(self, direction=unit('direction', self.direction))
+            set_fields(self, direction=unit_vector('direction', self.direction))
 
 
 @dataclass(frozen=True)
 class Swing:
-    """A chain of ``links`` that hangs from the point ``root`` (m) of ``bone``.
+    """A chain of ``links`` attached to the point ``root`` (m) of ``bone``.
 
-    ``mode``: 'spring' (each link is drawn back to its rest direction), 'pendulum' (no springs),
-    'free' (each mass falls as a body by itself, from its place at rest with ``velocity`` m/s,
-    world axes; only then does the velocity count).
+    ``mode``: 'spring' (links return to their rest directions), 'pendulum' (no springs), 'free'
+    (no rods: each mass falls from its rest position with ``velocity`` m/s, world axes, which only
+    this mode has).
     """
 
     name: str
@@ -76,10 +71,10 @@ class Swing:
     velocity: Vector = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        set_fields(self, root=finite('root', self.root),
-                   direction=unit('direction', self.direction), links=tuple(self.links),
-                   gravity=float(self.gravity), velocity=finite('velocity', self.velocity))
-        errors.check_range('gravity', self.gravity, -LARGEST_SHARE, LARGEST_SHARE)
+        set_fields(self, root=finite_floats('root', self.root),
+                   direction=unit_vector('direction', self.direction), links=tuple(self.links),
+                   gravity=float(self.gravity), velocity=finite_floats('velocity', self.velocity))
+        errors.check_range('gravity', self.gravity, -MAX_GRAVITY, MAX_GRAVITY)
         if self.mode not in MODES:
             raise errors.WrongForm('mode', self.mode, 'one of ' + ', '.join(MODES))
         if not self.links:
@@ -92,7 +87,7 @@ class Swing:
             raise errors.WrongForm('velocity', self.velocity, 'none, or mode: free')
 
     def directions(self) -> tuple[Vector, ...]:
-        """Each link's direction at rest (doll's frame, bind pose)."""
+        """Rest direction of each link (doll's frame, bind pose)."""
         return tuple(link.direction or self.direction for link in self.links)
 
 
@@ -100,7 +95,7 @@ def strand(links: int, length: float, mass: float = 0.1,
            stiffness: float | tuple[float, float] = 0.0, damping: float = 0.0) -> tuple[Link, ...]:
     """``links`` equal links that share ``length`` m and ``mass`` kg.
 
-    ``stiffness`` (N m/rad) goes linearly from the root's to the tip's; one number is both.
+    ``stiffness`` (N m/rad) is linear from root to tip; one number is both.
     """
     errors.check_range('links', links, 1, 1000)
     root, tip = stiffness if isinstance(stiffness, (tuple, list)) else (stiffness, stiffness)

@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from . import errors
 
@@ -10,13 +10,19 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 
-def floats(values: object) -> tuple[float, ...]:
-    """Turn any sequence of numbers into a tuple of floats: hashable, comparable, exact."""
+def floats(values: Iterable[float]) -> tuple[float, ...]:
+    """A tuple of floats."""
     return tuple(float(value) for value in values)
 
 
-def finite(path: str, values: object, count: int = 3) -> tuple[float, ...]:
-    """``count`` floats; WrongForm where that is not what is given, NotFinite for NaN, infinity."""
+def vector(values: Iterable[float]) -> Vector:
+    """A tuple of three floats."""
+    x, y, z = map(float, values)
+    return x, y, z
+
+
+def finite_floats(path: str, values: object, count: int = 3) -> tuple[float, ...]:
+    """``count`` finite floats. Raises WrongForm, NotFinite."""
     try:
         found = floats(values)
     except (TypeError, ValueError):
@@ -27,20 +33,20 @@ def finite(path: str, values: object, count: int = 3) -> tuple[float, ...]:
     return found
 
 
-def unit(path: str, values: object, expected: str = 'a direction, not zero',
-         count: int = 3) -> tuple[float, ...]:
-    """``count`` numbers scaled to length one; NotUnit for zero, else as finite()."""
-    values = finite(path, values, count)
+def unit_vector(path: str, values: object, expected: str = 'a direction, not zero',
+                count: int = 3) -> tuple[float, ...]:
+    """``count`` floats scaled to length one. Raises NotUnit for zero, WrongForm, NotFinite."""
+    values = finite_floats(path, values, count)
     length = math.hypot(*values)
     if length < 1e-9:
         raise errors.NotUnit(path, values, expected)
     return values if abs(length - 1) < 1e-15 else floats(value / length for value in values)
 
 
-def shortened(values: Sequence[float], most: float) -> tuple[Vector, float]:
-    """A finite vector, at most ``most`` long, and the length that it had.
+def clamp_norm(values: Sequence[float], most: float) -> tuple[Vector, float]:
+    """A finite vector scaled to a norm of at most ``most``, and its norm before.
 
-    The vector is first divided by its largest component, so that nothing overflows on the way.
+    It is first divided by its largest component, so that nothing overflows.
     """
     largest = max(map(abs, values))
     if largest == 0:

@@ -7,11 +7,11 @@ the remainder (see model/anthropometry.py). Shapes are for collision only and ha
 from __future__ import annotations
 
 from ..model import errors
-from ..model.anthropometry import GIRTH, PERCENTILES, SAMPLES, SEXES, TRUNK, Segment, shares
+from ..model.anthropometry import BODY, PERCENTILES, SAMPLES, SEXES, TRUNK, Segment, mass_fractions
 from ..model.compound import Compound
 from ..model.ragdoll import Bone, Ragdoll
 from ..model.shapes import Box, Capsule, Part
-from ..model.vectors import Vector
+from ..model.vectors import Vector, vector
 from .joints import joints
 from .places import HEEL, Places, places, radius, trunk_sides
 
@@ -38,15 +38,29 @@ def standard(sex: str, percentile: int = 50) -> tuple[float, float]:
 
 
 def person(height: float, mass: float, sex: str, name: str = 'person') -> Ragdoll:
-    """The doll of a person of ``height`` m and ``mass`` kg; ``sex``: 'female' or 'male'.
+    """The doll of an adult, standing, by de Leva's anthropometric tables.
 
-    Raises OutOfRange for values outside HEIGHTS, MASSES or SEXES.
+    Args:
+        height: m, 1.0 to 2.1.
+        mass: kg, 15 to 160.
+        sex: 'female' or 'male'.
+        name: of the doll.
+
+    Returns:
+        A doll of 16 bones, soles on z = 0.
+
+    Raises:
+        OutOfRange: for a height, mass or sex outside these.
+
+    Example:
+        >>> len(person(1.75, 70, 'female').bones)
+        16
     """
     errors.check_range('height', height, *HEIGHTS)
     errors.check_range('mass', mass, *MASSES)
     _check_sex(sex)
     at = places(height, mass, sex)
-    sample, share = SAMPLES[sex], shares(sex)
+    sample, share = SAMPLES[sex], mass_fractions(sex)
     bones = []
     for bone, part in at.segments:
         segment = sample.segments[part]
@@ -62,7 +76,7 @@ def _bone(name: str, part: str, segment: Segment, length: float, mass: float, at
     if part == 'foot':
         radii = segment.longitudinal, segment.transverse, segment.sagittal
     return Bone(name, Compound(shapes), mass, centre, color=COLORS.get(part, TROUSERS),
-                moments=tuple(mass * (radius * length) ** 2 for radius in radii))
+                moments=vector(mass * (radius * length) ** 2 for radius in radii))
 
 
 def _outline(bone: str, part: str, centre: float, at: Places) -> tuple[tuple[Part, ...], Vector]:
@@ -74,15 +88,15 @@ def _outline(bone: str, part: str, centre: float, at: Places) -> tuple[tuple[Par
     x, y, z = at.proximal(bone)
     if part == 'foot':
         length = at.lengths['foot']
-        size = (length, GIRTH.foot_breadth / 1000 * at.tall, at.ankle)
+        size = (length, BODY.foot_breadth / 1000 * at.tall, at.ankle)
         behind = length / 2 - centre
         return (Part(Box(size), (behind, 0, 0)),), (centre - HEEL * length, y, z / 2)
     place = (x, y, z - centre)
     if part == 'head':
         return _head(at, centre), place
     if part == 'hand':
-        length, breadth = GIRTH.hand_length / 1000 * at.tall, GIRTH.hand_breadth / 1000 * at.tall
-        thickness = GIRTH.hand / 2000 * at.tall - breadth
+        length, breadth = BODY.hand_length / 1000 * at.tall, BODY.hand_breadth / 1000 * at.tall
+        thickness = BODY.hand / 2000 * at.tall - breadth
         box = Box((thickness, breadth, length))
         return (Part(box, (0, 0, centre - length / 2)),), place
     length = at.lengths[part]
@@ -94,8 +108,8 @@ def _outline(bone: str, part: str, centre: float, at: Places) -> tuple[tuple[Par
 
 def _limb(part: str, length: float, wide: float, centre: float) -> Part:
     """A capsule that extends half a radius beyond both joints, but not beyond the ankle."""
-    girths = {'upper_arm': (GIRTH.biceps,), 'forearm': (GIRTH.forearm, GIRTH.wrist),
-              'thigh': (GIRTH.thigh, GIRTH.lower_thigh), 'shin': (GIRTH.calf, GIRTH.ankle)}[part]
+    girths = {'upper_arm': (BODY.biceps,), 'forearm': (BODY.forearm, BODY.wrist),
+              'thigh': (BODY.thigh, BODY.lower_thigh), 'shin': (BODY.calf, BODY.ankle)}[part]
     thick = radius(sum(girths) / len(girths), wide)
     above, below = thick / 2, 0.0 if part == 'shin' else thick / 2
     whole = max(length + above + below - 2 * thick, MIN_CYLINDER * length) + 2 * thick
@@ -104,9 +118,9 @@ def _limb(part: str, length: float, wide: float, centre: float) -> Part:
 
 def _head(at: Places, centre: float) -> tuple[Part, ...]:
     """The skull, from the vertex to the mid-gonion, and the neck below it."""
-    thick, length = radius(GIRTH.head, at.tall), at.lengths['head']
+    thick, length = radius(BODY.head, at.tall), at.lengths['head']
     skull = Capsule(min(thick, 0.49 * length), length - 2 * min(thick, 0.49 * length))
-    neck = Capsule(radius(GIRTH.neck, at.tall), max(at.neck, MIN_CYLINDER * length))
+    neck = Capsule(radius(BODY.neck, at.tall), max(at.neck, MIN_CYLINDER * length))
     return (Part(skull, (0, 0, centre - length / 2)),
             Part(neck, (0, 0, centre - length - at.neck / 2)))
 

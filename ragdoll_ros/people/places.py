@@ -4,7 +4,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..model.anthropometry import ANKLE, GIRTH, HEIGHT, MASS, MIDDLE, SAMPLES
+from ..model.anthropometry import ANKLE_HEIGHT, BODY, HEIGHT, MASS, SAMPLES, UNPAIRED
 
 SIDES = {'left': 1.0, 'right': -1.0}
 """Sides and the sign of their y, which is to the left."""
@@ -39,14 +39,14 @@ class Places:
     @property
     def segments(self) -> list[tuple[str, str]]:
         """Name of each bone and its segment in the table, from the root outwards."""
-        return [(name, name) for name in reversed(MIDDLE)] + [
+        return [(name, name) for name in reversed(UNPAIRED)] + [
             (f'{side}_{limb}', limb) for side in SIDES for limb in LIMBS]
 
     def proximal(self, bone: str) -> tuple[float, float, float]:
         """Proximal end of a bone, from which its centre is measured; of a foot the ankle."""
         side, _, limb = bone.partition('_')
         length = self.lengths
-        if bone in MIDDLE:
+        if bone in UNPAIRED:
             tops = {'head': self.height, 'chest': self.sternum, 'abdomen': self.xiphoid,
                     'pelvis': self.waist}
             return (0.0, 0.0, tops[bone])
@@ -73,24 +73,24 @@ def places(height: float, mass: float, sex: str) -> Places:
     lengths = {name: part.length / sample.height * height
                for name, part in sample.segments.items()}
     wide = math.sqrt((mass / height) / (MASS / HEIGHT))
-    ankle = ANKLE * height
+    ankle = ANKLE_HEIGHT * height
     hip = ankle + lengths['shin'] + lengths['thigh']
     waist = hip + lengths['pelvis']
     xiphoid = waist + lengths['abdomen']
     sternum = xiphoid + lengths['chest']
-    thigh = radius((GIRTH.thigh + GIRTH.lower_thigh) / 2, wide)
+    thigh = radius((BODY.thigh + BODY.lower_thigh) / 2, wide)
     chest, _ = trunk_sides('chest', wide)
     return Places(height, height / HEIGHT, wide, lengths, height - lengths['head'] - sternum,
                   ankle, hip, waist, xiphoid, sternum,
-                  hip_y=GIRTH.hip_breadth / 2000 * wide - thigh,
-                  shoulder_y=chest / 2 + radius(GIRTH.biceps, wide))
+                  hip_y=BODY.hip_breadth / 2000 * wide - thigh,
+                  shoulder_y=chest / 2 + radius(BODY.biceps, wide))
 
 
 def trunk_sides(part: str, wide: float) -> tuple[float, float]:
     """Breadth and depth, m, of a box with the circumference and aspect of a part of the trunk."""
     around, breadth, depth = {
-        'chest': (GIRTH.chest, GIRTH.chest_breadth, GIRTH.chest_depth),
-        'abdomen': (GIRTH.waist, GIRTH.waist_breadth, GIRTH.waist_depth),
-        'pelvis': (GIRTH.buttock, GIRTH.hip_breadth, GIRTH.buttock_depth)}[part]
+        'chest': (BODY.chest, BODY.chest_breadth, BODY.chest_depth),
+        'abdomen': (BODY.waist, BODY.waist_breadth, BODY.waist_depth),
+        'pelvis': (BODY.buttock, BODY.hip_breadth, BODY.buttock_depth)}[part]
     scale = around / (2 * (breadth + depth)) / 1000 * wide
     return breadth * scale, depth * scale

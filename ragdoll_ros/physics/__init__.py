@@ -1,1 +1,1 @@
-"""How a scene moves; Simulation is its only door."""
+"""The physics room: Simulation is its public interface."""

@@ -1,4 +1,4 @@
-"""The settings of accuracy: how finely a simulation steps, and what it does besides."""
+"""Accuracy: step sizes and tolerances of a simulation, and the named settings."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -8,19 +8,19 @@ from ..model import errors
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How fine."""
+    """Step sizes and tolerances of the engines."""
 
     step: float
-    """s: the rigid engine's longest step while something touches."""
+    """s: longest step of the rigid engine during contact."""
     flight_error: float
-    """m or rad by which the end of a step of its flight may err, by its own estimate."""
+    """m or rad: local error tolerance of the rigid engine's integrator without contact."""
     substeps: float
-    """Of PyBullet and MuJoCo in 10 ms; a stretch has a whole number of them, not fewer."""
+    """Substeps of PyBullet and MuJoCo in 10 ms; rounded up for each interval."""
     sleep: bool = True
-    """Stop the engine when all is at rest."""
+    """Put dolls at rest to sleep."""
     energy: bool = True
-    """Take out energy that nothing put in, and keep the momentum of what is in the air, where an
-    engine does not do so by itself: PyBullet."""
+    """Correct energy, and momentum without contact, where the engine does not conserve them:
+    PyBullet."""
 
 
 DRAFT = Accuracy(step=4e-3, flight_error=1e-10, substeps=4)
@@ -30,7 +30,7 @@ ACCURACIES = {'draft': DRAFT, 'normal': NORMAL, 'exact': EXACT}
 
 
 def resolve_accuracy(accuracy: str | Accuracy) -> Accuracy:
-    """The settings that a name stands for; OutOfRange for a name that is none."""
+    """Look up a named setting; raises OutOfRange for an unknown name."""
     if isinstance(accuracy, Accuracy):
         return accuracy
     if accuracy not in ACCURACIES:

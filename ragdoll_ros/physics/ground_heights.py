@@ -1,4 +1,4 @@
-"""How far bones are from the ground, and how far the anchors of joints come apart."""
+"""Distances of bones from the ground, and gaps between the anchors of joints."""
 from __future__ import annotations
 
 import math
@@ -13,7 +13,7 @@ from ..model.state import State
 
 
 class GroundHeights:
-    """The simple shapes that all bones of a scene consist of; equal dolls share theirs."""
+    """Computes the height of each bone's lowest point; equal dolls share their shape tables."""
 
     def __init__(self, scene: Scene) -> None:
         self._ground, self._count = scene.ground, len(scene.bones)
@@ -28,7 +28,7 @@ class GroundHeights:
         self._first = np.searchsorted(self._bones, np.arange(self._count))
 
     def __call__(self, state: State) -> np.ndarray:
-        """Distances (n,) m of the bones' lowest points from the ground; infinity without one."""
+        """Height (n,) m of each bone's lowest point above the ground; infinite without ground."""
         if self._ground is None:
             return np.full(self._count, math.inf)
         normal = np.array(self._ground.normal)
@@ -40,18 +40,18 @@ class GroundHeights:
 
 
 def _parts(doll: Ragdoll) -> tuple[np.ndarray, ...]:
-    """Of each of a doll's p simple shapes its bone (p,), its terms (p, 6) m of support_distance,
-    and its place (p, 3) m and axes (p, 3, 3) along those of the bone.
+    """Bone index (p,), arguments (p, 6) m of support_distance, position (p, 3) m and rotation
+    matrix (p, 3, 3) in the bone's frame, of each of a doll's p convex shapes.
     """
     parts = [(index, part) for index, bone in enumerate(doll.bones) for part in bone.shape.parts]
     return (np.array([index for index, _ in parts]),
-            np.array([part.shape.support for _, part in parts]),
+            np.array([part.shape.support_terms for _, part in parts]),
             np.array([part.position for _, part in parts]),
             rotation.matrix([part.orientation for _, part in parts]))
 
 
 class JointGap:
-    """Anchors of all j joints of a scene, along the axes of the two bones each ties."""
+    """Computes the distances between the two anchors of each of a scene's j joints."""
 
     def __init__(self, scene: Scene) -> None:
         bones, points = [], []
@@ -60,11 +60,11 @@ class JointGap:
             for joint in placement.doll.joints:
                 pair = [placement.doll.bone(name) for name in (joint.parent, joint.child)]
                 bones.append([index[bone.name] for bone in pair])
-                points.append([bone.pose.inward(joint.anchor) for bone in pair])
+                points.append([bone.pose.apply_inverse(joint.anchor) for bone in pair])
         self._bones = np.array(bones, int).reshape(-1, 2)
         self._points = np.array(points).reshape(-1, 2, 3)
 
     def gaps(self, state: State) -> np.ndarray:
-        """Distances (j,) m, joint by joint as the dolls list them."""
-        seen = state.poses(self._bones).outward(self._points)
+        """Distances (j,) m between anchors, in the dolls' order of joints."""
+        seen = state.poses(self._bones).apply(self._points)
         return np.linalg.norm(seen[:, 0] - seen[:, 1], axis=-1)

@@ -1,4 +1,4 @@
-"""What a bad state is, and the way back from one."""
+"""Guard detects diverged states and restores the last good one."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -10,46 +10,45 @@ from ..model.state import State
 from .simulation import Simulation
 
 BOUND = 1e9
-"""Length of all numbers of a state together (m, m/s, rad/s) that is still one: beyond it, float64
-tells positions no finer than 0.1 um. A fall without ground gets there in four hours."""
+"""Largest 2-norm of all numbers of a state (m, m/s, rad/s): there, float64 resolves positions to
+0.1 um. A free fall reaches it after four hours."""
 
 SPEED = 1.0
-"""m/s: motion that counts as energy at hand, as gravity may give none."""
+"""m/s: speed in the energy scale of a doll, which without gravity has no other term."""
 
 
 @dataclass(frozen=True)
 class BadState:
-    """What a simulation came to, and was taken back from."""
+    """A diverged state that was discarded."""
 
     reason: str
     time: int
-    """ns of simulated time."""
+    """Simulated time, ns."""
     state: State
 
 
 class Guard:
-    """Takes a simulation on by ticks, and back where one ends in a state that cannot be: one whose
-    numbers are not finite or out of bounds, or that has energy which nothing put in.
+    """Advances a simulation, and undoes ticks that end in a diverged state.
 
-    How much of it is too much the engine says, as a share of the energy at hand: that of the
-    motion but for what is too much, and what dolls gain that fall by a third of their size and move
-    at SPEED.
+    A state has diverged if a number is not finite or exceeds BOUND, or if energy rose in the tick
+    by more than Engine.energy_error times the energy scale: kinetic energy before the gain, plus
+    that of dolls that fall by a third of their extent and move at SPEED.
     """
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
-        self._least = _energy_at_hand(simulation.scene)
-        self._begin()
+        self._energy_scale = _energy_scale(simulation.scene)
+        self._accept()
 
     def advance(self) -> BadState | None:
-        """Go on by one tick; the bad state that it led to, then all is as it was before."""
+        """Advance by one tick; if its state has diverged, go back and return that state."""
         simulation = self._simulation
-        if simulation.starts != self._starts:
-            self._begin()
+        if simulation.reset_count != self._reset_count:
+            self._accept()
         before = simulation.state
         try:
-            reason = self._judge(simulation.advance(), before)
-        # What runs away may fail within the tick.
+            reason = self._fault(simulation.advance(), before)
+        # A diverging simulation may raise within the tick.
         except (ArithmeticError, LookupError, ValueError) as error:
             reason = f'{type(error).__name__}: {error}'
         if reason:
@@ -60,19 +59,19 @@ class Guard:
             self._good = simulation.checkpoint()
         return None
 
-    def _begin(self) -> None:
-        """Take what is for good."""
+    def _accept(self) -> None:
+        """Take the current state as good."""
         simulation = self._simulation
-        self._starts = simulation.starts
+        self._reset_count = simulation.reset_count
         self._good = simulation.checkpoint()
         self._excess = simulation.energy_excess
 
-    def _judge(self, state: State, before: State) -> str:
-        """What is bad about a state, else nothing."""
+    def _fault(self, state: State, before: State) -> str:
+        """Why a state has diverged; empty if it has not."""
         swings = self._simulation.swings
         for name, numbers in (('the state', state.rows),
                               ('a swing', None if swings is None else swings.positions)):
-            # not <=: NaN is no number
+            # 'not <=' is true for NaN as well
             if numbers is not None and not sum_of_squares(numbers) <= BOUND ** 2:
                 finite = np.isfinite(numbers).all()
                 return f'{name} is ' + (f'farther than {BOUND:g}' if finite else 'not finite')
@@ -80,22 +79,22 @@ class Guard:
             return ''
         simulation, excess = self._simulation, self._simulation.energy_excess
         gained, share = excess - self._excess, simulation.energy_error
-        # What moves is asked for only where it matters.
-        if not gained <= share * self._least and not gained <= share * (
-                self._least + simulation.kinetic_energy - gained):
-            return f'energy rose by {gained:.4g} J that nothing put in'
+        # The kinetic energy is computed only where it matters.
+        if not gained <= share * self._energy_scale and not gained <= share * (
+                self._energy_scale + simulation.kinetic_energy - gained):
+            return f'energy rose by {gained:.4g} J without work of a load'
         self._excess = excess
         return ''
 
 
 def sum_of_squares(numbers: np.ndarray) -> float:
-    """Of all numbers; not by BLAS, whose threads spin on for 0.1 s after each sum of a crowd's."""
+    """Sum of squares, without BLAS, whose threads spin for 0.1 s after each sum of a crowd's."""
     flat = numbers.ravel()
     return float(np.einsum('i,i', flat, flat))
 
 
-def _energy_at_hand(scene: Scene) -> float:
-    """Energy, J, that a scene's dolls have at hand when they stand still."""
+def _energy_scale(scene: Scene) -> float:
+    """Energy scale, J, of a scene's dolls at rest."""
     gravity = np.linalg.norm(scene.gravity)
     return sum(placement.doll.mass * (gravity * placement.doll.extent / 3 + SPEED ** 2 / 2)
                for placement in scene.dolls)

@@ -1,8 +1,9 @@
-"""A simulation that tells what acts on it, as it takes effect, and a way to do the same again.
+"""LoggedSimulation reports each action as an event; apply_event repeats one.
 
-An act is a call of one of Simulation's methods, told by its name and its arguments as plain
-numbers, texts and lists. Between acts are ticks, which whoever calls advance() counts. From the
-same scene on, the same acts at the same ticks give the same states to the bit.
+An event is the name of a Simulation method or property and its arguments as numbers, texts and
+lists. The caller of advance() counts the ticks between events. The same scene and the same events
+at the same ticks give the same states to the bit. Event names are part of the log format: they do
+not change with the names in the code.
 """
 from __future__ import annotations
 
@@ -18,117 +19,106 @@ from ..model.drive import Drive
 from ..model.push import Push
 from ..model.state import State
 from .accuracy import Accuracy
-from .actions.grab import EVENLY
+from .actions.grab import DRAG_TIME
 from .simulation import Simulation
 
 
-class RecordedSimulation(Simulation):
-    """A Simulation that calls ``tell(name, arguments)`` after each act."""
+class LoggedSimulation(Simulation):
+    """A Simulation that calls ``on_event(name, arguments)`` after each action."""
 
-    tell: Callable[[str, dict], object] = staticmethod(lambda name, arguments: None)
+    on_event: Callable[[str, dict], object] = staticmethod(lambda name, arguments: None)
 
     @property
     def conditions(self) -> dict:
-        """By what it simulates: engine, accuracy, tick in s, and its parts."""
+        """Engine, accuracy, tick in s, and samples per tick (event field ``parts``)."""
         return {'engine': self.engine_name, 'accuracy': dataclasses.asdict(self.accuracy),
-                'step': self.step, 'parts': self.parts}
+                'step': self.step, 'parts': self.samples_per_tick}
 
     @Simulation.step.setter
     def step(self, step: float) -> None:
-        """As Simulation's."""
         Simulation.step.fset(self, step)
-        self.tell('step', {'step': self.step})
+        self.on_event('step', {'step': self.step})
 
-    @Simulation.parts.setter
-    def parts(self, parts: int) -> None:
-        """As Simulation's."""
-        Simulation.parts.fset(self, parts)
-        self.tell('parts', {'parts': self.parts})
+    @Simulation.samples_per_tick.setter
+    def samples_per_tick(self, count: int) -> None:
+        Simulation.samples_per_tick.fset(self, count)
+        self.on_event('parts', {'parts': self.samples_per_tick})
 
     @Simulation.accuracy.setter
     def accuracy(self, accuracy: str | Accuracy) -> None:
-        """As Simulation's."""
         Simulation.accuracy.fset(self, accuracy)
-        self.tell('accuracy', dataclasses.asdict(self.accuracy))
+        self.on_event('accuracy', dataclasses.asdict(self.accuracy))
 
     def push(self, push: Push | Drive, channel: str | None = None) -> None:
-        """As Simulation's; a drive is told as one."""
         super().push(push, channel)
-        self.tell('drive' if isinstance(push, Drive) else 'push',
-                  {**vars(push), 'channel': channel})
+        self.on_event('drive' if isinstance(push, Drive) else 'push',
+                      {**vars(push), 'channel': channel})
 
     def release(self, channel: str) -> bool:
-        """As Simulation's; told where it ends a push."""
         ended = super().release(channel)
         if ended:
-            self.tell('release', {'channel': channel})
+            self.on_event('release', {'channel': channel})
         return ended
 
     def grab(self, hand: str, bone: str, point: Sequence[float] = (0.0, 0.0, 0.0),
              target: Sequence[float] | None = None) -> None:
-        """As Simulation's."""
         super().grab(hand, bone, point, target)
-        self.tell('grab', {'hand': hand, 'bone': bone, 'point': _plain(point),
-                           'target': None if target is None else _plain(target)})
+        self.on_event('grab', {'hand': hand, 'bone': bone, 'point': _floats(point),
+                               'target': None if target is None else _floats(target)})
 
-    def drag(self, hand: str, target: Sequence[float], within: float = EVENLY) -> None:
-        """As Simulation's."""
+    def drag(self, hand: str, target: Sequence[float], within: float = DRAG_TIME) -> None:
         super().drag(hand, target, within)
-        self.tell('drag', {'hand': hand, 'target': _plain(target), 'within': within})
+        self.on_event('drag', {'hand': hand, 'target': _floats(target), 'within': within})
 
     def let_go(self, hand: str) -> None:
-        """As Simulation's."""
         super().let_go(hand)
-        self.tell('let_go', {'hand': hand})
+        self.on_event('let_go', {'hand': hand})
 
     def hold(self, angle: str, stiffness: float, damping: float = 0.0,
              target: float | None = None) -> None:
-        """As Simulation's."""
         super().hold(angle, stiffness, damping, target)
-        self.tell('hold', {'angle': angle, 'stiffness': float(stiffness),
-                           'damping': float(damping),
-                           'target': None if target is None else float(target)})
+        self.on_event('hold', {'angle': angle, 'stiffness': float(stiffness),
+                               'damping': float(damping),
+                               'target': None if target is None else float(target)})
 
     def go_limp(self, angles: Sequence[str] | None = None) -> None:
-        """As Simulation's."""
         super().go_limp(angles)
-        self.tell('go_limp', {'angles': None if angles is None else list(angles)})
+        self.on_event('go_limp', {'angles': None if angles is None else list(angles)})
 
     def place(self, coordinates: GeneralizedState) -> State:
-        """As Simulation's; the reset in it is a part of it."""
-        tell, self.tell = self.tell, RecordedSimulation.tell
+        # place() includes a reset(), which is no event of its own.
+        on_event, self.on_event = self.on_event, LoggedSimulation.on_event
         try:
             state = super().place(coordinates)
         finally:
-            self.tell = tell
-        self.tell('place', {'q': _plain(coordinates.q), 'v': _plain(coordinates.v)})
+            self.on_event = on_event
+        self.on_event('place', {'q': _floats(coordinates.q), 'v': _floats(coordinates.v)})
         return state
 
     def reset(self) -> State:
-        """As Simulation's."""
         state = super().reset()
-        self.tell('reset', self.conditions)
+        self.on_event('reset', self.conditions)
         return state
 
-    def go_back(self, checkpoint: object) -> State:
-        """As Simulation's; told as from where it comes back to, as no tick stands in between."""
+    def go_back(self, checkpoint: tuple[int, object]) -> State:
+        # No tick lies between the checkpoint and now: apply_event restores the current state.
         state = super().go_back(checkpoint)
-        self.tell('go_back', {})
+        self.on_event('go_back', {})
         return state
 
 
-def repeat(simulation: Simulation, name: str, arguments: dict) -> None:
-    """Do again what was told. WrongForm for what is no act; else what the act itself raises."""
+def apply_event(simulation: Simulation, name: str, arguments: dict) -> None:
+    """Repeat a logged action; WrongForm for an unknown event, else what the action raises."""
     try:
-        _ACTS[name](simulation, **arguments)
+        _ACTIONS[name](simulation, **arguments)
     except errors.RagdollError:
         raise
     except (KeyError, TypeError, ValueError):
-        raise errors.WrongForm(name, arguments, 'an act of ' + ', '.join(_ACTS)) from None
+        raise errors.WrongForm(name, arguments, 'an event: ' + ', '.join(_ACTIONS)) from None
 
 
 def accuracy_from(fields: dict) -> Accuracy:
-    """The accuracy that conditions and acts tell; a ModelError for what is none."""
+    """Accuracy from its fields in an event; raises a ModelError for wrong fields."""
     try:
         accuracy = Accuracy(**fields)
         errors.check_positive('accuracy', (accuracy.step, accuracy.flight_error, accuracy.substeps))
@@ -143,19 +133,19 @@ def state_digest(state: State) -> str:
     return hashlib.sha256(np.ascontiguousarray(state.rows, '<f8')).hexdigest()
 
 
-_ACTS: dict[str, Callable[..., object]] = {
+_ACTIONS: dict[str, Callable[..., object]] = {
     'push': lambda simulation, channel, **push: simulation.push(Push(**push), channel),
     'drive': lambda simulation, channel, **drive: simulation.push(Drive(**drive), channel),
     **{name: lambda simulation, name=name, **arguments: getattr(simulation, name)(**arguments)
        for name in ('release', 'grab', 'drag', 'let_go', 'hold', 'go_limp')},
     'step': lambda simulation, step: setattr(simulation, 'step', step),
-    'parts': lambda simulation, parts: setattr(simulation, 'parts', parts),
+    'parts': lambda simulation, parts: setattr(simulation, 'samples_per_tick', parts),
     'accuracy': lambda simulation, **fields: setattr(simulation, 'accuracy', accuracy_from(fields)),
     'place': lambda simulation, q, v: simulation.place(GeneralizedState(np.array(q), np.array(v))),
     'go_back': lambda simulation: simulation.go_back(simulation.checkpoint()),
-    # What it tells beside is for who begins there.
+    # The fields of 'reset' are the conditions, for readers that start there.
     'reset': lambda simulation, **_: simulation.reset()}
 
 
-def _plain(values: Sequence[float]) -> list[float]:
+def _floats(values: Sequence[float]) -> list[float]:
     return [float(value) for value in values]

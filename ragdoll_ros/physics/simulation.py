@@ -1,9 +1,11 @@
-"""A scene, an engine, pushes and time: what turns the first three into states."""
+"""Simulation: integrates a scene tick by tick under pushes, drives, grabs and joint springs."""
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Sequence
 from functools import cached_property, partial
+from typing import cast
 
 import numpy as np
 
@@ -14,8 +16,8 @@ from ..model.push import Push
 from ..model.scene import SECOND, STEP_RANGE, Scene
 from ..model.state import State
 from .accuracy import Accuracy, resolve_accuracy
-from .actions.grab import EVENLY, Grab, Hands
-from .actions.joint_springs import Hold, Holds
+from .actions.grab import DRAG_TIME, Grab, Hands
+from .actions.joint_springs import JointSpring, JointSprings
 from .actions.push_queue import PushQueue
 from .engine.protocol import Contacts, Engine, Springs
 from .engine.registry import resolve_engine
@@ -24,36 +26,66 @@ from .sleeping import SleepDetector
 from .swing.pose import SwingState
 from .swing.simulation import SwingSimulation
 
-MOST_PARTS = 200
-"""Of a tick: samples of a sensor of 1 kHz in the longest one."""
+MAX_SAMPLES_PER_TICK = 200  # those of a sensor of 1 kHz in the longest tick
+MAX_WORKERS = 64  # threads, each with its own workspace
 
-MOST_WORKERS = 64
-"""Threads: each has its own scratch."""
+
+def _deprecated(old: str, new: str) -> property:
+    """Alias of attribute ``new`` that warns; kept for one version."""
+    def warned() -> str:
+        warnings.warn(f'Simulation.{old} is now {new}', DeprecationWarning, stacklevel=3)
+        return new
+    return property(lambda simulation: getattr(simulation, warned()),
+                    lambda simulation, value: setattr(simulation, warned(), value),
+                    doc=f'Deprecated name of {new}.')
 
 
 class Simulation:
-    """A scene that moves: push() it, advance() it by a tick, read its state.
+    """A scene in motion. The same actions at the same ticks give the same states to the bit.
 
-    ``step`` is the tick in s (None: the scene's), ``accuracy`` a name of ACCURACIES or an
-    Accuracy, ``engine`` a name of ENGINES or an Engine. ``workers`` is the number of threads over
-    which dolls are spread that do not touch, 'auto': as many as there are cores. The same pushes at
-    the same ticks give the same states to the bit, for any number of them.
+    Args:
+        scene: dolls, ground, gravity, material.
+        step: tick, s; None: the scene's.
+        accuracy: 'draft', 'normal', 'exact', or an Accuracy.
+        engine: 'auto', 'rigid', 'bullet', 'mujoco', or a class that implements Engine.
+        workers: threads that integrate separate clusters of dolls, 1 to 64; 'auto': one for each
+            processor. States do not depend on it.
+
+    Raises:
+        OutOfRange: step, accuracy, engine or workers is not valid.
+        MissingEngine: the engine's library is not installed or does not work.
+
+    Example:
+        >>> from ragdoll_ros import Push, Simulation, load_scene
+        >>> with Simulation(load_scene('drop')) as simulation:
+        ...     simulation.push(Push('torso', force=(500, 0, 0), duration=0.2))
+        ...     for _ in range(100):
+        ...         state = simulation.advance()
+        >>> state.positions.shape, simulation.time
+        ((10, 3), 1000000000)
     """
+
+    time: int
+    """Simulated time since the start, ns."""
+    substates: tuple[State, ...]
+    """States at the start of the last tick and at the end of each of its sub-intervals."""
+    asleep: bool
+    """Whether all dolls sleep, so that advance() does not integrate."""
 
     def __init__(self, scene: Scene, step: float | None = None,
                  accuracy: str | Accuracy = 'normal', engine: str | type[Engine] = 'auto',
                  workers: int | str = 1) -> None:
         if workers == 'auto':
             workers = len(os.sched_getaffinity(0))
-        errors.check_range('workers', workers, 1, MOST_WORKERS)
+        errors.check_range('workers', cast(int, workers), 1, MAX_WORKERS)
         self.scene = scene
         self.step = scene.step if step is None else step
-        self._parts = 1
-        self.starts = 0
-        """How often it has begun, at first, by reset() or by place()."""
+        self._samples_per_tick = 1
+        self.reset_count = 0
+        """Number of starts: the first, and one for each reset() and place()."""
         choice = resolve_engine(engine)
         self.engine_name, self.engine_reason = choice.name, choice.reason
-        """The engine that is taken; why it is not the one that 'auto' takes first."""
+        """Name of the engine, and why 'auto' did not select rigid."""
         self._make = partial(choice.make, scene, workers=int(workers))
         self._engine: Engine = self._make(resolve_accuracy(accuracy))
         self._placed: GeneralizedState | None = None
@@ -71,28 +103,28 @@ class Simulation:
 
     @property
     def state(self) -> State:
-        """Poses and velocities of all bones now."""
+        """Poses and velocities of all bones."""
         return self._engine.state
 
     @property
     def swings(self) -> SwingState | None:
-        """All masses of the scene's swings now; None for a scene without swings."""
-        return self._swings and self._swings.state
+        """State of all swing masses; None for a scene without swings."""
+        return self._swings.state if self._swings else None
 
     @property
     def step(self) -> float:
-        """A tick in s; may be changed between ticks."""
+        """Tick, s; may be changed between ticks."""
         return self.tick / SECOND
 
     @step.setter
     def step(self, step: float) -> None:
         errors.check_range('step', step, *STEP_RANGE)
         self.tick = round(step * SECOND)
-        """Nanoseconds in a tick."""
+        """Tick, ns."""
 
     @property
     def accuracy(self) -> Accuracy:
-        """How fine; may be changed between ticks."""
+        """Step sizes and tolerances; may be changed between ticks."""
         return self._engine.accuracy
 
     @accuracy.setter
@@ -100,144 +132,195 @@ class Simulation:
         self._engine.accuracy = resolve_accuracy(accuracy)
 
     @property
-    def parts(self) -> int:
-        """Equal parts that a tick is gone in, one after the other; ``trail`` has the states between
-        them. May be changed between ticks; other parts are other steps, and other last digits.
-        """
-        return self._parts
+    def samples_per_tick(self) -> int:
+        """Equal sub-intervals of a tick; ``substates`` has the state at the end of each.
 
-    @parts.setter
-    def parts(self, parts: int) -> None:
-        errors.check_range('parts', parts, 1, MOST_PARTS)
-        self._parts = int(parts)
+        May be changed between ticks. It changes step lengths, and so the last digits of states.
+        """
+        return self._samples_per_tick
+
+    @samples_per_tick.setter
+    def samples_per_tick(self, count: int) -> None:
+        errors.check_range('samples_per_tick', count, 1, MAX_SAMPLES_PER_TICK)
+        self._samples_per_tick = int(count)
+
+    starts = _deprecated('starts', 'reset_count')
+    parts = _deprecated('parts', 'samples_per_tick')
+    trail = _deprecated('trail', 'substates')
 
     @property
     def kinetic_energy(self) -> float:
-        """Of all dolls now, J."""
-        return float(self._engine.motion.kinetic.sum())
+        """Kinetic energy of all dolls, J."""
+        return float(self._engine.doll_totals.kinetic.sum())
 
     @property
     def energy_excess(self) -> float:
-        """Energy that nothing has put in since the start, J; losses make it negative."""
+        """Energy, J, minus that at the start and all work since; negative after losses."""
         return self._engine.energy_excess
 
     @property
     def energy_error(self) -> float:
-        """Share of the energy at hand that a tick of this engine may make from nothing."""
+        """Relative energy gain in a tick above which Guard takes a state for diverged."""
         return self._engine.energy_error
 
     @property
     def pushes(self) -> tuple[Push, ...]:
-        """Pushes that act now; a drive as the push that it is on a bone at rest."""
-        return self._pushes.acting(self.time)
+        """Active pushes; a drive appears as the push that it exerts on a bone at rest."""
+        return self._pushes.active(self.time)
 
     @property
     def grabs(self) -> tuple[Grab, ...]:
-        """What hands hold now."""
+        """Active grabs."""
         return self._hands.grabs
 
     @property
-    def holds(self) -> tuple[Hold, ...]:
-        """Joint angles that are held now."""
-        return self._holds.holds
+    def holds(self) -> tuple[JointSpring, ...]:
+        """Active joint springs."""
+        return self._joint_springs.joint_springs
 
     @property
     def contacts(self) -> Contacts:
-        """What touches now."""
+        """All contact points."""
         return self._engine.contacts()
 
     @property
     def bones_on_ground(self) -> np.ndarray:
-        """Which bones (n,) touch the ground now: those of contacts, but sooner told."""
+        """Which bones (n,) touch the ground; cheaper than ``contacts``."""
         return self._engine.bones_on_ground()
 
     @property
     def coordinates(self) -> GeneralizedState:
-        """Generalised coordinates and velocities of all dolls now."""
+        """Generalised coordinates and velocities of all dolls."""
         return self._engine.coordinates
 
     @property
     def joint_angles(self) -> np.ndarray:
-        """All joint angles, rad, in the order of Scene.angle_names."""
+        """Joint angles (k,) rad, in the order of Scene.angle_names."""
         return self._engine.joint_angles
 
     @property
     def joint_rates(self) -> np.ndarray:
-        """What the joint angles change by, rad/s."""
+        """Time derivatives of the joint angles (k,) rad/s."""
         return self._engine.joint_rates
 
     def push(self, push: Push | Drive, channel: str | None = None) -> None:
-        """Let a push act from its start on; on a ``channel`` it takes the place of the last.
+        """Queue a push or a drive.
 
-        Raises UnknownBone, or OutOfRange for a start in the past or a queue that is full.
+        Args:
+            push: force and torque on a bone, from ``push.start`` on or from now.
+            channel: a new push replaces the last one on the same channel; None: no channel.
+
+        Raises:
+            UnknownBone: the scene has no such bone.
+            OutOfRange: the start is in the past, or 1000 pushes are queued.
+
+        >>> simulation.push(Push('head', force=(0, 50, 0)), channel='keys')
         """
         self._pushes.add(push, channel, self.time)
 
     def release(self, channel: str) -> bool:
-        """End the push on a channel now; whether there was one."""
+        """End the push on a channel; returns whether there was one.
+
+        >>> simulation.release('no such channel')
+        False
+        """
         return self._pushes.release(channel)
 
     def grab(self, hand: str, bone: str, point: Sequence[float] = (0.0, 0.0, 0.0),
              target: Sequence[float] | None = None) -> None:
-        """Let a hand hold a point of a bone; what it held before it lets go.
+        """Attach a hand to a point of a bone by a spring; it releases what it held before.
 
-        ``point`` (3,) m from the bone's centre of mass along the bone's axes; ``target`` (3,) m in
-        the world as in drag(), None: where the point is now. Raises UnknownBone, or NotFinite or
-        OutOfRange for numbers that are none or too far away.
+        Args:
+            hand: any name.
+            bone: name of the bone.
+            point: (3,) m in the bone's frame, from its centre of mass.
+            target: (3,) m, world frame: where to move the hand, see drag(); None: nowhere.
+
+        Raises:
+            UnknownBone: the scene has no such bone.
+            NotFinite, OutOfRange: point or target is invalid or far away, or 20 hands are in use.
+
+        >>> simulation.grab('right', 'head')
         """
         self._hands.grab(hand, bone, point, target, self.state)
 
-    def drag(self, hand: str, target: Sequence[float], within: float = EVENLY) -> None:
-        """Move a hand to ``target`` (3,) m in the world, evenly ``within`` s of simulated time.
+    def drag(self, hand: str, target: Sequence[float], within: float = DRAG_TIME) -> None:
+        """Move a hand to ``target`` (3,) m, world frame, at constant velocity ``within`` s of
+        simulated time. Does nothing for a hand that holds nothing. Raises NotFinite, OutOfRange.
 
-        For a hand that holds nothing, nothing happens. Raises NotFinite or OutOfRange.
+        >>> simulation.drag('right', target=(0, 0, 1.5), within=0.5)
         """
         self._hands.drag(hand, target, within)
 
     def let_go(self, hand: str) -> None:
-        """Open a hand; what it held keeps the speed that it has."""
+        """Release what a hand holds; the bone keeps its velocity.
+
+        >>> simulation.let_go('right')
+        """
         self._hands.let_go(hand)
 
     def hold(self, angle: str, stiffness: float, damping: float = 0.0,
              target: float | None = None) -> None:
-        """Let a spring hold a joint angle of Scene.angle_names: -stiffness (angle - target) -
-        damping rate, N m; ``target`` in rad, None: as it is now. What held it before ends.
+        """Put a spring on a joint angle, torque -stiffness (angle - target) - damping rate.
 
-        Raises UnknownJoint; OutOfRange or NotFinite for numbers that can not be; WrongAxes for a
-        ball joint without limits, which has no angles; WrongForm where the engine is not rigid.
+        It replaces the angle's spring, if any. Only the rigid engine has joint springs.
+
+        Args:
+            angle: one of Scene.angle_names.
+            stiffness: N m/rad.
+            damping: N m s/rad.
+            target: rad; None: the current angle.
+
+        Raises:
+            UnknownJoint: the scene has no such angle.
+            NotFinite, OutOfRange: a number is not finite or out of range.
+            WrongAxes: the joint is a ball joint without limits, which has no angles.
+            WrongForm: the engine is not rigid.
+
+        >>> simulation.hold('left_shin', stiffness=300, damping=5)
         """
-        if not self._engine.holds:
-            raise errors.WrongForm('engine', self.engine_name, 'rigid, which holds joints')
-        self._holds.hold(angle, stiffness, damping, target, self.joint_angles)
+        if not self._engine.supports_joint_springs:
+            raise errors.WrongForm('engine', self.engine_name, 'rigid, which has joint springs')
+        self._joint_springs.hold(angle, stiffness, damping, target, self.joint_angles)
 
     def go_limp(self, angles: Sequence[str] | None = None) -> None:
-        """Let joint angles go that are held, None: all of them. Raises UnknownJoint."""
-        self._holds.go_limp(angles)
+        """Remove the springs of joint angles; None: of all. Raises UnknownJoint.
+
+        >>> simulation.go_limp(['left_shin'])
+        """
+        self._joint_springs.go_limp(angles)
 
     def advance(self) -> State:
-        """Go on by one tick; the state at its end. Raises Closed after close()."""
-        begin, trail = self.time, [self.state]
-        for part in range(1, self._parts + 1):
-            end = begin + self.tick * part // self._parts
+        """Integrate over one tick; returns the state at its end. Raises Closed after close().
+
+        >>> simulation.advance().positions.shape
+        (10, 3)
+        """
+        begin, substates = self.time, [self.state]
+        for sample in range(1, self._samples_per_tick + 1):
+            end = begin + self.tick * sample // self._samples_per_tick
             if self.asleep and not self._pushes and not self._springs:
                 self.time = end
             while self.time < end:
                 change = self._pushes.next_change(self.time)
                 self._advance_until(end if change is None else min(end, change))
-            trail.append(self.state)
-        self.trail = tuple(trail)
+            substates.append(self.state)
+        self.substates = tuple(substates)
         self._pushes.drop_ended(self.time)
-        self._fall_asleep()
+        self._put_to_sleep()
         if self._swings:
-            self._swings.follow(self.time, self.state)
+            self._swings.advance(self.time, self.state)
         return self.state
 
     def place(self, coordinates: GeneralizedState) -> State:
-        """Put the dolls elsewhere, with other velocities, and take that as the start of all.
+        """Set pose and velocities of all dolls, for now and for later resets, and reset().
 
-        Bones that overlap there do not collide from then on, and what is in the ground is lifted;
-        what merely rests on something, up to pressed() deep in it, rests on. Raises OutOfRange for
-        coordinates of other lengths than the scene's, NotFinite or NotUnit for what is no pose.
+        Collision is disabled between bones of a doll that overlap there by more than
+        allowed_penetration(); a doll that is deeper in the ground is lifted onto it. Raises
+        OutOfRange for lengths other than the scene's, NotFinite, NotUnit for orientations.
+
+        >>> simulation.place(simulation.coordinates) is simulation.state
+        True
         """
         layout = self._engine.layout
         q, v = np.array(coordinates.q, float), np.array(coordinates.v, float)
@@ -246,81 +329,93 @@ class Simulation:
         errors.check_finite('coordinates', (*q.tolist(), *v.tolist()))
         layout.check_orientations(q)
         self._placed = GeneralizedState(q, v)
-        self._engine.place(self._placed)
-        self._engine.forget(self._start)
+        self._engine.set_coordinates(self._placed)
+        self._engine.discard(self._start)
         self._start = self._engine.save()
         return self.reset()
 
-    def checkpoint(self) -> object:
-        """Where all is now, for go_back(); cheap enough for each tick."""
+    def checkpoint(self) -> tuple[int, object]:
+        """Save time and state for go_back(); cheap enough for every tick."""
         return self.time, self._engine.checkpoint()
 
-    def go_back(self, checkpoint: tuple) -> State:
-        """Go on from where all was at a checkpoint; swings hang at rest there. Pushes and hands go
-        on as they are.
+    def go_back(self, checkpoint: tuple[int, object]) -> State:
+        """Restore a checkpoint; pushes and hands are kept, swings start at rest.
 
-        A new engine does: what was bad may have spread through the old one, as a NaN does through
-        PyBullet's search for contacts.
+        A new engine is made, as a diverged state may have damaged the old one: a NaN stays in
+        PyBullet's broad phase.
         """
-        self.time, there = checkpoint
+        self.time, engine_checkpoint = checkpoint
         self._engine.close()
         self._engine = self._make(self.accuracy)
         if self._placed is not None:
-            self._engine.place(self._placed)
+            self._engine.set_coordinates(self._placed)
         self._start = self._engine.save()
-        self._engine.go_back(there)
-        self._sleep_detector.disturb()
-        self.asleep = bool(self._engine.resting.all())
+        self._engine.restore_checkpoint(engine_checkpoint)
+        self._sleep_detector.restart()
+        self.asleep = bool(self._engine.sleeping.all())
         if self._swings:
-            self._swings.begin(self.time, self.state)
+            self._swings.reset(self.time, self.state)
         return self.state
 
     def reset(self) -> State:
-        """Go back to the start, to the bit; pushes that wait are dropped, hands let go, and no
-        joint is held.
+        """Restore and return the initial state, to the bit; ends all pushes, grabs and springs.
+
+        >>> simulation.reset().positions.shape, simulation.time
+        ((10, 3), 0)
         """
-        self.starts += 1
+        self.reset_count += 1
         self._engine.restore(self._start)
         self.time = 0
-        """Nanoseconds simulated since the start."""
-        self.trail: tuple[State, ...] = (self.state,)
-        """States of the last tick: at its start and at the end of each of its ``parts``."""
+        self.substates = (self.state,)
         self._pushes = PushQueue(self.scene)
-        self._hands, self._holds = Hands(self.scene), Holds(self.scene)
-        self._sleep_detector.disturb()
+        self._hands, self._joint_springs = Hands(self.scene), JointSprings(self.scene)
+        self._sleep_detector.restart()
         self.asleep = False
-        """Whether all is at rest and the engine stands."""
         if self._swings:
-            self._swings.begin(self.time, self.state)
+            self._swings.reset(self.time, self.state)
         return self.state
 
     def measures(self) -> dict[str, float]:
-        """What went wrong so far, and what the last tick took: names end in their units."""
+        """Error measures since the start, and costs of the last tick; keys end in units.
+
+        >>> simulation.measures()['joint_gap_m'] < 1e-3
+        True
+        """
         engine = self._engine
         return {
             **engine.measures(),
             'joint_gap_m': float(self._gap.gaps(self.state).max(initial=0.0)),
             'limit_overshoot_rad': max(0.0, float(
-                engine.layout.past_limits(self.coordinates.q).max(initial=0.0))),
+                engine.layout.limit_violations(self.coordinates.q).max(initial=0.0))),
             'sinking_m': max(0.0, -float(self._heights(self.state).min())),
             'asleep': self.asleep}
 
     def close(self) -> None:
-        """Release the engine; a second time does nothing."""
+        """Release the engine; further calls do nothing."""
         self._engine.close()
-        self._engine = _ClosedEngine()
+        self._engine = cast(Engine, _ClosedEngine())
 
     def _advance_until(self, end: int) -> None:
-        """Go on to an instant, ns, before which no push begins or ends."""
-        acting = (self._pushes.wrenches(self.time, self.state), self._springs,
-                  self._pushes.drives(self.time))
-        if any(acting):
+        """Integrate until ``end``, ns; no push begins or ends before."""
+        loads = (self._pushes.wrenches(self.time, self.state), self._springs,
+                 self._pushes.drives(self.time))
+        if any(loads):
             self.asleep = False
         if not self.asleep:
             duration = (end - self.time) / SECOND
-            self._engine.advance(duration, *acting)
+            self._engine.advance(duration, *loads)
             self._hands.move(duration)
         self.time = end
+
+    def _put_to_sleep(self) -> None:
+        """Put clusters to sleep that have been still for long enough and rest on the ground."""
+        if self.asleep or not self.accuracy.sleep:
+            return
+        loaded = (*self._pushes.bones(self.time), *(spring.bone for spring in self._springs))
+        dolls = self._sleep_detector.find_ready(self._engine, self.tick, loaded)
+        if dolls.any():
+            self._engine.put_to_sleep(dolls)
+            self.asleep = bool(self._engine.sleeping.all())
 
     @cached_property
     def _gap(self) -> JointGap:
@@ -332,38 +427,15 @@ class Simulation:
 
     @property
     def _springs(self) -> Springs:
-        """Of hands and of held joints."""
-        return (*self._hands.springs, *self._holds.springs)
-
-    def _fall_asleep(self) -> None:
-        """Dolls sleep that have been still for a while, with all that they touch, where something
-        of them rests on the ground.
-        """
-        engine = self._engine
-        if self.asleep or not self.accuracy.sleep:
-            return
-        ready = self._sleep_detector.update(self.state, engine.motion.kinetic, self.tick)
-        pushed = self._pushes.bones(self.time)
-        for bone in (*pushed, *(spring.bone for spring in self._springs)):
-            doll = self.scene.doll_of_bone[bone]
-            self._sleep_detector.disturb(doll)
-            ready[doll] = False
-        if not np.count_nonzero(ready):
-            return
-        ready |= engine.resting
-        awake = np.bincount(engine.groups, ~ready) > 0
-        borne = np.bincount(engine.groups, engine.grounded()) > 0
-        dolls = (borne & ~awake)[engine.groups] & ~engine.resting
-        if dolls.any():
-            engine.stop(dolls)
-            self.asleep = bool(engine.resting.all())
+        """Springs of hands and of joint angles."""
+        return (*self._hands.springs, *self._joint_springs.springs)
 
 
 class _ClosedEngine:
-    """Stands where an engine was that is closed."""
+    """Replaces the engine after close()."""
 
     def close(self) -> None:
-        """Nothing is left to release."""
+        """Do nothing."""
 
     def __getattr__(self, name: str) -> object:
         raise errors.Closed('the simulation is closed: build another one')

@@ -1,73 +1,88 @@
-"""SleepDetector: which dolls may sleep, because they have not moved for a while."""
+"""SleepDetector: which dolls have been still for long enough to sleep."""
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
 from ..model import rotation
 from ..model.scene import SECOND, Scene
 from ..model.state import State
+from .engine.protocol import Engine
 
-HUMAN = 1.4
-"""m: extent of the default doll, for which the next two were measured."""
+REFERENCE_EXTENT = 1.4
+"""m: extent of the default doll, for which REST_SPEED and REST_DISPLACEMENT were measured."""
 
 REST_SPEED = 0.05
-"""m/s, and rad/s times the bone's size, below which a bone of the default doll counts as still:
-more than the flutter of a joint that leans on its limit, less than any fall gives within 10 ms.
-For other dolls it goes with the root of their size."""
+"""m/s, and rad/s times bone size: speed below which a bone of the default doll is still; above
+the jitter of a joint at its limit, below what any fall gives in 10 ms. Scales with the square root
+of the extent."""
 
 REST_DISPLACEMENT = 0.0012
-"""m that a still bone of the default doll may have moved in REST_TIME: limbs that sag against
-their joints' damping slower than 4 mm/s are stopped. For other dolls it goes with their size."""
+"""m by which a still bone of the default doll may move in REST_TIME: limbs that sag against joint
+damping slower than 4 mm/s are stopped. Scales with the doll's extent."""
 
 REST_TIME = 3 * SECOND // 10
-"""ns that all bones must be still before a doll sleeps; longer in weak gravity, under which all
-goes slower as its root. In 44 starts of the report bones that were not put to sleep then moved 2 mm
-more within 3 s in the median, as they do after 0.5 s, at the most 15 mm; 60 mm after 0.2 s."""
+"""ns for which all bones of a doll must be still; longer in weak gravity, by its inverse square
+root. In 44 starts of the report, bones that were not put to sleep then moved 2 mm more within 3 s
+in the median, as after 0.5 s, and 15 mm at most; 60 mm after 0.2 s."""
 
-EARTH = 9.8
-"""m/s^2: gravity for which the three above were measured."""
+REFERENCE_GRAVITY = 9.8
+"""m/s^2: gravity for which the values above were measured."""
 
 
 class SleepDetector:
-    """Watches the bones of a scene, tick by tick."""
+    """Tracks for how long each of d dolls has been still."""
 
     def __init__(self, scene: Scene) -> None:
         self._sizes = np.array([max(bone.shape.half_extents) for bone in scene.bones])
         self._lever = np.ones((len(scene.bones), 6))
         self._lever[:, 3:] = self._sizes[:, None]
-        """(n, 6): what makes speeds, m/s, of velocities and spins."""
+        """(n, 6): factors from linear and angular velocities to speeds, m/s."""
         self._first = np.array([own.start for own in scene.bone_slices])
         self._doll = scene.doll_of_bone
-        size = min(placement.doll.extent for placement in scene.dolls) / HUMAN
+        size = min(placement.doll.extent for placement in scene.dolls) / REFERENCE_EXTENT
         gravity = math.hypot(*scene.gravity)
-        self._pulled = gravity > 0
-        slower = max(1.0, math.sqrt(EARTH / gravity)) if gravity else math.inf
+        self._has_gravity = gravity > 0
+        slower = max(1.0, math.sqrt(REFERENCE_GRAVITY / gravity)) if gravity else math.inf
         self._speed = math.sqrt(size) / slower * REST_SPEED
         self._displacement = size * REST_DISPLACEMENT
         self._time = slower * REST_TIME
-        # A bone that is still has at most m v^2 / 2 for its speed and less than 3 times that for
-        # its spin, as no radius of gyration is longer than its largest half extent.
+        # A still bone has at most m v^2 / 2 of linear and less than 3 times that of rotational
+        # energy, as its radius of gyration is at most its largest half extent.
         masses = np.array([placement.doll.mass for placement in scene.dolls])
-        self._most = 2 * masses * (2 * self._speed) ** 2
+        self._max_kinetic = 2 * masses * (2 * self._speed) ** 2
         self._still = np.zeros(len(scene.dolls), np.int64)
         """ns for which each doll has been still."""
         self._since = np.zeros((len(scene.bones), 7))
-        """Where its bones were as that began."""
+        """(n, 7): poses of the bones when their doll became still."""
 
-    def disturb(self, dolls: np.ndarray | slice = slice(None)) -> None:
-        """Begin anew to wait, for these dolls (d,) or for all."""
+    def restart(self, dolls: np.ndarray | slice = slice(None)) -> None:
+        """Reset the timers of these dolls (d,), or of all."""
         self._still[dolls] = 0
 
-    def update(self, state: State, kinetic: np.ndarray, tick: int) -> np.ndarray:
-        """Which dolls (d,) have been still for long enough, after one more tick (ns).
-
-        ``kinetic`` (d,) J are the dolls' energies of motion.
+    def find_ready(self, engine: Engine, tick: int, loaded: Iterable[int]) -> np.ndarray:
+        """Which dolls (d,) to put to sleep, after one more tick (ns): whole clusters that are
+        still and rest on the ground. ``loaded`` bones keep their dolls awake.
         """
-        slow = kinetic <= self._most
-        if not self._pulled or not np.count_nonzero(slow):
-            self.disturb()
+        ready = self._update(engine.state, engine.doll_totals.kinetic, tick)
+        for bone in loaded:
+            self.restart(self._doll[bone])
+            ready[self._doll[bone]] = False
+        if not np.count_nonzero(ready):
+            return ready
+        clusters = engine.cluster_of_doll
+        ready |= engine.sleeping
+        awake = np.bincount(clusters, ~ready) > 0
+        supported = np.bincount(clusters, engine.dolls_on_ground()) > 0
+        return (supported & ~awake)[clusters] & ~engine.sleeping
+
+    def _update(self, state: State, kinetic: np.ndarray, tick: int) -> np.ndarray:
+        """Which dolls (d,) have been still for long enough; ``kinetic`` (d,) J."""
+        slow = kinetic <= self._max_kinetic
+        if not self._has_gravity or not np.count_nonzero(slow):
+            self.restart()
             return np.zeros(len(slow), bool)
         speeds = np.abs(state.rows[:, 7:] * self._lever).max(axis=1)
         slow &= np.maximum.reduceat(speeds, self._first) <= self._speed
@@ -81,5 +96,5 @@ class SleepDetector:
             np.abs(state.positions - self._since[:, :3]).max(axis=1),
             rotation.angle_between(state.orientations, self._since[:, 3:]) * self._sizes)
         crept = np.maximum.reduceat(moved, self._first) >= self._displacement
-        self.disturb(crept)
+        self.restart(crept)
         return ready & ~crept

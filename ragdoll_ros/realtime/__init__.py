@@ -1,1 +1,1 @@
-"""Simulated time beside the clock on the wall: the pacer, and keys that are held."""
+"""Real time: the pacer of ticks, and arrow keys that are held."""

@@ -1,4 +1,4 @@
-"""The arrow keys' pushes, for all that steer the doll.
+"""Arrow keys as pushes, for the teleop and the page.
 
 You look at the doll's face, from +x along -x: Up is away from you, Down toward you, Left and
 Right as you see it.
@@ -9,115 +9,117 @@ from collections.abc import Iterable
 
 from ..model.vectors import Vector
 
-STRENGTH = 2000.0
-"""N: of a push of which nothing else is said."""
+FORCE = 2000.0
+"""N: default force of a push."""
 
 LIFT = 0.0005
-"""N upwards for each N of a push, as the article has it."""
+"""Upward force relative to the push, from the article."""
 
 DIRECTIONS: dict[str, Vector] = {
     'up': (-1.0, 0.0, LIFT), 'down': (1.0, 0.0, LIFT),
     'right': (0.0, 1.0, LIFT), 'left': (0.0, -1.0, LIFT)}
-"""World axes (the article's keys)."""
+"""Direction of each key's push, world frame (the article's keys)."""
 
 
-def total(arrows: Iterable[str], strength: float = STRENGTH) -> Vector:
-    """Sum of the forces of all these arrows, N, world axes; each pushes with ``strength`` N."""
+def total_force(arrows: Iterable[str], force: float = FORCE) -> Vector:
+    """Sum of the pushes of these keys, N, world frame; each pushes with ``force`` N."""
     parts = [DIRECTIONS[arrow] for arrow in arrows]
-    return tuple(strength * part for part in map(sum, zip(*parts, strict=True))) if parts else (
+    return tuple(force * part for part in map(sum, zip(*parts, strict=True))) if parts else (
         0.0, 0.0, 0.0)
 
 
 TAP = 0.025
-"""s of simulated time that a tap pushes: a doll of 55 kg gets 0.9 m/s."""
+"""s of simulated time that a tap pushes; gives a doll of 55 kg 0.9 m/s."""
 
-REPEAT = 0.1
-"""s within which a key comes again that a terminal repeats, at ten times a second or more, and
-nobody taps twice; keys that come within it of each other are pressed together."""
+REPEAT_PERIOD = 0.1
+"""s: longest period of a terminal's key repeat, and shorter than two taps; keys that come within it
+of each other are pressed together."""
 
-FIRST = 0.7
-"""s within which a terminal repeats a held key for the first time."""
+REPEAT_DELAY = 0.7
+"""s: longest delay until a terminal repeats a held key."""
 
-STUCK = 2.0
-"""s after which a key counts as let go even if its release was never told (a lost focus)."""
+RELEASE_TIMEOUT = 2.0
+"""s after which a key counts as released even if no release was reported (a lost focus)."""
 
 OPPOSITE = {'up': 'down', 'down': 'up', 'left': 'right', 'right': 'left'}
 
 
-class Held:
-    """Arrows that push at a time ``now``, s of any steady clock.
+class HeldKeys:
+    """Active arrow keys of a terminal, from key events without (or with) releases.
 
-    A key that comes once is a tap; one that is repeated is held, until shortly after its last
-    repeat. An arrow pressed while others push joins them, and they last as long as it does; it
-    takes the place of its opposite. Where releases are told, a held key ends with them.
+    A key event that comes once is a tap; a repeated key is held until shortly after its last
+    repeat. A key pressed while others push joins them, and they last as long as it does; it
+    replaces its opposite. Where releases are reported, a held key ends with its release. ``now``
+    is the time of a steady clock, s.
     """
 
     def __init__(self) -> None:
         self.tap = TAP
-        """s of the clock that a tap pushes."""
+        """Duration of a tap, s of the clock."""
         self._keys: list[str] = []
         self._last = ''
-        self._came = self._until = 0.0
-        self._exact = self._lasts = False
+        self._last_time = self._until = 0.0
+        self._has_releases = self._is_held = False
 
-    def take(self, key: str, down: bool, now: float) -> None:
-        """Enter an arrow that went down or up."""
+    def on_key(self, key: str, down: bool, now: float) -> None:
+        """Handle an arrow key that went down or up."""
         if not down:
-            self._exact = True
+            self._has_releases = True
             self._keys = [other for other in self._keys if other != key]
-            self._until = now + STUCK if self._lasts else self._until
+            self._until = now + RELEASE_TIMEOUT if self._is_held else self._until
             return
-        since, pushing = now - self._came, self.left(now) > 0
-        again = key == self._last and key in self._keys and since <= FIRST
-        self._lasts = again and (self._exact or since <= REPEAT)
-        if not again:
-            joined = self._keys if pushing or since <= REPEAT else []
+        since, pushing = now - self._last_time, self.remaining(now) > 0
+        is_repeat = key == self._last and key in self._keys and since <= REPEAT_DELAY
+        self._is_held = is_repeat and (self._has_releases or since <= REPEAT_PERIOD)
+        if not is_repeat:
+            joined = self._keys if pushing or since <= REPEAT_PERIOD else []
             self._keys = [other for other in joined if other not in (key, OPPOSITE[key])] + [key]
-        self._last, self._came = key, now
-        self._until = now + (
-            self.tap if not self._lasts else STUCK if self._exact else REPEAT)
+        self._last, self._last_time = key, now
+        self._until = now + (self.tap if not self._is_held else RELEASE_TIMEOUT
+                             if self._has_releases else REPEAT_PERIOD)
 
-    def at(self, now: float) -> list[str]:
-        """Arrows that push."""
-        return list(self._keys) if self.left(now) > 0 else []
+    def active(self, now: float) -> list[str]:
+        """Keys that push."""
+        return list(self._keys) if self.remaining(now) > 0 else []
 
-    def left(self, now: float) -> float:
-        """How long they push on if no key comes, s."""
+    def remaining(self, now: float) -> float:
+        """Time until they stop pushing without another key event, s."""
         return max(0.0, self._until - now) if self._keys else 0.0
 
 
-HOLD = 0.15
-"""s after which a key that is still down is held: a tap on a key lasts 0.07 to 0.13 s."""
+HOLD_DELAY = 0.15
+"""s after which a key that is still down is held: a tap lasts 0.07 to 0.13 s."""
 
-SILENCE = 0.5
-"""s after which keys count as let go of which nothing more is told."""
+REPORT_TIMEOUT = 0.5
+"""s without a report after which all keys count as released."""
 
 
-class Pressed:
-    """Arrows of a keyboard that tells which keys are down, again and again while any is.
+class PressedKeys:
+    """Active arrow keys of a keyboard that reports repeatedly which keys are down.
 
-    A key pushes for a tap as it goes down, and on from HOLD later until it is let go. ``now``: s
-    of any steady clock.
+    A key pushes for a tap when it goes down, and from HOLD_DELAY later until its release. ``now``
+    is the time of a steady clock, s.
     """
 
     def __init__(self) -> None:
         self._since: dict[str, float] = {}
         self._down: frozenset[str] = frozenset()
-        self._told = 0.0
+        self._last_report = 0.0
 
-    def take(self, down: Iterable[str], now: float) -> bool:
-        """Enter which arrows are down; whether one has gone down just now."""
-        before, self._down, self._told = self._down, frozenset(down) & DIRECTIONS.keys(), now
+    def report(self, down: Iterable[str], now: float) -> bool:
+        """Report which keys are down. Returns whether one has just gone down."""
+        before, self._down, self._last_report = self._down, frozenset(down) & DIRECTIONS.keys(), now
         new = self._down - before
         self._since.update(dict.fromkeys(new, now))
         return bool(new)
 
     def held(self, now: float) -> list[str]:
-        """Arrows that are held."""
-        there = now - self._told <= SILENCE
-        return [arrow for arrow in sorted(self._down) if there and now - self._since[arrow] >= HOLD]
+        """Keys that are held."""
+        is_current = now - self._last_report <= REPORT_TIMEOUT
+        return [arrow for arrow in sorted(self._down)
+                if is_current and now - self._since[arrow] >= HOLD_DELAY]
 
-    def at(self, now: float) -> list[str]:
-        """Arrows that push."""
+    def active(self, now: float) -> list[str]:
+        """Keys that push."""
         tapped = [arrow for arrow, since in sorted(self._since.items()) if now - since < TAP]
         return sorted({*tapped, *self.held(now)})

@@ -1,1 +1,1 @@
-"""A run as poses over time, and the files that it is written to and read from."""
+"""Recordings: poses of a run over time, and their file formats."""

@@ -1,9 +1,9 @@
-"""A doll's motion as BVH (Biovision's motion capture), which animators' programs read.
+"""A doll's motion as BVH (Biovision motion capture).
 
-As is usual there: Y up, facing +Z, the left at +X, centimetres, degrees, at equal times. The rest
-pose is the doll's bind pose. The first joint is the root bone, at its centre of mass; each further
-one has the name of the bone that moves about it. Channels are Z, Y, X: a rotation about x, then y,
-then z of the parent's axes. Only the root has a place, so that a joint's gap is not in it.
+By convention Y up, facing +Z, left at +X, centimetres, degrees, a fixed frame time. Rest pose:
+the bind pose. The root is at the root bone's centre of mass; each further joint has its
+child's name. Channels are Z, Y, X: R = Rz Ry Rx in the parent's axes. Only the root has a position,
+so that gaps of joints are lost.
 """
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from .y_up import orientations_y_up, points_y_up
 
 CENTIMETRES = 100.0
 
-EVEN = 1e-7
-"""s by which times may be off from equal ones: the nanoseconds of a file's stamps add up to less.
-What is off by more is taken between poses."""
+TIME_TOLERANCE = 1e-7
+"""s, deviation from equal times, above the rounding of stamps to ns; beyond it poses are
+interpolated."""
 
 
 def bvh_text(recording: Recording, doll: int = 0) -> str:
-    """The motion of one doll of a recording, by its index in the scene, as a BVH file."""
+    """BVH of one doll of a recording, by its index in the scene."""
     ragdoll, part = recording.scene.dolls[doll].doll, recording.scene.bone_slices[doll]
-    step, positions, orientations = _evenly(recording)
+    step, positions, orientations = _resampled(recording)
     joints = ragdoll.joints_depth_first()
     place = {bone.name: k for k, bone in enumerate(ragdoll.bones)}
     names = [ragdoll.root.name, *(joint.child for joint in joints)]
@@ -45,16 +45,16 @@ def bvh_text(recording: Recording, doll: int = 0) -> str:
 
 
 def _hierarchy(doll: Ragdoll, name: str, depth: int) -> Iterator[str]:
-    """Lines of a bone's joint and of all below it."""
+    """Lines of a bone's joint and of its subtree."""
     below = [joint.child for joint in doll.joints if joint.parent == name]
     above = next((joint.parent for joint in doll.joints if joint.child == name), None)
-    at = _joint_place(doll, name)
+    at = _anchor(doll, name)
     indent, inner = '\t' * depth, '\t' * (depth + 1)
     places = 'Xposition Yposition Zposition ' if above is None else ''
-    yield f'{indent}{"ROOT" if above is None else "JOINT"} {_word(name)}'
+    yield f'{indent}{"ROOT" if above is None else "JOINT"} {_without_spaces(name)}'
     yield indent + '{'
-    # A root's place is in its channels, to which some readers add its offset, and others do not.
-    yield inner + _offset(at - (at if above is None else _joint_place(doll, above)))
+    # The root's position is in its channels; readers differ in whether they add its offset.
+    yield inner + _offset(at - (at if above is None else _anchor(doll, above)))
     yield f'{inner}CHANNELS {6 if places else 3} {places}Zrotation Yrotation Xrotation'
     for child in below:
         yield from _hierarchy(doll, child, depth + 1)
@@ -64,34 +64,34 @@ def _hierarchy(doll: Ragdoll, name: str, depth: int) -> Iterator[str]:
     yield indent + '}'
 
 
-def _joint_place(doll: Ragdoll, name: str) -> np.ndarray:
-    """Where a bone is tied to the one above, (3,) m, doll's frame; the root: its centre of mass."""
+def _anchor(doll: Ragdoll, name: str) -> np.ndarray:
+    """Anchor of a bone's joint (3,) m, doll's frame; the root's is its centre of mass."""
     return np.array(next((joint.anchor for joint in doll.joints if joint.child == name),
                          doll.bone(name).position))
 
 
 def _to_tip(doll: Ragdoll, name: str) -> np.ndarray:
-    """From a bone's joint as far beyond its centre of mass as that is from the joint, (3,) m."""
-    return 2 * (np.array(doll.bone(name).position) - _joint_place(doll, name))
+    """Vector (3,) m from a bone's joint to its end: twice that to its centre of mass."""
+    return 2 * (np.array(doll.bone(name).position) - _anchor(doll, name))
 
 
 def _offset(vector: np.ndarray) -> str:
     return 'OFFSET ' + ' '.join(f'{value:.7f}' for value in CENTIMETRES * points_y_up(vector))
 
 
-def _word(name: str) -> str:
-    """A name without white space, which ends names in BVH."""
+def _without_spaces(name: str) -> str:
+    """A name with underscores for white space, which BVH does not allow."""
     return '_'.join(name.split())
 
 
-def _evenly(recording: Recording) -> tuple[float, np.ndarray, np.ndarray]:
-    """Time from pose to pose, s, and poses at such times: the recording's own if they are."""
+def _resampled(recording: Recording) -> tuple[float, np.ndarray, np.ndarray]:
+    """Frame time, s, and poses at equal times: the recording's own, or interpolated."""
     count = len(recording)
     if count == 1:
         return 1.0, recording.positions, recording.orientations
     step = recording.duration / (count - 1)
     times = step * np.arange(count)
-    if abs(recording.times - times).max() < EVEN:
+    if abs(recording.times - times).max() < TIME_TOLERANCE:
         return step, recording.positions, recording.orientations
     poses = [recording.at(time) for time in times]
     return (step, np.array([pose.positions for pose in poses]),
@@ -101,7 +101,7 @@ def _evenly(recording: Recording) -> tuple[float, np.ndarray, np.ndarray]:
 def _zyx_degrees(matrices: np.ndarray) -> np.ndarray:
     """Angles (k, 3) z, y, x in degrees with R = Rz Ry Rx, of rotation matrices (k, 3, 3).
 
-    As rotation.to_rpy, exact at a y of 90 degrees too; without jumps by a whole turn.
+    As rotation.to_rpy, exact at y = 90 degrees too; unwrapped.
     """
     r = matrices
     z = np.arctan2(r[:, 1, 0], r[:, 0, 0])

@@ -1,9 +1,8 @@
-"""Recordings as files: MCAP, which Foxglove and `ros2 bag play` open as well.
+"""Recordings as MCAP files, which Foxglove and `ros2 bag play` open too.
 
-Three topics, as those of the node: /ragdoll/scene tells the scene once; /ragdoll/poses is where its
-bones are at each instant, the stamp being s of simulated time since the first; /ragdoll/swings the
-masses of its swings, where they were told. What `ros2 bag record` makes of a node's topics of these
-names is a recording, too.
+Three topics of the node: /ragdoll/scene once; /ragdoll/poses, the bones at each instant, stamped
+with simulated time since the first; /ragdoll/swings, the masses of the swings, if recorded. A
+`ros2 bag record` of a node's topics of these names is a recording too.
 """
 from __future__ import annotations
 
@@ -18,10 +17,10 @@ from ..files.cdr import (
     DEFINITIONS,
     POSE_ARRAY,
     STRING,
-    poses_bytes,
-    poses_of,
-    string_bytes,
-    text_of,
+    decode_poses,
+    decode_string,
+    encode_poses,
+    encode_string,
 )
 from ..files.run_scene import read_run_scene, run_scene_text
 from ..model import errors
@@ -30,48 +29,48 @@ from ..model.ragdoll import WORLD
 from ..model.rotation import IDENTITY
 from ..model.scene import SECOND, Scene
 from ..model.state import State
-from .recording import Pose, Recorder, Recording
+from .recording import RecordedPose, Recorder, Recording
 from .rods import Rods
 
-KINDS = {'scene': STRING, 'poses': POSE_ARRAY, 'swings': POSE_ARRAY}
+TOPIC_TYPES = {'scene': STRING, 'poses': POSE_ARRAY, 'swings': POSE_ARRAY}
 
 LARGEST_RECORDING = 1_000_000_000
-"""Bytes; a minute of ten bones at 60 Hz takes 2 MB."""
+"""Bytes; a minute of ten bones at 60 Hz is 2 MB."""
 
 Stamped = list[tuple[int, np.ndarray]]
 """Poses (n, 7) with their stamps, ns."""
 
 
 def recording_bytes(recording: Recording) -> bytes:
-    """A recording as MCAP, from which load_recording makes an equal one, but for parts of a ns."""
+    """A recording as MCAP, from which load_recording reads an equal one but for rounding to ns."""
     from mcap.writer import Writer
     stream = io.BytesIO()
     writer = Writer(stream)
     writer.start('ros2')
     channels = {topic: writer.register_channel(
         f'/ragdoll/{topic}', 'cdr', writer.register_schema(
-            kind, 'ros2msg', DEFINITIONS[kind].encode())) for topic, kind in KINDS.items()}
+            kind, 'ros2msg', DEFINITIONS[kind].encode())) for topic, kind in TOPIC_TYPES.items()}
 
     def write(topic: str, stamp: int, data: bytes) -> None:
         writer.add_message(channels[topic], stamp, data, stamp)
 
-    write('scene', 0, string_bytes(run_scene_text(recording.scene)))
+    write('scene', 0, encode_string(run_scene_text(recording.scene)))
     for index, time in enumerate(recording.times):
         stamp, pose = round(time * SECOND), recording.pose(index)
-        write('poses', stamp, poses_bytes(stamp, WORLD, np.hstack(
+        write('poses', stamp, encode_poses(stamp, WORLD, np.hstack(
             [pose.positions, pose.orientations])))
         if pose.rods is not None:
             masses = pose.rods[:, 1]
-            write('swings', stamp, poses_bytes(stamp, WORLD, np.hstack(
+            write('swings', stamp, encode_poses(stamp, WORLD, np.hstack(
                 [masses, np.tile(IDENTITY, (len(masses), 1))])))
     writer.finish()
     return stream.getvalue()
 
 
 def load_recording(path: str | Path) -> Recording:
-    """Read a recording; ModelErrors with the file's name and what is wrong in it.
+    """Read a recording. Raises ModelErrors with the file's name.
 
-    Of a file that breaks off, what stands before that is read, with a warning.
+    A truncated file is read as far as it is complete, with a warning.
     """
     path = Path(path)
     try:
@@ -84,25 +83,25 @@ def _recording(path: Path) -> Recording:
     if path.is_file() and path.stat().st_size > LARGEST_RECORDING:
         raise errors.OutOfRange('', f'{path.stat().st_size} bytes', f'at most {LARGEST_RECORDING}')
     scenes: set[str] = set()
-    heard: dict[str, Stamped] = {'poses': [], 'swings': []}
+    messages: dict[str, Stamped] = {'poses': [], 'swings': []}
     for topic, kind, data in read_messages(path, lambda text: print(text, file=sys.stderr)):
         last = topic.rpartition('/')[2]
-        if KINDS.get(last) == kind == STRING:
-            scenes.add(text_of(data))
-        elif KINDS.get(last) == kind:
-            heard[last].append(poses_of(data))
-    if len(scenes) != 1 or not heard['poses']:
-        raise errors.WrongForm('', f'{len(scenes)} scenes, {len(heard["poses"])} instants',
+        if TOPIC_TYPES.get(last) == kind == STRING:
+            scenes.add(decode_string(data))
+        elif TOPIC_TYPES.get(last) == kind:
+            messages[last].append(decode_poses(data))
+    if len(scenes) != 1 or not messages['poses']:
+        raise errors.WrongForm('', f'{len(scenes)} scenes, {len(messages["poses"])} instants',
                                'one scene and its poses: ros2 bag record /ragdoll/scene '
                                '/ragdoll/poses /ragdoll/swings')
     scene, _ = read_run_scene(scenes.pop())
-    return _recorded(scene, heard['poses'], dict(heard['swings']))
+    return _recording_of(scene, messages['poses'], dict(messages['swings']))
 
 
-def _recorded(scene: Scene, heard: Stamped, swings: dict[int, np.ndarray]) -> Recording:
-    """A recording of poses and, by their stamps, of swings' masses."""
+def _recording_of(scene: Scene, messages: Stamped, swings: dict[int, np.ndarray]) -> Recording:
+    """A recording from stamped poses of bones and, by stamp, of swings' masses."""
     recorder, rods, bones = Recorder(scene), Rods(scene), len(scene.bones)
-    for stamp, poses in heard:
+    for stamp, poses in messages:
         if len(poses) != bones:
             raise errors.WrongForm('poses', f'{len(poses)} poses', f'{bones}, one for each bone')
         positions, orientations = poses[:, :3], poses[:, 3:]
@@ -111,6 +110,6 @@ def _recorded(scene: Scene, heard: Stamped, swings: dict[int, np.ndarray]) -> Re
             if len(masses) != rods.count:
                 raise errors.WrongForm('swings', f'{len(masses)} masses', f'{rods.count} masses')
             unknown = np.zeros_like(positions)
-            ends = rods.between(masses[:, :3], State(positions, orientations, unknown, unknown))
-        recorder.add((stamp - heard[0][0]) / SECOND, Pose(positions, orientations, ends))
+            ends = rods.ends(masses[:, :3], State(positions, orientations, unknown, unknown))
+        recorder.add((stamp - messages[0][0]) / SECOND, RecordedPose(positions, orientations, ends))
     return recorder.recording()

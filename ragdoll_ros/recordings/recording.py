@@ -1,4 +1,4 @@
-"""A run as poses over time: taken as they come, and asked for the pose at any instant."""
+"""Recordings: poses of a scene over time, with interpolation."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ from ..model.scene import SECOND, Scene
 if TYPE_CHECKING:
     from ..physics.simulation import Simulation
 
-UNIT = 1e-6
-"""How far a quaternion's length may be from 1."""
+UNIT_TOLERANCE = 1e-6
+"""Largest deviation of a quaternion's norm from 1."""
 
 
 @dataclass(frozen=True)
-class Pose:
-    """Where all is at one instant: positions (n, 3) m, orientations (n, 4), rods (m, 2, 3) m."""
+class RecordedPose:
+    """One instant: positions (n, 3) m, orientations (n, 4) x, y, z, w, rods (m, 2, 3) m."""
 
     positions: np.ndarray
     orientations: np.ndarray
@@ -27,7 +27,7 @@ class Pose:
 
 @dataclass(frozen=True)
 class Recording:
-    """Poses of a scene's n bones at k >= 1 instants; a ModelError for arrays that do not fit."""
+    """World poses of a scene's n bones at k >= 1 instants. Raises a ModelError for wrong arrays."""
 
     scene: Scene
     times: np.ndarray
@@ -37,7 +37,7 @@ class Recording:
     orientations: np.ndarray
     """(k, n, 4) unit quaternions x, y, z, w."""
     rods: np.ndarray | None = None
-    """(k, m, 2, 3) m: both ends of every rod of the swings."""
+    """(k, m, 2, 3) m: both ends of each rod of the swings."""
 
     def __post_init__(self) -> None:
         count, bones = len(self.times), len(self.scene.bones)
@@ -49,21 +49,20 @@ class Recording:
         if not count or self.times[0] != 0 or (np.diff(self.times) <= 0).any():
             raise errors.OutOfRange('times', list(self.times[:4]), 'from 0 on, ascending')
         lengths = np.linalg.norm(self.orientations, axis=2)
-        if (abs(lengths - 1) > UNIT).any():
-            worst = self.orientations[abs(lengths - 1) > UNIT][0]
+        if (abs(lengths - 1) > UNIT_TOLERANCE).any():
+            worst = self.orientations[abs(lengths - 1) > UNIT_TOLERANCE][0]
             raise errors.NotUnit('orientations', worst.tolist(), 'unit quaternions x, y, z, w')
 
     @property
     def duration(self) -> float:
-        """Instant of the last pose, s."""
+        """Time of the last pose, s."""
         return float(self.times[-1])
 
-    def at(self, time: float) -> Pose:
-        """Where all is at ``time`` s; before the first and after the last pose, that one.
+    def at(self, time: float) -> RecordedPose:
+        """Interpolated pose at ``time`` s, clamped to the recording.
 
-        Between two: positions on the straight line, orientations on the shorter arc (normalised
-        mean, less than 0.04 degrees from the arc's even motion as long as a bone rotates less
-        than 30 degrees in between).
+        Positions are linear, orientations normalised linear along the shorter arc: within 0.04
+        degrees of slerp for rotations of less than 30 degrees between poses.
         """
         index = int(np.clip(np.searchsorted(self.times, time, 'right') - 1, 0, len(self) - 1))
         begin = self.pose(index)
@@ -74,28 +73,38 @@ class Recording:
         near = np.where((begin.orientations * end.orientations).sum(axis=1) < 0, -1.0, 1.0)
         orientations = (1 - share) * begin.orientations + share * near[:, None] * end.orientations
         rods = None if begin.rods is None else (1 - share) * begin.rods + share * end.rods
-        return Pose((1 - share) * begin.positions + share * end.positions,
-                    rotation.normalized(orientations), rods)
+        return RecordedPose((1 - share) * begin.positions + share * end.positions,
+                            rotation.normalized(orientations), rods)
 
-    def pose(self, index: int) -> Pose:
-        """Where all was at an instant of ``times``."""
+    def pose(self, index: int) -> RecordedPose:
+        """Pose at ``times[index]``."""
         rods = None if self.rods is None else self.rods[index]
-        return Pose(self.positions[index], self.orientations[index], rods)
+        return RecordedPose(self.positions[index], self.orientations[index], rods)
 
     def __len__(self) -> int:
         return len(self.times)
 
 
 class Recorder:
-    """Takes poses of one scene as they come.
+    """Collects poses of one scene into a recording.
 
-    Time that goes backwards is a reset: the recording goes on where it is, at the next pose.
+    A time that goes backwards is a reset: the recording continues at its end.
+
+    Args:
+        scene: of all the poses.
+
+    Example:
+        >>> recorder = Recorder(load_scene('drop'))
+        >>> with Simulation(recorder.scene) as simulation:
+        ...     recorder.take(simulation)
+        >>> recorder.recording().positions.shape
+        (1, 10, 3)
     """
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self._times: list[float] = []
-        self._poses: list[Pose] = []
+        self._poses: list[RecordedPose] = []
         self._last = 0.0
         self._shift = 0.0
 
@@ -104,11 +113,11 @@ class Recorder:
 
     @property
     def duration(self) -> float:
-        """Instant of the last pose, s."""
+        """Time of the last pose, s."""
         return self._times[-1] if self._times else 0.0
 
-    def add(self, time: float, pose: Pose) -> None:
-        """Take the pose at ``time`` s, which must stay as it is; the same instant again is not."""
+    def add(self, time: float, pose: RecordedPose) -> None:
+        """Add the pose at ``time`` s, without a copy; the same time again is ignored."""
         if not self._times or time < self._last:
             self._shift = self.duration - time
         self._last = time
@@ -117,13 +126,13 @@ class Recorder:
             self._poses.append(pose)
 
     def take(self, simulation: Simulation) -> None:
-        """Take where all of a simulation is now."""
+        """Add the current poses of a simulation."""
         state, swings = simulation.state, simulation.swings
-        self.add(simulation.time / SECOND, Pose(state.positions, state.orientations,
-                                                None if swings is None else swings.rods))
+        self.add(simulation.time / SECOND, RecordedPose(state.positions, state.orientations,
+                                                        None if swings is None else swings.rods))
 
     def recording(self) -> Recording:
-        """What was taken; OutOfRange if that is nothing."""
+        """The recording so far. Raises OutOfRange if it is empty."""
         poses = self._poses
         if not poses:
             raise errors.OutOfRange('recording', 0, 'at least one pose')
@@ -135,7 +144,7 @@ class Recorder:
 
 
 def _check(key: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
-    """Raise a ModelError unless an array has this shape and finite numbers alone."""
+    """Raise WrongForm or NotFinite unless an array has the shape and is finite."""
     if array.shape != shape:
         raise errors.WrongForm(key, array.shape, f'the shape {shape}')
     if not np.isfinite(array).all():

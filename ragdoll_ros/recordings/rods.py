@@ -1,4 +1,4 @@
-"""Rods of swings from their masses alone, as a topic tells them."""
+"""Rods of swings from the positions of their masses."""
 from __future__ import annotations
 
 import numpy as np
@@ -6,17 +6,17 @@ import numpy as np
 from ..model import rotation
 from ..model.scene import Scene
 from ..model.state import State
-from ..physics.swing.mount import mounts
+from ..physics.swing.mount import mount_swings
 
 
 class Rods:
-    """Where each rod of a scene's swings begins: on a bone, or at the mass before it."""
+    """Start of each rod of a scene's swings: on a bone, or the mass before it."""
 
     def __init__(self, scene: Scene) -> None:
         bones, roots, firsts, free = [], [], [], []
         self.count = 0
         """Masses of all swings."""
-        for mount in mounts(scene):
+        for mount in mount_swings(scene):
             links = len(mount.swing.links)
             bones.append(mount.bone)
             roots.append(mount.root)
@@ -27,10 +27,10 @@ class Rods:
         self._bones, self._roots = np.array(bones, int), np.array(roots).reshape(-1, 3)
         self._firsts, self._free = np.array(firsts, int), np.array(free, int)
 
-    def between(self, masses: np.ndarray, state: State) -> np.ndarray:
-        """Both ends (m, 2, 3) m of every rod, from the masses (m, 3) m and the bones' poses.
+    def ends(self, masses: np.ndarray, state: State) -> np.ndarray:
+        """Both ends (m, 2, 3) m of each rod, from the masses (m, 3) m and the bones' poses.
 
-        A free mass has no rod: both ends are its own place.
+        Of a free mass, which has no rod, both are its position.
         """
         begins = np.concatenate([masses[:1], masses[:-1]])
         begins[self._firsts] = state.positions[self._bones] + rotation.rotate(

@@ -1,38 +1,53 @@
-"""A recording into a file of the format that the file's suffix names."""
+"""Writing a recording in the format of the file's suffix."""
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Callable, Mapping
 from pathlib import Path
+
+import numpy as np
 
 from ..model import errors
 from ..model.skin import Skin
 from .bvh_file import bvh_text
-from .csv_file import csv_text
 from .gltf.gltf_file import gltf_bytes
 from .mcap_file import recording_bytes
 from .recording import Recording
+
+COLUMNS = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
+"""Columns of a bone, after its name and a dot: centre of mass, m; orientation."""
+
+
+def csv_text(recording: Recording) -> str:
+    """CSV (RFC 4180, Unix line ends): ``time`` in s, then COLUMNS of each bone. Exact."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator='\n')
+    writer.writerow(['time', *(f'{name}.{part}' for name in recording.scene.bone_names
+                               for part in COLUMNS)])
+    poses = np.concatenate([recording.positions, recording.orientations], axis=2)
+    writer.writerows([time, *row] for time, row in zip(
+        recording.times.tolist(), poses.reshape(len(poses), -1).tolist(), strict=True))
+    return stream.getvalue()
+
 
 FORMATS: dict[str, Callable[[Recording, Mapping[int, Skin]], bytes]] = {
     '.mcap': lambda recording, skins: recording_bytes(recording),
     '.glb': gltf_bytes,
     '.bvh': lambda recording, skins: bvh_text(recording).encode(),
     '.csv': lambda recording, skins: csv_text(recording).encode()}
-"""By suffix: MCAP, glTF, BVH, CSV."""
+"""Encoders by suffix."""
 
 
 def check_format(path: Path) -> None:
-    """Raise OutOfRange for a file's name whose suffix is not one of FORMATS."""
+    """Raise OutOfRange for a suffix that is not in FORMATS."""
     if path.suffix not in FORMATS:
         raise errors.OutOfRange('', path.name, 'a name that ends in ' + ', '.join(FORMATS))
 
 
-def contents(recording: Recording, path: str | Path,
-             skins: Mapping[int, Skin] = {}) -> dict[Path, bytes]:
-    """Files with their contents; OutOfRange for a suffix that is not one of FORMATS.
-
-    It is one file but for the BVH of several dolls, which is one for each: run.bvh becomes
-    run_left.bvh and run_right.bvh. ``skins`` are those of some dolls, by index, for glTF.
-    """
+def encoded_files(recording: Recording, path: str | Path,
+                  skins: Mapping[int, Skin] = {}) -> dict[Path, bytes]:
+    """Contents of the files that save_recording writes, by path. Raises OutOfRange."""
     path = Path(path)
     check_format(path)
     dolls = recording.scene.dolls
@@ -45,8 +60,29 @@ def contents(recording: Recording, path: str | Path,
 
 def save_recording(recording: Recording, path: str | Path,
                    skins: Mapping[int, Skin] = {}) -> list[Path]:
-    """Write what `contents` has; the paths. Unreadable where the disk refuses."""
-    made = contents(recording, path, skins)
+    """Write a recording as MCAP, glTF, BVH or CSV.
+
+    Args:
+        recording: from Recorder.recording().
+        path: of the file; its suffix .mcap, .glb, .bvh or .csv is the format. BVH of several dolls
+            is a file for each: run.bvh becomes run_left.bvh and run_right.bvh.
+        skins: of dolls by index, for glTF.
+
+    Returns:
+        Paths of the files.
+
+    Raises:
+        OutOfRange: the suffix is another one.
+        Unreadable: the file can not be written.
+
+    Example:
+        >>> recorder = Recorder(load_scene('drop'))
+        >>> with Simulation(recorder.scene) as simulation:
+        ...     recorder.take(simulation)
+        >>> [path.name for path in save_recording(recorder.recording(), 'fall.glb')]
+        ['fall.glb']
+    """
+    made = encoded_files(recording, path, skins)
     try:
         for file, content in made.items():
             file.write_bytes(content)

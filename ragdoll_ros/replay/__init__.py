@@ -1,1 +1,1 @@
-"""Recorded runs: read, repeated to the bit, compared."""
+"""Recorded runs: reading, repeating to the bit, comparing."""

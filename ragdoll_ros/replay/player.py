@@ -1,65 +1,64 @@
-"""A run again: the same acts at the same ticks, and whether the same states come of them."""
+"""Repeating a run: the same events at the same ticks, with a check of the states."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from ..model import errors
-from ..physics.logged_simulation import accuracy_from, repeat, state_digest
+from ..physics.logged_simulation import accuracy_from, apply_event, state_digest
 from ..physics.simulation import Simulation
-from .run import Event, Run
+from .run import Event, ReplayedRun
 
-TOLD = ('pause', 'parameters')
-"""Kinds of events that do nothing by themselves."""
+PASSIVE_KINDS = ('pause', 'parameters')
+"""Kinds of events that do not act on the simulation."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """Whether the state after ``tick`` ticks was that of the run, to the bit."""
+    """Whether the state after ``tick`` ticks is that of the run, to the bit."""
 
     tick: int
     equal: bool
 
 
 class Player:
-    """Repeats a run, by another ``engine`` or ``accuracy`` if one is named.
+    """Repeats a run, with another ``engine`` or ``accuracy`` if given.
 
-    ``warn`` is told what can not be repeated.
+    ``warn`` gets a text for what can not be repeated.
     """
 
-    def __init__(self, run: Run, warn: Callable[[str], None], engine: str | None = None,
+    def __init__(self, run: ReplayedRun, warn: Callable[[str], None], engine: str | None = None,
                  accuracy: str | None = None) -> None:
         self._run, self._warn = run, warn
         self._engine, self._accuracy = engine, accuracy
         self.simulation: Simulation | None = None
-        """What repeats the run now; None where it is not known how it went on."""
-        self.tick = self.made = 0
-        """Ticks of the node so far; those that were repeated."""
-        self.acts = 0
+        """None where events are missing."""
+        self.tick = self.ticks_repeated = self.events_repeated = 0
+        """The node's tick; counts of repeated ticks and events."""
         self.checks: list[Check] = []
 
     def ticks(self) -> Iterator[Simulation]:
-        """The simulation after each start and each tick. RagdollError for what is no run."""
+        """The simulation after each start and tick. Raises a RagdollError for a wrong event."""
         number = -1
         for event in self._run.events:
-            self._follow(event, number + 1)
+            self._check_sequence(event, number + 1)
             number = event.number
             while self.simulation is not None and self.tick < event.tick:
                 self.simulation.advance()
-                self.tick, self.made = self.tick + 1, self.made + 1
+                self.tick, self.ticks_repeated = self.tick + 1, self.ticks_repeated + 1
                 yield self.simulation
-            self._take(event)
+            self._apply(event)
             if event.is_start:
                 yield self.simulation
 
     def close(self) -> None:
-        """Give the engine back."""
+        """Release the engine."""
         if self.simulation is not None:
             self.simulation.close()
             self.simulation = None
 
-    def _follow(self, event: Event, expected: int) -> None:
-        """Give up, until the next start, where events are missing before this one."""
+    def _check_sequence(self, event: Event, expected: int) -> None:
+        """Stop until the next start if events are missing before this one."""
         if event.kind == 'start':
             return
         if event.number != expected:
@@ -70,11 +69,11 @@ class Player:
             raise errors.OutOfRange(f'event {event.number}: tick', event.tick,
                                     f'{self.tick} or later')
 
-    def _take(self, event: Event) -> None:
-        """Let an event take effect."""
+    def _apply(self, event: Event) -> None:
+        """Apply an event."""
         if event.kind == 'start' or (event.kind == 'reset' and self.simulation is None):
             self._begin(event)
-        elif self.simulation is None or event.kind in TOLD:
+        elif self.simulation is None or event.kind in PASSIVE_KINDS:
             return
         elif event.kind == 'state':
             self._check(event.fields.get('sha256'))
@@ -82,7 +81,7 @@ class Player:
             self._repeat(event)
 
     def _begin(self, event: Event) -> None:
-        """Begin at a start, by what it tells."""
+        """Build the simulation of a start event."""
         self.close()
         scene, fields = self._run.scene(event), event.fields
         try:
@@ -90,7 +89,7 @@ class Player:
                 scene, float(fields['step']),
                 self._accuracy or accuracy_from(fields['accuracy']),
                 self._engine or str(fields['engine']))
-            self.simulation.parts = int(fields.get('parts', 1))
+            self.simulation.samples_per_tick = int(fields.get('parts', 1))
         except errors.RagdollError:
             raise
         except (KeyError, TypeError, ValueError):
@@ -102,10 +101,10 @@ class Player:
 
     def _repeat(self, event: Event) -> None:
         try:
-            repeat(self.simulation, event.kind, event.fields)
+            apply_event(self.simulation, event.kind, event.fields)
         except errors.ModelError as error:
             raise error.at(f'event {event.number}') from None
-        self.acts += 1
+        self.events_repeated += 1
 
     def _check(self, digest: str) -> None:
         self.checks.append(Check(self.tick, state_digest(self.simulation.state) == digest))

@@ -1,4 +1,4 @@
-"""A run on the topics of a node `ragdoll`, by the clock on the wall."""
+"""A run published in real time on the topics of a node `ragdoll`."""
 from __future__ import annotations
 
 import time
@@ -11,8 +11,8 @@ from rclpy.node import Node
 from ..model.ragdoll import WORLD
 from ..physics.simulation import Simulation
 from ..ros.outputs import Outputs
-from ..ros.rclpy_context import ros_session
-from ..ros.signals import ended_by_signals
+from ..ros.process.rclpy_context import rclpy_context
+from ..ros.process.signals import run_until_signal
 from ..ros.stamps import Stamps
 from ..ros.ticker import Ticker
 
@@ -20,12 +20,12 @@ BONE_NAMES = 'bone_names'
 
 
 def publish(steps: Iterator[Simulation], pace: float, arguments: list[str]) -> int:
-    """Publish each of the ``steps``, ``pace`` s of them in each s on the wall, until they end.
+    """Publish the ``steps`` at the real-time factor ``pace`` until they end; the exit code.
 
-    ``arguments`` are those for ROS, from --ros-args on. The exit code.
+    ``arguments`` are ROS's, from --ros-args on.
     """
     def spin() -> int:
-        with ros_session(arguments):
+        with rclpy_context(arguments):
             node = PublishedRun(steps, pace)
             try:
                 while not node.is_over:
@@ -33,11 +33,11 @@ def publish(steps: Iterator[Simulation], pace: float, arguments: list[str]) -> i
             finally:
                 node.destroy_node()
         return 0
-    return ended_by_signals(spin)
+    return run_until_signal(spin)
 
 
 class PublishedRun(Node):
-    """Publishes what the node did whose run it was, with the stamps of now."""
+    """Publishes the topics of the recorded node, stamped with the current time."""
 
     def __init__(self, steps: Iterator[Simulation], pace: float) -> None:
         super().__init__('ragdoll')
@@ -58,11 +58,11 @@ class PublishedRun(Node):
             return
         if simulation is not self._simulation:
             self._simulation = simulation
-            self._outputs.describe(simulation.scene, WORLD, 'all')
+            self._outputs.set_scene(simulation.scene, WORLD, 'all')
             self.set_parameters([rclpy.Parameter(BONE_NAMES, value=list(
                 simulation.scene.bone_names))])
-        self._stamps.take(due)
-        self._outputs.publish(simulation, self._stamps.newest, time.monotonic_ns())
+        self._stamps.advance(due)
+        self._outputs.publish(simulation, self._stamps.latest, time.monotonic_ns())
         if simulation.tick / self._pace != self._period:
             self._period = simulation.tick / self._pace
             self._ticker.start(self._period)

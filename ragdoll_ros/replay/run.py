@@ -1,4 +1,4 @@
-"""A run as its bag tells it: events in their order, and the scenes that they are of."""
+"""A run read from a bag: its events in order and its scenes."""
 from __future__ import annotations
 
 import json
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..files.bag import read_messages
-from ..files.cdr import STRING, text_of
+from ..files.cdr import STRING, decode_string
 from ..files.run_scene import read_run_scene, scene_digest
 from ..model import errors
 from ..model.scene import Scene
@@ -17,7 +17,7 @@ RECORD = 'ros2 bag record /ragdoll/events /ragdoll/scene'
 
 @dataclass(frozen=True)
 class Event:
-    """What took effect after ``tick`` ticks; ``number`` counts the node's events."""
+    """An event after ``tick`` ticks; ``number`` counts the node's events."""
 
     number: int
     tick: int
@@ -26,23 +26,23 @@ class Event:
 
     @property
     def is_start(self) -> bool:
-        """Whether the state after it is known by the scene alone."""
+        """Whether the state after it follows from the scene alone."""
         return self.kind in ('start', 'reset')
 
 
 @dataclass(frozen=True)
-class Run:
-    """What a node did and what acted on it."""
+class ReplayedRun:
+    """Events, scenes and versions of a node's run."""
 
     node: str
     events: tuple[Event, ...]
     scenes: dict[str, Scene]
-    """By the SHA-256 of their text, as events name them."""
+    """By the SHA-256 of their text, as in events."""
     versions: tuple[str, ...]
-    """What computed it; more than one where nodes of several versions ran in turn."""
+    """Versions that computed it; several if nodes of different versions ran in turn."""
 
     def scene(self, event: Event) -> Scene:
-        """The scene of a start; WrongForm if the bag has another one."""
+        """The scene of a start event. Raises WrongForm if the bag lacks it."""
         digest = event.fields.get('scene')
         if digest not in self.scenes:
             held = ', '.join(f'{scene.name} ({each[:8]})' for each, scene in self.scenes.items())
@@ -53,13 +53,13 @@ class Run:
         return self.scenes[digest]
 
 
-def read_run(path: Path, node: str | None, warn: Callable[[str], None]) -> Run:
-    """The run of a ``node`` in a bag; of the one that is in it, if not said. RagdollError."""
+def read_run(path: Path, node: str | None, warn: Callable[[str], None]) -> ReplayedRun:
+    """The run of a ``node`` in a bag, by default its only one. Raises a RagdollError."""
     found: dict[tuple[str, str], list[str]] = {}
     for topic, kind, data in read_messages(path, warn):
         name, _, last = topic.rpartition('/')
         if kind == STRING and last in ('events', 'scene'):
-            found.setdefault((name, last), []).append(text_of(data))
+            found.setdefault((name, last), []).append(decode_string(data))
     nodes = sorted({name for name, last in found if last == 'events'})
     if not nodes:
         raise errors.Unreadable('', str(path), f'a recording of ~/events and ~/scene: {RECORD}')
@@ -72,12 +72,12 @@ def read_run(path: Path, node: str | None, warn: Callable[[str], None]) -> Run:
                                'recording begins late, call ~/reset while it records')
     texts = found.get((name, 'scene'), [])
     read = {scene_digest(text): read_run_scene(text) for text in texts}
-    return Run(name, events, {digest: scene for digest, (scene, _) in read.items()},
-               tuple(sorted({versions for _, versions in read.values()})))
+    return ReplayedRun(name, events, {digest: scene for digest, (scene, _) in read.items()},
+                       tuple(sorted({versions for _, versions in read.values()})))
 
 
 def _event(index: int, text: str) -> Event:
-    """From a line of JSON; WrongForm for what is none."""
+    """An event from JSON. Raises WrongForm."""
     try:
         fields = json.loads(text)
         number, tick, kind = (fields.pop(key) for key in ('number', 'tick', 'kind'))

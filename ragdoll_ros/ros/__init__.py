@@ -1,4 +1,4 @@
-"""The ROS side: it converts, schedules and shows, and leaves the physics to the simulation."""
-from .signals import hold_back
+"""The ROS 2 side: nodes, publishers, subscriptions and messages around a simulation."""
+from .process.signals import block_signals
 
-hold_back()
+block_signals()

@@ -1,4 +1,4 @@
-"""How the simulation does: on /diagnostics once a second, and at once when its time is handled."""
+"""The status on /diagnostics: once a second, and at once on a pause, reset or new scene."""
 from __future__ import annotations
 
 import math
@@ -12,53 +12,52 @@ from rclpy.node import Node
 
 from ..model.push import Push
 from ..model.scene import SECOND
-from .input_counts import Tally
+from .inputs.input_counts import InputCounts
 from .messages.convert import to_time
 
-if TYPE_CHECKING:  # else the page and the teleop, which read this file, would load an engine
+if TYPE_CHECKING:  # else the page and the teleop, which import this file, would load an engine
     from ..physics.simulation import Simulation
 
 PERIOD = 1.0
 """s of the steady clock between two reports."""
 
-BEHIND = 0.95
-"""Share of the wanted pace below which a report warns that the doll falls behind."""
+MIN_SPEED_RATIO = 0.95
+"""Real-time factor, relative to the requested one, below which a report warns."""
 
 
 class Diagnostics:
-    """Collects what each tick cost; reports pace, cost, errors and counts.
+    """Measures the cost of ticks; reports real-time factor, cost, error measures and counters.
 
-    ``facts()``: what only the node knows, by name; ``wanted_pace()``: simulated s asked for in each
-    s on the wall, 0 while paused; ``stamp()``: ns that a report is to bear.
+    ``node_values()``: values of the node to report, by key; ``stamp()``: stamp of a report, ns.
     """
 
-    def __init__(self, node: Node, steady: Clock, tally: Tally, facts: Callable[[], dict],
-                 wanted_pace: Callable[[], float], stamp: Callable[[], int]) -> None:
-        self._node, self._steady, self._tally = node, steady, tally
-        self._facts, self._wanted_pace, self._stamp = facts, wanted_pace, stamp
+    def __init__(self, node: Node, steady: Clock, counts: InputCounts,
+                 node_values: Callable[[], dict], stamp: Callable[[], int]) -> None:
+        self._node, self._steady, self._counts = node, steady, counts
+        self._node_values, self._stamp = node_values, stamp
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self._counted = self._dropped = self._bad = 0
+        self._last_counted = self._last_dropped = self._last_bad = 0
         self._last: dict[str, float] | None = None
         self.simulation: Simulation
-        self.begin()
-        node.create_timer(PERIOD, self._close, clock=steady)
+        self.restart()
+        node.create_timer(PERIOD, self._on_timer, clock=steady)
 
-    def count(self, cost: int, late: float, simulated: int) -> None:
-        """Enter a tick, all in ns: what it took on the wall, how long after it was due it began,
-        and what it simulated.
+    def record_tick(self, cost: int, lag: float, simulated: int) -> None:
+        """Record a tick, all in ns: wall time spent, lag of its start behind its due time, and
+        simulated time.
         """
         self._ticks += 1
         self._cost += cost
-        self._dearest = max(self._dearest, cost)
-        self._late += late
-        self._latest = max(self._latest, late)
+        self._max_cost = max(self._max_cost, cost)
+        self._lag += lag
+        self._max_lag = max(self._max_lag, lag)
         self._simulated += simulated
 
-    def report(self) -> None:
-        """Tell who listens how it is now; pace and cost are those of the last whole period."""
+    def publish(self) -> None:
+        """Publish a report if there is a subscriber; rates are those of the last full period."""
         if self._last is None or not self._publisher.get_subscription_count():
             return
-        level, message = self._judge()
+        level, message = self._level_and_message()
         status = DiagnosticStatus(
             level=level, name=status_name(self._node.get_namespace(), self._node.get_name()),
             message=message, hardware_id=self.simulation.scene.name,
@@ -67,82 +66,104 @@ class Diagnostics:
         array.header.stamp = to_time(self._stamp())
         self._publisher.publish(array)
 
-    def _close(self) -> None:
-        """Close a period: report it, and begin to count anew."""
+    def _on_timer(self) -> None:
+        """End a period and report it."""
         elapsed = max(1, self._steady.now().nanoseconds - self._since)
-        # In ms; what the process takes besides ticks is little, and to ask at each tick is not.
-        spent, ticks = time.process_time_ns() - self._spent, 1e6 * max(1, self._ticks)
+        # tick_cpu_ms is the whole process's: little besides ticks, and cheaper than a read a tick.
+        spent, ticks = time.process_time_ns() - self._cpu_since, 1e6 * max(1, self._ticks)
         self._last = {'pace': self._simulated / elapsed,
-                      'tick_cost_ms': self._cost / ticks, 'tick_cost_max_ms': self._dearest / 1e6,
+                      'tick_cost_ms': self._cost / ticks, 'tick_cost_max_ms': self._max_cost / 1e6,
                       'tick_cpu_ms': spent / ticks,
-                      'stamp_lag_ms': self._late / ticks, 'stamp_lag_max_ms': self._latest / 1e6}
-        self.report()
-        self.begin()
+                      'stamp_lag_ms': self._lag / ticks, 'stamp_lag_max_ms': self._max_lag / 1e6}
+        self.publish()
+        self.restart()
 
-    def begin(self) -> None:
-        """Begin to count anew, as after a change of the pace: a mean over both tells nothing."""
+    def restart(self) -> None:
+        """Restart the period, as after a change of the real-time factor."""
         self._since = self._steady.now().nanoseconds
-        self._spent = time.process_time_ns()
-        self._ticks = self._cost = self._dearest = self._simulated = 0
-        self._late = self._latest = 0.0
+        self._cpu_since = time.process_time_ns()
+        self._ticks = self._cost = self._max_cost = self._simulated = 0
+        self._lag = self._max_lag = 0.0
 
-    def _judge(self) -> tuple[bytes, str]:
-        """Level and message: what was bad, refused or late since the last report, else OK."""
-        tally, wanted = self._tally, self._wanted_pace()
-        counted = tally.refused.total() + tally.clamped.total()
-        refused, self._counted = counted > self._counted, counted
-        warnings = [tally.reason] if refused else []
-        facts = self._facts()
-        if facts['namesakes']:
-            warnings.append(f'{facts["namesakes"] + 1} nodes have this name')
-        warnings += self._stalls(wanted, facts)
-        bad, self._bad = facts['bad_states'] - self._bad, facts['bad_states']
+    def _level_and_message(self) -> tuple[bytes, str]:
+        """ERROR for bad states, WARN for refused input or lag since the last report, else OK."""
+        counts, values = self._counts, self._node_values()
+        requested = 0.0 if values['paused'] else values['real_time_factor']
+        counted = counts.refused.total() + counts.clamped.total()
+        refused, self._last_counted = counted > self._last_counted, counted
+        warnings = [counts.last_reason] if refused else []
+        if values['namesakes']:
+            warnings.append(f'{values["namesakes"] + 1} nodes have this name')
+        warnings += self._lag_warnings(requested, values)
+        bad, self._last_bad = values['bad_states'] - self._last_bad, values['bad_states']
         if bad:
-            dump = facts['state_dump'] and f'; the states before are in {facts["state_dump"]}'
+            dump = values['state_dump'] and f'; the states before are in {values["state_dump"]}'
             return DiagnosticStatus.ERROR, '; '.join(
-                [f'{bad} bad states were not published: {facts["bad_state"]}{dump}', *warnings])
+                [f'{bad} bad states were not published: {values["bad_state"]}{dump}', *warnings])
         if warnings:
             return DiagnosticStatus.WARN, '; '.join(warnings)
-        return DiagnosticStatus.OK, 'running' if wanted else 'paused'
+        return DiagnosticStatus.OK, 'running' if requested else 'paused'
 
-    def _stalls(self, wanted: float, facts: dict) -> list[str]:
-        """What fell behind the clock on the wall; late by more than a tick on the average counts,
-        as a busy machine lets one tick or another wait.
-        """
+    def _lag_warnings(self, requested: float, values: dict) -> list[str]:
+        """Warnings about the real-time factor, dropped ticks, and a mean lag of over one tick."""
         last, found = self._last, []
-        if wanted and self._ticks and last['pace'] < BEHIND * wanted:
-            found.append(f'pace {last["pace"]:.3g} falls behind {wanted:.3g}')
-        dropped, self._dropped = facts['dropped_ticks'] - self._dropped, facts['dropped_ticks']
+        if requested and self._ticks and last['pace'] < MIN_SPEED_RATIO * requested:
+            found.append(f'real-time factor {last["pace"]:.3g} is below the requested '
+                         f'{requested:.3g}')
+        dropped = values['dropped_ticks'] - self._last_dropped
+        self._last_dropped = values['dropped_ticks']
         if dropped:
             found.append(f'{dropped} ticks were dropped')
-        if wanted and last['stamp_lag_ms'] > self.simulation.tick / wanted / 1e6:
+        if requested and last['stamp_lag_ms'] > self.simulation.tick / requested / 1e6:
             found.append(f'stamps were {last["stamp_lag_ms"]:.3g} ms late')
         return found
 
     def _values(self) -> dict[str, object]:
-        simulation, tally = self.simulation, self._tally
+        simulation, counts = self.simulation, self._counts
         return {
             **self._last,
             'engine': simulation.engine_name,
             'engine_reason': simulation.engine_reason,
             'simulated_time': simulation.time / SECOND,
             'push': pushes_text(simulation.pushes),
-            **self._facts(),
+            **self._node_values(),
             **simulation.measures(),
-            'refused': tally.refused.total(),
-            'clamped': tally.clamped.total(),
-            'last_reason': tally.reason,
-            **{f'refused {source}': count for source, count in tally.refused.items()},
-            **{f'clamped {source}': count for source, count in tally.clamped.items()}}
+            'refused': counts.refused.total(),
+            'clamped': counts.clamped.total(),
+            'last_reason': counts.last_reason,
+            **{f'refused {source}': count for source, count in counts.refused.items()},
+            **{f'clamped {source}': count for source, count in counts.clamped.items()}}
+
+
+class DuplicateNodes:
+    """Counts other nodes with the name and namespace of ``node``, and warns of new ones: their
+    messages mix with this node's, and ROS does not report it.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self.count = 0
+
+    def update(self) -> None:
+        """Count the nodes in the graph; to be called by a timer."""
+        node = self._node
+        own = node.get_name(), node.get_namespace()
+        before, self.count = self.count, max(
+            0, node.get_node_names_and_namespaces().count(own) - 1)
+        if self.count > before:
+            node.get_logger().warning(
+                f'{self.count + 1} nodes are called {node.get_fully_qualified_name()}: their '
+                'messages mix; end all but one, or start each in its own namespace: '
+                '--ros-args -r __ns:=/other')
 
 
 def status_name(namespace: str, node: str) -> str:
-    """Name of a node's status: /diagnostics is one topic for all."""
+    """Name of a node's status in /diagnostics, with its namespace, as the topic is global."""
     return f'{namespace}/{node}: simulation'.lstrip('/')
 
 
 def pushes_text(pushes: Sequence[Push]) -> str:
-    """Pushes in words: force, torque, bone."""
+    """Force, torque and bone of each push."""
     return ', '.join(_push_text(push) for push in pushes) or 'none'
 
 

@@ -1,17 +1,17 @@
-"""A run as a log: what acts on the simulation on ~/events, the scene on ~/scene.
+"""The event log of a run: what acts on the simulation on ~/events, the scene on ~/scene.
 
-An event is a JSON object in a String. ``number`` counts events from the node's start, so that a gap
-is seen, ``tick`` the ticks made before it, ``kind`` says what the rest is:
+An event is a JSON object in a String. ``number`` counts events since the node's start, so a gap
+shows; ``tick`` is the number of ticks made before it; the other fields depend on ``kind``:
 
-- start: a simulation is new; its scene's SHA-256, engine, accuracy, step in s, its first state's
-  SHA-256 as ``state``
-- reset: it is back at its start; the same, but for the state
-- push, drive, release, grab, drag, let_go, step, accuracy, go_back: an act of
-  physics/logged_simulation.py, its arguments
-- state: ``sha256`` of the state, every HASHED ticks, while somebody listens
-- pause, parameters: for who reads along; what they do to the simulation is told by the others
+- start: a new simulation: SHA-256 of its scene, engine, accuracy, step in s, and SHA-256 of its
+  first state as ``state``
+- reset: the simulation is back at its start; the same fields without the state
+- push, drive, release, grab, drag, let_go, step, accuracy, go_back: a call of the simulation
+  (physics/logged_simulation.py) with its arguments
+- state: ``sha256`` of the state, every HASH_INTERVAL ticks, while there is a subscriber
+- pause, parameters: for information; their effects on the simulation are events of their own
 
-Numbers are written so that they read back to the same bits.
+Floats are written so that they are read back to the same bits.
 """
 from __future__ import annotations
 
@@ -22,36 +22,36 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
 from ..files.run_scene import run_scene_text, scene_digest
-from ..physics.logged_simulation import RecordedSimulation, state_digest
+from ..physics.logged_simulation import LoggedSimulation, state_digest
 from .outputs import LATCHED
 
-HASHED = 100
-"""Ticks from one SHA-256 of the state to the next."""
+HASH_INTERVAL = 100
+"""Ticks between two SHA-256 of the state."""
 
-PAST = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""A recorder that comes late gets what has acted so far: without it no run can be repeated."""
+EVENTS_QOS = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""A late recorder gets the past events: without them a run cannot be repeated."""
 
 
-class RunLog:
-    """Publishes what acts on the node's simulation, and what it is."""
+class EventLog:
+    """Publisher of ~/events and ~/scene."""
 
     def __init__(self, node: Node) -> None:
-        self._events = node.create_publisher(String, '~/events', PAST)
+        self._events = node.create_publisher(String, '~/events', EVENTS_QOS)
         self._scene = node.create_publisher(String, '~/scene', LATCHED)
-        self._simulation: RecordedSimulation | None = None
+        self._simulation: LoggedSimulation | None = None
         self._number = self._tick = 0
 
-    def follow(self, simulation: RecordedSimulation) -> None:
-        """Tell of this simulation from now on; of the same one again, nothing new."""
+    def set_simulation(self, simulation: LoggedSimulation) -> None:
+        """Log this simulation from now on; no effect if it is logged already."""
         if simulation is self._simulation:
             return
-        self._simulation, simulation.tell = simulation, self.tell
+        self._simulation, simulation.on_event = simulation, self.publish
         text = run_scene_text(simulation.scene)
         self._digest = scene_digest(text)
         self._scene.publish(String(data=text))
-        self.tell('start', {**simulation.conditions, 'state': state_digest(simulation.state)})
+        self.publish('start', {**simulation.conditions, 'state': state_digest(simulation.state)})
 
-    def tell(self, kind: str, fields: dict) -> None:
+    def publish(self, kind: str, fields: dict) -> None:
         """Publish an event."""
         if kind in ('start', 'reset'):
             fields = {'scene': self._digest, **fields}
@@ -60,7 +60,7 @@ class RunLog:
         self._events.publish(String(data=json.dumps(event)))
 
     def count_tick(self) -> None:
-        """Count a tick that was made."""
+        """Count a tick, and publish the digest of the state when it is due."""
         self._tick += 1
-        if self._tick % HASHED == 0 and self._events.get_subscription_count():
-            self.tell('state', {'sha256': state_digest(self._simulation.state)})
+        if self._tick % HASH_INTERVAL == 0 and self._events.get_subscription_count():
+            self.publish('state', {'sha256': state_digest(self._simulation.state)})

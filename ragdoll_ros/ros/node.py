@@ -1,4 +1,4 @@
-"""The node: makes a simulation go by the clock on the wall, and ties it to topics."""
+"""The node `ragdoll`: runs a simulation in real time and connects it to topics and services."""
 from __future__ import annotations
 
 import argparse
@@ -20,31 +20,31 @@ from rclpy.waitable import Waitable
 from ..model import errors
 from ..model.scene import Scene
 from ..physics.simulation import Simulation
-from .diagnostics import Diagnostics
-from .event_log import RunLog
-from .imus import Imus
-from .input_counts import Tally
-from .inputs import Inputs
-from .interactive import Interactive
+from .diagnostics import Diagnostics, DuplicateNodes
+from .event_log import EventLog
+from .imu.publishers import ImuPublishers
+from .inputs.input_counts import InputCounts
+from .inputs.interactive_marker_server import InteractiveMarkerServer
+from .inputs.subscriptions import PushSubscriptions
 from .log_lines import end_line, start_line
-from .namesakes import Namesakes
 from .outputs import Outputs
-from .parameters import SPECS, Parameters, Settings, make_simulation, parts_of, step_of
-from .rclpy_context import ros_session
-from .recovery import Rescue
+from .parameters.node_settings import SPECS, NodeSettings
+from .parameters.parameters import Parameters, make_simulation
+from .process.rclpy_context import rclpy_context
+from .process.signals import run_uninterrupted, run_until_signal
+from .recovery import Recovery
 from .services import Services
-from .signals import end_unbroken, ended_by_signals
 from .stamps import Stamps
-from .ticker import CALLS, MISFITS, Ticker
+from .ticker import QOS_EVENT_INTERVAL, SERVICE_INTERVAL, Ticker
 
 InvalidROSArguments = rclpy_implementation.RCLInvalidROSArgsError
 
-LOOK_AROUND = 0.5
-"""s on the wall between two looks at who is there, and two messages on /clock while paused."""
+GRAPH_PERIOD = 0.5
+"""s on the wall between two looks at the ROS graph, and two messages on /clock while paused."""
 
 IMU_SETTINGS = {'rate', 'real_time_factor', 'publish_clock',
                 *(name for name in SPECS if name.startswith('imu'))}
-"""What sensors are set up by."""
+"""Parameters that configure the IMU publishers."""
 
 EXAMPLE = """examples:
   ragdoll_node
@@ -56,7 +56,7 @@ EXAMPLE = """examples:
 class RagdollNode(Node):
     """The node ``ragdoll``. Options are those of rclpy's Node.
 
-    Raises a RagdollError with all that is wrong if its parameters or its scene can not be.
+    Raises a RagdollError with all faults if its parameters or its scene are not valid.
     """
 
     def __init__(self, **options: object) -> None:
@@ -68,125 +68,127 @@ class RagdollNode(Node):
             raise
 
     def _set_up(self) -> None:
-        self.tally = Tally(self.get_logger())
-        self._tuning = Parameters(self, self._parameter_overrides)
-        self.simulation = make_simulation(self._tuning.scene, self.settings)
+        self.input_counts = InputCounts(self.get_logger())
+        self._node_parameters = Parameters(self, self._parameter_overrides)
+        self.simulation = make_simulation(self._node_parameters.scene, self.settings)
         self._prepared: Simulation | None = None
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._stamps = Stamps(self._ros_time)
-        self._outputs, self._imus = Outputs(self), Imus(self)
-        self._log = RunLog(self)
-        self.inputs = Inputs(self, self.tally)
-        self.interactive = Interactive(self, self.tally, time.monotonic_ns)
-        self._diagnostics = Diagnostics(self, self._steady, self.tally, self._facts,
-                                        self._wanted_pace, self._time_of_report)
+        self._outputs, self._imus = Outputs(self), ImuPublishers(self)
+        self._event_log = EventLog(self)
+        self.inputs = PushSubscriptions(self, self.input_counts)
+        self.interactive = InteractiveMarkerServer(self, self.input_counts, time.monotonic_ns)
+        self._diagnostics = Diagnostics(self, self._steady, self.input_counts,
+                                        self._diagnostic_values, self._report_stamp)
         Services(self, self)
-        self._namesakes = Namesakes(self)
-        self.rescue = Rescue(self)
+        self._duplicate_nodes = DuplicateNodes(self)
+        self.recovery = Recovery(self)
         self.paused = False
-        self._use(self.simulation)
-        self._tell_start()
-        self._outputs.be_clock(self.settings.publish_clock)
+        self._set_simulation(self.simulation)
+        self._log_start()
+        self._outputs.set_clock_publisher(self.settings.publish_clock)
         self._ticker = Ticker(self, self._steady, self.tick)
-        self.create_timer(LOOK_AROUND, self._look_around, clock=self._steady)
+        self.create_timer(GRAPH_PERIOD, self._on_graph_timer, clock=self._steady)
         if self.settings.start_paused:
             self.pause(True)
-            self._begin()
+            self._publish_start()
         else:
-            self._go_on()
-        self._tuning.watch(self._prepare, self._apply)
+            self._restart_ticker()
+        self._node_parameters.add_callbacks(self._prepare, self._apply)
 
     @property
-    def settings(self) -> Settings:
+    def settings(self) -> NodeSettings:
         """Values of the parameters."""
-        return self._tuning.settings
+        return self._node_parameters.settings
 
     @property
     def stamp(self) -> int:
-        """Stamp of the state as it stands, ns."""
-        return self.simulation.time if self.settings.publish_clock else self._stamps.newest
+        """Stamp of the current state, ns."""
+        return self.simulation.time if self.settings.publish_clock else self._stamps.latest
 
     @property
     def services(self) -> Iterator[Service]:
-        """Services that an executor is to look at now."""
-        return super().services if self._ticker.looks(CALLS) else iter(())
+        """Services that an executor is to poll at this wake-up."""
+        return super().services if self._ticker.polls(SERVICE_INTERVAL) else iter(())
 
     @property
     def waitables(self) -> Iterator[Waitable]:
-        """Misfits of topics that an executor is to look at now."""
-        return super().waitables if self._ticker.looks(MISFITS) else iter(())
+        """QoS events that an executor is to poll at this wake-up."""
+        return super().waitables if self._ticker.polls(QOS_EVENT_INTERVAL) else iter(())
 
     def tick(self, due: float | None = None) -> None:
-        """Go on by one tick and publish; a bad state is never shown.
+        """Make one tick and publish; a bad state is not published.
 
-        ``due``: when, ns of the steady clock; now, if it is not said.
+        ``due``: when it was due, ns of the steady clock; default: now.
         """
         start = time.monotonic_ns()
-        stands = self.rescue.advance(self.settings.dump_directory)
-        if stands:
-            self._log.count_tick()
-        elif self.rescue.failed:
-            self._replace(make_simulation(self._tuning.scene, self.settings))
-        self._stamps.take(due)
+        is_good = self.recovery.advance(self.settings.dump_directory)
+        if is_good:
+            self._event_log.count_tick()
+        elif self.recovery.failed:
+            self._replace(make_simulation(self._node_parameters.scene, self.settings))
+        self._stamps.advance(due)
         self._publish()
-        if stands:
+        if is_good:
             self._imus.publish(self.simulation, self.stamp)
-        self._ticker.doze(self.simulation.asleep
-                          and not (self._outputs.heard or self._imus.heard))
-        late = 0.0 if due is None else max(0.0, start - due)
-        self._diagnostics.count(time.monotonic_ns() - start, late, self.simulation.tick)
+        self._ticker.set_idle(self.simulation.asleep and not (
+            self._outputs.has_subscribers or self._imus.has_subscribers))
+        lag = 0.0 if due is None else max(0.0, start - due)
+        self._diagnostics.record_tick(time.monotonic_ns() - start, lag, self.simulation.tick)
 
     def reset(self) -> None:
-        """Go back to the start, to the bit, and publish it."""
+        """Reset the simulation to its start, to the bit, and publish that."""
         self.simulation.reset()
-        self._begin()
+        self._publish_start()
 
-    def pause(self, wanted: bool) -> None:
-        """Hold the time, or let it go on from where it is."""
-        self.paused = wanted
-        self._log.tell('pause', {'paused': wanted})
-        self._go_on()
-        if wanted:
-            # What is not published with every tick.
-            self._outputs.stand(self.simulation, self.stamp)
+    def pause(self, paused: bool) -> None:
+        """Pause, or resume."""
+        self.paused = paused
+        self._event_log.publish('pause', {'paused': paused})
+        self._restart_ticker()
+        if paused:
+            # For late subscribers.
+            self._outputs.publish_on_pause(self.simulation, self.stamp)
             self.interactive.publish_poses()
-        self._diagnostics.report()
+        self._diagnostics.publish()
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """Set parameters; a refusal is counted, also one by a range that rclpy checks."""
-        wanted = [each for each in parameter_list if not self._tuning.stands(each)]
-        if parameter_list and not wanted:
+        """Set parameters; counts a refusal, also one by a range that rclpy checks."""
+        changes = [each for each in parameter_list
+                   if not self._node_parameters.is_unchanged_read_only(each)]
+        if parameter_list and not changes:
             return SetParametersResult(successful=True)
-        result = super().set_parameters_atomically(wanted)
+        result = super().set_parameters_atomically(changes)
         if not result.successful:
-            self.tally.refuse('parameters', result.reason)
+            self.input_counts.refuse('parameters', result.reason)
         return result
 
     def end(self) -> None:
-        """Give all back and say how far it came: ROS may be gone already, the log is not."""
-        line = end_line(self.simulation, self.tally.refused.total(), self._ticker.dropped)
+        """Destroy the node and log a summary, which works after rclpy's shutdown as well."""
+        line = end_line(self.simulation, self.input_counts.refused.total(),
+                        self._ticker.dropped_ticks)
         self.destroy_node()
         self.get_logger().info(line)
 
     def destroy_node(self) -> None:
-        """Give the engine back as well."""
+        """Close the simulation and destroy the node."""
         for simulation in (getattr(self, 'simulation', None), getattr(self, '_prepared', None)):
             if simulation is not None:
                 simulation.close()
         super().destroy_node()
 
     def _ros_time(self) -> int:
-        """Of the node's clock, ns; of the computer's where that is the same, which is quicker."""
+        """ROS time, ns; read from the system clock where that is the same, which is faster."""
         clock = self.get_clock()
         return clock.now().nanoseconds if clock.ros_time_is_active else time.time_ns()
 
-    def _time_of_report(self) -> int:
-        """ROS time, ns; where this node is the clock, what it says, heard or not."""
+    def _report_stamp(self) -> int:
+        """ROS time, ns, or simulated time if this node publishes /clock."""
         return self.stamp if self.settings.publish_clock else self._ros_time()
 
-    def _go_on(self) -> None:
-        """Tick from now on at the wanted pace, or not while the doll is paused."""
-        self._diagnostics.begin()
+    def _restart_ticker(self) -> None:
+        """Restart the ticks at the requested real-time factor, or stop them while paused."""
+        self._diagnostics.restart()
         if self.paused:
             self._ticker.stop()
         else:
@@ -197,103 +199,101 @@ class RagdollNode(Node):
         self._outputs.publish(simulation, self.stamp, now, self.paused)
         self.interactive.publish(now, self.paused)
 
-    def _begin(self) -> None:
-        """Publish a start: first which stamp it has, so that listeners know the next one's time."""
-        self._stamps.take()
-        self._diagnostics.report()
+    def _publish_start(self) -> None:
+        """Publish a new start; first /diagnostics, which maps stamps to simulated time."""
+        self._stamps.advance()
+        self._diagnostics.publish()
         self._publish()
-        self._go_on()
+        self._restart_ticker()
 
-    def _look_around(self) -> None:
-        """Look who has come, and tell them what stands: of /clock and /tf nobody asks the past."""
-        self._namesakes.look()
+    def _on_graph_timer(self) -> None:
+        """Check for duplicate nodes; while paused, serve new subscribers of /clock and /tf."""
+        self._duplicate_nodes.update()
         if self.paused:
-            self._outputs.repeat(self.simulation, self.stamp)
+            self._outputs.republish(self.simulation, self.stamp)
 
-    def _use(self, simulation: Simulation) -> None:
-        """Let all parts work with this simulation and the settings as they are."""
-        self._log.follow(simulation)
+    def _set_simulation(self, simulation: Simulation) -> None:
+        """Connect a simulation and the current settings to all parts of the node."""
+        self._event_log.set_simulation(simulation)
         self.simulation = self.inputs.simulation = self._diagnostics.simulation = simulation
         self.inputs.settings = self.settings
-        self.rescue.use(simulation)
-        self._outputs.describe(simulation.scene, self.settings.frame_id,
-                               self.settings.publish_tf)
-        self._imus.use(simulation.scene, self.settings)
-        self.interactive.use(simulation, self.settings)
+        self.recovery.set_simulation(simulation)
+        self._outputs.set_scene(simulation.scene, self.settings.frame_id,
+                                self.settings.publish_tf)
+        self._imus.configure(simulation.scene, self.settings)
+        self.interactive.set_simulation(simulation, self.settings)
 
-    def _tell_start(self) -> None:
-        """Say what is simulated, by what and how finely, and where to look."""
+    def _log_start(self) -> None:
         self.get_logger().info(start_line(self.simulation, self.settings, self))
 
     def _replace(self, simulation: Simulation) -> None:
         self.simulation.close()
-        self._use(simulation)
+        self._set_simulation(simulation)
 
-    def _prepare(self, changed: set[str], settings: Settings, scene: Scene) -> None:
-        """Build what may fail before the change is accepted."""
+    def _prepare(self, changed: set[str], settings: NodeSettings, scene: Scene) -> None:
+        """Create what may fail before a change is accepted."""
         if self._prepared is not None:
             self._prepared.close()
         self._prepared = (make_simulation(scene, settings)
                           if changed & {'scene', 'engine', 'workers'} else None)
 
     def _apply(self, changed: set[str]) -> None:
-        """Carry a change of the settings out."""
+        """Carry out a change of the settings."""
         settings = self.inputs.settings = self.interactive.settings = self.settings
-        self._log.tell('parameters', {name: getattr(settings, name) for name in sorted(changed)})
-        self._outputs.be_clock(settings.publish_clock)
+        self._event_log.publish('parameters', {name: getattr(settings, name)
+                                               for name in sorted(changed)})
+        self._outputs.set_clock_publisher(settings.publish_clock)
         if self._prepared is not None:
             simulation, self._prepared = self._prepared, None
             self._replace(simulation)
-            self._tell_start()
-            self._begin()
+            self._log_start()
+            self._publish_start()
         elif changed & {'frame_id', 'publish_tf'}:
-            self._use(self.simulation)
+            self._set_simulation(self.simulation)
             if self.paused:
                 self._publish()
         if 'accuracy' in changed:
             self.simulation.accuracy = settings.accuracy
         if changed & IMU_SETTINGS:
-            self._imus.use(self.simulation.scene, settings)
-            if self.simulation.parts != parts_of(settings):
-                self.simulation.parts = parts_of(settings)
+            self._imus.configure(self.simulation.scene, settings)
+            if self.simulation.samples_per_tick != settings.samples_per_tick:
+                self.simulation.samples_per_tick = settings.samples_per_tick
         if changed & {'scene', 'rate', 'real_time_factor'}:
-            self.simulation.step = step_of(settings)
-            self._go_on()
+            self.simulation.step = settings.step
+            self._restart_ticker()
 
-    def _wanted_pace(self) -> float:
-        return 0.0 if self.paused else self.settings.real_time_factor
-
-    def _facts(self) -> dict:
+    def _diagnostic_values(self) -> dict:
+        """Values of the node for /diagnostics; ``stamp_pace``: simulated time per stamp time."""
         settings, ticker = self.settings, self._ticker
-        pace = 1.0 if settings.publish_clock else settings.real_time_factor
+        stamp_factor = 1.0 if settings.publish_clock else settings.real_time_factor
         return {'paused': self.paused, 'real_time_factor': settings.real_time_factor,
-                'lost_time': ticker.lost / 1e9, 'dropped_ticks': ticker.dropped,
-                'stamp_pace': pace, 'namesakes': self._namesakes.count,
-                'stamp_of_zero': self.stamp - round(self.simulation.time / pace),
-                **self.rescue.facts()}
+                'lost_time': ticker.dropped_time / 1e9, 'dropped_ticks': ticker.dropped_ticks,
+                'stamp_pace': stamp_factor, 'namesakes': self._duplicate_nodes.count,
+                'stamp_of_zero': self.stamp - round(self.simulation.time / stamp_factor),
+                **self.recovery.diagnostics()}
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the node until SIGINT or SIGTERM; 0, or 2 if it cannot start as it is asked to."""
+    """Run the node until SIGINT or SIGTERM. Returns 0, or 2 for invalid arguments or scene."""
     arguments = sys.argv if arguments is None else arguments
     parser = argparse.ArgumentParser(
         'ragdoll_node', description=__doc__, epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter)
     try:
         parser.parse_args(remove_ros_args(arguments)[1:])
-        return ended_by_signals(lambda: _spin(arguments))
+        return run_until_signal(lambda: _spin(arguments))
     except (errors.RagdollError, ParameterException, InvalidROSArguments) as error:
         print(error, file=sys.stderr)
         return 2
 
 
 def _spin(arguments: list[str]) -> int:
-    with ros_session(arguments):
+    with rclpy_context(arguments):
         node = RagdollNode()
         try:
             rclpy.spin(node)
         finally:
-            end_unbroken(node.end)
+            run_uninterrupted(node.end)
     return 0
 
 

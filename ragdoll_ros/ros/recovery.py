@@ -1,32 +1,37 @@
-"""Bad states never get out: what the node does where a tick ends in one."""
+"""Recovery from bad states: they are not published, but undone, logged, and dumped to a file."""
 from __future__ import annotations
 
 import os
 import time
+from collections import deque
+from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 from rclpy.logging import get_logging_directory
 from rclpy.node import Node
 
+from ..model.push import Push
 from ..model.scene import SECOND
+from ..physics.actions.grab import Grab
 from ..physics.guard import BadState, Guard
 from ..physics.simulation import Simulation
-from .state_dump import StateDump
 
-IN_A_ROW = 3
-"""Bad ticks after which going back has not helped, and the scene begins anew."""
+MAX_CONSECUTIVE = 3
+"""Bad ticks in a row after which the scene is restarted instead of the tick repeated."""
 
-MOST_DUMPS = 10
-"""Files that a node writes at the most; what goes wrong more often is told by the first ones."""
+DUMP_LENGTH = 100
+"""Ticks in a state dump."""
+
+MAX_DUMPS = 10
+"""Files that a node writes at most."""
 
 LOG_PERIOD = 1.0
-"""s between two lines about bad states of which no file was written."""
+"""s: throttle of the log lines about bad states without a file."""
 
 
-class Rescue:
-    """Takes the simulation that the node uses on, tick by tick, and tells of each bad state: in the
-    log, in a file with what led there, and in facts() for /diagnostics.
-    """
+class Recovery:
+    """Advances the node's simulation, undoes a tick that ends in a bad state, and reports it."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -35,57 +40,112 @@ class Rescue:
         self._dumps = 0
         self._reason = self._dump = ''
 
-    def use(self, simulation: Simulation) -> None:
-        """Take this one on from now on."""
-        self._guard, self._last_states = Guard(simulation), StateDump(simulation)
-        self._in_a_row = 0
+    def set_simulation(self, simulation: Simulation) -> None:
+        """Advance this simulation from now on."""
+        self._guard, self._state_dump = Guard(simulation), StateDump(simulation)
+        self._consecutive = 0
 
     def advance(self, directory: str) -> bool:
-        """Go on by one tick, or by none where it was bad; whether the tick stands. ``directory``:
-        where files go; empty: where ROS has its logs.
-        """
-        self._last_states.acting()
+        """Make one tick; False if it was bad and undone. ``directory`` of dumps; '': ROS's log."""
+        self._state_dump.record_inputs()
         bad = self._guard.advance()
         if bad is None:
-            self._last_states.note()
-            self._in_a_row = 0
+            self._state_dump.record_state()
+            self._consecutive = 0
             return True
         self.count += 1
-        self._in_a_row += 1
+        self._consecutive += 1
         self._reason = bad.reason
-        self._tell(bad, directory)
+        self._report(bad, directory)
         return False
 
     @property
     def failed(self) -> bool:
-        """Whether going back has not helped, and a new simulation is wanted."""
-        return self._in_a_row >= IN_A_ROW
+        """Whether undoing ticks has not helped and the scene must be restarted."""
+        return self._consecutive >= MAX_CONSECUTIVE
 
-    def facts(self) -> dict[str, object]:
-        """For /diagnostics."""
+    def diagnostics(self) -> dict[str, object]:
+        """Values for /diagnostics."""
         return {'bad_states': self.count, 'bad_state': self._reason, 'state_dump': self._dump}
 
-    def _tell(self, bad: BadState, directory: str) -> None:
-        """Log it; write a file for the first of several in a row, as all others begin alike."""
+    def _report(self, bad: BadState, directory: str) -> None:
+        """Log it; write a file for the first of several in a row, as the others are alike."""
         logger = self._node.get_logger()
         line = f'bad state at {bad.time / SECOND:.9g} s was not published: {bad.reason}; '
-        if self._in_a_row == IN_A_ROW:
-            logger.error(f'{line}the scene begins anew', throttle_duration_sec=LOG_PERIOD)
-        elif self._in_a_row > 1 or self._dumps == MOST_DUMPS:
-            logger.error(f'{line}the doll is where it was', throttle_duration_sec=LOG_PERIOD)
+        if self._consecutive == MAX_CONSECUTIVE:
+            logger.error(f'{line}the scene restarts', throttle_duration_sec=LOG_PERIOD)
+        elif self._consecutive > 1 or self._dumps == MAX_DUMPS:
+            logger.error(f'{line}the tick was undone', throttle_duration_sec=LOG_PERIOD)
         else:
             self._dumps += 1
-            logger.error(f'{line}the doll is where it was; {self._written(bad, directory)}')
+            logger.error(f'{line}the tick was undone; {self._write_dump(bad, directory)}')
 
-    def _written(self, bad: BadState, directory: str) -> str:
-        """Write a file; which one, or why there is none."""
+    def _write_dump(self, bad: BadState, directory: str) -> str:
+        """Write a state dump. Returns a sentence with its path, or the error."""
         folder = Path(directory).expanduser() if directory else get_logging_directory()
         name = self._node.get_fully_qualified_name().strip('/').replace('/', '_')
         path = folder / f'{name}_{time.strftime("%Y%m%d_%H%M%S")}_{os.getpid()}_{self._dumps}.npz'
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self._last_states.write(path, bad)
+            self._state_dump.write(path, bad)
         except OSError as error:
             return f'the last states could not be written: {error}'
         self._dump = str(path)
         return f'the last states are in {path}'
+
+
+class StateDump:
+    """The last DUMP_LENGTH states of a simulation, with the pushes and grabs of each tick.
+
+    States are kept by reference, without a copy; 100 of a thousand dolls take 100 MB.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        self._ticks: deque[tuple] = deque(maxlen=DUMP_LENGTH)
+        self.record_inputs()
+
+    def record_inputs(self) -> None:
+        """Record pushes and grabs; to be called before a tick."""
+        self._inputs = self._simulation.pushes, self._simulation.grabs
+
+    def record_state(self) -> None:
+        """Record the state after a tick."""
+        self._ticks.append((self._simulation.time, self._simulation.state, *self._inputs))
+
+    def write(self, path: Path, bad: BadState) -> None:
+        """Write the buffer and the ``bad`` state as an .npz, readable without pickle.
+
+        Raises OSError if that fails, and removes the file.
+        """
+        ticks = [*self._ticks, (bad.time, bad.state, *self._inputs)][-DUMP_LENGTH:]
+        times, states, pushes, grabs = zip(*ticks, strict=True)
+        simulation = self._simulation
+        try:
+            with path.open('xb') as file:
+                np.savez(
+                    file, reason=bad.reason, scene=simulation.scene.name,
+                    engine=simulation.engine_name, bone_names=simulation.scene.bone_names,
+                    times=np.array(times), states=np.array([state.rows for state in states]),
+                    **_table('push', pushes, _push_row, 10, lambda push: push.bone),
+                    **_table('grab', grabs, _grab_row, 6, lambda grab: grab.bone))
+        except OSError:
+            path.unlink(missing_ok=True)
+            raise
+
+
+def _table(name: str, inputs: Sequence[Sequence], row: object, width: int,
+           bone: object) -> dict[str, np.ndarray]:
+    """The inputs of all ticks: index of the tick (k,), bone (k,) and numbers (k, width)."""
+    flat = [(tick, one) for tick, those in enumerate(inputs) for one in those]
+    return {f'{name}_ticks': np.array([tick for tick, _ in flat], np.int64),
+            f'{name}_bones': np.array([bone(one) for _, one in flat], str),
+            f'{name}_numbers': np.array([row(one) for _, one in flat], float).reshape(-1, width)}
+
+
+def _push_row(push: Push) -> list[float]:
+    return [*push.force, *push.torque, *push.point, push.local]
+
+
+def _grab_row(grab: Grab) -> list[float]:
+    return [*grab.point, *grab.target]

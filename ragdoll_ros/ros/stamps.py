@@ -1,53 +1,53 @@
-"""Which time the messages bear."""
+"""Stamps of the messages: ROS time, evenly spaced."""
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
 
-STEP_BACK = 1_000_000_000
-"""ns that ROS time goes back at the least where it begins anew: a computer's own clock may be set
-back by less, which is no reason for stamps that go back."""
+MIN_JUMP_BACK = 1_000_000_000
+"""ns by which ROS time must go back to count as a restart; a system clock may be set back by less,
+and stamps are not to go back then."""
 
-SLACK = 5_000_000
-"""ns that ROS time may be off a line over the steady clock before stamps follow it: a /clock goes
-in jumps, and stamps shall be spaced as the ticks are."""
+MAX_DRIFT = 5_000_000
+"""ns between ROS time and its extrapolation before stamps follow ROS time: a /clock advances in
+steps, and stamps are to be spaced as the ticks are."""
 
-DOUBT = 200_000
-"""ns between two looks at the steady clock, above which ROS time, read between, says too little."""
+MAX_READ_TIME = 200_000
+"""ns between two readings of the steady clock above which a ROS time read between is not used."""
 
 
 class Stamps:
-    """Stamps in ns: the ROS time at which a state was due on the wall.
+    """Stamps in ns: the ROS time at which each state was due.
 
-    They lie on a line over the steady clock as long as ROS time does, so that ticks that are due at
-    equal distances have stamps at equal distances. They never go back, except where ROS time
-    itself begins, at the first word of a /clock or as it goes back by more than a second; until
-    then they count from zero.
+    They are the steady clock plus an offset as long as ROS time is, so evenly spaced ticks have
+    evenly spaced stamps. They never go back, except where ROS time restarts: at the first message
+    of a /clock, or when it jumps back by more than a second. Before the first /clock they count
+    from zero.
 
-    ``now`` gives ROS time, ns, zero: not known yet; ``steady`` the time that ticks are due by.
+    ``now`` returns ROS time, ns, 0 while unknown; ``steady`` the clock of the ticks' due times, ns.
     """
 
     def __init__(self, now: Callable[[], int],
                  steady: Callable[[], int] = time.monotonic_ns) -> None:
         self._now, self._steady = now, steady
-        self._seen = now()
-        self._offset = self._seen - steady()
-        self.newest = self._seen
-        """Stamp of the newest state."""
+        self._last_now = now()
+        self._offset = self._last_now - steady()
+        self.latest = self._last_now
+        """Stamp of the latest state."""
 
-    def take(self, due: float | None = None) -> None:
-        """Stamp a new state that was due at this steady time, ns; now, if it is not said."""
-        self._follow()
+    def advance(self, due: float | None = None) -> None:
+        """Stamp a new state that was ``due`` at this steady time, ns; default: now."""
+        self._update_offset()
         due = self._steady() if due is None else round(due)
-        self.newest = max(due + self._offset, self.newest + 1)
+        self.latest = max(due + self._offset, self.latest + 1)
 
-    def _follow(self) -> None:
-        """Bring the line back to ROS time where that has left it."""
+    def _update_offset(self) -> None:
+        """Follow ROS time after a jump or a drift."""
         before = self._steady()
-        now, seen = self._now(), self._seen
+        now, last = self._now(), self._last_now
         after = self._steady()
-        self._seen = now
-        if seen == 0 < now or now < seen - STEP_BACK:
-            self._offset, self.newest = now - after, 0
-        elif now and after - before < DOUBT and abs(now - after - self._offset) > SLACK:
+        self._last_now = now
+        if last == 0 < now or now < last - MIN_JUMP_BACK:
+            self._offset, self.latest = now - after, 0
+        elif now and after - before < MAX_READ_TIME and abs(now - after - self._offset) > MAX_DRIFT:
             self._offset = now - after

@@ -1,4 +1,4 @@
-"""Ticks by the clock on the wall."""
+"""The tick timer, and rate limits for what rclpy's executor polls at each wake-up."""
 from __future__ import annotations
 
 import math
@@ -9,87 +9,110 @@ from rclpy.clock import Clock
 from rclpy.node import Node
 
 from ..realtime.pacer import Pacer
-from .glance import Glance
 
-SHORTEST_PERIOD = 1_000_000
-"""ns between two calls of the timer at the least; at a faster pace, it makes several ticks."""
+MIN_TIMER_PERIOD = 1_000_000
+"""ns; for a shorter tick period the timer callback makes several ticks."""
 
-LONGEST_BURST = 20_000_000
-"""ns that the timer may make ticks for before others have their turn."""
+MAX_CALLBACK_TIME = 20_000_000
+"""ns that one timer callback may spend on ticks before other callbacks get their turn."""
 
-CATCH_UP = 2
-"""Times the wanted pace at which a stall is caught up: listeners' queues are ten messages long."""
+CATCH_UP_RATE = 2
+"""Largest tick rate after a stall, relative to the normal rate: queues are ten messages deep."""
 
-DOZING = 2
-"""Ticks at once while none matters: who comes to listen, and what pushes, waits for one more at the
-most, and no stamp is late by more than a tick."""
+IDLE_TICKS = 2
+"""Ticks per wake-up while idle: a new subscriber or push waits for one more tick at most, and no
+stamp is late by more than a tick."""
 
-CALLS, MISFITS = 100_000_000, 1_000_000_000
-"""ns for which the call of a service may wait while ticks follow each other closely, and the
-warning that another's topic does not fit."""
+SERVICE_INTERVAL, QOS_EVENT_INTERVAL = 100_000_000, 1_000_000_000
+"""ns between two polls of the services and of the QoS events (incompatible QoS of other nodes)."""
+
+
+class PollThrottle:
+    """Rate limiter: polls services and QoS events for two wake-ups per ``interval`` (ns).
+
+    At each wake-up rclpy's executor goes through all waitables of a node: services and QoS events,
+    37 here, cost more per tick than a sleeping doll. Two wake-ups, because the executor collects
+    the entities, waits, and then handles what it had collected; a timer that is ready comes first.
+    """
+
+    def __init__(self, interval: int) -> None:
+        self._interval = interval
+        self._wakes_left = 2
+        self._next = 0
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the entities are to be polled now."""
+        return self._wakes_left > 0
+
+    def wake(self, now: int) -> None:
+        """Count a wake-up of the timer at ``now``, ns of the steady clock."""
+        self._wakes_left = max(0, self._wakes_left - 1)
+        if not self._wakes_left and now >= self._next:
+            self._wakes_left, self._next = 2, now + self._interval
 
 
 class Ticker:
-    """A timer of the ``steady`` clock that calls ``tick`` each period, from start() to stop().
+    """A timer on the ``steady`` clock that calls ``tick(due)`` each period, from start() to stop().
 
-    ``tick`` gets the steady time, ns, at which it is due.
+    ``due`` is the steady time, ns, at which the tick was due.
     """
 
     def __init__(self, node: Node, steady: Clock, tick: Callable[[float], None]) -> None:
         self._tick = tick
         self._pacer, self._runs = Pacer(1.0, 0), False
-        self._glances = {patience: Glance(patience) for patience in (CALLS, MISFITS)}
-        self._timer = node.create_timer(1.0, self._catch_up, clock=steady)
+        self._throttles = {interval: PollThrottle(interval)
+                           for interval in (SERVICE_INTERVAL, QOS_EVENT_INTERVAL)}
+        self._timer = node.create_timer(1.0, self._on_timer, clock=steady)
 
     @property
-    def lost(self) -> float:
-        """Time that was given up in long stalls, ns."""
-        return self._pacer.lost
+    def dropped_time(self) -> float:
+        """Time, ns, that was not caught up after long stalls."""
+        return self._pacer.dropped_time
 
     @property
-    def dropped(self) -> int:
-        """Ticks that were given up with it."""
-        return round(self._pacer.dropped)
+    def dropped_ticks(self) -> int:
+        """Number of ticks that would have been made in that time."""
+        return round(self._pacer.dropped_ticks)
 
-    def looks(self, patience: int) -> bool:
-        """Whether what may wait for ``patience``, CALLS or MISFITS, is to be looked at now."""
-        return not self._runs or self._glances[patience].is_open
+    def polls(self, interval: int) -> bool:
+        """Whether entities of this ``interval``, one of those above, are to be polled now."""
+        return not self._runs or self._throttles[interval].is_open
 
     def start(self, period: float) -> None:
-        """Begin anew: the first tick comes one ``period``, ns, from now."""
+        """Start or restart; the first tick is due one ``period``, ns, from now."""
         self._pacer.period = period
         self._pacer.start(time.monotonic_ns())
-        self._wake_for(1)
+        self._set_ticks_per_wake(1)
         self._timer.reset()
         self._runs = True
 
-    def doze(self, wanted: bool) -> None:
-        """Wake for every second tick, to make two then, or for each: to wake costs rclpy more than
-        a tick costs that nobody hears, of dolls that sleep.
+    def set_idle(self, idle: bool) -> None:
+        """While all dolls sleep without a subscriber, wake every second tick and make two: an
+        rclpy wake-up costs more than such a tick.
         """
-        ticks = DOZING if wanted else 1
-        if ticks != self._at_once:
-            self._wake_for(ticks)
+        ticks = IDLE_TICKS if idle else 1
+        if ticks != self._ticks_per_wake:
+            self._set_ticks_per_wake(ticks)
 
     def stop(self) -> None:
-        """No tick from now on."""
+        """Stop ticking."""
         self._timer.cancel()
         self._runs = False
 
-    def _wake_for(self, ticks: int) -> None:
-        """Have the timer wake once for so many ticks."""
-        self._at_once, period = ticks, self._pacer.period
-        self._timer.timer_period_ns = max(SHORTEST_PERIOD, round(period)) * ticks
-        self._most_ticks = math.ceil(CATCH_UP * self._timer.timer_period_ns / period)
+    def _set_ticks_per_wake(self, ticks: int) -> None:
+        self._ticks_per_wake, period = ticks, self._pacer.period
+        self._timer.timer_period_ns = max(MIN_TIMER_PERIOD, round(period)) * ticks
+        self._max_ticks = math.ceil(CATCH_UP_RATE * self._timer.timer_period_ns / period)
 
-    def _catch_up(self) -> None:
-        """Make the ticks that are due, as far as there is time."""
+    def _on_timer(self) -> None:
+        """Make the ticks that are due, within the time limit."""
         woken = time.monotonic_ns()
-        for glance in self._glances.values():
-            glance.wake(woken)
-        end = woken + LONGEST_BURST
-        for _ in range(self._most_ticks):
+        for throttle in self._throttles.values():
+            throttle.wake(woken)
+        end = woken + MAX_CALLBACK_TIME
+        for _ in range(self._max_ticks):
             now = time.monotonic_ns()
             if now > end or not self._pacer.due(now):
                 break
-            self._tick(self._pacer.at)
+            self._tick(self._pacer.last_due)

@@ -7,7 +7,7 @@ import time
 import viser
 
 from ..model.scene import Scene
-from ..realtime.arrow_keys import STRENGTH, TAP, Pressed, total
+from ..realtime.arrow_keys import FORCE, TAP, PressedKeys, total_force
 from .browser.client_events import tell
 from .sources.source import Source
 
@@ -69,7 +69,7 @@ class PushKeys:
     def __init__(self, server: viser.ViserServer, source: Source) -> None:
         self._source = source
         self._lock = threading.Lock()
-        self._pressed: dict[int, Pressed] = {}
+        self._pressed: dict[int, PressedKeys] = {}
         self._mass = 0.0
         self._next = 0.0
         self._pushing = False
@@ -81,7 +81,7 @@ class PushKeys:
             'left, away, toward you, right; arrow keys do the same, and push on while they are '
             'held')
         self.strength = gui.add_slider('Strength, N', *STRENGTHS, step=STEP,
-                                       initial_value=STRENGTH, visible=can_push, hint='of a push')
+                                       initial_value=FORCE, visible=can_push, hint='of a push')
         self._effect = gui.add_html('', visible=can_push)
         self.strength.on_update(lambda _: self._tell_effect())
         buttons.on_click(lambda event: self.tap(ARROWS[event.target.value]))
@@ -96,14 +96,14 @@ class PushKeys:
 
     def tap(self, arrow: str) -> None:
         """Push for a tap."""
-        self._source.push(total([arrow], self.strength.value), TAP)
+        self._source.push(total_force([arrow], self.strength.value), TAP)
 
     def take(self, page: int, down: list[str], now: float) -> None:
         """Enter which arrows are down on a page; what goes down pushes for a tap at least."""
         with self._lock:
-            pressed = self._pressed.setdefault(page, Pressed())
-            if pressed.take(down, now):
-                self._source.push(total(self._at(now), self.strength.value), TAP)
+            pressed = self._pressed.setdefault(page, PressedKeys())
+            if pressed.report(down, now):
+                self._source.push(total_force(self._at(now), self.strength.value), TAP)
 
     def keep(self, now: float) -> None:
         """Push on with what is held, and end the push of what no longer is; called at each turn."""
@@ -111,7 +111,7 @@ class PushKeys:
             held = any(each.held(now) for each in self._pressed.values())
             if held and now >= self._next:
                 self._next = now + REFRESH
-                self._source.push(total(self._at(now), self.strength.value), LASTS)
+                self._source.push(total_force(self._at(now), self.strength.value), LASTS)
             elif self._pushing and not held:
                 self._source.push((0.0, 0.0, 0.0), TAP)
             self._pushing = held
@@ -122,7 +122,7 @@ class PushKeys:
         self._tell_effect()
 
     def _at(self, now: float) -> list[str]:
-        return [arrow for each in self._pressed.values() for arrow in each.at(now)]
+        return [arrow for each in self._pressed.values() for arrow in each.active(now)]
 
     def _tell_effect(self) -> None:
         force = self.strength.value

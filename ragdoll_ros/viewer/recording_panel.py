@@ -9,7 +9,7 @@ import numpy as np
 import viser
 
 from ..recordings.mcap_file import recording_bytes
-from ..recordings.recording import Pose, Recorder
+from ..recordings.recording import RecordedPose, Recorder
 from .sources.source import Frame
 
 MOST_NUMBERS = 5_000_000
@@ -69,7 +69,7 @@ class RecordingPanel:
         if recorder.scene is not frame.scene:
             self._end(ELSEWHERE)
             return
-        pose = Pose(frame.state.positions, frame.state.orientations, frame.rods)
+        pose = RecordedPose(frame.state.positions, frame.state.orientations, frame.rods)
         numbers = pose.positions.size + pose.orientations.size + np.size(pose.rods)
         recorder.add(frame.time, pose)
         if (len(recorder) + 1) * numbers > MOST_NUMBERS:

@@ -13,7 +13,7 @@ import time
 
 import numpy as np
 
-from ...files.repeat import repeated
+from ...files.repeat import repeated_placements
 from ...files.scene import load_scene
 from ...model.push import Push
 from ...model.scene import Placement, Scene
@@ -35,7 +35,7 @@ def grid(count: int, **placed: object) -> Scene:
     drop = load_scene('drop')
     first = Placement(drop.dolls[0].doll, **placed)
     return dataclasses.replace(drop, name='grid', dolls=tuple(
-        repeated(first, {'count': count, 'grid': (SPACING, SPACING, 0.0)})))
+        repeated_placements(first, {'count': count, 'grid': (SPACING, SPACING, 0.0)})))
 
 
 def turning(count: int, first: int = 0) -> Scene:

@@ -10,7 +10,7 @@ import subprocess
 import sys
 from collections import Counter
 
-from ...files.repeat import repeated
+from ...files.repeat import repeated_placements
 from ...files.scene import load_scene
 from ...model.push import Push
 from ...model.scene import Placement, Scene
@@ -26,10 +26,10 @@ def sixty() -> Scene:
     """A lone doll, 50 dolls on their faces, most of them soon asleep, and 9 that fall onto them."""
     drop = load_scene('drop')
     doll = drop.dolls[0].doll
-    lying = repeated(
+    lying = repeated_placements(
         Placement(doll, 'doll', (0.0, 0.0, 0.12), (0.0, 1.0, 0.0, 1.0)),
         {'count': 50, 'grid': (2.5, 2.5, 0.0), 'columns': (10, 5), 'turned': 'yaw', 'seed': 1})
-    falling = repeated(
+    falling = repeated_placements(
         Placement(doll, 'falling', (1.0, 0.0, 0.8), spin=(0.2, 0.3, 0.0)),
         {'count': 9, 'grid': (7.5, 5.0, 0.5), 'columns': (3, 3)})
     lone = Placement(doll, 'lone', (-20.0, 0.0, 0.0), spin=(0.2, 0.3, 0.0))
@@ -41,17 +41,17 @@ def run(simulation: Simulation, ticks: int, seen: Counter | None = None) -> tupl
     scene, crowd, first = simulation.scene, hashlib.sha256(), hashlib.sha256()
     engine, pushes = simulation._engine, PUSHES if len(scene.dolls) > 1 else {}
     for tick in range(ticks):
-        rested = engine.resting.copy()
+        rested = engine.sleeping.copy()
         if 10 * tick % ticks == 0 and 10 * tick // ticks in pushes:
             simulation.push(pushes[10 * tick // ticks])
         rows = simulation.advance().rows
         crowd.update(rows.tobytes())
         first.update(rows[scene.bone_slices[0]].tobytes())
         if seen is not None:
-            joined = len(scene.dolls) - len(set(engine.groups.tolist()))
+            joined = len(scene.dolls) - len(set(engine.cluster_of_doll.tolist()))
             seen['joined'] = max(seen['joined'], joined)
-            seen['slept'] += int((engine.resting & ~rested).sum())
-            seen['woke'] += int((rested & ~engine.resting).sum())
+            seen['slept'] += int((engine.sleeping & ~rested).sum())
+            seen['woke'] += int((rested & ~engine.sleeping).sum())
     return crowd.hexdigest(), first.hexdigest()
 
 

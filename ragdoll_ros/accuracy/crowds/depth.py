@@ -33,7 +33,7 @@ class BoneDepth:
         self._turns = self._model.geom_quat[own][:, [1, 2, 3, 0]]
         self._radii = np.array([np.linalg.norm(bone.shape.half_extents) for bone in scene.bones])
         apart = {frozenset(scene.bone_index(scene.qualified(placement, name)) for name in pair)
-                 for placement in scene.dolls for pair in placement.doll.never_collide}
+                 for placement in scene.dolls for pair in placement.doll.excluded_pairs}
         pairs = itertools.combinations(range(len(bodies)), 2) if scene.self_collision else ()
         self._pairs = np.array([pair for pair in pairs if frozenset(pair) not in apart],
                                int).reshape(-1, 2)

@@ -131,7 +131,7 @@ def run_pile(scene: Scene, depths: BoneDepth, **options: object) -> Outcome:
     """Simulate a scene; ``options`` are passed to Simulation."""
     with Simulation(scene, **options) as simulation:
         return measured(scene, depths, simulation.advance, lambda: float(
-            simulation._engine.layout.past_limits(simulation.coordinates.q).max()))
+            simulation._engine.layout.limit_violations(simulation.coordinates.q).max()))
 
 
 def pile() -> None:

@@ -73,7 +73,7 @@ def impact_times(restitution: float) -> list[float]:
 def dropped(shape: Shape, restitution: float, flights: list[float], tick: float) -> Trial:
     """A body released level, 1 m above the ground."""
     doll = Ragdoll('body', (Bone('body', shape, 1.0, (0.0, 0.0, 0.0)),))
-    up = float(shape.reach(np.array((0.0, 0.0, -1.0))))
+    up = float(shape.support(np.array((0.0, 0.0, -1.0))))
     scene = Scene('bounce', (Placement(doll, position=(0.0, 0.0, up + HEIGHT)),), Ground(),
                   Material(0.0, 0.0, restitution), step=tick)
     return Trial(scene, (math.ceil(flights[-1] / tick) + 1) * tick)
@@ -85,7 +85,7 @@ def apex_shares(trajectory: Trajectory, shape: Shape, flights: list[float],
 
     Flights without a tick near the middle are skipped.
     """
-    up = float(shape.reach(np.array((0.0, 0.0, -1.0))))
+    up = float(shape.support(np.array((0.0, 0.0, -1.0))))
     height = (trajectory.positions[:, 0, 2] - up
               + trajectory.linear_velocities[:, 0, 2] ** 2 / (2 * GRAVITY))
     shares = []

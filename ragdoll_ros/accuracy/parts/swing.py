@@ -17,7 +17,7 @@ from ...model.ragdoll import Bone
 from ...model.shapes import Sphere
 from ...model.state import State
 from ...model.swing import Link, Swing
-from ...physics.swing.mount import Mount
+from ...physics.swing.mount import SwingMount
 from ...physics.swing.swings import Swings
 from ..references.closed_forms import pendulum_angle
 from ..results.runner import Job, Row, RunOptions
@@ -53,7 +53,7 @@ def measure() -> list[Row]:
 
 def _swings(link: Link, mode: str, gravity: float, **fields: object) -> Swings:
     swing = Swing('swing', 'bone', (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (link,), mode=mode, **fields)
-    mount = Mount.on(swing, Bone('bone', Sphere(0.1), 1.0, (0.0, 0.0, 0.0)), 0)
+    mount = SwingMount.on(swing, Bone('bone', Sphere(0.1), 1.0, (0.0, 0.0, 0.0)), 0)
     return Swings([mount], (0.0, 0.0, -gravity), lambda time: STILL)
 
 

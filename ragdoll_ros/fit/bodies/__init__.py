@@ -1,1 +1,1 @@
-"""What bodies weigh, and where they may not be in each other."""
+"""Masses of bodies, and overlaps between them."""

@@ -1,8 +1,8 @@
-"""How much of the volume inside a skin each body has.
+"""Volume that the skin of each body encloses, by the divergence theorem.
 
-A body's triangles are closed by fans where a neighbour's begin, one over each seam; two bodies
-share the seam's middle, so that together they have the volume of the whole. What is then left open
-where three bodies meet is closed by a fan as well. The volume is by the divergence theorem.
+The triangles of a body form an open surface. A triangle fan caps each boundary with a neighbour;
+both bodies share the fan's centre, so that the volumes add up to that of the whole skin. Another
+fan caps what remains open where three bodies meet.
 """
 from __future__ import annotations
 
@@ -10,44 +10,44 @@ import numpy as np
 
 from ..reading.character import Character
 
-WELDED = 1e-6
-"""Vertices as near as this, of the whole, are one: exporters split them at seams of textures."""
+WELD_TOLERANCE = 1e-6
+"""Vertices closer than this fraction of the extent are one: exporters split texture seams."""
 
 
 def skin_volumes(character: Character, carriers: np.ndarray, count: int) -> np.ndarray:
-    """Volume (count,) m^3 of the skin of each body; ``carriers`` (v,) has each vertex's, or -1.
+    """Skin volume (count,) m^3 of each body; ``carriers`` (v,) is each vertex's body, or -1.
 
-    Of a skin that is open or flat, what the fans over its rims make of it: little or nothing.
+    Near zero where the skin is open or flat.
     """
-    points, places = _welded(character)
+    points, places = _weld_vertices(character)
     triangles = places[character.triangles]
-    # Of a triangle between bodies: the one with two corners, else the first corner's.
+    # A triangle across a boundary belongs to the body with two corners, else to the first corner's.
     corner = carriers[character.triangles]
     owners = np.where(corner[:, 1] == corner[:, 2], corner[:, 1], corner[:, 0])
-    rims, bodies, others = _seams(triangles, owners, len(points))
+    rims, bodies, others = _boundary_edges(triangles, owners, len(points))
     volumes = np.zeros(count)
     for body in range(count):
         mine, own = triangles[owners == body], bodies == body
         cones = [points[mine]] if len(mine) else []
-        cones += _fans(points[rims[own]], _labels(rims[own], others[own]))
+        cones += _cap_boundaries(points[rims[own]], _boundary_loops(rims[own], others[own]))
         volumes[body] = sum(_volume(cone) for cone in cones)
-    # A mirrored skin is inside out.
+    # A mirrored skin has its triangles inside out.
     return volumes * (np.sign(volumes.sum()) or 1.0)
 
 
-def _welded(character: Character) -> tuple[np.ndarray, np.ndarray]:
-    """Points (p, 3) m about their middle, each place once, and the place (v,) of each vertex."""
+def _weld_vertices(character: Character) -> tuple[np.ndarray, np.ndarray]:
+    """Unique points (p, 3) m about their mean, and the point index (v,) of each vertex."""
     vertices = character.vertices - character.vertices.mean(axis=0)
-    _, first, places = np.unique(np.round(vertices / (WELDED * character.extent)), axis=0,
+    _, first, places = np.unique(np.round(vertices / (WELD_TOLERANCE * character.extent)), axis=0,
                                  return_index=True, return_inverse=True)
     return vertices[first], places.ravel()
 
 
-def _seams(triangles: np.ndarray, owners: np.ndarray,
-           count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Edges (e, 2) where bodies end, the body (e,) of each, and which (e,) is beyond: -1 for none.
+def _boundary_edges(triangles: np.ndarray, owners: np.ndarray,
+                    count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Boundary edges (e, 2) of the bodies, each edge's body (e,) and neighbour (e,), -1 for none.
 
-    Each edge in the order of its triangle, so that a seam has it once for either side.
+    Edges keep the winding of their triangle, so a boundary between two bodies appears twice.
     """
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     body = np.tile(owners, 3)
@@ -59,8 +59,8 @@ def _seams(triangles: np.ndarray, owners: np.ndarray,
     return edges[rim], body[rim], beyond[rim]
 
 
-def _labels(edges: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Number (e,) of the seam of each edge (e, 2): with one neighbour, and all in one piece."""
+def _boundary_loops(edges: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Label (e,) of each edge's (e, 2) boundary: connected, and with one neighbour."""
     heads: dict[tuple[int, int], tuple[int, int]] = {}
 
     def head(key: tuple[int, int]) -> tuple[int, int]:
@@ -76,8 +76,8 @@ def _labels(edges: np.ndarray, others: np.ndarray) -> np.ndarray:
         if keys else np.zeros(0, int)
 
 
-def _fans(rims: np.ndarray, labels: np.ndarray) -> list[np.ndarray]:
-    """Triangles (t, 3, 3) m that close rims (e, 2, 3) m, each seam's by a fan about its middle."""
+def _cap_boundaries(rims: np.ndarray, labels: np.ndarray) -> list[np.ndarray]:
+    """Triangles (t, 3, 3) m that cap the boundary edges (e, 2, 3) m, one fan for each label."""
     fans, open_ = [], []
     for label in range(labels.max(initial=-1) + 1):
         edges = rims[labels == label]
@@ -97,6 +97,6 @@ def _fan(edges: np.ndarray, middle: np.ndarray) -> np.ndarray:
 
 
 def _volume(triangles: np.ndarray) -> float:
-    """Volume between triangles (t, 3, 3) and the origin, m^3, outwards positive."""
+    """Volume between triangles (t, 3, 3) m and the origin, m^3, positive for outward normals."""
     a, b, c = triangles.transpose(1, 0, 2)
     return float(np.einsum('ti,ti->', a, np.cross(b, c)) / 6)

@@ -1,7 +1,7 @@
-"""Bodies that overlap a little without a joint between them are cut back until they do not.
+"""Trim shallow overlaps between bodies that no joint connects.
 
-Two thighs touch at the crotch; as bodies they would push each other apart from the start. What
-overlaps deeply stays as it is, and is let through (see colliding_pairs).
+Two thighs touch at the crotch; as bodies they would push each other apart at the start. Deep
+overlaps stay and are excluded from collision (see colliding_overlaps).
 """
 from __future__ import annotations
 
@@ -12,111 +12,113 @@ import numpy as np
 from ...model import rotation
 from ...model.ragdoll import Bone
 from ...model.shapes import Box, Shape, Sphere
-from ..shapes.shapes import Fitted
-from ..skeleton.anchors import NEAR, outside
-from ..skeleton.groups import Group
-from .overlap import DEEP
+from ..shapes.fitting import FittedShape
+from ..skeleton.anchors import ANCHOR_TOLERANCE, relative_distance
+from ..skeleton.groups import BodyGroup
+from .overlap import MIN_OVERLAP
 
-SHALLOW = 0.35
-"""Overlaps up to this share of half the thinner body's thickness are cut away."""
+MAX_TRIM = 0.35
+"""Deepest overlap that is trimmed, as a fraction of the thinner body's half thickness."""
 
-ROUNDS = 6
+MAX_ROUNDS = 6
 
 _HEIGHTS = np.linspace(-1, 1, 201)
 _AROUND = np.pi * (3 - np.sqrt(5)) * np.arange(201)
-WAYS = np.stack([np.sqrt(1 - _HEIGHTS ** 2) * np.cos(_AROUND),
-                 np.sqrt(1 - _HEIGHTS ** 2) * np.sin(_AROUND), _HEIGHTS], axis=1)
-"""Unit directions (201, 3), evenly on the sphere: a spiral of the golden angle."""
+DIRECTIONS = np.stack([np.sqrt(1 - _HEIGHTS ** 2) * np.cos(_AROUND),
+                       np.sqrt(1 - _HEIGHTS ** 2) * np.sin(_AROUND), _HEIGHTS], axis=1)
+"""Unit directions (201, 3), evenly spread over the sphere: a golden-angle spiral."""
 
 
-def trimmed(groups: list[Group], fits: list[Fitted], frames: list[np.ndarray]) -> list[Fitted]:
-    """The groups' bodies without the shallow overlaps of those that no joint connects.
+def trim_overlaps(groups: list[BodyGroup], fits: list[FittedShape],
+                  frames: list[np.ndarray]) -> list[FittedShape]:
+    """The groups' shapes without shallow overlaps between bodies that no joint connects.
 
-    What would take a body away from its joint is not cut.
-
-    ``fits`` are centred in the doll's frame, ``frames`` (3, 3) have their axes as columns.
+    A cut that would move a body away from one of its joints is not made. The ``fits`` are centred
+    in the doll's frame; ``frames`` (3, 3) have the shapes' axes as columns.
     """
     bones = [Bone(group.name, fit.shape, 1.0, fit.centre, rotation.from_matrix(frame))
              for group, fit, frame in zip(groups, fits, frames, strict=True)]
     pairs = [(i, k) for k in range(len(bones)) for i in range(k)
              if groups[k].parent != i and groups[i].parent != k]
     anchors = [np.array([each.anchor for k, each in enumerate(groups) if each.parent >= 0
-                         and not each.tied and index in (k, each.parent)]).reshape(-1, 3)
+                         and not each.fixed and index in (k, each.parent)]).reshape(-1, 3)
                for index in range(len(groups))]
-    most = {pair: SHALLOW * min(min(bones[k].shape.half_extents) for k in pair) for pair in pairs}
-    for _ in range(ROUNDS):
+    most = {pair: MAX_TRIM * min(min(bones[k].shape.half_extents) for k in pair) for pair in pairs}
+    for _ in range(MAX_ROUNDS):
         cuts = [cut for pair in pairs for cut in _cuts(bones, pair, most[pair])]
-        for index, way, depth in cuts:
-            less = _cut(bones[index], way, depth)
-            if _holds(less, anchors[index]):
-                bones[index] = less
+        for index, direction, depth in cuts:
+            cut = _cut(bones[index], direction, depth)
+            if _reaches_joints(cut, anchors[index]):
+                bones[index] = cut
         if not cuts:
             break
     return [dataclasses.replace(fit, shape=bone.shape, centre=np.array(bone.position))
             for fit, bone in zip(fits, bones, strict=True)]
 
 
-def _holds(bone: Bone, anchors: np.ndarray) -> bool:
-    """Whether a body is still at all its joints (k, 3)."""
-    return bool((outside(bone.shape, bone.pose.inward(anchors)) <= NEAR).all())
+def _reaches_joints(bone: Bone, anchors: np.ndarray) -> bool:
+    """Whether a body still reaches the anchors (k, 3) of its joints."""
+    distances = relative_distance(bone.shape, bone.pose.apply_inverse(anchors))
+    return bool((distances <= ANCHOR_TOLERANCE).all())
 
 
 def _cuts(bones: list[Bone], pair: tuple[int, int],
           most: float) -> list[tuple[int, np.ndarray, float]]:
-    """What to cut off each of two bodies: its index, the direction (3,) and how much, m."""
+    """Cuts for two bodies: index of the body, direction (3,) and depth, m."""
     first, second = (bones[k] for k in pair)
     sizes = [float(np.linalg.norm(bone.shape.half_extents)) for bone in (first, second)]
     if np.linalg.norm(np.subtract(first.position, second.position)) > sum(sizes):
         return []
-    depth, way = _penetration(first, second)
-    if not DEEP / 2 < depth <= most:
+    depth, direction = _penetration(first, second)
+    if not MIN_OVERLAP / 2 < depth <= most:
         return []
-    return [(pair[0], way, depth / 2), (pair[1], -way, depth / 2)]
+    return [(pair[0], direction, depth / 2), (pair[1], -direction, depth / 2)]
 
 
 def _penetration(first: Bone, second: Bone) -> tuple[float, np.ndarray]:
-    """How deep two convex bodies are in each other, m, and the unit direction (3,) of the way out.
+    """Penetration depth of two convex bodies, m, and the unit separating direction (3,).
 
-    The least of h_a(n) + h_b(-n) - n d over directions n, with h the bodies' support functions and
-    d from a's centre to b's; below zero where they are apart.
+    The minimum of h_a(n) + h_b(-n) - n d over directions n, with the bodies' support functions h
+    and the offset d from a's centre to b's; negative for separated bodies.
     """
-    apart = np.subtract(second.position, first.position)
+    offset = np.subtract(second.position, first.position)
     axes = np.concatenate([rotation.matrix(np.array(bone.orientation)).T
                            for bone in (first, second)])
-    tried = np.concatenate([WAYS, axes, -axes, apart[None]])
+    tried = np.concatenate([DIRECTIONS, axes, -axes, offset[None]])
     for spread in (0.1, 0.02, 0.0):
         tried = tried / np.maximum(np.linalg.norm(tried, axis=1, keepdims=True), 1e-12)
-        depths = _reach(first, tried) + _reach(second, -tried) - tried @ apart
+        depths = _support(first, tried) + _support(second, -tried) - tried @ offset
         best = tried[np.argmin(depths)]
-        tried = np.concatenate([best[None], best + spread * WAYS])
+        tried = np.concatenate([best[None], best + spread * DIRECTIONS])
     return float(depths.min()), best
 
 
-def _reach(bone: Bone, ways: np.ndarray) -> np.ndarray:
-    """How far (k,) m a body reaches from its centre along directions (k, 3) of the doll's frame."""
-    return bone.shape.reach(rotation.rotate(rotation.inverse(np.array(bone.orientation)), ways))
+def _support(bone: Bone, directions: np.ndarray) -> np.ndarray:
+    """Support function (k,) m of a body about its centre; directions (k, 3), doll's frame."""
+    back = rotation.inverse(np.array(bone.orientation))
+    return bone.shape.support(rotation.rotate(back, directions))
 
 
-def _cut(bone: Bone, way: np.ndarray, depth: float) -> Bone:
-    """The body, reaching ``depth`` m less far along a unit direction (3,); its far side stays."""
-    turned = rotation.rotate(rotation.inverse(np.array(bone.orientation)), way)
-    shape, back = _narrower(bone.shape, turned, depth)
-    return dataclasses.replace(bone, shape=shape, position=bone.pose.outward(back[None])[0])
+def _cut(bone: Bone, direction: np.ndarray, depth: float) -> Bone:
+    """The body cut by ``depth`` m on the side of a unit direction (3,); the far side stays."""
+    local = rotation.rotate(rotation.inverse(np.array(bone.orientation)), direction)
+    shape, centre = _shrink(bone.shape, local, depth)
+    return dataclasses.replace(bone, shape=shape, position=bone.pose.apply(centre[None])[0])
 
 
-def _narrower(shape: Shape, way: np.ndarray, depth: float) -> tuple[Shape, np.ndarray]:
-    """The shape that is left, and where (3,) its centre is, in the frame of the shape."""
+def _shrink(shape: Shape, direction: np.ndarray, depth: float) -> tuple[Shape, np.ndarray]:
+    """The remaining shape, and its centre (3,) m in the frame of the given shape."""
     if isinstance(shape, Sphere):
-        return Sphere(shape.radius - depth / 2), -way * depth / 2
+        return Sphere(shape.radius - depth / 2), -direction * depth / 2
     if isinstance(shape, Box):
-        axis = int(np.argmax(np.abs(way)))
-        less = np.eye(3)[axis] * depth / abs(way[axis])
-        return Box(tuple(np.array(shape.size) - less)), -np.sign(way[axis]) * less / 2
-    across = float(np.hypot(*way[:2]))
-    if across < abs(way[2]):
-        less = min(depth / abs(way[2]), shape.length / 2)
-        back = np.array([0, 0, -np.sign(way[2]) * less / 2])
-        return dataclasses.replace(shape, length=shape.length - less), back
-    less = min(depth / across, shape.radius / 2)
-    return (dataclasses.replace(shape, radius=shape.radius - less / 2),
-            np.array([*(-way[:2] / across), 0]) * less / 2)
+        axis = int(np.argmax(np.abs(direction)))
+        cut = np.eye(3)[axis] * depth / abs(direction[axis])
+        return Box(tuple(np.array(shape.size) - cut)), -np.sign(direction[axis]) * cut / 2
+    across = float(np.hypot(*direction[:2]))
+    if across < abs(direction[2]):
+        cut = min(depth / abs(direction[2]), shape.length / 2)
+        centre = np.array([0, 0, -np.sign(direction[2]) * cut / 2])
+        return dataclasses.replace(shape, length=shape.length - cut), centre
+    cut = min(depth / across, shape.radius / 2)
+    return (dataclasses.replace(shape, radius=shape.radius - cut / 2),
+            np.array([*(-direction[:2] / across), 0]) * cut / 2)

@@ -1,1 +1,1 @@
-"""Kinds, axes and ranges of joints."""
+"""Joint kinds, axes, limits and damping."""

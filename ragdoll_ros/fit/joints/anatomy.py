@@ -1,12 +1,12 @@
-"""A person's joints of two and three angles: ranges from the anatomical pose, not the bind pose.
+"""Joints of a person with two or three angles, limited from the anatomical pose.
 
 In the anatomical pose a person stands upright, arms and legs down. The ranges are the averages of
 the American Academy of Orthopaedic Surgeons (Joint Motion: Method of Measuring and Recording,
 1965). The first angle is about an axis fixed in the parent: abduction of an arm, about forward;
-flexion of all else. The second takes the limb out of that plane, the third turns it about itself.
-So an arm bound straight out and one bound half down differ in the zero of the first angle, and in
-nothing else. Wrists turn about themselves with the forearm alone, which here has no such joint; an
-ankle's second angle is about the foot's own length.
+flexion of all others. The second moves the limb out of that plane, the third is the twist. So an
+arm bound straight out and one bound half down differ in the zero of the first angle only. A wrist
+has no twist: the forearm twists, which has no such joint here. An ankle's second angle is about
+the foot's long axis.
 """
 from __future__ import annotations
 
@@ -16,79 +16,80 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import rotation
-from ...model.ragdoll import LARGEST_SWING, Joint, Limits
-from .neutral import SLOPE, Neutral
+from ...model.ragdoll import MAX_SWING, Joint, Limits
+from .neutral import FOOT_SLOPE, NeutralDirections
 
-STEEPEST = math.radians(60)
-"""A limb bound further out of the plane of its first angle has no such angle."""
+MAX_ELEVATION = math.radians(60)
+"""Elevation out of the plane of the first angle beyond which that angle is undefined."""
 
 KNEE, ELBOW = math.radians(135), math.radians(150)
-"""Flexion from straight, same source."""
+"""Flexion from the straight limb, same source."""
 
 Degrees = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Range:
-    """Degrees from the anatomical pose, of the left side; None: no such angle."""
+class JointRange:
+    """Degrees from the anatomical pose, left side; None: no such angle."""
 
     first: Degrees
-    """About the axis of the joint's Neutral."""
+    """About the axis of the joint's NeutralDirections."""
     second: Degrees | None
-    """Toward that axis."""
+    """Towards that axis."""
     twist: Degrees | None
     mirrored: tuple[bool, bool, bool]
-    """Which of the three are the other way round on the right."""
+    """Which of the three change sign on the right side."""
 
 
 RANGES = {
-    # Adduction 30 (with the trunk in the way) to abduction 180; extension 60, and flexion up to
-    # where three angles lose a freedom: higher goes by abduction; rotation 90 out, 70 in.
-    'upper_arm': Range((-30, 180), (-60, 85), (-90, 70), (True, False, True)),
+    # Adduction 30 (the trunk blocks more) to abduction 180; extension 60, and flexion up to the
+    # gimbal singularity: abduction reaches higher; rotation 90 outward, 70 inward.
+    'upper_arm': JointRange((-30, 180), (-60, 85), (-90, 70), (True, False, True)),
     # Flexion 120 to extension 30; adduction 30 to abduction 45; rotation 45 both ways.
-    'thigh': Range((-120, 30), (-30, 45), (-45, 45), (False, True, True)),
+    'thigh': JointRange((-120, 30), (-30, 45), (-45, 45), (False, True, True)),
     # Extension 70 to flexion 80; radial deviation 20, ulnar 30.
-    'hand': Range((-70, 80), (-20, 30), None, (False, True, False)),
+    'hand': JointRange((-70, 80), (-20, 30), None, (False, True, False)),
     # Dorsiflexion 20 to plantar flexion 50; inversion 35, eversion 15.
-    'foot': Range((-20, 50), None, (-35, 15), (False, False, True)),
-    # Extension 45 to flexion 45; 45 to either side; rotation 60. Of all joints up to the head.
-    'neck': Range((-45, 45), (-45, 45), (-60, 60), (False, False, False))}
+    'foot': JointRange((-20, 50), None, (-35, 15), (False, False, True)),
+    # Extension 45 to flexion 45; 45 to either side; rotation 60. Total of all neck joints.
+    'neck': JointRange((-45, 45), (-45, 45), (-60, 60), (False, False, False))}
 RANGES['head'] = RANGES['neck']
 
 
-def persons_joint(parent: str, child: str, role: str, side: int, anchor: np.ndarray,
-                  rest: Neutral, share: float = 1.0) -> Joint | None:
-    """Joint of a limb whose role has ranges; ball or, without a second or a twist, universal.
+def human_joint(parent: str, child: str, role: str, side: int, anchor: np.ndarray,
+                rest: NeutralDirections, share: float = 1.0) -> Joint | None:
+    """Joint of a limb whose role has ranges: ball or, with two angles, universal.
 
-    ``side`` is 1 left, -1 right; ``share`` of the ranges is this joint's. None where the limb is
-    bound too steeply out of the plane of the first angle.
+    ``side`` is 1 left, -1 right; ``share`` is the fraction of the ranges of this joint. None where
+    the limb is bound too steeply out of the plane of the first angle.
     """
-    found, axis = RANGES[role], rest.axis
-    out = math.asin(max(-1.0, min(1.0, float(rest.along @ axis))))
-    if abs(out) > STEEPEST:
+    ranges, axis = RANGES[role], rest.axis
+    elevation = math.asin(max(-1.0, min(1.0, float(rest.along @ axis))))
+    if abs(elevation) > MAX_ELEVATION:
         return None
-    inside = rest.along - (rest.along @ axis) * axis
-    inside = inside / np.linalg.norm(inside)
+    in_plane = rest.along - (rest.along @ axis) * axis
+    in_plane = in_plane / np.linalg.norm(in_plane)
     # About the axis from straight, right-handed.
-    bound = math.atan2(float(np.cross(rest.straight, inside) @ axis), float(rest.straight @ inside))
+    bind_angle = math.atan2(float(np.cross(rest.straight, in_plane) @ axis),
+                            float(rest.straight @ in_plane))
     first, second, twist = (
-        pair and _from(pair, zero, share, side < 0 and flips) for pair, zero, flips in zip(
-            (found.first, found.second, found.twist), (bound, out, 0.0), found.mirrored,
-            strict=True))
+        pair and _limits(pair, zero, share, side < 0 and flips) for pair, zero, flips in zip(
+            (ranges.first, ranges.second, ranges.twist), (bind_angle, elevation, 0.0),
+            ranges.mirrored, strict=True))
     if second is None:
-        length = rotation.rotate(rotation.from_axis_angle(axis, -SLOPE), inside)
-        return Joint(parent, child, 'universal', anchor, (axis, length), (first, twist))
+        foot_axis = rotation.rotate(rotation.from_axis_angle(axis, -FOOT_SLOPE), in_plane)
+        return Joint(parent, child, 'universal', anchor, (axis, foot_axis), (first, twist))
     if twist is None:
-        return Joint(parent, child, 'universal', anchor, (axis, np.cross(inside, axis)),
+        return Joint(parent, child, 'universal', anchor, (axis, np.cross(in_plane, axis)),
                      (first, second))
-    second = tuple(max(-LARGEST_SWING, min(LARGEST_SWING, angle)) for angle in second)
-    return Joint(parent, child, 'ball', anchor, (inside, axis), (first, second, twist))
+    second = tuple(max(-MAX_SWING, min(MAX_SWING, angle)) for angle in second)
+    return Joint(parent, child, 'ball', anchor, (in_plane, axis), (first, second, twist))
 
 
-def _from(pair: Degrees, zero: float, share: float, mirrored: bool) -> Limits:
-    """Degrees to rad, counted from ``zero`` rad."""
+def _limits(pair: Degrees, zero: float, share: float, mirrored: bool) -> Limits:
+    """Limits, rad from ``zero`` rad, of a range in degrees from the anatomical pose."""
     if mirrored:
         pair = -pair[1], -pair[0]
     low, high = (share * math.radians(angle) - zero for angle in pair)
-    # An arm bound higher than any arm goes may stay there.
+    # The bind pose is always within the limits.
     return min(low, 0.0), max(high, 0.0)

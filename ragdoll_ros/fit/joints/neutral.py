@@ -1,8 +1,7 @@
-"""Where a person's limbs point in the anatomical pose, carried into the bind pose by their parents.
+"""Directions of a person's limbs in the anatomical pose, transferred to the bind pose.
 
-Upright, arms and legs down, feet flat. Shoulders and hips are seen from the trunk, which stands
-upright in every bind pose; a wrist, an ankle or a head from the bone before it, whatever way that
-one is bound.
+In the anatomical pose arms and legs hang down and the feet are level. Shoulders and hips refer to
+the trunk, which is upright in every bind pose; a wrist, ankle or head to the bone before it.
 """
 from __future__ import annotations
 
@@ -12,76 +11,78 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..reading.character import Character
-from ..skeleton.groups import Group
+from ..skeleton.groups import BodyGroup
 
 FORWARD, LEFT, UP = np.eye(3)
 
-SLOPE = math.atan(0.039 / 0.114)
-"""How far the toes' end is below a level line through the ankle, as an angle: of a person's
-height the ankle is .039 above the sole, the foot .152 long, a quarter of it behind the ankle
+FOOT_SLOPE = math.atan(0.039 / 0.114)
+"""Angle below horizontal of the line from the ankle to the end of the toes. As fractions of body
+height, the ankle is .039 above the sole; the foot is .152 long, a quarter of it behind the ankle
 (Drillis and Contini, Body Segment Parameters, 1966)."""
 
-TOES = 0.1
-"""Share of a foot's skin, that farthest from the ankle, whose middle is the toes' end."""
+TOE_SHARE = 0.1
+"""Fraction of a foot's vertices, farthest from the ankle, whose mean is the end of the toes."""
 
-FLAT = 0.8
-"""A hand is flat, so that its skin tells where the palm is, where it is so much thinner than
-broad; of real hands .6."""
+MAX_HAND_FLATNESS = 0.8
+"""Largest ratio of thickness to breadth at which a hand's shape shows its palm; real hands have
+0.6."""
 
-HEADS = ('neck', 'head')
+HEAD_ROLES = ('neck', 'head')
 
 
 @dataclass(frozen=True)
-class Neutral:
-    """Unit directions (3,), doll's frame, bind pose; ``axis`` is across ``straight``."""
+class NeutralDirections:
+    """Unit directions (3,), doll's frame, bind pose; ``axis`` is perpendicular to ``straight``."""
 
     straight: np.ndarray
-    """Where the limb would point if its parent were as it is bound and this joint as one stands."""
+    """Direction of the limb with this joint in the anatomical pose and its parent as bound."""
     axis: np.ndarray
-    """About which its first angle is."""
+    """Axis of the first angle."""
     along: np.ndarray
-    """Where it points."""
+    """Direction of the limb in the bind pose."""
 
 
-def neutral(character: Character, groups: list[Group], index: int, side: int,
-            above: np.ndarray | None, along: np.ndarray) -> Neutral | None:
-    """Of the joint to a group's parent; None where the skeleton or the bind pose tells none.
+def find_neutral(character: Character, groups: list[BodyGroup], index: int, side: int,
+                 above: np.ndarray | None, along: np.ndarray) -> NeutralDirections | None:
+    """Neutral directions of the joint to a group's parent; None where they are undefined.
 
-    ``above`` (3,) is the direction of the bone before, None below the root; ``along`` (3,) that of
-    the group's own; ``side`` is 1 on the left, -1 on the right.
+    ``above`` (3,) is the direction of the previous bone, None below the root; ``along`` (3,) that
+    of the group's own; ``side`` is 1 left, -1 right.
     """
     group = groups[index]
     if group.role == 'upper_arm':
-        return Neutral(-UP, FORWARD, along)
+        return NeutralDirections(-UP, FORWARD, along)
     if group.role == 'thigh':
-        return Neutral(-UP, LEFT, along)
-    if group.role in HEADS:
-        straight = above if groups[group.parent].role in HEADS and above is not None else UP
-        return _across(straight, LEFT, along)
+        return NeutralDirections(-UP, LEFT, along)
+    if group.role in HEAD_ROLES:
+        straight = above if groups[group.parent].role in HEAD_ROLES and above is not None else UP
+        return _perpendicular_axis(straight, LEFT, along)
     if above is None:
         return None
     if group.role == 'hand':
-        return _across(above, np.cross(above, _palm(character, group, side, above)), along)
+        palm = _palm(character, group, side, above)
+        return _perpendicular_axis(above, np.cross(above, palm), along)
     toes = _toes(character, groups, index)
-    shin = _across(above, LEFT, toes)
+    shin = _perpendicular_axis(above, LEFT, toes)
     if shin is None:
         return None
     ahead = np.cross(above, shin.axis)
-    return Neutral(math.cos(SLOPE) * ahead + math.sin(SLOPE) * above, shin.axis, toes)
+    straight = math.cos(FOOT_SLOPE) * ahead + math.sin(FOOT_SLOPE) * above
+    return NeutralDirections(straight, shin.axis, toes)
 
 
-def _across(straight: np.ndarray, axis: np.ndarray, along: np.ndarray) -> Neutral | None:
-    """With what of ``axis`` is across ``straight``; None where that is little."""
+def _perpendicular_axis(straight: np.ndarray, axis: np.ndarray,
+                        along: np.ndarray) -> NeutralDirections | None:
+    """Directions with the part of ``axis`` perpendicular to ``straight``; None if it is small."""
     axis = axis - (axis @ straight) * straight
     length = float(np.linalg.norm(axis))
-    return Neutral(straight, axis / length, along) if length > 0.3 else None
+    return NeutralDirections(straight, axis / length, along) if length > 0.3 else None
 
 
-def _palm(character: Character, group: Group, side: int, above: np.ndarray) -> np.ndarray:
-    """Unit direction (3,) that the palm faces: the hand's thin one, else to where arms hang.
+def _palm(character: Character, group: BodyGroup, side: int, above: np.ndarray) -> np.ndarray:
+    """Unit direction (3,) that the palm faces: the hand's thin axis, else towards the thigh.
 
-    Arms that hang have their palms to the thighs, and forearms turn them forwards as far as
-    backwards, but for a little.
+    The palms of hanging arms face the thighs, and a forearm rotates about as far either way.
     """
     inward = side * np.cross(above, FORWARD)
     if np.linalg.norm(inward) < 0.3:
@@ -91,16 +92,16 @@ def _palm(character: Character, group: Group, side: int, above: np.ndarray) -> n
     if len(points) < 4:
         return inward
     extents, axes = np.linalg.eigh(np.cov(points.T))
-    if extents[0] > FLAT ** 2 * extents[1]:
+    if extents[0] > MAX_HAND_FLATNESS ** 2 * extents[1]:
         return inward
     return axes[:, 0] if axes[:, 0] @ (2 * inward + FORWARD) > 0 else -axes[:, 0]
 
 
-def _toes(character: Character, groups: list[Group], index: int) -> np.ndarray:
-    """Unit direction (3,) from the ankle to the toes' end."""
+def _toes(character: Character, groups: list[BodyGroup], index: int) -> np.ndarray:
+    """Unit direction (3,) from the ankle to the end of the toes."""
     ankle = groups[index].anchor
     steps = np.concatenate([character.vertices[group.vertices] - ankle for group in groups
                             if group is groups[index] or group.parent == index])
     far = np.linalg.norm(steps, axis=1)
-    end = steps[far >= np.quantile(far, 1 - TOES)].mean(axis=0) if len(steps) else -UP
+    end = steps[far >= np.quantile(far, 1 - TOE_SHARE)].mean(axis=0) if len(steps) else -UP
     return end / max(float(np.linalg.norm(end)), 1e-9)

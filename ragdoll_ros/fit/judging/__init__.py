@@ -1,1 +1,1 @@
-"""Whether to believe a doll."""
+"""Checks of a doll, and the verdict on it."""

@@ -1,29 +1,29 @@
-"""How much of its skin each body holds, how much of all bodies is skin, and what that weighs."""
+"""Coverage of the skin by the bodies, their volume, and the density of the doll."""
 from __future__ import annotations
 
 from ...model.ragdoll import Ragdoll
-from ..bodies.overlap import covered, depth_in
+from ..bodies.overlap import covered, penetration_depth
 from ..reading.character import Character
-from ..shapes.shapes import TOLERANCE
+from ..shapes.fitting import TOLERANCE
 from .finding import Finding
 
-LITTLE, TOO_LITTLE = 0.75, 0.5
-"""Share of its vertices that a body should hold, and without which it is not theirs."""
+DOUBTFUL_COVERAGE, WRONG_COVERAGE = 0.75, 0.5
+"""Fraction of a body's vertices inside it, below which it is doubtful, wrong."""
 
-FEWEST = 12
-"""Vertices of a body whose share says something."""
+MIN_VERTICES = 12
+"""Vertices of a body from which on its coverage is checked."""
 
-BLOATED, SWOLLEN = 2.5, 5.0
-"""Volume of all bodies over the skin's that is doubtful, or wrong."""
+DOUBTFUL_VOLUME, WRONG_VOLUME = 2.5, 5.0
+"""Volume of the bodies over that of the skin, above which it is doubtful, wrong."""
 
-LIGHTEST, HEAVIEST = 300.0, 2500.0
-"""kg/m^3 of the whole; a skin that is open tells too little volume, so a share of the bodies'
-counts as skin."""
+MIN_DENSITY, MAX_DENSITY = 300.0, 2500.0
+"""kg/m^3 of the doll. An open skin encloses too little volume, so at least a fraction of the
+bodies' volume counts as the skin's."""
 
 
 def find_uncovered(doll: Ragdoll, character: Character,
                    parts: dict[str, tuple[str, ...]]) -> list[Finding]:
-    """Bodies that miss their skin; ``parts`` has the character's bones of each body."""
+    """Bodies that miss their skin; ``parts`` lists the character's bones of each body."""
     body_of = {bone: name for name, bones in parts.items() for bone in bones}
     owners = [body_of.get(name) for name in character.bone_names]
     heaviest = character.weights.argmax(axis=1)
@@ -34,22 +34,22 @@ def find_uncovered(doll: Ragdoll, character: Character,
     for bone in doll.bones:
         own = [index for index, owner in enumerate(owners) if owner == bone.name]
         points = character.vertices[weighted & (moved[:, None] == own).any(axis=1)]
-        if len(points) < FEWEST:
+        if len(points) < MIN_VERTICES:
             continue
-        share = float((depth_in(bone, points) >= -tolerance).mean())
-        if share < LITTLE:
-            found.append(Finding(f'{bone.name} holds {100 * share:.0f} % of its skin',
-                                 share < TOO_LITTLE))
+        share = float((penetration_depth(bone, points) >= -tolerance).mean())
+        if share < DOUBTFUL_COVERAGE:
+            found.append(Finding(f'{bone.name} covers {100 * share:.0f} % of its skin',
+                                 share < WRONG_COVERAGE))
     whole = float(covered(doll.bones, character.vertices, tolerance).mean())
     if whole < 0.9:
-        found.append(Finding(f'the bodies hold {100 * whole:.0f} % of the skin',
-                             whole < LITTLE))
+        found.append(Finding(f'the bodies cover {100 * whole:.0f} % of the skin',
+                             whole < DOUBTFUL_COVERAGE))
     skin, volume = character.volume(), sum(bone.shape.volume for bone in doll.bones)
-    density = doll.mass / max(skin, volume / BLOATED)
-    if not LIGHTEST < density < HEAVIEST:
+    density = doll.mass / max(skin, volume / DOUBTFUL_VOLUME)
+    if not MIN_DENSITY < density < MAX_DENSITY:
         found.append(Finding(f'{doll.mass:.3g} kg in a skin of {1000 * skin:.3g} l: '
-                             f'{density:.0f} kg/m^3, where animals have 1000 (--mass)'))
-    if skin > 0 and volume > BLOATED * skin:
+                             f'{density:.0f} kg/m^3, where animals have 1000 (set --mass)'))
+    if skin > 0 and volume > DOUBTFUL_VOLUME * skin:
         found.append(Finding(f'the bodies have {volume / skin:.2g} times the volume of the skin',
-                             volume > SWOLLEN * skin))
+                             volume > WRONG_VOLUME * skin))
     return found

@@ -1,4 +1,4 @@
-"""What a measure has found about a doll."""
+"""Result of a check of a doll."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Finding:
-    """A sentence for the user, and how much it weighs."""
+    """A sentence for the user, and its severity."""
 
     sentence: str
     wrong: bool = False
-    """Whether no doll that is right has it; otherwise some have."""
+    """Whether no correct doll has this finding; otherwise some have."""
 
     @property
     def word(self) -> str:
-        """``wrong`` or ``doubtful``."""
+        """Severity: 'wrong' or 'doubtful'."""
         return 'wrong' if self.wrong else 'doubtful'

@@ -1,4 +1,4 @@
-"""Whether to believe a doll: good, doubtful or wrong, and why."""
+"""Verdict on a doll: good, doubtful or wrong, with the findings of all checks."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -9,24 +9,23 @@ from ...model.ragdoll import Ragdoll
 from ..pipeline import Fit
 from ..roles.names import doll_roles
 from ..roles.person import is_person
-from .attachment import find_gaps, find_wrong_root
+from .connectivity import find_detached_joints, find_wrong_root
 from .coverage import find_uncovered
-from .doubts import extent, find_doubts
+from .drop_test import run_drop_test
 from .finding import Finding
-from .proportions import find_masses
+from .plausibility import extent, find_implausible, find_implausible_masses
 from .symmetry import find_asymmetries
-from .trial import find_in_a_fall
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What all measures have found."""
+    """Findings of all checks."""
 
     findings: tuple[Finding, ...] = ()
 
     @property
     def word(self) -> str:
-        """``good`` without a finding, ``wrong`` with one that no right doll has."""
+        """'wrong' with a finding that no correct doll has, 'good' without findings."""
         if any(finding.wrong for finding in self.findings):
             return 'wrong'
         return 'doubtful' if self.findings else 'good'
@@ -38,22 +37,22 @@ class Verdict:
 
 def judge(doll: Ragdoll, fit: Fit | None = None, falls: bool = True,
           measured: bool = False) -> Verdict:
-    """Verdict on a doll, of a ``fit`` also by its skin.
+    """Verdict on a doll; with its ``fit``, on the coverage of its skin too.
 
-    ``falls``: let it fall for a second. ``measured``: a robot's bodies and joints are where its
-    file says, so that where they are tells nothing.
+    ``falls``: include the drop test. ``measured``: a robot, whose bodies and joints are where its
+    file states, so that connectivity, symmetry and proportions are not checked.
     """
     size, roles = extent(doll), doll_roles(doll)
-    found = find_doubts(doll, measured)
+    found = find_implausible(doll, measured)
     if not measured:
-        found += find_gaps(doll, size) + find_wrong_root(doll, roles)
+        found += find_detached_joints(doll, size) + find_wrong_root(doll, roles)
         found += find_asymmetries(doll, size)
     positions = np.array([bone.position for bone in doll.bones])
     if is_person(roles, positions) and not measured:
-        found += find_masses(doll, roles, size)
+        found += find_implausible_masses(doll, roles, size)
     if fit is not None:
         found += find_uncovered(doll, fit.character,
                                 {body.bone.name: body.bones for body in fit.bodies})
     if falls:
-        found += find_in_a_fall(doll, size)
+        found += run_drop_test(doll, size)
     return Verdict(tuple(found))

@@ -1,1 +1,1 @@
-"""A character's file: its skin, skeleton and springs, in metres and REP 103's axes."""
+"""Reader of glTF and VRM characters: skin, skeleton and spring bones in m and REP 103 axes."""

@@ -1,28 +1,28 @@
-"""Arrays out of a glTF file: strides, sparse accessors, normalised integers.
+"""Accessors of a glTF file as arrays: strides, sparse accessors, normalized integers.
 
-As in sections 3.6.2 and 3.11 of the glTF 2.0 specification.
+Sections 3.6.2 and 3.11 of the glTF 2.0 specification.
 """
 from __future__ import annotations
 
 import numpy as np
 
 from ...model import errors
-from .gltf_file import GltfFile, count, nested
+from .gltf_file import GltfFile, get_container, get_count
 
-LARGEST_SCALARS, LARGEST_VECTORS = 3_000_000, 500_000
-"""Elements in one array: a skin of a million triangles has three million indices."""
+MAX_SCALARS, MAX_VECTORS = 3_000_000, 500_000
+"""Elements of one accessor: a skin of a million triangles has three million indices."""
 
-COMPONENTS = {5120: np.dtype('<i1'), 5121: np.dtype('<u1'), 5122: np.dtype('<i2'),
-              5123: np.dtype('<u2'), 5125: np.dtype('<u4'), 5126: np.dtype('<f4')}
+COMPONENT_TYPES = {5120: np.dtype('<i1'), 5121: np.dtype('<u1'), 5122: np.dtype('<i2'),
+                   5123: np.dtype('<u2'), 5125: np.dtype('<u4'), 5126: np.dtype('<f4')}
 
-WIDTHS = {'SCALAR': 1, 'VEC2': 2, 'VEC3': 3, 'VEC4': 4, 'MAT4': 16}
+COMPONENT_COUNTS = {'SCALAR': 1, 'VEC2': 2, 'VEC3': 3, 'VEC4': 4, 'MAT4': 16}
 
 
 def read_floats(file: GltfFile, index: object, kind: str, where: str) -> np.ndarray:
-    """Values (count, width) float64 of the accessor at an index, of type ``kind`` ('VEC3', ...).
+    """Values (count, width) float64 of an accessor whose type is ``kind`` ('VEC3', ...).
 
-    NotFinite where one is not finite, else a ModelError about what is broken, at ``where`` or in
-    the accessor.
+    Raises NotFinite for a value that is not finite, another ModelError for a broken accessor;
+    ``where`` is the field that refers to it.
     """
     values = _read(file, index, kind, where)
     if not np.isfinite(values).all():
@@ -32,9 +32,9 @@ def read_floats(file: GltfFile, index: object, kind: str, where: str) -> np.ndar
 
 
 def read_indices(file: GltfFile, index: object, kind: str, limit: int, where: str) -> np.ndarray:
-    """Values (count, width) int32 of the accessor at an index, each from 0 to below ``limit``.
+    """Values (count, width) int32 of an accessor, each in 0 to ``limit`` - 1.
 
-    WrongForm where they are floats, OutOfRange for one outside; else as read_floats.
+    Raises WrongForm for floats, OutOfRange for a value outside; else as read_floats.
     """
     values = _read(file, index, kind, where)
     if values.dtype.kind == 'f':
@@ -51,65 +51,68 @@ def _read(file: GltfFile, index: object, kind: str, where: str) -> np.ndarray:
     place = f'accessors[{index}]'
     if accessor.get('type') != kind:
         raise errors.WrongForm(f'{place}.type', accessor.get('type'), kind)
-    number = count(accessor, 'count', place)
-    most = LARGEST_SCALARS if kind == 'SCALAR' else LARGEST_VECTORS
+    number = get_count(accessor, 'count', place)
+    most = MAX_SCALARS if kind == 'SCALAR' else MAX_VECTORS
     if number > most:
         raise errors.OutOfRange(f'{place}.count', number, f'at most {most}')
     if accessor.get('bufferView') is None:
-        values = np.zeros((number, WIDTHS[kind]), _dtype(accessor, place))
+        values = np.zeros((number, COMPONENT_COUNTS[kind]), _dtype(accessor, place))
     else:
-        values = _strided(file, accessor, number, WIDTHS[kind], place)
-    sparse = nested(accessor, 'sparse', dict, place)
+        values = _read_strided(file, accessor, number, COMPONENT_COUNTS[kind], place)
+    sparse = get_container(accessor, 'sparse', dict, place)
     if sparse:
-        values = _substituted(file, sparse, values, f'{place}.sparse')
-    return _normalised(values) if accessor.get('normalized') else values
+        values = _apply_sparse(file, sparse, values, f'{place}.sparse')
+    return _normalize(values) if accessor.get('normalized') else values
 
 
-def _strided(file: GltfFile, accessor: dict, number: int, width: int, place: str) -> np.ndarray:
+def _read_strided(file: GltfFile, accessor: dict, number: int, width: int,
+                  place: str) -> np.ndarray:
     dtype, index = _dtype(accessor, place), accessor['bufferView']
     view = file.entry('bufferViews', index, place)
     element = dtype.itemsize * width
-    stride = count(view, 'byteStride', f'bufferViews[{index}]', 0) or element
+    stride = get_count(view, 'byteStride', f'bufferViews[{index}]', 0) or element
     if stride < element or stride > 252:
         raise errors.OutOfRange(f'bufferViews[{index}].byteStride', stride, f'{element} to 252')
     if number == 0:
         return np.zeros((0, width), dtype)
-    start = count(accessor, 'byteOffset', place, 0)
+    start = get_count(accessor, 'byteOffset', place, 0)
     data = file.read(index, start, stride * (number - 1) + element, place)
     return np.ndarray((number, width), dtype, data, strides=(stride, dtype.itemsize))
 
 
-def _substituted(file: GltfFile, sparse: dict, values: np.ndarray, place: str) -> np.ndarray:
-    number = count(sparse, 'count', place)
+def _apply_sparse(file: GltfFile, sparse: dict, values: np.ndarray, place: str) -> np.ndarray:
+    number = get_count(sparse, 'count', place)
     if number > len(values):
         raise errors.OutOfRange(f'{place}.count', number, f'at most {len(values)}')
-    part = nested(sparse, 'indices', dict, place)
+    part = get_container(sparse, 'indices', dict, place)
     dtype = _dtype(part, f'{place}.indices')
-    at = _packed(file, part, dtype, number, f'{place}.indices')
+    at = _read_packed(file, part, dtype, number, f'{place}.indices')
     if dtype.kind != 'u' or (at >= len(values)).any():
         raise errors.OutOfRange(f'{place}.indices', 'an index', f'from 0 to {len(values) - 1}')
     values = values.copy()
-    values[at] = _packed(file, nested(sparse, 'values', dict, place), values.dtype,
-                         number * values.shape[1], f'{place}.values').reshape(-1, values.shape[1])
+    packed = _read_packed(file, get_container(sparse, 'values', dict, place), values.dtype,
+                          number * values.shape[1], f'{place}.values')
+    values[at] = packed.reshape(-1, values.shape[1])
     return values
 
 
-def _packed(file: GltfFile, part: dict, dtype: np.dtype, number: int, place: str) -> np.ndarray:
-    data = file.read(part.get('bufferView'), count(part, 'byteOffset', place, 0),
+def _read_packed(file: GltfFile, part: dict, dtype: np.dtype, number: int,
+                 place: str) -> np.ndarray:
+    data = file.read(part.get('bufferView'), get_count(part, 'byteOffset', place, 0),
                      number * dtype.itemsize, place)
     return np.frombuffer(data, dtype)
 
 
 def _dtype(accessor: dict, place: str) -> np.dtype:
     kind = accessor.get('componentType')
-    if type(kind) is not int or kind not in COMPONENTS:
-        expected = 'one of ' + ', '.join(map(str, COMPONENTS))
+    if type(kind) is not int or kind not in COMPONENT_TYPES:
+        expected = 'one of ' + ', '.join(map(str, COMPONENT_TYPES))
         raise errors.WrongForm(f'{place}.componentType', kind, expected)
-    return COMPONENTS[kind]
+    return COMPONENT_TYPES[kind]
 
 
-def _normalised(values: np.ndarray) -> np.ndarray:
-    """Integers as fractions of their largest value; the lowest of a signed kind is -1 too."""
+def _normalize(values: np.ndarray) -> np.ndarray:
+    """Integers as fractions of the type's maximum; the minimum of a signed type gives -1 too."""
     if values.dtype.kind == 'f':
         return values
     return np.maximum(values / np.iinfo(values.dtype).max, -1.0)

@@ -1,4 +1,4 @@
-"""A rigged, skinned character in this package's frame: x forward, y left, z up, metres."""
+"""A rigged, skinned character in REP 103 axes: x forward, y left, z up; metres."""
 from __future__ import annotations
 
 import functools
@@ -9,23 +9,23 @@ import numpy as np
 
 from ...model import errors, rotation
 from ...model.ragdoll import WORLD
-from ...model.skin import Paint
+from ...model.skin import Appearance
 from ..roles.names import plain_name, side_of
-from .draco import decompressed
+from .draco import decompress
 from .gltf_file import GltfFile
 from .materials import Materials
 from .nodes import Nodes, read_nodes
 from .rigid_meshes import add_rigid_meshes
 from .scale import metres_per_unit
 from .skins import Skins, read_skins
-from .spring_bones import Spring, placed, read_springs, without_short_rods
+from .spring_bones import SpringBone, drop_short_segments, read_springs, with_points
 
 TO_ROS = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
-"""glTF is Y up and faces +Z, its left is +X: (x, y, z) here is (z, x, y) there."""
+"""glTF has +Y up, +Z forward and +X left: its (z, x, y) is (x, y, z) here."""
 
 
-MOST_BONES = 1500
-"""A face in every detail has some 900."""
+MAX_BONES = 1500
+"""A detailed face has about 900."""
 
 
 @dataclass(frozen=True)
@@ -37,25 +37,25 @@ class Character:
     parents: tuple[int, ...]
     """Index of each bone's parent, -1 for a bone without one."""
     positions: np.ndarray
-    """(n, 3) m, the root of each bone."""
+    """(n, 3) m, the origin of each bone."""
     orientations: np.ndarray
-    """(n, 4) x, y, z, w, of the axes that the file gives each bone."""
+    """(n, 4) xyzw, the axes of each bone in the file."""
     vertices: np.ndarray
     """(v, 3) m."""
     triangles: np.ndarray
     """(t, 3) vertex indices."""
     bones: np.ndarray
-    """(v, k) indices of the bones that move each vertex."""
+    """(v, k) bone indices of each vertex's influences."""
     weights: np.ndarray
-    """(v, k) their skin weights; a row's sum is 1, or 0 where no bone moves the vertex."""
+    """(v, k) skin weights of the influences; a row's sum is 1, or 0 for an unweighted vertex."""
     scale: float = 1.0
-    """Metres to one unit of the file."""
+    """Metres per unit of the file."""
     notes: tuple[str, ...] = ()
-    """A sentence for each thing that could not be taken over as it is."""
-    springs: tuple[Spring, ...] = ()
-    """Its points in m, the character's frame."""
-    paint: Paint | None = None
-    """What its surface looks like; None where the file says nothing of that."""
+    """Warnings: what could not be imported as it is in the file."""
+    springs: tuple[SpringBone, ...] = ()
+    """Spring bones; their points are in m, the character's frame."""
+    appearance: Appearance | None = None
+    """Appearance of the surface; None where the file has neither materials nor normals."""
 
     @functools.cached_property
     def extent(self) -> float:
@@ -63,33 +63,34 @@ class Character:
         return float(np.ptp(self.vertices, axis=0).max())
 
     def vertex_areas(self) -> np.ndarray:
-        """Area (v,) m^2 that each vertex stands for: a third of its triangles'."""
+        """Area (v,) m^2 of each vertex: a third of its triangles'."""
         return np.bincount(self.triangles.ravel(), np.repeat(self.corner_areas(), 3),
                            len(self.vertices))
 
     def corner_areas(self) -> np.ndarray:
-        """Third (t,) m^2 of each triangle's area."""
+        """A third (t,) m^2 of each triangle's area."""
         corners = self.vertices[self.triangles]
         return np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0],
                                        corners[:, 2] - corners[:, 0]), axis=1) / 6
 
     def volume(self) -> float:
-        """Volume inside the skin, m^3, by the divergence theorem; right if the skin is closed."""
+        """Volume inside the skin, m^3, by the divergence theorem; exact for a closed skin."""
         corners = self.vertices[self.triangles] - self.vertices.mean(axis=0)
         return float(abs(np.einsum('ti,ti->', corners[:, 0],
                                    np.cross(corners[:, 1], corners[:, 2])) / 6))
 
 
 def read_character(path: str | Path, scale: float | None = None) -> Character:
-    """Character of a .glb or .gltf file; ModelErrors with what keeps it from being one.
+    """Character of a .glb or .gltf file.
 
-    ``scale`` is m to one unit of the file; None takes 1, or a guess with a note; see scale.py.
+    ``scale`` is metres per unit of the file; None: 1, or an estimate with a note, see scale.py.
+    Raises ModelErrors with the fault of the file.
     """
     if scale is not None:
         errors.check_positive('scale', scale)
     try:
-        file = decompressed(GltfFile(path))
-        # What overflows is found where it ends up.
+        file = decompress(GltfFile(path))
+        # Overflow shows in the results, which are checked.
         with np.errstate(over='ignore', invalid='ignore'):
             nodes = read_nodes(file)
             skins = read_skins(file, nodes)
@@ -105,41 +106,43 @@ def read_character(path: str | Path, scale: float | None = None) -> Character:
 
 
 def _character(file: GltfFile, nodes: Nodes, skins: Skins, scale: float | None) -> Character:
-    joints = [node for node in nodes.order if node in skins.rests]
-    if len(joints) > MOST_BONES:
-        raise errors.OutOfRange('skins', len(joints), f'at most {MOST_BONES} joints')
+    joints = [node for node in nodes.order if node in skins.bind_matrices]
+    if len(joints) > MAX_BONES:
+        raise errors.OutOfRange('skins', len(joints), f'at most {MAX_BONES} joints')
     place = {node: bone for bone, node in enumerate(joints)}
     lookup = np.zeros(len(nodes.order), np.int32)
     lookup[joints] = range(len(joints))
-    rests = np.stack([skins.rests[node] for node in joints])
-    if not np.isfinite(skins.vertices).all() or not np.isfinite(rests).all():
+    bind_matrices = np.stack([skins.bind_matrices[node] for node in joints])
+    if not np.isfinite(skins.vertices).all() or not np.isfinite(bind_matrices).all():
         raise errors.NotFinite('meshes', 'vertices in the bind pose', 'finite numbers')
     names = _bone_names([file.json['nodes'][node].get('name') for node in joints])
     notes = list(skins.notes)
     axes = TO_ROS
-    positions, vertices = rests[:, :3, 3] @ axes.T, skins.vertices @ axes.T
-    # A bone keeps the axes that the file gives it, so that its inverse bind matrix fits on.
-    linear = axes @ rests[:, :3, :3]
+    positions, vertices = bind_matrices[:, :3, 3] @ axes.T, skins.vertices @ axes.T
+    # A bone keeps its axes from the file, so that its inverse bind matrix applies.
+    linear = axes @ bind_matrices[:, :3, :3]
     yaw = yaw_to_front(names, positions)
     if yaw:
-        notes.append(f'its left limbs say that it does not face +Z: turned by {yaw} degrees')
+        notes.append(f'the left limbs show that the character does not face +Z: turned by {yaw} '
+                     'degrees')
         upright = np.round(rotation.matrix(rotation.from_axis_angle((0, 0, 1), np.radians(yaw))))
         positions, vertices, linear = positions @ upright.T, vertices @ upright.T, upright @ linear
         axes = upright @ axes
     parents = tuple(_parent_bone(node, nodes.parents, place) for node in joints)
     metres = metres_per_unit(names, parents, positions, vertices, notes) if scale is None else scale
     springs = _springs(file, nodes, skins, place, metres * axes, notes)
-    paint = _paint(file, skins, axes, notes)
+    appearance = _read_appearance(file, skins, axes, notes)
     stem = _bone_names([file.path.stem])[0]
     return Character(
         stem, names, parents,
         positions * metres, np.stack([_nearest_rotation(matrix) for matrix in linear]),
         vertices * metres, skins.triangles, lookup[skins.nodes], skins.weights, metres,
-        tuple(notes), springs, paint)
+        tuple(notes), springs, appearance)
 
 
-def _paint(file: GltfFile, skins: Skins, axes: np.ndarray, notes: list[str]) -> Paint | None:
-    """What the surface looks like, normals taken to the character's frame by ``axes`` (3, 3)."""
+def _read_appearance(file: GltfFile, skins: Skins, axes: np.ndarray,
+                     notes: list[str]) -> Appearance | None:
+    """Appearance of the surface; ``axes`` (3, 3) rotate normals to the character's frame."""
     materials = Materials(file, notes)
     numbers = np.array([materials.number(each) for each in skins.materials], int)
     if not materials.entries and not skins.normals.any():
@@ -147,30 +150,30 @@ def _paint(file: GltfFile, skins: Skins, axes: np.ndarray, notes: list[str]) -> 
     normals = skins.normals @ axes.T
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 1e-30)
-    return Paint(np.nan_to_num(normals), skins.uvs, numbers[skins.meshes],
-                 tuple(materials.entries), tuple(materials.textures))
+    return Appearance(np.nan_to_num(normals), skins.uvs, numbers[skins.meshes],
+                      tuple(materials.entries), tuple(materials.textures))
 
 
 def _springs(file: GltfFile, nodes: Nodes, skins: Skins, place: dict[int, int],
-             matrix: np.ndarray, notes: list[str]) -> tuple[Spring, ...]:
-    """Springs on the character's bones, their points taken to its frame by ``matrix`` (3, 3)."""
+             matrix: np.ndarray, notes: list[str]) -> tuple[SpringBone, ...]:
+    """Spring bones of the character; ``matrix`` (3, 3) takes their points to its frame."""
     found = []
     for spring in read_springs(file, nodes, notes):
         carrier = _parent_bone(spring.nodes[0], nodes.parents, place)
         if carrier < 0:
-            notes.append(f'spring {spring.name} has no bone above it: left out')
+            notes.append(f'spring {spring.name} has no bone above it: ignored')
             continue
-        spring = placed(spring, nodes, skins.rests)
-        found.append(without_short_rods(replace(
+        spring = with_points(spring, nodes, skins.bind_matrices)
+        found.append(drop_short_segments(replace(
             spring, points=spring.points @ matrix.T, carrier=carrier,
             bones=tuple(place[node] for node in spring.nodes if node in place)), notes))
-    found = [spring for spring in found if spring.rods]
+    found = [spring for spring in found if spring.joints]
     names = _bone_names([spring.name for spring in found])
     return tuple(replace(spring, name=name) for spring, name in zip(found, names, strict=True))
 
 
 def _parent_bone(node: int, parents: list[int], place: dict[int, int]) -> int:
-    """Bone of the nearest node above that is one, -1 if there is none."""
+    """Bone of the nearest ancestor node that is a bone, -1 if there is none."""
     node = parents[node]
     while node >= 0 and node not in place:
         node = parents[node]
@@ -178,7 +181,7 @@ def _parent_bone(node: int, parents: list[int], place: dict[int, int]) -> int:
 
 
 def _bone_names(given: list[object]) -> tuple[str, ...]:
-    """Names as a doll takes them, each once: what has none is called bone_N."""
+    """Unique names that a doll may have; a bone without a name becomes bone_N."""
     taken = {WORLD: 1}
     names = []
     for number, name in enumerate(given):
@@ -192,7 +195,7 @@ def _bone_names(given: list[object]) -> tuple[str, ...]:
 
 
 def yaw_to_front(names: tuple[str, ...], positions: np.ndarray) -> int:
-    """Rotation about the vertical, degrees, that brings the bones named left to +y: 0, 90, ..."""
+    """Yaw, degrees, in steps of 90, that turns the bones named left to +y."""
     sides = np.array([side_of(name) for name in names])
     if not (sides > 0).any() or not (sides < 0).any():
         return 0
@@ -204,7 +207,7 @@ def yaw_to_front(names: tuple[str, ...], positions: np.ndarray) -> int:
 
 
 def _nearest_rotation(matrix: np.ndarray) -> np.ndarray:
-    """Quaternion (4,) of the rotation nearest to a matrix (3, 3) that may scale and mirror."""
+    """Quaternion (4,) xyzw of the rotation nearest to a matrix (3, 3) with scale or reflection."""
     u, _, vt = np.linalg.svd(matrix)
     if np.linalg.det(u @ vt) < 0:
         u = u * (1.0, 1.0, -1.0)

@@ -1,7 +1,7 @@
-"""Draco-compressed primitives of a glTF file, by DracoPy, which the extra `fit` installs.
+"""Draco-compressed primitives of a glTF file, decoded by DracoPy from the extra `fit`.
 
-As in KHR_draco_mesh_compression: a primitive's attributes and indices lie compressed in a buffer
-view of its own, and their accessors have none.
+KHR_draco_mesh_compression: the attributes and indices of a primitive are compressed in a buffer
+view of their own, and their accessors have none.
 """
 from __future__ import annotations
 
@@ -10,53 +10,53 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model import errors
-from .accessors import COMPONENTS
-from .gltf_file import GltfFile, count, nested, objects
+from .accessors import COMPONENT_TYPES
+from .gltf_file import GltfFile, get_container, get_count, get_objects
 
 if TYPE_CHECKING:
     from DracoPy import DracoMesh
 
 EXTENSION = 'KHR_draco_mesh_compression'
 
-NEEDED = ('POSITION', 'JOINTS_', 'WEIGHTS_')
-"""What a character is read from; normals, colours and textures stay as they are."""
+ATTRIBUTES = ('POSITION', 'JOINTS_', 'WEIGHTS_')
+"""Attributes that are decoded; normals, colours and texture coordinates are not."""
 
 
-def decompressed(file: GltfFile) -> GltfFile:
-    """The file, its compressed accessors given buffers of their own.
+def decompress(file: GltfFile) -> GltfFile:
+    """The file, with uncompressed buffers for its compressed accessors.
 
-    A ModelError says what is broken, or that DracoPy is missing.
+    Raises a ModelError for broken data or where DracoPy is missing.
     """
     for number, mesh in enumerate(file.json['meshes']):
         where = f'meshes[{number}]'
-        for index, primitive in enumerate(objects(mesh, 'primitives', where)):
+        for index, primitive in enumerate(get_objects(mesh, 'primitives', where)):
             place = f'{where}.primitives[{index}]'
-            extensions = nested(primitive, 'extensions', dict, place)
-            packed = nested(extensions, EXTENSION, dict, f'{place}.extensions')
-            if packed:
-                _expand(file, primitive, packed, place)
+            extensions = get_container(primitive, 'extensions', dict, place)
+            compressed = get_container(extensions, EXTENSION, dict, f'{place}.extensions')
+            if compressed:
+                _decompress_primitive(file, primitive, compressed, place)
     return file
 
 
-def _expand(file: GltfFile, primitive: dict, packed: dict, where: str) -> None:
-    """Give the accessors of a primitive what the extension's object ``packed`` points to."""
+def _decompress_primitive(file: GltfFile, primitive: dict, compressed: dict, where: str) -> None:
+    """Store the decoded attributes and indices of a primitive's ``compressed`` extension."""
     place = f'{where}.extensions.{EXTENSION}'
-    view = packed.get('bufferView')
-    size = count(file.entry('bufferViews', view, place), 'byteLength', f'bufferViews[{view}]')
-    mesh = _decoded(file.read(view, 0, size, place), place)
+    view = compressed.get('bufferView')
+    size = get_count(file.entry('bufferViews', view, place), 'byteLength', f'bufferViews[{view}]')
+    mesh = _decode(file.read(view, 0, size, place), place)
     known = {attribute['unique_id']: attribute['data'] for attribute in mesh.attributes}
-    accessors = nested(primitive, 'attributes', dict, where)
-    for name, number in nested(packed, 'attributes', dict, place).items():
-        if name.startswith(NEEDED):
+    accessors = get_container(primitive, 'attributes', dict, where)
+    for name, number in get_container(compressed, 'attributes', dict, place).items():
+        if name.startswith(ATTRIBUTES):
             if type(number) is not int or number not in known:
                 raise errors.OutOfRange(f'{place}.attributes.{name}', number,
                                         f'one of {sorted(known)}')
-            _store(file, accessors.get(name), known[number], f'{where}.attributes.{name}')
+            _store_values(file, accessors.get(name), known[number], f'{where}.attributes.{name}')
     if primitive.get('indices') is not None:
-        _store(file, primitive['indices'], mesh.faces.reshape(-1, 1), f'{where}.indices')
+        _store_values(file, primitive['indices'], mesh.faces.reshape(-1, 1), f'{where}.indices')
 
 
-def _decoded(data: bytes, where: str) -> DracoMesh:
+def _decode(data: bytes, where: str) -> DracoMesh:
     try:
         import DracoPy
     except ImportError:
@@ -65,7 +65,7 @@ def _decoded(data: bytes, where: str) -> DracoMesh:
         )) from None
     try:
         mesh = DracoPy.decode(data)
-    # Whatever a broken file does to a library that does not check it.
+    # DracoPy does not validate its input: a broken file may raise anything.
     except Exception as error:
         raise errors.Unreadable(where, f'{type(error).__name__}: {error}',
                                 'Draco-compressed bytes') from None
@@ -74,16 +74,16 @@ def _decoded(data: bytes, where: str) -> DracoMesh:
     return mesh
 
 
-def _store(file: GltfFile, index: object, values: np.ndarray, where: str) -> None:
-    """Let an accessor read values (n, width) from a buffer of their own."""
+def _store_values(file: GltfFile, index: object, values: np.ndarray, where: str) -> None:
+    """Store values (n, width) in a new buffer for an accessor."""
     accessor, place = file.entry('accessors', index, where), f'accessors[{index}]'
     kind = accessor.get('componentType')
-    if type(kind) is not int or kind not in COMPONENTS:
+    if type(kind) is not int or kind not in COMPONENT_TYPES:
         raise errors.WrongForm(f'{place}.componentType', kind,
-                               'one of ' + ', '.join(map(str, COMPONENTS)))
-    if count(accessor, 'count', place) != len(values):
+                               'one of ' + ', '.join(map(str, COMPONENT_TYPES)))
+    if get_count(accessor, 'count', place) != len(values):
         raise errors.WrongForm(f'{place}.count', accessor['count'], f'{len(values)}, as compressed')
-    # An accessor may say otherwise than what was compressed; what comes of that is checked later.
+    # Values that the accessor's type cannot hold are found by later checks.
     with np.errstate(invalid='ignore'):
-        data = values.astype(COMPONENTS[kind]).tobytes()
+        data = values.astype(COMPONENT_TYPES[kind]).tobytes()
     accessor.update(bufferView=file.add_view(data), byteOffset=0)

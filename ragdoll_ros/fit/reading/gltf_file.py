@@ -1,8 +1,8 @@
-"""The container of a glTF 2.0 file: its JSON, and where the bytes of its buffers lie.
+"""Container of a glTF 2.0 file: its JSON and its buffers.
 
-Nothing is read but the JSON and the bytes an accessor asks for, and nothing is believed: every
-length is held against the file's own size, and what the JSON says is checked where it is read.
-The chunks are those of section 4.4 of the glTF 2.0 specification.
+Reads the JSON and the requested bytes only, and trusts nothing: lengths are checked against the
+file's size, and JSON values where they are read. Section 4.4 of the glTF 2.0 specification has
+the chunks.
 """
 from __future__ import annotations
 
@@ -18,26 +18,25 @@ from typing import BinaryIO
 
 from ...model import errors
 
-LARGEST_JSON = 32_000_000
+MAX_JSON_BYTES = 32_000_000
 """Bytes of JSON; a character with hundreds of animations has 2 MB."""
 
-LARGEST_STRUCTURE = 500_000
-"""Commas and brackets in the JSON: what becomes Python objects, 64 bytes each and more."""
+MAX_JSON_TOKENS = 500_000
+"""Commas and brackets of the JSON: each becomes a Python object of 64 bytes or more."""
 
-UNREADABLE_EXTENSIONS = ('EXT_meshopt_compression', 'KHR_meshopt_compression')
-"""Of what is on PyPI for them only meshopt (first released in October 2026) has wheels, from
-Python 3.11 on."""
+UNSUPPORTED_EXTENSIONS = ('EXT_meshopt_compression', 'KHR_meshopt_compression')
+"""The only decoder with wheels on PyPI is meshopt (since October 2026), for Python 3.11 and up."""
 
-LARGEST_WHOLE = 2 ** 53
-"""Whole numbers of the JSON stay below (section 2.7 of the specification)."""
+MAX_INTEGER = 2 ** 53
+"""Upper bound of integers in the JSON (section 2.7 of the specification)."""
 
-LISTS = ('nodes', 'skins', 'meshes', 'accessors', 'bufferViews', 'buffers')
-"""The parts of a document that are read: lists of objects that name each other by index."""
+INDEXED_LISTS = ('nodes', 'skins', 'meshes', 'accessors', 'bufferViews', 'buffers')
+"""Top-level lists of objects that refer to each other by index."""
 
 
 @dataclass(frozen=True)
 class Buffer:
-    """Where one buffer's ``size`` bytes are: in ``path`` from byte ``start``, or in ``data``."""
+    """A buffer of ``size`` bytes: in ``path`` from byte ``start``, or in ``data``."""
 
     size: int
     path: Path | None = None
@@ -45,7 +44,7 @@ class Buffer:
     data: bytes = b''
 
     def read(self, offset: int, size: int, where: str) -> bytes:
-        """Return ``size`` bytes from ``offset`` on; Unreadable where the file ends before."""
+        """Return ``size`` bytes from ``offset`` on; raises Unreadable for a truncated file."""
         if self.path is None:
             return self.data[offset:offset + size]
         with self.path.open('rb') as file:
@@ -57,9 +56,9 @@ class Buffer:
 
 
 class GltfFile:
-    """A .glb or .gltf file: its ``json``, whose LISTS are lists of objects, and its buffers.
+    """A .glb or .gltf file: ``json``, with INDEXED_LISTS as lists of objects, and its buffers.
 
-    A ModelError says what keeps it from being one; OSError where it cannot be opened.
+    Raises a ModelError for a file of another format, OSError where it cannot be opened.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -79,7 +78,7 @@ class GltfFile:
         self._buffers: dict[int, Buffer] = {}
 
     def entry(self, key: str, index: object, where: str) -> dict:
-        """Return the object at an index of one of the LISTS; OutOfRange if it is no index."""
+        """Return an object of one of the INDEXED_LISTS; raises OutOfRange for a wrong index."""
         entries = self.json[key]
         if type(index) is not int or not 0 <= index < len(entries):
             raise errors.OutOfRange(
@@ -90,11 +89,12 @@ class GltfFile:
     def read(self, view_index: object, offset: int, size: int, where: str) -> bytes:
         """Return ``size`` bytes of a buffer view from ``offset`` on.
 
-        OutOfRange where they leave the view, the view its buffer, or the buffer its file.
+        Raises OutOfRange where they exceed the view, or the view its buffer.
         """
         view = self.entry('bufferViews', view_index, where)
         place = f'bufferViews[{view_index}]'
-        start, length = count(view, 'byteOffset', place, 0), count(view, 'byteLength', place)
+        start = get_count(view, 'byteOffset', place, 0)
+        length = get_count(view, 'byteLength', place)
         if offset < 0 or offset + size > length:
             raise errors.OutOfRange(where, f'bytes {offset} to {offset + size}',
                                     f'within the {length} bytes of {place}')
@@ -105,7 +105,7 @@ class GltfFile:
         return buffer.read(start + offset, size, place)
 
     def add_view(self, data: bytes) -> int:
-        """Index of a new buffer view, of all of a new buffer that holds ``data``."""
+        """Index of a new buffer view, all of a new buffer with the given data."""
         buffers, views = self.json['buffers'], self.json['bufferViews']
         self._buffers[len(buffers)] = Buffer(len(data), data=data)
         buffers.append({'byteLength': len(data)})
@@ -119,30 +119,30 @@ class GltfFile:
         return self._buffers[index]
 
     def _open_buffer(self, entry: dict, where: str) -> Buffer:
-        wanted, uri = count(entry, 'byteLength', where), entry.get('uri')
+        length, uri = get_count(entry, 'byteLength', where), entry.get('uri')
         if uri is None:
             if self._chunk is None:
                 raise errors.WrongForm(where, None, 'a uri, or a binary chunk in the file')
             buffer = self._chunk
         elif not isinstance(uri, str):
-            raise errors.WrongForm(f'{where}.uri', uri, 'a text')
+            raise errors.WrongForm(f'{where}.uri', uri, 'a string')
         elif uri.startswith('data:'):
-            buffer = embedded(uri, where)
+            buffer = decode_data_uri(uri, where)
         else:
-            path = inside(self.path.parent, uri, where)
+            path = resolve_uri(self.path.parent, uri, where)
             buffer = Buffer(path.stat().st_size, path)
-        if wanted > buffer.size:
-            raise errors.OutOfRange(f'{where}.byteLength', wanted,
-                                    f'at most the {buffer.size} bytes there are')
+        if length > buffer.size:
+            raise errors.OutOfRange(f'{where}.byteLength', length,
+                                    f'at most {buffer.size} bytes')
         return buffer
 
     def _read_text(self) -> bytes:
-        if self.size > LARGEST_JSON:
-            raise errors.Unreadable('', f'{self.size} bytes', f'at most {LARGEST_JSON} of JSON')
+        if self.size > MAX_JSON_BYTES:
+            raise errors.Unreadable('', f'{self.size} bytes', f'at most {MAX_JSON_BYTES} of JSON')
         return self.path.read_bytes()
 
     def _read_chunks(self) -> tuple[bytes, Buffer | None]:
-        """Bytes of the JSON chunk, and where the binary chunk lies."""
+        """Bytes of the JSON chunk, and the binary chunk if there is one."""
         with self.path.open('rb') as file:
             header = file.read(12)
             if len(header) < 12:
@@ -153,21 +153,21 @@ class GltfFile:
             if length > self.size:
                 raise errors.Unreadable('header.length', length,
                                         f'at most the {self.size} bytes of the file')
-            kind, start, size = self._chunk_head(file, 12)
+            kind, start, size = self._read_chunk_header(file, 12)
             if kind != b'JSON':
                 raise errors.WrongForm('byte 16', kind, 'a JSON chunk first')
-            if size > LARGEST_JSON:
-                raise errors.Unreadable('byte 12', size, f'at most {LARGEST_JSON} bytes of JSON')
+            if size > MAX_JSON_BYTES:
+                raise errors.Unreadable('byte 12', size, f'at most {MAX_JSON_BYTES} bytes of JSON')
             text = file.read(size)
-            # Chunks begin on multiples of four bytes.
+            # Chunks are aligned to four bytes.
             after = start + size + -size % 4
             if after + 8 > length:
                 return text, None
             file.seek(after)
-            kind, start, size = self._chunk_head(file, after)
+            kind, start, size = self._read_chunk_header(file, after)
         return text, Buffer(size, self.path, start) if kind == b'BIN\0' else None
 
-    def _chunk_head(self, file: BinaryIO, at: int) -> tuple[bytes, int, int]:
+    def _read_chunk_header(self, file: BinaryIO, at: int) -> tuple[bytes, int, int]:
         head = file.read(8)
         if len(head) < 8:
             raise errors.Unreadable(f'byte {at}', f'{len(head)} bytes', 'a chunk')
@@ -178,8 +178,8 @@ class GltfFile:
         return kind, at + 8, size
 
 
-def nested(entry: dict, key: str, kind: type, where: str) -> dict | list:
-    """Value of a key, of ``kind`` dict or list; empty where there is none, else WrongForm."""
+def get_container(entry: dict, key: str, kind: type, where: str) -> dict | list:
+    """Value of a key, a dict or list as ``kind``; empty where missing, WrongForm for another."""
     value = entry.get(key)
     if value is None:
         return kind()
@@ -189,27 +189,27 @@ def nested(entry: dict, key: str, kind: type, where: str) -> dict | list:
     return value
 
 
-def objects(entry: dict, key: str, where: str = '') -> list[dict]:
-    """Value of a key, a list of objects; empty where there is none, WrongForm for another."""
-    values = nested(entry, key, list, where)
+def get_objects(entry: dict, key: str, where: str = '') -> list[dict]:
+    """Value of a key, a list of objects; empty where missing, WrongForm for another type."""
+    values = get_container(entry, key, list, where)
     for index, value in enumerate(values):
         if not isinstance(value, dict):
             raise errors.WrongForm(f'{where}.{key}[{index}]'.lstrip('.'), value, 'an object')
     return values
 
 
-def count(entry: dict, key: str, where: str, default: int | None = None) -> int:
-    """Number of things or bytes under a key; WrongForm unless it is whole and not negative."""
+def get_count(entry: dict, key: str, where: str, default: int | None = None) -> int:
+    """Value of a key, a count, length or offset; WrongForm unless a non-negative integer."""
     value = entry.get(key)
     value = default if value is None else value
-    if type(value) is not int or not 0 <= value < LARGEST_WHOLE:
+    if type(value) is not int or not 0 <= value < MAX_INTEGER:
         raise errors.WrongForm(f'{where}.{key}', value, 'a whole number, zero or above')
     return value
 
 
 def _parse(text: bytes) -> dict:
-    if sum(text.count(mark) for mark in (b',', b'[', b'{')) > LARGEST_STRUCTURE:
-        raise errors.Unreadable('JSON', 'too many entries', f'at most {LARGEST_STRUCTURE}')
+    if sum(text.count(mark) for mark in (b',', b'[', b'{')) > MAX_JSON_TOKENS:
+        raise errors.Unreadable('JSON', 'too many entries', f'at most {MAX_JSON_TOKENS}')
     try:
         data = json.loads(text.decode('utf-8').rstrip('\0'))
     except RecursionError:
@@ -218,15 +218,15 @@ def _parse(text: bytes) -> dict:
         raise errors.Unreadable('JSON', str(error), 'JSON in UTF-8') from None
     if not isinstance(data, dict):
         raise errors.WrongForm('JSON', data, 'an object with nodes, skins and meshes')
-    for extension in nested(data, 'extensionsRequired', list, ''):
-        if extension in UNREADABLE_EXTENSIONS:
+    for extension in get_container(data, 'extensionsRequired', list, ''):
+        if extension in UNSUPPORTED_EXTENSIONS:
             raise errors.WrongForm('extensionsRequired', extension,
                                    'an uncompressed file: export it without compression')
-    return data | {key: objects(data, key) for key in LISTS}
+    return data | {key: get_objects(data, key) for key in INDEXED_LISTS}
 
 
-def embedded(uri: str, where: str) -> Buffer:
-    """What a data: URI holds; WrongForm where that is not base64."""
+def decode_data_uri(uri: str, where: str) -> Buffer:
+    """Contents of a base64 data: URI; raises WrongForm for another encoding."""
     head, comma, body = uri.partition(',')
     try:
         if not comma or not head.endswith(';base64'):
@@ -237,8 +237,8 @@ def embedded(uri: str, where: str) -> Buffer:
     return Buffer(len(data), data=data)
 
 
-def inside(folder: Path, uri: str, where: str) -> Path:
-    """Path of a file of its own; it must lie in the folder of the glTF file, else Unreadable."""
+def resolve_uri(folder: Path, uri: str, where: str) -> Path:
+    """Path of a URI, a file in the folder of the glTF file; raises Unreadable for any other."""
     home = folder.resolve()
     try:
         path = (home / urllib.parse.unquote(uri)).resolve()

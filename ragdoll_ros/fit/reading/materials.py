@@ -1,8 +1,7 @@
-"""Materials of a glTF file with their images: what a skin looks like, for whoever draws it.
+"""Materials and images of a glTF file, for viewers.
 
-Taken over are the numbers and textures of section 5.19 of glTF 2.0, KHR_materials_unlit and
-KHR_texture_transform, with the first set of texture coordinates. What is not as the specification
-has it is left out: looks are no reason to refuse a character.
+Section 5.19 of glTF 2.0, KHR_materials_unlit and KHR_texture_transform, with the first set of
+texture coordinates. Invalid parts are ignored: no character is refused for its appearance.
 """
 from __future__ import annotations
 
@@ -10,24 +9,25 @@ import math
 
 from ...model import errors
 from ...model.skin import Texture
-from .gltf_file import GltfFile, count, embedded, inside
+from .gltf_file import GltfFile, decode_data_uri, get_count, resolve_uri
 
-MOST_BYTES = 64_000_000
-"""Of all images of a character: each page that is open gets them once."""
+MAX_IMAGE_BYTES = 64_000_000
+"""Total size of a character's images; each open page receives them once."""
 
-NUMBERS = {'baseColorFactor': 4, 'metallicFactor': 1, 'roughnessFactor': 1, 'emissiveFactor': 3,
-           'alphaCutoff': 1, 'scale': 1, 'strength': 1, 'offset': 2, 'rotation': 1}
-"""Keys of numbers, and how many each has."""
+NUMERIC_KEYS = {'baseColorFactor': 4, 'metallicFactor': 1, 'roughnessFactor': 1,
+                'emissiveFactor': 3, 'alphaCutoff': 1, 'scale': 1, 'strength': 1, 'offset': 2,
+                'rotation': 1}
+"""Numeric properties and their numbers of components."""
 
 TEXTURES = ('baseColorTexture', 'metallicRoughnessTexture', 'normalTexture', 'occlusionTexture',
             'emissiveTexture')
 
-SIGNS = {b'\x89PNG': 'image/png', b'\xff\xd8\xff': 'image/jpeg', b'RIFF': 'image/webp'}
-"""How images begin, and what they are."""
+MAGIC_NUMBERS = {b'\x89PNG': 'image/png', b'\xff\xd8\xff': 'image/jpeg', b'RIFF': 'image/webp'}
+"""First bytes of image files, and their media types."""
 
 
 class Materials:
-    """Those of a file, each taken when it is first asked for; ``notes`` get what is left out."""
+    """Materials of a file, read on first use; ``notes`` receive warnings."""
 
     def __init__(self, file: GltfFile, notes: list[str]) -> None:
         self._file, self._notes = file, notes
@@ -38,7 +38,7 @@ class Materials:
         self.textures: list[Texture] = []
 
     def number(self, index: object) -> int:
-        """Which of ``entries`` is the material at an index of the file; -1 where there is none."""
+        """Index in ``entries`` of a material of the file, by its index there; -1 for none."""
         given = self._list('materials')
         if type(index) is not int or not 0 <= index < len(given):
             return -1
@@ -48,10 +48,10 @@ class Materials:
         return self._numbers[index]
 
     def _material(self, given: dict) -> dict:
-        taken = {**_numbers(given), **self._infos(given)}
+        taken = {**_numbers(given), **self._texture_infos(given)}
         surface = given.get('pbrMetallicRoughness')
         if isinstance(surface, dict):
-            taken['pbrMetallicRoughness'] = {**_numbers(surface), **self._infos(surface)}
+            taken['pbrMetallicRoughness'] = {**_numbers(surface), **self._texture_infos(surface)}
         if given.get('alphaMode') in ('OPAQUE', 'MASK', 'BLEND'):
             taken['alphaMode'] = given['alphaMode']
         if isinstance(given.get('doubleSided'), bool):
@@ -61,8 +61,8 @@ class Materials:
             taken['extensions'] = {'KHR_materials_unlit': {}}
         return taken
 
-    def _infos(self, given: dict) -> dict:
-        """What of an object refers to textures."""
+    def _texture_infos(self, given: dict) -> dict:
+        """Texture infos of an object, with indices into ``textures``."""
         found = {}
         for key in TEXTURES:
             info = given.get(key)
@@ -71,15 +71,16 @@ class Materials:
             texture = self._texture(info.get('index'))
             if texture is not None:
                 found[key] = {'index': texture, **_numbers(info)}
-                moved = info.get('extensions')
-                moved = moved.get('KHR_texture_transform') if isinstance(moved, dict) else None
-                if isinstance(moved, dict):
-                    numbers = _numbers({**moved, 'scale': None}) | _pair(moved, 'scale')
+                extensions = info.get('extensions')
+                transform = extensions.get('KHR_texture_transform') if isinstance(
+                    extensions, dict) else None
+                if isinstance(transform, dict):
+                    numbers = _numbers({**transform, 'scale': None}) | _pair(transform, 'scale')
                     found[key]['extensions'] = {'KHR_texture_transform': numbers}
         return found
 
     def _texture(self, index: object) -> int | None:
-        """Which of ``textures`` it is; None where it cannot be had."""
+        """Index in ``textures`` of a texture of the file; None where it cannot be read."""
         if type(index) is not int:
             return None
         if index not in self._textures:
@@ -87,7 +88,7 @@ class Materials:
             try:
                 texture = self._read(self._entry('textures', index))
             except (errors.ModelError, OSError) as error:
-                self._notes.append(f'textures[{index}] is left out: {error}')
+                self._notes.append(f'textures[{index}] is ignored: {error}')
             else:
                 self._textures[index] = len(self.textures)
                 self.textures.append(texture)
@@ -98,21 +99,22 @@ class Materials:
         uri, view = image.get('uri'), image.get('bufferView')
         if view is not None:
             entry = self._file.entry('bufferViews', view, 'images')
-            size = count(entry, 'byteLength', f'bufferViews[{view}]')
-            content = self._file.read(view, 0, min(size, MOST_BYTES), 'images')
+            size = get_count(entry, 'byteLength', f'bufferViews[{view}]')
+            content = self._file.read(view, 0, min(size, MAX_IMAGE_BYTES), 'images')
         elif isinstance(uri, str) and uri.startswith('data:'):
-            buffer = embedded(uri, 'images')
+            buffer = decode_data_uri(uri, 'images')
             content = buffer.read(0, buffer.size, 'images')
         elif isinstance(uri, str):
-            path = inside(self._file.path.parent, uri, 'images')
-            content = path.read_bytes() if path.stat().st_size <= MOST_BYTES else b''
+            path = resolve_uri(self._file.path.parent, uri, 'images')
+            content = path.read_bytes() if path.stat().st_size <= MAX_IMAGE_BYTES else b''
         else:
             raise errors.WrongForm('images', uri, 'a uri or a bufferView')
-        kind = next((kind for sign, kind in SIGNS.items() if content.startswith(sign)), None)
+        kind = next((kind for magic, kind in MAGIC_NUMBERS.items()
+                     if content.startswith(magic)), None)
         self._bytes += len(content)
-        if kind is None or self._bytes > MOST_BYTES:
+        if kind is None or self._bytes > MAX_IMAGE_BYTES:
             raise errors.WrongForm('images', f'{len(content)} bytes',
-                                   f'PNG, JPEG or WebP, at most {MOST_BYTES} bytes of all')
+                                   f'PNG, JPEG or WebP, at most {MAX_IMAGE_BYTES} bytes in total')
         return Texture(content, kind, self._sampler(given.get('sampler')))
 
     def _sampler(self, index: object) -> dict:
@@ -136,9 +138,9 @@ class Materials:
 
 
 def _numbers(given: dict) -> dict:
-    """What of an object is under the keys of NUMBERS, and is numbers."""
+    """Valid numeric properties of an object; see NUMERIC_KEYS."""
     found = {}
-    for key, width in NUMBERS.items():
+    for key, width in NUMERIC_KEYS.items():
         value = given.get(key)
         values = [value] if width == 1 else value
         if isinstance(values, list) and len(values) == width and all(map(_is_number, values)):

@@ -1,4 +1,4 @@
-"""The nodes of a glTF file as one forest with the place of each in the file's world."""
+"""Nodes of a glTF file as a forest with global transforms."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -6,30 +6,32 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import errors, rotation
-from .gltf_file import GltfFile, nested
+from .gltf_file import GltfFile, get_container
 
 
 @dataclass(frozen=True)
 class Nodes:
-    """The n nodes of a file, as its list of nodes numbers them."""
+    """The n nodes of a file, by their index."""
 
     parents: list[int]
-    """-1 for a node without one."""
+    """-1 for a root."""
     children: list[list[int]]
     order: list[int]
     """Every node once, parents first."""
     worlds: np.ndarray
-    """(n, 4, 4) that take a point of a node's frame to the file's world; the file's units."""
+    """(n, 4, 4) global transforms, from the node's frame to the world; units of the file."""
 
 
 def read_nodes(file: GltfFile) -> Nodes:
-    """Nodes of a file; JointCycle or ConnectedTwice where they form no forest.
+    """Nodes of a file.
 
-    OutOfRange for a child that is no node, WrongForm, NotFinite or NotUnit for a broken matrix.
+    Raises JointCycle or ConnectedTwice where they form no forest, OutOfRange for a child that is
+    no node, WrongForm, NotFinite or NotUnit for a broken transform.
     """
     nodes = file.json['nodes']
     parents = [-1] * len(nodes)
-    below = [nested(node, 'children', list, f'nodes[{index}]') for index, node in enumerate(nodes)]
+    below = [get_container(node, 'children', list, f'nodes[{index}]')
+             for index, node in enumerate(nodes)]
     for index, children in enumerate(below):
         for child in children:
             file.entry('nodes', child, f'nodes[{index}].children')
@@ -46,14 +48,14 @@ def read_nodes(file: GltfFile) -> Nodes:
                                 'nodes that form trees')
     worlds = np.zeros((len(nodes), 4, 4))
     for index in order:
-        local = _local(nodes[index], f'nodes[{index}]')
+        local = _local_matrix(nodes[index], f'nodes[{index}]')
         parent = parents[index]
         worlds[index] = local if parent < 0 else worlds[parent] @ local
     return Nodes(parents, below, order, worlds)
 
 
-def _local(node: dict, where: str) -> np.ndarray:
-    """Matrix (4, 4) of a node in its parent: column-major, or translation, rotation, scale."""
+def _local_matrix(node: dict, where: str) -> np.ndarray:
+    """Local transform (4, 4) of a node, from its matrix or its translation, rotation, scale."""
     given = node.get('matrix')
     if given is not None:
         return _numbers(given, 16, f'{where}.matrix').reshape(4, 4).T

@@ -1,7 +1,7 @@
-"""Meshes without a skin that hang from bones: armour, hats, the parts of a robot.
+"""Meshes without a skin on bones: armour, hats, parts of a robot.
 
-Each is skin that one bone moves alone. In a file without any skin every node with a mesh is a bone,
-or its parent if that is there for this one mesh: a joint.
+Each becomes skin of one bone with weight 1. In a file without skins each node with a mesh becomes
+a bone, or its parent if that is the pivot of this mesh only.
 """
 from __future__ import annotations
 
@@ -12,56 +12,56 @@ import numpy as np
 from ...model import errors
 from .gltf_file import GltfFile
 from .nodes import Nodes
-from .skins import Skins, look_of, primitive_points, primitives, triangles_of
+from .skins import Skins, primitives, read_appearance, read_positions, read_triangles
 
 
 def add_rigid_meshes(file: GltfFile, nodes: Nodes, skins: Skins) -> None:
-    """Add all meshes that no skin moves; a note tells how many hang from no bone.
+    """Add all unskinned meshes; a note counts those without a bone above.
 
-    WrongForm where the file has no skin and less than two parts.
+    Raises WrongForm where the file has no skin and fewer than two parts.
     """
-    loose = [index for index, node in enumerate(file.json['nodes'])
-             if node.get('mesh') is not None and node.get('skin') is None]
-    if not skins.rests:
-        bones = {node: _pivot(file, nodes, node) for node in loose}
+    unskinned = [index for index, node in enumerate(file.json['nodes'])
+                 if node.get('mesh') is not None and node.get('skin') is None]
+    if not skins.bind_matrices:
+        bones = {node: _bone_of_mesh(file, nodes, node) for node in unskinned}
         if file.json['skins'] or len(set(bones.values())) < 2:
             raise errors.WrongForm('skins', 'no skin that moves a mesh',
                                    'a skinned mesh (a node with both mesh and skin), or a file '
                                    'without skins whose parts are meshes of several nodes')
-        skins.rests.update((bone, nodes.worlds[bone]) for bone in bones.values())
-        skins.notes.append(f'no skin: its {len(bones)} meshes are taken for rigid parts')
+        skins.bind_matrices.update((bone, nodes.worlds[bone]) for bone in bones.values())
+        skins.notes.append(f'no skin: the {len(bones)} meshes become rigid parts')
     else:
-        bones = {node: _bone_above(nodes, skins, node) for node in loose}
+        bones = {node: _bone_above(nodes, skins, node) for node in unskinned}
     left = sum(not _add(file, nodes, skins, node, bone) for node, bone in bones.items())
     if left:
-        skins.notes.append(f'{left} mesh{"es" * (left > 1)} without a skin and on no bone left out')
+        skins.notes.append(f'{left} mesh{"es" * (left > 1)} without a skin and a bone ignored')
 
 
 def _add(file: GltfFile, nodes: Nodes, skins: Skins, node: int, bone: int) -> bool:
-    """Add the mesh of a node in the bind pose of its bone; False where it has no place."""
+    """Add the mesh of a node in the bind pose of its bone; False without an invertible bone."""
     if bone < 0 or not abs(np.linalg.det(nodes.worlds[bone])) > 1e-30:
         return False
-    place = skins.rests[bone] @ np.linalg.inv(nodes.worlds[bone]) @ nodes.worlds[node]
+    place = skins.bind_matrices[bone] @ np.linalg.inv(nodes.worlds[bone]) @ nodes.worlds[node]
     for primitive, where in primitives(file, file.json['nodes'][node], node):
-        points = primitive_points(file, primitive, where)
-        triangles = triangles_of(file, primitive, len(points), where)
-        # A mirrored part would be inside out, and its volume below zero.
+        points = read_positions(file, primitive, where)
+        triangles = read_triangles(file, primitive, len(points), where)
+        # Reflection turns triangles inside out.
         triangles = triangles[:, ::-1] if np.linalg.det(place[:3, :3]) < 0 else triangles
-        look = look_of(file, primitive, len(points), where)
+        appearance = read_appearance(file, primitive, len(points), where)
         skins.add(points @ place[:3, :3].T + place[:3, 3], triangles,
                   np.full((len(points), 1), bone, np.int32), np.ones((len(points), 1)),
-                  replace(look, normals=look.normals @ place[:3, :3].T))
+                  replace(appearance, normals=appearance.normals @ place[:3, :3].T))
     return True
 
 
 def _bone_above(nodes: Nodes, skins: Skins, node: int) -> int:
-    while node >= 0 and node not in skins.rests:
+    while node >= 0 and node not in skins.bind_matrices:
         node = nodes.parents[node]
     return node
 
 
-def _pivot(file: GltfFile, nodes: Nodes, node: int) -> int:
-    """The bone of a mesh: its parent, if that has no other mesh than this one's, at its end."""
+def _bone_of_mesh(file: GltfFile, nodes: Nodes, node: int) -> int:
+    """Bone of an unskinned mesh: its parent if that has this mesh only, as a leaf, else itself."""
     parent = nodes.parents[node]
     if parent < 0 or nodes.children[node]:
         return node

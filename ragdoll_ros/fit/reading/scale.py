@@ -1,7 +1,7 @@
-"""How many metres one unit of a character's file has.
+"""Length unit of a character's file.
 
-glTF's unit is the metre (2.0, section 3.4), but many files keep that of the program that wrote
-them. What is known decides: a person's height, else that no animal is longer than TALLEST.
+glTF's unit is the metre (2.0, section 3.4), but many files keep the unit of their editor. The
+estimate uses a person's height, else that no animal is longer than MAX_EXTENT.
 """
 from __future__ import annotations
 
@@ -13,26 +13,27 @@ from ..roles.person import is_person
 
 UNITS = {0.01: 'centimetres', 0.001: 'millimetres', 0.0254: 'inches', 0.3048: 'feet',
          0.1: 'decimetres', 100.0: 'hundreds of metres (a scale of 0.01 applied twice)'}
-"""Metres to the units that programs export in, the commonest first."""
+"""Metres per unit of the units that editors export, the most common first."""
 
-PERSON, ADULT = (0.25, 3.0), (0.9, 2.3)
-"""m: heights of persons and puppets that are believed, and for which a unit is looked for."""
+PERSON_HEIGHTS, ADULT_HEIGHTS = (0.25, 3.0), (0.9, 2.3)
+"""m: heights of persons (and puppets) that need no other unit, and that another unit must give."""
 
-USUAL = 1.75
-"""m, of a person where no unit fits; half an animal's length there."""
+DEFAULT_HEIGHT = 1.75
+"""m, of a person where no unit fits; an animal then has twice this length."""
 
-LONG, TALLEST, SMALLEST = 20.0, 100.0, 0.05
-"""m: what is longer is worth a warning, too long for metres, or too short."""
+LONG_EXTENT, MAX_EXTENT, MIN_EXTENT = 20.0, 100.0, 0.05
+"""m: longer files get a warning; sizes in m are at most, at least these."""
 
-FILE = (0.002, 30_000.0)
-"""Sizes beyond which no unit is known."""
+KNOWN_EXTENTS = (0.002, 30_000.0)
+"""Extents, in units of the file, between which a unit is estimated."""
 
 
 def metres_per_unit(names: tuple[str, ...], parents: tuple[int, ...], positions: np.ndarray,
                     vertices: np.ndarray, notes: list[str]) -> float:
-    """Metres to one unit, with a note where it is a guess; OutOfRange for a skin without a size.
+    """Metres per unit, with a note where it is an estimate.
 
-    Bones by name, parent and place (n, 3), skin (v, 3), z up, in the file's units.
+    Bones by name, parent and position (n, 3), skin (v, 3), z up, in units of the file. Raises
+    OutOfRange for a skin without an extent.
     """
     extents = np.ptp(vertices, axis=0)
     size = float(extents.max())
@@ -40,30 +41,31 @@ def metres_per_unit(names: tuple[str, ...], parents: tuple[int, ...], positions:
         raise errors.OutOfRange('meshes', size, 'a skin with a size')
     if is_person(roles_of(names, parents), positions):
         what, size = 'a person', float(extents[2])
-        metres, unit = _of_person(size)
+        metres, unit = _person_unit(size)
     else:
         what = 'a character'
-        metres, unit = _of_other(size)
+        metres, unit = _other_unit(size)
     if metres != 1:
-        notes.append(f'{what} of {size:.4g} units smells of {unit}: one unit is taken for '
-                     f'{metres:.4g} m (--scale says otherwise)')
-    elif size > LONG:
-        notes.append(f'{what} of {size:.4g} units is taken to be as many metres long, as glTF has '
-                     'it (--scale says otherwise)')
+        notes.append(f'{what} of {size:.4g} units suggests {unit}: a unit of {metres:.4g} m is '
+                     'assumed (set it with --scale)')
+    elif size > LONG_EXTENT:
+        notes.append(f'{what} of {size:.4g} units: metres are assumed, as glTF specifies (set the '
+                     'unit with --scale)')
     return metres
 
 
-def _of_person(height: float) -> tuple[float, str]:
-    if PERSON[0] <= height <= PERSON[1]:
+def _person_unit(height: float) -> tuple[float, str]:
+    if PERSON_HEIGHTS[0] <= height <= PERSON_HEIGHTS[1]:
         return 1.0, 'metres'
+    low, high = ADULT_HEIGHTS
     return next(((metres, unit) for metres, unit in UNITS.items()
-                 if ADULT[0] <= height * metres <= ADULT[1]), (USUAL / height, 'no known unit'))
+                 if low <= height * metres <= high), (DEFAULT_HEIGHT / height, 'no known unit'))
 
 
-def _of_other(size: float) -> tuple[float, str]:
-    if SMALLEST <= size <= TALLEST:
+def _other_unit(size: float) -> tuple[float, str]:
+    if MIN_EXTENT <= size <= MAX_EXTENT:
         return 1.0, 'metres'
-    if FILE[0] < size < FILE[1]:
-        metres = 100.0 if size < SMALLEST else 0.01 if size <= 1000 else 0.001
+    if KNOWN_EXTENTS[0] < size < KNOWN_EXTENTS[1]:
+        metres = 100.0 if size < MIN_EXTENT else 0.01 if size <= 1000 else 0.001
         return metres, UNITS[metres]
-    return 2 * USUAL / size, 'no known unit'
+    return 2 * DEFAULT_HEIGHT / size, 'no known unit'

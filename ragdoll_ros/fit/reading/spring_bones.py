@@ -1,8 +1,8 @@
-"""Spring bones of a VRM character: hair, tails and skirts, as its glTF file tells of them.
+"""Spring bones of a VRM character: hair, tails and skirts.
 
-Read are VRMC_springBone 1.0 and the secondaryAnimation of VRM 0.x. A spring is a chain of nodes;
-each but the last is the root of a rod to the next, and its own numbers rule that rod. Colliders,
-hit radii, centres and the level part of gravity are left out.
+VRMC_springBone 1.0 and the secondaryAnimation of VRM 0.x. A spring is a chain of nodes; each joint
+governs the segment to the next node. Colliders, hit radii, centers and the horizontal part of
+gravity are ignored.
 """
 from __future__ import annotations
 
@@ -11,139 +11,142 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...model import errors
-from ...model.swing import LENGTHS
-from .gltf_file import GltfFile, nested, objects
+from ...model.swing import LENGTH_RANGE
+from .gltf_file import GltfFile, get_container, get_objects
 from .nodes import Nodes
 
-TAIL = 0.07
-"""m: VRM 0.x lets the last node of a chain end so far on, in line."""
+TIP_LENGTH = 0.07
+"""m; length of the segment beyond the last node in VRM 0.x."""
 
-SETTINGS = {'stiffness': (1.0, 0.0, 1e6), 'gravityPower': (0.0, -1e6, 1e6),
-            'dragForce': (0.5, 0.0, 1.0)}
-"""Default (the specification's), least and most."""
+JOINT_SETTINGS = {'stiffness': (1.0, 0.0, 1e6), 'gravityPower': (0.0, -1e6, 1e6),
+                  'dragForce': (0.5, 0.0, 1.0)}
+"""Default of the specification, minimum, maximum."""
 
 
 @dataclass(frozen=True)
-class Rod:
-    """VRM's numbers of one rod."""
+class SpringJoint:
+    """VRM's settings of one joint of a spring."""
 
     stiffness: float
-    """Units of the file a second."""
+    """Units of the file per second."""
     gravity: float
-    """Units of the file a second, downwards."""
+    """Units of the file per second, downwards."""
     drag: float
-    """Share a frame, 0 to 1."""
+    """Fraction per frame, 0 to 1."""
 
 
 @dataclass(frozen=True)
-class Spring:
-    """A chain of the file's ``nodes`` (n) and the ``rods`` from each to the next."""
+class SpringBone:
+    """A chain of ``nodes`` of the file; ``joints`` govern the segments between them."""
 
     name: str
     nodes: tuple[int, ...]
-    rods: tuple[Rod, ...]
+    joints: tuple[SpringJoint, ...]
     points: np.ndarray | None = None
-    """(rods + 1, 3) of the nodes, bind pose: the file's axes and units; a character's in m."""
+    """(joints + 1, 3), bind pose: the file's axes and units; of a character, m."""
     carrier: int = -1
-    """The character's bone above the first node."""
+    """The character's bone that the chain is attached to."""
     bones: tuple[int, ...] = ()
-    """The character's bones that swing."""
+    """The character's bones in the chain."""
 
 
-def read_springs(file: GltfFile, nodes: Nodes, notes: list[str]) -> list[Spring]:
-    """All springs, without points; a ModelError for what is broken, a note on what is left out."""
-    extensions = nested(file.json, 'extensions', dict, '')
-    found: list[Spring] = []
+def read_springs(file: GltfFile, nodes: Nodes, notes: list[str]) -> list[SpringBone]:
+    """All spring bones, without points; raises a ModelError for broken data, notes the ignored."""
+    extensions = get_container(file.json, 'extensions', dict, '')
+    found: list[SpringBone] = []
     if 'VRMC_springBone' in extensions:
         where = 'extensions.VRMC_springBone'
-        data = nested(extensions, 'VRMC_springBone', dict, 'extensions')
-        for number, entry in enumerate(objects(data, 'springs', where)):
+        data = get_container(extensions, 'VRMC_springBone', dict, 'extensions')
+        for number, entry in enumerate(get_objects(data, 'springs', where)):
             found.append(_spring(file, nodes, entry, f'{where}.springs[{number}]'))
     else:
         where = 'extensions.VRM.secondaryAnimation'
-        data = nested(nested(extensions, 'VRM', dict, 'extensions'), 'secondaryAnimation', dict,
-                      'extensions.VRM')
-        for number, entry in enumerate(objects(data, 'boneGroups', where)):
-            found += _group(file, nodes, entry, f'{where}.boneGroups[{number}]')
+        data = get_container(get_container(extensions, 'VRM', dict, 'extensions'),
+                             'secondaryAnimation', dict, 'extensions.VRM')
+        for number, entry in enumerate(get_objects(data, 'boneGroups', where)):
+            found += _bone_group(file, nodes, entry, f'{where}.boneGroups[{number}]')
         found.sort(key=lambda spring: nodes.order.index(spring.nodes[0]))
     springs, taken = [], set()
     for spring in found:
-        if not spring.rods:
-            notes.append(f'spring {spring.name} has one node and so nothing to swing: left out')
+        if not spring.joints:
+            notes.append(f'spring {spring.name} has one node and so no segment: ignored')
         elif taken.intersection(spring.nodes):
-            notes.append(f'spring {spring.name} shares a node with another: left out')
+            notes.append(f'spring {spring.name} shares a node with another: ignored')
         else:
             springs.append(spring)
             taken.update(spring.nodes)
     return springs
 
 
-def placed(spring: Spring, nodes: Nodes, rests: dict[int, np.ndarray]) -> Spring:
-    """The spring with its points in the bind pose, ``rests`` of the nodes that a skin binds.
+def with_points(spring: SpringBone, nodes: Nodes,
+                bind_matrices: dict[int, np.ndarray]) -> SpringBone:
+    """The spring with its points in the bind pose; ``bind_matrices`` are those of skin joints.
 
-    Other nodes stand to the nearest of these above them as the file's nodes do. NotFinite or
-    WrongForm where that leaves no place.
+    Other nodes keep their transform relative to the nearest such ancestor. Raises NotFinite or
+    WrongForm where that is undefined.
     """
-    points = [_place(node, nodes, rests) for node in spring.nodes]
-    if len(points) == len(spring.rods):
+    points = [_node_position(node, nodes, bind_matrices) for node in spring.nodes]
+    if len(points) == len(spring.joints):
         above = nodes.parents[spring.nodes[-1]]
-        step = points[-1] - (_place(above, nodes, rests) if above >= 0 else points[-1])
+        step = points[-1] - (_node_position(above, nodes, bind_matrices) if above >= 0
+                             else points[-1])
         length = float(np.linalg.norm(step))
-        points.append(points[-1] + (step / length if length > 0 else (0, -1, 0)) * np.array(TAIL))
+        direction = step / length if length > 0 else (0, -1, 0)
+        points.append(points[-1] + direction * np.array(TIP_LENGTH))
     if not np.isfinite(points).all():
-        raise errors.NotFinite(f'spring {spring.name}', 'nodes', 'places that are finite')
+        raise errors.NotFinite(f'spring {spring.name}', 'nodes', 'finite positions')
     return replace(spring, points=np.array(points))
 
 
-def without_short_rods(spring: Spring, notes: list[str]) -> Spring:
-    """The spring (points in m) without rods too short to swing: their ends become one point."""
+def drop_short_segments(spring: SpringBone, notes: list[str]) -> SpringBone:
+    """The spring (points in m) with the ends of segments too short for a swing merged."""
     lengths = np.linalg.norm(np.diff(spring.points, axis=0), axis=1)
-    long = lengths >= LENGTHS[0]
+    long = lengths >= LENGTH_RANGE[0]
     if long.all():
         return spring
-    notes.append(f'spring {spring.name} has rods below {1000 * LENGTHS[0]:g} mm: left out')
-    return replace(spring, points=spring.points[np.concatenate([[True], long])],
-                   rods=tuple(rod for rod, keep in zip(spring.rods, long, strict=True) if keep))
+    notes.append(f'spring {spring.name} has segments below {1000 * LENGTH_RANGE[0]:g} mm: ignored')
+    joints = tuple(joint for joint, keep in zip(spring.joints, long, strict=True) if keep)
+    return replace(spring, points=spring.points[np.concatenate([[True], long])], joints=joints)
 
 
-def _spring(file: GltfFile, nodes: Nodes, entry: dict, where: str) -> Spring:
-    joints = objects(entry, 'joints', where)
+def _spring(file: GltfFile, nodes: Nodes, entry: dict, where: str) -> SpringBone:
+    joints = get_objects(entry, 'joints', where)
     if not joints:
         raise errors.WrongForm(f'{where}.joints', joints, 'at least one joint')
     chain: list[int] = []
     for number, joint in enumerate(joints):
         place, node = f'{where}.joints[{number}].node', joint.get('node')
         file.entry('nodes', node, place)
-        if chain and not _below(node, chain[-1], nodes):
+        if chain and not _is_descendant(node, chain[-1], nodes):
             raise errors.WrongForm(place, node, f'a node below nodes[{chain[-1]}], which is '
                                    'before it in the chain')
         chain.append(node)
-    rods = tuple(_rod(joint, f'{where}.joints[{number}]')
-                 for number, joint in enumerate(joints))[:-1]
-    return Spring(_name(file, entry.get('name'), chain[0]), tuple(chain), rods)
+    joints = tuple(_spring_joint(joint, f'{where}.joints[{number}]')
+                   for number, joint in enumerate(joints))[:-1]
+    return SpringBone(_name(file, entry.get('name'), chain[0]), tuple(chain), joints)
 
 
-def _group(file: GltfFile, nodes: Nodes, entry: dict, where: str) -> list[Spring]:
-    """Springs of a group of VRM 0.x: one from each root down its first children."""
-    # The misspelt key is the format's own.
+def _bone_group(file: GltfFile, nodes: Nodes, entry: dict, where: str) -> list[SpringBone]:
+    """Spring bones of a VRM 0.x bone group: one from each root along the first children."""
+    # The format misspells this key.
     entry = {'stiffness': 1.0, **entry}
     entry['stiffness'] = entry.get('stiffiness', entry['stiffness'])
     down = entry.get('gravityDir')
     entry['gravityDir'] = [down.get(axis) for axis in 'xyz'] if isinstance(down, dict) else down
-    rod = _rod(entry, where)
+    joint = _spring_joint(entry, where)
     springs = []
-    for root in nested(entry, 'bones', list, where):
+    for root in get_container(entry, 'bones', list, where):
         file.entry('nodes', root, f'{where}.bones')
         chain = [root]
         while nodes.children[chain[-1]]:
             chain.append(nodes.children[chain[-1]][0])
-        springs.append(Spring(_name(file, None, root), tuple(chain), (rod,) * len(chain)))
+        springs.append(SpringBone(_name(file, None, root), tuple(chain), (joint,) * len(chain)))
     return springs
 
 
-def _rod(data: dict, where: str) -> Rod:
+def _spring_joint(data: dict, where: str) -> SpringJoint:
     values = {}
-    for key, (default, least, most) in SETTINGS.items():
+    for key, (default, least, most) in JOINT_SETTINGS.items():
         value = data.get(key, default)
         if type(value) not in (int, float) or not least <= value <= most:
             raise errors.OutOfRange(f'{where}.{key}', value, f'a number from {least:g} to {most:g}')
@@ -153,25 +156,26 @@ def _rod(data: dict, where: str) -> Rod:
             type(part) in (int, float) and abs(part) < 1e6 for part in down):
         raise errors.WrongForm(f'{where}.gravityDir', down, '3 numbers')
     length = float(np.linalg.norm(down)) or 1.0
-    return Rod(values['stiffness'], -values['gravityPower'] * down[1] / length, values['dragForce'])
+    return SpringJoint(values['stiffness'], -values['gravityPower'] * down[1] / length,
+                       values['dragForce'])
 
 
-def _place(node: int, nodes: Nodes, rests: dict[int, np.ndarray]) -> np.ndarray:
-    """Point (3,) of a node, as it stands to the nearest node at or above it that a skin binds."""
-    bound = node
-    while bound >= 0 and bound not in rests:
-        bound = nodes.parents[bound]
-    if bound in (node, -1):
-        return (rests[node] if bound >= 0 else nodes.worlds[node])[:3, 3]
+def _node_position(node: int, nodes: Nodes, bind_matrices: dict[int, np.ndarray]) -> np.ndarray:
+    """Position (3,) of a node, fixed to the nearest skin joint at or above it."""
+    joint_node = node
+    while joint_node >= 0 and joint_node not in bind_matrices:
+        joint_node = nodes.parents[joint_node]
+    if joint_node in (node, -1):
+        return (bind_matrices[node] if joint_node >= 0 else nodes.worlds[node])[:3, 3]
     try:
-        back = np.linalg.inv(nodes.worlds[bound])
+        back = np.linalg.inv(nodes.worlds[joint_node])
     except np.linalg.LinAlgError:
-        raise errors.WrongForm(f'nodes[{bound}]', 'a scale of zero',
-                               'nodes that leave a spring its length') from None
-    return (rests[bound] @ back @ nodes.worlds[node])[:3, 3]
+        raise errors.WrongForm(f'nodes[{joint_node}]', 'a scale of zero',
+                               'nodes that give a spring a length') from None
+    return (bind_matrices[joint_node] @ back @ nodes.worlds[node])[:3, 3]
 
 
-def _below(node: int, above: int, nodes: Nodes) -> bool:
+def _is_descendant(node: int, above: int, nodes: Nodes) -> bool:
     node = nodes.parents[node]
     while node not in (-1, above):
         node = nodes.parents[node]

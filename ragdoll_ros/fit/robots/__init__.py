@@ -1,1 +1,1 @@
-"""Dolls of robots' URDFs and meshes."""
+"""Dolls from URDF descriptions of robots, and shapes from their meshes."""

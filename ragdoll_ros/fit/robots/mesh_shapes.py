@@ -1,7 +1,7 @@
-"""Simple shapes around a robot's mesh: one, or several where boxes show that one fits badly.
+"""Primitive shapes around a robot's mesh: one, or several where cuts save enough volume.
 
-A part of a robot is solid and has been drawn along its axes, so that those count beside the
-principal ones. What is hollow, a tray or a mug, is filled.
+Parts of robots are solid and modelled along their axes, so those are tried beside the principal
+axes. Hollow parts, such as trays and mugs, are filled.
 """
 from __future__ import annotations
 
@@ -10,48 +10,48 @@ import numpy as np
 from ...model import rotation
 from ...model.pose import Pose
 from ...model.shapes import Shape
-from ..shapes.axes import spread
-from ..shapes.shapes import MAKERS, WANTED, Fitted, fit_shape
+from ..shapes.axes import principal_components
+from ..shapes.fitting import CANDIDATES, MIN_COVERAGE, FittedShape, fit_shape
 
-POINTS, FEW_POINTS = 2000, 400
-"""On a mesh's surface, for its shapes and for where it is cut."""
+POINTS, CUT_POINTS = 2000, 400
+"""Points sampled on a mesh's surface, for its shapes and for its cuts."""
 
-MOST_SHAPES = 6
-"""Of a mesh; each costs in contacts."""
+MAX_SHAPES = 6
+"""Shapes of a mesh; each adds contacts."""
 
-WORTH = 0.3
-"""A cut that saves less than this share of a box is not made."""
+MIN_SAVING = 0.3
+"""Fraction of a box's volume that a cut must save."""
 
-CUTS = np.arange(1, 16) / 16
-"""Where a cut is tried, as shares of the extent along each axis."""
+CUT_POSITIONS = np.arange(1, 16) / 16
+"""Tried positions of cuts, as fractions of the extent along an axis."""
 
-THINNEST, TOLERANCE = 0.01, 0.006
-"""Of the mesh's extent: the least edge, and how far out a point still counts as inside."""
+MIN_EDGE, INSIDE_TOLERANCE = 0.01, 0.006
+"""Fractions of the mesh's extent: shortest edge, and distance of points counted as inside."""
 
-GAP = 0.05
-"""Of a piece's extent: about how far its points are apart."""
+POINT_SPACING = 0.05
+"""Approximate spacing of the points, as a fraction of a part's extent."""
 
-LEAST = 0.001
-"""m; no shape is thinner."""
+MIN_THICKNESS_M = 0.001
+"""m; smallest thickness of a shape."""
 
-ORDERS = [0, 1, 2], [1, 2, 0], [2, 0, 1]
-"""Of three axes, so that each is z once."""
+AXIS_ORDERS = [0, 1, 2], [1, 2, 0], [2, 0, 1]
+"""Cyclic permutations of the axes, so that each is z once."""
 
 
 def fit_mesh(triangles: np.ndarray) -> list[tuple[Shape, Pose]]:
     """Shapes around triangles (t, 3, 3) m, with their poses in the mesh's frame."""
     points = surface_points(triangles, POINTS)
     extent = float(np.ptp(points, axis=0).max())
-    thinnest = max(THINNEST * extent, LEAST)
-    return [_smallest(piece, thinnest, TOLERANCE * extent)
-            for piece in _pieces(points, thinnest)]
+    thinnest = max(MIN_EDGE * extent, MIN_THICKNESS_M)
+    return [_smallest(part, thinnest, INSIDE_TOLERANCE * extent)
+            for part in _cut_points(points, thinnest)]
 
 
 def surface_points(triangles: np.ndarray, count: int) -> np.ndarray:
-    """Points (count, 3) spread evenly over triangles (t, 3, 3), the same ones each time."""
+    """Points (count, 3) evenly spread over triangles (t, 3, 3); deterministic."""
     a, b, c = triangles.transpose(1, 0, 2)
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    # Of what is a line or a point, its corners.
+    # A degenerate mesh has no area: sample its triangles equally.
     areas = areas if areas.sum() > 0 else np.ones(len(areas))
     steps = (np.arange(count) + 0.5) / count
     chosen = np.searchsorted(np.cumsum(areas) / areas.sum(), steps).clip(max=len(areas) - 1)
@@ -62,62 +62,62 @@ def surface_points(triangles: np.ndarray, count: int) -> np.ndarray:
 
 
 def _smallest(points: np.ndarray, thinnest: float, tolerance: float) -> tuple[Shape, Pose]:
-    """The smallest shape of any kind in any axes that holds the points, and its pose."""
-    def badness(fitted: Fitted) -> tuple[bool, float]:
-        return fitted.share < WANTED, fitted.shape.volume
+    """The smallest shape of any kind and axes that contains the points, and its pose."""
+    def cost(fitted: FittedShape) -> tuple[bool, float]:
+        return fitted.coverage < MIN_COVERAGE, fitted.shape.volume
 
     fits = [(fit_shape(points @ frame, kind, thinnest, tolerance), frame)
-            for axes in _axes(points) for frame in (axes[:, order] for order in ORDERS)
-            for kind in MAKERS]
-    fitted, frame = min(fits, key=lambda pair: badness(pair[0]))
+            for axes in _axes(points) for frame in (axes[:, order] for order in AXIS_ORDERS)
+            for kind in CANDIDATES]
+    fitted, frame = min(fits, key=lambda pair: cost(pair[0]))
     return fitted.shape, Pose(frame @ fitted.centre, rotation.from_matrix(frame))
 
 
-def _pieces(points: np.ndarray, thinnest: float) -> list[np.ndarray]:
-    """Points (p, 3) cut in pieces, each time where boxes around them save most volume."""
-    pieces, cuts = [points], [_best_cut(points, thinnest)]
-    while len(pieces) < MOST_SHAPES:
+def _cut_points(points: np.ndarray, thinnest: float) -> list[np.ndarray]:
+    """Points (p, 3) split into parts, each time where boxes around the parts save most volume."""
+    parts, cuts = [points], [_best_cut(points, thinnest)]
+    while len(parts) < MAX_SHAPES:
         index = max(range(len(cuts)), key=lambda k: cuts[k][0])
-        saved, normal, place = cuts[index]
+        saved, normal, position = cuts[index]
         if saved <= 0:
             break
-        halves = _halves(pieces[index], normal, place)
-        pieces[index:index + 1] = halves
+        halves = _halves(parts[index], normal, position)
+        parts[index:index + 1] = halves
         cuts[index:index + 1] = [_best_cut(half, thinnest) for half in halves]
-    return pieces
+    return parts
 
 
 def _best_cut(points: np.ndarray, thinnest: float) -> tuple[float, np.ndarray, float]:
-    """Volume, m^3, that a cut of points saves, its normal (3,) and place, m; 0 if not worth it."""
-    few = points[::-(-len(points) // FEW_POINTS)]
-    whole = _box(few, thinnest)
-    best = WORTH * whole, np.zeros(3), 0.0
+    """Best cut: volume saved, m^3, unit normal (3,) and offset, m; 0 below MIN_SAVING."""
+    few = points[::-(-len(points) // CUT_POINTS)]
+    whole = _box_volume(few, thinnest)
+    best = MIN_SAVING * whole, np.zeros(3), 0.0
     for normal in np.concatenate([axes.T for axes in _axes(few)]):
         along = few @ normal
         low, high = along.min(), along.max()
-        for place in low + CUTS * (high - low):
-            parts = few[along < place], few[along >= place]
+        for position in low + CUT_POSITIONS * (high - low):
+            parts = few[along < position], few[along >= position]
             if min(map(len, parts)) > 3:
-                saved = whole - sum(_box(part, thinnest) for part in parts)
-                best = max(best, (saved, normal, place), key=lambda cut: cut[0])
+                saved = whole - sum(_box_volume(part, thinnest) for part in parts)
+                best = max(best, (saved, normal, position), key=lambda cut: cut[0])
     return best if best[1].any() else (0.0, *best[1:])
 
 
-def _box(points: np.ndarray, thinnest: float) -> float:
+def _box_volume(points: np.ndarray, thinnest: float) -> float:
     """Volume of the smallest box around points, m^3."""
     return min(float(np.maximum(np.ptp(points @ axes, axis=0), thinnest).prod())
                for axes in _axes(points))
 
 
-def _halves(points: np.ndarray, normal: np.ndarray, place: float) -> list[np.ndarray]:
-    """Points on each side of a plane, those near it drawn out to it, so that no gap is left."""
-    off = points @ normal - place
-    near = np.abs(off) < GAP * np.ptp(points, axis=0).max()
+def _halves(points: np.ndarray, normal: np.ndarray, position: float) -> list[np.ndarray]:
+    """Points on each side of a plane; nearby points are projected to it, so that no gap remains."""
+    off = points @ normal - position
+    near = np.abs(off) < POINT_SPACING * np.ptp(points, axis=0).max()
     drawn = points - off[:, None] * normal
     return [np.concatenate([points[side], drawn[side & near]]) for side in (off < 0, off >= 0)]
 
 
 def _axes(points: np.ndarray) -> list[np.ndarray]:
-    """Axes (3, 3) as columns: the mesh's own, and the principal ones of the points."""
-    _, principal = spread(points, np.ones(len(points)))
+    """Candidate axes (3, 3), as columns: the mesh's own, and the principal axes."""
+    _, principal = principal_components(points, np.ones(len(points)))
     return [np.eye(3), principal * (1, 1, np.linalg.det(principal))]

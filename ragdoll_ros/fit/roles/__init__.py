@@ -1,1 +1,1 @@
-"""What bones are, by their names, and whether all of them are a person's."""
+"""Anatomical roles of bones by name, and whether a skeleton is a person's."""

@@ -1,6 +1,6 @@
-"""Roles of bones (a thigh, a hand), from the names that well-known skeletons give them.
+"""Anatomical roles of bones (thigh, hand, ...) from their names in well-known skeletons.
 
-The words are in config/bone_names.yaml.
+The vocabulary is config/bone_names.yaml.
 """
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ from collections import Counter
 from ...model.ragdoll import Ragdoll
 from .vocabulary import vocabulary
 
-FEWEST, COMMON = 8, 0.7
-"""Of so many names, a word that this share of them begin or end with says nothing of any."""
+MIN_NAMES, AFFIX_SHARE = 8, 0.7
+"""From this many names on, a word that begins or ends this fraction of them carries no meaning."""
 
-LIMBS = {'clavicle', 'upper_arm', 'forearm', 'hand', 'thigh', 'shin', 'foot', 'toe', 'head'}
-"""Roles of which a limb has one: a second bone of the same role is a piece of the first."""
+SINGLE_ROLES = {'clavicle', 'upper_arm', 'forearm', 'hand', 'thigh', 'shin', 'foot', 'toe', 'head'}
+"""Roles that a limb has once: a second bone of the same role belongs to the same segment."""
 
 ARM = ('upper_arm', 'forearm', 'hand', 'finger')
 LEG = ('thigh', 'shin', 'foot', 'toe')
 
 
 def plain_name(name: str, otherwise: str) -> str:
-    """The name as a doll's file takes it: printable, without slashes, not empty."""
+    """The name as doll files allow it: printable, without slashes, not empty."""
     text = ''.join(c if c.isprintable() and c != '/' else '_' for c in name)
     return text.strip()[:90] or otherwise
 
 
 def side_of(name: str) -> int:
-    """1 for a bone named as a left one, -1 for a right one, 0 for neither."""
+    """Side that a bone's name states: 1 left, -1 right, 0 neither."""
     return _side_and_words(name)[0]
 
 
 def roles_of(names: tuple[str, ...], parents: tuple[int, ...]) -> tuple[str | None, ...]:
-    """Role of each bone, None where its name says nothing.
+    """Role of each bone, None where its name states none.
 
-    ``parents`` are indices of the bones, which come parents first; -1 for a bone without one.
+    ``parents`` are bone indices, parents first; -1 for a bone without a parent.
     """
-    raw = [_raw_role(words) for words in _own_words(names)]
+    raw = [_raw_role(words) for words in _distinct_words(names)]
     roles: list[str | None] = []
     for bone, (role, parent) in enumerate(zip(raw, parents, strict=True)):
         above = roles[parent] if parent >= 0 else None
@@ -52,18 +52,18 @@ def roles_of(names: tuple[str, ...], parents: tuple[int, ...]) -> tuple[str | No
             # Mixamo and VRM call the collar bone shoulder, SMPL the upper arm.
             role = 'clavicle' if {'?arm', 'upper_arm', '?shoulder'} & set(below) else 'upper_arm'
         elif role == '?arm':
-            role = _next(ARM, above) if sided else None
+            role = _next_segment(ARM, above) if sided else None
         elif role == '?leg':
-            role = _next(LEG, above) if sided else None
+            role = _next_segment(LEG, above) if sided else None
         elif role == 'finger' and above not in ('hand', 'finger', 'forearm'):
-            # Index, middle and ring are words of their own.
+            # 'Index', 'middle' and 'ring' occur in other names too.
             role = None
         roles.append(role)
     return tuple(roles)
 
 
 def doll_roles(doll: Ragdoll) -> tuple[str | None, ...]:
-    """Role of each of the doll's bones, by their names; see roles_of."""
+    """Role of each bone of a doll by name; see roles_of."""
     order = [doll.root.name, *(joint.child for joint in doll.joints_from_root())]
     above = {joint.child: order.index(joint.parent) for joint in doll.joints}
     roles = dict(zip(order, roles_of(tuple(order), tuple(above.get(n, -1) for n in order)),
@@ -71,34 +71,34 @@ def doll_roles(doll: Ragdoll) -> tuple[str | None, ...]:
     return tuple(roles[bone.name] for bone in doll.bones)
 
 
-def _next(limb: tuple[str, ...], above: str | None) -> str:
-    """Of a limb numbered bone by bone, the piece that follows the one above."""
+def _next_segment(limb: tuple[str, ...], above: str | None) -> str:
+    """Role that follows the parent's in a limb whose bones are numbered."""
     if above not in limb:
         return limb[0]
     return limb[min(limb.index(above) + 1, len(limb) - 1)]
 
 
 def _raw_role(words: tuple[str, ...]) -> str | None:
-    """Role by the first word of the vocabulary that is the name, else that is in it."""
+    """Role of the first vocabulary word that equals the name, else that occurs in it."""
     key, roles = ''.join(words), vocabulary().roles
     for role, word in roles:
         if key == word:
             return role
     for role, word in roles:
-        # Three letters are found in too many words: an ear in a forearm's 'fear'.
+        # Short words occur within others: the 'ear' in 'forearm'.
         if word in key and (len(word) > 3 or not word.isascii() or word in words):
             return role
     return None
 
 
-def _own_words(names: tuple[str, ...]) -> list[tuple[str, ...]]:
-    """Words of each name without those that most begin or end with: Ringmaster_LeftArm_skin."""
+def _distinct_words(names: tuple[str, ...]) -> list[tuple[str, ...]]:
+    """Words of each name without the affixes shared by most: Ringmaster_LeftArm_skin."""
     words = [_side_and_words(name)[1] for name in names]
     for end in (0, -1):
-        while len(words) >= FEWEST:
+        while len(words) >= MIN_NAMES:
             first = Counter(each[end] for each in words if each).most_common(1)
-            # A word that may be a bone's has to be on all: most bones of some are hair.
-            least = 1.0 if first and _raw_role((first[0][0],)) else COMMON
+            # A word that may state a role must be on all names: most bones of some rigs are hair.
+            least = 1.0 if first and _raw_role((first[0][0],)) else AFFIX_SHARE
             if not first or first[0][1] < least * len(words):
                 break
             rest = slice(1, None) if end == 0 else slice(None, -1)
@@ -108,10 +108,10 @@ def _own_words(names: tuple[str, ...]) -> list[tuple[str, ...]]:
 
 @functools.lru_cache(4096)
 def _side_and_words(name: str) -> tuple[int, tuple[str, ...]]:
-    """Split a name into plain words without fillers and numbers, and the side it names."""
+    """Side of a name, and its words in lower case without fillers and numbers."""
     known = vocabulary()
     words = [word.lower() for word in re.findall(
-        r'[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[^\W\d_A-Za-z]+', _plain(re.split(r'[:|]', name)[-1]))]
+        r'[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[^\W\d_A-Za-z]+', _normalize(re.split(r'[:|]', name)[-1]))]
     side = next((known.sides[word] for word in words if word in known.sides), 0)
     words = [word for word in words if word not in known.sides and word not in known.fillers]
     for index, word in enumerate([] if side else words):
@@ -123,24 +123,24 @@ def _side_and_words(name: str) -> tuple[int, tuple[str, ...]]:
 
 
 def _without_side(word: str, alone: bool) -> tuple[str, int]:
-    """What is left of a word without the side that it is written in one with, and that side.
+    """A word without the side that it contains, and the side, 0 for none.
 
-    CMU writes lhumerus and rfoot; others leftarm, and 左ひじ.
+    CMU writes lhumerus and rfoot; others write leftarm or 左ひじ.
     """
     known = vocabulary()
     for mark, side in known.sides.items():
         if not mark.isascii():
             if mark in word:
                 return word.replace(mark, '', 1), side
-        elif (len(mark) > 1 or alone) and word not in known.known:
+        elif (len(mark) > 1 or alone) and word not in known.role_words:
             for rest in (word[len(mark):] if word.startswith(mark) else '',
                          word[:-len(mark)] if len(mark) > 1 and word.endswith(mark) else ''):
-                if rest in known.known:
+                if rest in known.role_words:
                     return rest, side
     return word, 0
 
 
-def _plain(name: str) -> str:
-    """The name without accents and with the usual forms of letters: Fuß is Fuss, ﾋｼﾞ is ヒジ."""
+def _normalize(name: str) -> str:
+    """The name without accents and in standard letter forms: Fuß to Fuss, ﾋｼﾞ to ヒジ."""
     parts = unicodedata.normalize('NFD', unicodedata.normalize('NFKC', name).replace('ß', 'ss'))
     return unicodedata.normalize('NFC', re.sub('[\u0300-\u036f]', '', parts))

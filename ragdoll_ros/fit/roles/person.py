@@ -1,6 +1,6 @@
-"""Whether a skeleton is a person's, and the segments that a person has.
+"""Whether a skeleton is a person's, and body segments with their shares of the mass.
 
-Shares of mass: a man's, by model/anthropometry.py. His head has the neck.
+The shares are those of a man in model/anthropometry.py; the head includes the neck.
 """
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ SEGMENTS = {'head': MEN.segments['head'].mass,
             'trunk': sum(MEN.segments[part].mass for part in TRUNK),
             **{name: part.mass for name, part in MEN.segments.items()
                if name not in ('head', *TRUNK)}}
-"""Percent of the whole, each limb of one side."""
+"""Percent of the total mass; limbs are of one side."""
 
 SEGMENT_OF = {**{name: name for name in SEGMENTS}, 'neck': 'head', 'soft': 'head', 'spine': 'trunk',
               'hips': 'trunk', 'clavicle': 'trunk', 'finger': 'hand', 'toe': 'foot'}
-"""The segment that a bone of a role is part of; what has no role is part of the trunk."""
+"""Segment of each role; bones without a role belong to the trunk."""
 
-LIMBS = ('upper_arm', 'forearm', 'thigh', 'shin')
-"""Roles of which a person has two each."""
+PAIRED_ROLES = ('upper_arm', 'forearm', 'thigh', 'shin')
+"""Roles that a person has twice."""
 
-LEAN = 0.7
-"""A head is this far from above the hips at the most, of how much higher it is: not a dog's."""
+MAX_LEAN = 0.7
+"""Largest horizontal over vertical offset of the head from the hips; quadrupeds exceed it."""
 
 
 def is_person(roles: Sequence[str | None], positions: np.ndarray) -> bool:
-    """Whether bones of these roles at (n, 3) m, x forward and z up, are an upright person's."""
+    """Whether bones of these roles at (n, 3) m, x forward, z up, form an upright person."""
     count = Counter(roles)
-    if any(count[role] < 2 for role in LIMBS) or not count['head'] + count['neck']:
+    if any(count[role] < 2 for role in PAIRED_ROLES) or not count['head'] + count['neck']:
         return False
 
     def middle(*wanted: str) -> np.ndarray:
@@ -40,11 +40,11 @@ def is_person(roles: Sequence[str | None], positions: np.ndarray) -> bool:
                        axis=0)
 
     rise = middle('head', 'neck') - middle('thigh')
-    return bool(rise[2] > 0 and np.linalg.norm(rise[:2]) < LEAN * rise[2]
+    return bool(rise[2] > 0 and np.linalg.norm(rise[:2]) < MAX_LEAN * rise[2]
                 and middle('shin')[2] < middle('thigh')[2])
 
 
 def segment(role: str | None, name: str) -> tuple[str, int]:
-    """Segment that a bone is part of, and its side: 1 left, -1 right, 0 in the middle."""
+    """Segment of a bone, and its side: 1 left, -1 right, 0 in the middle."""
     part = SEGMENT_OF.get(role, 'trunk')
     return part, 0 if part in ('trunk', 'head') else side_of(name)

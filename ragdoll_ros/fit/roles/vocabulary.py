@@ -1,4 +1,4 @@
-"""Words that tell what a bone is: those of config/bone_names.yaml, and the user's own."""
+"""Vocabulary of bone names: config/bone_names.yaml and the user's own file."""
 from __future__ import annotations
 
 import functools
@@ -15,36 +15,36 @@ FILE = 'bone_names.yaml'
 
 @dataclass(frozen=True)
 class Vocabulary:
-    """Words as they stand in names once these are made plain."""
+    """Normalized words of bone names."""
 
     roles: tuple[tuple[str, str], ...]
-    """Role and word, those first that are to win."""
+    """(role, word) in order of precedence."""
     sides: dict[str, int]
-    """1 for words of the left, -1 for words of the right."""
+    """1 for words that mean left, -1 for right."""
     fillers: frozenset[str]
 
     @functools.cached_property
-    def known(self) -> frozenset[str]:
-        """Every word of a role."""
+    def role_words(self) -> frozenset[str]:
+        """All words that state a role."""
         return frozenset(word for _, word in self.roles)
 
 
-def users_file() -> Path:
-    """Where a user's own words are, if there are any."""
-    # Path.home() fails where the user has no entry.
+def user_file() -> Path:
+    """Path of the user's own vocabulary, which need not exist."""
+    # Path.home() raises for a user without a passwd entry.
     folder = os.environ.get('XDG_CONFIG_HOME') or os.path.expanduser('~/.config')
     return Path(folder, 'ragdoll_ros', FILE)
 
 
 @functools.cache
 def vocabulary() -> Vocabulary:
-    """The words of both files; ModelErrors for a file that is none."""
-    return read_vocabulary([path for path in (users_file(), config_folder() / FILE)
+    """The merged vocabulary of both files; ModelErrors for a broken file."""
+    return read_vocabulary([path for path in (user_file(), config_folder() / FILE)
                             if os.path.isfile(path)])
 
 
 def read_vocabulary(paths: list[Path]) -> Vocabulary:
-    """The words of several files, an earlier one's before a later one's."""
+    """The merged vocabulary of several files; earlier files take precedence."""
     roles: list[tuple[str, str]] = []
     sides: dict[str, int] = {}
     fillers: set[str] = set()
@@ -54,7 +54,7 @@ def read_vocabulary(paths: list[Path]) -> Vocabulary:
         own = [(role, str(word).casefold()) for role, words in data.get('roles', {}).items()
                for word in words]
         order = order or list(data.get('roles', {}))
-        _check(path, own, order)
+        _check_roles(path, own, order)
         roles = own + roles
         for key, side in (('left', 1), ('right', -1)):
             sides.update((str(word).casefold(), side) for word in data.get(key, ()))
@@ -77,7 +77,7 @@ def _read(path: Path) -> dict:
     return data
 
 
-def _check(path: Path, own: list[tuple[str, str]], known: list[str]) -> None:
+def _check_roles(path: Path, own: list[tuple[str, str]], known: list[str]) -> None:
     for role, word in own:
         if role not in known:
             raise errors.ModelErrors(str(path), [errors.WrongForm(

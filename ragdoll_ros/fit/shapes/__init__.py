@@ -1,1 +1,1 @@
-"""Axes and shapes of a cloud of points."""
+"""Principal axes of point clusters, and collision shapes fitted to them."""

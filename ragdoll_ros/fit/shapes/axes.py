@@ -1,31 +1,31 @@
-"""Axes of a body from its cluster of vertices: along the principal axis, or along the bone."""
+"""Axes of a body from its vertices: along the principal axis, or along the bone."""
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
 
-STANDS_OUT = 0.2
-"""The first principal axis counts when the spread along it is this much above the second's."""
+MIN_ELONGATION = 0.2
+"""Elongation from which on the first principal axis is used."""
 
 
 @dataclass(frozen=True)
 class Axes:
-    """Axes of a body and how they were found."""
+    """Axes of a body, and how they were chosen."""
 
     frame: np.ndarray
-    """(3, 3) with the unit x, y and z axis, doll's frame, as columns; z is the long one."""
-    distinct: float
-    """1 - s2 / s1, with s1 and s2 the two largest standard deviations: 0 for a ball, 1 a line."""
+    """(3, 3), columns are the unit x, y and z axes, doll's frame; z is the long axis."""
+    elongation: float
+    """1 - s2 / s1 for the two largest standard deviations s1, s2: 0 for a sphere, 1 for a line."""
     principal: bool
-    """Whether z is the first principal axis (else the bone's direction)."""
+    """Whether z is the first principal axis; else it is the bone's direction."""
 
 
-def spread(points: np.ndarray, areas: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def principal_components(points: np.ndarray, areas: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Standard deviations (3,) m, largest first, and the principal axes (3, 3) as columns.
 
-    Roots of the eigenvalues and the eigenvectors of the covariance about the mean, in which each
-    of the points (p, 3) m counts by the area (p,) m^2 it stands for. Up to one point: zeros.
+    From the covariance of the points (p, 3) m about their mean, weighted by ``areas`` (p,) m^2.
+    Zeros for fewer than two points.
     """
     if len(points) == 0:
         return np.zeros(3), np.eye(3)
@@ -38,25 +38,25 @@ def spread(points: np.ndarray, areas: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 def fit_axes(points: np.ndarray, areas: np.ndarray, direction: np.ndarray,
              orientation: str = 'principal') -> Axes:
-    """Axes of a cluster (p, 3) m of vertices that stand for ``areas`` (p,) m^2, doll's frame.
+    """Axes of a cluster of vertices (p, 3) m with ``areas`` (p,) m^2, doll's frame.
 
-    ``direction`` (3,), a unit vector, is the bone's: z for ``orientation`` 'bone', and where no
-    principal axis stands out; else z is the first principal axis, its sign toward the direction.
-    x is the principal axis across z, as near to forwards (then left) as its sign allows; where
-    none stands out, the direction across z that is nearest to forwards.
+    z is the first principal axis, with the sign of the bone's unit ``direction`` (3,); it is the
+    direction itself for ``orientation`` 'bone' and for clusters below MIN_ELONGATION. x is the
+    second principal axis, with the sign that faces forward (else left); where it is ambiguous, the
+    perpendicular of z nearest to forward.
     """
-    deviations, vectors = spread(points, areas)
-    distinct = 1 - deviations[1] / deviations[0] if deviations[0] > 1e-9 else 0.0
-    principal = orientation == 'principal' and distinct >= STANDS_OUT
+    deviations, vectors = principal_components(points, areas)
+    elongation = 1 - deviations[1] / deviations[0] if deviations[0] > 1e-9 else 0.0
+    principal = orientation == 'principal' and elongation >= MIN_ELONGATION
     z = vectors[:, 0] if principal else direction
     if z @ direction < 0:
         z = -z
-    return Axes(_frame(z, points, areas), float(distinct), principal)
+    return Axes(_frame(z, points, areas), float(elongation), principal)
 
 
 def _frame(z: np.ndarray, points: np.ndarray, areas: np.ndarray) -> np.ndarray:
-    """Right-handed frame (3, 3) about a unit z."""
-    deviations, vectors = spread(points - np.outer(points @ z, z), areas)
+    """Right-handed frame (3, 3) with a given unit z."""
+    deviations, vectors = principal_components(points - np.outer(points @ z, z), areas)
     x = vectors[:, 0]
     if deviations[0] < 1e-9 or deviations[1] > 0.95 * deviations[0]:
         x = np.eye(3)[0] if abs(z[0]) < 0.9 else np.eye(3)[1]

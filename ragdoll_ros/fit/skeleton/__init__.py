@@ -1,1 +1,1 @@
-"""Which bones become bodies, and how they hang together."""
+"""Selection of the bones that become bodies, and their kinematic tree."""

@@ -1,6 +1,6 @@
-"""Which bones of a character are neighbours: edges between bones, by what their skins show.
+"""Edges between the bones of a character, as shown by their skin.
 
-The file's own edges come first where the skin agrees, then what shares most skin, then what is
+First the edges of the file that the skin confirms, then the pairs that share most skin, then the
 nearest.
 """
 from __future__ import annotations
@@ -8,114 +8,111 @@ from __future__ import annotations
 import numpy as np
 
 from ..reading.character import Character
-from ..roles.names import LIMBS
-from .borders import find_borders, find_gaps
+from ..roles.names import SINGLE_ROLES
+from .skin_adjacency import cluster_distances, find_adjacency
 
-AGREES = 0.1
-"""The skin agrees with the file where bone and parent share this much of the most that the bone
-shares with any."""
+MIN_FILE_AREA = 0.1
+"""The skin confirms an edge of the file if bone and parent share this fraction of the largest area
+that the bone shares with any bone."""
 
-NOISE = 0.003
-"""Skin shared by less than this share of the smaller bone's is a stray weight."""
+MIN_SHARED_AREA = 0.003
+"""Fraction of the smaller bone's skin below which shared skin is noise in the weights."""
 
-TOUCHING = 0.03
-"""Skins this near to each other, of the whole character, may be jointed."""
+TOUCH_DISTANCE = 0.03
+"""Distance between skins that a joint may bridge, as a fraction of the character's extent."""
 
-LARGE = 0.3
-"""An island of more than this share of the skin is no limb that the file forgot to join."""
+MAX_LOOSE_AREA = 0.3
+"""Fraction of the skin above which a detached part is no limb with a missing edge."""
 
-HALVES = 0.25
-"""A left and a right bone are halves of one body if this share of their borders is common."""
+MIN_HALF_AREA = 0.25
+"""Fraction of its shared skin that a left bone shares with the right one: halves of one body."""
 
-PAIRED = 0.02
-"""Left and right mirror each other to this share of the whole."""
+MIRROR_TOLERANCE = 0.02
+"""Largest deviation of a mirror image, as a fraction of the character's extent."""
 
 
 class SkinForest:
-    """The bones with skin of a character; ``edges`` join them until they are one tree.
+    """The skinned bones of a character, by index; ``edges`` connect them until they form one tree.
 
-    ``halves`` and ``tied`` are edges between bones that are one body, and between those that
-    nothing joins. All by the bones' indices.
+    ``halves`` are edges within one body, ``fixed`` those that nothing but the distance suggests.
     """
 
     def __init__(self, character: Character, clusters: list[np.ndarray],
                  roles: tuple[str | None, ...]) -> None:
         self.character, self.clusters, self.roles = character, list(clusters), roles
         areas = character.vertex_areas()
-        # Hair may have more skin than the body, and carries none of it.
+        # Hair may have more skin than the body, but supports none of it.
         self.areas = np.array([0.0 if role == 'soft' else areas[cluster].sum()
                                for cluster, role in zip(clusters, roles, strict=True)])
         self.skinned = [bone for bone, cluster in enumerate(clusters) if len(cluster)]
-        self.above = [self._skinned_above(bone) for bone in range(len(clusters))]
-        self.twins = self._find_twins()
-        self.borders = find_borders(character)
-        # As much on both sides, so that left and right are joined alike.
-        shared = self.borders.shared
-        self.shared = shared + shared[np.ix_(self.twins, self.twins)]
+        self.skinned_parents = [self._skinned_above(bone) for bone in range(len(clusters))]
+        self.mirrored = self._find_mirrored()
+        self.adjacency = find_adjacency(character)
+        # Symmetrized, so that left and right get the same edges.
+        shared = self.adjacency.shared_area
+        self.shared = shared + shared[np.ix_(self.mirrored, self.mirrored)]
         self.edges: list[tuple[int, int]] = []
         self.halves: list[tuple[int, int]] = []
-        self.tied: list[tuple[int, int]] = []
+        self.fixed: list[tuple[int, int]] = []
         self._tree_of = np.arange(len(clusters))
 
     def join_halves(self) -> None:
-        """Left and right that meet in the middle over much of their border are one body.
-
-        So are halves of a pelvis by their names.
-        """
+        """Left and right bones that share much skin, or are both pelvis by name, are one body."""
         for bone in self.skinned:
-            twin = int(self.twins[bone])
+            other = int(self.mirrored[bone])
             total = self.shared[bone].sum()
-            if bone < twin and (self._is_pelvis(bone) or (
-                    self.roles[bone] not in LIMBS
-                    and self.shared[bone, twin] > HALVES * total > 0)):
-                self._join(bone, twin)
-                self.halves.append((bone, twin))
+            if bone < other and (self._is_pelvis(bone) or (
+                    self.roles[bone] not in SINGLE_ROLES
+                    and self.shared[bone, other] > MIN_HALF_AREA * total > 0)):
+                self._join(bone, other)
+                self.halves.append((bone, other))
 
-    def join_as_the_file(self) -> None:
-        """Bones whose skin meets their parent's in the file."""
+    def join_file_edges(self) -> None:
+        """Connect bones to their parents in the file where their skins meet."""
         for bone in self.skinned:
-            parent = self.above[bone]
-            if parent >= 0 and self.twins[bone] != parent and (
-                    self.shared[bone, parent] > AGREES * self.shared[bone].max() > 0):
+            parent = self.skinned_parents[bone]
+            if parent >= 0 and self.mirrored[bone] != parent and (
+                    self.shared[bone, parent] > MIN_FILE_AREA * self.shared[bone].max() > 0):
                 self._join(bone, parent)
 
-    def join_by_skin(self) -> None:
-        """Bones that share skin, those that share most first."""
-        least = NOISE * np.minimum(self.areas[:, None], self.areas)
+    def join_shared_skin(self) -> None:
+        """Connect bones that share skin, the largest shared area first."""
+        least = MIN_SHARED_AREA * np.minimum(self.areas[:, None], self.areas)
         pairs = [(a, b) for a, b in np.argwhere(np.triu(self.shared > least))
-                 if self.twins[a] != b and len(self.clusters[a]) and len(self.clusters[b])]
+                 if self.mirrored[a] != b and len(self.clusters[a]) and len(self.clusters[b])]
         for a, b in sorted(pairs, key=lambda pair: -self.shared[pair]):
             self._join(int(a), int(b))
 
-    def join_by_nearness(self) -> None:
-        """Islands of skin: as the file has them where that is near, else where they are nearest."""
+    def join_nearest(self) -> None:
+        """Connect the remaining trees: by an edge of the file if that is near, else the nearest."""
         if len(self._trees()) == 1:
             return
-        gaps = find_gaps(self.character, self.clusters)
-        near = TOUCHING * self.character.extent
-        file = {(bone, self.above[bone]) for bone in self.skinned if self.above[bone] >= 0}
-        # Twins are jointed to each other only where there is nothing else.
-        gaps[self.skinned, self.twins[self.skinned]] += self.character.extent
+        distances = cluster_distances(self.character, self.clusters)
+        touching = TOUCH_DISTANCE * self.character.extent
+        file_edges = {(bone, parent) for bone in self.skinned
+                      if (parent := self.skinned_parents[bone]) >= 0}
+        # Mirror images are connected to each other only as a last resort.
+        distances[self.skinned, self.mirrored[self.skinned]] += self.character.extent
         while len(trees := self._trees()) > 1:
             island = min(trees, key=lambda tree: self.areas[self._tree_of == tree].sum())
-            inner = np.array([bone for bone in self.skinned if self._tree_of[bone] == island])
-            outer = np.array([bone for bone in self.skinned if self._tree_of[bone] != island])
-            between = gaps[np.ix_(inner, outer)]
-            gap = between.min()
+            inside = np.array([bone for bone in self.skinned if self._tree_of[bone] == island])
+            outside = np.array([bone for bone in self.skinned if self._tree_of[bone] != island])
+            between = distances[np.ix_(inside, outside)]
+            distance = between.min()
             row, column = np.unravel_index(np.argmin(between), between.shape)
-            edge = int(inner[row]), int(outer[column])
-            known = [(a, b) for a, b in file if self._tree_of[a] != self._tree_of[b]
-                     and island in (self._tree_of[a], self._tree_of[b])]
-            kept = min(known, key=lambda pair: (gaps[pair], pair), default=None)
-            if kept and (gaps[kept] <= gap + near or gap > near):
-                edge = kept
-            large = self.areas[inner].sum() > LARGE * self.areas.sum()
-            strange = not kept and self._file_root(edge[0]) != self._file_root(edge[1])
-            if strange and (large or gap > near):
-                # By its own root, as nothing is known of where it might turn.
-                top = next(bone for bone in inner if self.above[bone] not in inner)
-                edge = int(top), int(outer[np.argmin(gaps[top, outer])])
-                self.tied.append(edge)
+            edge = int(inside[row]), int(outside[column])
+            file_links = [(a, b) for a, b in file_edges if self._tree_of[a] != self._tree_of[b]
+                          and island in (self._tree_of[a], self._tree_of[b])]
+            file_edge = min(file_links, key=lambda pair: (distances[pair], pair), default=None)
+            if file_edge and (distances[file_edge] <= distance + touching or distance > touching):
+                edge = file_edge
+            large = self.areas[inside].sum() > MAX_LOOSE_AREA * self.areas.sum()
+            unrelated = not file_edge and self._file_root(edge[0]) != self._file_root(edge[1])
+            if unrelated and (large or distance > touching):
+                # At its own root: where it could articulate is unknown.
+                top = next(bone for bone in inside if self.skinned_parents[bone] not in inside)
+                edge = int(top), int(outside[np.argmin(distances[top, outside])])
+                self.fixed.append(edge)
             self._join(*edge)
 
     def _join(self, a: int, b: int) -> None:
@@ -137,22 +134,22 @@ class SkinForest:
             bone = self.character.parents[bone]
         return bone
 
-    def _find_twins(self) -> np.ndarray:
-        """Index (n,) of the bone whose skin is each one's mirror image; its own where none is."""
-        character, twins = self.character, np.arange(len(self.clusters))
+    def _find_mirrored(self) -> np.ndarray:
+        """Index (n,) of the bone with the mirrored skin; the bone's own where there is none."""
+        character, mirrored = self.character, np.arange(len(self.clusters))
         means = np.array([character.vertices[self.clusters[bone]].mean(axis=0)
                           for bone in self.skinned])
-        # Half of the bones are on each side, whatever one hand holds.
+        # The median: half of the bones are on each side, whatever a hand holds.
         images = means * (1, -1, 1) + (0, 2 * np.median(means[:, 1]), 0)
         nearest = [int(np.argmin(np.linalg.norm(means - image, axis=1))) for image in images]
         for k, other in enumerate(nearest):
             off = np.linalg.norm(means[other] - images[k])
-            if nearest[other] == k and off < PAIRED * character.extent:
-                twins[self.skinned[k]] = self.skinned[other]
-        return twins
+            if nearest[other] == k and off < MIRROR_TOLERANCE * character.extent:
+                mirrored[self.skinned[k]] = self.skinned[other]
+        return mirrored
 
     def _is_pelvis(self, bone: int) -> bool:
-        """Whether it is named as hips; what is called a thigh and has a thigh is half of them."""
+        """Whether it is named as hips, or is a thigh with a thigh below: half of the hips."""
         below = [self.roles[k] for k in self.skinned
-                 if self.above[k] == bone and k != self.twins[bone]]
+                 if self.skinned_parents[k] == bone and k != self.mirrored[bone]]
         return self.roles[bone] == 'hips' or (self.roles[bone] == 'thigh' and 'thigh' in below)

@@ -1,32 +1,32 @@
-"""Hair, skirts and capes as springs: chains of bones that hang from a body and carry nothing.
+"""Hair, skirts and capes as spring bones: chains of bones that support no body.
 
-Bones with such names are taken for springs, and where a character has more bodies than run in real
-time, so are its thinnest branches. They swing by VRM's default numbers and collide with nothing.
+Chains with such names become spring bones, and so do the thinnest branches of a character with
+more bodies than run in real time. They have VRM's default settings and do not collide.
 """
 from __future__ import annotations
 
 import numpy as np
 
 from ..reading.character import Character
-from ..reading.spring_bones import Rod, Spring
-from .groups import Group
+from ..reading.spring_bones import SpringBone, SpringJoint
+from .groups import BodyGroup
 from .skin_tree import SkinTree
 
-MOST_BODIES = 60
-"""Bodies of a doll: with as many of balls, a tick of 10 ms takes about 10 ms."""
+MAX_BODIES = 60
+"""Bodies of a doll: with as many ball joints, a tick of 10 ms takes about 10 ms."""
 
-ALIKE = 2.0
-"""Branches are about as thin if one has up to this much more skin to a bone."""
+SIMILAR_AREA = 2.0
+"""Ratio of skin areas per bone up to which branches count as equally thin."""
 
-STIFFNESS, DRAG = 1.0, 0.5
-"""m/s and a share a frame: what VRM's springs have if their file says nothing."""
+DEFAULT_STIFFNESS, DEFAULT_DRAG = 1.0, 0.5
+"""m/s and fraction per frame: VRM's defaults."""
 
 
 def soft_chains(character: Character, tree: SkinTree, roles: tuple[str | None, ...],
-                clusters: list[np.ndarray]) -> list[Spring]:
-    """Springs of two or more bones whose role is 'soft', one below the other.
+                clusters: list[np.ndarray]) -> list[SpringBone]:
+    """Spring bones of chains of two or more bones whose role is 'soft'.
 
-    A side branch is a spring of its own, fixed on the same body.
+    A side branch is a spring bone of its own, attached to the same body.
     """
     taken = {bone for spring in character.springs for bone in spring.bones}
     soft = {bone for bone, role in enumerate(roles) if role == 'soft' and len(clusters[bone])
@@ -41,7 +41,7 @@ def soft_chains(character: Character, tree: SkinTree, roles: tuple[str | None, .
         while below := [k for k in sorted(soft) if tree.parents[k] == chain[-1]]:
             chain.append(below[0])
         soft -= set(chain)
-        # A single bone, an ear or a jaw, is part of what carries it.
+        # A single bone, such as an ear or a jaw, is part of its parent's body.
         if len(chain) > 1 and carrier not in taken:
             springs.append(_spring(character, chain, carrier,
                                    [tree.anchors[each][0] for each in chain],
@@ -50,36 +50,33 @@ def soft_chains(character: Character, tree: SkinTree, roles: tuple[str | None, .
     return springs
 
 
-def thinned(character: Character, groups: list[Group],
-            kept: frozenset[int] = frozenset()) -> tuple[list[Group], list[Spring]]:
-    """At most MOST_BODIES of the groups; above that the thinnest branches become springs.
+def limit_bodies(character: Character, groups: list[BodyGroup],
+                 forced: frozenset[int] = frozenset()) -> tuple[list[BodyGroup], list[SpringBone]]:
+    """Reduce the groups to MAX_BODIES: the thinnest branches become spring bones.
 
-    With each go those that hang on the same body and are about as thin: all hair, or none. Groups
-    with a bone that is ``kept`` stay, and do not count.
+    Branches of the same body that are about as thin go together: all hair, or none. Groups with a
+    ``forced`` bone stay and do not count.
     """
-    springs: list[Spring] = []
+    springs: list[SpringBone] = []
     areas = character.vertex_areas()
-    most = MOST_BODIES + sum(bool(kept & set(group.bones)) for group in groups)
-    while len(groups) > most and (branches := _branches(groups, kept)):
+    limit = MAX_BODIES + sum(bool(forced & set(group.bones)) for group in groups)
+    while len(groups) > limit and (branches := _branches(groups, forced)):
         sizes = [np.mean([areas[groups[k].vertices].sum() for k in branch]) for branch in branches]
         carrier = groups[branches[int(np.argmin(sizes))][0]].parent
         family = [branch for branch, size in zip(branches, sizes, strict=True)
-                  if groups[branch[0]].parent == carrier and size <= ALIKE * min(sizes)]
+                  if groups[branch[0]].parent == carrier and size <= SIMILAR_AREA * min(sizes)]
         for branch in family:
             bones = [bone for k in branch for bone in groups[k].bones]
             springs.append(_spring(character, [groups[k].bone for k in branch],
                                    groups[carrier].bone, [groups[k].anchor for k in branch],
                                    groups[branch[-1]].vertices, bones))
             groups[carrier].bones += bones
-        groups = _without(groups, {k for branch in family for k in branch})
+        groups = _remove_groups(groups, {k for branch in family for k in branch})
     return groups, springs
 
 
-def _branches(groups: list[Group], kept: frozenset[int]) -> list[list[int]]:
-    """Chains of groups without a branch, from what hangs on a branching body to the end.
-
-    But those with a bone that is ``kept``.
-    """
+def _branches(groups: list[BodyGroup], forced: frozenset[int]) -> list[list[int]]:
+    """Unbranched chains of groups from a branching body to the end, without ``forced`` bones."""
     children = [[k for k, group in enumerate(groups) if group.parent == index]
                 for index in range(len(groups))]
     branches = []
@@ -87,23 +84,23 @@ def _branches(groups: list[Group], kept: frozenset[int]) -> list[list[int]]:
         chain = [end]
         while (above := groups[chain[0]].parent) >= 0 and len(children[above]) == 1:
             chain.insert(0, above)
-        if above >= 0 and not any(kept & set(groups[k].bones) for k in chain):
+        if above >= 0 and not any(forced & set(groups[k].bones) for k in chain):
             branches.append(chain)
     return branches
 
 
-def _without(groups: list[Group], gone: set[int]) -> list[Group]:
-    kept = [k for k in range(len(groups)) if k not in gone]
-    for k in kept:
-        groups[k].parent = kept.index(groups[k].parent) if groups[k].parent >= 0 else -1
-    return [groups[k] for k in kept]
+def _remove_groups(groups: list[BodyGroup], removed: set[int]) -> list[BodyGroup]:
+    remaining = [k for k in range(len(groups)) if k not in removed]
+    for k in remaining:
+        groups[k].parent = remaining.index(groups[k].parent) if groups[k].parent >= 0 else -1
+    return [groups[k] for k in remaining]
 
 
 def _spring(character: Character, chain: list[int], carrier: int, roots: list[np.ndarray],
-            last: np.ndarray, bones: list[int] | None = None) -> Spring:
-    """Spring along the roots of a chain of bones, to the end of the last one's skin."""
+            last: np.ndarray, bones: list[int] | None = None) -> SpringBone:
+    """Spring bone along the roots of a chain of bones, to the far end of the last one's skin."""
     points = character.vertices[last]
     tip = points[np.argmax(np.linalg.norm(points - roots[-1], axis=1))]
-    rod = Rod(STIFFNESS / character.scale, 0.0, DRAG)
-    return Spring(character.bone_names[chain[0]], (), (rod,) * len(chain),
-                  np.array([*roots, tip]), carrier, tuple(bones or chain))
+    joint = SpringJoint(DEFAULT_STIFFNESS / character.scale, 0.0, DEFAULT_DRAG)
+    return SpringBone(character.bone_names[chain[0]], (), (joint,) * len(chain),
+                      np.array([*roots, tip]), carrier, tuple(bones or chain))

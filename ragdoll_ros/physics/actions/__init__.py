@@ -1,1 +1,1 @@
-"""What acts on a simulation: pushes, grabs, joint springs."""
+"""Actions on a simulation: pushes, drives, grabs, joint springs."""

@@ -1,8 +1,8 @@
 """Grabs: hands that hold points of bones by springs of limited force.
 
-A hand is where it was told to be, reached evenly, so that twenty pointer events a second do not
-jerk. Between it and the point it holds is a spring of stiffness k = M w^2 with the damping
-c = 2 M w, M the doll's mass: hung by it, the doll is critically damped and sags by g / w^2.
+A hand moves to each target at constant velocity, which smooths pointer events of 20 Hz. The spring
+between hand and point has stiffness k = M w^2 and damping c = 2 M w, M the doll's mass: a doll that
+hangs from it is critically damped and sags by g / w^2.
 """
 from __future__ import annotations
 
@@ -18,36 +18,34 @@ from ...model.scene import Scene
 from ...model.state import State
 from ...model.vectors import Vector, floats
 from ..engine.protocol import Spring
-from ..motion import point_motion
+from ..rigid_body import point_motion
 
 FREQUENCY = 30.0
-"""rad/s, w: a doll follows within 0.2 s (e^-6 of the way is left) and sags by 11 mm."""
+"""rad/s, w: a doll follows within 0.2 s (up to e^-6 of the distance) and sags by 11 mm."""
 
-LARGEST_PULL = 2000.0
-"""N that a hand pulls with at the most."""
+MAX_FORCE = 2000.0
+"""N: force limit of a hand."""
 
-LARGEST_ACCELERATION = 40.0
-"""m/s^2 that a hand may give a whole doll: four times its weight. Light dolls get no more."""
+MAX_ACCELERATION = 40.0
+"""m/s^2: limit of the acceleration of a whole doll, about four times its weight."""
 
 REACH = 2.0
-"""Distances of a bone's centre from its farthest corner within which a hand may hold it: a skin
-is wider than its bones, but a lever of any length would break joints."""
+"""Largest distance of the held point from the bone's centre, in distances of the bone's farthest
+corner: skins are wider than bones, but a long lever would break joints."""
 
-FARTHEST = 1e6
-"""m from the world's origin that a hand may be."""
+MAX_COORDINATE = 1e6
+"""m: bound on each coordinate of a point or a target."""
 
-MOST_HANDS = 20
-"""Hands that may hold something at once; one more is refused."""
+MAX_HANDS = 20
+"""Hands that hold something at once."""
 
-EVENLY = 0.05
-"""s within which a hand gets where it shall be: the time between two of 20 events a second."""
+DRAG_TIME = 0.05
+"""s: default duration of a hand's movement, the period of 20 Hz pointer events."""
 
 
 @dataclass(frozen=True)
 class Grab:
-    """What a hand holds: a ``point`` (m, from the bone's centre of mass along the bone's axes),
-    and the ``target`` (m, world) that the hand was told to be at.
-    """
+    """A held ``point`` (m, in the bone's frame) and the hand's ``target`` (m, world frame)."""
 
     hand: str
     bone: str
@@ -56,7 +54,7 @@ class Grab:
 
 
 class Hands:
-    """All hands of a scene that hold something; false if there is none."""
+    """The hands of a scene that hold something."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -64,18 +62,18 @@ class Hands:
 
     @property
     def grabs(self) -> tuple[Grab, ...]:
-        """What is held, the longest held first."""
+        """Active grabs, oldest first."""
         return tuple(Grab(name, self._scene.bone_names[spring.bone], tuple(spring.point.tolist()),
                           tuple(spring.target.tolist())) for name, spring in self._springs.items())
 
     @property
     def springs(self) -> tuple[Spring, ...]:
-        """The springs by which they pull now."""
+        """Springs of the hands for Engine.advance()."""
         return tuple(self._springs.values())
 
     def grab(self, name: str, bone: str, point: Sequence[float],
              target: Sequence[float] | None, state: State) -> None:
-        """Let a hand hold a point of a bone. Raises UnknownBone, NotFinite or OutOfRange."""
+        """Attach a hand to a point of a bone; see Simulation.grab()."""
         index = self._scene.bone_index(bone)
         held = np.array(_checked('point', point))
         reach = REACH * math.hypot(*self._scene.bones[index].shape.half_extents)
@@ -84,32 +82,32 @@ class Hands:
         now, _ = point_motion(state, index, held)
         aim = now if target is None else np.array(_checked('target', target))
         self.let_go(name)
-        if len(self._springs) >= MOST_HANDS:
-            raise errors.OutOfRange('hands', MOST_HANDS + 1, f'at most {MOST_HANDS}')
+        if len(self._springs) >= MAX_HANDS:
+            raise errors.OutOfRange('hands', MAX_HANDS + 1, f'at most {MAX_HANDS}')
         mass = self._scene.dolls[self._scene.doll_of_bone[index]].doll.mass
         self._springs[name] = Spring(
-            index, held, now, aim, 0.0 if target is None else EVENLY, mass * FREQUENCY ** 2,
-            2 * mass * FREQUENCY, min(LARGEST_PULL, LARGEST_ACCELERATION * mass))
+            index, held, now, aim, 0.0 if target is None else DRAG_TIME, mass * FREQUENCY ** 2,
+            2 * mass * FREQUENCY, min(MAX_FORCE, MAX_ACCELERATION * mass))
 
     def drag(self, name: str, target: Sequence[float], within: float) -> None:
-        """Move a hand; one that holds nothing holds nothing still."""
+        """Move a hand; see Simulation.drag()."""
         aim = np.array(_checked('target', target))
         errors.check_range('within', within, 0.0, 1e6)
         if name in self._springs:
             self._springs[name] = dataclasses.replace(self._springs[name], target=aim, left=within)
 
     def let_go(self, name: str) -> None:
-        """Open a hand."""
+        """Detach a hand."""
         self._springs.pop(name, None)
 
     def move(self, duration: float) -> None:
-        """Let all hands go on by ``duration`` s."""
+        """Advance the hands' positions by ``duration`` s."""
         self._springs = {name: spring.after(duration) for name, spring in self._springs.items()}
 
 
 def _checked(name: str, values: Sequence[float]) -> Vector:
     values = floats(values)
     errors.check_finite(name, values)
-    if len(values) != 3 or max(map(abs, values)) > FARTHEST:
-        raise errors.OutOfRange(name, values, f'three numbers (m) up to {FARTHEST:g}')
+    if len(values) != 3 or max(map(abs, values)) > MAX_COORDINATE:
+        raise errors.OutOfRange(name, values, f'three numbers (m) up to {MAX_COORDINATE:g}')
     return values

@@ -1,4 +1,4 @@
-"""Holds: springs that hold joint angles until they are let go, as the joints of one who stands."""
+"""Joint springs: springs on joint angles, as of muscles that hold a pose until they go limp."""
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -8,17 +8,15 @@ import numpy as np
 
 from ...model import errors
 from ...model.scene import Scene
-from ..engine.protocol import AppliedHold
+from ..engine.protocol import AppliedJointSpring
 
-STIFFEST = 1e6
-"""N m/rad, and N m s/rad: a hundred people's, far from what steps can no longer tell."""
+MAX_STIFFNESS = 1e6
+"""N m/rad and N m s/rad: a hundred times a person's, and far from loss of precision."""
 
 
 @dataclass(frozen=True)
-class Hold:
-    """What holds a joint angle: its name, the target in rad, stiffness in N m/rad, damping in
-    N m s/rad.
-    """
+class JointSpring:
+    """A spring on a joint angle: target in rad, stiffness in N m/rad, damping in N m s/rad."""
 
     angle: str
     target: float
@@ -26,44 +24,44 @@ class Hold:
     damping: float
 
 
-class Holds:
-    """All angles of a scene that are held."""
+class JointSprings:
+    """The active joint springs of a scene, at most one for each angle."""
 
     def __init__(self, scene: Scene) -> None:
         self._names = scene.angle_names
-        self._places = [place for placement in scene.dolls for joint in placement.doll.joints
-                        for place in self._places_of(scene, placement, joint)]
-        self._held: dict[str, AppliedHold] = {}
+        self._axes = [axis for placement in scene.dolls for joint in placement.doll.joints
+                      for axis in self._joint_axes(scene, placement, joint)]
+        self._applied: dict[str, AppliedJointSpring] = {}
 
     @property
-    def holds(self) -> tuple[Hold, ...]:
-        """What is held, the longest held first."""
-        return tuple(Hold(name, held.target, held.stiffness, held.damping)
-                     for name, held in self._held.items())
+    def joint_springs(self) -> tuple[JointSpring, ...]:
+        """Active springs by name, oldest first."""
+        return tuple(JointSpring(name, spring.target, spring.stiffness, spring.damping)
+                     for name, spring in self._applied.items())
 
     @property
-    def springs(self) -> tuple[AppliedHold, ...]:
-        """The springs by which they are held now."""
-        return tuple(self._held.values())
+    def springs(self) -> tuple[AppliedJointSpring, ...]:
+        """Active springs for Engine.advance()."""
+        return tuple(self._applied.values())
 
     def hold(self, angle: str, stiffness: float, damping: float, target: float | None,
              angles: np.ndarray) -> None:
-        """Hold an angle of ``angles`` (k,), all of now, from now on as this says."""
+        """Add or replace a spring, see Simulation.hold(); ``angles`` (k,) rad: the current ones."""
         index = self._index(angle)
-        if self._places[index] is None:
-            raise errors.WrongAxes('angle', angle, 'an angle of no ball joint without limits')
+        if self._axes[index] is None:
+            raise errors.WrongAxes('angle', angle, 'no ball joint without limits: it has no angles')
         for key, value in (('stiffness', stiffness), ('damping', damping)):
-            errors.check_range(key, value, 0.0, STIFFEST)
+            errors.check_range(key, value, 0.0, MAX_STIFFNESS)
         aim = float(angles[index]) if target is None else float(target)
         errors.check_finite('target', (aim,))
-        bone, axis = self._places[index]
-        self._held[angle] = AppliedHold(bone, axis, aim, float(stiffness), float(damping))
+        bone, axis = self._axes[index]
+        self._applied[angle] = AppliedJointSpring(bone, axis, aim, float(stiffness), float(damping))
 
     def go_limp(self, angles: Sequence[str] | None) -> None:
-        """Let angles go, None: all; what is not held stays limp."""
+        """Remove the springs of these angles; None: of all."""
         for angle in self._names if angles is None else angles:
             self._index(angle)
-            self._held.pop(angle, None)
+            self._applied.pop(angle, None)
 
     def _index(self, angle: str) -> int:
         if angle not in self._names:
@@ -71,7 +69,7 @@ class Holds:
         return self._names.index(angle)
 
     @staticmethod
-    def _places_of(scene: Scene, placement: object, joint: object) -> list[tuple[int, int] | None]:
-        """Bone and axis of each angle of a joint."""
+    def _joint_axes(scene: Scene, placement: object, joint: object) -> list[tuple[int, int] | None]:
+        """Child bone and axis index of each angle of a joint; None without angles."""
         bone = scene.bone_index(scene.qualified(placement, joint.child))
         return [None if joint.is_free_ball else (bone, axis) for axis in range(joint.dof)]

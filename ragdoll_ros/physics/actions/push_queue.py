@@ -1,4 +1,4 @@
-"""Pushes and drives that wait or act: a bounded queue, and what each does while it acts."""
+"""PushQueue: a bounded queue of pushes and drives, and the loads of those that are active."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ from ...model.scene import SECOND, Scene
 from ...model.state import State
 from ..engine.protocol import AppliedDrive, AppliedWrench
 
-MOST_PUSHES = 1000
-"""Pushes that may wait at once; one more is refused."""
+MAX_PUSHES = 1000
+"""Length of the queue."""
 
 
 @dataclass
-class _Active:
-    """A push with its times in ns; its wrench once it has begun."""
+class _QueuedPush:
+    """A push or drive with its times, ns, and its wrench once it has begun."""
 
     push: Push | Drive
     bone: int
@@ -29,75 +29,75 @@ class _Active:
 
 
 class PushQueue:
-    """Pushes and drives of a scene in the order in which they came. Times in ns."""
+    """Pushes and drives of a scene, in the order of their arrival. Times in ns."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._queue: list[_Active] = []
+        self._queue: list[_QueuedPush] = []
 
     def __len__(self) -> int:
         return len(self._queue)
 
     def bones(self, now: int) -> list[int]:
-        """The bones that are being pushed."""
-        return [active.bone for active in self._acting(now)]
+        """Indices of the bones under active pushes and drives."""
+        return [queued.bone for queued in self._active(now)]
 
     def add(self, push: Push | Drive, channel: str | None, now: int) -> None:
-        """Queue a push; on a ``channel`` it takes the place of the last. See Simulation.push."""
+        """Queue a push; see Simulation.push()."""
         bone = self._scene.bone_index(push.bone)
         start = now if push.start is None else round(push.start * SECOND)
         if start < now:
             raise errors.OutOfRange('start', push.start, f'{now / SECOND:g} s or later')
         if channel is not None:
             self.release(channel)
-        if len(self._queue) >= MOST_PUSHES:
-            raise errors.OutOfRange('pushes', len(self._queue) + 1, f'at most {MOST_PUSHES}')
+        if len(self._queue) >= MAX_PUSHES:
+            raise errors.OutOfRange('pushes', len(self._queue) + 1, f'at most {MAX_PUSHES}')
         end = start + max(1, round(push.duration * SECOND))
-        self._queue.append(_Active(push, bone, start, end, channel))
+        self._queue.append(_QueuedPush(push, bone, start, end, channel))
 
     def release(self, channel: str) -> bool:
-        """End the push on a channel now; whether there was one."""
-        left = [active for active in self._queue if active.channel != channel]
+        """End the push on a channel; returns whether there was one."""
+        left = [queued for queued in self._queue if queued.channel != channel]
         ended, self._queue = len(left) < len(self._queue), left
         return ended
 
     def drop_ended(self, now: int) -> None:
-        """Forget pushes that are over."""
-        self._queue = [active for active in self._queue if active.end > now]
+        """Remove pushes that have ended."""
+        self._queue = [queued for queued in self._queue if queued.end > now]
 
-    def acting(self, now: int) -> tuple[Push, ...]:
-        """Pushes that act; a drive as the push that it is on a bone at rest."""
-        return tuple(active.push.at_rest if isinstance(active.push, Drive) else active.push
-                     for active in self._acting(now))
+    def active(self, now: int) -> tuple[Push, ...]:
+        """Active pushes; a drive as the push that it exerts on a bone at rest."""
+        return tuple(queued.push.at_rest if isinstance(queued.push, Drive) else queued.push
+                     for queued in self._active(now))
 
     def wrenches(self, now: int, state: State) -> list[AppliedWrench]:
-        """What pushes do to the bones; a push's point is tied to its bone when it begins."""
-        return [self._wrench(active, state) for active in self._acting(now)
-                if isinstance(active.push, Push)]
+        """Loads of active pushes; a push's point is fixed in its bone's frame when it begins."""
+        return [self._wrench(queued, state) for queued in self._active(now)
+                if isinstance(queued.push, Push)]
 
     def drives(self, now: int) -> list[AppliedDrive]:
-        """What drives do to the bones."""
-        return [_applied(active.push, active.bone) for active in self._acting(now)
-                if isinstance(active.push, Drive)]
+        """Loads of active drives."""
+        return [_applied(queued.push, queued.bone) for queued in self._active(now)
+                if isinstance(queued.push, Drive)]
 
     def next_change(self, now: int) -> int | None:
-        """Instant at which the next push begins or ends; None if none does."""
-        times = [time for active in self._queue for time in (active.start, active.end)]
+        """Time of the next start or end of a push; None without one."""
+        times = [time for queued in self._queue for time in (queued.start, queued.end)]
         return min((time for time in times if time > now), default=None)
 
-    def _acting(self, now: int) -> list[_Active]:
-        return [active for active in self._queue if active.start <= now < active.end]
+    def _active(self, now: int) -> list[_QueuedPush]:
+        return [queued for queued in self._queue if queued.start <= now < queued.end]
 
     @staticmethod
-    def _wrench(active: _Active, state: State) -> AppliedWrench:
-        if active.wrench is None:
-            push = active.push
+    def _wrench(queued: _QueuedPush, state: State) -> AppliedWrench:
+        if queued.wrench is None:
+            push = queued.push
             point = np.array(push.point)
             if not push.local:
-                point = rotation.rotate(rotation.inverse(state.orientations[active.bone]), point)
-            active.wrench = AppliedWrench(active.bone, np.array(push.force), np.array(push.torque),
+                point = rotation.rotate(rotation.inverse(state.orientations[queued.bone]), point)
+            queued.wrench = AppliedWrench(queued.bone, np.array(push.force), np.array(push.torque),
                                           point, push.local)
-        return active.wrench
+        return queued.wrench
 
 
 def _applied(drive: Drive, bone: int) -> AppliedDrive:

@@ -1,1 +1,1 @@
-"""Engines: what turns a scene into motion. One small protocol, one file for each engine."""
+"""Physics engines: one protocol, one file for each library."""

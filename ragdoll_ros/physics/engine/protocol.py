@@ -1,4 +1,4 @@
-"""What an engine must be able to do. Everything is SI, world frame, quaternions x, y, z, w."""
+"""The interface of a physics engine. SI units, world frame, quaternions x, y, z, w."""
 from __future__ import annotations
 
 import dataclasses
@@ -13,43 +13,43 @@ from ...model.coordinates import DofLayout, GeneralizedState
 from ...model.scene import Scene
 from ...model.state import State
 from ..accuracy import Accuracy
-from ..motion import Motion
+from .doll_totals import DollTotals
 
 GROUND = -1
-"""Index that stands for the ground where a bone's would stand."""
+"""Body index of the ground, in place of a bone's."""
 
-PRESSED = 0.025
-"""Overlap, as a share of half the thinnest bone's thickness, up to which bones rest or slide on
-each other where a motion starts. What overlaps by more was put there, and would burst apart."""
+ALLOWED_PENETRATION = 0.025
+"""Initial penetration, as a fraction of the thinnest bone's half thickness, that still counts as a
+contact. A deeper overlap is part of the pose, and its contact forces would burst the doll apart."""
 
 
 class MissingEngine(errors.RagdollError):
-    """An engine whose library is not installed, or does not work here."""
+    """The library of an engine is not installed or does not work."""
 
 
 @dataclass(frozen=True)
 class Contacts:
-    """All c points at which two things touch: bone ``a`` with bone ``b``, or with the GROUND."""
+    """All c contact points, each between bone ``a`` and bone ``b`` or the GROUND."""
 
     a: np.ndarray
-    """(c,) indices of bones."""
+    """(c,) bone indices."""
     b: np.ndarray
-    """(c,) those of others, or GROUND."""
+    """(c,) bone indices, or GROUND."""
     positions: np.ndarray
-    """(c, 3) m on a's surface."""
+    """(c, 3) m, on the surface of a."""
     normals: np.ndarray
-    """(c, 3) of length one, from b to a."""
+    """(c, 3) unit vectors from b to a."""
     depths: np.ndarray
-    """(c,) m; negative: a gap."""
+    """(c,) penetration, m; negative for a gap."""
     forces: np.ndarray
-    """(c,) N along the normal in the last substep."""
+    """(c,) normal force in the last substep, N."""
 
     def __len__(self) -> int:
         return len(self.a)
 
     @classmethod
     def of(cls, rows: Sequence[Sequence[float]]) -> Contacts:
-        """From rows (c, 10) of all these side by side."""
+        """Make contacts from rows (c, 10): a, b, position, normal, depth, force."""
         table = np.array(rows, float).reshape(-1, 10)
         a, b = table[:, :2].T.astype(np.int64)
         return cls(a, b, table[:, 2:5], table[:, 5:8], table[:, 8], table[:, 9])
@@ -57,10 +57,10 @@ class Contacts:
 
 @dataclass(frozen=True)
 class AppliedWrench:
-    """A force (3,) N and a torque (3,) N m on a bone, for one step.
+    """A force (3,) N and a torque (3,) N m on a bone, constant over one step.
 
-    ``point`` (3,) m is where the force attacks, from the bone's centre of mass along the bone's
-    own axes. ``local``: so are force and torque, else they are along the world's.
+    ``point`` (3,) m is where the force acts, in the bone's frame, from its centre of mass. Force
+    and torque are in the bone's frame if ``local``, else in the world frame.
     """
 
     bone: int
@@ -71,32 +71,33 @@ class AppliedWrench:
 
 
 Wrenches = Sequence[AppliedWrench]
-"""All that acts during one step."""
 
 
 @dataclass(frozen=True)
 class Spring:
-    """A hand's spring: it pulls a bone with -k (x - hand) - c (v - hand's velocity), ``most`` N at
-    the most, where x and v are position and velocity of the ``point``.
+    """A spring and damper between a hand and a point of a bone: f = -k (x - h) - c (v - h').
+
+    x and v are the point's position and velocity, h and h' the hand's. |f| is limited to ``most``.
     """
 
     bone: int
     point: np.ndarray
-    """(3,) m from the bone's centre of mass along the bone's axes."""
+    """(3,) m, in the bone's frame, from its centre of mass."""
     position: np.ndarray
-    """(3,) m where the hand is now."""
+    """(3,) m: the hand's position h now."""
     target: np.ndarray
-    """(3,) m where it goes, evenly."""
+    """(3,) m: the position that the hand approaches at constant velocity."""
     left: float
-    """s until it is there."""
+    """s until the hand reaches the target."""
     stiffness: float
     """k, N/m."""
     damping: float
     """c, N s/m."""
     most: float
+    """N: force limit."""
 
     def after(self, duration: float) -> Spring:
-        """The same ``duration`` s later, its hand farther on."""
+        """The spring ``duration`` s later, with the hand moved towards its target."""
         if duration >= self.left:
             return dataclasses.replace(self, position=self.target, left=0.0)
         way = (self.target - self.position) * (duration / self.left)
@@ -104,12 +105,12 @@ class Spring:
 
 
 @dataclass(frozen=True)
-class AppliedHold:
-    """A spring that holds an angle of the joint above a bone: -k (angle - target) - c rate, N m."""
+class AppliedJointSpring:
+    """A spring on an angle of the joint above a bone: torque -k (angle - target) - c rate, N m."""
 
     bone: int
     axis: int
-    """Which of the joint's axes, from 0 on."""
+    """Index of the joint's axis."""
     target: float
     """rad"""
     stiffness: float
@@ -118,31 +119,32 @@ class AppliedHold:
     """c, N m s/rad."""
 
 
-Springs = Sequence[Spring | AppliedHold]
+Springs = Sequence[Spring | AppliedJointSpring]
 
 
 @dataclass(frozen=True)
 class AppliedDrive:
-    """Pushes a bone at its centre of mass with c (u - v), ``most`` N at the most, where v is its
-    velocity and u that which it shall have, and turns it likewise; world axes.
+    """Velocity control of a bone: force c (u - v) at its centre of mass, and a torque likewise.
+
+    u is the target velocity and v the bone's, world frame.
     """
 
     bone: int
     targets: np.ndarray
-    """(2, 3) u, m/s, and that of turning, rad/s."""
+    """(2, 3) linear, m/s, and angular target velocity, rad/s."""
     gains: tuple[float, float]
-    """c, N s/m, and that of turning, N m s; 0 leaves it free."""
+    """Linear c, N s/m, and angular, N m s; 0: not controlled."""
     most: tuple[float, float]
-    """N and N m."""
+    """Limits of force, N, and torque, N m."""
 
 
 Drives = Sequence[AppliedDrive]
 
 
 class Engine(Protocol):
-    """A scene in motion: where it is, what moves it on, what went wrong.
+    """A scene's physics: state, time step, contacts, energy account.
 
-    It begins where the scene's placements say, as after place().
+    A new engine has the pose and velocities of the scene's placements.
     """
 
     scene: Scene
@@ -150,94 +152,90 @@ class Engine(Protocol):
     accuracy: Accuracy
     """May be changed between ticks."""
     energy_error: float
-    """Share of the energy at hand that a tick may make from nothing; more is no error of the method
-    but a bad state."""
-    holds: bool
-    """Whether joints can be held; for an engine where they can not, none are."""
-    resting: np.ndarray
-    """(d,) dolls that stand until something pushes, grabs or comes near them."""
+    """Relative energy gain in a tick above which the state counts as diverged; see Guard."""
+    supports_joint_springs: bool
+    """Whether advance() takes AppliedJointSpring."""
+    sleeping: np.ndarray
+    """(d,) bool: dolls that are not integrated until a load or another doll wakes them."""
 
     def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
-        """``workers``: threads that it may use; what comes of it is the same to the bit."""
+        """Build the scene; results do not depend on ``workers``, the number of threads."""
 
     @property
     def state(self) -> State:
-        """Poses and velocities of all bones now."""
+        """Poses and velocities of all bones."""
 
     @property
     def coordinates(self) -> GeneralizedState:
-        """Generalised coordinates and velocities of all dolls now."""
+        """Generalised coordinates and velocities of all dolls."""
 
     @property
     def joint_angles(self) -> np.ndarray:
-        """Joint angles (k,) rad of these coordinates, in the order of Scene.angle_names."""
+        """Joint angles (k,) rad, in the order of Scene.angle_names."""
 
     @property
     def joint_rates(self) -> np.ndarray:
-        """What they change by (k,), rad/s."""
+        """Time derivatives of the joint angles (k,) rad/s."""
 
     @property
-    def motion(self) -> Motion:
-        """Sums over each doll now."""
+    def doll_totals(self) -> DollTotals:
+        """Energy, momentum and inertia of each doll."""
 
     @property
-    def groups(self) -> np.ndarray:
-        """Number (d,) of what each doll goes on with: dolls of one number fall asleep together."""
+    def cluster_of_doll(self) -> np.ndarray:
+        """Cluster index (d,): dolls of one cluster are integrated together and sleep together."""
 
-    def place(self, coordinates: GeneralizedState) -> None:
-        """Put all dolls there and begin: nothing has been gained or lost yet.
+    def set_coordinates(self, coordinates: GeneralizedState) -> None:
+        """Set the state, wake all dolls and restart the energy account.
 
-        Bones of one doll that overlap by more than pressed() collide no more, for good or until
-        they have come apart; a doll that is deeper in the ground is lifted onto it.
+        Collision is disabled between bones of one doll that overlap by more than
+        allowed_penetration(), for good or until they separate. A doll that is deeper than that in
+        the ground is lifted onto it.
         """
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
                 drives: Drives = ()) -> None:
-        """Go on by ``duration`` s under wrenches and drives that neither begin nor end within it,
-        and springs of hands and of held joints.
-        """
+        """Integrate over ``duration`` s, under loads that act during all of it."""
 
-    def stop(self, dolls: np.ndarray) -> None:
-        """Bring dolls (d,), whole groups, to rest where they are; the energy that is left is lost
-        for good.
-        """
+    def put_to_sleep(self, dolls: np.ndarray) -> None:
+        """Set the velocities of dolls (d,), whole clusters, to zero; their energy is removed."""
 
-    def grounded(self) -> np.ndarray:
+    def dolls_on_ground(self) -> np.ndarray:
         """Which dolls (d,) rest on the ground."""
 
     def contacts(self) -> Contacts:
-        """What touches now."""
+        """All contact points."""
 
     def bones_on_ground(self) -> np.ndarray:
-        """Which bones (n,), true or false, have contacts with the ground now."""
+        """Which bones (n,) touch the ground."""
 
     @property
     def energy_excess(self) -> float:
-        """Energy, J, above that at the start and all work since; losses make it negative."""
+        """Energy, J, minus that at the start and all work since; negative after losses."""
 
     def measures(self) -> dict[str, float]:
-        """What went wrong since the start: names end in their units."""
+        """Error measures and counters since the start; keys end in units."""
 
     def save(self) -> object:
-        """A snapshot that restore brings back to the bit, accounts included."""
+        """Take a snapshot that restore() reproduces to the bit, energy account included."""
 
     def restore(self, snapshot: object) -> None:
-        """Go back to a snapshot."""
+        """Restore a snapshot."""
 
-    def forget(self, snapshot: object) -> None:
-        """Release what a snapshot holds."""
+    def discard(self, snapshot: object) -> None:
+        """Release the memory of a snapshot."""
 
     def checkpoint(self) -> object:
-        """Where all is and what the accounts say: far cheaper than save()."""
+        """Save coordinates and energy account only: far cheaper than save()."""
 
-    def go_back(self, checkpoint: object) -> None:
-        """Go on from the checkpoint of an engine of the same scene; what touches is found anew."""
+    def restore_checkpoint(self, checkpoint: object) -> None:
+        """Restore a checkpoint, also of another engine of the scene; contacts are recomputed."""
 
     def close(self) -> None:
-        """Release everything; a second time does nothing."""
+        """Release all resources; further calls do nothing."""
 
 
-def pressed(scene: Scene) -> float:
-    """Depth, m, up to which a scene's bones may rest in each other and in the ground."""
-    return PRESSED * min(min(part.shape.half_extents)
+def allowed_penetration(scene: Scene) -> float:
+    """Initial penetration, m, that counts as a contact, between bones and with the ground."""
+    return ALLOWED_PENETRATION * min(min(part.shape.half_extents)
                          for bone in scene.bones for part in bone.shape.parts)

@@ -1,4 +1,4 @@
-"""Engines by name; what one needs is imported when it is asked for."""
+"""Engines by name. The library of an engine is imported when the engine is requested."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -8,12 +8,12 @@ from .. import kernels
 from .protocol import Engine, MissingEngine
 
 ENGINES = ('auto', 'rigid', 'bullet', 'mujoco')
-"""'auto' is rigid where machine code can be made, else bullet."""
+"""'auto' selects rigid where numba can compile, else bullet."""
 
 
 @dataclass(frozen=True)
 class EngineChoice:
-    """The engine that is taken, its name, and why it is not the rigid one, if 'auto' was asked."""
+    """The selected engine; ``reason`` says why 'auto' did not select rigid."""
 
     name: str
     make: type[Engine]
@@ -21,9 +21,9 @@ class EngineChoice:
 
 
 def resolve_engine(engine: str | type[Engine]) -> EngineChoice:
-    """The engine for a name, or a class as it is; OutOfRange for a name that is none.
+    """Look up an engine by name, or wrap a class.
 
-    Raises MissingEngine for an engine whose library is missing or does not work.
+    Raises OutOfRange for an unknown name, MissingEngine if its library is missing or broken.
     """
     if not isinstance(engine, str):
         return EngineChoice(engine.__name__, engine)
@@ -42,7 +42,7 @@ def resolve_engine(engine: str | type[Engine]) -> EngineChoice:
 
 
 def _bullet_engine(problem: str) -> type[Engine]:
-    """PyBullet's; ``problem`` is what the rigid engine lacks, if that was asked for first."""
+    """Import BulletEngine; ``problem``: why the rigid engine is not available, for the message."""
     try:
         from .substepped.bullet import BulletEngine
     except ImportError as error:
@@ -53,6 +53,6 @@ def _bullet_engine(problem: str) -> type[Engine]:
 
 
 def check_engine(name: str) -> None:
-    """Raise OutOfRange for a name that is none."""
+    """Raise OutOfRange for an unknown engine name."""
     if name not in ENGINES:
         raise errors.OutOfRange('engine', name, 'one of ' + ', '.join(ENGINES))

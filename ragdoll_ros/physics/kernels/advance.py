@@ -1,36 +1,73 @@
-"""A stretch of motion from end to end: flight, touches, impacts, steps between them."""
+"""Advance clusters of dolls by a time, as the algorithm reads.
+
+One tick of a cluster, and what its stages read and write:
+
+    advance ── for each cluster: advance_cluster
+      enable_separated_pairs     q, excluded -> excluded          pairs that overlapped at the start
+      update_kinematics_and_gaps q, v -> kinematics, gaps         narrow phase
+      until the time is up:
+        can_fly                  gaps, contacts, v                does everything separate?
+        begin_dense_step         q, v, loads -> dense_step        DOP853 with dense output
+        find_first_contact       dense_step -> event_time         conservative advancement
+        follow_dense_step        dense_step -> q, v               to the event or the time's end
+      or
+        step_to_impact           q, v, gaps -> q, v, gaps         step control, time of impact
+          begin_contact_step     q, v -> start contacts, sums_before
+          contact_step           -> q_end, v_end                  Moreau's centered scheme
+            unconstrained_velocity  middle, loads, springs -> v_free, factor of the mass matrix
+            find_contacts           middle, gaps_active -> contacts
+            warm_start              last contacts -> impulses
+            solve_contacts          contacts, v_free -> v_change, correction   islands
+          finish_step            v_end, correction -> q_end, v_end, gaps_end   position correction
+          update_bracket, next_trial_step   gaps_end -> length of the next trial
+      and where something has met:
+        impact                   q, gaps -> v                     restitution, friction
+      write_bone_states, sum_dolls   q, v -> bone_states, doll_sums
+
+The broad phase and sleep are outside, in engine/rigid.
+"""
 from __future__ import annotations
 
 import math
 
 import numpy as np
 
+from .cluster_state import CLUSTER_STATE, ClusterState
 from .compiling.bundle import bundle_at
 from .compiling.decorators import JOBS, REAL, compiled, entry
-from .contact.gaps import look, part_pairs
-from .dynamics.forward import pose
-from .flight.event import find_event
-from .flight.fly import fly, may_fly
-from .flight.path import begin_path
-from .maths.quaternion import cross, times
-from .stepping.control import step_or_touch
+from .contact.gaps import enable_separated_pairs, update_kinematics_and_gaps
+from .dynamics.kinematics import (
+    Kinematics,
+    forward_kinematics,
+    inertial_frame,
+    put_quat,
+    root_position,
+    velocity_at,
+)
+from .flight.dense_step import begin_dense_step
+from .flight.first_contact import find_first_contact
+from .flight.flight import can_fly, follow_dense_step
+from .maths.vectors import add, put, vec
 from .stepping.impact import impact
 from .stepping.momentum import sum_dolls
-from .system import COURSE, ROOM, SYSTEM, Course, Room, System
+from .stepping.step_control import step_to_impact
+from .system import SYSTEM, System
+from .workspace import WORKSPACE, Workspace
 
-LONGEST = 0.05
-"""s of a path."""
+LONGEST_FLIGHT = 0.05
+"""s: the longest step of flight that is tried."""
 
-MOST_EVENTS = 200
-"""Impacts in one stretch of a doll by itself, over the cube of their number of several that go on
-together: from then on no instant of a touch is sought, so that many do not cost their square."""
+MAX_IMPACTS = 200
+"""Impacts of one doll in one tick, over the cube of the number of dolls in the cluster: from then
+on no time of impact is sought, so that many dolls do not cost their square."""
 
-system_at, room_at, course_at = bundle_at(SYSTEM), bundle_at(ROOM), bundle_at(COURSE)
+system_at, workspace_at, cluster_state_at = (bundle_at(SYSTEM), bundle_at(WORKSPACE),
+                                             bundle_at(CLUSTER_STATE))
 
 
 @compiled
 def is_finite(values: np.ndarray) -> bool:
-    """Whether all values (k,) are, and their sum."""
+    """Whether all values (k,) are finite, and their sum."""
     total = 0.0
     for j in range(len(values)):
         total += values[j]
@@ -38,75 +75,86 @@ def is_finite(values: np.ndarray) -> bool:
 
 
 @compiled
-def observe(s: System, r: Room, q: np.ndarray, v: np.ndarray, rows: np.ndarray) -> None:
-    """Position, orientation, linear and angular velocity (n, 13) of all bones, world frame."""
-    pose(s.tree, q, v, r.work)
+def write_bone_states(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray,
+                      states: np.ndarray) -> None:
+    """Enter position, orientation, linear and angular velocity (n, 13) of all bones, world frame;
+    ``kin`` becomes that of q and v.
+    """
+    forward_kinematics(s.tree, q, v, kin)
     for i in range(len(s.tree)):
-        bone, turn, move, centre = s.tree[i], r.work.turns[i], r.work.moves[i], r.work.centres[i]
-        row, root, bind = rows[bone.bone], s.tree[s.root_of[i]].q, bone.bind
-        row[3], row[4], row[5], row[6] = times(turn[0], turn[1], turn[2], turn[3], bind[0],
-                                               bind[1], bind[2], bind[3])
-        x, y, z = cross(move[0], move[1], move[2], centre[0], centre[1], centre[2])
-        row[7], row[8], row[9] = move[3] + x, move[4] + y, move[5] + z
-        for k in range(3):
-            row[k] = q[root + k] + centre[k]
-            row[10 + k] = move[k]
+        body = s.tree[i]
+        state, at = states[body.bone], vec(kin.positions[i])
+        put_quat(state[3:7], inertial_frame(body, kin, i))
+        put(state[7:10], velocity_at(kin, i, at))
+        put(state[0:3], add(root_position(q, s.tree[s.body_root[i]].q_start), at))
+        put(state[10:13], vec(kin.spatial_velocities[i]))
 
 
 @compiled
-def go_on(s: System, r: Room, course: Course, duration: float, step: float,
-          tolerance: float) -> None:
-    """Take the course of one cluster on by ``duration`` s; see advance()."""
-    q, v, path, tally = course.q, course.v, course.path[0], r.tally[0]
-    loads, springs, time, events = course.loads, course.springs, 0.0, 0
-    most = MOST_EVENTS // len(r.given) ** 3
-    flies = s.flies[0] > 0 and len(springs) == 0
-    parted = part_pairs(s, r, q, v)
-    if parted:
-        path.valid = path.begun = 0
-    if parted or duration == 0.0:
-        look(s, r, q, v, r.gaps, math.inf, r.gaps)
-        tally.seen = 1
-    # What is no number would be gone through in the finest steps, which takes a second.
+def refresh_gaps(s: System, ws: Workspace, cluster: ClusterState) -> None:
+    """Enter the gaps of now."""
+    update_kinematics_and_gaps(s, ws, ws.step.end, cluster.q, cluster.v, ws.gaps, math.inf,
+                               ws.gaps)
+    ws.stats[0].gaps_current = 1
+
+
+@compiled
+def try_flight(s: System, ws: Workspace, cluster: ClusterState, left: float, nominal: float,
+               tolerance: float) -> None:
+    """Begin a step of flight if everything separates."""
+    longest = min(left, LONGEST_FLIGHT) if len(cluster.loads) else LONGEST_FLIGHT
+    if can_fly(s, ws, cluster, nominal) and begin_dense_step(s, ws, cluster, tolerance, longest):
+        find_first_contact(s, ws, cluster)
+        ws.stats[0].contact_count = 0
+
+
+@compiled
+def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: float,
+                    nominal: float, tolerance: float) -> None:
+    """Advance one cluster by ``duration`` s; see advance()."""
+    q, v, dense, stats = cluster.q, cluster.v, cluster.dense_step[0], ws.stats[0]
+    time, impacts = 0.0, 0
+    max_impacts = MAX_IMPACTS // len(ws.step.external) ** 3
+    flies = s.flight_enabled[0] > 0 and len(cluster.springs) == 0
+    separated = enable_separated_pairs(s, ws, ws.step.end, q, v)
+    if separated:
+        dense.valid = dense.first_rate_known = 0
+    if separated or duration == 0.0:
+        refresh_gaps(s, ws, cluster)
+    # A state that is not finite would be integrated in the finest steps, which takes a second.
     while time < duration - 1e-12 and is_finite(q) and is_finite(v):
-        left = duration - time
-        if not path.valid and not tally.seen:
-            look(s, r, q, v, r.gaps, math.inf, r.gaps)
-            tally.seen = 1
-        if (not path.valid and flies and events < most
-                and may_fly(s, r, course, loads, step)
-                and begin_path(s, r, course, loads, tolerance,
-                               min(left, LONGEST) if len(loads) else LONGEST)):
-            find_event(s, r, course)
-            tally.contacts = 0
-        if path.valid:
-            gone, touched = fly(s, r, course, left, loads)
-            tally.seen = 0
+        left, seek = duration - time, impacts < max_impacts
+        if not dense.valid and not stats.gaps_current:
+            refresh_gaps(s, ws, cluster)
+        if not dense.valid and flies and seek:
+            try_flight(s, ws, cluster, left, nominal, tolerance)
+        if dense.valid:
+            gone, touched = follow_dense_step(s, ws, cluster, left)
+            stats.gaps_current = 0
             if touched:
-                look(s, r, q, v, r.gaps, math.inf, r.gaps)
-                tally.seen = 1
+                refresh_gaps(s, ws, cluster)
         else:
-            if not flies or events >= most:
-                look(s, r, q, v, r.gaps, math.inf, r.gaps)
-            h = left / max(1, math.ceil(left / step - 1e-9))
-            gone, touched = step_or_touch(s, r, course, h, loads, springs, time, step,
-                                          events < most)
-            path.begun, path.next = 0, 0.0
+            if not flies or not seek:
+                refresh_gaps(s, ws, cluster)
+            h = left / max(1, math.ceil(left / nominal - 1e-9))
+            gone, touched = step_to_impact(s, ws, cluster, h, time, nominal, seek)
+            dense.first_rate_known, dense.next_length = 0, 0.0
         time += gone
-        tally.settled = 0 if touched else 1
+        stats.ended_without_impact = 0 if touched else 1
         if touched:
-            impact(s, r, q, v, events < most)
-            events += 1
-    observe(s, r, q, v, course.rows)
-    sum_dolls(s, q, r, course.sums)
+            impact(s, ws, q, v, seek)
+            impacts += 1
+    write_bone_states(s, ws.step.end, q, v, cluster.bone_states)
+    sum_dolls(s, ws, ws.step.end, q, cluster.doll_sums)
 
 
 @entry(JOBS, REAL, REAL, REAL)
 def advance(jobs: np.ndarray, duration: float, step: float, tolerance: float) -> None:
-    """Take clusters on by ``duration`` s, each by itself, and enter in their courses the rows and
-    sums at the end. ``jobs`` (k, 3): addresses of their bundles, system, room and course. ``step``:
-    s of a step on the ground; ``tolerance``: m or rad by which a path's end may err.
+    """Advance clusters by ``duration`` s, each by itself, and enter their bone states and sums.
+
+    ``jobs`` (k, 3): addresses of the bundles of a cluster's system, workspace and state. ``step``:
+    length of a contact step, s; ``tolerance``: error of a step of flight, m or rad.
     """
     for k in range(len(jobs)):
-        go_on(system_at(jobs[k, 0]), room_at(jobs[k, 1]), course_at(jobs[k, 2]), duration, step,
-              tolerance)
+        advance_cluster(system_at(jobs[k, 0]), workspace_at(jobs[k, 1]),
+                        cluster_state_at(jobs[k, 2]), duration, step, tolerance)

@@ -1,1 +1,1 @@
-"""Sensors that read a simulation."""
+"""Inertial sensors of a simulation."""

@@ -1,12 +1,11 @@
-"""Inertial sensors worn on bones: what they read of a motion, and what they add to it.
+"""Inertial measurement units (IMUs) on bones: samples of angular rate and specific force.
 
-A sensor averages over each sample, as those that integrate do: a sample is the constant angular
-rate and the constant specific force, both in the sensor's own frame, that take its orientation and
-its velocity at the sample's start to those at its end. With the turn p = w dt of a sample that is
-G f dt = R0^T (v1 - v0 - g dt), where G is the mean of the rotations exp(s p), s from 0 to 1 (the
-left Jacobian of SO(3); Forster et al. 2017, IEEE T-RO 33:1, on preintegration). So a train of
-samples, integrated, gives the motion back, and one with an impact in it has all that the impact
-changed, spread over the sample: its peak goes with the rate, its sum does not.
+A sample is the mean over its interval: the constant angular rate w and specific force f, in the
+sensor's frame, that take orientation and velocity at its start to those at its end. With p = w dt,
+G f dt = R0^T (v1 - v0 - g dt), where G is the mean of exp(s p) for s from 0 to 1, the left Jacobian
+of SO(3) (Forster et al. 2017, IEEE T-RO 33:1, on preintegration). So the integral of the samples is
+the motion. A sample with an impact contains its whole change of velocity: the peak depends on the
+sample rate, the sum does not.
 """
 from __future__ import annotations
 
@@ -19,33 +18,31 @@ from ...model import errors, rotation
 from ...model.errors import set_fields
 from ...model.rotation import IDENTITY
 from ...model.state import State
-from ...model.vectors import Quaternion, Vector, finite, unit
-from ..motion import cross
+from ...model.vectors import Quaternion, Vector, finite_floats, unit_vector
+from ..rigid_body import cross
 
 SMALL = 1e-4
-"""rad: of smaller turns, what follows in the series is 1e-9 of its first term."""
+"""rad: below, the second term of the series is less than 1e-9 of the first."""
 
 
 @dataclass(frozen=True)
-class Mount:
-    """Where a sensor is worn: at ``position`` m from the bone's centre of mass along the bone's
-    axes, into which ``orientation`` turns its own.
-    """
+class ImuMount:
+    """Pose of a sensor in the frame of its bone; ``position`` in m from the centre of mass."""
 
     bone: str
     position: Vector = (0.0, 0.0, 0.0)
     orientation: Quaternion = IDENTITY
 
     def __post_init__(self) -> None:
-        set_fields(self, position=finite('position', self.position),
-                   orientation=unit('orientation', self.orientation, count=4))
+        set_fields(self, position=finite_floats('position', self.position),
+                   orientation=unit_vector('orientation', self.orientation, count=4))
 
 
 @dataclass(frozen=True)
-class Flaws:
-    """What a sensor adds to what it should read: white noise, by the standard deviations of one
-    sample, a constant ``bias`` (3 m/s^2, 3 rad/s), and a ``range``, m/s^2 and rad/s, at which it
-    clips, 0: none.
+class ImuErrors:
+    """Error model of a sensor: white noise, given as the standard deviations of one sample (m/s^2,
+    rad/s), a constant ``bias`` (3 m/s^2, 3 rad/s), and saturation at ``range`` (m/s^2, rad/s;
+    0: none).
     """
 
     noise_acceleration: float = 0.0
@@ -54,13 +51,14 @@ class Flaws:
     range: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        set_fields(self, bias=finite('bias', self.bias, 6), range=finite('range', self.range, 2))
+        set_fields(self, bias=finite_floats('bias', self.bias, 6),
+                   range=finite_floats('range', self.range, 2))
         for key, value in (('noise_acceleration', self.noise_acceleration),
                            ('noise_rate', self.noise_rate), ('range', min(self.range))):
             errors.check_range(key, value, 0.0, 1e6)
 
     def __call__(self, samples: np.ndarray, random: np.random.Generator) -> np.ndarray:
-        """What is read in place of samples (..., 6)."""
+        """Add the errors to true samples (..., 6): specific force, angular rate."""
         spread = np.repeat([self.noise_acceleration, self.noise_rate], 3)
         read = samples + self.bias
         if spread.any():
@@ -69,22 +67,22 @@ class Flaws:
         return np.clip(read, -most, most)
 
 
-def sensor_motion(rows: np.ndarray, mount: Mount) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions (..., 3) m, orientations (..., 4) and velocities (..., 3) m/s of a sensor in the
-    world, from rows (..., 13) of its bone as State has them.
+def sensor_motion(rows: np.ndarray, mount: ImuMount) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions (..., 3) m, orientations (..., 4) and velocities (..., 3) m/s of a sensor, world
+    frame, from rows (..., 13) of its bone's State.
     """
     arms = rotation.rotate(rows[..., 3:7], np.array(mount.position))
     return (rows[..., :3] + arms, rotation.multiply(rows[..., 3:7], np.array(mount.orientation)),
             rows[..., 7:10] + cross(rows[..., 10:13], arms))
 
 
-def imu_samples(rows: np.ndarray, mount: Mount, step: float,
+def imu_samples(rows: np.ndarray, mount: ImuMount, step: float,
                 gravity: Sequence[float]) -> np.ndarray:
     """Samples (t, 6) between states of a bone that are ``step`` s apart, rows (t + 1, 13): specific
     force, m/s^2, and angular rate, rad/s, in the sensor's frame (REP 145).
 
-    At rest it reads -gravity, in free fall 0. A turn of more than pi in a sample reads as its
-    shorter way round.
+    The specific force is -gravity at rest and 0 in free fall. Rotations above pi in one sample are
+    aliased.
     """
     _, turns, velocities = sensor_motion(rows, mount)
     turned = rotation.rotation_vector(rotation.multiply(rotation.inverse(turns[:-1]), turns[1:]))
@@ -93,17 +91,17 @@ def imu_samples(rows: np.ndarray, mount: Mount, step: float,
     return np.concatenate([force, turned / step], axis=1)
 
 
-def trail_samples(trail: Sequence[State], bone: int, mount: Mount, step: float,
-                  gravity: Sequence[float]) -> np.ndarray:
-    """Samples (t, 6) of the last tick, of ``step`` s, from Simulation.trail; ``bone``: its place in
-    the scene.
+def tick_samples(substates: Sequence[State], bone: int, mount: ImuMount, step: float,
+                 gravity: Sequence[float]) -> np.ndarray:
+    """Samples (t, 6) of the last tick, of ``step`` s, from Simulation.substates and the bone's
+    index in the scene.
     """
-    rows = np.array([state.rows[bone] for state in trail])
+    rows = np.array([state.rows[bone] for state in substates])
     return imu_samples(rows, mount, step / max(len(rows) - 1, 1), gravity)
 
 
 def _from_mean(turned: np.ndarray, mean: np.ndarray) -> np.ndarray:
-    """Vectors (t, 3) whose mean is ``mean`` while they are turned by ``turned`` (t, 3):
+    """Solve G f = ``mean`` (t, 3) for f, with p = ``turned`` (t, 3) rad:
     G^-1 = 1 - [p]/2 + c [p]^2, c = (1 - (|p|/2) cot(|p|/2)) / |p|^2.
     """
     size = np.linalg.norm(turned, axis=-1, keepdims=True)

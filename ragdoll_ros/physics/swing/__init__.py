@@ -1,1 +1,1 @@
-"""Hair, tails and straps: cheap pendulums and springs that ride on bones."""
+"""Swings: hair, tails and straps as pendulum chains on bones, without reaction on them."""

@@ -1,4 +1,4 @@
-"""What a tick of swings costs, without the dolls that carry them."""
+"""Benchmark of swings without dolls: CPU time of a tick."""
 from __future__ import annotations
 
 import statistics
@@ -9,7 +9,7 @@ import numpy as np
 from ...model.rotation import from_rotation_vector
 from ...model.state import State
 from ...model.swing import Swing, strand
-from .mount import Mount
+from .mount import SwingMount
 from .swings import Swings
 from .track import Track
 
@@ -18,25 +18,25 @@ def tick_cost(count: int = 1000, links: int = 1, bones: int = 10, tick: float = 
               ticks: int = 200) -> float:
     """Median time, s, of a tick of ``tick`` s with ``count`` swings of ``links`` damped springs.
 
-    The bones shake and rotate at 3 Hz. A tick is all of it: the bones' state told, the swings
-    moved, every mass's position in the world read.
+    The bones translate and rotate at 3 Hz. A tick adds the bones' state, integrates the swings and
+    computes the positions of all masses.
     """
     random = np.random.default_rng(0)
     mounted = []
     for index in range(count):
         swing = Swing(f'swing_{index}', '', (0.1, 0, 0), random.normal(size=3),
                       strand(links, 0.3, 0.1, (random.uniform(0.2, 2), 0.1), 0.3))
-        mounted.append(Mount(swing, index % bones, swing.name, np.array(swing.root),
+        mounted.append(SwingMount(swing, index % bones, swing.name, np.array(swing.root),
                              np.array(swing.directions())))
     track = Track()
     swings = Swings(mounted, (0, 0, -9.8), track)
     states = [_shaken(bones, number * tick) for number in range(ticks + 1)]
-    track.tell(0.0, states[0])
+    track.add(0.0, states[0])
     swings.evaluate(0.0)
     costs = []
     for number in range(1, ticks + 1):
         begin = time.perf_counter()
-        track.tell(number * tick, states[number])
+        track.add(number * tick, states[number])
         _ = swings.evaluate(number * tick).positions
         costs.append(time.perf_counter() - begin)
     return statistics.median(costs)

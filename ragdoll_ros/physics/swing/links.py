@@ -1,35 +1,35 @@
-"""One level of links, all at once: how they swing through one step.
+"""Integration of one level of links, vectorized, over one step.
 
-The equation of a link of unit direction d, with the world's axes throughout:
+The equation of motion of a link of unit direction d, world frame:
 
-    d'' = -|d'|^2 d + P [ w arc(d, n) - c (d' - spin x d) + (share g - r'')/reach ]
+    d'' = -|d'|^2 d + P [ w log_map(d, n) - c (d' - spin x d) + (share g - r'')/reach ]
 
-P projects on the plane across d; n is the rest direction and spin the angular velocity of the
-frame it is fixed in; r the link's root; arc as in sphere.py; w = k/J, c the damping. A link
-whose chain goes on carries the masses beyond it as if they hung straight on: with s_j their
-distances along the straight chain, J = sum m_j s_j^2 and reach = J / sum m_j s_j. For a chain
-of one mass that is m l^2 and l, and exact.
+P projects on the tangent plane at d; n is the rest direction, and spin the angular velocity of the
+frame in which it is fixed; r is the link's root; log is the logarithm map of the sphere
+(sphere.py); w = k/J, c the damping. A link carries the masses beyond it as if the chain were
+straight: with s_j their distances from the root, J = sum m_j s_j^2 and reach = J / sum m_j s_j.
+For a chain of one mass these are m l^2 and l, and exact.
 
 The integrator is exponential, of order 2 (Hochbruck and Ostermann, Exponential integrators,
-Acta Numerica 19, 2010, section 2, there in a linear space; here in the tangent plane at d,
-taken back to the sphere by the great circle):
+Acta Numerica 19, 2010, section 2, for linear spaces; here in the tangent plane at d, with the
+exponential map of the sphere):
 
-1. In the tangent plane at d the equation is that of the damped oscillator about a target that
-   moves with the frame, under a force linear in time: solved exactly (oscillator.py).
-2. Go along that tangent, take the rate along (sphere.py).
-3. What the true force at the end differs from the model's acts on the rate as a force that
-   grows from nothing over the step.
+1. In the tangent plane at d, solve exactly the damped oscillator about a target that moves with
+   the frame, under a force linear in time (oscillator.py).
+2. Map the result to the sphere and transport the rate in parallel (sphere.py).
+3. Add to the rate the difference between true and model force at the end, as a force that grows
+   linearly from zero over the step.
 
-What follows from it:
-- A swing that moves in one plane in a still frame, without gravity, is the linear oscillator:
-  exact to rounding for every step, stiffness and damping.
-- Without spring and damping it is kick, rotate, kick: Stoermer and Verlet's, on the sphere.
-- Two points of the sphere are never further apart than their images in a tangent plane
-  (Toponogov), so 1 and 2 never add energy to a spring in a still frame. 3 could where w h^2 is
-  large; its rate is held to the energy of 1, which exact motion has: still of order 2, and
-  stable for every stiffness, damping and step.
-- The root's motion through the step is the cubic through the places and velocities at its ends:
-  the root's change of velocity is met exactly, jerk included.
+Properties:
+- Planar motion in a frame at rest, without gravity, is the linear oscillator: exact to rounding for
+  every step, stiffness and damping.
+- Without spring and damping it is the Stoermer-Verlet method on the sphere.
+- Distances on the sphere are at most those of the images in a tangent plane (Toponogov), so that
+  1 and 2 never add energy to a spring in a frame at rest. 3 may, for large w h^2; its rate is
+  limited to the energy after 1. The method is still of order 2, and stable for every stiffness,
+  damping and step.
+- The root follows the cubic through positions and velocities at both ends of the step, so that its
+  change of velocity enters exactly.
 """
 from __future__ import annotations
 
@@ -39,70 +39,70 @@ from functools import cached_property
 import numpy as np
 
 from .oscillator import flow
-from .sphere import along, arc, cross, dot
+from .sphere import cross, dot, exp_map, log_map
 
 _ROUNDING = 1e-12
-"""Share of the energy that counts as rounding."""
+"""Relative rounding error of an energy."""
 
 _LEAST = 1e-300
-"""1/s^2: keeps 0/0 away."""
+"""1/s^2: avoids 0/0."""
 
 
 @dataclass(frozen=True)
-class Seat:
-    """What n links are rooted on at one instant; world frame."""
+class BaseFrames:
+    """Frames at the roots of n links at one time; world frame."""
 
     point: np.ndarray
-    """(3, n) m, the links' roots."""
+    """(3, n) m, origins."""
     velocity: np.ndarray
     """(3, n) m/s."""
     axes: np.ndarray
-    """(3, 3, n): [j] is the j-th axis of the frame that the rest directions are fixed in."""
+    """(3, 3, n): [j] is the j-th axis; rest directions are fixed in these frames."""
     spin: np.ndarray
-    """(3, n) rad/s, angular velocity of that frame."""
+    """(3, n) rad/s, angular velocities."""
 
     def outward(self, v: np.ndarray) -> np.ndarray:
-        """Vectors (3, n) of the frame, in the world."""
+        """Rotate vectors (3, n) from the frames to the world frame."""
         return np.einsum('jin,jn->in', self.axes, v)
 
     def inward(self, v: np.ndarray) -> np.ndarray:
-        """Vectors (3, n) of the world, in the frame."""
+        """Rotate vectors (3, n) from the world frame to the frames."""
         return np.einsum('jin,in->jn', self.axes, v)
 
 
 @dataclass(frozen=True)
 class Links:
-    """n links at one instant; world frame."""
+    """State of n links at one time; world frame."""
 
-    seat: Seat
+    base: BaseFrames
     direction: np.ndarray
     """(3, n) unit vectors from root to mass."""
     rate: np.ndarray
     """(3, n) 1/s, the direction's rate of change."""
     pull: np.ndarray
-    """(3, n) rad, the arc to the rest direction."""
+    """(3, n) rad, log map of the rest direction at the direction."""
     drift: np.ndarray
-    """(3, n) 1/s, the rate a direction fixed in the frame would have."""
+    """(3, n) 1/s, rate of a direction fixed in the base frame."""
 
     @classmethod
-    def at(cls, seat: Seat, rest: np.ndarray, direction: np.ndarray,
+    def at(cls, base: BaseFrames, rest: np.ndarray, direction: np.ndarray,
            rate: np.ndarray | None = None) -> Links:
-        """Links that point so; without a rate they are at rest in their frame."""
-        drift = cross(seat.spin, direction)
-        return cls(seat, direction, drift if rate is None else rate,
-                   arc(direction, seat.outward(rest)), drift)
+        """Links with these directions and rates; None: at rest in the base frame."""
+        drift = cross(base.spin, direction)
+        return cls(base, direction, drift if rate is None else rate,
+                   log_map(direction, base.outward(rest)), drift)
 
 
 @dataclass(frozen=True)
 class Level:
-    """What does not change about n links that are equally far from their bones."""
+    """Constants of the n links with the same number of links between them and their bones."""
 
     rest: np.ndarray
-    """(3, n) unit rest directions in the axes of the seats."""
+    """(3, n) unit rest directions in the base frames."""
     length: np.ndarray
     """(n,) m."""
     reach: np.ndarray
-    """(n,) m, the length of the simple pendulum with the same period."""
+    """(n,) m, length of the simple pendulum of the same period."""
     inertia: np.ndarray
     """(n,) kg m^2, J."""
     stiffness: np.ndarray
@@ -110,88 +110,87 @@ class Level:
     damping: np.ndarray
     """(n,) 1/s, c."""
     gravity: np.ndarray
-    """(3, n) m/s^2, the share that acts."""
+    """(3, n) m/s^2, scaled by the swing's share of gravity."""
 
     @cached_property
-    def lightness(self) -> np.ndarray:
-        """(3, n) 1/m, one over the reach."""
+    def inverse_reach(self) -> np.ndarray:
+        """(3, n) 1/m."""
         return _rows(1 / self.reach)
 
     @cached_property
-    def springy(self) -> bool:
+    def has_springs(self) -> bool:
         """Whether any link has a spring."""
         return bool(np.any(self.stiffness))
 
-    def forces(self, before: Seat, after: Seat, h: float) -> tuple[np.ndarray, np.ndarray]:
-        """Gravity and the roots' inertia, (3, n) 1/s^2, at both ends of a step of ``h`` s.
+    def forces(self, before: BaseFrames, after: BaseFrames,
+               h: float) -> tuple[np.ndarray, np.ndarray]:
+        """Gravity and inertial force of the root, (3, n) 1/s^2, at both ends of a step of ``h`` s.
 
-        The roots go on the cubic that joins two seats in place and velocity.
+        The root follows the cubic through both positions and velocities.
         """
         double = 2 / h
         cubic = (after.point - before.point) * (6 / h ** 2)
         cubic -= (before.velocity + after.velocity) * double
-        return ((self.gravity - cubic + before.velocity * double) * self.lightness,
-                (self.gravity + cubic - after.velocity * double) * self.lightness)
+        return ((self.gravity - cubic + before.velocity * double) * self.inverse_reach,
+                (self.gravity + cubic - after.velocity * double) * self.inverse_reach)
 
-    def swing(self, now: Links, seat: Seat, step: Step,
+    def swing(self, now: Links, base: BaseFrames, step: Step,
               forces: tuple[np.ndarray, np.ndarray]) -> Links:
-        """The links one ``step`` later, when their seats are at ``seat``."""
+        """Integrate links over one step; ``base`` are the frames at its end."""
         d, rate, pull, drift = now.direction, now.rate, now.pull, now.drift
         first, last = forces
-        turned = arc(d, seat.outward(now.seat.inward(d)))
-        x = _across(d, step.x_pull * pull + step.x_rate * rate + step.x_turned * turned
+        turned = log_map(d, base.outward(now.base.inward(d)))
+        x = _tangential(d, step.x_pull * pull + step.x_rate * rate + step.x_turned * turned
                     + step.x_drift * drift + step.x_first * first + step.x_last * last)
         left = pull + turned - x
-        v = _across(d, step.v_pull * pull + step.v_rate * rate + step.v_turned * turned
+        v = _tangential(d, step.v_pull * pull + step.v_rate * rate + step.v_turned * turned
                     + step.v_drift * drift + step.v_first * first - step.end_pull * left)
-        d, v, moved = along(d, x, v, left)
-        then = Links.at(seat, self.rest, d)
+        d, v, moved = exp_map(d, x, v, left)
+        then = Links.at(base, self.rest, d)
         v += step.end_pull * then.pull + step.end_drift * then.drift
-        if self.springy:
+        if self.has_springs:
             v = self._bounded(v, moved, then, step)
-        v += step.end_force * _across(d, last)
-        return Links(seat, d, v, then.pull, then.drift)
+        v += step.end_force * _tangential(d, last)
+        return Links(base, d, v, then.pull, then.drift)
 
     def _bounded(self, v: np.ndarray, left: np.ndarray, then: Links, step: Step) -> np.ndarray:
-        """Hold the rates to the energy they had before the springs' correction.
+        """Limit the rates to the energy before the correction of the spring force.
 
-        That is |v|^2 + w |arc|^2, relative to the frame. ``left`` is the arc that the model
-        leaves. Where the frame turns about the link by phi in the step, the true arc leads the
-        model's by phi and the true rate lags by phi; the sum of the two energies stays the same
-        to third order in the step if the model's arc is turned by -phi here. Without that the
-        bound would take away what is no gain, and the method be of order 1.
+        Energy is |v|^2 + w |log|^2, relative to the frame; ``left`` is the log map that the model
+        gives. If the frame turns about the link by phi in the step, the true log map leads the
+        model's by phi, and the true rate lags by phi. Rotating the model's by -phi keeps the sum of
+        both energies to third order in the step; without it the limit would reduce the order to 1.
         """
         relative = v - then.drift
-        left = _twisted(left, then.direction, dot(then.seat.spin, then.direction) * (-step.h / 2))
+        left = _rotated(left, then.direction, dot(then.base.spin, then.direction) * (-step.h / 2))
         before = relative - step.end_pull * (then.pull - left)
         whole = dot(before, before) + self.stiffness * dot(left, left)
         most = whole * (1 + _ROUNDING) - self.stiffness * dot(then.pull, then.pull)
         share = np.maximum(most, 0) / (dot(relative, relative) + _LEAST)
         return then.drift + np.minimum(np.sqrt(share), 1) * relative
 
-    def tips(self, links: Links) -> Seat:
-        """The masses' own motion and frames: the seats of the next level.
+    def tips(self, links: Links) -> BaseFrames:
+        """Frames at the masses: the bases of the next level.
 
-        The frame turns with the rod by the smallest turn from the rest direction n to d; its
-        angular velocity relative to the seat is (n + d) x d' / (1 + n . d).
+        The base frame is rotated by the smallest rotation from the rest direction n to d; the
+        relative angular velocity is (n + d) x d' / (1 + n . d).
         """
-        seat, d = links.seat, links.direction
-        n = seat.outward(self.rest)
+        base, d = links.base, links.direction
+        n = base.outward(self.rest)
         middle = n + d
         scale = 1 / np.maximum(1 + dot(n, d), 1e-3)
-        axes = (seat.axes + 2 * self.rest[:, None] * d
-                - (np.einsum('jin,in->jn', seat.axes, middle) * scale)[:, None] * middle)
-        spin = seat.spin + cross(middle, links.rate - links.drift) * scale
-        return Seat(seat.point + self.length * d, seat.velocity + self.length * links.rate,
+        axes = (base.axes + 2 * self.rest[:, None] * d
+                - (np.einsum('jin,in->jn', base.axes, middle) * scale)[:, None] * middle)
+        spin = base.spin + cross(middle, links.rate - links.drift) * scale
+        return BaseFrames(base.point + self.length * d, base.velocity + self.length * links.rate,
                     axes, spin)
 
 
 class Step:
-    """The factors of one step of ``h`` s for one level, each (3, n): see Level.swing.
+    """Coefficients (3, n) of Level.swing for a step of ``h`` s.
 
-    Those of x and v are the oscillator's (oscillator.Flow) about the target pull + y(t), where
-    y is the parabola with y(0) = 0, y'(0) = drift, y(h) = turned. v lacks what the correction
-    at the end brings.
+    Those of x and v are the oscillator's (oscillator.Flow) about the target pull + y(t), y the
+    parabola with y(0) = 0, y'(0) = drift, y(h) = turned; v excludes the correction at the end.
     """
 
     def __init__(self, level: Level, h: float) -> None:
@@ -213,16 +212,16 @@ class Step:
 
 
 def _rows(factor: np.ndarray) -> np.ndarray:
-    """Repeat (n,) to (3, n): to multiply two such is twice as fast as to broadcast."""
+    """Repeat (n,) to (3, n): the product of two such arrays is twice as fast as broadcasting."""
     return np.repeat(factor[None], 3, axis=0)
 
 
-def _across(d: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Parts of v across the directions d."""
+def _tangential(d: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Components of v orthogonal to the directions d."""
     return v - dot(d, v) * d
 
 
-def _twisted(v: np.ndarray, d: np.ndarray, half: np.ndarray) -> np.ndarray:
-    """Tangents v turned about d by twice ``half`` rad, to third order; their length stays."""
+def _rotated(v: np.ndarray, d: np.ndarray, half: np.ndarray) -> np.ndarray:
+    """Rotate tangents v about d by 2 * ``half`` rad, to third order; keeps their length."""
     scale = 1 / (1 + half * half)
     return ((1 - half * half) * scale) * v + (2 * half * scale) * cross(d, v)

@@ -1,4 +1,4 @@
-"""The exact motion of the damped oscillator, for any stiffness, damping and step."""
+"""Exact solution of the damped oscillator for any stiffness, damping and step."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 _TERMS = 24
-"""Of the series; with arguments up to 1 the first one left out is below 1e-24."""
+"""Terms of the series; for arguments up to 1 the remainder is below 1e-24."""
 
 
 @dataclass(frozen=True)
 class Flow:
-    """What z'' = -w z - c z' + f, with f linear in time, makes of z and z' in a step h.
+    """Coefficients of the solution of z'' = -w z - c z' + f, f linear in time, over a step h.
 
     z(h)  = (1 - w n1) z + m z' + n1 f(0) + n3 (f(h) - f(0))
     z'(h) = -w m z + (1 - w n1 - c m) z' + m f(0) + n1/h (f(h) - f(0))
@@ -19,11 +19,11 @@ class Flow:
     """
 
     m: np.ndarray
-    """What z gains from a unit z', s."""
+    """Response of z to a unit z', s."""
     n1: np.ndarray
-    """What z gains from a unit force, s^2."""
+    """Response of z to a unit force, s^2."""
     n3: np.ndarray
-    """What z gains from a force that grows from 0 to 1, s^2."""
+    """Response of z to a force that grows from 0 to 1, s^2."""
 
 
 def flow(w: np.ndarray, c: np.ndarray, h: float) -> Flow:

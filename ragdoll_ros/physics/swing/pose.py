@@ -1,4 +1,4 @@
-"""What swings tell about their masses at one instant."""
+"""SwingState: positions, velocities and orientations of all swing masses at one time."""
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -10,24 +10,24 @@ import numpy as np
 from ...model import rotation
 from ...model.state import State
 from .links import Level, Links
-from .mount import Mount
+from .mount import SwingMount
 from .sphere import cross, dot
 
 
 @dataclass(frozen=True)
-class Order:
-    """Where the m masses of a scene's swings, swing by swing, root to tip, are found."""
+class MassIndex:
+    """Maps levels and free masses to the scene's order of m masses: by swing, root to tip."""
 
     chained: np.ndarray
-    """Numbers of the chained masses, level by level."""
+    """Indices of the chained masses, level by level."""
     free: np.ndarray
-    """Numbers of the free masses."""
+    """Indices of the free masses."""
     bone: np.ndarray
-    """(m,) number of the bone each rides on."""
+    """(m,) index of each mass's bone."""
 
     @classmethod
-    def of(cls, mounted: Sequence[Mount], chains: Sequence[Mount]) -> Order:
-        """The order for mounted swings, of which ``chains`` are not free."""
+    def of(cls, mounted: Sequence[SwingMount], chains: Sequence[SwingMount]) -> MassIndex:
+        """Make the index of mounted swings, of which ``chains`` are not free."""
         begins, count = {}, 0
         for mount in mounted:
             begins[id(mount)] = count
@@ -40,13 +40,13 @@ class Order:
         return cls(np.array(chained, int), free, np.array(bone, int))
 
     @cached_property
-    def plain(self) -> bool:
-        """Whether one level's columns are the masses in order."""
+    def is_identity(self) -> bool:
+        """Whether the only level has all masses in the scene's order."""
         return np.array_equal(self.chained, np.arange(len(self.bone)))
 
     def gather(self, chained: Sequence[np.ndarray], free: np.ndarray) -> np.ndarray:
-        """One row for each mass from the levels' columns and the free masses' rows."""
-        if len(chained) == 1 and self.plain:
+        """Rows (m, k) in the scene's order from the levels' (k, n) and the free masses' (f, k)."""
+        if len(chained) == 1 and self.is_identity:
             return chained[0].T
         out = np.empty((len(self.bone), free.shape[1]))
         if chained:
@@ -56,8 +56,8 @@ class Order:
 
 
 @dataclass(frozen=True)
-class Flight:
-    """Free masses at one instant: rows, world frame; they do not turn."""
+class FreeMasses:
+    """State of the free masses, rows, world frame; they do not rotate."""
 
     positions: np.ndarray
     velocities: np.ndarray
@@ -66,67 +66,68 @@ class Flight:
 
 @dataclass(frozen=True)
 class SwingState:
-    """All m masses of the swings at ``time`` s, in the scene's order; worked out when asked for.
+    """All m masses at ``time`` s, in the scene's order; arrays are computed on first use.
 
-    A mass's orientation is that of its rod's frame: at rest it is the bone's own, and from
-    there it has turned with the rod by the smallest rotations.
+    A mass has the orientation of its rod's frame: that of the bone at rest, rotated with the rod
+    by the smallest rotation of each link.
     """
 
     time: float
     bones: State
     levels: Sequence[Level] = field(repr=False)
     links: Sequence[Links] = field(repr=False)
-    flight: Flight = field(repr=False)
-    order: Order = field(repr=False)
+    free: FreeMasses = field(repr=False)
+    mass_index: MassIndex = field(repr=False)
 
     @cached_property
     def positions(self) -> np.ndarray:
-        """(m, 3) m, world frame."""
-        tips = [links.seat.point + level.length * links.direction
+        """Positions (m, 3) m, world frame."""
+        tips = [links.base.point + level.length * links.direction
                 for level, links in zip(self.levels, self.links, strict=True)]
-        return self.order.gather(tips, self.flight.positions)
+        return self.mass_index.gather(tips, self.free.positions)
 
     @property
     def rods(self) -> np.ndarray:
-        """(m, 2, 3) m, world frame: both ends of the rod of each mass."""
+        """Both ends of each mass's rod, (m, 2, 3) m, world frame."""
         return np.stack([self.roots, self.positions], axis=1)
 
     @cached_property
     def velocities(self) -> np.ndarray:
-        """(m, 3) m/s, world frame."""
-        tips = [links.seat.velocity + level.length * links.rate
+        """Velocities (m, 3) m/s, world frame."""
+        tips = [links.base.velocity + level.length * links.rate
                 for level, links in zip(self.levels, self.links, strict=True)]
-        return self.order.gather(tips, self.flight.velocities)
+        return self.mass_index.gather(tips, self.free.velocities)
 
     @cached_property
     def roots(self) -> np.ndarray:
-        """(m, 3) m, world frame: where each mass's rod begins; a free mass's own place."""
-        return self.order.gather([links.seat.point for links in self.links], self.flight.positions)
+        """Roots of the rods (m, 3) m, world frame; a free mass's own position."""
+        points = [links.base.point for links in self.links]
+        return self.mass_index.gather(points, self.free.positions)
 
     @cached_property
     def directions(self) -> np.ndarray:
-        """(m, 3) unit vectors along the rods, world frame; zero for free masses."""
-        return self.order.gather([links.direction for links in self.links],
-                                 np.zeros_like(self.flight.positions))
+        """Unit vectors along the rods (m, 3), world frame; zero for free masses."""
+        return self.mass_index.gather([links.direction for links in self.links],
+                                 np.zeros_like(self.free.positions))
 
     @cached_property
     def rates(self) -> np.ndarray:
-        """(m, 3) 1/s, rates of the directions, world frame."""
-        return self.order.gather([links.rate for links in self.links],
-                                 np.zeros_like(self.flight.positions))
+        """Time derivatives of the directions (m, 3) 1/s, world frame."""
+        return self.mass_index.gather([links.rate for links in self.links],
+                                 np.zeros_like(self.free.positions))
 
     @cached_property
     def orientations(self) -> np.ndarray:
-        """(m, 4) unit quaternions x, y, z, w, world frame."""
+        """Unit quaternions x, y, z, w (m, 4), world frame."""
         turns: list[np.ndarray] = []
         begin = 0
         for level, links in zip(self.levels, self.links, strict=True):
             count = len(level.length)
-            bones = self.order.bone[self.order.chained[begin:begin + count]]
+            bones = self.mass_index.bone[self.mass_index.chained[begin:begin + count]]
             frame = turns[-1][:, :count].T if turns else self.bones.orientations[bones]
-            n = links.seat.outward(level.rest)
+            n = links.base.outward(level.rest)
             arcs = np.vstack([cross(n, links.direction), 1 + dot(n, links.direction)])
             arcs[0, np.sum(arcs * arcs, axis=0) < 1e-24] = 1
             turns.append(rotation.multiply(rotation.normalized(arcs.T), frame).T)
             begin += count
-        return self.order.gather(turns, self.flight.orientations)
+        return self.mass_index.gather(turns, self.free.orientations)

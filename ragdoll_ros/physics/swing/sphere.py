@@ -1,13 +1,10 @@
-"""Directions as points of the unit sphere: the arc between two, and how to go along one.
-
-All vectors are (3, n): component first, so that one operation runs over all directions.
-"""
+"""Logarithm and exponential map of the unit sphere, vectorized; all vectors are (3, n)."""
 from __future__ import annotations
 
 import numpy as np
 
-_TINY = 1e-150
-"""Keeps 0/0 away, and is lost in rounding beside any other length."""
+_SMALLEST = 1e-150
+"""Avoids 0/0; vanishes in rounding beside any other length."""
 
 _YZX = np.array([1, 2, 0])
 
@@ -18,32 +15,31 @@ def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Vector products (3, n)."""
+    """Cross products (3, n)."""
     turned = a * b.take(_YZX, axis=0)
     turned -= b * a.take(_YZX, axis=0)
     return turned.take(_YZX, axis=0)
 
 
-def arc(d: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Tangents (3, n) at ``d`` along the shortest arc to ``target``, as long as that arc, rad.
+def log_map(d: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Logarithm map: tangents (3, n) rad at ``d`` that point to ``target``, as long as the arc.
 
-    The opposite point has no shortest arc: zero there.
+    Zero for the antipode, where it is not defined.
     """
     cos = dot(d, target)
     across = target - cos * d
     sin = np.sqrt(dot(across, across))
-    across *= np.arctan2(sin, cos) / (sin + _TINY)
+    across *= np.arctan2(sin, cos) / (sin + _SMALLEST)
     return across
 
 
-def along(d: np.ndarray, x: np.ndarray, *tangents: np.ndarray) -> list[np.ndarray]:
-    """Go from ``d`` along its tangent ``x`` on a great circle; take ``tangents`` at d along.
+def exp_map(d: np.ndarray, x: np.ndarray, *tangents: np.ndarray) -> list[np.ndarray]:
+    """Exponential map of tangents ``x`` at ``d``, and parallel transport of ``tangents`` at d.
 
-    Gives the new directions, unit to rounding, and each tangent moved in parallel: same length,
-    same angle to the great circle (the exponential map and the parallel transport of the sphere).
+    Returns the new directions, of unit length to rounding, and each transported tangent.
     """
-    half = np.sqrt(dot(x, x)) / 2 + _TINY
-    # One tangent of the half angle costs less than a sine and a cosine of the whole.
+    half = np.sqrt(dot(x, x)) / 2 + _SMALLEST
+    # The tangent of the half angle is cheaper than sine and cosine of the whole.
     tan = np.tan(half)
     square = tan * tan
     scale = 1 / (1 + square)

@@ -1,4 +1,4 @@
-"""The motion of the bones that swings ride on: known at ticks, interpolated between them."""
+"""Track: bone states at ticks, interpolated between them."""
 from __future__ import annotations
 
 import bisect
@@ -10,44 +10,43 @@ from ...model.state import State
 
 
 class Track:
-    """States of bones over time: told at ticks, asked between them, as far back as ``memory`` s.
+    """States of bones over the last ``memory`` s; track(time) interpolates them.
 
-    Called with a time it gives the state on the cubic Hermite path through the two told around it:
-    in position by their velocities; in orientation by a cubic rotation vector whose rates at
-    both ends are the angular velocities there. Fourth order in the ticks' spacing; velocities
-    too are the path's. Of the turns that lead from one orientation to the next it takes the one
-    nearest to what the angular velocities say. Outside of what was told it stands still.
+    Interpolation is cubic Hermite: of positions with the linear velocities, of orientations by a
+    rotation vector whose rates at both ends are the angular velocities. Its error is of fourth
+    order in the tick; velocities are those of the path. Whole turns between two states are chosen
+    by the angular velocities. Before the first and after the last state it is constant.
     """
 
     def __init__(self, memory: float = 0.02) -> None:
         self._memory = memory
         self._times: list[float] = []
-        self._told: list[State] = []
+        self._states: list[State] = []
 
-    def tell(self, time: float, state: State) -> None:
-        """Add the state at ``time`` s; a time not later than the last begins a new track."""
+    def add(self, time: float, state: State) -> None:
+        """Add the state at ``time`` s; a time not later than the last restarts the track."""
         if self._times and time <= self._times[-1]:
             self._times.clear()
-            self._told.clear()
+            self._states.clear()
         old = max(bisect.bisect_right(self._times, time - self._memory) - 1, 0)
-        del self._times[:old], self._told[:old]
+        del self._times[:old], self._states[:old]
         self._times.append(time)
-        self._told.append(state)
+        self._states.append(state)
 
     def __call__(self, time: float) -> State:
-        """The state at ``time`` s."""
+        """State at ``time`` s."""
         index = bisect.bisect_left(self._times, time)
         if index == len(self._times):
-            return self._told[-1]
+            return self._states[-1]
         if index == 0 or self._times[index] == time:
-            return self._told[index]
+            return self._states[index]
         begin, end = self._times[index - 1], self._times[index]
-        return between(self._told[index - 1], self._told[index], end - begin,
+        return between(self._states[index - 1], self._states[index], end - begin,
                        (time - begin) / (end - begin))
 
 
 def between(first: State, last: State, span: float, part: float) -> State:
-    """State at ``part`` (0 to 1) of a path of ``span`` s from the one to the other."""
+    """State at fraction ``part`` (0 to 1) of the path of ``span`` s between two states."""
     positions, linear = _hermite(first.positions, last.positions, first.linear_velocities,
                                  last.linear_velocities, span, part)
     turn = _turn(first, last, span)
@@ -60,7 +59,7 @@ def between(first: State, last: State, span: float, part: float) -> State:
 
 def _hermite(a: np.ndarray, b: np.ndarray, a_rate: np.ndarray, b_rate: np.ndarray,
              span: float, part: float) -> tuple[np.ndarray, np.ndarray]:
-    """Cubic through a and b with these rates, and its rate."""
+    """Cubic Hermite interpolation of a and b with these rates, and its rate."""
     s, change = part, (b - a) / span
     value = (a + span * s * (a_rate * (1 - s) ** 2 + change * s * (3 - 2 * s)
                              - b_rate * s * (1 - s)))
@@ -69,7 +68,7 @@ def _hermite(a: np.ndarray, b: np.ndarray, a_rate: np.ndarray, b_rate: np.ndarra
 
 
 def _turn(first: State, last: State, span: float) -> np.ndarray:
-    """Rotation vectors (n, 3) from the first orientations to the last, whole turns included."""
+    """Rotation vectors (n, 3) rad from the first orientations to the last, with whole turns."""
     turn = rotation.multiply(last.orientations, rotation.inverse(first.orientations))
     vector = rotation.rotation_vector(turn)
     angle = np.linalg.norm(vector, axis=1, keepdims=True)
@@ -83,9 +82,9 @@ def _turn(first: State, last: State, span: float) -> np.ndarray:
 
 
 def _rate_of_turn(vector: np.ndarray, rate: np.ndarray) -> np.ndarray:
-    """Angular velocities of turns by these rotation vectors, which change at these rates.
+    """Angular velocities of rotation vectors with these rates: the left Jacobian of SO(3).
 
-    The left Jacobian of SO(3): Barfoot, State Estimation for Robotics, 2017, eq. 7.77.
+    Barfoot, State Estimation for Robotics, 2017, eq. 7.77.
     """
     angle = np.linalg.norm(vector, axis=1, keepdims=True)
     half = angle / 2
@@ -98,10 +97,9 @@ def _rate_of_turn(vector: np.ndarray, rate: np.ndarray) -> np.ndarray:
 
 
 def _rate_of_vector(vector: np.ndarray, angular: np.ndarray) -> np.ndarray:
-    """Rates of rotation vectors whose turns have these angular velocities.
+    """Rates of rotation vectors with these angular velocities: the inverse left Jacobian, eq. 7.76.
 
-    The inverse of the above (eq. 7.76); past one and a half turns it is near singular, and the
-    plain angular velocity is taken.
+    Beyond 1.5 pi, near its singularity, the angular velocity itself.
     """
     angle = np.linalg.norm(vector, axis=1, keepdims=True)
     half = angle / 2

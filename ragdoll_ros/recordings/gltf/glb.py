@@ -1,4 +1,4 @@
-"""A binary glTF 2.0 file as it grows: its JSON, and the bytes that this refers to."""
+"""Builder of a binary glTF 2.0 file: its JSON and its buffer."""
 from __future__ import annotations
 
 import json
@@ -9,24 +9,24 @@ import numpy as np
 COMPONENTS = {'float32': 5126, 'uint32': 5125, 'uint16': 5123}
 KINDS = {1: 'SCALAR', 2: 'VEC2', 3: 'VEC3', 4: 'VEC4', 16: 'MAT4'}
 ATTRIBUTES, INDICES = 34962, 34963
-"""Targets of buffer views (glTF 2.0, 5.11.5): what is drawn; None for what is not."""
+"""Targets of buffer views (glTF 2.0, 5.11.5) of meshes."""
 
 
 class Glb:
-    """``document`` is its JSON; ``add`` and ``accessor`` give the index of what they add."""
+    """``document`` is its JSON; the methods return the index of what they add."""
 
     def __init__(self) -> None:
         self.document: dict = {'asset': {'version': '2.0', 'generator': 'ragdoll_ros'}}
         self._bytes = bytearray()
 
     def add(self, kind: str, **entry: object) -> int:
-        """Add an entry to one of the document's lists, such as nodes."""
+        """Add an entry to a list of the document, such as nodes."""
         entries = self.document.setdefault(kind, [])
         entries.append(entry)
         return len(entries) - 1
 
     def accessor(self, array: np.ndarray, target: int | None = None) -> int:
-        """Add numbers (n,) or (n, k) of a type of COMPONENTS, with their bounds."""
+        """Add an array (n,) or (n, k) of a type of COMPONENTS, with its bounds."""
         array = np.ascontiguousarray(array)
         rows = array.reshape(len(array), -1)
         bounds = {key: edge.tolist() for key, edge in (
@@ -36,14 +36,14 @@ class Glb:
                         type=KINDS[rows.shape[1]], **bounds)
 
     def view(self, content: bytes, target: int | None = None) -> int:
-        """Add bytes, at a multiple of four."""
+        """Add a buffer view, aligned to four bytes."""
         at = len(self._bytes)
         self._bytes += content + b'\0' * (-len(content) % 4)
         return self.add('bufferViews', buffer=0, byteOffset=at, byteLength=len(content),
                         **({} if target is None else {'target': target}))
 
     def content(self) -> bytes:
-        """The whole file (glTF 2.0, 4.4)."""
+        """The file (glTF 2.0, 4.4)."""
         document = {**self.document, 'buffers': [{'byteLength': len(self._bytes)}]}
         text = json.dumps(document, separators=(',', ':'), allow_nan=False).encode()
         text += b' ' * (-len(text) % 4)

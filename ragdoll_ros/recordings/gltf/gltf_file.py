@@ -1,8 +1,8 @@
-"""Recordings as glTF 2.0 animations, which Blender, three.js and game engines open.
+"""Recordings as glTF 2.0 animations.
 
-Y up, facing +Z, metres (y_up.py). Each doll is a node, and each of its bones a node below it with
-its mesh, which stands where the bone's centre of mass is, along its shape's axes: the animation has
-the poses themselves, not angles of joints, so that no error adds up along a limb.
+Y up, facing +Z, metres (y_up.py). Each doll is a node, each bone a child node with a mesh at the
+bone's centre of mass, in its axes. The animation has poses, not joint angles, so that errors do not
+add up along a limb.
 """
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from ..recording import Recording
 from ..y_up import orientations_y_up, points_y_up
 from .glb import ATTRIBUTES, Glb
 from .gltf_skin import add_material, add_skin
-from .vertex_normals import creased
+from .vertex_normals import crease_normals
 
 
 def gltf_bytes(recording: Recording, skins: Mapping[int, Skin] = {}) -> bytes:
     """A recording as a .glb file.
 
-    ``skins`` has those of some dolls, by their index in the scene: they are drawn instead of the
-    dolls' bones. Numbers are of 32 bits, so that each doll's node stands in the middle of its
-    motion, at whole metres: within 16 m of there, places are exact to 1e-6 m. Swings are left out.
+    ``skins`` of dolls, by index in the scene, replace the meshes of their bones. Numbers are
+    float32, so each doll's node is at the middle of its motion, rounded to metres: within 16 m
+    positions are exact to 1e-6 m. Swings are not written.
     """
     glb = Glb()
     times = glb.accessor(recording.times.astype(np.float32))
@@ -60,7 +60,7 @@ def gltf_bytes(recording: Recording, skins: Mapping[int, Skin] = {}) -> bytes:
 
 
 class _Shapes:
-    """Meshes of bones, one for all that are alike."""
+    """Meshes of bones; equal ones are shared."""
 
     def __init__(self, glb: Glb) -> None:
         self._glb = glb
@@ -69,7 +69,7 @@ class _Shapes:
         self._materials: dict[tuple[float, ...], int] = {}
 
     def mesh(self, bone: Bone) -> int:
-        """The mesh of a bone, in its own axes and its colour."""
+        """Index of a bone's mesh, in its own axes and colour."""
         color = bone.color or DEFAULT_COLOR
         key = bone.shape, color
         if key not in self._meshes:
@@ -83,14 +83,14 @@ class _Shapes:
     def _surface(self, shape: Shape | Compound) -> dict[str, int]:
         if shape not in self._attributes:
             places, normals = (points_y_up(each).astype(np.float32)
-                               for each in creased(*shape.mesh()))
+                               for each in crease_normals(*shape.mesh()))
             self._attributes[shape] = {'POSITION': self._glb.accessor(places, ATTRIBUTES),
                                        'NORMAL': self._glb.accessor(normals, ATTRIBUTES)}
         return self._attributes[shape]
 
 
 def _continuous(orientations: np.ndarray) -> np.ndarray:
-    """The same rotations (k, n, 4), of q and -q the one that is nearer to the instant before."""
+    """The same rotations (k, n, 4), with the sign of q that is nearer to the instant before."""
     steps = np.einsum('kni,kni->kn', orientations[1:], orientations[:-1])
     signs = np.cumprod(np.where(steps < 0, -1.0, 1.0), axis=0)
     return np.concatenate([orientations[:1], orientations[1:] * signs[..., None]])

@@ -1,28 +1,28 @@
-"""A doll's skin in a glTF file: its surface with materials and images, and what moves it."""
+"""A doll's skin in a glTF file: surface, materials, images, joints and weights."""
 from __future__ import annotations
 
 import numpy as np
 
 from ...model import rotation
 from ...model.pose import Pose
-from ...model.skin import Paint, Skin
+from ...model.skin import Appearance, Skin
 from ..y_up import orientations_y_up, points_y_up
 from .glb import ATTRIBUTES, INDICES, Glb
 from .vertex_normals import smooth_normals
 
 ROUGHNESS = 0.8
-"""Of surfaces that bring none, as glTF's materials have it: no mirror, no chalk."""
+"""glTF's roughnessFactor of surfaces without materials."""
 
 INFLUENCES = 4
-"""Bones that move a vertex, at the most: what every reader of glTF can do."""
+"""Most joints of a vertex that every glTF reader supports."""
 
 
 def add_skin(glb: Glb, skin: Skin, nodes: list[int], name: str) -> int:
-    """Add a doll's skin, Y up, moved by the nodes of its bones; the node that shows it."""
+    """Add a doll's skin, Y up, with the nodes of its bones as joints; its node."""
     weights = np.pad(skin.weights, ((0, 0), (0, max(0, INFLUENCES - skin.weights.shape[1]))))
     joints = np.argsort(-weights, axis=1, kind='stable')[:, :INFLUENCES]
     weights = np.take_along_axis(weights, joints, axis=1)
-    # The specification wants slots without weight to be zero.
+    # The specification requires joint 0 where the weight is zero.
     joints = np.where(weights > 0, joints, 0).astype(np.uint16)
     weights = weights / weights.sum(axis=1, keepdims=True)
     moved = {'JOINTS_0': glb.accessor(joints, ATTRIBUTES),
@@ -35,11 +35,11 @@ def add_skin(glb: Glb, skin: Skin, nodes: list[int], name: str) -> int:
     return glb.add('nodes', name=name, mesh=mesh, skin=bound)
 
 
-def paint_bytes(skin: Skin) -> bytes:
-    """The surface alone, in its bind pose, as a .glb for viser: the doll's frame, z up.
+def surface_glb(skin: Skin) -> bytes:
+    """The surface in its bind pose, doll's frame, z up, as a .glb for viser.
 
-    Its primitives are the runs of `by_material`. Normals are the attribute _NORMAL as well, since
-    viser makes others of its own.
+    Its primitives are the runs of group_by_material. Normals are in the attribute _NORMAL too, as
+    viser replaces NORMAL.
     """
     glb = Glb()
     normals = skin_normals(skin)
@@ -49,25 +49,27 @@ def paint_bytes(skin: Skin) -> bytes:
     return glb.content()
 
 
-def by_material(skin: Skin) -> tuple[np.ndarray, list[tuple[int, int, int]]]:
-    """Triangles (t, 3), those of a material together, and each run's material, begin and end."""
-    numbers = np.full(len(skin.triangles), -1) if skin.paint is None else skin.paint.numbers
-    order = np.argsort(numbers, kind='stable')
-    found, firsts = np.unique(numbers[order], return_index=True)
-    ends = [*firsts[1:].tolist(), len(numbers)]
+def group_by_material(skin: Skin) -> tuple[np.ndarray, list[tuple[int, int, int]]]:
+    """Triangles (t, 3) sorted by material, and each run's material, begin and end."""
+    materials = (np.full(len(skin.triangles), -1) if skin.appearance is None
+                 else skin.appearance.material_indices)
+    order = np.argsort(materials, kind='stable')
+    found, firsts = np.unique(materials[order], return_index=True)
+    ends = [*firsts[1:].tolist(), len(materials)]
     return skin.triangles[order], list(zip(found.tolist(), firsts.tolist(), ends, strict=True))
 
 
 def skin_normals(skin: Skin) -> np.ndarray:
-    """Unit normals (v, 3) in the bind pose, doll's frame: the file's, where it has any."""
+    """Unit normals (v, 3) in the bind pose, doll's frame: the file's, else smooth ones."""
     smooth = smooth_normals(skin.vertices, skin.triangles)
-    if skin.paint is None:
+    if skin.appearance is None:
         return smooth
-    return np.where(skin.paint.normals.any(axis=1, keepdims=True), skin.paint.normals, smooth)
+    normals = skin.appearance.normals
+    return np.where(normals.any(axis=1, keepdims=True), normals, smooth)
 
 
 def add_material(glb: Glb, color: tuple[float, ...]) -> int:
-    """A plain surface of an sRGB colour with opacity, each from 0 to 1."""
+    """Add a material of an sRGB colour with opacity, each from 0 to 1."""
     values = np.array(color[:3])
     # IEC 61966-2-1: glTF's factors are linear.
     linear = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
@@ -78,32 +80,33 @@ def add_material(glb: Glb, color: tuple[float, ...]) -> int:
 
 def _primitives(glb: Glb, skin: Skin, points: np.ndarray, directions: dict[str, np.ndarray],
                 attributes: dict[str, int]) -> list[dict]:
-    """One for each material, all of the same vertices."""
+    """A primitive for each material, all with the same vertices."""
     given = {'POSITION': points, **directions}
-    if skin.paint is not None:
-        given['TEXCOORD_0'] = skin.paint.uvs
+    if skin.appearance is not None:
+        given['TEXCOORD_0'] = skin.appearance.uvs
     attributes = attributes | {name: glb.accessor(values.astype(np.float32), ATTRIBUTES)
                                for name, values in given.items()}
-    triangles, runs = by_material(skin)
-    taken = [] if skin.paint is None else _add_materials(glb, skin.paint)
+    triangles, runs = group_by_material(skin)
+    taken = [] if skin.appearance is None else _add_materials(glb, skin.appearance)
     return [{'attributes': attributes,
              'material': taken[number] if number >= 0 else add_material(glb, skin.color),
              'indices': glb.accessor(triangles[begin:end].astype(np.uint32).ravel(), INDICES)}
             for number, begin, end in runs]
 
 
-def _add_materials(glb: Glb, paint: Paint) -> list[int]:
-    """The materials of a paint with their textures; their indices in the file."""
+def _add_materials(glb: Glb, appearance: Appearance) -> list[int]:
+    """Add materials with their textures; their indices."""
     textures = []
-    for texture in paint.textures:
+    for texture in appearance.textures:
         image = glb.add('images', bufferView=glb.view(texture.image), mimeType=texture.kind)
         textures.append(glb.add('textures', source=image,
                                 sampler=glb.add('samplers', **texture.sampler)))
-    return [glb.add('materials', **_with_textures(glb, each, textures)) for each in paint.materials]
+    return [glb.add('materials', **_with_textures(glb, material, textures))
+            for material in appearance.materials]
 
 
 def _with_textures(glb: Glb, entry: dict, textures: list[int]) -> dict:
-    """A material whose textures are those of the file; its extensions are named there."""
+    """A material with the file's indices of textures; adds its extensions to extensionsUsed."""
     made = {}
     for key, value in entry.items():
         made[key] = _with_textures(glb, value, textures) if isinstance(value, dict) else value
@@ -116,10 +119,10 @@ def _with_textures(glb: Glb, entry: dict, textures: list[int]) -> dict:
 
 
 def _inverse_binds(skin: Skin) -> np.ndarray:
-    """Matrices (b, 16), column by column, from the skin's place into its bones' axes."""
+    """Inverse bind matrices (b, 16), column by column."""
     bound = Pose(points_y_up(skin.positions), orientations_y_up(skin.orientations))
     inverses = np.zeros((len(skin.bones), 4, 4))
     inverses[:, :3, :3] = rotation.matrix(rotation.inverse(bound.orientation))
-    inverses[:, :3, 3] = bound.inward(np.zeros(3))
+    inverses[:, :3, 3] = bound.apply_inverse(np.zeros(3))
     inverses[:, 3, 3] = 1
     return inverses.transpose(0, 2, 1).reshape(-1, 16)

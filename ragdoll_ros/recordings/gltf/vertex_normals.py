@@ -1,4 +1,4 @@
-"""Normals of meshes as one looks at them: smooth where they are round, sharp at edges."""
+"""Vertex normals of meshes, smooth with sharp edges."""
 from __future__ import annotations
 
 import math
@@ -6,15 +6,15 @@ import math
 import numpy as np
 
 CREASE = math.radians(40)
-"""rad between two faces from which on their common edge is sharp: more than the 18 degrees between
-faces of a ball or cylinder of 20 corners, less than a box's 90."""
+"""rad, crease angle: above the 18 degrees between faces of a circle of 20 vertices, below a box's
+90."""
 
 
-def creased(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (3t, 3) m, three to a triangle of ``triangles`` (t, 3), and their unit normals.
+def crease_normals(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (3t, 3) m, three to each of ``triangles`` (t, 3), and their unit normals.
 
-    A corner's normal is the mean of those of the faces around it that are within CREASE of its own
-    face's, by their areas. Faces without an area are left out.
+    A normal is the mean, weighted by area, of those of the faces around the vertex within CREASE of
+    its own face's. Degenerate faces are left out.
     """
     corners = vertices[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -34,10 +34,7 @@ def creased(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np
 
 
 def smooth_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (v, 3): the mean of the triangles' around each vertex, by their areas.
-
-    Of a vertex that no triangle has, or that has no mean, it is z.
-    """
+    """Unit normals (v, 3): the triangles' mean around each vertex, weighted by area; else z."""
     corners = vertices[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     sums = np.stack([np.bincount(triangles.ravel(), np.repeat(component, 3), len(vertices))

@@ -1,1 +1,1 @@
-"""Arrays as ROS messages."""
+"""Conversion of states to ROS messages, and serialized message templates."""

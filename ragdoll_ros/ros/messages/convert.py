@@ -1,6 +1,6 @@
-"""From states to messages, in the plain way: every message from scratch, field by field.
+"""Conversion of arrays to messages, field by field.
 
-What runs each tick is packed.Packed, which takes these functions as its model.
+Each tick uses serialized templates instead (serialized.py), which are traced from these functions.
 """
 from __future__ import annotations
 
@@ -18,67 +18,67 @@ from ...model.scene import Scene
 from ...model.state import State
 from ...physics.swing.pose import SwingState
 
-if TYPE_CHECKING:  # else the page, which reads this file, would load an engine
+if TYPE_CHECKING:  # else the page, which imports this file, would load an engine
     from ...physics.engine.protocol import Contacts
-    from ...physics.sensors.imu import Flaws
+    from ...physics.sensors.imu import ImuErrors
 
 
 def count_masses(scene: Scene) -> int:
-    """How many point masses all swings of a scene have."""
+    """Number of point masses of all swings of a scene."""
     return sum(len(swing.links) for placement in scene.dolls for swing in placement.doll.swings)
 
 
 def poses_of(state: State | SwingState) -> np.ndarray:
-    """Poses (n, 7) of bones or of swings' masses: position m, orientation x, y, z, w."""
+    """Poses (n, 7) of bones or of swings' masses, world frame: position m, quaternion xyzw."""
     if isinstance(state, State):
         return state.rows[:, :7]
     return np.concatenate([state.positions, state.orientations], axis=1)
 
 
 def contact_poses(contacts: Contacts) -> np.ndarray:
-    """Poses (c, 7) of contacts: position m, and the smallest rotation of x to the normal."""
+    """Poses (c, 7) of contacts, world frame: position m, shortest rotation of x to the normal."""
     x, y, z = contacts.normals.T
-    turns = np.stack([np.zeros_like(x), -z, y, 1 + x], axis=1)
-    turns[1 + x < 1e-15] = (0, 0, 1, 0)
-    return np.concatenate([contacts.positions, rotation.normalized(turns)], axis=1)
+    quaternions = np.stack([np.zeros_like(x), -z, y, 1 + x], axis=1)
+    quaternions[1 + x < 1e-15] = (0, 0, 1, 0)
+    return np.concatenate([contacts.positions, rotation.normalized(quaternions)], axis=1)
 
 
 def twists_of(state: State) -> np.ndarray:
-    """Twists (n, 6) in the world frame: linear m/s, angular rad/s."""
+    """Twists (n, 6), world frame: linear m/s, angular rad/s."""
     return state.rows[:, 7:]
 
 
 def to_time(nanoseconds: int) -> Time:
-    """A stamp from ns."""
-    seconds, rest = divmod(nanoseconds, 1_000_000_000)
-    return Time(sec=seconds, nanosec=rest)
+    """Time from ns."""
+    seconds, nanoseconds = divmod(nanoseconds, 1_000_000_000)
+    return Time(sec=seconds, nanosec=nanoseconds)
 
 
 def to_header(stamp: int, frame: str) -> Header:
-    """A header from a stamp in ns."""
+    """Header with a stamp in ns."""
     return Header(stamp=to_time(stamp), frame_id=frame)
 
 
 def to_point(values: np.ndarray) -> Point:
-    """A point from (3,) m."""
+    """Point from (3,) m."""
     x, y, z = map(float, values)
     return Point(x=x, y=y, z=z)
 
 
 def to_vector(values: np.ndarray) -> Vector3:
-    """A vector from (3,)."""
+    """Vector3 from (3,)."""
     x, y, z = map(float, values)
     return Vector3(x=x, y=y, z=z)
 
 
 def to_quaternion(values: np.ndarray) -> Quaternion:
-    """A quaternion from (4,) x, y, z, w."""
+    """Quaternion from (4,) xyzw."""
     x, y, z, w = map(float, values)
     return Quaternion(x=x, y=y, z=z, w=w)
 
 
 def to_pose(row: Sequence[float]) -> Pose:
-    """A pose from 7 numbers: position m, orientation x, y, z, w."""
+    """Pose from 7 numbers: position m, quaternion xyzw."""
     pose = Pose()
     p, q = pose.position, pose.orientation
     p.x, p.y, p.z, q.x, q.y, q.z, q.w = row
@@ -86,7 +86,7 @@ def to_pose(row: Sequence[float]) -> Pose:
 
 
 def to_transform(row: Sequence[float]) -> Transform:
-    """A transform from 7 numbers: translation m, rotation x, y, z, w."""
+    """Transform from 7 numbers: translation m, quaternion xyzw."""
     transform = Transform()
     t, q = transform.translation, transform.rotation
     t.x, t.y, t.z, q.x, q.y, q.z, q.w = row
@@ -94,7 +94,7 @@ def to_transform(row: Sequence[float]) -> Transform:
 
 
 def to_twist(row: Sequence[float]) -> Twist:
-    """A twist from 6 numbers: linear m/s, angular rad/s."""
+    """Twist from 6 numbers: linear m/s, angular rad/s."""
     twist = Twist()
     v, w = twist.linear, twist.angular
     v.x, v.y, v.z, w.x, w.y, w.z = row
@@ -102,22 +102,22 @@ def to_twist(row: Sequence[float]) -> Twist:
 
 
 def to_pose_array(frame: str, stamp: int, poses: np.ndarray) -> PoseArray:
-    """Poses (n, 7)."""
+    """PoseArray of poses (n, 7)."""
     return PoseArray(header=to_header(stamp, frame), poses=[to_pose(row) for row in poses.tolist()])
 
 
 def to_multi_dof(frame: str, names: tuple[str, ...], stamp: int, poses: np.ndarray,
                  twists: np.ndarray) -> MultiDOFJointState:
-    """Poses (n, 7) and twists (n, 6) with the bones' names."""
+    """MultiDOFJointState of poses (n, 7) and twists (n, 6) of the named bones."""
     return MultiDOFJointState(
         header=to_header(stamp, frame), joint_names=list(names),
         transforms=[to_transform(row) for row in poses.tolist()],
         twist=[to_twist(row) for row in twists.tolist()])
 
 
-def to_imu(frame: str, flaws: Flaws, stamp: int, rate: np.ndarray, force: np.ndarray) -> Imu:
-    """Angular rate (3,) rad/s and specific force (3,) m/s^2 of a sensor, in its ``frame``: data_raw
-    of REP 145, which measures no orientation. Without noise the covariance is unknown.
+def to_imu(frame: str, flaws: ImuErrors, stamp: int, rate: np.ndarray, force: np.ndarray) -> Imu:
+    """Imu message (data_raw of REP 145, no orientation) of angular rate (3,) rad/s and specific
+    force (3,) m/s^2 in the sensor's ``frame``. Without noise the covariance is zero, unknown.
     """
     message = Imu(header=to_header(stamp, frame), angular_velocity=to_vector(rate),
                   linear_acceleration=to_vector(force))
@@ -129,6 +129,6 @@ def to_imu(frame: str, flaws: Flaws, stamp: int, rate: np.ndarray, force: np.nda
 
 def to_joint_state(frame: str, names: tuple[str, ...], stamp: int, angles: np.ndarray,
                    rates: np.ndarray) -> JointState:
-    """Joint angles (k,) rad and their rates (k,) rad/s, with their names."""
+    """JointState of joint angles (k,) rad and their rates (k,) rad/s."""
     return JointState(header=to_header(stamp, frame), name=list(names), position=angles.tolist(),
                       velocity=rates.tolist())

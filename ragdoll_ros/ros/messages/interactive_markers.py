@@ -1,4 +1,4 @@
-"""Bones as interactive markers: a ghost of each bone's shape that a mouse can drag."""
+"""Interactive markers of bones: a translucent copy of each bone's shape that can be dragged."""
 from __future__ import annotations
 
 import copy
@@ -19,33 +19,32 @@ from ...model.scene import Scene
 from ...model.shapes import Part
 from ...model.state import State
 from .convert import poses_of, to_pose, to_vector
-from .markers import KINDS, paint
-from .serialized import Packed
+from .markers import MARKER_TYPES, set_color
+from .serialized import SerializedTemplate
 
 OPACITY = 0.15
-"""Of a ghost: seen when it is left behind, out of the way where the bone itself is shown."""
+"""Of the copies: visible where they lag behind, faint where the bone itself is shown."""
 
-GROWTH = 1.02
-"""Times as large as its bone that a ghost is, so that their faces do not flicker."""
+SCALE = 1.02
+"""Scale of the copies, so that their faces do not flicker with the bone's."""
 
-AXES = 0.2
-"""m: length of the axes that RViz draws on demand."""
+AXES_LENGTH = 0.2
+"""m: axes that RViz draws on demand."""
 
 
-class Handles:
-    """Interactive markers of all bones of a scene, named as the bones, which ``server`` tells of.
+class InteractiveMarkers:
+    """Interactive markers of all bones of a scene, with the bones' names; created on demand.
 
-    Nothing is made of them before it is asked for. Stamps are zero: RViz then answers in the
-    marker's own frame, not in its fixed one.
+    Stamps are zero: RViz then sends feedback in the marker's frame, not in its fixed frame.
     """
 
-    def __init__(self, scene: Scene, frame: str, server: str) -> None:
-        self._scene, self._server = scene, server
+    def __init__(self, scene: Scene, frame: str, server_id: str) -> None:
+        self._scene, self._server_id = scene, server_id
         self._header = Header(frame_id=frame)
         self.names = frozenset(scene.bone_names)
 
-    def markers(self, state: State) -> list[InteractiveMarker]:
-        """A marker where each bone is; in those of equal bones, what is equal is one object."""
+    def at(self, state: State) -> list[InteractiveMarker]:
+        """A marker at each bone's pose; markers of equal bones share their controls."""
         models, markers = {}, []
         for name, bone, row in zip(self._scene.bone_names, self._scene.bones,
                                    poses_of(state).tolist(), strict=True):
@@ -56,28 +55,29 @@ class Handles:
             markers.append(marker)
         return markers
 
-    def update(self, sequence: int, state: State) -> bytes:
-        """Serialized update that bears this number: where all markers are."""
-        return self._packed.message(0, _as_float(sequence), poses_of(state))
+    def serialize_update(self, sequence: int, state: State) -> bytes:
+        """Serialized update of all poses, with this sequence number."""
+        return self._template.serialize(0, _as_float(sequence), poses_of(state))
 
-    def to_update(self, sequence: int, **content: list) -> InteractiveMarkerUpdate:
-        """An update that bears this number, in the plain way."""
-        return InteractiveMarkerUpdate(server_id=self._server, seq_num=sequence,
+    def make_update(self, sequence: int, **content: list) -> InteractiveMarkerUpdate:
+        """An update message with this sequence number."""
+        return InteractiveMarkerUpdate(server_id=self._server_id, seq_num=sequence,
                                        type=InteractiveMarkerUpdate.UPDATE, **content)
 
     @cached_property
-    def _packed(self) -> Packed:
-        return Packed(self._to_poses, (1,), (len(self._scene.bones), 7))
+    def _template(self) -> SerializedTemplate:
+        return SerializedTemplate.trace(self._pose_update, (1,), (len(self._scene.bones), 7))
 
-    def _to_poses(self, _: int, sequence: np.ndarray, poses: np.ndarray) -> InteractiveMarkerUpdate:
-        """An update of poses (n, 7); its number comes as a float64 of the same bytes."""
-        return self.to_update(int(sequence.view(np.uint64)[0]), poses=[
+    def _pose_update(self, _: int, sequence: np.ndarray,
+                     poses: np.ndarray) -> InteractiveMarkerUpdate:
+        """An update of poses (n, 7); the sequence number is a uint64 viewed as float64."""
+        return self.make_update(int(sequence.view(np.uint64)[0]), poses=[
             InteractiveMarkerPose(header=self._header, name=name, pose=to_pose(row))
             for name, row in zip(self._scene.bone_names, poses.tolist(), strict=True)])
 
 
 def _as_float(number: int) -> np.ndarray:
-    """(1,) float64 of the same bytes as a number of 64 bits."""
+    """A uint64 viewed as float64 (1,)."""
     return np.array([number], np.uint64).view(float)
 
 
@@ -85,15 +85,15 @@ def _marker(bone: Bone, header: Header) -> InteractiveMarker:
     control = InteractiveMarkerControl(
         name='drag', interaction_mode=InteractiveMarkerControl.MOVE_3D,
         orientation_mode=InteractiveMarkerControl.INHERIT, always_visible=False,
-        markers=[_ghost(bone, part) for part in bone.shape.primitives])
+        markers=[_part_marker(bone, part) for part in bone.shape.primitives])
     control.orientation.w = 1.0
-    return InteractiveMarker(header=header, scale=AXES, controls=[control])
+    return InteractiveMarker(header=header, scale=AXES_LENGTH, controls=[control])
 
 
-def _ghost(bone: Bone, part: Part) -> Marker:
-    """A part of a bone, relative to it: a frame of its own would be looked up."""
-    ghost = Marker(type=KINDS[part.kind], action=Marker.ADD)
-    ghost.scale = to_vector([GROWTH * side for side in part.size])
-    ghost.pose = to_pose((*part.position, *part.orientation))
-    paint(ghost, (*(bone.color or DEFAULT_COLOR)[:3], OPACITY))
-    return ghost
+def _part_marker(bone: Bone, part: Part) -> Marker:
+    """Marker of a part of a bone; without a frame_id its pose is relative to the marker's."""
+    marker = Marker(type=MARKER_TYPES[part.kind], action=Marker.ADD)
+    marker.scale = to_vector([SCALE * side for side in part.size])
+    marker.pose = to_pose((*part.position, *part.orientation))
+    set_color(marker, (*(bone.color or DEFAULT_COLOR)[:3], OPACITY))
+    return marker

@@ -1,4 +1,4 @@
-"""Bones, swings and pushes as markers, for RViz."""
+"""Markers of bones, swings and pushes, for RViz."""
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -16,21 +16,21 @@ from ...model.scene import Scene
 from ...model.state import State
 from ...physics.swing.pose import SwingState
 from .convert import count_masses, to_header, to_point, to_pose, to_vector
-from .serialized import STAMP_MARK, Form, marked
-from .serialized_markers import MarkerList, joined
+from .serialized import STAMP_SENTINEL, SerializedTemplate, sentinels
+from .serialized_markers import MarkerArrayBuilder, append_markers
 
 RED = (0.9, 0.2, 0.1, 1.0)
 BROWN = (0.35, 0.2, 0.1, 1.0)
-ROD = 0.01
-"""m: thickness of the rods of swings."""
+ROD_WIDTH = 0.01
+"""m: line width of the swings' rods."""
 
-KINDS = {'box': Marker.CUBE, 'sphere': Marker.SPHERE, 'cylinder': Marker.CYLINDER}
+MARKER_TYPES = {'box': Marker.CUBE, 'sphere': Marker.SPHERE, 'cylinder': Marker.CYLINDER}
 
 
-class Markers:
-    """A MarkerArray of a scene's bones, of the rods of its swings and of the pushes that act.
+class SceneMarkers:
+    """The MarkerArray of a scene: shapes of its bones, rods of its swings, arrows of the pushes.
 
-    Bones and rods have a form; the few arrows are made anew for each message.
+    Bones and rods have a template; the few arrows are serialized for each message.
     """
 
     def __init__(self, scene: Scene, frame: str) -> None:
@@ -38,91 +38,95 @@ class Markers:
         parts = [(index, part) for index, bone in enumerate(scene.bones)
                  for part in bone.shape.primitives]
         self._bones = np.array([index for index, _ in parts])
-        self._within = Pose(np.array([part.position for _, part in parts]),
-                            np.array([part.orientation for _, part in parts]))
-        self._arrows = 0
-        self._fresh = True
+        self._part_poses = Pose(np.array([part.position for _, part in parts]),
+                                np.array([part.orientation for _, part in parts]))
+        self._arrow_count = 0
+        self._is_first = True
 
-    def message(self, stamp: int, state: State, pushes: Sequence[Push],
-                swings: SwingState | None = None) -> bytes:
-        """Serialized markers where the bones are; arrows of pushes that have ended are taken away.
+    def serialize(self, stamp: int, state: State, pushes: Sequence[Push],
+                  swings: SwingState | None = None) -> bytes:
+        """Serialized MarkerArray of a state; ``stamp`` in ns. Deletes arrows of ended pushes.
 
-        The first message takes away whatever the scene before has left.
+        The first message deletes all markers of the last scene.
         """
-        poses = np.concatenate(state.poses(self._bones).compose(self._within), axis=1)
+        poses = np.concatenate(state.poses(self._bones).compose(self._part_poses), axis=1)
         ends = np.zeros((0, 3)) if swings is None else np.stack(
             [swings.roots, swings.positions], axis=1).reshape(-1, 3)
-        form = self._make_form(first=True) if self._fresh else self._form
-        self._fresh = False
-        return joined(form.message(stamp, poses, ends), self._pushes(stamp, pushes, state))
+        template = self._make_template(first=True) if self._is_first else self._template
+        self._is_first = False
+        return append_markers(template.serialize(stamp, poses, ends),
+                              self._push_markers(stamp, pushes, state))
 
     @cached_property
-    def _form(self) -> Form:
-        return self._make_form()
+    def _template(self) -> SerializedTemplate:
+        return self._make_template()
 
-    def _make_form(self, first: bool = False) -> Form:
-        """The form of all bones' parts, with poses (p, 7), and of all rods, with ends (2 m, 3) m.
+    def _make_template(self, first: bool = False) -> SerializedTemplate:
+        """Template of the bones' parts, poses (p, 7), and of the rods, end points (2 m, 3) m.
 
-        The ``first`` takes away what there was.
+        The ``first`` message begins with DELETEALL.
         """
-        header, scene, array = to_header(STAMP_MARK, self._frame), self._scene, MarkerList()
+        header, scene = to_header(STAMP_SENTINEL, self._frame), self._scene
+        array = MarkerArrayBuilder()
         if first:
             array.append('all', '', lambda _: (
                 [Marker(header=header, action=Marker.DELETEALL)], np.zeros((1, 0))))
         poses = [array.append(id(placement.doll), scene.qualified(placement, ''),
-                              partial(_parts, header, placement.doll)) for placement in scene.dolls]
+                              partial(_part_markers, header, placement.doll))
+                 for placement in scene.dolls]
         masses, ends = count_masses(scene), np.zeros(0, int)
         if masses:
-            ends = array.append('swings', '', lambda _: _rods(header, marked(1, (2 * masses, 3))))
-        return array.form(np.concatenate(poses), ends)
+            ends = array.append('swings', '', lambda _: _rod_marker(
+                header, sentinels(1, (2 * masses, 3))))
+        return array.template(np.concatenate(poses), ends)
 
-    def _pushes(self, stamp: int, pushes: Sequence[Push], state: State) -> list[Marker]:
-        """Arrows of the pushes that act, and the end of those that have been and are no more."""
+    def _push_markers(self, stamp: int, pushes: Sequence[Push], state: State) -> list[Marker]:
+        """Arrows of the active pushes, and DELETE for those of ended ones."""
         arrows = [self._arrow(number, push, state) for number, push in enumerate(
             push for push in pushes if any(push.force))]
-        gone = [Marker(ns='push', id=number, action=Marker.DELETE)
-                for number in range(len(arrows), self._arrows)]
-        self._arrows = len(arrows)
-        for marker in arrows + gone:
+        deleted = [Marker(ns='push', id=number, action=Marker.DELETE)
+                for number in range(len(arrows), self._arrow_count)]
+        self._arrow_count = len(arrows)
+        for marker in arrows + deleted:
             marker.header = to_header(stamp, self._frame)
-        return arrows + gone
+        return arrows + deleted
 
     def _arrow(self, number: int, push: Push, state: State) -> Marker:
-        """Arrow whose tip is where the push attacks."""
+        """Arrow whose tip is the push's point of application."""
         bone = self._scene.bone_index(push.bone)
         tail, tip = push.arrow(state.positions[bone], state.orientations[bone])
         marker = Marker(ns='push', id=number, type=Marker.ARROW, action=Marker.ADD)
         marker.scale = to_vector((np.linalg.norm(tip - tail), 0.04, 0.06))
         orientation = rotation.shortest_arc(np.array([1.0, 0, 0]), tip - tail)
         marker.pose = to_pose((*tail.tolist(), *orientation.tolist()))
-        paint(marker, RED)
+        set_color(marker, RED)
         return marker
 
 
-def _parts(header: Header, doll: Ragdoll, name: str) -> tuple[list[Marker], np.ndarray]:
-    """Markers of the parts of all bones of a doll of that name, and the poses (p, 7) they have."""
+def _part_markers(header: Header, doll: Ragdoll, name: str) -> tuple[list[Marker], np.ndarray]:
+    """Markers of the parts of a doll's bones, and their poses (p, 7); ``name`` is the prefix."""
     parts = [(bone, number, part) for bone in doll.bones
              for number, part in enumerate(bone.shape.primitives)]
-    poses = marked(1, (len(parts), 7))
+    poses = sentinels(1, (len(parts), 7))
     markers = []
     for (bone, number, part), row in zip(parts, poses.tolist(), strict=True):
-        marker = Marker(header=header, ns=name + bone.name, id=number, type=KINDS[part.kind],
+        marker = Marker(header=header, ns=name + bone.name, id=number, type=MARKER_TYPES[part.kind],
                         action=Marker.ADD, pose=to_pose(row), scale=to_vector(part.size))
-        paint(marker, bone.color or DEFAULT_COLOR)
+        set_color(marker, bone.color or DEFAULT_COLOR)
         markers.append(marker)
     return markers, poses
 
 
-def _rods(header: Header, ends: np.ndarray) -> tuple[list[Marker], np.ndarray]:
-    """All rods of the swings, each from root to mass, as one list of lines; and its numbers."""
+def _rod_marker(header: Header, ends: np.ndarray) -> tuple[list[Marker], np.ndarray]:
+    """One LINE_LIST of all rods, each from root to mass, and its end points."""
     marker = Marker(header=header, ns='swings', id=0, type=Marker.LINE_LIST, action=Marker.ADD)
-    marker.scale.x = ROD
+    marker.scale.x = ROD_WIDTH
     marker.pose.orientation.w = 1.0
     marker.points = [to_point(end) for end in ends]
-    paint(marker, BROWN)
+    set_color(marker, BROWN)
     return [marker], ends.reshape(1, -1)
 
 
-def paint(marker: Marker, color: tuple[float, ...]) -> None:
+def set_color(marker: Marker, color: tuple[float, ...]) -> None:
     """Set a marker's colour: red, green, blue, opacity."""
     marker.color.r, marker.color.g, marker.color.b, marker.color.a = map(float, color)

@@ -1,7 +1,7 @@
-"""A MarkerArray put together from serialized pieces, of which equal dolls share one.
+"""A MarkerArray assembled from serialized blocks that equal dolls share.
 
-Where a number stands in a serialized marker depends on where that begins, modulo eight. So a piece
-is serialized behind a marker that ends, so seen, where the piece is to go.
+CDR aligns float64 to eight bytes, so the bytes of a block depend on its offset modulo eight: a
+block is serialized behind a marker that ends at an equivalent offset.
 """
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from rclpy.serialization import serialize_message
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ...model.scene import SECOND
-from .serialized import HEAD, STAMP_MARK, Form
+from .serialized import CDR_HEADER, STAMP_SENTINEL, SerializedTemplate
 
-STAMP = struct.pack('=iI', *divmod(STAMP_MARK, SECOND))
+STAMP = struct.pack('=iI', *divmod(STAMP_SENTINEL, SECOND))
 
-Make = Callable[[str], tuple[list[Marker], np.ndarray]]
+MakeMarkers = Callable[[str], tuple[list[Marker], np.ndarray]]
 
 
-class Piece:
-    """Markers as they are serialized behind ``end`` bytes of a MarkerArray.
+class MarkerBlock:
+    """Markers serialized for an offset of ``end`` bytes in a MarkerArray.
 
-    Each has the stamp STAMP_MARK, and its row of ``numbers`` (markers, k) from some place on.
-    ``stamps``, ``names`` and ``numbers`` are places in ``data``, in bytes: of each marker's stamp,
-    of its namespace, and of each number, row by row.
+    Each marker has the stamp STAMP_SENTINEL and contains its row of ``numbers`` (markers, k).
+    ``stamps``, ``names`` and ``numbers`` are byte offsets in ``data``: of each marker's stamp, of
+    its namespace, and of each number, row by row.
     """
 
     def __init__(self, end: int, markers: list[Marker], numbers: np.ndarray) -> None:
-        self.data, self.count = following(end, markers), len(markers)
+        self.data, self.count = serialize_behind(end, markers), len(markers)
         self.stamps, self.names, rows, at = [], [], [], 0
         for marker, row in zip(markers, numbers, strict=True):
             self.stamps.append(self.data.index(STAMP, at))
@@ -39,60 +39,60 @@ class Piece:
             rows.append(self.data.index(row.tobytes(), at))
         self.numbers = (np.array(rows)[:, None] + 8 * np.arange(numbers.shape[1])).ravel()
 
-    def named(self, name: bytes) -> bytes:
-        """The data, with this at the beginning of each namespace."""
+    def with_prefix(self, prefix: bytes) -> bytes:
+        """The data with this prefix at the start of each namespace."""
         data = bytearray(self.data)
         for at in self.names:
-            data[at:at + len(name)] = name
+            data[at:at + len(prefix)] = prefix
         return bytes(data)
 
 
-class MarkerList:
-    """A serialized MarkerArray that grows, and the places of its stamps and numbers."""
+class MarkerArrayBuilder:
+    """A serialized MarkerArray that grows, with the offsets of its stamps and numbers."""
 
     def __init__(self) -> None:
-        self._pieces = [serialize_message(MarkerArray())[:HEAD + 4]]
-        self._end = HEAD + 4
-        self._made: dict[tuple, Piece] = {}
+        self._chunks = [serialize_message(MarkerArray())[:CDR_HEADER + 4]]
+        self._end = CDR_HEADER + 4
+        self._blocks: dict[tuple, MarkerBlock] = {}
         self._count = 0
         self._stamps: list[np.ndarray] = []
 
-    def append(self, kind: object, name: str, make: Make) -> np.ndarray:
-        """Append the markers of a kind, as of one named so; places of their numbers, in bytes.
+    def append(self, key: object, prefix: str, make: MakeMarkers) -> np.ndarray:
+        """Append a block of markers. Returns the byte offsets of its numbers.
 
-        ``make`` gives markers, whose namespaces begin with the name that it is given, and their
-        numbers. It is called for the first of a kind; for another, unless its name is of another
-        length, a copy of the bytes will do.
+        ``make(prefix)`` returns markers, whose namespaces start with ``prefix``, and their numbers.
+        Blocks with equal ``key``, length of prefix and alignment share one call of it.
         """
-        owner = name.encode()
-        key = kind, len(owner), self._end % 8
-        if key not in self._made:
-            self._made[key] = Piece(self._end, *make('x' * len(owner)))
-        piece = self._made[key]
+        start = prefix.encode()
+        full_key = key, len(start), self._end % 8
+        if full_key not in self._blocks:
+            self._blocks[full_key] = MarkerBlock(self._end, *make('x' * len(start)))
+        block = self._blocks[full_key]
         begin = self._end + -self._end % 4
-        self._pieces += [bytes(begin - self._end), piece.named(owner)]
-        self._end = begin + len(piece.data)
-        self._count += piece.count
-        self._stamps.append(begin + np.array(piece.stamps))
-        return begin + piece.numbers
+        self._chunks += [bytes(begin - self._end), block.with_prefix(start)]
+        self._end = begin + len(block.data)
+        self._count += block.count
+        self._stamps.append(begin + np.array(block.stamps))
+        return begin + block.numbers
 
-    def form(self, *numbers: np.ndarray) -> Form:
-        """The form of the array as it is now, its numbers to be set at these places."""
-        self._pieces[0] = self._pieces[0][:HEAD] + struct.pack('=I', self._count)
-        return Form(b''.join(self._pieces), np.concatenate(self._stamps), *numbers)
+    def template(self, *numbers: np.ndarray) -> SerializedTemplate:
+        """Template of the current array, with its numbers at these byte offsets."""
+        self._chunks[0] = self._chunks[0][:CDR_HEADER] + struct.pack('=I', self._count)
+        return SerializedTemplate(b''.join(self._chunks), np.concatenate(self._stamps), *numbers)
 
 
-def joined(array: bytes, more: list[Marker]) -> bytes:
+def append_markers(array: bytes, markers: list[Marker]) -> bytes:
     """A serialized MarkerArray with more markers at its end."""
-    if not more:
+    if not markers:
         return array
-    count, = struct.unpack_from('=I', array, HEAD)
-    return b''.join((array[:HEAD], struct.pack('=I', count + len(more)), array[HEAD + 4:],
-                     bytes(-len(array) % 4), following(len(array), more)))
+    count, = struct.unpack_from('=I', array, CDR_HEADER)
+    return b''.join((array[:CDR_HEADER], struct.pack('=I', count + len(markers)),
+                     array[CDR_HEADER + 4:], bytes(-len(array) % 4),
+                     serialize_behind(len(array), markers)))
 
 
-def following(end: int, markers: list[Marker]) -> bytes:
-    """Bytes of markers in a MarkerArray behind ``end`` bytes, from the next multiple of four on."""
+def serialize_behind(end: int, markers: list[Marker]) -> bytes:
+    """Bytes of markers that follow ``end`` bytes of a MarkerArray, after padding to four bytes."""
     for text in ('', 'four'):
         before = Marker(text=text)
         begin = len(serialize_message(MarkerArray(markers=[before])))

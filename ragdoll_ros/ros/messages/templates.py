@@ -1,44 +1,46 @@
-"""The messages of a scene that are packed, each made ready when it first has a listener."""
+"""The message templates of a scene, each created when it first has a subscriber."""
 from __future__ import annotations
 
 from functools import cached_property, partial
 
 from ...model.scene import Scene
 from .convert import count_masses, to_joint_state, to_multi_dof, to_pose_array
-from .markers import Markers
-from .serialized import Packed
+from .markers import SceneMarkers
+from .serialized import SerializedTemplate
+
+trace = SerializedTemplate.trace
 
 
-class Layouts:
-    """What goes out of a scene of n bones and m swinging masses, in the world's ``frame``."""
+class SceneTemplates:
+    """Templates for a scene of n bones and m swinging masses; ``frame`` names the world frame."""
 
     def __init__(self, scene: Scene, frame: str) -> None:
         self._scene, self._frame = scene, frame
 
     @cached_property
-    def poses(self) -> Packed:
+    def poses(self) -> SerializedTemplate:
         """PoseArray of the bones' poses (n, 7)."""
-        return Packed(partial(to_pose_array, self._frame), (len(self._scene.bones), 7))
+        return trace(partial(to_pose_array, self._frame), (len(self._scene.bones), 7))
 
     @cached_property
-    def state(self) -> Packed:
+    def state(self) -> SerializedTemplate:
         """MultiDOFJointState of poses (n, 7) and twists (n, 6)."""
         bones = len(self._scene.bones)
-        return Packed(partial(to_multi_dof, self._frame, self._scene.bone_names),
-                      (bones, 7), (bones, 6))
+        return trace(partial(to_multi_dof, self._frame, self._scene.bone_names),
+                     (bones, 7), (bones, 6))
 
     @cached_property
-    def joints(self) -> Packed:
+    def joints(self) -> SerializedTemplate:
         """JointState of all joint angles (k,) rad and their rates (k,) rad/s."""
         names = self._scene.angle_names
-        return Packed(partial(to_joint_state, self._frame, names), (len(names),), (len(names),))
+        return trace(partial(to_joint_state, self._frame, names), (len(names),), (len(names),))
 
     @cached_property
-    def swings(self) -> Packed:
+    def swings(self) -> SerializedTemplate:
         """PoseArray of the masses' poses (m, 7)."""
-        return Packed(partial(to_pose_array, self._frame), (count_masses(self._scene), 7))
+        return trace(partial(to_pose_array, self._frame), (count_masses(self._scene), 7))
 
     @cached_property
-    def markers(self) -> Markers:
+    def markers(self) -> SceneMarkers:
         """MarkerArray of bones, swings and pushes."""
-        return Markers(self._scene, self._frame)
+        return SceneMarkers(self._scene, self._frame)

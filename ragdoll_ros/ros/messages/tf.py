@@ -1,4 +1,4 @@
-"""Frames of the links on /tf, where tf2_msgs is installed."""
+"""The links' frames on /tf, if tf2_msgs is installed."""
 from __future__ import annotations
 
 from functools import partial
@@ -12,89 +12,88 @@ from rclpy.publisher import Publisher
 from ...model.scene import Scene
 from .convert import to_header, to_transform
 from .link_tree import LinkTree
-from .serialized import Packed
+from .serialized import SerializedTemplate
 
 if TYPE_CHECKING:  # else the page, which reads outputs.py, would load an engine
     from ...physics.simulation import Simulation
 
 try:
     from tf2_msgs.msg import TFMessage
-except ImportError as error:  # PyPI, which has the rest of ROS, has none
+except ImportError as error:  # not on PyPI, which has the rest of ROS
     TFMessage, MISSING = None, str(error)
 
-TREES = ('all', 'root', 'none')
-"""What is published: the frames of all links, of each doll's root alone, of nothing."""
+PUBLISH_TF = ('all', 'root', 'none')
+"""Values of the parameter: frames of all links, of each doll's root link only, no frames."""
 
 DEPTH = 100
-"""As tf2_ros has it."""
+"""Queue depth, that of tf2_ros."""
 
 
-class Frames:
-    """The TFMessage of a tree of links."""
+class TfTemplate:
+    """Template of the TFMessage of a scene's links."""
 
-    def __init__(self, scene: Scene, frame: str, roots_alone: bool) -> None:
-        self._tree = LinkTree(scene, frame, roots_alone)
-        self._packed = Packed(partial(to_tf, self._tree.edges), (len(self._tree.edges), 7))
+    def __init__(self, scene: Scene, frame: str, roots_only: bool) -> None:
+        self._tree = LinkTree(scene, frame, roots_only)
+        self._template = SerializedTemplate.trace(partial(to_tf, self._tree.edges),
+                                                  (len(self._tree.edges), 7))
 
-    def message(self, simulation: Simulation, stamp: int) -> bytes:
-        """Serialized, as the simulation is; stamp in ns."""
-        return self._packed.message(
+    def serialize(self, simulation: Simulation, stamp: int) -> bytes:
+        """Serialized TFMessage of the current state; stamp in ns."""
+        return self._template.serialize(
             stamp, self._tree.poses(simulation.state, simulation.joint_angles))
 
 
-class Transforms:
-    """The publisher of /tf, and what goes out through it while somebody listens."""
+class TfPublisher:
+    """The publisher of /tf; publishes only while subscribed."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
         self._publisher: Publisher | None = None
-        self._told = False
+        self._has_logged_missing = False
 
-    def describe(self, scene: Scene, frame: str, tree: str) -> None:
-        """Make ready for a scene in the world's ``frame``; ``tree`` is one of TREES."""
-        self._make = partial(Frames, scene, frame, tree == 'root')
-        self._frames: Frames | None = None
-        self._listeners = 0
-        if tree == 'none' and self._publisher is not None:
+    def set_scene(self, scene: Scene, frame: str, publish_tf: str) -> None:
+        """Prepare for a scene; ``frame`` names the world frame, ``publish_tf``: see PUBLISH_TF."""
+        self._make_template = partial(TfTemplate, scene, frame, publish_tf == 'root')
+        self._template: TfTemplate | None = None
+        self._subscribers = 0
+        if publish_tf == 'none' and self._publisher is not None:
             self._node.destroy_publisher(self._publisher)
             self._publisher = None
-        elif tree != 'none' and TFMessage is None:
-            self._tell_missing()
-        elif tree != 'none' and self._publisher is None:
+        elif publish_tf != 'none' and TFMessage is None:
+            self._log_missing()
+        elif publish_tf != 'none' and self._publisher is None:
             self._publisher = self._node.create_publisher(TFMessage, '/tf', DEPTH)
 
     @property
-    def heard(self) -> bool:
-        """Whether somebody listened as it was last published."""
-        return self._listeners > 0
+    def has_subscribers(self) -> bool:
+        """Whether there was a subscriber at the last publication."""
+        return self._subscribers > 0
 
     def publish(self, simulation: Simulation, stamp: int) -> None:
-        """Publish where the links are; stamp in ns."""
-        self._listeners = self._count()
-        if self._listeners:
-            self._frames = self._frames or self._make()
-            self._publisher.publish(self._frames.message(simulation, stamp))
+        """Publish the frames of the current state; stamp in ns."""
+        self._subscribers = self._count_subscribers()
+        if self._subscribers:
+            self._template = self._template or self._make_template()
+            self._publisher.publish(self._template.serialize(simulation, stamp))
 
-    def repeat(self, simulation: Simulation, stamp: int) -> None:
-        """Publish once more what stands, if somebody has come: /tf keeps nothing for who is late,
-        and who has it already would complain of the same stamp.
-        """
-        before, self._listeners = self._listeners, self._count()
-        if self._listeners > before:
+    def republish(self, simulation: Simulation, stamp: int) -> None:
+        """While paused, publish again, but only for a new subscriber: tf2 warns of old stamps."""
+        before, self._subscribers = self._subscribers, self._count_subscribers()
+        if self._subscribers > before:
             self.publish(simulation, stamp)
 
-    def _count(self) -> int:
+    def _count_subscribers(self) -> int:
         return self._publisher.get_subscription_count() if self._publisher else 0
 
-    def _tell_missing(self) -> None:
-        if not self._told:
-            self._told = True
+    def _log_missing(self) -> None:
+        if not self._has_logged_missing:
+            self._has_logged_missing = True
             self._node.get_logger().info(f'/tf is not published, as tf2_msgs is not installed: '
                                          f'{MISSING}')
 
 
 def to_tf(edges: list[tuple[str, str]], stamp: int, poses: np.ndarray) -> TFMessage:
-    """Frames of (parent, child) at poses (m, 7) in their parents', in the plain way."""
+    """TFMessage of frames (parent, child) at poses (m, 7) relative to their parents."""
     return TFMessage(transforms=[
         TransformStamped(header=to_header(stamp, parent), child_frame_id=child,
                          transform=to_transform(row))

@@ -1,1 +1,1 @@
-"""Keys of a terminal as pushes of a node."""
+"""Keyboard teleoperation of a node from a terminal."""

@@ -1,8 +1,8 @@
-"""Arrow keys push the doll: Up away from you, Down toward you, Left and Right as you see it.
+"""Keyboard teleoperation: Up pushes the doll away from you, Down toward you, Left and Right.
 
 You look at the doll's face, from +x along -x. A push is 2000 N: a tap gives the doll about 1 m/s, a
-held key pushes on, and keys add up, as far as the terminal can tell. Space pauses and goes on, r
-resets, q quits.
+held key keeps pushing, and pushes of several keys add up. Space pauses and resumes, r resets, q
+quits.
 """
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 from std_srvs.srv import SetBool, Trigger
 
-from ...realtime.arrow_keys import DIRECTIONS, TAP, Held, total
-from ..rclpy_context import ros_session
-from .find_node import Followed
-from .status_line import Status
+from ...realtime.arrow_keys import DIRECTIONS, TAP, HeldKeys, total_force
+from ..process.rclpy_context import rclpy_context
+from .find_node import NodeFinder
+from .status_line import StatusLine
 from .terminal_keys import Keyboard
 
 PERIOD = 0.02
-"""s between two messages of a held push, well within the node's push_timeout."""
+"""s between two messages of a held key, well below the node's push_timeout."""
 
-MESSAGES = 4
-"""Messages that are taken in each PERIOD: two states and, now and then, a report."""
+CALLBACKS = 4
+"""Callbacks per PERIOD: two states and, now and then, a report."""
 
 LINE_PERIOD = 0.1
 """s between two status lines."""
 
-LOOK_PERIOD = 0.5
-"""s between two looks at which nodes there are."""
+GRAPH_PERIOD = 0.5
+"""s between two checks of the ROS graph."""
 
 HELP = 'arrows push: tap or hold | space pauses | r resets | q quits'
 
@@ -48,121 +48,121 @@ EXAMPLE = """examples:
 
 
 class Teleop(Node):
-    """Sends pushes to the node that it follows, and calls its services; ``asked``: see Followed."""
+    """Publishes pushes to a ragdoll node and calls its services; ``requested``: see NodeFinder."""
 
-    def __init__(self, asked: str = '') -> None:
+    def __init__(self, requested: str = '') -> None:
         super().__init__('ragdoll_teleop')
-        self._followed = Followed(self, asked)
-        self.held = Held()
+        self._finder = NodeFinder(self, requested)
+        self.held_keys = HeldKeys()
         self._pushing = False
-        self._take_up(self._followed.name)
+        self._connect(self._finder.name)
 
-    def look_around(self) -> None:
-        """Follow another node, if the one that was steered is not there."""
-        if self._followed.look():
+    def update_node(self) -> None:
+        """Connect to another node if the current one is gone."""
+        if self._finder.update():
             for subscription in self.status.subscriptions:
                 self.destroy_subscription(subscription)
             self.destroy_publisher(self._force)
             for client in (self._reset, self._pause):
                 self.destroy_client(client)
-            self._take_up(self._followed.name)
+            self._connect(self._finder.name)
 
-    def take(self, key: str, down: bool, now: float) -> bool:
-        """Do what a key says; False to quit."""
+    def on_key(self, key: str, down: bool, now: float) -> bool:
+        """Handle a key that went down or up; False to quit."""
         if key in DIRECTIONS:
-            self.held.tap = TAP / self.status.pace
-            self.held.take(key, down, now)
+            self.held_keys.tap = TAP / self.status.real_time_factor
+            self.held_keys.on_key(key, down, now)
         elif key == ' ':
             self._pause.call_async(SetBool.Request(data=not self.status.paused))
         elif key in 'rR':
             self._reset.call_async(Trigger.Request())
         return key not in 'qQ'
 
-    def go_on(self) -> bool:
-        """Let the time go on; False if there is no node to tell."""
+    def resume(self) -> bool:
+        """Resume the node; False if its service is not available."""
         if not self._pause.service_is_ready():
             return False
         self._pause.call_async(SetBool.Request(data=False))
         return True
 
-    def send(self, now: float) -> str:
-        """Send the push of the keys that are held, once zero when none is; say which it is."""
-        keys = self.held.at(now)
-        force = total(keys)
+    def publish_force(self, now: float) -> str:
+        """Publish the force of the active keys, and zero once after them. Returns it as text."""
+        keys = self.held_keys.active(now)
+        force = total_force(keys)
         if keys or self._pushing:
             x, y, z = force
             self._force.publish(Wrench(force=Vector3(x=x, y=y, z=z)))
         self._pushing = bool(keys)
         return f'({force[0]:g} {force[1]:g} {force[2]:g}) N' if keys else ''
 
-    def patience(self, now: float) -> float:
-        """How long there is nothing to send, s."""
-        return min(PERIOD, self.held.left(now)) if self._pushing else PERIOD
+    def next_publish(self, now: float) -> float:
+        """Time until the next force is due, s."""
+        return min(PERIOD, self.held_keys.remaining(now)) if self._pushing else PERIOD
 
-    def line(self, push: str) -> str:
-        """How the doll does, and the push that acts; or why none can be steered."""
-        return self._followed.problem or self.status.line(push)
+    def status_text(self, push: str) -> str:
+        """The status line with the active push, or why no node can be chosen."""
+        return self._finder.problem or self.status.text(push)
 
-    def _take_up(self, name: str) -> None:
-        """Steer the node of a full name."""
-        self.status = Status(self, name)
+    def _connect(self, name: str) -> None:
+        """Create publishers and clients for the node of a fully qualified name."""
+        self.status = StatusLine(self, name)
         self._force = self.create_publisher(Wrench, f'{name}/force', 10)
         self._reset = self.create_client(Trigger, f'{name}/reset')
         self._pause = self.create_client(SetBool, f'{name}/pause')
 
 
-def steer(teleop: Teleop, attend: Callable[[], bool] = lambda: True) -> None:
-    """Go on until a key quits, ROS shuts down or ``attend``, called each time, says False."""
-    next_line = next_look = 0.0
+def spin_with_keyboard(teleop: Teleop, keep_running: Callable[[], bool] = lambda: True) -> None:
+    """Spin until q, a shutdown of rclpy, or ``keep_running``, called each turn, returns False."""
+    next_line = next_graph = 0.0
     pushed = ''
     with SingleThreadedExecutor() as executor, Keyboard() as keyboard:
         executor.add_node(teleop)
-        while rclpy.ok() and attend():
-            keys = keyboard.keys(teleop.patience(time.monotonic()))
+        while rclpy.ok() and keep_running():
+            keys = keyboard.keys(teleop.next_publish(time.monotonic()))
             now = time.monotonic()
-            if not all(teleop.take(key, down, now) for key, down in keys):
+            if not all(teleop.on_key(key, down, now) for key, down in keys):
                 break
-            # A tap is over before the next line: that shows it all the same.
-            pushed = teleop.send(now) or pushed
-            if now >= next_look:
-                next_look = now + LOOK_PERIOD
-                teleop.look_around()
+            # A tap may end before the next line, which shows it nevertheless.
+            pushed = teleop.publish_force(now) or pushed
+            if now >= next_graph:
+                next_graph = now + GRAPH_PERIOD
+                teleop.update_node()
             if now >= next_line:
                 next_line = now + LINE_PERIOD
-                show(teleop.line(pushed))
+                show(teleop.status_text(pushed))
                 pushed = ''
-            for _ in range(MESSAGES):
+            for _ in range(CALLBACKS):
                 executor.spin_once(timeout_sec=0)
     print()
 
 
 def show(line: str) -> None:
-    """Write a line over the last one, no longer than the terminal is wide."""
+    """Overwrite the current line of the terminal, cut to its width."""
     width = shutil.get_terminal_size().columns
     sys.stdout.write(f'\r{line[:width - 1]}\x1b[K')
     sys.stdout.flush()
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Steer a running node until q; 2 without a terminal, or if no node can have that name."""
+    """Steer a running node until q. Returns 2 without a terminal or for an invalid name."""
     arguments = sys.argv if arguments is None else arguments
     parser = argparse.ArgumentParser(
         'ragdoll_teleop', description=__doc__, epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('node', nargs='?', default='',
-                        help='name of the node; else ragdoll, or the only one that there is')
-    asked = parser.parse_args(remove_ros_args(arguments)[1:]).node
+                        help='name of the node (default: ragdoll, or the only ragdoll node)')
+    requested = parser.parse_args(remove_ros_args(arguments)[1:]).node
     if not sys.stdin.isatty():
-        print('ragdoll_teleop: standard input is no terminal; keys need one', file=sys.stderr)
+        print('ragdoll_teleop: standard input is not a terminal', file=sys.stderr)
         return 2
-    with ros_session(arguments):
+    with rclpy_context(arguments):
         try:
-            teleop = Teleop(asked)
+            teleop = Teleop(requested)
         except InvalidTopicNameException as error:
             print(f'ragdoll_teleop: {error}', file=sys.stderr)
             return 2
         print(HELP)
-        steer(teleop)
+        spin_with_keyboard(teleop)
     return 0
 
 

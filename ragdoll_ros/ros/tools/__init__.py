@@ -1,1 +1,1 @@
-"""Benchmarks, the soak test, and a listener."""
+"""Benchmarks, the soak test, and topic statistics."""

@@ -1,8 +1,8 @@
-"""What a tick costs and what of: simulation, by itself and checked, conversion, messages.
+"""Cost of a tick by part: simulation, simulation with its guard, conversion, messages.
 
-Beside it, in the same process and turn by turn, the barest loop that does the same job: PyBullet
-stepped at a fixed 1 ms, one getLinkStates, one publish of a ready message. Take the ratios; the
-microseconds are this machine's.
+The baseline, measured alternately in the same process, is a minimal loop: PyBullet stepped at a
+fixed 1 ms, one getLinkStates, one publish of a prepared message. Compare the ratios; microseconds
+depend on the machine.
 """
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from ..outputs import Outputs
 
 ROUNDS = 15
 TICKS = 20
-BARE = dataclasses.replace(ACCURACIES['normal'], substeps=10, energy=False)
+BASELINE = dataclasses.replace(ACCURACIES['normal'], substeps=10, energy=False)
 
 
 def cost(action: Callable[[], object]) -> float:
-    """CPU time in us of one call, over TICKS calls."""
+    """Mean CPU time of one call, us, over TICKS calls."""
     begin = time.process_time()
     for _ in range(TICKS):
         action()
@@ -38,31 +38,31 @@ def cost(action: Callable[[], object]) -> float:
 
 
 def row(node: Node, scene: Scene, accuracy: str, ticks_before: int) -> dict[str, float]:
-    """Median costs in us of a tick's parts, ours and the bare loop's, turn by turn."""
+    """Median cost of each part of a tick and of the baseline, us."""
     simulation = Simulation(scene, accuracy=dataclasses.replace(
         ACCURACIES[accuracy], sleep=ticks_before > 500))
     for _ in range(ticks_before):
         simulation.advance()
     outputs = Outputs(node)
-    outputs.describe(scene, 'world', 'none')
-    ready = to_pose_array('world', 0, poses_of(simulation.state))
-    publisher = node.create_publisher(PoseArray, '~/bare', 10)
-    bare = BulletEngine(scene, BARE)
-    bare.place(simulation.coordinates)
+    outputs.set_scene(scene, 'world', 'none')
+    message = to_pose_array('world', 0, poses_of(simulation.state))
+    publisher = node.create_publisher(PoseArray, '~/baseline', 10)
+    baseline = BulletEngine(scene, BASELINE)
+    baseline.place(simulation.coordinates)
 
-    def step_barely() -> None:
-        bare.advance(scene.step)
-        _ = bare.state
+    def step_baseline() -> None:
+        baseline.advance(scene.step)
+        _ = baseline.state
 
     guard = Guard(simulation)
     rounds = [{'simulation': cost(simulation.advance),
-               'checked': cost(guard.advance),
+               'guarded': cost(guard.advance),
                'conversion': cost(lambda: poses_of(simulation.state)),
                'messages': cost(lambda: outputs.publish(simulation, 0, 0)),
-               'bare engine': cost(step_barely),
-               'bare publish': cost(lambda: publisher.publish(ready))} for _ in range(ROUNDS)]
+               'base engine': cost(step_baseline),
+               'base publish': cost(lambda: publisher.publish(message))} for _ in range(ROUNDS)]
     simulation.close()
-    bare.close()
+    baseline.close()
     return {name: statistics.median(found[name] for found in rounds) for name in rounds[0]}
 
 
@@ -73,16 +73,16 @@ def main() -> None:
     drop = load_scene('drop')
     high = dataclasses.replace(drop, dolls=(dataclasses.replace(
         drop.dolls[0], position=(0, 0, 1000), spin=(0.2, 0.1, 0.3)),))
-    print('us a tick of 10 ms, median; bare: fixed 1 ms substeps, getLinkStates, a ready message')
+    print('us per tick of 10 ms, median; base: 1 ms substeps, getLinkStates, a prepared message')
     print(' ' * 22 + ''.join(f'{name:>14}' for name in (
-        'simulation', 'checked', 'conversion', 'messages', 'bare engine',
-        'bare publish', 'tick / bare')))
+        'simulation', 'guarded', 'conversion', 'messages', 'base engine',
+        'base publish', 'tick / base')))
     for label, scene, before in (('in flight', high, 0), ('on the ground', drop, 100),
                                  ('asleep', drop, 1500)):
         for accuracy in ACCURACIES:
             costs = row(node, scene, accuracy, before)
-            ratio = ((costs['checked'] + costs['messages'])
-                     / (costs['bare engine'] + costs['bare publish']))
+            ratio = ((costs['guarded'] + costs['messages'])
+                     / (costs['base engine'] + costs['base publish']))
             print(f'{label + ", " + accuracy:22}' + ''.join(
                 f'{us:14.1f}' for us in costs.values()) + f'{ratio:14.2f}', flush=True)
     node.destroy_node()

@@ -1,4 +1,4 @@
-"""Says of topics with PoseArrays how many messages come, how large, and how evenly."""
+"""Topic statistics of PoseArrays: message rate, bandwidth and spacing."""
 from __future__ import annotations
 
 import argparse
@@ -12,12 +12,12 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 
-from ..rclpy_context import ros_session
+from ..process.rclpy_context import rclpy_context
 
 TOPIC = '/ragdoll/poses'
 
-FIRST = 10
-"""Messages of each topic that are not counted, as discovery bunches them."""
+SKIPPED = 10
+"""First messages of each topic that are not counted: discovery bunches them."""
 
 EXAMPLE = """examples:
   python -m ragdoll_ros.ros.tools.listen
@@ -25,23 +25,23 @@ EXAMPLE = """examples:
 """
 
 
-class Heard:
-    """Arrivals and sizes of what comes on a topic."""
+class TopicStatistics:
+    """Arrival times and sizes of the messages on a topic."""
 
     def __init__(self, node: Node, topic: str) -> None:
         self.topic = topic
         self.arrivals: list[int] = []
         """ns of the steady clock."""
         self.bytes = 0
-        node.create_subscription(PoseArray, topic, self._take, 100, raw=True)
+        node.create_subscription(PoseArray, topic, self._on_message, 100, raw=True)
 
-    def _take(self, data: bytes) -> None:
+    def _on_message(self, data: bytes) -> None:
         self.arrivals.append(time.monotonic_ns())
         self.bytes += len(data)
 
     def line(self) -> str:
-        """Messages and bytes in a second, and ms from one message to the next."""
-        counted = self.arrivals[FIRST:]
+        """Rate, size, bandwidth and spacing as text."""
+        counted = self.arrivals[SKIPPED:]
         if len(counted) < 2:
             return f'{self.topic}: {len(self.arrivals)} messages'
         gaps = np.diff(counted) / 1e6
@@ -53,24 +53,25 @@ class Heard:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Listen, from the first message of every topic on, and print a line for each."""
+    """Listen from the first message of every topic on, and print a line for each."""
     arguments = sys.argv if arguments is None else arguments
     parser = argparse.ArgumentParser(
         'python -m ragdoll_ros.ros.tools.listen', description=__doc__, epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('topics', nargs='*', default=[TOPIC], help=f'({TOPIC})')
-    parser.add_argument('--seconds', type=float, default=5.0, help='for how long (%(default)s)')
+    parser.add_argument('topics', nargs='*', default=[TOPIC], help=f'topics (default: {TOPIC})')
+    parser.add_argument('--seconds', type=float, default=5.0,
+                        help='duration, s (default: %(default)s)')
     options = parser.parse_args(remove_ros_args(arguments)[1:])
-    with ros_session(arguments), SingleThreadedExecutor() as executor:
+    with rclpy_context(arguments), SingleThreadedExecutor() as executor:
         node = Node('listen')
         executor.add_node(node)
-        heard = [Heard(node, topic) for topic in options.topics]
-        while rclpy.ok() and not all(each.arrivals for each in heard):
+        statistics = [TopicStatistics(node, topic) for topic in options.topics]
+        while rclpy.ok() and not all(each.arrivals for each in statistics):
             executor.spin_once(timeout_sec=1.0)
         end = time.monotonic() + options.seconds
         while rclpy.ok() and time.monotonic() < end:
             executor.spin_once(timeout_sec=0.1)
-        print('\n'.join(each.line() for each in heard), flush=True)
+        print('\n'.join(each.line() for each in statistics), flush=True)
     return 0
 
 

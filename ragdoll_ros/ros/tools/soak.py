@@ -1,7 +1,7 @@
-"""`python -m ragdoll_ros.ros.tools.soak`: hours of the node in minutes, and what they leave behind.
+"""`python -m ragdoll_ros.ros.tools.soak`: soak test for leaks of memory, threads and files.
 
-A node as fast as it goes, pushed, set back and given other scenes by messages and calls that come
-over DDS as anybody's, while somebody listens. What grows with time shows: memory, threads, files.
+A node at maximum speed is pushed, reset and given other scenes, while a peer subscribes to its
+poses over DDS. Hours of simulated time pass in minutes.
 """
 from __future__ import annotations
 
@@ -24,44 +24,43 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from ..node import RagdollNode
-from ..rclpy_context import ros_session
+from ..process.rclpy_context import rclpy_context
 
 TICKS = 864_000
 """2.4 hours at 100 Hz."""
 
 RESETS, CHANGES, SAMPLES = 1000, 100, 200
-"""How often in a run the scene is set back, another one comes, and memory is looked at."""
+"""Resets, changes of the scene, and resource samples in a run."""
 
 SCENES = ('drop', 'flight', 'article', 'crowd')
-"""Taken in turn."""
+"""Loaded in turn."""
 
-PUSHES = 0.05
-"""Of each tick: probability that a message pushes."""
+PUSH_RATE = 0.05
+"""Pushes per tick."""
 
-STRONGEST = 2000.0
+MAX_FORCE = 2000.0
 """N."""
 
-WARM = 0.5
-"""Share of the run after which nothing should grow any more: by then each scene has come 12 times,
-and `~/events` has the 1000 messages that it keeps."""
+WARM_UP = 0.5
+"""Share of the run after which nothing should grow: by then each scene has been loaded 12 times and
+the queue of `~/events` is full."""
 
-ROUNDS = int((1 - WARM) * CHANGES / len(SCENES))
-"""Parts of what follows, in each of which every scene comes once: a crowd takes 5 MB that other
-scenes give back, so that memory is compared from round to round."""
+ROUNDS = int((1 - WARM_UP) * CHANGES / len(SCENES))
+"""Rounds after the warm-up, each with every scene once. Memory is compared between rounds, as a
+crowd takes 5 MB that other scenes free."""
 
-GROWTH = 1.0
-"""MB an hour on the wall that memory may grow by."""
+MAX_GROWTH = 1.0
+"""MB per hour of wall time."""
 
 LIBC = ctypes.CDLL(None)
-"""Of this process."""
 
-LONG_ENOUGH = 300.0
-"""s of the warm part from which on its growth is judged: in less, a page more is too much."""
+MIN_DURATION = 300.0
+"""s after the warm-up that are needed to judge the growth."""
 
 
 @dataclass(frozen=True)
-class Sample:
-    """What the process has at a time, s."""
+class SoakSample:
+    """Resources of the process at a time, s."""
 
     time: float
     memory: float
@@ -70,9 +69,9 @@ class Sample:
     files: int
 
     @classmethod
-    def now(cls) -> Sample:
-        """Of this process, without what it only keeps for later: garbage, and memory that malloc
-        has free, which goes up and down by 3 MB from one scene to the next.
+    def now(cls) -> SoakSample:
+        """Sample this process after a garbage collection and malloc_trim: memory that malloc keeps
+        varies by 3 MB between scenes.
         """
         gc.collect()
         LIBC.malloc_trim(0)
@@ -82,82 +81,82 @@ class Sample:
 
 
 class CountingNode(RagdollNode):
-    """The node, which counts its ticks."""
+    """The node, counting its ticks."""
 
     ticks = 0
 
     def tick(self, due: float | None = None) -> None:
-        """Go on by one tick; see RagdollNode."""
+        """Make one tick; see RagdollNode."""
         super().tick(due)
         self.ticks += 1
 
 
 class Soak:
-    """A node, who pushes it and who listens, in one executor; all goes by the count of ticks."""
+    """The node and a peer that pushes and subscribes, in one executor; scheduled by tick count."""
 
     def __init__(self, ticks: int, seed: int) -> None:
         self._ticks, self._random = ticks, random.Random(seed)
         self._node = CountingNode(parameter_overrides=[Parameter('real_time_factor', value=100.0)])
-        self._other = Node('soak')
-        self._force = self._other.create_publisher(Wrench, '/ragdoll/force', 10)
-        self._other.create_subscription(PoseArray, '/ragdoll/poses', self._hear, 10)
-        self.heard = self.bad = 0
+        self._peer = Node('soak')
+        self._force = self._peer.create_publisher(Wrench, '/ragdoll/force', 10)
+        self._peer.create_subscription(PoseArray, '/ragdoll/poses', self._on_poses, 10)
+        self.received = self.bad = 0
         self._executor = SingleThreadedExecutor()
-        for node in (self._node, self._other):
+        for node in (self._node, self._peer):
             self._executor.add_node(node)
 
-    def run(self) -> list[Sample]:
-        """Make all ticks; what the process had meanwhile."""
-        samples, begin = [Sample.now()], time.monotonic()
+    def run(self) -> list[SoakSample]:
+        """Make all ticks. Returns the samples."""
+        samples, begin = [SoakSample.now()], time.monotonic()
         done = {'reset': 0, 'change': 0, 'sample': 0, 'push': 0}
         while self._node.ticks < self._ticks:
             self._executor.spin_once(timeout_sec=1.0)
             share = self._node.ticks / self._ticks
             for name, count, act in (('reset', RESETS, self._node.reset),
                                      ('change', CHANGES, self._change),
-                                     ('push', self._ticks * PUSHES, self._push)):
+                                     ('push', self._ticks * PUSH_RATE, self._push)):
                 if done[name] < int(share * count):
                     done[name] += 1
                     act()
             if done['sample'] < int(share * SAMPLES):
                 done['sample'] += 1
-                samples.append(Sample.now())
-                _say(share, samples[-1], time.monotonic() - begin)
+                samples.append(SoakSample.now())
+                _print_progress(share, samples[-1], time.monotonic() - begin)
         return samples
 
     def close(self) -> None:
-        """Give all back."""
+        """Destroy the nodes."""
         self._executor.shutdown()
         self._node.end()
-        self._other.destroy_node()
+        self._peer.destroy_node()
 
     @property
-    def taken_back(self) -> int:
-        """Bad states that the node did not publish."""
-        return self._node.rescue.count
+    def undone(self) -> int:
+        """Number of bad states that the node has undone."""
+        return self._node.recovery.count
 
     def _push(self) -> None:
-        force = Vector3(**{axis: self._random.uniform(-STRONGEST, STRONGEST) for axis in 'xyz'})
+        force = Vector3(**{axis: self._random.uniform(-MAX_FORCE, MAX_FORCE) for axis in 'xyz'})
         self._force.publish(Wrench(force=force))
 
     def _change(self) -> None:
-        """Take the next scene."""
+        """Load the next scene."""
         name = SCENES[(SCENES.index(self._node.settings.scene) + 1) % len(SCENES)]
         result, = self._node.set_parameters([Parameter('scene', value=name)])
         if not result.successful:
             raise RuntimeError(result.reason)
 
-    def _hear(self, message: PoseArray) -> None:
-        self.heard += 1
+    def _on_poses(self, message: PoseArray) -> None:
+        self.received += 1
         self.bad += not all(math.isfinite(pose.position.x + pose.orientation.w)
                             for pose in message.poses)
 
 
-def growth(samples: Sequence[Sample]) -> tuple[float, float]:
-    """MB an hour by which memory grew once warm, and how far that may be off (two sigma): a line
-    through the medians of the rounds of scenes.
+def growth(samples: Sequence[SoakSample]) -> tuple[float, float]:
+    """Growth of memory after the warm-up and its uncertainty (two sigma), MB per hour, by a line
+    fitted to the medians of the rounds.
     """
-    warm = samples[int(WARM * len(samples)):]
+    warm = samples[int(WARM_UP * len(samples)):]
     hours = [sample.time / 3600 for sample in warm]
     memory = [sample.memory for sample in warm]
     middles, medians = ([np.median(part) for part in np.array_split(values, ROUNDS)]
@@ -167,17 +166,17 @@ def growth(samples: Sequence[Sample]) -> tuple[float, float]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run it; 1 if something grew, or a bad state was seen."""
+    """Run the soak test. Returns 1 if something grew or a bad state was found."""
     parser = argparse.ArgumentParser(
         'python -m ragdoll_ros.ros.tools.soak', description=__doc__.partition('\n')[0],
         epilog='example: python -m ragdoll_ros.ros.tools.soak --ticks 20000')
     parser.add_argument('--ticks', type=int, default=TICKS, metavar='N',
                         help=f'ticks to make, at least 1000 ({TICKS})')
-    parser.add_argument('--seed', type=int, default=1, help='of the random pushes (1)')
+    parser.add_argument('--seed', type=int, default=1, help='seed of the random pushes (1)')
     options = parser.parse_args(arguments)
     if options.ticks < 1000:
         parser.error(f'--ticks {options.ticks}: expected 1000 or more')
-    with ros_session([]):
+    with rclpy_context([]):
         soak = Soak(options.ticks, options.seed)
         try:
             samples = soak.run()
@@ -187,26 +186,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _judge(samples: Sequence[Sample], soak: Soak) -> int:
-    """Print what was found; 0 if all is as it should be."""
+def _judge(samples: Sequence[SoakSample], soak: Soak) -> int:
+    """Print the result. Returns the exit code."""
     slope, error = growth(samples)
-    warm = samples[int(WARM * len(samples)):]
+    warm = samples[int(WARM_UP * len(samples)):]
     middle, last = warm[:len(warm) // 2], warm[len(warm) // 2:]
-    told = warm[-1].time - warm[0].time >= LONG_ENOUGH
+    is_long = warm[-1].time - warm[0].time >= MIN_DURATION
     flat = all(max(getattr(sample, name) for sample in last)
                <= max(getattr(sample, name) for sample in middle) for name in ('threads', 'files'))
     print(f'{samples[-1].time - samples[0].time:.0f} s; memory grew by {slope:.2f} +- {error:.2f} '
-          f'MB an hour{"" if told else " (too short a run to tell)"}, {warm[0].memory:.1f} to '
+          f'MB per hour{"" if is_long else " (too short a run to tell)"}, {warm[0].memory:.1f} to '
           f'{warm[-1].memory:.1f} MB; threads and descriptors '
-          f'{"flat" if flat else "GREW"}; {soak.heard} PoseArrays heard, {soak.bad} of them bad; '
-          f'{soak.taken_back} bad states taken back')
-    # What can not be told from growth is not called flat.
-    grew = told and slope + error > GROWTH
-    return int(grew or not flat or soak.bad > 0 or soak.taken_back > 0 or soak.heard == 0)
+          f'{"flat" if flat else "GREW"}; {soak.received} PoseArrays received, {soak.bad} bad; '
+          f'{soak.undone} bad states undone')
+    # The uncertainty counts as growth.
+    grew = is_long and slope + error > MAX_GROWTH
+    return int(grew or not flat or soak.bad > 0 or soak.undone > 0 or soak.received == 0)
 
 
-def _say(share: float, sample: Sample, gone: float) -> None:
-    print(f'{share:4.0%} {gone:6.0f} s, about {gone * (1 / share - 1):.0f} s left: '
+def _print_progress(share: float, sample: SoakSample, elapsed: float) -> None:
+    print(f'{share:4.0%} {elapsed:6.0f} s, about {elapsed * (1 / share - 1):.0f} s left: '
           f'{sample.memory:.1f} MB, {sample.threads} threads, {sample.files} descriptors',
           flush=True)
 

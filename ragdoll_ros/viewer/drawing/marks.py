@@ -97,5 +97,5 @@ def arrow_before(bone: Bone, push: Push, position: np.ndarray,
     arrow = push.arrow(position, orientation)
     direction = rotation.normalized(arrow[1] - arrow[0])
     local = rotation.rotate(rotation.inverse(orientation), direction)
-    depth = (arrow[1] - position) @ direction + bone.shape.reach(local)
+    depth = (arrow[1] - position) @ direction + bone.shape.support(local)
     return arrow - direction * depth

@@ -9,7 +9,7 @@ from ...model import errors
 from ...model.scene import Scene
 from ...model.skin import Skin
 from ...model.state import State
-from ...recordings.gltf.gltf_skin import by_material, paint_bytes
+from ...recordings.gltf.gltf_skin import group_by_material, surface_glb
 from .bodies import WXYZ
 
 MOST = 30
@@ -71,9 +71,9 @@ class Skins:
 
     def _add(self, server: viser.ViserServer, name: str, skin: Skin) -> None:
         self.handles.append(server.scene.add_mesh_skinned(
-            name, skin.vertices, by_material(skin)[0], color=skin.color[:3], side='double',
+            name, skin.vertices, group_by_material(skin)[0], color=skin.color[:3], side='double',
             bone_wxyzs=skin.orientations[:, WXYZ], bone_positions=skin.positions,
             skin_weights=skin.weights))
-        if skin.paint is not None:
-            server.scene.add_glb(f'{name}/paint', paint_bytes(skin), visible=False,
+        if skin.appearance is not None:
+            server.scene.add_glb(f'{name}/paint', surface_glb(skin), visible=False,
                                  cast_shadow=False)

@@ -20,7 +20,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from ...model import errors, rotation
-from ...model.ragdoll import JOINT_KINDS, LARGEST_SWING, Bone, Joint, Ragdoll, SkeletonFrame
+from ...model.ragdoll import JOINT_KINDS, MAX_SWING, Bone, Joint, Ragdoll, SkeletonFrame
 from ...model.scene import Placement, Scene
 from ...model.shapes import SHAPES, Box, Shape, Sphere
 from ...model.swing import Swing
@@ -141,7 +141,7 @@ def set_joint_kind(scene: Scene, name: str, kind: str) -> Scene:
     hinge, universal, twist = _axes(joint, bone)
     pairs = joint.limits or ((-USUAL, USUAL),)
     widest = max((max(map(abs, pair)) for pair in pairs if pair), default=0.0)
-    swing = min(widest, LARGEST_SWING)
+    swing = min(widest, MAX_SWING)
     second = joint.limits[1] if joint.kind == 'universal' else (-USUAL, USUAL)
     ball = ((-swing, swing), (-USUAL_TWIST, USUAL_TWIST)) if swing else (None, None)
     axes, limits = {'hinge': ((hinge,), pairs[:1]), 'ball': ((twist,), ball),

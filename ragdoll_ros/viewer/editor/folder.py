@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from ...files import yaml_text
 from ...files.config import scene_names
-from ...files.scene import load_scene, save_scene, scene_from, scene_text
+from ...files.scene import load_scene, save_scene, scene_from_data, scene_text
 from ...model import errors
 from ...model.scene import Placement, Scene, all_above_ground
 
@@ -85,7 +85,7 @@ class Folder:
             data = yaml_text.parse(content)
             self._check_dolls(data)
             self._check_models(data)
-            return scene_from(data, self.path / name)
+            return scene_from_data(data, self.path / name)
         except errors.ModelError as error:
             raise errors.ModelErrors(name, [error]) from None
         except errors.ModelErrors as error:

@@ -19,9 +19,10 @@ def add_bone(scene: Scene, parent: str, name: str) -> Scene:
     if not NAME.fullmatch(name):
         raise errors.WrongForm('name', name, 'text without / and control characters')
     if any(bone.name == name for bone in placement.doll.bones):
-        raise errors.DuplicateName('name', name, 'a name of its own')
+        raise errors.DuplicateName('name', name, 'a unique name')
     outward = outward_from(joint_of(scene, parent), above)
-    reach = float(above.shape.reach(rotation.rotate(rotation.inverse(above.orientation), outward)))
+    reach = float(above.shape.support(
+        rotation.rotate(rotation.inverse(above.orientation), outward)))
     bone = dataclasses.replace(above, name=name, position=above.position + 2 * reach * outward)
     joint = Joint(above.name, name, 'ball', above.position + reach * outward, (outward,),
                   ((-USUAL, USUAL), (-USUAL_TWIST, USUAL_TWIST)))

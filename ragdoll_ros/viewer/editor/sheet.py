@@ -17,7 +17,7 @@ from ...model import errors, rotation
 from ...model.ragdoll import DEFAULT_COLOR, JOINT_KINDS, Joint
 from ...model.scene import Scene
 from ...model.shapes import SHAPES, SIZES, Shape
-from ...model.vectors import unit
+from ...model.vectors import unit_vector
 from ..widgets import number_parsing
 from . import changes
 
@@ -175,7 +175,7 @@ def _set_axes_and_limits(scene: Scene, name: str, new: Sheet, shown: Sheet) -> S
         key = f'axis_{index + 1}'
         # A limb that was rotated has rotated its axes already.
         kept = kind.name == joint.kind and new[key] == shown[key]
-        axes.append(joint.axes[index] if kept else unit(key, new[key]))
+        axes.append(joint.axes[index] if kept else unit_vector(key, new[key]))
     if kind.axes == 2:
         axes[1] = _straightened(*axes)
     symmetric = kind.name == 'ball' and kind.limits == 2

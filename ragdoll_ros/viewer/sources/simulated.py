@@ -15,7 +15,7 @@ from ...model import errors, rotation
 from ...model.push import Push
 from ...model.scene import SECOND, Scene
 from ...model.vectors import Vector
-from ...physics.actions.grab import EVENLY
+from ...physics.actions.grab import DRAG_TIME
 from ...physics.simulation import Simulation
 from ...realtime.pacer import Pacer
 from .source import PACES, Frame, Held, Report, Source, Wanted
@@ -104,7 +104,8 @@ class Simulated(Source):
         self._commands.put(lambda: self._simulation.grab(hand, bone, point, target))
 
     def drag(self, hand: str, target: Vector) -> None:
-        self._commands.put(lambda: self._simulation.drag(hand, target, EVENLY * self._report.pace))
+        self._commands.put(lambda: self._simulation.drag(
+            hand, target, DRAG_TIME * self._report.pace))
 
     def let_go(self, hand: str) -> None:
         self._commands.put(lambda: self._simulation.let_go(hand))

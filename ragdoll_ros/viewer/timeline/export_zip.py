@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ...fit.skin import skins_of
 from ...recordings.recording import Recording
-from ...recordings.save import FORMATS, contents
+from ...recordings.save import FORMATS, encoded_files
 
 
 def zipped(recording: Recording, name: str, can_write: Callable[[str], bool]) -> bytes:
@@ -20,6 +20,6 @@ def zipped(recording: Recording, name: str, can_write: Callable[[str], bool]) ->
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, 'w', zipfile.ZIP_DEFLATED) as package:
         for suffix in filter(can_write, FORMATS):
-            for path, content in contents(recording, Path(name + suffix), skins).items():
+            for path, content in encoded_files(recording, Path(name + suffix), skins).items():
                 package.writestr(str(path), content)
     return stream.getvalue()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...physics.ground_heights import GroundHeights
-from ...recordings.recording import Pose, Recorder, Recording
+from ...recordings.recording import RecordedPose, Recorder, Recording
 from ..sources.source import Frame
 
 SPAN = 60.0
@@ -69,7 +69,8 @@ class Cut:
         recorder = Recorder(self.frame(0).scene)
         for index, time in enumerate((self.times - self.times[0]).tolist()):
             frame = self.frame(index)
-            recorder.add(time, Pose(frame.state.positions, frame.state.orientations, frame.rods))
+            recorder.add(time, RecordedPose(frame.state.positions, frame.state.orientations,
+                                            frame.rods))
         return recorder.recording()
 
 

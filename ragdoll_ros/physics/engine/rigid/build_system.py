@@ -1,4 +1,4 @@
-"""A scene as the tables that the rigid core reads."""
+"""The system of a scene: the tables that the kernels read."""
 from __future__ import annotations
 
 import math
@@ -10,16 +10,21 @@ from ....model import rotation
 from ....model.coordinates import DofLayout
 from ....model.ragdoll import Joint, Ragdoll, joint_axes
 from ....model.scene import Scene
-from ...kernels.record import RECORD
-from ...kernels.system import BOUND, GEOM, PAIR, STICKS, System
-from ...motion import damping_rate
+from ...kernels.collision.shapes import SHAPE_KIND
+from ...kernels.dynamics.body import BODY
+from ...kernels.system import (
+    GEOM,
+    GEOM_PAIR,
+    JOINT_LIMIT,
+    NO_SLIP,
+    System,
+    coordinate_count,
+)
+from ...rigid_body import damping_rate
 
-KINDS = {'sphere': 0, 'capsule': 1, 'box': 2, 'cylinder': 3}
-"""Numbers of the kinds of shapes, as in kernels/collision/shapes.py."""
-
-STIFFEST = 1000.0
-"""1/s at which joint damping may end a motion for it to be flown; above, steps take it
-implicitly."""
+MAX_FLIGHT_DAMPING = 1000.0
+"""1/s: largest decay rate of joint damping that is integrated explicitly, in flight; above, contact
+steps take it implicitly."""
 
 GROUND_POINTS = {'sphere': 1, 'capsule': 2, 'box': 8, 'cylinder': 10}
 """Points of each kind that may touch the ground, see kernels/contact/gaps.py."""
@@ -28,109 +33,110 @@ Law = tuple[float, float, float]
 """Friction, rolling friction (m), restitution."""
 
 
-def system_of(scene: Scene) -> System:
-    """The tables of a scene; ``pairs`` are those within dolls."""
-    tree = table(scene)
+def build_system(scene: Scene) -> System:
+    """The system of a scene; its pairs are those within dolls."""
+    tree = _kinematic_tree(scene)
     layout = DofLayout([placement.doll for placement in scene.dolls])
     ground = scene.ground
-    bounds = np.zeros(len(layout.limited[0]), BOUND)
-    bounds['q'], bounds['v'] = layout.limited
-    bounds['lower'], bounds['upper'] = layout.limits
+    limits = np.zeros(len(layout.limited[0]), JOINT_LIMIT)
+    limits['q'], limits['dof'] = layout.limited
+    limits['lower'], limits['upper'] = layout.limits
     geoms = _geoms(scene, tree)
     return System(
         tree=tree, gravity=np.array(scene.gravity, float), **_dofs(tree, layout.sizes[1]),
-        geoms=geoms, pairs=pairs_between(scene, _within_dolls(scene)),
-        bounds=bounds, normal=np.array(ground.normal if ground else (0.0, 0.0, 1.0)),
-        offset=np.array([ground.offset if ground else -math.inf]),
-        bounce_speed=np.array([scene.material.restitution_speed]),
+        geoms=geoms, pairs=pairs_between(scene, _within_dolls(scene)), joint_limits=limits,
+        ground_normal=np.array(ground.normal if ground else (0.0, 0.0, 1.0)),
+        ground_offset=np.array([ground.offset if ground else -math.inf]),
+        restitution_speed=np.array([scene.material.restitution_speed]),
         doll_masses=np.array([placement.doll.mass for placement in scene.dolls]),
-        heft=np.array([tree['mass'].sum() * geoms['reach'].max() * math.hypot(*scene.gravity)]),
-        flies=np.array([float(damping_rate(scene) < STIFFEST)]))
+        energy_scale=_energy_scale(tree, geoms, scene.gravity),
+        flight_enabled=np.array([float(damping_rate(scene) < MAX_FLIGHT_DAMPING)]))
 
 
-def table(scene: Scene) -> np.ndarray:
-    """Records of all bones of a scene, coordinates in the order of DofLayout."""
+def _kinematic_tree(scene: Scene) -> np.ndarray:
+    """Records of all bones of a scene, parents first; coordinates in the order of DofLayout."""
     places = {name: place for place, name in enumerate(scene.bone_names)}
-    records: list[np.ndarray] = []
+    bodies: list[np.ndarray] = []
     q = v = 0
     for placement in scene.dolls:
         doll, at = placement.doll, {}
         for joint in (None, *doll.joints_depth_first()):
             bone = doll.bone(joint.child) if joint else doll.root
-            record = np.zeros((), RECORD)
-            record['parent'], record['free'] = -1, 1
+            body = np.zeros((), BODY)
+            body['parent'], body['has_quaternion'] = -1, 1
             if joint:
-                _enter_joint(record, doll, joint, at)
-            record['bone'] = places[scene.qualified(placement, bone.name)]
-            record['mass'], record['inertia'] = bone.mass, bone.inertia
-            record['bind'], record['q'], record['v'] = bone.orientation, q, v
-            at[bone.name] = len(records)
-            records.append(record)
+                _enter_joint(body, doll, joint, at)
+            body['bone'] = places[scene.qualified(placement, bone.name)]
+            body['mass'], body['inertia'] = bone.mass, bone.inertia
+            body['inertial_orientation'] = bone.orientation
+            body['q_start'], body['v_start'] = q, v
+            at[bone.name] = len(bodies)
+            bodies.append(body)
             if joint is None:
                 q, v = q + 7, v + 6
             else:
-                q, v = q + (4 if record['free'] else joint.dof), v + joint.dof
-    return np.array(records, RECORD)
+                q, v = q + (4 if body['has_quaternion'] else joint.dof), v + joint.dof
+    return np.array(bodies, BODY)
 
 
-def _enter_joint(record: np.ndarray, doll: Ragdoll, joint: Joint, at: dict[str, int]) -> None:
-    """Enter what a joint says of its child's record; ``at``: which record is whose."""
-    record['parent'] = at[joint.parent]
-    record['free'] = joint.is_free_ball
-    record['dof'], record['damping'] = joint.dof, joint.damping
-    record['before'] = np.subtract(joint.anchor, doll.bone(joint.parent).position)
-    record['after'] = np.subtract(doll.bone(joint.child).position, joint.anchor)
-    record['axes'][:joint.dof] = joint_axes(joint)
+def _enter_joint(body: np.ndarray, doll: Ragdoll, joint: Joint, at: dict[str, int]) -> None:
+    """Enter the joint to the parent; ``at``: the record of each bone so far."""
+    body['parent'] = at[joint.parent]
+    body['has_quaternion'] = joint.is_free_ball
+    body['dof_count'], body['joint_damping'] = joint.dof, joint.damping
+    body['parent_to_joint'] = np.subtract(joint.anchor, doll.bone(joint.parent).position)
+    body['joint_to_com'] = np.subtract(doll.bone(joint.child).position, joint.anchor)
+    body['joint_axes'][:joint.dof] = joint_axes(joint)
 
 
-def joined(systems: Sequence[System], pairs: np.ndarray) -> System:
-    """The tables of several systems as one, and ``pairs`` between their geoms."""
-    q = v = bones = geoms = points = 0
+def _energy_scale(tree: np.ndarray, geoms: np.ndarray, gravity: Sequence[float]) -> np.ndarray:
+    """M g L, J, of all bodies, L the largest reach of a geom."""
+    return np.array([tree['mass'].sum() * geoms['reach'].max() * math.hypot(*gravity)])
+
+
+def join_systems(systems: Sequence[System], pairs: np.ndarray) -> System:
+    """Several systems as one, with ``pairs`` between their geoms."""
+    q = v = bodies = dolls = geoms = points = 0
     parts = []
     for one in systems:
-        tree, shapes, own, bounds = (part.copy() for part in (
-            one.tree, one.geoms, one.pairs, one.bounds))
-        tree['parent'] += np.where(tree['parent'] >= 0, bones, 0)
-        tree['bone'] += bones
-        shapes['bone'] += bones
-        shapes['first'] += points
-        for rows in (tree, bounds):
-            rows['q'] += q
-            rows['v'] += v
+        tree, shapes, own, limits = (part.copy() for part in (
+            one.tree, one.geoms, one.pairs, one.joint_limits))
+        tree['parent'] += np.where(tree['parent'] >= 0, bodies, 0)
+        tree['bone'] += bodies
+        tree['q_start'] += q
+        tree['v_start'] += v
+        shapes['body'] += bodies
+        shapes['first_point'] += points
+        limits['q'] += q
+        limits['dof'] += v
         own['a'] += geoms
         own['b'] += geoms
         parts.append(one._replace(
-            tree=tree, geoms=shapes, pairs=own, bounds=bounds,
-            up=np.where(one.up >= 0, one.up + v, -1), last=one.last + v,
-            bone_of=one.bone_of + bones, root_of=one.root_of + bones,
-            doll_of=one.doll_of + sum(len(part.doll_masses) for part in parts)))
-        q, v, bones = q + coordinates(one), v + len(one.up), bones + len(tree)
-        geoms, points = geoms + len(shapes), points + int(shapes['count'].sum())
+            tree=tree, geoms=shapes, pairs=own, joint_limits=limits,
+            dof_parent=np.where(one.dof_parent >= 0, one.dof_parent + v, -1),
+            dof_body=one.dof_body + bodies, body_last_dof=one.body_last_dof + v,
+            body_root=one.body_root + bodies, body_doll=one.body_doll + dolls))
+        q, v, bodies = q + coordinate_count(one), v + len(one.dof_parent), bodies + len(tree)
+        geoms, points = geoms + len(shapes), points + int(shapes['point_count'].sum())
+        dolls += len(one.doll_masses)
     whole = {name: np.concatenate([getattr(part, name) for part in parts]) for name in (
-        'tree', 'up', 'last', 'bone_of', 'root_of', 'doll_of', 'damping', 'geoms', 'bounds',
-        'doll_masses')}
-    tree, shapes = whole['tree'], whole['geoms']
+        'tree', 'dof_parent', 'dof_body', 'dof_damping', 'body_last_dof', 'body_root', 'body_doll',
+        'geoms', 'joint_limits', 'doll_masses')}
     return parts[0]._replace(
         **whole, pairs=np.concatenate([*(part.pairs for part in parts), pairs]),
-        heft=np.array([tree['mass'].sum() * shapes['reach'].max()
-                       * math.hypot(*parts[0].gravity)]),
-        flies=np.array([min(part.flies[0] for part in parts)]))
-
-
-def coordinates(system: System) -> int:
-    """How many coordinates a system has."""
-    return len(system.up) + int(system.tree['free'].sum())
+        energy_scale=_energy_scale(whole['tree'], whole['geoms'], parts[0].gravity),
+        flight_enabled=np.array([min(part.flight_enabled[0] for part in parts)]))
 
 
 def pairs_between(scene: Scene, couples: np.ndarray) -> np.ndarray:
     """Pairs of geoms (p, 2) with the law of their contact."""
     laws = np.array([scene.material.on(bone) for bone in scene.bones
                      for _ in bone.shape.parts]).reshape(-1, 3)
-    pairs = np.zeros(len(couples), PAIR)
+    pairs = np.zeros(len(couples), GEOM_PAIR)
     if len(couples):
         pairs['a'], pairs['b'] = couples.T
         law = contact_law(laws[couples[:, 0]], laws[couples[:, 1]])
-        pairs['friction'], pairs['rolling'], pairs['restitution'] = law.T
+        pairs['friction'], pairs['rolling_friction'], pairs['restitution'] = law.T
     return pairs
 
 
@@ -140,30 +146,31 @@ def contact_law(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """
     out = np.empty(np.broadcast_shapes(a.shape, b.shape))
     low, high = np.minimum(a[..., 0], b[..., 0]), np.maximum(a[..., 0], b[..., 0])
-    mean = np.sqrt(np.minimum(low, STICKS) * np.minimum(high, STICKS))
-    out[..., 0] = np.where(np.isfinite(high), mean, np.minimum(low, STICKS))
+    mean = np.sqrt(np.minimum(low, NO_SLIP) * np.minimum(high, NO_SLIP))
+    out[..., 0] = np.where(np.isfinite(high), mean, np.minimum(low, NO_SLIP))
     out[..., 1] = (a[..., 1] + b[..., 1]) / 2
     out[..., 2] = np.sqrt(a[..., 2] * b[..., 2])
     return out
 
 
 def _dofs(tree: np.ndarray, count: int) -> dict[str, np.ndarray]:
-    """How velocities and bones hang together; see System."""
-    up, bone_of = np.full(count, -1), np.zeros(count, np.int64)
-    last, root_of, doll_of = np.zeros((3, len(tree)), np.int64)
-    damping, doll = np.zeros(count), -1
-    for i, bone in enumerate(tree):
-        if bone['parent'] < 0:
-            doll, before, dof, root_of[i] = doll + 1, -1, 6, i
+    """How degrees of freedom and bodies depend on each other; see System."""
+    dof_parent, dof_body = np.full(count, -1), np.zeros(count, np.int64)
+    body_last_dof, body_root, body_doll = np.zeros((3, len(tree)), np.int64)
+    dof_damping, doll = np.zeros(count), -1
+    for i, body in enumerate(tree):
+        if body['parent'] < 0:
+            doll, before, dofs, body_root[i] = doll + 1, -1, 6, i
         else:
-            before, dof, root_of[i] = last[bone['parent']], bone['dof'], root_of[bone['parent']]
-        doll_of[i] = doll
-        for j in range(bone['v'], bone['v'] + dof):
-            up[j], bone_of[j], before = before, i, j
-            damping[j] = bone['damping'] if bone['parent'] >= 0 else 0.0
-        last[i] = before
-    return {'up': up, 'last': last, 'bone_of': bone_of, 'root_of': root_of, 'doll_of': doll_of,
-            'damping': damping}
+            before, dofs = body_last_dof[body['parent']], body['dof_count']
+            body_root[i] = body_root[body['parent']]
+        body_doll[i] = doll
+        for j in range(body['v_start'], body['v_start'] + dofs):
+            dof_parent[j], dof_body[j], before = before, i, j
+            dof_damping[j] = body['joint_damping'] if body['parent'] >= 0 else 0.0
+        body_last_dof[i] = before
+    return {'dof_parent': dof_parent, 'dof_body': dof_body, 'dof_damping': dof_damping,
+            'body_last_dof': body_last_dof, 'body_root': body_root, 'body_doll': body_doll}
 
 
 def _geoms(scene: Scene, tree: np.ndarray) -> np.ndarray:
@@ -175,15 +182,15 @@ def _geoms(scene: Scene, tree: np.ndarray) -> np.ndarray:
     geoms, first = np.zeros(len(parts), GEOM), 0
     for geom, (index, bone, part) in zip(geoms, parts, strict=True):
         shape, count = part.shape, GROUND_POINTS[part.shape.kind]
-        geom['bone'], geom['kind'] = record[index], KINDS[shape.kind]
+        geom['body'], geom['kind'] = record[index], SHAPE_KIND[shape.kind]
         geom['size'] = _size(shape)
-        geom['offset'] = rotation.rotate(bone.orientation, np.array(part.position))
-        geom['turn'] = rotation.multiply(bone.orientation, np.array(part.orientation))
-        geom['radius'] = _radius(shape)
-        geom['reach'] = geom['radius'] + math.hypot(*part.position)
+        geom['position'] = rotation.rotate(bone.orientation, np.array(part.position))
+        geom['orientation'] = rotation.multiply(bone.orientation, np.array(part.orientation))
+        geom['bounding_radius'] = _bounding_radius(shape)
+        geom['reach'] = geom['bounding_radius'] + math.hypot(*part.position)
         law = contact_law(np.array(scene.material.on(bone)), base)
-        geom['friction'], geom['rolling'], geom['restitution'] = law
-        geom['first'], geom['count'] = first, count
+        geom['friction'], geom['rolling_friction'], geom['restitution'] = law
+        geom['first_point'], geom['point_count'] = first, count
         first += count
     return geoms
 
@@ -194,8 +201,8 @@ def _size(shape: object) -> tuple[float, ...]:
     return (shape.radius, 0.0 if shape.kind == 'sphere' else shape.length / 2, 0.0)
 
 
-def _radius(shape: object) -> float:
-    """Of the ball around a shape, m."""
+def _bounding_radius(shape: object) -> float:
+    """Of the sphere around a shape, m."""
     if shape.kind == 'sphere':
         return shape.radius
     if shape.kind == 'capsule':
@@ -212,7 +219,7 @@ def _within_dolls(scene: Scene) -> np.ndarray:
     apart = set()
     for own, placement in zip(scene.bone_slices, scene.dolls, strict=True):
         place = {bone.name: own.start + k for k, bone in enumerate(placement.doll.bones)}
-        apart |= {frozenset(place[name] for name in pair) for pair in placement.doll.never_collide}
+        apart |= {frozenset(place[name] for name in pair) for pair in placement.doll.excluded_pairs}
     doll = scene.doll_of_bone[owner]
     found = [(a, b) for d in range(len(scene.dolls))
              for members in [np.flatnonzero(doll == d)]

@@ -1,65 +1,68 @@
-"""The courses of all dolls by themselves, side by side: saved and looked through all at once."""
+"""DollStates: the cluster states of all single dolls, in arrays of the whole scene."""
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from ...kernels.system import Course, System, make_course
+from ...kernels.cluster_state import ClusterState, make_cluster_state
+from ...kernels.system import System
 
-KEPT = ('dense', 'ends', 'path', 'within', 'gaps', 'reaction', 'q', 'v', 'rows', 'sums', 'tally')
-"""What a snapshot holds beside the contacts that are known."""
+SNAPSHOT = ('dense_output', 'end_rates', 'dense_step', 'excluded', 'gaps', 'contact_accelerations',
+            'q', 'v', 'bone_states', 'doll_sums', 'stats')
+"""What a snapshot holds beside the contacts."""
 
-CONTACTS_OF_GEOM = 12
-"""Contacts for which there is room, for each part of a bone."""
+CONTACTS_PER_GEOM = 12
+"""Contacts for which there is room."""
 
 
-class Courses(Sequence):
-    """A course of each doll; ``whole`` are their arrays, flat, doll by doll."""
+class DollStates(Sequence):
+    """The ClusterState of each doll by itself; ``arrays`` hold those of all dolls, flat."""
 
     def __init__(self, systems: Sequence[System]) -> None:
-        blank = {id(system): make_course(system, room_for_contacts(system)) for system in systems}
+        blank = {id(system): make_cluster_state(system, contact_capacity(system))
+                 for system in systems}
         own = [blank[id(system)] for system in systems]
         parts = []
-        for name in (*KEPT, 'known'):
-            each = [getattr(course, name) for course in own]
+        for name in (*SNAPSHOT, 'contacts'):
+            each = [getattr(state, name) for state in own]
             ends = np.cumsum([part.size for part in each])
             flat = np.zeros(ends[-1], each[0].dtype)
             parts.append((name, flat, [
                 flat[end - part.size:end].reshape(part.shape)
                 for end, part in zip(ends.tolist(), each, strict=True)]))
-        self.whole = {name: flat for name, flat, _ in parts}
-        self._room = np.array([len(course.known) for course in own])
+        self.arrays = {name: flat for name, flat, _ in parts}
+        self._room = np.array([len(state.contacts) for state in own])
         self._first = np.cumsum(self._room) - self._room
-        self._each = [course._replace(**{name: views[doll] for name, _, views in parts})
-                      for doll, course in enumerate(own)]
+        self._each = [state._replace(**{name: views[doll] for name, _, views in parts})
+                      for doll, state in enumerate(own)]
 
-    def __getitem__(self, doll: int) -> Course:
+    def __getitem__(self, doll: int) -> ClusterState:
         return self._each[doll]
 
     def __len__(self) -> int:
         return len(self._each)
 
     def contacts_of(self, dolls: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Which (c,) of ``known`` contacts these dolls (d,), true or false, know, and whose."""
-        # where the first of a joined cluster counts, there may be more than it has room for
-        counts = np.where(dolls, np.minimum(self.whole['tally']['contacts'], self._room), 0)
+        """Indices (c,) of the contacts of these dolls (d,), true or false, and whose they are."""
+        # the first doll of a larger cluster holds its statistics, with more contacts than it has
+        counts = np.where(dolls, np.minimum(self.arrays['stats']['contact_count'], self._room), 0)
         begin = np.repeat(self._first - np.cumsum(counts) + counts, counts)
         return begin + np.arange(len(begin)), np.repeat(np.arange(len(counts)), counts)
 
     def save(self) -> object:
         """A snapshot of all."""
         known, _ = self.contacts_of(np.ones(len(self), bool))
-        return {name: self.whole[name].copy() for name in KEPT}, self.whole['known'][known]
+        return {name: self.arrays[name].copy() for name in SNAPSHOT}, self.arrays['contacts'][known]
 
     def restore(self, snapshot: tuple) -> None:
-        """Go back to a snapshot."""
+        """Restore a snapshot."""
         for name, values in snapshot[0].items():
-            self.whole[name][:] = values
+            self.arrays[name][:] = values
         known, _ = self.contacts_of(np.ones(len(self), bool))
-        self.whole['known'][known] = snapshot[1]
+        self.arrays['contacts'][known] = snapshot[1]
 
 
-def room_for_contacts(system: System) -> int:
-    """Contacts for which a course of this system has room."""
-    return CONTACTS_OF_GEOM * len(system.geoms) + len(system.bounds)
+def contact_capacity(system: System) -> int:
+    """Contacts for which a state of this system has room."""
+    return CONTACTS_PER_GEOM * len(system.geoms) + len(system.joint_limits)

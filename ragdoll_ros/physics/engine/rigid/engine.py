@@ -1,7 +1,7 @@
-"""The package's own engine: rigid bodies, machine code from a stretch's start to its end.
+"""RigidEngine: the package's own engine for rigid bodies, in compiled code.
 
-What it does is in kernels/: advance.py reads as the algorithm. Here are only its tables, its state
-and what is told of it.
+The algorithm is in kernels/: advance.py. Here are the broad phase, the clusters, and the state and
+the measures that it hands out.
 """
 from __future__ import annotations
 
@@ -15,41 +15,42 @@ from ....model.scene import Scene
 from ....model.state import State
 from ...accuracy import Accuracy
 from ...ground_heights import GroundHeights
-from ...kernels.system import OUTSIDE, WITHIN
-from ...motion import Motion
-from ..protocol import GROUND, Contacts, Drives, Springs, Wrenches, pressed
-from .broad_phase import Neighbours
+from ...kernels.system import JOINT_OUTSIDE_LIMITS, OVERLAPPING
+from ..doll_totals import DollTotals
+from ..protocol import GROUND, Contacts, Drives, Springs, Wrenches, allowed_penetration
+from .broad_phase import BroadPhase
 from .clusters import Cluster, Clusters
-from .loads import NO_LOADS, NO_SPRINGS, load_rows, spring_rows
+from .loads import NO_LOADS, NO_SPRINGS, load_records, spring_records
 
 FINER = 0.25
-"""Share of the step by which the last stretch is gone again to tell its error."""
+"""Share of the step with which the last interval is repeated to estimate its error."""
 
-AHEAD = 0.05
-"""s that clusters are made for: those that may touch so soon go on together."""
+LOOK_AHEAD = 0.05
+"""s: dolls that may touch so soon form a cluster."""
 
-KEPT = 10
-"""Stretches for which clusters are kept, unless others come near."""
+MAX_AGE = 10
+"""Intervals for which clusters are kept, unless other dolls come near."""
 
 
 class RigidEngine:
-    """An Engine by the rigid core; see Engine."""
+    """An Engine of rigid bodies; see Engine."""
 
     energy_error = 1e-2
-    holds = True
+    supports_joint_springs = True
 
     def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
         self.scene, self.accuracy = scene, accuracy
         self.layout = DofLayout([placement.doll for placement in scene.dolls])
         self._clusters = Clusters(scene, self.layout, workers)
-        self._neighbours = Neighbours(scene, self._clusters.reach())
+        self._broad_phase = BroadPhase(scene, self._clusters.reach())
         self._heights = GroundHeights(scene)
-        self._spins = self.layout.root_spins
-        self.resting = np.zeros(len(scene.dolls), bool)
-        self._designed = [np.full(len(own), WITHIN) for own in self._clusters.flags(WITHIN)]
-        """Pairs that are within each other as bound: they are left so until they come apart."""
-        self.place(self._placed())
-        self._designed = self._clusters.flags(WITHIN)
+        self._spins = self.layout.root_angular_velocities
+        self.sleeping = np.zeros(len(scene.dolls), bool)
+        self._initial_overlaps = [np.full(len(own), OVERLAPPING)
+                                  for own in self._clusters.excluded(OVERLAPPING)]
+        """Pairs that overlap at the start: they are excluded until they separate."""
+        self.set_coordinates(self._placed())
+        self._initial_overlaps = self._clusters.excluded(OVERLAPPING)
 
     @property
     def state(self) -> State:
@@ -75,62 +76,63 @@ class RigidEngine:
         return self.layout.joint_rates(GeneralizedState(self._clusters.q, self._clusters.v))
 
     @property
-    def motion(self) -> Motion:
+    def doll_totals(self) -> DollTotals:
         """Sums over each doll now."""
-        return self._motion
+        return self._doll_totals
 
     @property
-    def groups(self) -> np.ndarray:
+    def cluster_of_doll(self) -> np.ndarray:
         """Number (d,) of what each doll goes on with: dolls of one number fall asleep together."""
         return self._clusters.of_doll
 
-    def place(self, coordinates: GeneralizedState) -> None:
+    def set_coordinates(self, coordinates: GeneralizedState) -> None:
         """Put all dolls there and begin; see Engine."""
         clusters, q, v = self._clusters, self._clusters.q, self._clusters.v
         q[:], v[:] = coordinates.q, coordinates.v
         turns = rotation.inverse(q[self.layout.root_orientations])
         v[self._spins] = rotation.rotate(turns, v[self._spins])
-        clusters.tally[:] = 0
-        clusters.begin()
-        self.resting[:] = False
-        self._look()
+        clusters.stats[:] = 0
+        clusters.separate()
+        self.sleeping[:] = False
+        self._refresh()
         self._lift_out()
-        clusters.within([own | OUTSIDE for own in self._designed])
-        self._look()
-        self._age = KEPT
-        self._start_energy = float(self.motion.energy.sum())
-        self._departure = None
+        clusters.exclude([own | JOINT_OUTSIDE_LIMITS for own in self._initial_overlaps])
+        self._refresh()
+        self._age = MAX_AGE
+        self._start_energy = float(self.doll_totals.energy.sum())
+        self._last_start = None
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
                 drives: Drives = ()) -> None:
         """Go on by ``duration`` s; see Engine."""
         clusters, acting = self._clusters, (wrenches, springs, drives)
-        self._departure = clusters.q.copy(), clusters.v.copy(), duration, acting
+        self._last_start = clusters.q.copy(), clusters.v.copy(), duration, acting
+        of_doll = self.cluster_of_doll
         for acts in (*wrenches, *springs, *drives):
-            self.resting[self.groups == self.groups[self.scene.doll_of_bone[acts.bone]]] = False
-        self._meet(duration)
-        self._go(duration, acting, self.accuracy)
+            self.sleeping[of_doll == of_doll[self.scene.doll_of_bone[acts.bone]]] = False
+        self._update_clusters(duration)
+        self._advance(duration, acting, self.accuracy)
 
-    def stop(self, dolls: np.ndarray) -> None:
+    def put_to_sleep(self, dolls: np.ndarray) -> None:
         """Bring dolls (d,) to rest where they are; the energy that is left is lost for good."""
         self._clusters.stop(dolls)
-        self.resting[dolls] = True
-        self._departure = None
-        self._look()
+        self.sleeping[dolls] = True
+        self._last_start = None
+        self._refresh()
 
-    def grounded(self) -> np.ndarray:
+    def dolls_on_ground(self) -> np.ndarray:
         """Which dolls (d,) rest on the ground."""
-        known, bones, _ = self._clusters.touching()
+        contacts, bones, _ = self._clusters.contacts()
         found = np.zeros(len(self.scene.dolls), bool)
-        on = (bones[:, 1] == GROUND) & (known['impulse'][:, 0] > 0)
+        on = (bones[:, 1] == GROUND) & (contacts['impulse'][:, 0] > 0)
         found[self.scene.doll_of_bone[bones[on, 0]]] = True
         return found
 
     def contacts(self) -> Contacts:
         """What touches now."""
-        known, bones, lasted = self._clusters.touching()
-        return Contacts(bones[:, 0], bones[:, 1], known['point'], known['normal'], -known['gap'],
-                        known['impulse'][:, 0] / lasted)
+        found, bones, dt = self._clusters.contacts()
+        return Contacts(bones[:, 0], bones[:, 1], found['point'], found['normal'], -found['gap'],
+                        found['impulse'][:, 0] / dt)
 
     def bones_on_ground(self) -> np.ndarray:
         """Which bones (n,) touch the ground now."""
@@ -139,127 +141,130 @@ class RigidEngine:
     @property
     def energy_excess(self) -> float:
         """Energy, J, above that at the start and all work since."""
-        return (float(self._motion.energy.sum()) - self._start_energy
+        return (float(self._doll_totals.energy.sum()) - self._start_energy
                 - self._clusters.work())
 
     def measures(self) -> dict[str, float]:
         """What went wrong since the start, and what was done: names end in their units."""
-        tally = self._clusters.totals()
+        stats = self._clusters.totals()
         return {
-            'energy_excess_J': self.energy_excess, 'energy_lifted_J': float(tally['lifted']),
-            'work_of_pushes_J': float(tally['pushed']), 'work_of_grabs_J': float(tally['handed']),
+            'energy_excess_J': self.energy_excess,
+            'energy_lifted_J': float(stats['work_position_correction']),
+            'work_of_pushes_J': float(stats['work_pushes']),
+            'work_of_grabs_J': float(stats['work_grabs']),
             'error_estimate_m': self._estimate_error(), 'error_trusted': True,
-            'flights': int(tally['flights']), 'substeps': int(tally['steps']),
-            'impacts': int(tally['impacts']), 'unsolved_total': int(tally['unsolved'])}
+            'flights': int(stats['flight_steps']), 'substeps': int(stats['steps']),
+            'impacts': int(stats['impacts']), 'unsolved_total': int(stats['unsolved'])}
 
     def save(self) -> object:
         """A snapshot that restore brings back to the bit."""
-        return self._clusters.save(), self.resting.copy(), self._age, self._start_energy
+        return self._clusters.save(), self.sleeping.copy(), self._age, self._start_energy
 
     def restore(self, snapshot: tuple) -> None:
         """Go back to a snapshot."""
-        kept, self.resting[:], self._age, self._start_energy = snapshot
+        kept, self.sleeping[:], self._age, self._start_energy = snapshot
         self._clusters.restore(kept)
-        self._departure = None
-        self._show()
+        self._last_start = None
+        self._update_state()
 
-    def forget(self, snapshot: object) -> None:
+    def discard(self, snapshot: object) -> None:
         """Nothing to release: the memory goes with the object."""
 
     def checkpoint(self) -> object:
         """Where all is and what the accounts say: far cheaper than save()."""
-        return self._clusters.checkpoint(), self.resting.copy(), self._start_energy
+        return self._clusters.checkpoint(), self.sleeping.copy(), self._start_energy
 
-    def go_back(self, checkpoint: tuple) -> None:
+    def restore_checkpoint(self, checkpoint: tuple) -> None:
         """Go on from a checkpoint; see Engine."""
-        kept, self.resting[:], self._start_energy = checkpoint
-        self._clusters.go_back(kept)
-        self._age = KEPT
-        self._departure = None
-        self._look()
+        kept, self.sleeping[:], self._start_energy = checkpoint
+        self._clusters.restore_checkpoint(kept)
+        self._age = MAX_AGE
+        self._last_start = None
+        self._refresh()
 
     def close(self) -> None:
         """End the threads."""
         self._clusters.close()
 
-    def _meet(self, duration: float) -> None:
-        """See that those go on together who may touch within ``duration`` s; they wake. What sleeps
-        on each other stays together.
+    def _update_clusters(self, duration: float) -> None:
+        """Form clusters of the dolls that may touch within ``duration`` s, and wake sleeping ones
+        among them. Sleeping dolls in contact stay in one cluster.
         """
         if len(self.scene.dolls) == 1:
             return
-        rows = self._clusters.rows
-        near = self._neighbours.couples(rows, duration, ~self.resting, self.groups)
+        clusters = self._clusters
+        near = self._near(duration)
         self._age += 1
-        if (self._clusters.know(near) and not self.resting[near].any()
-                and (self._age <= KEPT or self._clusters.all_alone)):
+        if (clusters.covers(near) and not self.sleeping[near].any()
+                and (self._age <= MAX_AGE or clusters.all_alone)):
             return
         while True:
-            near = self._neighbours.couples(rows, max(duration, AHEAD), ~self.resting,
-                                            self.groups)
-            if not self.resting[near].any():
+            near = self._near(max(duration, LOOK_AHEAD))
+            if not self.sleeping[near].any():
                 break
-            self.resting[near] = False
-        asleep = self._clusters.couples
-        asleep = asleep[self.resting[asleep].all(axis=1)]
-        self._clusters.group(np.unique(np.concatenate([near, asleep]), axis=0))
+            self.sleeping[near] = False
+        asleep = clusters.pairs
+        asleep = asleep[self.sleeping[asleep].all(axis=1)]
+        clusters.form(np.unique(np.concatenate([near, asleep]), axis=0))
         self._age = 0
 
-    def _go(self, duration: float, acting: tuple[Wrenches, Springs, Drives],
-            accuracy: Accuracy) -> None:
-        """Take all clusters on that do not rest."""
-        acted = self._act(acting) if any(acting) else ()
-        self._clusters.advance(duration, accuracy, self.resting)
-        for cluster in acted:
-            cluster.use(cluster.course._replace(loads=NO_LOADS, springs=NO_SPRINGS))
-            cluster.course.path[:] = 0
-        self._show()
+    def _near(self, ahead: float) -> np.ndarray:
+        """Pairs (k, 2) of dolls that may touch within ``ahead`` s, one of each awake."""
+        return self._broad_phase.pairs(self._clusters.bone_states, ahead, ~self.sleeping,
+                                       self.cluster_of_doll)
 
-    def _show(self) -> None:
-        """The state and the sums that all have come to."""
-        self._state = State.of(self._clusters.rows.copy())
-        self._motion = Motion.of(self._clusters.sums.view(float).reshape(-1, 20).copy())
+    def _advance(self, duration: float, acting: tuple[Wrenches, Springs, Drives],
+                 accuracy: Accuracy) -> None:
+        """Advance all clusters that do not rest."""
+        acted = self._act(acting) if any(acting) else ()
+        self._clusters.advance(duration, accuracy, self.sleeping)
+        for cluster in acted:
+            cluster.set_loads(NO_LOADS, NO_SPRINGS)
+        self._update_state()
+
+    def _update_state(self) -> None:
+        """Copy state and sums from the clusters."""
+        self._state = State.of(self._clusters.bone_states.copy())
+        self._doll_totals = DollTotals.of(self._clusters.sums.view(float).reshape(-1, 20).copy())
 
     def _act(self, acting: tuple[Wrenches, Springs, Drives]) -> list[Cluster]:
-        """Enter what acts where it acts; the clusters concerned, whose flights begin anew."""
+        """Let loads and springs act on their clusters, which are returned."""
         acts: dict[int, tuple[list, list, list]] = {}
         for kind, given in enumerate(acting):
             for one in given:
                 place = int(self._clusters.of_doll[self.scene.doll_of_bone[one.bone]])
                 acts.setdefault(place, ([], [], []))[kind].append(one)
         acted = []
-        for place, (loads, hands, drives) in acts.items():
+        for place, (loads, springs, drives) in acts.items():
             cluster = self._clusters.members[place]
             bones = cluster.bones.tolist()
-            records = cluster.system.tree['bone'].tolist()
-            cluster.use(cluster.course._replace(
-                loads=load_rows(loads, bones),
-                springs=spring_rows(hands, drives, self.scene, bones, records)))
-            cluster.course.path[:] = 0
+            bodies = cluster.system.tree['bone'].tolist()
+            cluster.set_loads(load_records(loads, bones),
+                              spring_records(springs, drives, self.scene, bones, bodies))
             acted.append(cluster)
         return acted
 
-    def _look(self) -> None:
-        """See where all is."""
-        self._clusters.advance(0.0, self.accuracy, np.zeros(len(self.resting), bool))
-        self._show()
+    def _refresh(self) -> None:
+        """Compute state and gaps from q and v."""
+        self._clusters.advance(0.0, self.accuracy, np.zeros(len(self.sleeping), bool))
+        self._update_state()
 
     def _lift_out(self) -> None:
-        """Set dolls that are in the ground onto it."""
+        """Move dolls that penetrate the ground onto it."""
         if self.scene.ground is None:
             return
         depths = -np.minimum.reduceat(self._heights(self.state),
                                       [own.start for own in self.scene.bone_slices])
-        for doll in np.flatnonzero(depths > pressed(self.scene)):
+        for doll in np.flatnonzero(depths > allowed_penetration(self.scene)):
             at = self.layout.root_positions[doll]
             self._clusters.q[at] += depths[doll] * np.array(self.scene.ground.normal)
 
     def _placed(self) -> GeneralizedState:
-        """Where the scene's placements stand."""
+        """Coordinates of the scene's placements."""
         q, v = np.zeros(self.layout.sizes[0]), np.zeros(self.layout.sizes[1])
         for cluster in self._clusters:
-            balls = cluster.system.tree[cluster.system.tree['free'] > 0]
-            q[cluster.q[balls['q'][balls['parent'] >= 0] + 3]] = 1.0
+            balls = cluster.system.tree[cluster.system.tree['has_quaternion'] > 0]
+            q[cluster.q[balls['q_start'][balls['parent'] >= 0] + 3]] = 1.0
         for doll, placement in enumerate(self.scene.dolls):
             pose = placement.bone_pose(placement.doll.root)
             q[self.layout.root_positions[doll]] = pose.position
@@ -269,24 +274,24 @@ class RigidEngine:
         return GeneralizedState(q, v)
 
     def _estimate_error(self) -> float:
-        """Error, m, that the last stretch added to the worst position.
+        """Error, m, that the last interval added to the worst position.
 
-        It is gone again in steps a quarter as long, flights with a hundredth of the error: what is
-        of order 2 then errs by a sixteenth.
+        The interval is repeated with steps a quarter as long and a hundredth of the error in
+        flight: a scheme of order 2 then has a sixteenth of the error.
         """
-        if self._departure is None:
+        if self._last_start is None:
             return 0.0
-        q, v, duration, acting = self._departure
+        q, v, duration, acting = self._last_start
         finer = dataclasses.replace(self.accuracy, step=FINER * self.accuracy.step,
                                     flight_error=self.accuracy.flight_error / 100)
         here, there = self.save(), self.state.positions
         clusters = self._clusters
         clusters.q[:], clusters.v[:] = q, v
-        clusters.gather()
-        clusters.forget()
-        self._go(duration, acting, finer)
+        clusters.gather_state()
+        clusters.invalidate()
+        self._advance(duration, acting, finer)
         missed = np.linalg.norm(self.state.positions - there, axis=1).max()
-        departure = self._departure
+        start = self._last_start
         self.restore(here)
-        self._departure = departure
+        self._last_start = start
         return float(missed / (1 - FINER ** 2))

@@ -1,4 +1,4 @@
-"""What acts on a cluster, as tables for compiled code: wrenches, springs, drives."""
+"""What acts on a cluster, as records for the kernels: wrenches, springs, drives."""
 from __future__ import annotations
 
 import math
@@ -6,67 +6,81 @@ import math
 import numpy as np
 
 from ....model.scene import Scene
-from ...kernels.system import HAND, HOLDS, MOVES, TURNS
-from ..protocol import AppliedDrive, AppliedHold, Drives, Spring, Springs, Wrenches
+from ...kernels.dynamics.loads import (
+    ANGULAR_DRIVE,
+    GRAB,
+    JOINT_SPRING,
+    LINEAR_DRIVE,
+    LOAD,
+    SPRING,
+)
+from ..protocol import AppliedDrive, AppliedJointSpring, Drives, Spring, Springs, Wrenches
 
-NO_LOADS = np.zeros((0, 11))
-NO_SPRINGS = np.zeros((0, 20))
-
-
-def load_rows(wrenches: Wrenches, bones: list[int]) -> np.ndarray:
-    """Wrenches as a table (m, 11), on ``bones`` of a cluster."""
-    rows = np.zeros((len(wrenches), 11))
-    for row, load in zip(rows, wrenches, strict=True):
-        row[0], row[1:4], row[4:7], row[7:10], row[10] = (
-            bones.index(load.bone), load.force, load.torque, load.point, load.local)
-    return rows
+NO_LOADS = np.zeros(0, LOAD)
+NO_SPRINGS = np.zeros(0, SPRING)
 
 
-def spring_rows(springs: Springs, drives: Drives, scene: Scene, bones: list[int],
-                records: list[int]) -> np.ndarray:
-    """Springs and drives as a table (k, 20), on ``bones`` of a cluster that stand in ``records``.
+def load_records(wrenches: Wrenches, bones: list[int]) -> np.ndarray:
+    """Wrenches as records (m,), on ``bones`` of a cluster."""
+    loads = np.zeros(len(wrenches), LOAD)
+    for load, wrench in zip(loads, wrenches, strict=True):
+        load['bone'], load['local'] = bones.index(wrench.bone), wrench.local
+        load['force'], load['torque'], load['point'] = wrench.force, wrench.torque, wrench.point
+    return loads
 
-    A row: record, point, where the hand is and how it moves, for how long, stiffness, damping, the
-    most that it pulls with; whether it pulls with less and, if not, with what (scratch); what it
-    is; a drive's mobility.
-    """
-    rows = []
+
+def spring_records(springs: Springs, drives: Drives, scene: Scene, bones: list[int],
+                   bodies: list[int]) -> np.ndarray:
+    """Springs and drives as records (k,); ``bones`` of a cluster are those of its ``bodies``."""
+    records = []
     for spring in springs:
-        record = records.index(bones.index(spring.bone))
-        rows.append(_hold(record, spring, scene) if isinstance(spring, AppliedHold)
-                    else _hand(record, spring))
+        body = bodies.index(bones.index(spring.bone))
+        records.append(_joint_spring(body, spring, scene) if isinstance(spring, AppliedJointSpring)
+                       else _grab(body, spring))
     for drive in drives:
-        rows += _drive(records.index(bones.index(drive.bone)), drive, scene)
-    return np.array(rows) if rows else NO_SPRINGS
+        records += _drive(bodies.index(bones.index(drive.bone)), drive, scene)
+    return np.array(records, SPRING) if records else NO_SPRINGS
 
 
-def _hand(record: int, spring: Spring) -> np.ndarray:
+def _grab(body: int, spring: Spring) -> np.ndarray:
     spring = spring.after(0.0)
-    speed = (spring.target - spring.position) / spring.left if spring.left > 0 else np.zeros(3)
-    return np.concatenate([[record], spring.point, spring.position, speed, [
-        spring.left, spring.stiffness, spring.damping, spring.most, 1.0, 0.0, 0.0, 0.0, HAND, 0.0]])
+    record = _record(GRAB, body, spring.stiffness, spring.damping, spring.most)
+    record['point'], record['target'] = spring.point, spring.position
+    if spring.left > 0:
+        record['target_velocity'] = (spring.target - spring.position) / spring.left
+    record['time_left'] = spring.left
+    return record
 
 
-def _hold(record: int, hold: AppliedHold, scene: Scene) -> np.ndarray:
+def _joint_spring(body: int, hold: AppliedJointSpring, scene: Scene) -> np.ndarray:
     """The mobility is that of the bone alone about its thinnest axis, the most that it can be."""
-    mobility = 1 / min(scene.bones[hold.bone].inertia)
-    row = np.zeros(20)
-    row[[0, 1, 4]] = record, hold.axis, hold.target
-    row[10:15] = math.inf, hold.stiffness, hold.damping, math.inf, 1.0
-    row[18:] = HOLDS, mobility
-    return row
+    record = _record(JOINT_SPRING, body, hold.stiffness, hold.damping, math.inf)
+    record['axis'], record['target_angle'] = hold.axis, hold.target
+    record['mobility'] = 1 / min(scene.bones[hold.bone].inertia)
+    return record
 
 
-def _drive(record: int, drive: AppliedDrive, scene: Scene) -> list[np.ndarray]:
-    """Up to two springs without stiffness, at the bone's centre.
+def _drive(body: int, drive: AppliedDrive, scene: Scene) -> list[np.ndarray]:
+    """Up to two springs without stiffness, at the bone's center of mass.
 
     The mobility is that of the bone alone, the most that it can be: a drive that is taken for
-    stiffer than it is ends nearer to the step's end.
+    stiffer than it is is evaluated nearer to the step's end.
     """
-    bone, none = scene.bones[drive.bone], np.zeros(6)
+    bone, records = scene.bones[drive.bone], []
     mobilities = 1 / bone.mass, 1 / min(bone.inertia)
-    return [np.concatenate([[record], none, target, [math.inf, 0.0, gain, most, 1.0, 0.0, 0.0, 0.0,
-                                                     kind, mobility]])
-            for kind, target, gain, most, mobility in zip(
-                (MOVES, TURNS), drive.targets, drive.gains, drive.most, mobilities, strict=True)
-            if gain > 0]
+    for kind, target, gain, most, mobility in zip(
+            (LINEAR_DRIVE, ANGULAR_DRIVE), drive.targets, drive.gains, drive.most, mobilities,
+            strict=True):
+        if gain > 0:
+            record = _record(kind, body, 0.0, gain, most)
+            record['target_velocity'], record['mobility'] = target, mobility
+            records.append(record)
+    return records
+
+
+def _record(kind: int, body: int, stiffness: float, damping: float, most: float) -> np.ndarray:
+    """A spring with these; its target stands at the origin for ever."""
+    record = np.zeros((), SPRING)
+    record['kind'], record['body'], record['time_left'] = kind, body, math.inf
+    record['stiffness'], record['damping'], record['max_force'] = stiffness, damping, most
+    return record

@@ -1,1 +1,1 @@
-"""What the engines share that go in equal substeps: PyBullet and MuJoCo."""
+"""Engines with equal substeps, PyBullet and MuJoCo, and what both share."""

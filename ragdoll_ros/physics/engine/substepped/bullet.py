@@ -1,8 +1,8 @@
-"""PyBullet behind the engine protocol, the one file that knows it.
+"""BulletEngine: the engine protocol on PyBullet; no other file imports that library.
 
-Built from what was measured: dolls are Featherstone multibodies read from URDF with explicit
-inertia; universal joints are two hinges with a link of no mass between; joint motors, link
-damping and velocity clamps, which are on by default, are off.
+Dolls are Featherstone multibodies read from URDF with explicit inertia. Universal joints are two
+hinges with a massless link between. Joint motors, link damping and velocity clamps, which PyBullet
+enables by default, are disabled.
 """
 from __future__ import annotations
 
@@ -17,67 +17,65 @@ from ....files.urdf import to_urdf
 from ....model import errors, rotation
 from ....model.coordinates import GeneralizedState
 from ....model.ragdoll import Bone, Ragdoll
-from ....model.scene import Placement, Scene, grip
+from ....model.scene import Placement, Scene, finite_friction
 from ....model.state import State
 from ...accuracy import Accuracy
-from ...motion import damping_rate
-from ..protocol import GROUND, AppliedWrench, Contacts, Wrenches, pressed
+from ...rigid_body import damping_rate
+from ..protocol import GROUND, AppliedWrench, Contacts, Wrenches, allowed_penetration
 from .conservation import ConservationProjection
 from .engine import SubsteppedEngine
-from .silence import hushed
+from .silence import silenced_output
 
-with hushed():  # PyBullet prints when it was built
+with silenced_output():  # PyBullet prints its build time
     import pybullet
 
 BREAKING_DISTANCE = 2e-3
-"""m at which a contact point is let go. A gap is room to move in within a substep, so that it eats
-of a bounce: the default, 0.02 m, eats half of every small one."""
+"""m: separation at which a contact point is dropped. Larger values absorb restitution: PyBullet's
+default, 0.02 m, halves every small bounce."""
 
 LEAST_BOUNCE = 0.05
-"""m/s: approach speed below which nothing bounces, if the material and the substep don't ask for
-more. It must lie above the speed that gravity gives within a substep, or a resting bone
-chatters for ever; twice that is taken."""
+"""m/s: lowest restitution threshold. The threshold is at least twice the speed that gravity adds in
+a substep, else a resting bone chatters."""
 
 SOLVER_ITERATIONS = 20
-"""20 are as good as 50; 5 to 10 leave 1 to 5 mm of sinking."""
+"""As accurate as 50; 5 to 10 leave 1 to 5 mm of penetration."""
 
 RETURN = 0.01
-"""s: time constant with which a joint past its limit, and bones that overlap, come back. Bullet's
-own shares of 0.2 and 0.08 a step return them faster the finer the steps, a blow that makes energy;
-its split impulse never does for limits."""
+"""s: time constant of the correction of joint limits and penetration. PyBullet's defaults, 0.2 and
+0.08 per step, correct faster with smaller steps and so add energy; its split impulse does not apply
+to limits."""
 
 LARGEST_RATE = 1e4
-"""rad/s and m/s at which PyBullet clamps; its default of 100 makes energy in a 50 m drop."""
+"""rad/s and m/s: PyBullet's velocity clamp. The default, 100, adds energy in a drop of 50 m."""
 
 MOST_COORDINATES = 128
-"""Numbers in q of one doll that PyBullet tells of; it drops more without a word."""
+"""Numbers in q of one doll that PyBullet returns; it drops more without an error."""
 
-STIFFEST = 1.5
-"""Substep times the fastest rate at which damping ends a motion: from 2 on, explicit steps make
-energy of it."""
+MAX_DAMPING_STEP = 1.5
+"""Bound on substep times damping rate; explicit damping is unstable from 2 on."""
 
 _FLAGS = (pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_IMPLICIT_CYLINDER)
 
 
 @dataclass
 class _Doll:
-    """A doll in the engine: its body, and the links that are its bones and joints."""
+    """PyBullet's indices of a doll's body, links and joints."""
 
     body: int
     links: list[int]
     """Link of each bone in the doll's order; -1 for the root."""
     children: list[int]
-    """Links of the bones but the root, in the doll's order."""
+    """``links`` without the root."""
     root: int
-    """Index of the root among the doll's bones."""
+    """Index of the root bone in the doll."""
     joints: list[int]
-    """Joints that move, in the engine's order, root to leaf."""
+    """Joints with degrees of freedom, root to leaf."""
     widths: list[tuple[int, int]]
-    """Numbers in q and in v of each joint."""
+    """Numbers of coordinates in q and in v of each of these joints."""
 
 
 class _World:
-    """The scene in a client of PyBullet: ground and dolls, as they stand and move at the start."""
+    """Builds ground and dolls of a scene in a PyBullet client, with their initial velocities."""
 
     def __init__(self, scene: Scene, client: int) -> None:
         self.scene, self._client = scene, client
@@ -116,7 +114,7 @@ class _World:
         return self._set_up(doll, body)
 
     def _set_up(self, doll: Ragdoll, body: int) -> _Doll:
-        """Find links and joints by name, and switch off what PyBullet switches on."""
+        """Map links and joints by name; disable motors, damping and clamps."""
         links, joints, widths = {doll.root.name: -1}, [], []
         damping = {name: joint.damping for joint in doll.joints
                    for name in (joint.child, *joint.angle_names)}
@@ -139,14 +137,14 @@ class _World:
         order = [links[bone.name] for bone in doll.bones]
         for bone, link in zip(doll.bones, order, strict=True):
             self._set_material(body, link, bone)
-        for pair in doll.never_collide:
+        for pair in doll.excluded_pairs:
             pybullet.setCollisionFilterPair(body, body, *(links[name] for name in pair), 0,
                                             physicsClientId=self._client)
         return _Doll(body, order, [link for link in order if link >= 0], order.index(-1),
                      joints, widths)
 
     def _free_joint(self, body: int, joint: int, ball: bool) -> None:
-        """Take PyBullet's default motor off a joint."""
+        """Disable the default motor of a joint."""
         if ball:
             pybullet.setJointMotorControlMultiDof(
                 body, joint, pybullet.POSITION_CONTROL, targetPosition=[0, 0, 0, 1],
@@ -156,13 +154,13 @@ class _World:
                                            physicsClientId=self._client)
 
     def _set_material(self, body: int, link: int, bone: Bone | None) -> None:
-        """Set what a bone, or the ground, brings to a contact.
+        """Set friction and restitution of a link, or of the ground.
 
-        PyBullet multiplies the two parts, so take roots; for rolling it adds each one's lever arm
-        times the other's friction.
+        PyBullet multiplies the coefficients of both bodies, hence the square roots; for rolling
+        friction it adds each body's coefficient times the other's sliding friction.
         """
         friction, rolling, restitution = self.scene.material.on(bone)
-        sliding = math.sqrt(grip(friction))
+        sliding = math.sqrt(finite_friction(friction))
         pybullet.changeDynamics(
             body, link, lateralFriction=sliding,
             rollingFriction=rolling / (2 * sliding) if sliding else 0.0, spinningFriction=0,
@@ -170,10 +168,7 @@ class _World:
 
 
 class BulletEngine(SubsteppedEngine):
-    """A scene in PyBullet, with an account of energy and momentum.
-
-    Runs in a client of its own, so that many can live side by side.
-    """
+    """A scene in its own PyBullet client, with correction of energy and momentum."""
 
     def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
         super().__init__(scene, accuracy, workers=workers)
@@ -184,15 +179,14 @@ class BulletEngine(SubsteppedEngine):
         self._damping_rate = damping_rate(scene)
         self._projection = ConservationProjection(scene, self.layout)
         try:
-            self._take(_World(scene, self._client))
+            self._adopt(_World(scene, self._client))
         except BaseException:
             self.close()
             raise
 
     def contacts(self) -> Contacts:
-        """What touched in the last substep."""
         found = []
-        # PyBullet divides a substep's impulse by the time of all.
+        # PyBullet divides the impulse of a substep by the duration of all substeps.
         substeps = self._timing[1] if self._timing else 1
         for point in pybullet.getContactPoints(physicsClientId=self._client):
             a, b = self._bone_of.get(point[1:4:2]), self._bone_of.get(point[2:5:2])
@@ -204,37 +198,36 @@ class BulletEngine(SubsteppedEngine):
         return Contacts.of(found)
 
     def close(self) -> None:
-        """Release the client; a second time does nothing."""
         if self._client >= 0:
             pybullet.disconnect(self._client)
             self._client = -1
 
-    def _take(self, world: _World) -> None:
-        """Note what the world holds, and let it begin."""
+    def _adopt(self, world: _World) -> None:
+        """Map PyBullet's bodies and links to dolls and bones, and set the initial state."""
         self._ground, self._dolls = world.ground, world.dolls
         self._links = [(doll.body, link) for doll in self._dolls for link in doll.links]
         self._doll_of = {doll.body: index for index, doll in enumerate(self._dolls)}
         if self._ground is not None:
             self._doll_of[self._ground] = GROUND
         self._bone_of = {link: bone for bone, link in enumerate(self._links)}
-        self.place(self.coordinates)
+        self.set_coordinates(self.coordinates)
 
     def _check_sizes(self) -> None:
-        """Refuse what PyBullet would cut off without a word."""
-        for placement, own in zip(self.scene.dolls, self.layout.own_q, strict=True):
+        """Raise OutOfRange for dolls with more coordinates than PyBullet returns."""
+        for placement, own in zip(self.scene.dolls, self.layout.doll_q, strict=True):
             count = own.stop - own.start
             if count > MOST_COORDINATES:
                 raise errors.OutOfRange(
                     f'joints of {placement.name}', count, f'at most {MOST_COORDINATES} coordinates '
                     'for engine bullet, 7 for the root')
 
-    def _run(self, duration: float, substeps: int, loads: Wrenches) -> set[tuple[int, int]]:
-        """Go on; substep by substep where something is to be seen to in each.
+    def _run_substeps(self, duration: float, substeps: int,
+                      loads: Wrenches) -> set[tuple[int, int]]:
+        """Take equal substeps, in one call to PyBullet where nothing changes between them.
 
-        PyBullet damps joints, and turns loads, once in a call. Which pairs touched is told only if
-        the account wants to know.
+        Joint damping and loads are updated once per call. Pairs are collected only for _conserve().
         """
-        watch = self._accounts
+        watch = self._conserves
         if not (loads or watch or self._damping_rate):
             self._step(duration, substeps)
             return set()
@@ -244,12 +237,12 @@ class BulletEngine(SubsteppedEngine):
                 self._apply(load)
             self._step(duration / substeps, 1)
             if watch:
-                touched |= self._touched()
+                touched |= self._touching_pairs()
         return {(a, b) for a, b in touched if a != b}
 
     @property
-    def _accounts(self) -> bool:
-        """Whether energy and momentum are kept."""
+    def _conserves(self) -> bool:
+        """Whether energy and momentum are corrected."""
         return self.accuracy.energy
 
     def _step(self, duration: float, substeps: int) -> None:
@@ -267,26 +260,26 @@ class BulletEngine(SubsteppedEngine):
         pybullet.stepSimulation(physicsClientId=self._client)
 
     def _least_substeps(self, duration: float) -> int:
-        return math.ceil(self._damping_rate * duration / STIFFEST)
+        return math.ceil(self._damping_rate * duration / MAX_DAMPING_STEP)
 
     def _conserve(self, before: State, duration: float, loads: Wrenches,
                   touched: set[tuple[int, int]]) -> None:
-        """Keep the momentum of what was in the air, and take out energy from nothing."""
+        """Restore the momenta of dolls in the air and remove spurious energy."""
         projection, account = self._projection, self._account
         met = set().union(*touched)
         outside = np.array([doll in met for doll in range(len(self._dolls))])
         if not outside.all():
-            self._put(projection.with_momentum(self.coordinates, (before, self.state), duration,
-                                               loads, outside))
+            self._set_state(projection.with_momentum(
+                self.coordinates, (before, self.state), duration, loads, outside))
         groups = projection.groups(touched)
-        # What is tolerated goes with the kinetic energy: once more, with what is left of it.
+        # The tolerance depends on the kinetic energy, which the first correction changes.
         for _ in range(2):
-            surplus = projection.surplus(account, self.motion, groups)
+            surplus = projection.surplus(account, self.doll_totals, groups)
             if (surplus <= 0).all():
                 break
-            self._put(projection.without_surplus(self.coordinates, self.motion, surplus, outside,
-                                                 account))
-        projection.close_step(account, self.motion, groups)
+            self._set_state(projection.without_surplus(
+                self.coordinates, self.doll_totals, surplus, outside, account))
+        projection.close_step(account, self.doll_totals, groups)
 
     def _read_state(self) -> State:
         return State.of(np.array([row for doll in self._dolls for row in self._rows(doll)]))
@@ -306,8 +299,8 @@ class BulletEngine(SubsteppedEngine):
                     v += joint[1]
         return GeneralizedState(np.array(q), np.array(v))
 
-    def _set(self, coordinates: GeneralizedState) -> None:
-        # PyBullet takes any quaternion for one of length one, and its own length for a scale.
+    def _write_coordinates(self, coordinates: GeneralizedState) -> None:
+        # PyBullet does not normalise quaternions: their length would scale the doll.
         q, v = self.layout.normalized(coordinates.q).tolist(), coordinates.v.tolist()
         i = j = 0
         for doll in self._dolls:
@@ -325,12 +318,12 @@ class BulletEngine(SubsteppedEngine):
                 pybullet.resetJointStatesMultiDof(
                     doll.body, doll.joints, values, rates, physicsClientId=self._client)
 
-    def _touched(self) -> set[tuple[int, int]]:
+    def _touching_pairs(self) -> set[tuple[int, int]]:
         points = pybullet.getContactPoints(physicsClientId=self._client)
         return {(self._doll_of[point[1]], self._doll_of[point[2]]) for point in points}
 
     def _exclude_overlaps(self) -> None:
-        depth = pressed(self.scene)
+        depth = allowed_penetration(self.scene)
         pybullet.performCollisionDetection(physicsClientId=self._client)
         for point in pybullet.getContactPoints(physicsClientId=self._client):
             if point[1] == point[2] and point[8] < -depth:
@@ -342,11 +335,11 @@ class BulletEngine(SubsteppedEngine):
     def _restore(self, held: int) -> None:
         pybullet.restoreState(stateId=held, physicsClientId=self._client)
 
-    def _forget(self, held: int) -> None:
+    def _discard(self, held: int) -> None:
         pybullet.removeState(held, physicsClientId=self._client)
 
     def _rows(self, doll: _Doll) -> list[tuple]:
-        """Position, orientation, linear and angular velocity of each bone."""
+        """Position, orientation, linear and angular velocity of each bone of a doll."""
         bones = []
         if doll.children:
             links = pybullet.getLinkStates(

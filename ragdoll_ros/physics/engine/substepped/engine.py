@@ -1,4 +1,4 @@
-"""What engines that go in equal substeps share: stretches, loads and their work, the account."""
+"""SubsteppedEngine: loads, work and energy account of engines with equal substeps."""
 from __future__ import annotations
 
 import math
@@ -12,220 +12,208 @@ from ....model.scene import Scene
 from ....model.state import State
 from ...accuracy import Accuracy
 from ...ground_heights import GroundHeights
-from ...motion import Motion
-from ..protocol import GROUND, Drives, Springs, Wrenches, pressed
-from .doll_sums import DollSums
-from .energy_account import Account
-from .explicit_springs import LONGEST, Pull, driven, pulls
-from .work import longest_stretch, work
+from ..doll_totals import DollSums, DollTotals
+from ..protocol import GROUND, Drives, Springs, Wrenches, allowed_penetration
+from .energy_account import EnergyAccount
+from .explicit_springs import CONSTANT_FORCE_TIME, SpringWrench, drive_wrenches, spring_wrenches
+from .work import steady_time, work
 
 SPAN = 0.01
-"""s for which Accuracy counts substeps, and the longest stretch of which work or an account is
-taken."""
+"""s: Accuracy.substeps counts substeps in this time. Also the longest interval under loads, and the
+longest between two corrections of energy and momentum."""
 
 LEAST_SHARE = 0.01
-"""Of what is asked for: stretches under loads are no shorter, however fast the bone spins."""
+"""Shortest interval under loads, as a fraction of the duration, however fast the bone spins."""
 
 
 class SubsteppedEngine(ABC):
-    """An Engine but for its library: how that steps, reads, places and tells what touches.
+    """Base class of engines that wrap a library with fixed time steps; see Engine for its methods.
 
-    A stretch is some substeps under loads that are taken to be steady. One thread takes all of
-    them, however many ``workers`` there may be.
+    advance() splits its duration into intervals of constant loads, each of one or more equal
+    substeps. One thread computes all of them, whatever ``workers`` is.
     """
 
-    holds = False
+    supports_joint_springs = False
 
     lags = True
-    """Whether a substep moves all by the velocity at its end (semi-implicit Euler)."""
+    """Whether substeps are semi-implicit Euler: positions advance by the velocity at the end."""
 
     energy_error = 0.1
-    """See Engine; PyBullet made 0.016 of hard pushes, where the account had not yet taken it."""
+    """See Engine; the largest gain measured with PyBullet, under hard pushes, is 0.016."""
 
     def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
         self.scene, self.accuracy = scene, accuracy
         self.layout = DofLayout([placement.doll for placement in scene.dolls])
         self._sums, self._heights = DollSums(scene), GroundHeights(scene)
-        self.resting = np.zeros(len(scene.dolls), bool)
+        self.sleeping = np.zeros(len(scene.dolls), bool)
         self._taken = 0
-        """Substeps that the last advance took."""
-        self._changed()
+        """Substeps of the last advance()."""
+        self._invalidate()
 
     @property
     def state(self) -> State:
-        """Poses and velocities of all bones now."""
         if self._state is None:
             self._state = self._read_state()
         return self._state
 
     @property
     def coordinates(self) -> GeneralizedState:
-        """Generalised coordinates and velocities of all dolls now."""
         if self._coordinates is None:
             self._coordinates = self._read_coordinates()
         return self._coordinates
 
     @property
     def joint_angles(self) -> np.ndarray:
-        """Joint angles (k,) rad now."""
         return self.layout.joint_angles(self.coordinates.q)
 
     @property
     def joint_rates(self) -> np.ndarray:
-        """What they change by (k,), rad/s."""
         return self.layout.joint_rates(self.coordinates)
 
     @property
-    def motion(self) -> Motion:
-        """Sums over each doll now."""
-        if self._motion is None:
-            self._motion = self._sums.motion(self.state)
-        return self._motion
+    def doll_totals(self) -> DollTotals:
+        if self._doll_totals is None:
+            self._doll_totals = self._sums.totals(self.state)
+        return self._doll_totals
 
     @property
-    def groups(self) -> np.ndarray:
-        """Zeros (d,): all dolls go on together."""
-        return np.zeros(len(self.resting), np.int64)
+    def cluster_of_doll(self) -> np.ndarray:
+        """Zeros (d,): all dolls form one cluster."""
+        return np.zeros(len(self.sleeping), np.int64)
 
-    def place(self, coordinates: GeneralizedState) -> None:
-        """Put all dolls there and begin; see Engine."""
-        self.resting[:] = False
-        self._put(coordinates)
-        self._lift_out()
+    def set_coordinates(self, coordinates: GeneralizedState) -> None:
+        self.sleeping[:] = False
+        self._set_state(coordinates)
+        self._lift_out_of_ground()
         self._exclude_overlaps()
-        self._changed()
-        self._account = Account.opened(self.motion.energy)
+        self._invalidate()
+        self._account = EnergyAccount.opened(self.doll_totals.energy)
         self._taken = 0
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
                 drives: Drives = ()) -> None:
-        """Go on by ``duration`` s; see Engine."""
-        self.resting[:] = False
+        self.sleeping[:] = False
         self._taken, least, left = 0, LEAST_SHARE * duration, duration
         while left > 1e-12 * duration:
-            longest = max(least, min(left, *self._steady(wrenches, springs or drives)))
+            longest = max(least, min(left, *self._interval_limits(wrenches, springs or drives)))
             length = left / math.ceil(left / longest - 1e-6)
-            self._stretch(length, [*wrenches, *pulls(springs, self._sums, self.state, length),
-                                   *driven(drives, self._sums, self.state, length)])
+            self._advance_interval(length, [
+                *wrenches, *spring_wrenches(springs, self._sums, self.state, length),
+                *drive_wrenches(drives, self._sums, self.state, length)])
             springs = [spring.after(length) for spring in springs]
             left -= length
 
-    def stop(self, dolls: np.ndarray) -> None:
-        """Bring all to rest where it is; the energy that is left is lost for good."""
-        self.resting[:] = True
+    def put_to_sleep(self, dolls: np.ndarray) -> None:
+        """Set all velocities to zero; the energy account is lowered by what is lost."""
+        self.sleeping[:] = True
         here = self.coordinates
-        self._put(GeneralizedState(here.q, np.zeros_like(here.v)))
-        self._account.lower(self.motion.energy)
+        self._set_state(GeneralizedState(here.q, np.zeros_like(here.v)))
+        self._account.lower(self.doll_totals.energy)
         self._taken = 0
 
-    def grounded(self) -> np.ndarray:
-        """Whether anything touches the ground, for all dolls (d,) the same."""
-        return np.full(len(self.resting), any(GROUND in pair for pair in self._touched()))
+    def dolls_on_ground(self) -> np.ndarray:
+        """Whether any doll touches the ground, (d,): the dolls are one cluster."""
+        return np.full(len(self.sleeping), any(GROUND in pair for pair in self._touching_pairs()))
 
     def bones_on_ground(self) -> np.ndarray:
-        """Which bones (n,) touch the ground now."""
         contacts, on = self.contacts(), np.zeros(len(self.scene.bones), bool)
         on[contacts.a[contacts.b == GROUND]] = True
         return on
 
     @property
     def energy_excess(self) -> float:
-        """Energy, J, above that at the start and all work since."""
-        return self._account.excess(self.motion.energy)
+        return self._account.excess(self.doll_totals.energy)
 
     def measures(self) -> dict[str, float]:
-        """What the account says, and the substeps that the last advance took."""
-        return {**self._account.measures(self.motion.energy), 'substeps': self._taken}
+        """Measures of the energy account, and the substeps of the last advance()."""
+        return {**self._account.measures(self.doll_totals.energy), 'substeps': self._taken}
 
     def save(self) -> object:
-        """A snapshot that restore brings back to the bit."""
         return self._save(), self._account.copy()
 
     def restore(self, snapshot: object) -> None:
-        """Go back to a snapshot."""
         held, account = snapshot
-        self.resting[:] = False
+        self.sleeping[:] = False
         self._restore(held)
         self._account, self._taken = account.copy(), 0
-        self._changed()
+        self._invalidate()
 
-    def forget(self, snapshot: object) -> None:
-        """Release what a snapshot holds."""
-        self._forget(snapshot[0])
+    def discard(self, snapshot: object) -> None:
+        self._discard(snapshot[0])
 
     def checkpoint(self) -> object:
-        """Where all is and what the account says: far cheaper than save()."""
         return self.coordinates, self._account.copy()
 
-    def go_back(self, checkpoint: tuple) -> None:
-        """Go on from a checkpoint; see Engine."""
+    def restore_checkpoint(self, checkpoint: tuple) -> None:
         coordinates, account = checkpoint
-        self._put(coordinates)
+        self._set_state(coordinates)
         self._account = account.copy()
 
     @property
-    def _accounts(self) -> bool:
-        """Whether an account is closed after each stretch."""
+    def _conserves(self) -> bool:
+        """Whether _conserve() runs after each interval."""
         return False
 
-    def _steady(self, wrenches: Wrenches, springs: Springs | Drives) -> Iterator[float]:
-        """For how long loads may be taken as steady, and an account may wait, s."""
-        yield SPAN if wrenches or springs or self._accounts else math.inf
-        yield LONGEST if springs else math.inf
+    def _interval_limits(self, wrenches: Wrenches, springs: Springs | Drives) -> Iterator[float]:
+        """Upper bounds, s, on an interval of constant loads."""
+        yield SPAN if wrenches or springs or self._conserves else math.inf
+        yield CONSTANT_FORCE_TIME if springs else math.inf
         for wrench in wrenches:
-            yield longest_stretch(wrench, self.state, self._sums.inertias[wrench.bone])
+            yield steady_time(wrench, self.state, self._sums.inertias[wrench.bone])
 
-    def _stretch(self, duration: float, loads: Wrenches) -> None:
-        """Go through substeps under steady loads, and enter their work."""
+    def _advance_interval(self, duration: float, loads: Wrenches) -> None:
+        """Step over ``duration`` s under constant loads and add their work to the account."""
         before, substeps = self.state, max(self._least_substeps(duration), math.ceil(
             self.accuracy.substeps * duration / SPAN - 1e-6))
-        touched = self._run(duration, substeps, loads)
+        touched = self._run_substeps(duration, substeps, loads)
         self._taken += substeps
-        self._changed()
+        self._invalidate()
         for load in loads:
             joules = work(load, before, self.state, duration,
                           duration / substeps if self.lags else 0.0)
-            self._account.add_work(self._sums.doll_of[load.bone], joules, isinstance(load, Pull))
-        if self._accounts:
+            self._account.add_work(self._sums.doll_of[load.bone], joules,
+                                   isinstance(load, SpringWrench))
+        if self._conserves:
             self._conserve(before, duration, loads, touched)
 
     def _conserve(self, before: State, duration: float, loads: Wrenches,
                   touched: set[tuple[int, int]]) -> None:
-        """Close the account of a stretch in which pairs of dolls ``touched``, where one is kept."""
+        """Correct energy and momentum after an interval in which these pairs of dolls touched."""
         raise NotImplementedError
 
-    def _lift_out(self) -> None:
-        """Set dolls that are in the ground onto it: else they stay, or are thrown out."""
+    def _lift_out_of_ground(self) -> None:
+        """Raise dolls that penetrate the ground: else they stay in it, or are thrown out."""
         heights = self._heights(self.state)
         depths = -np.array([heights[own].min() for own in self.scene.bone_slices])
-        sunk = depths > pressed(self.scene)
+        sunk = depths > allowed_penetration(self.scene)
         if sunk.any():
             q = self.coordinates.q.copy()
             q[self.layout.root_positions] += np.outer(np.where(sunk, depths, 0),
                                                       self.scene.ground.normal)
-            self._put(GeneralizedState(q, self.coordinates.v))
+            self._set_state(GeneralizedState(q, self.coordinates.v))
 
-    def _put(self, coordinates: GeneralizedState) -> None:
-        self._set(coordinates)
-        self._changed()
+    def _set_state(self, coordinates: GeneralizedState) -> None:
+        self._write_coordinates(coordinates)
+        self._invalidate()
 
-    def _changed(self) -> None:
-        """Forget what was read."""
+    def _invalidate(self) -> None:
+        """Discard cached values."""
         self._state: State | None = None
         self._coordinates: GeneralizedState | None = None
-        self._motion: Motion | None = None
+        self._doll_totals: DollTotals | None = None
 
     def _least_substeps(self, duration: float) -> int:
-        """Substeps that a stretch must have, whatever the accuracy says."""
+        """Lower bound on the substeps of an interval, for stability."""
         return 1
 
     @abstractmethod
-    def _run(self, duration: float, substeps: int, loads: Wrenches) -> set[tuple[int, int]]:
-        """Go on in equal substeps; pairs of dolls, or of a doll and GROUND, that touched."""
+    def _run_substeps(self, duration: float, substeps: int,
+                       loads: Wrenches) -> set[tuple[int, int]]:
+        """Take equal substeps; returns the pairs of dolls, or doll and GROUND, that touched."""
 
     @abstractmethod
-    def _touched(self) -> set[tuple[int, int]]:
-        """Such pairs in the last substep."""
+    def _touching_pairs(self) -> set[tuple[int, int]]:
+        """Pairs of dolls, or doll and GROUND, that touched in the last substep."""
 
     @abstractmethod
     def _read_state(self) -> State: ...
@@ -234,12 +222,11 @@ class SubsteppedEngine(ABC):
     def _read_coordinates(self) -> GeneralizedState: ...
 
     @abstractmethod
-    def _set(self, coordinates: GeneralizedState) -> None:
-        """Put the dolls there."""
+    def _write_coordinates(self, coordinates: GeneralizedState) -> None: ...
 
     @abstractmethod
     def _exclude_overlaps(self) -> None:
-        """Let bones of one doll that overlap by more than pressed() now collide no more."""
+        """Disable collision of bones of one doll that penetrate beyond allowed_penetration()."""
 
     @abstractmethod
     def _save(self) -> object: ...
@@ -248,4 +235,4 @@ class SubsteppedEngine(ABC):
     def _restore(self, held: object) -> None: ...
 
     @abstractmethod
-    def _forget(self, held: object) -> None: ...
+    def _discard(self, held: object) -> None: ...

@@ -1,35 +1,35 @@
-"""Hands' springs and drives as loads that are steady for a stretch: for engines without them."""
+"""Springs of hands and drives as constant loads over an interval, for engines without them."""
 from __future__ import annotations
 
 import numpy as np
 
 from ....model.state import State
-from ...motion import point_motion
+from ...rigid_body import point_motion
+from ..doll_totals import DollSums
 from ..protocol import AppliedDrive, AppliedWrench, Drives, Spring, Springs
-from .doll_sums import DollSums
 
-LONGEST = 2.5e-3
-"""s for which the force of a hand or a drive stays as it is."""
-
-
-class Pull(AppliedWrench):
-    """The load of a hand."""
+CONSTANT_FORCE_TIME = 2.5e-3
+"""s: longest interval over which the force of a hand or a drive is constant."""
 
 
-def pulls(springs: Springs, sums: DollSums, state: State, duration: float) -> list[Pull]:
-    """Loads of all hands for the next ``duration`` s."""
+class SpringWrench(AppliedWrench):
+    """The load of a hand's spring; its work is accounted for separately."""
+
+
+def spring_wrenches(springs: Springs, sums: DollSums, state: State,
+                    duration: float) -> list[SpringWrench]:
+    """Loads of all hands over the next ``duration`` s."""
     dolls = [sums.doll_of[spring.bone] for spring in springs]
-    return [_pull(spring, dolls.count(doll), sums, state, duration)
+    return [_spring_wrench(spring, dolls.count(doll), sums, state, duration)
             for spring, doll in zip(springs, dolls, strict=True)]
 
 
-def _pull(spring: Spring, sharing: int, sums: DollSums, state: State, h: float) -> Pull:
-    """Pull of a spring and damper at the end of the step that it makes (backward Euler).
+def _spring_wrench(spring: Spring, sharing: int, sums: DollSums, state: State,
+                   h: float) -> SpringWrench:
+    """Force of a spring and damper at the end of a step h (backward Euler).
 
-    f = -k (x + h u' - x_hand) - c (u' - u_hand), u' = u + h (g + W f), W the mobility: all of a
-    doll falls with g, whatever its joints. Stable for any h, as the hand never does more than bring
-    the point where it shall be. Hands that share a doll see W times their number, as their pulls
-    add up.
+    f = -k (x + h u' - x_hand) - c (u' - u_hand), u' = u + h (g + W f), W the mobility. Stable for
+    any h. W is multiplied by ``sharing``, the number of hands on the doll, as their forces add up.
     """
     place, velocity = point_motion(state, spring.bone, spring.point)
     velocity = velocity + h * sums.gravity
@@ -39,16 +39,17 @@ def _pull(spring: Spring, sharing: int, sums: DollSums, state: State, h: float) 
     softened = np.eye(3) + h * (spring.damping + h * spring.stiffness) * sharing * mobility(
         sums, state, spring.bone, spring.point)
     force = np.linalg.solve(softened, force)
-    return Pull(spring.bone, _limited(force, spring.most), np.zeros(3), spring.point)
+    return SpringWrench(spring.bone, _limited(force, spring.most), np.zeros(3), spring.point)
 
 
-def driven(drives: Drives, sums: DollSums, state: State, duration: float) -> list[AppliedWrench]:
-    """Loads of all drives for the next ``duration`` s."""
-    return [_driven(drive, sums, state, duration) for drive in drives]
+def drive_wrenches(drives: Drives, sums: DollSums, state: State,
+                   duration: float) -> list[AppliedWrench]:
+    """Loads of all drives over the next ``duration`` s."""
+    return [_drive_wrench(drive, sums, state, duration) for drive in drives]
 
 
-def _driven(drive: AppliedDrive, sums: DollSums, state: State, h: float) -> AppliedWrench:
-    """Force and torque of a drive at the end of the step that they make, as of a hand's damper."""
+def _drive_wrench(drive: AppliedDrive, sums: DollSums, state: State, h: float) -> AppliedWrench:
+    """Force and torque of a drive at the end of a step h (backward Euler)."""
     bone = drive.bone
     turn = state.rotation_matrices[bone]
     missing = drive.targets - np.stack([state.linear_velocities[bone] + h * sums.gravity,
@@ -66,11 +67,11 @@ def _limited(force: np.ndarray, most: float) -> np.ndarray:
 
 
 def mobility(sums: DollSums, state: State, bone: int, point: np.ndarray) -> np.ndarray:
-    """Acceleration (3, 3) 1/kg of a point of a bone per force there, were the bone free.
+    """Mobility (3, 3) 1/kg of a point of the bone without its joints: acceleration per force.
 
-    W = 1/m + [r]^T I^-1 [r], r the point's arm and [r] a = r x a. In a doll the bone gives way
-    less (the inverse of the operational space inertia, Khatib 1987): a hand that counts on more is
-    the gentler.
+    W = 1/m + [r]^T I^-1 [r], r the arm from the centre of mass and [r] a = r x a. It is an upper
+    bound on the doll's (the inverse operational space inertia, Khatib 1987), so that a spring that
+    assumes it is too soft rather than too stiff.
     """
     turn = state.rotation_matrices[bone]
     arm = np.cross(np.eye(3), turn @ point)

@@ -1,6 +1,6 @@
-"""MuJoCo behind the engine protocol: the same doll, to stand beside the others in the report.
+"""MujocoEngine: the engine protocol on MuJoCo, for comparison in the accuracy report.
 
-The package works without it: `pip install ragdoll_ros[report]` brings it.
+MuJoCo is optional: `pip install ragdoll_ros[report]`.
 """
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from ....model.ragdoll import Joint, joint_frame
 from ....model.scene import Placement, Scene
 from ....model.state import State
 from ...accuracy import Accuracy
-from ..protocol import GROUND, Contacts, MissingEngine, Wrenches, pressed
+from ..protocol import GROUND, Contacts, MissingEngine, Wrenches, allowed_penetration
 from .engine import SubsteppedEngine
 
 INTEGRATORS = ('euler', 'implicitfast', 'rk4')
-"""Order 1 with implicit joint damping; order 1, implicit in all velocities; order 4."""
+"""Semi-implicit Euler with implicit joint damping; Euler implicit in all velocities; order 4."""
 
 CONTACT_SUBSTEPS, LIMIT_SUBSTEPS = 4.0, 2.0
-"""Time constants of contacts and of joint limits in substeps: with shorter ones contacts make
-energy, with longer ones bones sink and joints overshoot by more."""
+"""Time constants (solref) of contacts and of joint limits, in substeps. Shorter ones add energy,
+longer ones allow more penetration and overshoot."""
 
 XYZW, WXYZ = [1, 2, 3, 0], [3, 0, 1, 2]
-"""From MuJoCo's order of a quaternion to ours, and back."""
+"""Permutations from MuJoCo's quaternion order w, x, y, z to x, y, z, w, and back."""
 
 
 class MujocoEngine(SubsteppedEngine):
-    """A scene in MuJoCo."""
+    """A scene in MuJoCo, without correction of energy."""
 
     energy_error = 1.0
-    """See Engine; it keeps no account, and made 0.5 of hard pushes."""
+    """See Engine; the largest gain measured, under hard pushes, is 0.5."""
 
     def __init__(self, scene: Scene, accuracy: Accuracy, integrator: str = 'implicitfast', *,
                  workers: int = 1) -> None:
@@ -47,12 +47,11 @@ class MujocoEngine(SubsteppedEngine):
         self.lags = integrator != 'rk4'
         self._mujoco = mujoco
         self._integrator = getattr(mujoco.mjtIntegrator, 'mjINT_' + integrator.upper())
-        self._apart: set[frozenset[str]] = set()
+        self._excluded_pairs: set[frozenset[str]] = set()
         self._build()
-        self.place(self._moving())
+        self.set_coordinates(self._initial_coordinates())
 
     def contacts(self) -> Contacts:
-        """What touches now."""
         self._mujoco.mj_forward(self._model, self._data)
         self._stale = False
         found, force = [], np.zeros(6)
@@ -69,9 +68,10 @@ class MujocoEngine(SubsteppedEngine):
         return Contacts.of(found)
 
     def close(self) -> None:
-        """Nothing to give back: the memory goes with the object."""
+        """Do nothing: memory is freed with the object."""
 
-    def _run(self, duration: float, substeps: int, loads: Wrenches) -> set[tuple[int, int]]:
+    def _run_substeps(self, duration: float, substeps: int,
+                      loads: Wrenches) -> set[tuple[int, int]]:
         step = duration / substeps
         if step != self._model.opt.timestep:
             self._model.opt.timestep = step
@@ -81,12 +81,12 @@ class MujocoEngine(SubsteppedEngine):
         self._mujoco.mj_step(self._model, self._data, substeps)
         self._data.xfrc_applied[:] = 0
         self._stale = True
-        return self._touched()
+        return self._touching_pairs()
 
     def _read_state(self) -> State:
         self._refresh()
         data, bodies = self._data, self._bodies
-        # cvel is given in the centre of mass of the whole tree
+        # cvel is expressed at the centre of mass of the kinematic tree
         angular = data.cvel[bodies, :3].copy()
         arms = data.xipos[bodies] - data.subtree_com[self._model.body_rootid[bodies]]
         return State(data.xipos[bodies].copy(), data.xquat[bodies][:, [1, 2, 3, 0]],
@@ -101,7 +101,7 @@ class MujocoEngine(SubsteppedEngine):
             q[iq:iq + 4] = rotation.multiply(turn, rotation.inverse(seat))
         return GeneralizedState(q, self._outwards(self._data.qpos, self._data.qvel))
 
-    def _set(self, coordinates: GeneralizedState) -> None:
+    def _write_coordinates(self, coordinates: GeneralizedState) -> None:
         q, v = coordinates.q.copy(), coordinates.v.copy()
         for iq, iv in self._roots:
             turn = coordinates.q[iq + 3:iq + 7]
@@ -115,7 +115,7 @@ class MujocoEngine(SubsteppedEngine):
         self._data.qpos[:], self._data.qvel[:] = q, v
         self._stale = True
 
-    def _touched(self) -> set[tuple[int, int]]:
+    def _touching_pairs(self) -> set[tuple[int, int]]:
         if not self._data.ncon:
             return set()
         return {tuple(pair) for pair in self._doll_of[self._data.contact.geom].tolist()}
@@ -124,16 +124,16 @@ class MujocoEngine(SubsteppedEngine):
         self._refresh()
         self._mujoco.mj_collision(self._model, self._data)
         bodies, roots = self._model.geom_bodyid, self._model.body_rootid
-        pairs, depth = set(), pressed(self.scene)
+        pairs, depth = set(), allowed_penetration(self.scene)
         for contact in self._data.contact:
             a, b = bodies[contact.geom]
             if contact.dist < -depth and a and b and roots[a] == roots[b]:
                 pairs.add(frozenset(self._model.body(int(body)).name for body in (a, b)))
         if pairs:
             here = self._read_coordinates()
-            self._apart |= pairs
+            self._excluded_pairs |= pairs
             self._build()
-            self._set(here)
+            self._write_coordinates(here)
 
     def _save(self) -> object:
         kind = self._mujoco.mjtState.mjSTATE_INTEGRATION
@@ -146,15 +146,14 @@ class MujocoEngine(SubsteppedEngine):
         self._mujoco.mj_setState(self._model, self._data, held, kind)
         self._stale = True
 
-    def _forget(self, held: object) -> None:
-        """Nothing to give back: the memory goes with the object."""
+    def _discard(self, held: object) -> None: ...
 
     def _build(self) -> None:
         mujoco = self._mujoco
-        self._model = mujoco.MjModel.from_xml_string(to_mjcf(self.scene, self._apart))
+        self._model = mujoco.MjModel.from_xml_string(to_mjcf(self.scene, self._excluded_pairs))
         self._data = mujoco.MjData(self._model)
         self._model.opt.integrator = self._integrator
-        # a scene that explodes shall be seen to: MuJoCo would put it back to its start
+        # no automatic reset of diverged states: Guard must see them
         self._model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         self._bodies = np.array([self._model.body(name).id for name in self.scene.bone_names])
         bones = {int(body): bone for bone, body in enumerate(self._bodies)}
@@ -171,7 +170,7 @@ class MujocoEngine(SubsteppedEngine):
         self._stale = True
 
     def _ball(self, placement: Placement, joint: Joint) -> tuple[int, int, np.ndarray]:
-        """Where a free ball joint's coordinates and rates begin, and how its child sits in it."""
+        """Addresses in q and v of a free ball joint, and its child's orientation at rest."""
         child = placement.doll.bone(joint.child)
         seat = rotation.multiply(rotation.inverse(joint_frame(joint)), child.orientation)
         return *self._address(placement, joint.child), seat
@@ -180,8 +179,8 @@ class MujocoEngine(SubsteppedEngine):
         joint = self._model.joint(self.scene.qualified(placement, name))
         return int(joint.qposadr[0]), int(joint.dofadr[0])
 
-    def _moving(self) -> GeneralizedState:
-        """Each doll in motion as at the start, as one rigid body about its centre of mass."""
+    def _initial_coordinates(self) -> GeneralizedState:
+        """Initial coordinates with the placements' velocities, each doll moving as a rigid body."""
         start = self._read_coordinates()
         for placement, (_, iv) in zip(self.scene.dolls, self._roots, strict=True):
             start.v[iv:iv + 3] = placement.root_velocity()
@@ -200,7 +199,7 @@ class MujocoEngine(SubsteppedEngine):
             self._data.xfrc_applied[body, 3:] += torque + np.cross(arm, force)
 
     def _outwards(self, qpos: np.ndarray, rates: np.ndarray) -> np.ndarray:
-        """Velocities or accelerations with each spin turned from MuJoCo's axes to ours."""
+        """Rotate angular velocities or accelerations from MuJoCo's axes to the protocol's."""
         v = rates.copy()
         for iq, iv in self._roots:
             v[iv + 3:iv + 6] = rotation.rotate(qpos[iq + 3:iq + 7][XYZW], v[iv + 3:iv + 6])
@@ -209,7 +208,7 @@ class MujocoEngine(SubsteppedEngine):
         return v
 
     def _refresh(self) -> None:
-        """Bring poses and velocities of the bodies up to the coordinates, once."""
+        """Update the kinematics of the bodies if the coordinates have changed."""
         if self._stale:
             self._mujoco.mj_kinematics(self._model, self._data)
             self._mujoco.mj_comPos(self._model, self._data)
@@ -218,7 +217,7 @@ class MujocoEngine(SubsteppedEngine):
 
 
 def silence_warnings() -> None:
-    """Keep MuJoCo's warnings about diverging runs off the terminal, where it is installed."""
+    """Discard MuJoCo's warnings about diverging runs, if MuJoCo is installed."""
     with contextlib.suppress(ImportError):
         import mujoco
         mujoco.set_mju_user_warning(lambda message: None)

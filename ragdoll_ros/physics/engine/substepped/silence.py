@@ -1,4 +1,4 @@
-"""Keeps what a library prints by C's own means, on its import say, from being seen."""
+"""Silence what a C library prints to standard output and standard error."""
 from __future__ import annotations
 
 import ctypes
@@ -7,33 +7,30 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
-STREAMS = (1, 2)
-"""Standard output and standard error."""
-
 
 @contextmanager
-def hushed() -> Iterator[None]:
-    """Let standard output and standard error lead nowhere meanwhile, for all of the process."""
+def silenced_output() -> Iterator[None]:
+    """Redirect the process's standard output and standard error to the null device."""
     with ExitStack() as streams:
-        for stream in STREAMS:
-            streams.enter_context(_hushed(stream))
+        for stream in (1, 2):
+            streams.enter_context(_silenced(stream))
         yield
 
 
 @contextmanager
-def _hushed(stream: int) -> Iterator[None]:
+def _silenced(stream: int) -> Iterator[None]:
     try:
         kept = os.dup(stream)
-    except OSError:  # it is closed: nothing is seen anyway
+    except OSError:  # the stream is closed
         yield
         return
     _flush()
-    with open(os.devnull, 'wb') as nowhere:
-        os.dup2(nowhere.fileno(), stream)
+    with open(os.devnull, 'wb') as null:
+        os.dup2(null.fileno(), stream)
     try:
         yield
     finally:
-        _flush()  # what is held back would come out later
+        _flush()  # buffered output would appear after the redirection
         os.dup2(kept, stream)
         os.close(kept)
 

@@ -1,4 +1,4 @@
-"""What loads do to a bone in a stretch of motion: their mean, their work; how long it may be."""
+"""Mean and work of a load over an interval, and the interval for which it may be kept constant."""
 from __future__ import annotations
 
 import math
@@ -7,18 +7,18 @@ import numpy as np
 
 from ....model import rotation
 from ....model.state import State
-from ...motion import cross, point_motion
+from ...rigid_body import cross, point_motion
 from ..protocol import AppliedWrench
 
 STEADY = 0.2
-"""rad that a bone may turn while a torque, or a force along its axes, is entered as one."""
+"""rad: rotation of a bone over which a torque or a local force counts as constant."""
 
 
-def longest_stretch(load: AppliedWrench, state: State, inertia: np.ndarray) -> float:
-    """Time, s, in which a bone that a torque or a load along its own axes pushes turns by STEADY.
+def steady_time(load: AppliedWrench, state: State, inertia: np.ndarray) -> float:
+    """Shortest time, s, in which a bone under a torque or a local load can turn by STEADY.
 
-    At the least: w t + a t^2 / 2, where a is what the bone alone, of principal moments
-    ``inertia`` (3,) kg m^2, would have.
+    Solves w t + a t^2 / 2 = STEADY, a the angular acceleration of the bone without its joints and
+    with the smallest of its principal moments ``inertia`` (3,) kg m^2. Infinite for other loads.
     """
     if not (load.local or load.torque.any()):
         return math.inf
@@ -29,28 +29,27 @@ def longest_stretch(load: AppliedWrench, state: State, inertia: np.ndarray) -> f
     return 2 * STEADY / (spin + root) if root > 0 else math.inf
 
 
-def mean_load(load: AppliedWrench, before: State, after: State) -> tuple[np.ndarray, np.ndarray]:
-    """Force (3,) N and torque (3,) N m in world axes; of a local load over a steady turn."""
+def mean_wrench(load: AppliedWrench, before: State, after: State) -> tuple[np.ndarray, np.ndarray]:
+    """Mean force (3,) N and torque (3,) N m, world frame; a local load turns at a constant rate."""
     if not load.local:
         return load.force, load.torque
-    turn = rotation.mean_of_turn(_turned(load.bone, before,
-                                         after)) @ before.rotation_matrices[load.bone]
+    turn = rotation.mean_rotation_matrix(
+        _turned(load.bone, before, after)) @ before.rotation_matrices[load.bone]
     return turn @ load.force, turn @ load.torque
 
 
 def work(load: AppliedWrench, before: State, after: State, duration: float,
          substep: float) -> float:
-    """Work, J, in a stretch of ``duration`` s: of the force along its point's displacement, and of
-    the torque through its bone's rotation.
+    """Work, J, over ``duration`` s: force times displacement of its point plus torque times turn.
 
-    A step that takes the velocity first (semi-implicit Euler, ``substep`` h s long) moves a point
-    by h v' where its energy grows by F (v + v') h / 2: the difference adds up to
-    F (v_end - v_start) h / 2 and is left out. Where the load turns with its bone, what it does
-    beyond mean times displacement is that of two even changes, t dF dv / 12. Turns are no vectors:
-    the integral of w is the turn's plus t^2 / 12 w_start x w_end (Magnus).
+    A substep h of semi-implicit Euler moves a point by h v', while the energy grows by
+    F (v + v') h / 2; the sum of the differences, F (v_end - v_start) h / 2, is subtracted
+    (``substep`` = 0: none). A local load adds the covariance of force and velocity, t dF dv / 12,
+    both taken as linear in time. The integral of w is the rotation vector plus
+    t^2 / 12 w_start x w_end (Magnus expansion).
     """
     bone = load.bone
-    force, torque = mean_load(load, before, after)
+    force, torque = mean_wrench(load, before, after)
     (place, speed), (end, end_speed) = (
         point_motion(state, bone, load.point) for state in (before, after))
     faster = end_speed - speed
@@ -67,6 +66,6 @@ def work(load: AppliedWrench, before: State, after: State, duration: float,
 
 
 def _turned(bone: int, before: State, after: State) -> np.ndarray:
-    """Rotation vector (3,) rad, in the world, by which a bone has turned."""
+    """Rotation vector (3,) rad of a bone from one state to another, world frame."""
     return rotation.rotation_vector(rotation.multiply(
         after.orientations[bone], rotation.inverse(before.orientations[bone])))

@@ -1,1 +1,1 @@
-"""Where two shapes touch, whatever bodies they are of."""
+"""Narrow phase: contact manifolds and distances of pairs of shapes."""

@@ -1,6 +1,8 @@
-"""Along which way two convex bodies that are apart are nearest, by the method of Gilbert, Johnson
-and Keerthi (1988): the point nearest to the origin of the Minkowski difference, here of
-c - scale (a + b), as all our shapes are symmetric about their centres.
+"""Closest points of two disjoint convex shapes: GJK.
+
+Gilbert, Johnson, Keerthi, A fast procedure for computing the distance between complex objects in
+three-dimensional space, 1988: the point nearest to the origin of the Minkowski difference. As all
+shapes are symmetric about their centres, it is c - scale (a + b) here.
 """
 from __future__ import annotations
 
@@ -9,87 +11,84 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from .shapes import support
+from ..maths.vectors import Vec3, add, add_scaled, cross, divide, dot, put, scale, sub, vec
+from .shapes import Shape, support_point
 
-STEPS = 60
-"""After which the best direction so far must do; 5 to 20 are usual, most where rims meet."""
+MAX_ITERATIONS = 60
+"""After which the best direction so far is taken; 5 to 20 are usual, most where rims meet."""
 
-Direction = tuple[int, float, float, float]
-"""Corners of the simplex in use, and the unit vector from b to a."""
+SIMPLEX_VERTEX = np.dtype([('point', float, 3), ('support', float, 3)], align=True)
+"""A vertex of a simplex: point of the Minkowski difference, and the sum of the support points that
+it is made of, which holds for any offset and scale."""
+
+Direction = tuple[int, Vec3]
+"""Number of vertices of the last simplex, and the unit vector from b to a."""
+
+Nearest = tuple[float, Vec3, int]
+"""Squared distance from the origin, the point, and the vertices it is made of, a bit each."""
 
 
 @compiled
-def nearest_direction(kind_a: int, size_a: np.ndarray, ra: np.ndarray, kind_b: int,
-                      size_b: np.ndarray, rb: np.ndarray, cx: float, cy: float, cz: float,
-                      scale: float, close: float, points: np.ndarray, count: int, nx: float,
-                      ny: float, nz: float) -> Direction:
-    """Unit vector from b to a between the nearest points of bodies drawn at ``scale``.
+def closest_direction(a: Shape, b: Shape, c: Vec3, ratio: float, tolerance: float,
+                      simplex: np.ndarray, count: int, n: Vec3) -> Direction:
+    """Unit vector from b to a between their closest points; both are scaled by ``ratio``.
 
-    c is the way from b's centre to a's; ``close`` what part of the distance may be wrong. n is
-    where to begin, with the ``count`` corners that an earlier call left in ``points`` (4, 6): the
-    first half of a row is the corner, the second what it is made of, which holds for any c.
+    c is the offset of a's centre from b's, ``tolerance`` the relative error of the distance. The
+    iteration starts with n and the first ``count`` vertices of an earlier ``simplex`` (4,).
     """
-    square, vx, vy, vz = math.inf, nx, ny, nz
+    square, v = math.inf, n
     for k in range(count):
-        for e in range(3):
-            points[k, e] = (cx if e == 0 else cy if e == 1 else cz) - scale * points[k, 3 + e]
-    for step in range(STEPS):
+        put(simplex[k].point, add_scaled(c, -ratio, vec(simplex[k].support)))
+    for step in range(MAX_ITERATIONS):
         if step > 0 or count == 0:
-            ax, ay, az = support(kind_a, size_a, ra, nx, ny, nz)
-            bx, by, bz = support(kind_b, size_b, rb, nx, ny, nz)
-            ax, ay, az = ax + bx, ay + by, az + bz
-            x, y, z = cx - scale * ax, cy - scale * ay, cz - scale * az
-            if step > 0 and square - (vx * x + vy * y + vz * z) <= close * square:
+            support = add(support_point(a, n), support_point(b, n))
+            point = add_scaled(c, -ratio, support)
+            if step > 0 and square - dot(v, point) <= tolerance * square:
                 break
-            row = points[count]
-            row[0], row[1], row[2], row[3], row[4], row[5] = x, y, z, ax, ay, az
+            put(simplex[count].point, point)
+            put(simplex[count].support, support)
             count += 1
-        count, x, y, z = _nearest(points, count)
-        now = x * x + y * y + z * z
-        if now >= square or now <= 0:
+        count, point = _nearest(simplex, count)
+        found = dot(point, point)
+        if found >= square or found <= 0:
             break
-        square, vx, vy, vz = now, x, y, z
-        length = math.sqrt(square)
-        nx, ny, nz = vx / length, vy / length, vz / length
-    return count, nx, ny, nz
+        square, v = found, point
+        n = divide(v, math.sqrt(square))
+    return count, n
 
 
 @compiled
-def _nearest(points: np.ndarray, count: int) -> tuple[int, float, float, float]:
-    """The point of a simplex that is nearest to the origin; keeps the corners that it is made of.
+def _nearest(simplex: np.ndarray, count: int) -> tuple[int, Vec3]:
+    """The point of a simplex nearest to the origin; reduces it to the vertices it is made of.
 
-    The tetrahedron's is the nearest of its faces', as the origin is outside, and not on the one
-    without the last corner, which came as it was nearer.
+    In a tetrahedron it is on a face, as the origin is outside, and not on that without the last
+    vertex, which came because it was nearer.
     """
     if count == 1:
-        return 1, points[0, 0], points[0, 1], points[0, 2]
+        return 1, vec(simplex[0].point)
     last = count - 1
     if count == 2:
-        square, x, y, z, kept = _on_segment(points, last - 1, last)
+        square, point, kept = _nearest_on_segment(simplex, last - 1, last)
     else:
-        square, x, y, z, kept = _on_triangle(points, last - 2, last - 1, last)
+        square, point, kept = _nearest_on_triangle(simplex, last - 2, last - 1, last)
     for k in range(1, count - 1 if count == 4 else 1):
-        found, a, b, c, these = _on_triangle(points, last - 3, k, last)
+        found, other, these = _nearest_on_triangle(simplex, last - 3, k, last)
         if found < square:
-            square, x, y, z, kept = found, a, b, c, these
+            square, point, kept = found, other, these
     number = 0
     for k in range(count):
         if kept & (1 << k):
-            for e in range(6):
-                points[number, e] = points[k, e]
+            put(simplex[number].point, vec(simplex[k].point))
+            put(simplex[number].support, vec(simplex[k].support))
             number += 1
-    return number, x, y, z
-
-
-Nearest = tuple[float, float, float, float, int]
-"""Square of the distance from the origin, the point, and the corners it stands on, a bit each."""
+    return number, point
 
 
 @compiled
-def _on_segment(points: np.ndarray, i: int, j: int) -> Nearest:
-    ax, ay, az = points[i, 0], points[i, 1], points[i, 2]
-    px, py, pz = points[j, 0] - ax, points[j, 1] - ay, points[j, 2] - az
-    along, square = -(ax * px + ay * py + az * pz), px * px + py * py + pz * pz
+def _nearest_on_segment(simplex: np.ndarray, i: int, j: int) -> Nearest:
+    a = vec(simplex[i].point)
+    edge = sub(vec(simplex[j].point), a)
+    along, square = -dot(a, edge), dot(edge, edge)
     kept = (1 << i) | (1 << j)
     if along <= 0:
         t, kept = 0.0, 1 << i
@@ -97,42 +96,30 @@ def _on_segment(points: np.ndarray, i: int, j: int) -> Nearest:
         t, kept = 1.0, 1 << j
     else:
         t = along / square
-    x, y, z = ax + t * px, ay + t * py, az + t * pz
-    return x * x + y * y + z * z, x, y, z, kept
+    point = add_scaled(a, t, edge)
+    return dot(point, point), point, kept
 
 
 @compiled
-def _on_triangle(points: np.ndarray, i: int, j: int, m: int) -> Nearest:
-    """Within, it lies along the normal, which from differences keeps its digits in slivers too."""
-    ax, ay, az = points[i, 0], points[i, 1], points[i, 2]
-    bx, by, bz = points[j, 0], points[j, 1], points[j, 2]
-    cx, cy, cz = points[m, 0], points[m, 1], points[m, 2]
-    nx, ny, nz = cross(bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az)
-    square = nx * nx + ny * ny + nz * nz
-    if square > 0 and _turns(nx, ny, nz, ax, ay, az, bx, by, bz) and _turns(
-            nx, ny, nz, bx, by, bz, cx, cy, cz) and _turns(nx, ny, nz, cx, cy, cz, ax, ay, az):
-        t = (ax * nx + ay * ny + az * nz) / square
-        return t * t * square, t * nx, t * ny, t * nz, (1 << i) | (1 << j) | (1 << m)
-    best = _on_segment(points, i, j)
-    other = _on_segment(points, j, m)
+def _nearest_on_triangle(simplex: np.ndarray, i: int, j: int, m: int) -> Nearest:
+    """Inside, it is along the normal, which from differences is accurate in slivers too."""
+    a, b, c = vec(simplex[i].point), vec(simplex[j].point), vec(simplex[m].point)
+    n = cross(sub(b, a), sub(c, a))
+    square = dot(n, n)
+    if square > 0 and _inside(n, a, b) and _inside(n, b, c) and _inside(n, c, a):
+        t = dot(a, n) / square
+        return t * t * square, scale(t, n), (1 << i) | (1 << j) | (1 << m)
+    best = _nearest_on_segment(simplex, i, j)
+    other = _nearest_on_segment(simplex, j, m)
     if other[0] < best[0]:
         best = other
-    other = _on_segment(points, i, m)
+    other = _nearest_on_segment(simplex, i, m)
     if other[0] < best[0]:
         best = other
     return best
 
 
 @compiled
-def _turns(nx: float, ny: float, nz: float, ax: float, ay: float, az: float, bx: float, by: float,
-           bz: float) -> bool:
-    """Whether the origin lies on the inner side of the edge a b of a triangle with normal n."""
-    x, y, z = cross(ax, ay, az, bx - ax, by - ay, bz - az)
-    return nx * x + ny * y + nz * z > 0
-
-
-@compiled
-def cross(ax: float, ay: float, az: float, bx: float, by: float,
-          bz: float) -> tuple[float, float, float]:
-    """Cross product of two vectors."""
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+def _inside(n: Vec3, a: Vec3, b: Vec3) -> bool:
+    """Whether the origin is on the inner side of the edge a b of a triangle with normal n."""
+    return dot(n, cross(a, sub(b, a))) > 0

@@ -1,130 +1,145 @@
-"""What shapes are to one who looks for contacts: extents, farthest points, distances.
+"""Collision shapes: kinds, support functions and signed distances.
 
-Kinds and sizes: sphere (r, 0, 0); capsule (r, half length without its ends, 0); box (half extents);
-cylinder (r, half length, 0). The last three are centred, capsules and cylinders along their own z.
-All are symmetric about their centre, so that a direction and its opposite have one extent.
+Kinds and sizes, m: sphere (radius, 0, 0); capsule (radius, half length of its axis, 0); box (half
+extents); cylinder (radius, half length, 0). The axis of a capsule or cylinder is its own z axis.
+All are symmetric about their centre, so that their support functions are even.
 """
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from ..compiling.decorators import compiled
+from ..maths.vectors import Vec3, divide, norm, to_local, to_world, vec
 
 SPHERE, CAPSULE, BOX, CYLINDER = 0, 1, 2, 3
+"""Kinds of shapes. Spheres and capsules, which are a core with a radius, come first."""
+
+SHAPE_KIND = {'sphere': SPHERE, 'capsule': CAPSULE, 'box': BOX, 'cylinder': CYLINDER}
+"""The kind of each name in scenes."""
+
+
+class Shape(NamedTuple):
+    """A shape at a pose: kind, size, centre (m, world), rotation matrix (3, 3) to the world."""
+
+    kind: int
+    size: Vec3
+    position: Vec3
+    rotation: np.ndarray
 
 
 @compiled
-def into(r: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """A vector of the world in a body's frame, whose rotation is ``r`` (3, 3)."""
-    return (r[0, 0] * x + r[1, 0] * y + r[2, 0] * z, r[0, 1] * x + r[1, 1] * y + r[2, 1] * z,
-            r[0, 2] * x + r[1, 2] * y + r[2, 2] * z)
+def shape_at(geom: np.record, position: np.ndarray, rotation: np.ndarray) -> Shape:
+    """The shape of a geom whose centre (3,) and rotation (3, 3) are given."""
+    return Shape(geom.kind, vec(geom.size), vec(position), rotation)
 
 
 @compiled
-def out_of(r: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """A vector of a body's frame in the world."""
-    return (r[0, 0] * x + r[0, 1] * y + r[0, 2] * z, r[1, 0] * x + r[1, 1] * y + r[1, 2] * z,
-            r[2, 0] * x + r[2, 1] * y + r[2, 2] * z)
-
-
-@compiled
-def bound(kind: int, size: np.ndarray) -> float:
-    """Radius, m, of the sphere about the centre that holds the shape."""
-    if kind == BOX:
-        return math.sqrt(size[0] * size[0] + size[1] * size[1] + size[2] * size[2])
-    if kind == CYLINDER:
+def bounding_radius(shape: Shape) -> float:
+    """Radius, m, of the bounding sphere about the centre."""
+    size = shape.size
+    if shape.kind == BOX:
+        return norm(size)
+    if shape.kind == CYLINDER:
         return math.sqrt(size[0] * size[0] + size[1] * size[1])
     return size[0] + size[1]
 
 
 @compiled
-def extent(kind: int, size: np.ndarray, r: np.ndarray, x: float, y: float, z: float) -> float:
-    """How far, m, a shape reaches from its centre along a unit vector of the world.
+def core_extent(shape: Shape, n: Vec3) -> float:
+    """Support function, m, about the centre along a unit vector of the world; no spheres.
 
-    Of a capsule its axis alone: what is around it is the same along all vectors.
+    Of a capsule that of its axis, without the radius, which is the same along all vectors.
     """
-    x, y, z = into(r, x, y, z)
-    if kind == BOX:
+    size, (x, y, z) = shape.size, to_local(shape.rotation, n)
+    if shape.kind == BOX:
         return size[0] * abs(x) + size[1] * abs(y) + size[2] * abs(z)
-    if kind == CAPSULE:
+    if shape.kind == CAPSULE:
         return size[1] * abs(z)
     return size[0] * math.sqrt(x * x + y * y) + size[1] * abs(z)
 
 
 @compiled
-def support(kind: int, size: np.ndarray, r: np.ndarray, x: float, y: float,
-            z: float) -> tuple[float, float, float]:
-    """The point of a shape, from its centre, that is farthest along a vector; see extent."""
-    x, y, z = into(r, x, y, z)
-    if kind == BOX:
-        return out_of(r, math.copysign(size[0], x), math.copysign(size[1], y),
-                      math.copysign(size[2], z))
-    across = math.sqrt(x * x + y * y)
-    radius = 0.0 if kind == CAPSULE or across == 0 else size[0] / across
-    return out_of(r, x * radius, y * radius, math.copysign(size[1], z))
+def extent(shape: Shape, n: Vec3) -> float:
+    """Support function, m, about the centre along a unit vector of the world."""
+    if shape.kind == SPHERE:
+        return shape.size[0]
+    reach = core_extent(shape, n)
+    return reach + shape.size[0] if shape.kind == CAPSULE else reach
 
 
 @compiled
-def sideways(ux: float, uy: float) -> tuple[float, float, float]:
-    """Unit vector at right angles to z and u, for a place from which all ways out are alike."""
-    length = math.sqrt(ux * ux + uy * uy)
+def support_point(shape: Shape, n: Vec3) -> Vec3:
+    """Support point from the centre, world, m: farthest along n; of a capsule's axis as above."""
+    size, (x, y, z) = shape.size, to_local(shape.rotation, n)
+    if shape.kind == BOX:
+        return to_world(shape.rotation, (
+            math.copysign(size[0], x), math.copysign(size[1], y), math.copysign(size[2], z)))
+    across = math.sqrt(x * x + y * y)
+    radius = 0.0 if shape.kind == CAPSULE or across == 0 else size[0] / across
+    return to_world(shape.rotation, (x * radius, y * radius, math.copysign(size[1], z)))
+
+
+@compiled
+def _perpendicular(u: Vec3) -> Vec3:
+    """Unit vector perpendicular to z and u, for points whose gradient is not unique."""
+    length = math.sqrt(u[0] * u[0] + u[1] * u[1])
     if length < 1e-12:
         return 1.0, 0.0, 0.0
-    return uy / length, -ux / length, 0.0
+    return u[1] / length, -u[0] / length, 0.0
 
 
 @compiled
-def distance(kind: int, size: np.ndarray, x: float, y: float, z: float, ux: float,
-             uy: float) -> tuple[float, float, float, float]:
-    """Signed distance, m, of a point of the shape's frame from its surface, and its gradient.
+def signed_distance(shape: Shape, p: Vec3, u: Vec3) -> tuple[float, Vec3]:
+    """Signed distance, m, of a point from the surface, and its gradient; all in the shape's frame.
 
-    It is convex, as the shapes are. Where the gradient is not unique it is at right angles to u,
-    the axis of what is asked for. Ericson, Real-Time Collision Detection (2005), section 5.1.
+    It is convex, as the shapes are. Where the gradient is not unique, one perpendicular to u.
+    Ericson, Real-Time Collision Detection (2005), section 5.1.
     """
-    if kind == BOX:
-        return _box_distance(size, x, y, z)
-    if kind == CYLINDER:
-        return _cylinder_distance(size, x, y, z, ux, uy)
-    if kind == CAPSULE:
-        z -= min(max(z, -size[1]), size[1])
-    length = math.sqrt(x * x + y * y + z * z)
+    size = shape.size
+    if shape.kind == BOX:
+        return _box_distance(size, p)
+    if shape.kind == CYLINDER:
+        return _cylinder_distance(size, p, u)
+    if shape.kind == CAPSULE:
+        p = p[0], p[1], p[2] - min(max(p[2], -size[1]), size[1])
+    length = norm(p)
     if length < 1e-12:
-        x, y, z = sideways(ux, uy)
-        return -size[0], x, y, z
-    return length - size[0], x / length, y / length, z / length
+        return -size[0], _perpendicular(u)
+    return length - size[0], divide(p, length)
 
 
 @compiled
-def _box_distance(size: np.ndarray, x: float, y: float,
-                  z: float) -> tuple[float, float, float, float]:
+def _box_distance(size: Vec3, p: Vec3) -> tuple[float, Vec3]:
+    x, y, z = p
     a, b, c = abs(x) - size[0], abs(y) - size[1], abs(z) - size[2]
     if a <= 0 and b <= 0 and c <= 0:
         if c >= a and c >= b:
-            return c, 0.0, 0.0, math.copysign(1.0, z)
+            return c, (0.0, 0.0, math.copysign(1.0, z))
         if b >= a:
-            return b, 0.0, math.copysign(1.0, y), 0.0
-        return a, math.copysign(1.0, x), 0.0, 0.0
+            return b, (0.0, math.copysign(1.0, y), 0.0)
+        return a, (math.copysign(1.0, x), 0.0, 0.0)
     a, b, c = max(a, 0.0), max(b, 0.0), max(c, 0.0)
     length = math.sqrt(a * a + b * b + c * c)
-    return (length, math.copysign(a, x) / length, math.copysign(b, y) / length,
-            math.copysign(c, z) / length)
+    return length, (math.copysign(a, x) / length, math.copysign(b, y) / length,
+                    math.copysign(c, z) / length)
 
 
 @compiled
-def _cylinder_distance(size: np.ndarray, x: float, y: float, z: float, ux: float,
-                       uy: float) -> tuple[float, float, float, float]:
+def _cylinder_distance(size: Vec3, p: Vec3, u: Vec3) -> tuple[float, Vec3]:
+    x, y, z = p
     across = math.sqrt(x * x + y * y)
     a, c = across - size[0], abs(z) - size[1]
     if across < 1e-12:
-        x, y, _ = sideways(ux, uy)
+        x, y, _ = _perpendicular(u)
     else:
         x, y = x / across, y / across
     if a <= 0 and c <= 0:
         if c >= a:
-            return c, 0.0, 0.0, math.copysign(1.0, z)
-        return a, x, y, 0.0
+            return c, (0.0, 0.0, math.copysign(1.0, z))
+        return a, (x, y, 0.0)
     a, c = max(a, 0.0), max(c, 0.0)
     length = math.sqrt(a * a + c * c)
-    return length, x * a / length, y * a / length, math.copysign(c, z) / length
+    return length, (x * a / length, y * a / length, math.copysign(c, z) / length)

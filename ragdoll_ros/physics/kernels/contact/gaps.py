@@ -1,7 +1,7 @@
-"""How far apart is all that may touch.
+"""Gaps: how far apart is everything that may touch.
 
-Gaps, in ``gaps``: of each geom's points from the ground, m; of each bound the room to its lower and
-its upper side, rad; of each pair of geoms the separation, m.
+In ``gaps``: heights of each geom's points above the ground, m; of each limited joint the distances
+from its lower and its upper limit, rad; of each pair of geoms the separation, m.
 """
 from __future__ import annotations
 
@@ -9,70 +9,101 @@ import math
 
 import numpy as np
 
-from ..collision.pair import separation
-from ..collision.shapes import CAPSULE, SPHERE, extent
+from ..collision.narrow_phase import separation
+from ..collision.shapes import BOX, CAPSULE, SPHERE, Shape, extent, shape_at
 from ..compiling.decorators import compiled
-from ..dynamics.forward import Work, pose
-from ..maths.quaternion import cross, times, to_matrix, turned
-from ..system import OUTSIDE, WITHIN, Room, System
+from ..dynamics.kinematics import Kinematics, body_velocity, forward_kinematics, place_geoms
+from ..maths.vectors import Vec3, divide, dot, norm, sub, to_local, vec
+from ..system import JOINT_OUTSIDE_LIMITS, OVERLAPPING, System
+from ..workspace import Contacts, Workspace
 
 TOUCHING = 1e-6
 """m or rad: what is nearer touches."""
 
 FAR = 0.02
-"""m: nobody asks for the gap of what is farther apart, but that it is."""
+"""m: of geoms that are farther from the ground, the gap of their bounding sphere will do."""
 
 NEAR = 5e-3
-"""m: two bones that were apart by more, less twice what their speeds may have taken, are."""
+"""m: the separation of geoms that are farther apart need not be exact: a lower bound will do."""
 
-NEARLY = 1e-3
-"""m: two bones that began within each other collide from when they are no deeper than this."""
+STILL_OVERLAPPING = 1e-3
+"""m: geoms that overlapped at the start collide from when their penetration is less."""
 
-BEYOND = 2e-3
+BEYOND_LIMIT = 2e-3
 """rad by which a joint is outside its limits."""
 
-BURIED = 1e-3
-"""m: what is deeper in the ground comes out whatever it costs; bones, as far as the motion pays."""
+DEEP_PENETRATION = 1e-3
+"""m: what is deeper in the ground is corrected whatever the energy it takes."""
 
-NEVER = 1e6
-"""m: the gap of two bones that do not collide."""
-
-
-@compiled
-def place_geoms(tree: np.ndarray, root_of: np.ndarray, geoms: np.ndarray, work: Work,
-                q: np.ndarray, centres: np.ndarray, turns: np.ndarray) -> None:
-    """Centres (g, 3) m and rotation matrices (g, 3, 3) of all geoms; work is posed at q."""
-    for k in range(len(geoms)):
-        geom = geoms[k]
-        i = geom.bone
-        t, c, root = work.turns[i], work.centres[i], tree[root_of[i]].q
-        x, y, z = turned(t[0], t[1], t[2], t[3], geom.offset[0], geom.offset[1], geom.offset[2])
-        at = centres[k]
-        at[0], at[1], at[2] = q[root] + c[0] + x, q[root + 1] + c[1] + y, q[root + 2] + c[2] + z
-        x, y, z, w = times(t[0], t[1], t[2], t[3], geom.turn[0], geom.turn[1], geom.turn[2],
-                           geom.turn[3])
-        to_matrix(x, y, z, w, turns[k])
+EXCLUDED = 1e6
+"""m: the gap of a pair that does not collide."""
 
 
 @compiled
-def ground_gaps(geom: np.record, at: np.ndarray, turn: np.ndarray, n: np.ndarray, offset: float,
+def update_kinematics_and_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray,
+                               v: np.ndarray, before: np.ndarray, h: float,
+                               out: np.ndarray) -> None:
+    """Let ``kin`` be that of q and v, and enter all gaps into ``out``; see update_gaps()."""
+    forward_kinematics(s.tree, q, v, kin)
+    update_gaps(s, ws, kin, q, before, h, out)
+
+
+@compiled
+def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before: np.ndarray,
+                h: float, out: np.ndarray) -> None:
+    """Enter all gaps at q and place the geoms in ``kin``. ``before``: the gaps h s earlier, from
+    which pairs are known to be still apart; h infinite: unknown.
+    """
+    place_geoms(s.tree, s.body_root, s.geoms, q, kin)
+    n = 0
+    for k in range(len(s.geoms)):
+        if s.ground_offset[0] > -math.inf:
+            ground_gaps(s.geoms[k], kin.geom_positions[k], kin.geom_rotations[k],
+                        vec(s.ground_normal), s.ground_offset[0], out)
+        n += s.geoms[k].point_count
+    for k in range(len(s.joint_limits)):
+        limit = s.joint_limits[k]
+        out[n], out[n + 1] = q[limit.q] - limit.lower, limit.upper - q[limit.q]
+        n += 2
+    motion = ws.contacts.motion
+    if len(s.pairs):
+        for i in range(len(s.tree)):
+            velocity, motion[i].angular_speed = body_velocity(kin, i)
+            motion[i].speed = norm(velocity)
+    for k in range(len(s.pairs)):
+        if k < len(ws.excluded) and ws.excluded[k]:
+            out[n + k] = EXCLUDED
+            continue
+        a, b = s.geoms[s.pairs[k].a], s.geoms[s.pairs[k].b]
+        least = before[n + k] - 2 * (
+            motion_bound(motion[a.body], a.reach, h) + motion_bound(motion[b.body], b.reach, h))
+        out[n + k] = least if least > NEAR else pair_gap(s, k, kin)
+
+
+@compiled
+def motion_bound(motion: np.record, reach: float, h: float) -> float:
+    """Distance, m, that no point of a body within ``reach`` m exceeds in h s."""
+    return (h * (motion.speed + motion.angular_speed * reach) + motion.correction
+            + motion.correction_angle * reach)
+
+
+@compiled
+def ground_gaps(geom: np.record, position: np.ndarray, r: np.ndarray, normal: Vec3, offset: float,
                 out: np.ndarray) -> None:
-    """Heights of a geom's points over the ground: see ground_point()."""
-    high = at[0] * n[0] + at[1] * n[1] + at[2] * n[2] - offset
-    first = geom.first
-    if high > geom.radius + FAR:
-        for k in range(geom.count):
-            out[first + k] = high - geom.radius
+    """Enter the heights of a geom's points above the ground; which they are: ground_point()."""
+    high = dot(vec(position), normal) - offset
+    first = geom.first_point
+    if high > geom.bounding_radius + FAR:
+        for k in range(geom.point_count):
+            out[first + k] = high - geom.bounding_radius
         return
-    a = turn[0, 0] * n[0] + turn[1, 0] * n[1] + turn[2, 0] * n[2]
-    b = turn[0, 1] * n[0] + turn[1, 1] * n[1] + turn[2, 1] * n[2]
-    c = turn[0, 2] * n[0] + turn[1, 2] * n[1] + turn[2, 2] * n[2]
+    a, b, c = to_local(r, normal)
     size = geom.size
-    if geom.kind == 0:
+    if geom.kind == SPHERE:
         out[first] = high - size[0]
-    elif geom.kind == 1:
+    elif geom.kind == CAPSULE:
         out[first], out[first + 1] = high - size[1] * c - size[0], high + size[1] * c - size[0]
-    elif geom.kind == 2:
+    elif geom.kind == BOX:
         a, b, c = a * size[0], b * size[1], c * size[2]
         for k in range(8):
             out[first + k] = (high + (a if k & 1 else -a) + (b if k & 2 else -b)
@@ -94,170 +125,121 @@ def ground_gaps(geom: np.record, at: np.ndarray, turn: np.ndarray, n: np.ndarray
 
 
 @compiled
-def ground_point(geom: np.record, k: int, at: np.ndarray, turn: np.ndarray, n: np.ndarray,
-                 out: np.ndarray) -> None:
-    """Point k (3,) m of a geom: a ball's lowest, a capsule's two, a box's corners; of each end of
-    a cylinder its lowest and four corners of its rim.
+def ground_point(geom: np.record, k: int, position: np.ndarray, r: np.ndarray,
+                 normal: Vec3) -> Vec3:
+    """Point k, m, of a geom that may touch the ground: of a sphere the lowest, of a capsule the
+    lowest of each end, of a box the corners, of each end of a cylinder the lowest and four of its
+    rim.
     """
     size = geom.size
     x = y = z = 0.0
-    if geom.kind <= 1:
-        z = 0.0 if geom.kind == 0 else (size[1] if k else -size[1])
-        for j in range(3):
-            out[j] = at[j] + turn[j, 2] * z - size[0] * n[j]
-        return
-    if geom.kind == 2:
+    if geom.kind <= CAPSULE:
+        z = 0.0 if geom.kind == SPHERE else (size[1] if k else -size[1])
+        return (position[0] + r[0, 2] * z - size[0] * normal[0],
+                position[1] + r[1, 2] * z - size[0] * normal[1],
+                position[2] + r[2, 2] * z - size[0] * normal[2])
+    if geom.kind == BOX:
         x, y, z = (size[0] if k & 1 else -size[0], size[1] if k & 2 else -size[1],
                    size[2] if k & 4 else -size[2])
     else:
         z, k = (size[1] if k >= 5 else -size[1]), k % 5
         if k == 0:
-            x = -(turn[0, 0] * n[0] + turn[1, 0] * n[1] + turn[2, 0] * n[2])
-            y = -(turn[0, 1] * n[0] + turn[1, 1] * n[1] + turn[2, 1] * n[2])
+            a, b, _ = to_local(r, normal)
+            x, y = -a, -b
             far = math.sqrt(x * x + y * y)
             x, y = (x * size[0] / far, y * size[0] / far) if far > 1e-12 else (size[0], 0.0)
         else:
             x = (0.0, size[0], -size[0], 0.0, 0.0)[k]
             y = (0.0, 0.0, 0.0, size[0], -size[0])[k]
-    for j in range(3):
-        out[j] = at[j] + turn[j, 0] * x + turn[j, 1] * y + turn[j, 2] * z
+    return (position[0] + r[0, 0] * x + r[0, 1] * y + r[0, 2] * z,
+            position[1] + r[1, 0] * x + r[1, 1] * y + r[1, 2] * z,
+            position[2] + r[2, 0] * x + r[2, 1] * y + r[2, 2] * z)
 
 
 @compiled
-def all_gaps(s: System, q: np.ndarray, r: Room, before: np.ndarray, h: float,
-             out: np.ndarray) -> None:
-    """All gaps; work is posed at q. ``before``: those h s earlier; h infinite: unknown. What bones
-    were moved and turned since beside their velocities: r.own[:, 2] m, r.own[:, 3] rad.
+def enable_separated_pairs(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray,
+                           v: np.ndarray) -> bool:
+    """Let excluded pairs collide from now on whose reason is gone: geoms that overlapped have
+    separated, and joints between them are within their limits again. Returns whether there are
+    any; their gaps are not known yet.
     """
-    place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
-    n = 0
-    for k in range(len(s.geoms)):
-        if s.offset[0] > -math.inf:
-            ground_gaps(s.geoms[k], r.at[k], r.turn[k], s.normal, s.offset[0], out)
-        n += s.geoms[k].count
-    for k in range(len(s.bounds)):
-        bound = s.bounds[k]
-        out[n], out[n + 1] = q[bound.q] - bound.lower, bound.upper - q[bound.q]
-        n += 2
-    if len(s.pairs):
-        for i in range(len(s.tree)):
-            x, y, z, w = bone_velocity(r.work, i)
-            r.own[i, 0], r.own[i, 1] = math.sqrt(x * x + y * y + z * z), w
-    for k in range(len(s.pairs)):
-        if k < len(r.within) and r.within[k]:
-            out[n + k] = NEVER
-            continue
-        a, b = s.geoms[s.pairs[k].a], s.geoms[s.pairs[k].b]
-        least = before[n + k] - 2 * (
-            way(r.own[a.bone], a.reach, h) + way(r.own[b.bone], b.reach, h))
-        out[n + k] = least if least > NEAR else pair_gap(
-            a, b, r.at[s.pairs[k].a], r.turn[s.pairs[k].a], r.at[s.pairs[k].b],
-            r.turn[s.pairs[k].b])
-
-
-@compiled
-def way(own: np.ndarray, reach: float, h: float) -> float:
-    """How far, m, a point of a bone within its reach goes in h s; see all_gaps()."""
-    return h * (own[0] + own[1] * reach) + own[2] + own[3] * reach
-
-
-@compiled
-def part_pairs(s: System, r: Room, q: np.ndarray, v: np.ndarray) -> bool:
-    """Let those collide from now on that were within each other and have come apart, and those with
-    a joint in between that was outside its limits and is back: nothing is to hold that back.
-    Whether there are any, whose gaps are not known yet.
-    """
-    some = False
-    for k in range(len(r.within)):
-        some |= r.within[k] != 0
+    excluded, some = ws.excluded, False
+    for k in range(len(excluded)):
+        some |= excluded[k] != 0
     if not some:
         return False
     some = False
-    pose(s.tree, q, v, r.work)
-    place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
-    for i in range(len(s.tree)):
-        r.own[i, 0] = 0.0
-    for k in range(len(s.bounds)):
-        bound = s.bounds[k]
-        if max(bound.lower - q[bound.q], q[bound.q] - bound.upper) > 2 * BEYOND:
-            r.own[s.bone_of[bound.v], 0] = 1.0
-    for k in range(len(r.within)):
-        a, b, before = s.pairs[k].a, s.pairs[k].b, r.within[k]
-        if r.within[k] & WITHIN and pair_gap(s.geoms[a], s.geoms[b], r.at[a], r.turn[a], r.at[b],
-                                             r.turn[b]) > -NEARLY:
-            r.within[k] &= ~WITHIN
-        if r.within[k] & OUTSIDE and not outside_between(s, r, s.geoms[a].bone, s.geoms[b].bone):
-            r.within[k] &= ~OUTSIDE
-        some |= before != 0 and r.within[k] == 0
+    forward_kinematics(s.tree, q, v, kin)
+    place_geoms(s.tree, s.body_root, s.geoms, q, kin)
+    mark_joints_outside(s, q, ws.contacts.joint_outside)
+    for k in range(len(excluded)):
+        a, b, before = s.geoms[s.pairs[k].a], s.geoms[s.pairs[k].b], excluded[k]
+        if excluded[k] & OVERLAPPING and pair_gap(s, k, kin) > -STILL_OVERLAPPING:
+            excluded[k] &= ~OVERLAPPING
+        if excluded[k] & JOINT_OUTSIDE_LIMITS and not limit_violated_between(
+                s, ws.contacts, a.body, b.body):
+            excluded[k] &= ~JOINT_OUTSIDE_LIMITS
+        some |= before != 0 and excluded[k] == 0
     return some
 
 
 @compiled
-def outside_between(s: System, r: Room, i: int, j: int) -> bool:
-    """Whether a joint on the way from one bone to another is marked in r.own; parents stand before
-    their children.
-    """
+def mark_joints_outside(s: System, q: np.ndarray, outside: np.ndarray) -> None:
+    """Enter for each body (n,) whether the joint to its parent is outside its limits."""
+    for i in range(len(s.tree)):
+        outside[i] = 0
+    for k in range(len(s.joint_limits)):
+        limit = s.joint_limits[k]
+        if max(limit.lower - q[limit.q], q[limit.q] - limit.upper) > 2 * BEYOND_LIMIT:
+            outside[s.dof_body[limit.dof]] = 1
+
+
+@compiled
+def limit_violated_between(s: System, contacts: Contacts, i: int, j: int) -> bool:
+    """Whether a joint on the path between two bodies of a tree is outside its limits."""
     while i != j:
         if i < j:
             i, j = j, i
-        if r.own[i, 0] > 0:
+        if contacts.joint_outside[i]:
             return True
         i = s.tree[i].parent
     return False
 
 
 @compiled
-def bone_velocity(work: Work, i: int) -> tuple[float, float, float, float]:
-    """Velocity (3) m/s of a bone's centre and its angular speed, rad/s; work is posed."""
-    m, c = work.moves[i], work.centres[i]
-    x, y, z = cross(m[0], m[1], m[2], c[0], c[1], c[2])
-    return (m[3] + x, m[4] + y, m[5] + z, math.sqrt(m[0] ** 2 + m[1] ** 2 + m[2] ** 2))
+def placed_shape(s: System, kin: Kinematics, k: int) -> Shape:
+    """Geom k where ``kin`` has placed it."""
+    return shape_at(s.geoms[k], kin.geom_positions[k], kin.geom_rotations[k])
 
 
 @compiled
-def along(kind: int, size: np.ndarray, r: np.ndarray, x: float, y: float, z: float) -> float:
-    """How far, m, a geom reaches from its centre along a unit vector of the world."""
-    if kind == SPHERE:
-        return size[0]
-    reach = extent(kind, size, r, x, y, z)
-    return reach + size[0] if kind == CAPSULE else reach
-
-
-@compiled
-def pair_gap(a: np.record, b: np.record, pa: np.ndarray, ra: np.ndarray, pb: np.ndarray,
-             rb: np.ndarray) -> float:
-    """Separation of two geoms, m; of what is farther apart than NEAR, a bound below it: that of
-    spheres around them, then that along the line of their centres.
+def pair_gap(s: System, k: int, kin: Kinematics) -> float:
+    """Separation, m, of pair k; of geoms that are farther apart than NEAR a lower bound, by their
+    bounding spheres or their extents along the line of their centers.
     """
-    x, y, z = pa[0] - pb[0], pa[1] - pb[1], pa[2] - pb[2]
-    length = math.sqrt(x * x + y * y + z * z)
-    far = length - (a.radius + b.radius)
+    i, j = s.pairs[k].a, s.pairs[k].b
+    way = sub(vec(kin.geom_positions[i]), vec(kin.geom_positions[j]))
+    length = norm(way)
+    far = length - (s.geoms[i].bounding_radius + s.geoms[j].bounding_radius)
     if far > NEAR:
         return far
+    a, b = placed_shape(s, kin, i), placed_shape(s, kin, j)
     if length > NEAR:
-        x, y, z = x / length, y / length, z / length
-        far = length - along(a.kind, a.size, ra, x, y, z) - along(b.kind, b.size, rb, x, y, z)
+        way = divide(way, length)
+        far = length - extent(a, way) - extent(b, way)
         if far > NEAR:
             return far
-    return separation(a.kind, a.size, pa, ra, b.kind, b.size, pb, rb, NEAR)
+    return separation(a, b, NEAR)
 
 
 @compiled
-def of_limit(s: System, gaps: np.ndarray, j: int) -> bool:
-    """Whether gap j of all is a joint's from a limit, in rad."""
-    first = first_limit(s, gaps)
-    return first <= j < first + 2 * len(s.bounds)
+def first_joint_limit_gap(s: System, gaps: np.ndarray) -> int:
+    """Index of the first gap that is a joint's from a limit."""
+    return len(gaps) - len(s.pairs) - 2 * len(s.joint_limits)
 
 
 @compiled
-def first_limit(s: System, gaps: np.ndarray) -> int:
-    """The first of all gaps that is a joint's from a limit."""
-    return len(gaps) - len(s.pairs) - 2 * len(s.bounds)
-
-
-@compiled
-def look(s: System, r: Room, q: np.ndarray, v: np.ndarray, before: np.ndarray, h: float,
-         out: np.ndarray) -> None:
-    """Pose all at q and v, and enter all gaps; see all_gaps()."""
-    pose(s.tree, q, v, r.work)
-    all_gaps(s, q, r, before, h, out)
+def is_joint_limit_gap(s: System, gaps: np.ndarray, j: int) -> bool:
+    """Whether gap j is a joint's from a limit, in rad."""
+    first = first_joint_limit_gap(s, gaps)
+    return first <= j < first + 2 * len(s.joint_limits)

@@ -97,28 +97,28 @@ SLOWEST = 0.1
 
 
 @compiled
-def add_up(shares: np.ndarray, count: int, k: np.ndarray, h: float, out: np.ndarray) -> None:
-    """Add up the rates of ``count`` stages, times h."""
+def weighted_sum(weights: np.ndarray, count: int, k: np.ndarray, h: float, out: np.ndarray) -> None:
+    """Enter the weighted sum of the derivatives of ``count`` stages, times h."""
     for j in range(len(out)):
         out[j] = 0.0
     for stage in range(count):
-        if shares[stage] != 0.0:
-            share = h * shares[stage]
+        if weights[stage] != 0.0:
+            share = h * weights[stage]
             for j in range(len(out)):
                 out[j] += share * k[stage, j]
 
 
 @compiled
 def step_error(k: np.ndarray, h: float, nq: int, room: np.ndarray) -> float:
-    """The error that DOP853 takes for that of its order 8 (Hairer, Norsett, Wanner, II.10);
-    infinity if a number was none.
+    """DOP853's estimate of the error of its order 8 (Hairer, Norsett, Wanner, II.10); infinity if a
+    number is not finite. ``room`` (nq + nv,): scratch.
     """
     fifth, third, all_of_it = 0.0, 0.0, 0.0
-    add_up(ERRORS[0], 16, k, h, room)
+    weighted_sum(ERRORS[0], 16, k, h, room)
     for j in range(len(room)):
         fifth = max(fifth, abs(room[j]) * (1.0 if j < nq else SLOWEST))
         all_of_it += room[j]
-    add_up(ERRORS[1], 16, k, h, room)
+    weighted_sum(ERRORS[1], 16, k, h, room)
     for j in range(len(room)):
         third = max(third, abs(room[j]) * (1.0 if j < nq else SLOWEST))
         all_of_it += room[j]

@@ -1,6 +1,6 @@
-"""A large island: what its contacts answer, by sweeps through their rows.
+"""A large island: its contacts by Gauss-Seidel sweeps through their rows, without W.
 
-W of hundreds of rows costs more to build and to factor than to do without: a sweep through
+W of hundreds of rows costs more to form and to factor than to do without: a sweep through
 z = Y^T p costs what the rows have of entries. Between the sweeps goes a step along the direction
 of Fletcher and Reeves, which makes them converge ten times as fast (Silcowitz-Hansen, Niebe and
 Erleben, The Visual Computer 26, 2010).
@@ -10,164 +10,174 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..system import COMPLIANCE, STICKS, Room
-from .one_contact import on_disc, one_contact
-from .solver import OPENING, weaken_by
-from .sweep import LIMIT, ROLLING
+from ..contact_kind import LIMIT, ROLLING
+from ..system import COMPLIANCE, NO_SLIP
+from ..workspace import Island, Workspace
+from .one_contact import project_to_disc, solve_one_contact
+from .solver import OPENING, scale_to_no_work
 
-MOST_SWEEPS = 100
+MAX_SWEEPS = 100
 """Of a large island."""
 
-GOOD = 1e-6
-"""m/s to which a large island is solved, if that many sweeps bring it there."""
+TOLERANCE = 1e-6
+"""m/s to which a large island is solved, if that many sweeps suffice."""
 
-LOCKED = 1e30
-"""Of a row along which nothing can move, instead of its W."""
+IMMOVABLE = 1e30
+"""Takes the place of W's diagonal entry for a row along which nothing can move."""
 
-ROUGHLY = 1e-2
-"""m/s: what is left by more is counted, and its impulses are kept from making energy."""
+UNSOLVED = 1e-2
+"""m/s: islands with a larger residual are counted, and their impulses kept from adding energy."""
 
 
 @compiled
-def solve_large(r: Room, count: int, n: int, h: float, thrown: bool, deep: bool) -> None:
-    """Solve an island as solve_small() does, but that what is thrown back so that it would make
-    energy is not thrown, and that curved ways are taken as straight.
+def solve_large(ws: Workspace, m: int, n: int, has_restitution: bool,
+                has_penetration: bool) -> None:
+    """Solve an island as solve_small() does, except that restitution that would add energy is left
+    out altogether, and that curvature is neglected.
     """
-    b, p, out, start = r.p[0], r.p[1], r.p[2], r.p[3]
-    own_blocks(r, count, COMPLIANCE)
-    left, turns = sweep_island(r, count, n, b, p)
-    if let_go(r, count, b, p):
-        left, more = sweep_island(r, count, n, b, p)
-        turns += more
-    work, spent = work_and_spent(r, n, start, p)
-    if thrown and work + spent / 2 > 0:
-        left, more = sweep_island(r, count, n, start, p)
-        turns += more
-        r.tally[0].softened += 1
-        work, spent = work_and_spent(r, n, start, p)
-    r.tally[0].sweeps += turns
-    if not left <= ROUGHLY:
-        r.tally[0].unsolved += 1
+    island, b, p, u = (ws.island, ws.island.rhs, ws.island.impulses, ws.island.free_velocity)
+    diagonal_blocks(ws, m, COMPLIANCE)
+    left, sweeps = sweep_to_tolerance(ws, m, n, b, p)
+    if release_opening_contacts(ws, m, b, p):
+        left, more = sweep_to_tolerance(ws, m, n, b, p)
+        sweeps += more
+    work, spent = work_terms(island, n, u, p)
+    if has_restitution and work + spent / 2 > 0:
+        left, more = sweep_to_tolerance(ws, m, n, u, p)
+        sweeps += more
+        ws.stats[0].restitution_reduced += 1
+        work, spent = work_terms(island, n, u, p)
+    ws.stats[0].sweeps += sweeps
+    if not left <= UNSOLVED:
+        ws.stats[0].unsolved += 1
         if not work + spent / 2 <= 0:
-            weaken_by(p, n, work, spent)
-    r.left[0] = max(r.left[0], left)
-    if deep:
-        normals_alone(r, count)
+            scale_to_no_work(p, n, work, spent)
+    ws.step.scalars[0].residual = max(ws.step.scalars[0].residual, left)
+    if has_penetration:
+        keep_normals_only(island, m)
         for i in range(n):
-            b[i] = out[i] = 0.0
-        for k in range(count):
-            b[r.rows[k]] = -r.need[0, k]
-        sweep_island(r, count, n, b, out)
+            b[i] = island.correction[i] = 0.0
+        for k in range(m):
+            b[island.members[k].row] = -island.members[k].correction
+        sweep_to_tolerance(ws, m, n, b, island.correction)
 
 
 @compiled
-def own_blocks(r: Room, count: int, compliance: float) -> None:
-    """W of each contact by itself, r.blocks (count, 25), its diagonal with the compliance."""
-    for k in range(count):
-        i = int(r.need[1, k])
-        c = r.contacts[i]
-        r.need[3, k] = compliance
+def diagonal_blocks(ws: Workspace, m: int, compliance: float) -> None:
+    """Enter W of each contact by itself into island.blocks, its diagonal with the compliance."""
+    island = ws.island
+    for k in range(m):
+        c, block = ws.contacts.found[island.members[k].contact], island.blocks[k]
+        island.members[k].compliance = compliance
         for e in range(c.kind):
             for g in range(e + 1):
                 total = 0.0
-                for x in range(c.support):
-                    total += r.Y[c.row + e, x] * r.Y[c.row + g, x]
-                r.blocks[k, 5 * e + g] = r.blocks[k, 5 * g + e] = total
-            own = r.blocks[k, 6 * e]
-            r.blocks[k, 6 * e] = (1 + compliance) * own if own > 0 else LOCKED
+                for x in range(c.dof_count):
+                    total += island.Y[c.first_row + e, x] * island.Y[c.first_row + g, x]
+                block[e, g] = block[g, e] = total
+            own = block[e, e]
+            block[e, e] = (1 + compliance) * own if own > 0 else IMMOVABLE
 
 
 @compiled
-def normals_alone(r: Room, count: int) -> None:
-    """Leave of each contact its normal, with the compliance r.need[2] instead of r.need[3]."""
-    for k in range(count):
-        r.blocks[k, 0] *= (1 + r.need[2, k]) / (1 + r.need[3, k])
-        r.kinds[k], r.need[3, k] = LIMIT, r.need[2, k]
+def keep_normals_only(island: Island, m: int) -> None:
+    """Keep of each contact its normal row alone, with the compliance of position correction."""
+    for k in range(m):
+        member, block = island.members[k], island.blocks[k]
+        block[0, 0] *= (1 + member.correction_compliance) / (1 + member.compliance)
+        member.kind, member.compliance = LIMIT, member.correction_compliance
 
 
 @compiled
-def seen(r: Room, k: int, e: int, b: np.ndarray, p: np.ndarray, z: np.ndarray) -> float:
+def row_velocity(ws: Workspace, k: int, e: int, b: np.ndarray, p: np.ndarray) -> float:
     """Velocity along row e of contact k."""
-    i = int(r.need[1, k])
-    row, soft = r.rows[k] + e, r.need[3, k]
-    total = b[row] + p[row] * r.blocks[k, 6 * e] * soft / (1 + soft)
-    for x in range(r.contacts[i].support):
-        total += r.Y[row, x] * z[r.support[i, x]]
+    island, member = ws.island, ws.island.members[k]
+    row, soft, support = member.row + e, member.compliance, island.support[member.contact]
+    total = b[row] + p[row] * island.blocks[k, e, e] * soft / (1 + soft)
+    for x in range(ws.contacts.found[member.contact].dof_count):
+        total += island.Y[row, x] * island.z[support[x]]
     return total
 
 
 @compiled
-def give(r: Room, k: int, e: int, change: float, p: np.ndarray, z: np.ndarray) -> float:
-    """Change the impulse of row e of contact k; by how much its velocity changes."""
-    i = int(r.need[1, k])
-    row = r.rows[k] + e
+def change_impulse(ws: Workspace, k: int, e: int, change: float, p: np.ndarray) -> float:
+    """Change the impulse of row e of contact k. Returns by how much its velocity changes."""
+    island, member = ws.island, ws.island.members[k]
+    row, support = member.row + e, island.support[member.contact]
     p[row] += change
-    for x in range(r.contacts[i].support):
-        z[r.support[i, x]] += r.Y[row, x] * change
-    return abs(change) * r.blocks[k, 6 * e]
+    for x in range(ws.contacts.found[member.contact].dof_count):
+        island.z[support[x]] += island.Y[row, x] * change
+    return abs(change) * island.blocks[k, e, e]
 
 
 @compiled
-def sweep_rows(r: Room, count: int, b: np.ndarray, p: np.ndarray, z: np.ndarray) -> float:
-    """Go once through the contacts; the largest change of a velocity, m/s or rad/s."""
+def sweep_large_island(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray) -> float:
+    """Solve for the impulses of each contact in turn. Returns the largest change of a velocity,
+    m/s or rad/s.
+    """
     worst = 0.0
-    for k in range(count):
-        a, own = r.rows[k], r.blocks[k]
-        u0 = seen(r, k, 0, b, p, z)
-        if r.kinds[k] == LIMIT:
-            worst = max(worst, give(r, k, 0, max(0.0, p[a] - u0 / own[0]) - p[a], p, z))
+    for k in range(m):
+        member, block = ws.island.members[k], ws.island.blocks[k]
+        a, mu = member.row, member.friction
+        u0 = row_velocity(ws, k, 0, b, p)
+        if member.kind == LIMIT:
+            worst = max(worst, change_impulse(
+                ws, k, 0, max(0.0, p[a] - u0 / block[0, 0]) - p[a], p))
             continue
         x, y, w = p[a], p[a + 1], p[a + 2]
-        if u0 >= 0 and x == 0.0 and y == 0.0 and w == 0.0 and r.mu[k] < STICKS:
+        if u0 >= 0 and x == 0.0 and y == 0.0 and w == 0.0 and mu < NO_SLIP:
             continue
-        u1, u2 = seen(r, k, 1, b, p, z), seen(r, k, 2, b, p, z)
-        c0 = u0 - own[0] * x - own[1] * y - own[2] * w
-        c1 = u1 - own[5] * x - own[6] * y - own[7] * w
-        c2 = u2 - own[10] * x - own[11] * y - own[12] * w
-        nx, ny, nw = one_contact(own, 5, 0, c0, c1, c2, x, y, w, r.mu[k])
-        worst = max(worst, give(r, k, 0, nx - x, p, z), give(r, k, 1, ny - y, p, z),
-                    give(r, k, 2, nw - w, p, z))
-        if r.kinds[k] == ROLLING:
-            most = r.roll[k] * nx
-            rho = 1 / max(own[18], own[24])
-            x, y = on_disc(p[a + 3] - rho * seen(r, k, 3, b, p, z),
-                           p[a + 4] - rho * seen(r, k, 4, b, p, z), most)
-            worst = max(worst, give(r, k, 3, x - p[a + 3], p, z),
-                        give(r, k, 4, y - p[a + 4], p, z))
+        u1, u2 = row_velocity(ws, k, 1, b, p), row_velocity(ws, k, 2, b, p)
+        c = (u0 - block[0, 0] * x - block[0, 1] * y - block[0, 2] * w,
+             u1 - block[1, 0] * x - block[1, 1] * y - block[1, 2] * w,
+             u2 - block[2, 0] * x - block[2, 1] * y - block[2, 2] * w)
+        nx, ny, nw = solve_one_contact(block.reshape(25), 5, 0, c, (x, y, w), mu)
+        worst = max(worst, change_impulse(ws, k, 0, nx - x, p),
+                    change_impulse(ws, k, 1, ny - y, p), change_impulse(ws, k, 2, nw - w, p))
+        if member.kind == ROLLING:
+            most = member.rolling_friction * nx
+            rho = 1 / max(block[3, 3], block[4, 4])
+            x, y = project_to_disc(p[a + 3] - rho * row_velocity(ws, k, 3, b, p),
+                                   p[a + 4] - rho * row_velocity(ws, k, 4, b, p), most)
+            worst = max(worst, change_impulse(ws, k, 3, x - p[a + 3], p),
+                        change_impulse(ws, k, 4, y - p[a + 4], p))
     return worst
 
 
 @compiled
-def sweep_island(r: Room, count: int, n: int, b: np.ndarray, p: np.ndarray) -> tuple[float, int]:
-    """Solve for p (n,), from where it stands; the last change of a velocity, m/s, and the sweeps.
-
-    r.vectors[5] is z = Y^T p at the end.
+def sweep_to_tolerance(ws: Workspace, m: int, n: int, b: np.ndarray,
+                       p: np.ndarray) -> tuple[float, int]:
+    """Solve for p (n,), from where it stands. Returns the last change of a velocity, m/s, and the
+    sweeps. island.z is Y^T p at the end.
     """
-    z, z_was, z_way = r.vectors[5], r.vectors[6], r.vectors[7]
-    was, way = r.solver[0], r.solver[1]
+    island = ws.island
+    z, z_was, z_way = island.z, island.z_previous, island.z_direction
+    was, way = island.row_impulses, island.row_direction
     for j in range(len(z)):
         z[j] = z_way[j] = 0.0
     for i in range(n):
         way[i] = 0.0
-    for k in range(count):
-        for e in range(r.kinds[k]):
-            begun, p[r.rows[k] + e] = p[r.rows[k] + e], 0.0
-            give(r, k, e, begun, p, z)
+    for k in range(m):
+        member = island.members[k]
+        for e in range(member.kind):
+            begun, p[member.row + e] = p[member.row + e], 0.0
+            change_impulse(ws, k, e, begun, p)
     worst, done, before = 0.0, 0, 0.0
-    for _ in range(MOST_SWEEPS):
+    for _ in range(MAX_SWEEPS):
         for i in range(n):
             was[i] = p[i]
         for j in range(len(z)):
             z_was[j] = z[j]
-        worst = sweep_rows(r, count, b, p, z)
+        worst = sweep_large_island(ws, m, b, p)
         done += 1
-        if worst <= GOOD or done == MOST_SWEEPS:
+        if worst <= TOLERANCE or done == MAX_SWEEPS:
             break
         square = 0.0
-        for k in range(count):
-            for e in range(r.kinds[k]):
-                row = r.rows[k] + e
-                square += (p[row] - was[row]) ** 2 * r.blocks[k, 6 * e]
+        for k in range(m):
+            member, block = island.members[k], island.blocks[k]
+            for e in range(member.kind):
+                row = member.row + e
+                square += (p[row] - was[row]) ** 2 * block[e, e]
         share = square / before if before > 0 else 0.0
         before = square
         if share > 1:
@@ -184,25 +194,26 @@ def sweep_island(r: Room, count: int, n: int, b: np.ndarray, p: np.ndarray) -> t
 
 
 @compiled
-def let_go(r: Room, count: int, b: np.ndarray, p: np.ndarray) -> bool:
-    """Let go sideways the contacts without friction's limit that open; whether there are any."""
+def release_opening_contacts(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray) -> bool:
+    """Release contacts without friction's limit that open. Returns whether there are any."""
     some = False
-    for k in range(count):
-        a = r.rows[k]
-        if r.kinds[k] != LIMIT and r.mu[k] >= STICKS and p[a] <= 0.0 and (
+    for k in range(m):
+        member = ws.island.members[k]
+        a = member.row
+        if member.kind != LIMIT and member.friction >= NO_SLIP and p[a] <= 0.0 and (
                 p[a + 1] != 0.0 or p[a + 2] != 0.0) and (
-                seen(r, k, 0, b, p, r.vectors[5]) > OPENING):
-            r.mu[k], some = -1.0, True
+                row_velocity(ws, k, 0, b, p) > OPENING):
+            member.friction, some = -1.0, True
             p[a] = p[a + 1] = p[a + 2] = 0.0
     return some
 
 
 @compiled
-def work_and_spent(r: Room, n: int, u: np.ndarray, p: np.ndarray) -> tuple[float, float]:
-    """What impulses p, of which r.vectors[5] is z, do to what moves at u: p u, and p W p, J."""
+def work_terms(island: Island, n: int, u: np.ndarray, p: np.ndarray) -> tuple[float, float]:
+    """P u and p W p, J, of impulses p, of which island.z is Y^T p, on row velocities u."""
     work = spent = 0.0
     for i in range(n):
         work += p[i] * u[i]
-    for j in range(r.vectors.shape[1]):
-        spent += r.vectors[5, j] ** 2
+    for j in range(len(island.z)):
+        spent += island.z[j] ** 2
     return work, spent

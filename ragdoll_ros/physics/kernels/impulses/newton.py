@@ -1,9 +1,10 @@
-"""Newton's method on all rows of an island at once, semi-smooth.
+"""Semi-smooth Newton method on all rows of an island at once.
 
-The function is that of Alart and Curnier (CMAME 92, 1991). What several contacts of one face bear
-together is nearly free, and a full step along it leaves every cone. So each step is one of the
-proximal point method (Rockafellar, SIAM Journal on Control and Optimization 14, 1976): a change of
-an impulse is resisted by a share of its own W, which does not move the solution.
+The function is Alart and Curnier's (CMAME 92, 1991). Impulses that several contacts of one face
+bear together are nearly undetermined, and a full step along them leaves every friction cone. So
+each step is one of the proximal point method (Rockafellar, SIAM Journal on Control and Optimization
+14, 1976): a share ``proximal`` of the diagonal of W resists the change of an impulse, which does
+not move the solution.
 """
 from __future__ import annotations
 
@@ -12,71 +13,74 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..system import STICKS
-from .one_contact import on_disc
-from .sweep import velocities
+from ..system import NO_SLIP
+from ..workspace import Island
+from .gauss_seidel import velocities
+from .one_contact import project_to_disc
 
-NEWTON_STEPS = 40
-"""At the most; from the sweeps' end some three are. All are taken in full: on the way the residual
-may grow, as contacts change sides. The best is kept."""
+MAX_STEPS = 40
+"""From the end of the sweeps some three are needed. All are taken in full: the residual may grow on
+the way, as contacts change between sticking and sliding. The best is kept."""
 
 PATIENCE = 8
-"""Steps that do not halve the residual, after which it goes in circles."""
+"""Steps that do not halve the residual, after which the method cycles."""
 
 
 @compiled
-def residual(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
-             n: int, W: np.ndarray, b: np.ndarray, p: np.ndarray, u: np.ndarray,
-             phi: np.ndarray) -> float:
-    """Alart and Curnier's function, in velocities: zero where p is the solution; its largest."""
-    worst = 0.0
+def alart_curnier(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray) -> float:
+    """Enter u = W p + b into island.velocity, and Alart and Curnier's function, scaled to
+    velocities and zero at the solution, into island.residual. Returns its largest entry.
+    """
+    W, u, phi, worst = island.W, island.velocity, island.residual, 0.0
     velocities(W, b, p, n, u)
     for c in range(m):
-        a = rows[c]
+        member = island.members[c]
+        a = member.row
         own = W[a * n + a]
         push = max(0.0, p[a] - u[a] / own)
         phi[a] = (p[a] - push) * own
         worst = max(worst, abs(phi[a]))
-        for k in range(1, kinds[c], 2):
+        for k in range(1, member.kind, 2):
             i = a + k
             own = max(W[i * n + i], W[(i + 1) * n + i + 1])
-            if k == 1 and mu[c] >= STICKS:
+            if k == 1 and member.friction >= NO_SLIP:
                 phi[i], phi[i + 1] = u[i], u[i + 1]
             else:
-                most = push * max(0.0, mu[c] if k == 1 else roll[c])
-                y, z = on_disc(p[i] - u[i] / own, p[i + 1] - u[i + 1] / own, most)
+                law = member.friction if k == 1 else member.rolling_friction
+                most = push * max(0.0, law)
+                y, z = project_to_disc(p[i] - u[i] / own, p[i + 1] - u[i + 1] / own, most)
                 phi[i], phi[i + 1] = (p[i] - y) * own, (p[i + 1] - z) * own
             worst = max(worst, abs(phi[i]), abs(phi[i + 1]))
     return worst
 
 
 @compiled
-def linearize(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int, n: int,
-              W: np.ndarray, p: np.ndarray, u: np.ndarray, phi: np.ndarray, resist: float,
-              G: np.ndarray, way: np.ndarray) -> None:
-    """Jacobian of residual(), flat (n * n), with the share ``resist`` of W's diagonal added to W,
-    and the right-hand side ``way`` (n,) of the equations of a step.
+def linearize(island: Island, m: int, n: int, p: np.ndarray, proximal: float) -> None:
+    """Enter the Jacobian of alart_curnier(), with the share ``proximal`` of W's diagonal added to
+    W, into island.G, flat (n * n), and the right-hand side of a step into island.direction.
     """
+    W, G, u, way = island.W, island.G, island.velocity, island.direction
     for i in range(n):
-        way[i] = -phi[i]
+        way[i] = -island.residual[i]
     for c in range(m):
-        a = rows[c]
+        member = island.members[c]
+        a = member.row
         own = W[a * n + a]
         push = p[a] - u[a] / own
         active = push > 0
-        follow(W, G, n, a, active, resist)
+        write_velocity_row(W, G, n, a, active, proximal)
         if not active:
             way[a] = -p[a]
-        for k in range(1, kinds[c], 2):
+        for k in range(1, member.kind, 2):
             i = a + k
             own_t = max(W[i * n + i], W[(i + 1) * n + i + 1])
-            law = max(0.0, mu[c] if k == 1 else roll[c])
+            law = max(0.0, member.friction if k == 1 else member.rolling_friction)
             y, z = p[i] - u[i] / own_t, p[i + 1] - u[i + 1] / own_t
             size, most = math.sqrt(y * y + z * z), law * max(0.0, push)
-            sticks = k == 1 and law >= STICKS
+            sticks = k == 1 and law >= NO_SLIP
             if sticks or not active or size <= most:
                 for e in range(i, i + 2):
-                    follow(W, G, n, e, active or sticks, resist)
+                    write_velocity_row(W, G, n, e, active or sticks, proximal)
                     if not active and not sticks:
                         way[e] = -p[e]
                 continue
@@ -89,24 +93,25 @@ def linearize(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndar
                 for j in range(n):
                     G[at + j] = normal * W[a * n + j] + (
                         ky * W[i * n + j] + kz * W[(i + 1) * n + j])
-                G[at + a] += resist * normal * own - own_t * law * d
+                G[at + a] += proximal * normal * own - own_t * law * d
                 G[at + i + e] += own_t
-                G[at + i] += (resist * W[i * n + i] - own_t) * ky
-                G[at + i + 1] += (resist * W[(i + 1) * n + i + 1] - own_t) * kz
+                G[at + i] += (proximal * W[i * n + i] - own_t) * ky
+                G[at + i + 1] += (proximal * W[(i + 1) * n + i + 1] - own_t) * kz
 
 
 @compiled
-def follow(W: np.ndarray, G: np.ndarray, n: int, i: int, active: bool, resist: float) -> None:
-    """Let the step bring row i's velocity to nothing, or, if it is not ``active``, its impulse."""
+def write_velocity_row(W: np.ndarray, G: np.ndarray, n: int, i: int, active: bool,
+                       proximal: float) -> None:
+    """Let the step zero the velocity of row i, or, if it is not ``active``, its impulse."""
     at = i * n
     for j in range(n):
         G[at + j] = W[at + j] if active else 0.0
-    G[at + i] = (1 + resist) * W[at + i] if active else 1.0
+    G[at + i] = (1 + proximal) * W[at + i] if active else 1.0
 
 
 @compiled
-def gauss(G: np.ndarray, n: int, x: np.ndarray) -> bool:
-    """Solve G x = b in b's place, rows swapped by their largest; false if G is singular."""
+def gaussian_elimination(G: np.ndarray, n: int, x: np.ndarray) -> bool:
+    """Solve G x = b in place with partial pivoting. Returns whether G is regular."""
     for k in range(n):
         best, most = k, abs(G[k * n + k])
         for i in range(k + 1, n):
@@ -134,9 +139,10 @@ def gauss(G: np.ndarray, n: int, x: np.ndarray) -> bool:
 
 
 @compiled
-def solve_active(G: np.ndarray, n: int, x: np.ndarray, places: np.ndarray) -> bool:
-    """Solve G x = b, flat (n * n), in b's place; False if that fails. Rows of what is open have but
-    their diagonal: they are solved for first, the others by gauss(). places (2n,): room.
+def solve_reduced(G: np.ndarray, n: int, x: np.ndarray, places: np.ndarray,
+                  reduced: np.ndarray) -> bool:
+    """Solve G x = b, flat (n * n), in place; returns whether G is regular. Rows of open contacts
+    have but their diagonal: they are eliminated first. places, reduced (n,): scratch.
     """
     m = 0
     for i in range(n):
@@ -152,46 +158,43 @@ def solve_active(G: np.ndarray, n: int, x: np.ndarray, places: np.ndarray) -> bo
             m += 1
     k = 0
     for a in range(m):
-        i = int(places[a])
+        i = places[a]
         c = 0
         for j in range(n):
-            if c < m and int(places[c]) == j:
+            if c < m and places[c] == j:
                 c += 1
             else:
                 x[i] -= G[i * n + j] * x[j]
     for a in range(m):
-        i = int(places[a])
+        i = places[a]
         for c in range(m):
-            G[k] = G[i * n + int(places[c])]
+            G[k] = G[i * n + places[c]]
             k += 1
-        places[n + a] = x[i]
-    if not gauss(G, m, places[n:n + m]):
+        reduced[a] = x[i]
+    if not gaussian_elimination(G, m, reduced):
         return False
     for a in range(m):
-        x[int(places[a])] = places[n + a]
+        x[places[a]] = reduced[a]
     return True
 
 
 @compiled
-def newton(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int, n: int,
-           W: np.ndarray, b: np.ndarray, p: np.ndarray, tolerance: float, resist: float,
-           room: np.ndarray, G: np.ndarray) -> float:
-    """Newton's method from p on, against ``resist``; p becomes the best found, the largest
-    residual, m/s, is given.
-    """
-    u, phi, way, keep, places = room[0], room[1], room[2], room[3], room[7]
+def newton(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray, tolerance: float,
+           proximal: float) -> float:
+    """Take Newton steps from p on. p becomes the best found; returns its largest residual, m/s."""
+    way, keep = island.direction, island.best
     best, late = math.inf, 0
-    for turn in range(NEWTON_STEPS + 1):
-        worst = residual(kinds, rows, mu, roll, m, n, W, b, p, u, phi)
+    for turn in range(MAX_STEPS + 1):
+        worst = alart_curnier(island, m, n, b, p)
         late = 0 if worst < best / 2 else late + 1
         if worst < best:
             best = worst
             for i in range(n):
                 keep[i] = p[i]
-        if best <= tolerance or late > PATIENCE or turn == NEWTON_STEPS:
+        if best <= tolerance or late > PATIENCE or turn == MAX_STEPS:
             break
-        linearize(kinds, rows, mu, roll, m, n, W, p, u, phi, resist, G, way)
-        if not solve_active(G, n, way, places):
+        linearize(island, m, n, p, proximal)
+        if not solve_reduced(island.G, n, way, island.places, island.active):
             break
         total = 0.0
         for i in range(n):

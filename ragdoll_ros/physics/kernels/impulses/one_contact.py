@@ -6,24 +6,28 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..system import STICKS
+from ..maths.vectors import Vec3
+from ..system import NO_SLIP
 
-NARROWINGS = 50
-"""Steps in which a sliding contact is sought at the most; some four are taken."""
+MAX_ITERATIONS = 50
+"""Of the search for the drag of a sliding contact; some four are needed."""
 
 
 @compiled
-def one_contact(W: np.ndarray, n: int, a: int, c0: float, c1: float, c2: float, x: float,
-                y: float, z: float, mu: float) -> tuple[float, float, float]:
-    """Impulse of one contact by itself, whose velocity without it is c; near the last (x, y, z).
+def solve_one_contact(W: np.ndarray, n: int, a: int, c: Vec3, last: Vec3, mu: float) -> Vec3:
+    """Impulse of the contact whose rows of W (flat, n a row) begin at a, and whose velocity without
+    it is c. ``last``: an impulse to start from.
 
-    Where it slides, u_t = -d p_t with a drag d > 0, and u_n = 0: linear for a given d. Sought is
-    the d at which |p_t| = mu p_n, which there is as d = 0 gives more (it would stick) and an
-    endless d none: by Newton's method on mu p_n / |p_t|, nearly a line in d, between bounds.
+    A sliding contact has u_t = -d p_t with a drag d > 0, and u_n = 0: linear for given d. Sought
+    is the d at which |p_t| = mu p_n. It exists, as d = 0 gives more (else the contact would stick)
+    and infinite d gives none: by Newton's method on mu p_n / |p_t|, nearly a line in d, between
+    bounds.
     """
     at = a * n + a
     w00, w01, w02 = W[at], W[at + 1], W[at + 2]
     w11, w12, w22 = W[at + n + 1], W[at + n + 2], W[at + 2 * n + 2]
+    c0, c1, c2 = c
+    x, y, z = last
     if mu <= 0.0:
         return max(0.0, -c0 / w00), 0.0, 0.0
     d0, d1, d2 = w11 * w22 - w12 * w12, w02 * w12 - w01 * w22, w01 * w12 - w02 * w11
@@ -33,17 +37,20 @@ def one_contact(W: np.ndarray, n: int, a: int, c0: float, c1: float, c2: float, 
         sx = -(d0 * c0 + d1 * c1 + d2 * c2) / det
         sy = -(d1 * c0 + e11 * c1 + e12 * c2) / det
         sz = -(d2 * c0 + e12 * c1 + e22 * c2) / det
-        if sx >= 0 and (mu >= STICKS or sy * sy + sz * sz <= mu * mu * sx * sx):
+        if sx >= 0 and (mu >= NO_SLIP or sy * sy + sz * sz <= mu * mu * sx * sx):
             return sx, sy, sz
-    if mu >= STICKS:
+    if mu >= NO_SLIP:
         det = w11 * w22 - w12 * w12
         return 0.0, (w12 * c2 - w22 * c1) / det, (w12 * c1 - w11 * c2) / det
     if c0 >= 0:
         return 0.0, 0.0, 0.0
-    drag = first_drag(w11, w22, -c0 * mu / w00, c1 + w01 * x + w11 * y + w12 * z,
-                      c2 + w02 * x + w12 * y + w22 * z, c1, c2, y, z)
+    drag = -((c1 + w01 * x + w11 * y + w12 * z) * y + (c2 + w02 * x + w12 * y + w22 * z) * z)
+    if drag > 0:
+        drag /= y * y + z * z
+    else:  # no impulse to start from: friction against c on a free surface
+        drag = max(0.0, math.sqrt(c1 * c1 + c2 * c2) / (-c0 * mu / w00) - (w11 + w22) / 2)
     least, most = 0.0, math.inf
-    for _ in range(NARROWINGS):
+    for _ in range(MAX_ITERATIONS):
         v11, v22 = w11 + drag, w22 + drag
         det = v11 * v22 - w12 * w12
         g1, g2 = (v22 * w01 - w12 * w02) / det, (v11 * w02 - w12 * w01) / det
@@ -66,24 +73,12 @@ def one_contact(W: np.ndarray, n: int, a: int, c0: float, c1: float, c2: float, 
         drag -= over * size / slope if slope > 0 else math.inf
         if not least < drag < most:
             drag = (least + most) / 2 if most < math.inf else 2 * least + w11 + w22
-    y, z = on_disc(y, z, mu * x)
+    y, z = project_to_disc(y, z, mu * x)
     return x, y, z
 
 
 @compiled
-def first_drag(w11: float, w22: float, most: float, u1: float, u2: float, c1: float, c2: float,
-               y: float, z: float) -> float:
-    """Where to begin to seek u_t / -p_t: from the last impulses (y, z), whose u is known; without
-    any, from friction ``most`` against c along a surface that nothing else acts on.
-    """
-    drag = -(u1 * y + u2 * z)
-    if drag > 0:
-        return drag / (y * y + z * z)
-    return max(0.0, math.sqrt(c1 * c1 + c2 * c2) / most - (w11 + w22) / 2)
-
-
-@compiled
-def on_disc(y: float, z: float, radius: float) -> tuple[float, float]:
+def project_to_disc(y: float, z: float, radius: float) -> tuple[float, float]:
     """The point of a disc nearest to (y, z)."""
     size = math.sqrt(y * y + z * z)
     if size > radius:

@@ -1,4 +1,4 @@
-"""A small island: what its contacts answer, by W = Y Y^T, as exactly as numbers allow."""
+"""A small island: its contacts by W = Y Y^T, the Delassus operator."""
 from __future__ import annotations
 
 import math
@@ -7,86 +7,89 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..maths.cholesky import factor_row, substitute
-from ..system import COMPLIANCE, OF_IMPACTS, Room
-from .solver import solve_impulses, solve_normals, weaken_by
+from ..system import COMPLIANCE, IMPACT_COMPLIANCE
+from ..workspace import Island, Workspace
+from .solver import scale_to_no_work, solve_impulses, solve_position_correction
 
 SWEEPS = 8
-"""Sweeps before Newton's method is asked for the first time."""
+"""Gauss-Seidel sweeps before the first Newton step."""
 
 UNSOLVED = 1e-5
-"""m/s: what is left by more is counted, and its impulses are kept from making energy."""
+"""m/s: islands with a larger residual are counted, and their impulses kept from adding energy."""
 
-LOCKED = 1e-13
-"""Share of the largest ease, W, of an island's rows up to which one is locked."""
+SINGULAR = 1e-13
+"""Share of the largest diagonal entry of W up to which a row cannot move."""
 
-NO_MOTION = 1e-4
-"""Share of W's diagonal up to which no motion of the bodies is what rows see of a curved way."""
+CURVATURE_COMPLIANCE = 1e-4
+"""Share of W's diagonal up to which a curvature bias is no motion of the bodies."""
 
 STRAIGHT = 1e-11
-"""m/s or rad/s: of a way that is less curved, nobody asks whether it is a motion."""
+"""m/s or rad/s: a smaller curvature bias is taken as it is."""
 
 
 @compiled
-def solve_small(r: Room, count: int, n: int, h: float, tolerance: float, thrown: bool,
-                deep: bool) -> None:
-    """Solve an island of n rows over h s, or at an impact, h = 0, for its impulses, r.p[1], and, if
-    something is ``deep``, for those that give depths back, r.p[2]. ``thrown``: r.p[0] asks for
-    restitution, which may make energy.
+def solve_small(ws: Workspace, m: int, n: int, h: float, tolerance: float, has_restitution: bool,
+                has_penetration: bool) -> None:
+    """Solve an island of m contacts and n rows over h s, or at an impact, h = 0, for its impulses;
+    if ``has_penetration``, also for those of position correction.
+
+    ``has_restitution``: the right-hand side asks for restitution, which may add energy.
     """
-    b, p, start, soft = r.p[0], r.p[1], r.p[3], r.p[4]
-    form_matrix(r, count, n, COMPLIANCE if h > 0 else OF_IMPACTS)
+    island, b, p, u, soft = (ws.island, ws.island.rhs, ws.island.impulses, ws.island.free_velocity,
+                             ws.island.soft)
+    form_contact_matrix(ws, m, n, COMPLIANCE if h > 0 else IMPACT_COMPLIANCE)
     if h > 0:
-        follow_curve(r, count, n)
-    rest_locked(r.W, n, b)
-    left, turns = solve_impulses(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, b, p, tolerance,
-                                 SWEEPS, r.solver, r.G)
-    if thrown and gained(r.W, start, p, n) > 0:
+        add_curvature_bias(island, m, n)
+    mask_singular_rows(island.W, n, b)
+    left, sweeps = solve_impulses(island, m, n, b, p, tolerance, SWEEPS)
+    if has_restitution and energy_gain(island.W, u, p, n) > 0:
         for j in range(n):
             soft[j] = p[j]
-        solve_impulses(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, start, soft, tolerance, SWEEPS,
-                       r.solver, r.G)
-        if gained(r.W, start, soft, n) > 0:
-            weaken_impulses(r.W, start, soft, n)
-        hold_energy(r.W, start, soft, p, n)
-        r.tally[0].softened += 1
-    r.tally[0].sweeps += turns
+        solve_impulses(island, m, n, u, soft, tolerance, SWEEPS)
+        if energy_gain(island.W, u, soft, n) > 0:
+            scale_to_energy_bound(island.W, u, soft, n)
+        bound_energy(island.W, u, soft, p, n)
+        ws.stats[0].restitution_reduced += 1
+    ws.stats[0].sweeps += sweeps
     if not left <= UNSOLVED:
-        r.tally[0].unsolved += 1
-        weaken_impulses(r.W, start, p, n)
-    if deep:
-        solve_normals(r.kinds, r.rows, r.mu, r.roll, count, n, r.W, r.need, r.p[2], r.solver, r.G)
+        ws.stats[0].unsolved += 1
+        scale_to_energy_bound(island.W, u, p, n)
+    if has_penetration:
+        solve_position_correction(island, m, n)
 
 
 @compiled
-def form_matrix(r: Room, count: int, n: int, compliance: float) -> None:
-    """W = Y Y^T, flat (n * n), its diagonal with the compliance; row by row of Y^T, which a
-    processor does several columns of at once.
+def form_contact_matrix(ws: Workspace, m: int, n: int, compliance: float) -> None:
+    """Enter W = Y Y^T, flat (n * n), its diagonal with the compliance; row by row of Y^T, so that
+    the processor does several columns at once.
     """
-    Y, W, YT = r.Y, r.W, r.YT
+    island = ws.island
+    Y, W, YT, members = island.Y, island.W, island.YT, island.members
     for x in range(len(YT)):
         for e in range(n):
             YT[x, e] = 0.0
-    for k in range(count):
-        i = int(r.need[1, k])
-        for e in range(r.rows[k], r.rows[k] + r.kinds[k]):
-            for x in range(r.contacts[i].support):
-                YT[r.support[i, x], e] = Y[e, x]
-    for k in range(count):
-        i = int(r.need[1, k])
-        for e in range(r.rows[k], r.rows[k] + r.kinds[k]):
+    for k in range(m):
+        i = members[k].contact
+        for e in range(members[k].row, members[k].row + members[k].kind):
+            for x in range(ws.contacts.found[i].dof_count):
+                YT[island.support[i, x], e] = Y[e, x]
+    for k in range(m):
+        i = members[k].contact
+        dofs, support = ws.contacts.found[i].dof_count, island.support[i]
+        for e in range(members[k].row, members[k].row + members[k].kind):
             own = W[e * n:e * n + e + 1]
             for f in range(e + 1):
                 own[f] = 0.0
-            support, x = r.contacts[i].support, 0
-            while x + 4 <= support:
-                at = r.support[i]
-                a, b, c, d = YT[at[x]], YT[at[x + 1]], YT[at[x + 2]], YT[at[x + 3]]
+            x = 0
+            while x + 4 <= dofs:
+                a, b, c, d = (YT[support[x]], YT[support[x + 1]], YT[support[x + 2]],
+                              YT[support[x + 3]])
                 p, q, s, t = Y[e, x], Y[e, x + 1], Y[e, x + 2], Y[e, x + 3]
                 for f in range(e + 1):
                     own[f] = own[f] + p * a[f] + q * b[f] + s * c[f] + t * d[f]
                 x += 4
-            while x < support:
-                p, a = Y[e, x], YT[r.support[i, x]]
+            while x < dofs:
+                p, a = Y[e, x], YT[support[x]]
                 for f in range(e + 1):
                     own[f] += p * a[f]
                 x += 1
@@ -96,13 +99,14 @@ def form_matrix(r: Room, count: int, n: int, compliance: float) -> None:
 
 
 @compiled
-def follow_curve(r: Room, count: int, n: int) -> None:
-    """Add to r.p[0] what rows see of a curved way, r.p[4], as far as it is a motion of the bodies:
-    the points of a patch that turns see more than any motion could answer. What opens sees its own.
+def add_curvature_bias(island: Island, m: int, n: int) -> None:
+    """Add the curvature bias to the right-hand side, as far as it is a motion of the bodies: the
+    points of a patch that turns have more than any impulses could answer. What separates has its
+    own.
 
-    That motion is W x, where (W + R) x is what they see, and R a little of W's diagonal.
+    That motion is W x, where (W + R) x is the bias, and R a little of W's diagonal.
     """
-    W, G, curve, b, x = r.W, r.G, r.p[4], r.p[0], r.p[2]
+    W, G, curve, b, x = island.W, island.G, island.curvature, island.rhs, island.correction
     most = size = 0.0
     for i in range(n):
         size = max(size, abs(curve[i]))
@@ -115,10 +119,11 @@ def follow_curve(r: Room, count: int, n: int) -> None:
         x[i] = curve[i]
         for j in range(n):
             G[i * n + j] = W[i * n + j]
-        G[i * n + i] += NO_MOTION * W[i * n + i] + LOCKED * most
-    for k in range(count):
-        if r.need[3, k] > 0:
-            for i in range(r.rows[k], r.rows[k] + r.kinds[k]):
+        G[i * n + i] += CURVATURE_COMPLIANCE * W[i * n + i] + SINGULAR * most
+    for k in range(m):
+        member = island.members[k]
+        if member.separating:
+            for i in range(member.row, member.row + member.kind):
                 for j in range(n):
                     G[i * n + j] = G[j * n + i] = 0.0
                 G[i * n + i], x[i] = 1.0, 0.0
@@ -126,19 +131,19 @@ def follow_curve(r: Room, count: int, n: int) -> None:
         factor_row(G, n, i, n)
     substitute(G, n, n, x)
     for i in range(n):
-        b[i] += curve[i] - (NO_MOTION * W[i * n + i] + LOCKED * most) * x[i]
+        b[i] += curve[i] - (CURVATURE_COMPLIANCE * W[i * n + i] + SINGULAR * most) * x[i]
 
 
 @compiled
-def rest_locked(W: np.ndarray, n: int, b: np.ndarray) -> None:
-    """Let rows ask for nothing along which nothing can move, as no joint lets it: W is zero there,
-    and would be divided by.
+def mask_singular_rows(W: np.ndarray, n: int, b: np.ndarray) -> None:
+    """Mask rows along which no body can move, as joints do not let it: their W is zero, and would
+    be divided by.
     """
     most = 0.0
     for i in range(n):
         most = max(most, W[i * n + i])
     for i in range(n):
-        if W[i * n + i] <= LOCKED * most:
+        if W[i * n + i] <= SINGULAR * most:
             for j in range(n):
                 W[i * n + j] = W[j * n + i] = 0.0
             W[i * n + i] = most if most > 0 else 1.0
@@ -146,9 +151,9 @@ def rest_locked(W: np.ndarray, n: int, b: np.ndarray) -> None:
 
 
 @compiled
-def gained(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> float:
-    """Kinetic energy, J, that impulses p give to what moves at u: p (u + W p / 2); 0 if that is
-    rounding.
+def energy_gain(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> float:
+    """Kinetic energy, J, that impulses p add to a motion with row velocities u: p (u + W p / 2);
+    0 if that is rounding.
     """
     total = size = 0.0
     for i in range(n):
@@ -161,8 +166,8 @@ def gained(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> float:
 
 
 @compiled
-def weaken_impulses(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> None:
-    """Scale impulses that are no solution so that they make no energy."""
+def scale_to_energy_bound(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> None:
+    """Scale impulses that are no solution so that they add no energy."""
     work = spent = 0.0
     for i in range(n):
         w = 0.0
@@ -170,16 +175,16 @@ def weaken_impulses(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> None
             w += W[i * n + j] * p[j]
         work += p[i] * u[i]
         spent += p[i] * w
-    weaken_by(p, n, work, spent)
+    scale_to_no_work(p, n, work, spent)
 
 
 @compiled
-def hold_energy(W: np.ndarray, u: np.ndarray, soft: np.ndarray, p: np.ndarray, n: int) -> None:
-    """Draw p towards the ``soft`` impulses, those of no restitution, until no energy is made.
+def bound_energy(W: np.ndarray, u: np.ndarray, soft: np.ndarray, p: np.ndarray, n: int) -> None:
+    """Move p towards the impulses ``soft`` without restitution, until it adds no energy.
 
-    Newton's law with friction can make some (Kane and Levinson 1985). Soft impulses never do:
-    p u+ <= 0 and so p (u + W p / 2) = p u+ - p W p / 2 < 0; between both, all are within their
-    cones and press nothing into anything, as cones and half-spaces are convex.
+    Newton's law with friction can add energy (Kane and Levinson 1985). Soft impulses never do:
+    p u+ <= 0 and so p (u + W p / 2) = p u+ - p W p / 2 < 0. Between both, all impulses are within
+    their cones and nothing penetrates, as cones and half-spaces are convex.
     """
     a = b = 0.0
     for i in range(n):
@@ -189,7 +194,7 @@ def hold_energy(W: np.ndarray, u: np.ndarray, soft: np.ndarray, p: np.ndarray, n
             ws += W[i * n + j] * soft[j]
         a += (p[i] - soft[i]) * w / 2
         b += (p[i] - soft[i]) * (u[i] + ws)
-    c = min(0.0, gained(W, u, soft, n))
+    c = min(0.0, energy_gain(W, u, soft, n))
     root = math.sqrt(max(0.0, b * b - 4 * a * c))
     share = (-2 * c / (b + root) if b > 0 else (root - b) / (2 * a)) if a > 0 else 1.0
     share = min(1.0, max(0.0, share))

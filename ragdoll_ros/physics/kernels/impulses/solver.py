@@ -1,11 +1,11 @@
-"""Impulses of an island of contacts and limits, by Signorini's and Coulomb's laws exactly.
+"""Impulses of a small island of contacts and limits, by Signorini's and Coulomb's laws exactly.
 
-Unknown are the impulses p, rows of 1 (a limit), 3 (a contact: normal, two along the surface) or 5
-(the same and two of rolling). The velocities after are u = W p + b. Wanted:
+Unknown are the impulses p, rows of 1 (a limit), 3 (a contact: normal and two tangents) or 5 (the
+same and two of rolling). The velocities after are u = W p + b. The complementarity problem:
 u_n >= 0, p_n >= 0, u_n p_n = 0; |p_t| <= mu p_n, and where u_t is not zero p_t = -mu p_n u_t/|u_t|.
 
-Without friction, or where it has no limit, an active set solves it. Else sweeps come near; where
-they stall, as with mass ratios of 1:1000, Newton's method ends it.
+Without friction, or where it has no limit, the active set method solves it. Else Gauss-Seidel
+sweeps come near, and where they stall, as with mass ratios of 1:1000, Newton's method finishes.
 """
 from __future__ import annotations
 
@@ -14,68 +14,71 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..system import STICKS
+from ..contact_kind import LIMIT
+from ..system import NO_SLIP
+from ..workspace import Island
 from .active_set import is_convex, solve_active_set
+from .gauss_seidel import gauss_seidel_sweep
 from .newton import newton
-from .one_contact import on_disc
-from .sweep import LIMIT, sweep
+from .one_contact import project_to_disc
 
 ROUNDS, LOOSER = 6, 3
-"""Of sweeps, twice as many as in the round before, and of Newton's method, against ten times as
-much; the first LOOSER that come to no end make do with ten times the tolerance."""
+"""Rounds of sweeps, twice as many each time, and of Newton's method, against ten times the proximal
+share; the first LOOSER rounds that fail are followed by ten times the tolerance."""
 
-RESIST = 1e-5
-"""Share of its own W by which an impulse resists the first round's steps: enough for what is known
-to 1e-8 of W, the compliance, and far less than what decides what bodies do."""
+PROXIMAL = 1e-5
+"""Share of W's diagonal that resists the first round's Newton steps: enough for impulses that the
+compliance, 1e-8 of W, decides, and far less than what decides the motion of bodies."""
 
 OPENING = 1e-4
-"""m/s from which a contact without friction's limit is let go as open."""
+"""m/s from which a contact without friction's limit is released as open."""
 
 
 @compiled
-def admissible(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
-               p: np.ndarray) -> None:
-    """Bring all impulses into their cones: no contact ever pulls."""
+def project_to_cones(members: np.ndarray, m: int, p: np.ndarray) -> None:
+    """Project all impulses to their friction cones: no contact ever pulls."""
     for c in range(m):
-        a = rows[c]
+        member = members[c]
+        a = member.row
         p[a] = max(0.0, p[a])
-        for k in range(1, kinds[c], 2):
-            if k == 1 and mu[c] >= STICKS:
+        for k in range(1, member.kind, 2):
+            if k == 1 and member.friction >= NO_SLIP:
                 continue
-            most = p[a] * max(0.0, mu[c] if k == 1 else roll[c])
-            p[a + k], p[a + k + 1] = on_disc(p[a + k], p[a + k + 1], most)
+            law = member.friction if k == 1 else member.rolling_friction
+            p[a + k], p[a + k + 1] = project_to_disc(p[a + k], p[a + k + 1], p[a] * max(0.0, law))
 
 
 @compiled
-def solve_cones(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
-                n: int, W: np.ndarray, b: np.ndarray, p: np.ndarray, tolerance: float,
-                sweeps: int, room: np.ndarray, G: np.ndarray) -> tuple[float, int]:
-    """Solve for p (n,), from where it stands; the largest residual left, m/s, and the sweeps."""
-    done, left, resist = 0, math.inf, RESIST
-    convex = is_convex(kinds, mu, roll, m)
+def solve_cones(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray, tolerance: float,
+                sweeps: int) -> tuple[float, int]:
+    """Solve for p (n,), from where it stands. Returns the largest residual left, m/s, and the
+    sweeps.
+    """
+    done, left, proximal = 0, math.inf, PROXIMAL
+    convex = is_convex(island.members, m)
     if convex:
         sweeps = 1
     for turn in range(ROUNDS):
         for _ in range(sweeps):
             done += 1
-            worst = sweep(kinds, rows, mu, roll, m, n, W, b, p, room[0])
+            worst = gauss_seidel_sweep(island.members, m, n, island.W, b, p, island.velocity)
             if worst <= tolerance:
                 return worst, done
-        if convex and solve_active_set(kinds, rows, mu, m, n, W, b, p, tolerance, room, G):
+        if convex and solve_active_set(island, m, n, b, p, tolerance):
             return tolerance, done
-        left = newton(kinds, rows, mu, roll, m, n, W, b, p, tolerance, resist, room, G)
-        admissible(kinds, rows, mu, roll, m, p)
+        left = newton(island, m, n, b, p, tolerance, proximal)
+        project_to_cones(island.members, m, p)
         if turn < LOOSER:
             tolerance *= 10
         if left <= tolerance:
             return left, done
-        sweeps, resist = 2 * sweeps, 10 * resist
+        sweeps, proximal = 2 * sweeps, 10 * proximal
     return left, done
 
 
 @compiled
-def opens(W: np.ndarray, n: int, a: int, b: np.ndarray, p: np.ndarray) -> bool:
-    """Whether a contact comes apart."""
+def is_opening(W: np.ndarray, n: int, a: int, b: np.ndarray, p: np.ndarray) -> bool:
+    """Whether the contact with normal row a opens."""
     u = b[a]
     for j in range(n):
         u += W[a * n + j] * p[j]
@@ -83,65 +86,67 @@ def opens(W: np.ndarray, n: int, a: int, b: np.ndarray, p: np.ndarray) -> bool:
 
 
 @compiled
-def solve_impulses(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
-                   n: int, W: np.ndarray, b: np.ndarray, p: np.ndarray, tolerance: float,
-                   sweeps: int, room: np.ndarray, G: np.ndarray) -> tuple[float, int]:
-    """Solve for p (n,), from where it stands; the largest residual left, m/s, and the sweeps.
+def solve_impulses(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray, tolerance: float,
+                   sweeps: int) -> tuple[float, int]:
+    """Solve for p (n,), from where it stands. Returns the largest residual left, m/s, and the
+    sweeps.
 
-    Friction without limit makes a convex problem of it, which holds a contact sideways even as it
-    opens; so what has come out as open is let go, and all is solved once more. What then closes
-    after all is held: between the two there is no answer (Painleve).
+    Friction without limit makes the problem convex, but holds a contact sideways even as it opens.
+    So contacts that turn out to open are released, and all is solved once more. Those that then
+    close after all are held: between the two there is no solution (Painleve's paradox).
     """
-    left, done = solve_cones(kinds, rows, mu, roll, m, n, W, b, p, tolerance, sweeps, room, G)
+    left, done = solve_cones(island, m, n, b, p, tolerance, sweeps)
     for turn in range(2):
         some = False
         for c in range(m):
-            a = rows[c]
-            if kinds[c] == LIMIT:
+            member = island.members[c]
+            a = member.row
+            if member.kind == LIMIT:
                 continue
-            if turn == 0 and mu[c] >= STICKS and p[a] <= 0.0 and (
-                    p[a + 1] != 0.0 or p[a + 2] != 0.0) and opens(W, n, a, b, p):
-                mu[c] = -1.0
+            if turn == 0 and member.friction >= NO_SLIP and p[a] <= 0.0 and (
+                    p[a + 1] != 0.0 or p[a + 2] != 0.0) and is_opening(island.W, n, a, b, p):
+                member.friction = -1.0
                 p[a] = p[a + 1] = p[a + 2] = 0.0
                 some = True
-            elif turn == 1 and mu[c] < 0 and p[a] > 0:
-                mu[c] = STICKS
+            elif turn == 1 and member.friction < 0 and p[a] > 0:
+                member.friction = NO_SLIP
                 some = True
         if not some:
             break
-        left, more = solve_cones(kinds, rows, mu, roll, m, n, W, b, p, tolerance, sweeps, room, G)
+        left, more = solve_cones(island, m, n, b, p, tolerance, sweeps)
         done += more
     return left, done
 
 
 @compiled
-def solve_normals(kinds: np.ndarray, rows: np.ndarray, mu: np.ndarray, roll: np.ndarray, m: int,
-                  n: int, W: np.ndarray, need: np.ndarray, p: np.ndarray, room: np.ndarray,
-                  G: np.ndarray) -> None:
-    """Least normal impulses p (n,) that give each contact its velocity need[0] (m,) or more, but
-    for a compliance of need[2], as a share of its W.
+def solve_position_correction(island: Island, m: int, n: int) -> None:
+    """Enter into island.correction the least normal impulses (n,) that give each contact the
+    velocity ``correction`` of its member or more, but for its ``correction_compliance``.
 
-    W, kinds and rows are lost: the normals' own W takes their place.
+    W and the members are overwritten: only the normal rows remain.
     """
-    b, own = room[4], room[5]
+    W, b, own, normal_row = island.W, island.normal_rhs, island.normal_impulses, island.normal_row
+    for c in range(m):
+        normal_row[c] = island.members[c].row
     for c in range(m):
         for e in range(m):
-            W[c * m + e] = W[rows[c] * n + rows[e]]
+            W[c * m + e] = W[normal_row[c] * n + normal_row[e]]
     for i in range(n):
-        p[i] = 0.0
+        island.correction[i] = 0.0
     for c in range(m):
-        W[c * m + c] *= 1 + need[2, c]
-        b[c], own[c], room[6, c] = -need[0, c], 0.0, rows[c]
-        kinds[c], rows[c], mu[c], roll[c] = LIMIT, c, 0.0, 0.0
-    solve_cones(kinds, rows, mu, roll, m, m, W, b, own, 1e-9, 4, room, G)
+        member = island.members[c]
+        W[c * m + c] *= 1 + member.correction_compliance
+        b[c], own[c] = -member.correction, 0.0
+        member.kind, member.row, member.friction, member.rolling_friction = LIMIT, c, 0.0, 0.0
+    solve_cones(island, m, m, b, own, 1e-9, 4)
     for c in range(m):
-        p[int(room[6, c])] = max(0.0, own[c])
+        island.correction[normal_row[c]] = max(0.0, own[c])
 
 
 @compiled
-def weaken_by(p: np.ndarray, n: int, work: float, spent: float) -> None:
-    """Scale impulses p (n,) whose energy is ``work`` + ``spent`` / 2, J, so that it is none; what
-    is no number becomes none.
+def scale_to_no_work(p: np.ndarray, n: int, work: float, spent: float) -> None:
+    """Scale impulses p (n,) whose energy is ``work`` + ``spent`` / 2, J, so that it is none;
+    impulses that are not finite become zero.
     """
     share = min(1.0, max(0.0, -2 * work / spent)) if spent > 0 else 0.0
     if not math.isfinite(share) or not math.isfinite(work):

@@ -1,43 +1,48 @@
-"""The instant of an impact: Newton's law of restitution and Coulomb's of friction."""
+"""An impact: Newton's law of restitution and Coulomb's law of friction at an instant."""
 from __future__ import annotations
 
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..contact.find import find_contacts
-from ..contact.gaps import place_geoms
-from ..dynamics.forward import pose
-from ..dynamics.mass import crba, factor, root_axes, turn_inertias
-from ..impulses.response import respond
-from ..system import Room, System
+from ..contact.find_contacts import find_contacts
+from ..contact.gaps import TOUCHING
+from ..dynamics.kinematics import (
+    forward_kinematics,
+    place_geoms,
+    root_motion_subspaces,
+    rotate_inertias,
+)
+from ..dynamics.mass_matrix import factor_ltl, mass_matrix
+from ..impulses.solve_contacts import solve_contacts
+from ..system import System
+from ..workspace import Workspace
 
 TOLERANCE = 1e-10
 """m/s to which contacts are solved."""
 
 
 @compiled
-def impact(s: System, r: Room, q: np.ndarray, v: np.ndarray, bounces: bool) -> int:
-    """Change v by the impulses of all that touches at q by r.gaps; how many contacts there are.
-
-    Not ``bounces``: nothing is thrown back.
+def impact(s: System, ws: Workspace, q: np.ndarray, v: np.ndarray, bounces: bool) -> int:
+    """Change v by the impulses of everything that touches at q by ws.gaps. Returns the number of
+    contacts. ``bounces``: whether there is restitution.
     """
-    pose(s.tree, q, v, r.work)
-    place_geoms(s.tree, s.root_of, s.geoms, r.work, q, r.at, r.turn)
-    m = find_contacts(s, q, r, r.gaps, 1e-6)
+    kin, dyn, contacts = ws.step.start, ws.step.dynamics, ws.contacts.found
+    forward_kinematics(s.tree, q, v, kin)
+    place_geoms(s.tree, s.body_root, s.geoms, q, kin)
+    m = find_contacts(s, ws, kin, q, ws.gaps, TOUCHING)
     if m == 0:
         return 0
-    root_axes(s.tree, q, r.work.axes)
-    turn_inertias(s.tree, r.work, r.own)
-    crba(s.tree, s.up, s.bone_of, r.work, r.own, r.composite, r.H)
-    factor(r.H, s.up)
+    root_motion_subspaces(s.tree, q, kin)
+    rotate_inertias(s.tree, kin, dyn.matrix)
+    mass_matrix(s.tree, s.dof_parent, s.dof_body, kin, dyn)
+    factor_ltl(dyn.H, s.dof_parent)
     for i in range(m):
         for e in range(5):
-            r.contacts[i].impulse[e] = 0.0
+            contacts[i].impulse[e] = 0.0
         if not bounces:
-            r.contacts[i].restitution = 0.0
-    change, shift = r.vectors[0], r.vectors[1]
-    respond(s, r, q, v, v, m, 0.0, TOLERANCE, change, shift)
+            contacts[i].restitution = 0.0
+    solve_contacts(s, ws, kin, q, v, v, m, 0.0, TOLERANCE)
     for j in range(len(v)):
-        v[j] += change[j]
-    r.tally[0].impacts += 1
+        v[j] += ws.step.v_change[j]
+    ws.stats[0].impacts += 1
     return m

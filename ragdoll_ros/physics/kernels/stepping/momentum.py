@@ -1,10 +1,10 @@
-"""That a step keeps momentum: of each doll that does not touch the ground, to rounding.
+"""Conservation of momentum in a step, of each doll that does not touch the ground, to rounding.
 
-A centred step in generalised coordinates keeps the momentum at its middle pose, that at its end but
-to third order. What it has missed is given back as a motion of the whole doll as one rigid body.
-With the impulses J of all that acts from outside at points x, over h s:
-P' = P + m g h + J, C' = C + h (P + P') / (2 m), L' = L + (x - (C + C') / 2) x J about the centre of
-mass C. So the sums over dolls that touch each other are kept as well.
+A centered step in generalized coordinates conserves the momentum at its middle pose, that at its
+end only to third order. What it has missed is given back as a rigid motion of the whole doll.
+With the impulses J of everything that acts from outside at points x, over h s:
+P' = P + m g h + J, C' = C + h (P + P') / (2 m), L' = L + (x - (C + C') / 2) x J about the center of
+mass C. So the sums over dolls that touch each other are conserved as well.
 """
 from __future__ import annotations
 
@@ -13,74 +13,84 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..dynamics.mass import turn_inertias
+from ..contact_kind import LIMIT, ROLLING
+from ..dynamics.kinematics import (
+    Kinematics,
+    inertia_times,
+    root_orientation,
+    root_position,
+    rotate_inertias,
+    velocity_at,
+)
 from ..maths.cholesky import solve
-from ..maths.quaternion import cross, turned
-from ..system import Room, System
+from ..maths.vectors import (
+    Vec3,
+    add,
+    add_scaled,
+    cross,
+    divide,
+    dot,
+    put,
+    quat_rotate_inverse,
+    scale,
+    sub,
+    vec,
+)
+from ..system import System
+from ..workspace import Workspace
 
-SMALL = 0.01
-"""Share of a motion's energy that may be taken out of it without a word."""
+REMOVABLE = 0.01
+"""Share of the internal kinetic energy that may be removed from it without being counted."""
 
 
 @compiled
-def sum_dolls(s: System, q: np.ndarray, r: Room, out: np.ndarray) -> None:
-    """Sums (d,) over each doll; work is posed at q."""
-    turn_inertias(s.tree, r.work, r.own)
+def sum_dolls(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, out: np.ndarray) -> None:
+    """Enter the sums (d,) over each doll; ``kin`` is that of q."""
+    rotate_inertias(s.tree, kin, ws.step.dynamics.matrix)
     for d in range(len(out)):
         doll = out[d]
         doll.kinetic = 0.0
         for k in range(3):
-            doll.centre[k] = doll.momentum[k] = doll.angular[k] = 0.0
+            doll.center[k] = doll.momentum[k] = doll.angular_momentum[k] = 0.0
             for j in range(3):
                 doll.inertia[j, k] = 0.0
     for i in range(len(s.tree)):
-        d, m, c, root = s.doll_of[i], s.tree[i].mass, r.work.centres[i], s.tree[s.root_of[i]].q
+        d, mass = s.body_doll[i], s.tree[i].mass
+        at = add(root_position(q, s.tree[s.body_root[i]].q_start), vec(kin.positions[i]))
         for k in range(3):
-            out[d].centre[k] += m * (q[root + k] + c[k]) / s.doll_masses[d]
+            out[d].center[k] += mass * at[k] / s.doll_masses[d]
     for i in range(len(s.tree)):
-        add_bone(out[s.doll_of[i]], s.tree[i].mass, r.work.centres[i], r.work.moves[i], r.own[i],
-                 q, s.tree[s.root_of[i]].q)
+        root = root_position(q, s.tree[s.body_root[i]].q_start)
+        add_body(out[s.body_doll[i]], s.tree[i].mass, kin, i, root)
     for d in range(len(out)):
-        doll, g = out[d], s.gravity
-        doll.energy = doll.kinetic - s.doll_masses[d] * (
-            doll.centre[0] * g[0] + doll.centre[1] * g[1] + doll.centre[2] * g[2])
+        doll = out[d]
+        doll.energy = doll.kinetic - s.doll_masses[d] * dot(vec(doll.center), vec(s.gravity))
 
 
 @compiled
-def add_bone(doll: np.record, m: float, c: np.ndarray, move: np.ndarray, I: np.ndarray,
-             q: np.ndarray, root: int) -> None:
-    """Add a bone of mass m, kg, ``c`` (3,) m from its doll's root, which stands in q at ``root``,
-    with the spatial velocity ``move`` and the inertia I (6,) about its own centre.
-    """
-    x, y, z = (q[root] + c[0] - doll.centre[0], q[root + 1] + c[1] - doll.centre[1],
-               q[root + 2] + c[2] - doll.centre[2])
-    wx, wy, wz = move[0], move[1], move[2]
-    vx, vy, vz = cross(wx, wy, wz, c[0], c[1], c[2])
-    vx, vy, vz = move[3] + vx, move[4] + vy, move[5] + vz
-    lx = I[0] * wx + I[1] * wy + I[2] * wz
-    ly = I[1] * wx + I[3] * wy + I[4] * wz
-    lz = I[2] * wx + I[4] * wy + I[5] * wz
-    doll.kinetic += (m * (vx * vx + vy * vy + vz * vz) + lx * wx + ly * wy + lz * wz) / 2
-    doll.momentum[0] += m * vx
-    doll.momentum[1] += m * vy
-    doll.momentum[2] += m * vz
-    vx, vy, vz = cross(x, y, z, m * vx, m * vy, m * vz)
-    doll.angular[0] += vx + lx
-    doll.angular[1] += vy + ly
-    doll.angular[2] += vz + lz
+def add_body(doll: np.record, mass: float, kin: Kinematics, i: int, root: Vec3) -> None:
+    """Add body i, whose doll's root is at ``root``, m, to the sums of its doll."""
+    x, y, z = sub(add(root, vec(kin.positions[i])), vec(doll.center))
+    w, I = vec(kin.spatial_velocities[i]), kin.inertias[i]
+    u, spin = velocity_at(kin, i, vec(kin.positions[i])), inertia_times(I, w)
+    doll.kinetic += (mass * dot(u, u) + spin[0] * w[0] + spin[1] * w[1] + spin[2] * w[2]) / 2
+    momentum = scale(mass, u)
+    put(doll.momentum, add(vec(doll.momentum), momentum))
+    put(doll.angular_momentum,
+        add(vec(doll.angular_momentum), add(cross((x, y, z), momentum), spin)))
     own = doll.inertia
-    own[0, 0] += I[0] + m * (y * y + z * z)
-    own[1, 1] += I[3] + m * (x * x + z * z)
-    own[2, 2] += I[5] + m * (x * x + y * y)
-    own[0, 1] += I[1] - m * x * y
-    own[0, 2] += I[2] - m * x * z
-    own[1, 2] += I[4] - m * y * z
+    own[0, 0] += I[0] + mass * (y * y + z * z)
+    own[1, 1] += I[3] + mass * (x * x + z * z)
+    own[2, 2] += I[5] + mass * (x * x + y * y)
+    own[0, 1] += I[1] - mass * x * y
+    own[0, 2] += I[2] - mass * x * z
+    own[1, 2] += I[4] - mass * y * z
     own[1, 0], own[2, 0], own[2, 1] = own[0, 1], own[0, 2], own[1, 2]
 
 
 @compiled
 def total_energy(dolls: np.ndarray) -> tuple[float, float]:
-    """Energy of all dolls, J, and the kinetic part of it."""
+    """Energy of all dolls, J, and its kinetic part."""
     energy = kinetic = 0.0
     for d in range(len(dolls)):
         energy += dolls[d].energy
@@ -89,150 +99,136 @@ def total_energy(dolls: np.ndarray) -> tuple[float, float]:
 
 
 @compiled
-def give(given: np.record, sign: float, x: float, y: float, z: float, jx: float, jy: float,
-         jz: float) -> None:
-    """Enter an impulse, N s, at a point of the world, m."""
-    given.impulse[0] += sign * jx
-    given.impulse[1] += sign * jy
-    given.impulse[2] += sign * jz
-    a, b, c = cross(x, y, z, jx, jy, jz)
-    given.moment[0] += sign * a
-    given.moment[1] += sign * b
-    given.moment[2] += sign * c
+def add_impulse(external: np.record, share: float, at: Vec3, impulse: Vec3) -> None:
+    """Add ``share`` times an impulse, N s, that acts at a point of the world, m."""
+    moment = cross(at, impulse)
+    put(external.impulse, add_scaled(vec(external.impulse), share, impulse))
+    put(external.moment, add_scaled(vec(external.moment), share, moment))
 
 
 @compiled
-def give_contacts(s: System, r: Room, m: int, given: np.ndarray) -> None:
-    """Enter the impulses of m contacts, and who bears whom."""
+def add_contact_impulses(s: System, ws: Workspace, m: int) -> None:
+    """Enter the impulses of m contacts between dolls into step.external, and which dolls are on the
+    ground or touch each other.
+    """
+    external = ws.step.external
     for n in range(m):
-        c = r.contacts[n]
-        if c.kind == 1:
+        c = ws.contacts.found[n]
+        if c.kind == LIMIT:
             continue
-        one = s.doll_of[c.a]
-        other = s.doll_of[c.b] if c.b >= 0 else -1
-        if other < 0:
-            p = c.impulse  # what sticks may be held sideways alone
-            if p[0] != 0.0 or p[1] != 0.0 or p[2] != 0.0:
-                given[one].borne = 1
+        p, one = c.impulse, s.body_doll[c.body_a]
+        if c.body_b < 0:
+            if p[0] != 0.0 or p[1] != 0.0 or p[2] != 0.0:  # friction without limit needs no normal
+                external[one].on_ground = 1
             continue
+        other = s.body_doll[c.body_b]
         if one == other:
             continue
-        given[one].meets = given[other].meets = 1
-        p, t, w = c.impulse, c.across[0], c.across[1]
+        external[one].touches_other = external[other].touches_other = 1
+        t, w = vec(c.tangents[0]), vec(c.tangents[1])
         for doll, sign in ((one, 1.0), (other, -1.0)):
-            give(given[doll], sign, c.point[0], c.point[1], c.point[2], p[0] * c.normal[0],
-                 p[0] * c.normal[1], p[0] * c.normal[2])
-            give(given[doll], sign, c.arm[0], c.arm[1], c.arm[2], p[1] * t[0] + p[2] * w[0],
-                 p[1] * t[1] + p[2] * w[1], p[1] * t[2] + p[2] * w[2])
-            if c.kind == 5:
-                for k in range(3):
-                    given[doll].moment[k] += sign * (p[3] * t[k] + p[4] * w[k])
+            add_impulse(external[doll], sign, vec(c.point), scale(p[0], vec(c.normal)))
+            add_impulse(external[doll], sign, vec(c.friction_point),
+                        add(scale(p[1], t), scale(p[2], w)))
+            if c.kind == ROLLING:
+                moment = external[doll].moment
+                put(moment, add_scaled(vec(moment), sign, add(scale(p[3], t), scale(p[4], w))))
 
 
 @compiled
-def keep_momentum(s: System, r: Room, h: float, q: np.ndarray, v: np.ndarray) -> None:
-    """Change q and v at the end of a step of h s, before which the sums were r.before, so that each
-    doll which the ground does not bear has the momentum and the place that are due; r.after are
-    the sums at q and v. Giving depths back may have moved dolls apart that touch each other: their
-    spins make up for what that changes of their angular momentum about the world's origin.
+def conserve_momentum(s: System, ws: Workspace, h: float, q: np.ndarray, v: np.ndarray) -> None:
+    """Change q and v at the end of a step of h s, where the sums are sums_after, so that each doll
+    that is not on the ground has the momentum and the center of mass that are due.
+
+    Position correction may have moved dolls apart that touch each other: their spins make up for
+    what that changes of their angular momentum about the world's origin.
     """
-    gained, mean, turn, moved = r.table[12], r.table[13], r.table[14], r.table[15]
+    step, g = ws.step, vec(s.gravity)
     for i in range(len(s.tree)):
-        bone, d = s.tree[i], s.doll_of[i]
-        if bone.parent >= 0 or r.given[d].borne:
+        body, d = s.tree[i], s.body_doll[i]
+        if body.parent >= 0 or step.external[d].on_ground:
             continue
-        old, new, given, m = r.before[d], r.after[d], r.given[d], s.doll_masses[d]
-        at, rate = bone.q, bone.v
+        old, new, external, mass = (step.sums_before[d], step.sums_after[d], step.external[d],
+                                    s.doll_masses[d])
+        impulse, momentum, center = vec(external.impulse), vec(old.momentum), vec(new.center)
+        weight = mass * g[0] * h, mass * g[1] * h, mass * g[2] * h
+        due = add(add(momentum, impulse), weight)
+        way, twice = scale(h, add(momentum, due)), 2 * mass
+        place = add(vec(old.center), divide(way, twice))
+        mean = add(vec(old.center), place)
+        mean = mean[0] / 2, mean[1] / 2, mean[2] / 2
+        shift = sub(place, vec(external.center) if external.touches_other else center)
+        moved = sub(add(center, shift), place)
+        spin = sub(sub(sub(add(vec(old.angular_momentum), vec(external.moment)),
+                           cross(mean, impulse)), cross(moved, due)), vec(new.angular_momentum))
+        spin = locked_angular_velocity(ws, new, spin)
+        gained = divide(sub(due, vec(new.momentum)), mass)
+        at, dof = body.q_start, body.v_start
+        change = add(gained, cross(spin, sub(root_position(q, at), center)))
+        turn = quat_rotate_inverse(root_orientation(q, at), spin)
         for k in range(3):
-            due = old.momentum[k] + given.impulse[k] + m * s.gravity[k] * h
-            place = old.centre[k] + h * (old.momentum[k] + due) / (2 * m)
-            mean[k] = (old.centre[k] + place) / 2
-            mean[3 + k] = place - (given.centre[k] if given.meets else new.centre[k])
-            gained[k] = (due - new.momentum[k]) / m
-            moved[k] = new.centre[k] + mean[3 + k] - place
-            turn[k] = due
-        x, y, z = cross(mean[0], mean[1], mean[2], given.impulse[0], given.impulse[1],
-                        given.impulse[2])
-        dx, dy, dz = cross(moved[0], moved[1], moved[2], turn[0], turn[1], turn[2])
-        turn[0] = old.angular[0] + given.moment[0] - x - dx - new.angular[0]
-        turn[1] = old.angular[1] + given.moment[1] - y - dy - new.angular[1]
-        turn[2] = old.angular[2] + given.moment[2] - z - dz - new.angular[2]
-        lock(new, r.work.matrix, turn)
-        x, y, z = cross(turn[0], turn[1], turn[2], q[at] - new.centre[0], q[at + 1] - new.centre[1],
-                        q[at + 2] - new.centre[2])
-        v[rate] += gained[0] + x
-        v[rate + 1] += gained[1] + y
-        v[rate + 2] += gained[2] + z
-        x, y, z = turned(q[at + 3], q[at + 4], q[at + 5], -q[at + 6], turn[0], turn[1], turn[2])
-        v[rate + 3] += x
-        v[rate + 4] += y
-        v[rate + 5] += z
-        for k in range(3):
-            q[at + k] += mean[3 + k]
+            v[dof + k] += change[k]
+            v[dof + 3 + k] += turn[k]
+            q[at + k] += shift[k]
 
 
 @compiled
-def inner_energy(s: System, r: Room) -> float:
-    """Kinetic energy, J, of v - w in take_out, by the sums r.after."""
-    spin, inner = r.table[14], 0.0
-    for d in range(len(r.after)):
-        inner += r.after[d].kinetic
-        if not r.given[d].borne:
-            for k in range(3):
-                spin[k] = r.after[d].angular[k]
-            lock(r.after[d], r.work.matrix, spin)
-            inner -= rigid_energy(r.after[d], s.doll_masses[d], spin)
+def internal_kinetic_energy(s: System, ws: Workspace) -> float:
+    """Kinetic energy, J, of the motion that remove_energy() may scale, by sums_after: that of all
+    dolls, without the rigid motion of those that are not on the ground.
+    """
+    after, inner = ws.step.sums_after, 0.0
+    for d in range(len(after)):
+        inner += after[d].kinetic
+        if not ws.step.external[d].on_ground:
+            spin = locked_angular_velocity(ws, after[d], vec(after[d].angular_momentum))
+            inner -= rigid_energy(after[d], s.doll_masses[d], spin)
     return inner
 
 
 @compiled
-def take_out(s: System, r: Room, gained: float, q: np.ndarray, v: np.ndarray) -> None:
-    """Take energy, J, that came from nothing out of the motion v at q, the sums there being
-    r.after, as far as there is any.
+def remove_energy(s: System, ws: Workspace, gained: float, q: np.ndarray, v: np.ndarray) -> None:
+    """Remove energy, J, that came from nothing from the motion v at q, where the sums are
+    sums_after, as far as there is any.
 
-    v becomes w + s (v - w). Of dolls that the ground bears w is zero, of others their motion as
-    one rigid body: their momenta stay. What is at rest against w stays so, and what slides or comes
-    apart does so in the same direction.
+    v becomes w + s (v - w). Of dolls on the ground w is zero, of others their rigid motion, so that
+    their momenta stay. What is at rest relative to w stays so, and what slides or separates goes on
+    in the same direction.
     """
-    matrix, spin, inner = r.work.matrix, r.table[14], inner_energy(s, r)
+    inner = internal_kinetic_energy(s, ws)
     share = math.sqrt(max(0.0, 1 - gained / inner)) if inner > 0 else 1.0
     for i in range(len(s.tree)):
-        bone, new = s.tree[i], r.after[s.doll_of[i]]
-        at, rate = bone.q, bone.v
-        if bone.parent >= 0 or r.given[s.doll_of[i]].borne:
-            for k in range(bone.dof if bone.parent >= 0 else 6):
-                v[rate + k] *= share
+        body, d = s.tree[i], s.body_doll[i]
+        at, dof = body.q_start, body.v_start
+        if body.parent >= 0 or ws.step.external[d].on_ground:
+            for k in range(body.dof_count if body.parent >= 0 else 6):
+                v[dof + k] *= share
             continue
+        new = ws.step.sums_after[d]
+        spin = locked_angular_velocity(ws, new, vec(new.angular_momentum))
+        move = add(divide(vec(new.momentum), s.doll_masses[d]),
+                   cross(spin, sub(root_position(q, at), vec(new.center))))
+        turn = quat_rotate_inverse(root_orientation(q, at), spin)
         for k in range(3):
-            spin[k] = new.angular[k]
-        lock(new, matrix, spin)
-        x, y, z = cross(spin[0], spin[1], spin[2], q[at] - new.centre[0], q[at + 1] - new.centre[1],
-                        q[at + 2] - new.centre[2])
-        mass = s.doll_masses[s.doll_of[i]]
-        x, y, z = new.momentum[0] / mass + x, new.momentum[1] / mass + y, new.momentum[2] / mass + z
-        v[rate] = x + share * (v[rate] - x)
-        v[rate + 1] = y + share * (v[rate + 1] - y)
-        v[rate + 2] = z + share * (v[rate + 2] - z)
-        x, y, z = turned(q[at + 3], q[at + 4], q[at + 5], -q[at + 6], spin[0], spin[1], spin[2])
-        v[rate + 3] = x + share * (v[rate + 3] - x)
-        v[rate + 4] = y + share * (v[rate + 4] - y)
-        v[rate + 5] = z + share * (v[rate + 5] - z)
+            v[dof + k] = move[k] + share * (v[dof + k] - move[k])
+            v[dof + 3 + k] = turn[k] + share * (v[dof + 3 + k] - turn[k])
 
 
 @compiled
-def lock(doll: np.record, matrix: np.ndarray, spin: np.ndarray) -> None:
-    """Put in an angular momentum's place the angular velocity (3,) rad/s of a doll that has it as
-    one rigid body.
-    """
+def locked_angular_velocity(ws: Workspace, doll: np.record, angular_momentum: Vec3) -> Vec3:
+    """Angular velocity, rad/s, of a doll with this angular momentum and all joints locked."""
+    matrix, spin = ws.step.dynamics.matrix, ws.step.spin
     for j in range(3):
         for k in range(3):
             matrix[j, k] = doll.inertia[j, k]
-    solve(matrix, spin[:3])
+    put(spin, angular_momentum)
+    solve(matrix, spin)
+    return vec(spin)
 
 
 @compiled
-def rigid_energy(doll: np.record, mass: float, spin: np.ndarray) -> float:
-    """Kinetic energy, J, of that body."""
-    p, l = doll.momentum, doll.angular
+def rigid_energy(doll: np.record, mass: float, spin: Vec3) -> float:
+    """Kinetic energy, J, of that rigid motion."""
+    p, l = doll.momentum, doll.angular_momentum
     return ((p[0] ** 2 + p[1] ** 2 + p[2] ** 2) / mass + spin[0] * l[0] + spin[1] * l[1]
             + spin[2] * l[2]) / 2

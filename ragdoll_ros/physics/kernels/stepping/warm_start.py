@@ -1,4 +1,4 @@
-"""Impulses for a step to begin with: those of the step before."""
+"""Warm start: a step's solve begins with the impulses of the step before."""
 from __future__ import annotations
 
 import math
@@ -6,68 +6,79 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..impulses.response import PARTING
-from ..system import Room, System
+from ..contact_kind import LIMIT
+from ..impulses.solve_contacts import SEPARATING
+from ..maths.vectors import norm, vec
+from ..system import System
+from ..workspace import Workspace
 
 JAMMED = 10.0
-"""Times all momenta and weights that impulses may be before they are those of a jam."""
+"""Times all momenta and weights from which on impulses are those of a jam."""
 
 
 @compiled
-def jammed(s: System, r: Room, h: float) -> float:
-    """Sum of impulses, N s, that only what jams exceeds in h s."""
-    momentum, g = 0.0, s.gravity
-    weight = math.sqrt(g[0] ** 2 + g[1] ** 2 + g[2] ** 2)
-    for d in range(len(r.before)):
+def jam_threshold(s: System, ws: Workspace, h: float) -> float:
+    """Sum of impulses, N s, that only jammed contacts exceed in h s."""
+    momentum, weight = 0.0, norm(vec(s.gravity))
+    for d in range(len(ws.step.sums_before)):
         mass = s.doll_masses[d]
-        momentum += math.sqrt(2 * r.before[d].kinetic * mass) + mass * weight * h
+        momentum += math.sqrt(2 * ws.step.sums_before[d].kinetic * mass) + mass * weight * h
     return JAMMED * momentum
 
 
 @compiled
-def warm_start(s: System, r: Room, m: int, known: np.ndarray, h: float) -> None:
-    """Begin with the impulses of the step before, of the contacts that there were.
+def warm_start(s: System, ws: Workspace, m: int, known: np.ndarray, h: float) -> None:
+    """Let m contacts begin with the impulses that the ``known`` contacts of the last step had, and
+    enter which of them are persistent.
 
-    Where contacts jam, what they press against each other is decided by nothing, and would grow
-    from step to step: from where it is beyond all measure, they begin with none.
+    What jammed contacts press against each other is determined by nothing and would grow from step
+    to step: above the threshold they begin without impulses.
     """
-    tally, pressed = r.tally[0], 0.0
-    scale = h / tally.lasted if tally.lasted > 0 else 0.0
-    for j in range(tally.contacts):
+    stats, pressed = ws.stats[0], 0.0
+    share = h / stats.last_dt if stats.last_dt > 0 else 0.0
+    for j in range(stats.contact_count):
         pressed += abs(known[j].impulse[0])
-    if scale * pressed > jammed(s, r, h):
-        scale = 0.0
+    if share * pressed > jam_threshold(s, ws, h):
+        share = 0.0
+    start_count = ws.step.scalars[0].start_contact_count
     j = k = 0
     for i in range(m):
-        c = r.contacts[i]
+        c = ws.contacts.found[i]
         for e in range(5):
             c.impulse[e] = 0.0
-        j = find_key(known, tally.contacts, c.key, j)
-        if j < tally.contacts:
+        j = find_id(known, stats.contact_count, c.id, j)
+        if j < stats.contact_count:
             for e in range(5):
-                c.impulse[e] = scale * known[j].impulse[e]
-        k = find_key(r.begun, r.count[0], c.key, k)
-        c.begun = 1 if k < r.count[0] else 0
-        if c.begun:
-            old = r.begun[k]
-            c.gap = old.gap
-            for e in range(5):
-                c.start[e] = old.start[e]
-            if c.kind > 1 and old.start[0] > PARTING:
-                c.friction = c.rolling = 0.0
-                for e in range(1, 5):
-                    c.impulse[e] = 0.0
+                c.impulse[e] = share * known[j].impulse[e]
+        k = find_id(ws.contacts.start, start_count, c.id, k)
+        c.persistent = 1 if k < start_count else 0
+        if c.persistent:
+            take_start(c, ws.contacts.start[k])
 
 
 @compiled
-def find_key(contacts: np.ndarray, count: int, key: int, near: int) -> int:
-    """Where among so many contacts that with the key stands, sought from ``near`` on, as most stand
-    in the same order; ``count``: nowhere.
+def take_start(c: np.record, start: np.record) -> None:
+    """Enter gap and velocities of a persistent contact as the step began; what separates then has
+    no friction.
+    """
+    c.gap = start.gap
+    for e in range(5):
+        c.start_velocity[e] = start.start_velocity[e]
+    if c.kind != LIMIT and start.start_velocity[0] > SEPARATING:
+        c.friction = c.rolling_friction = 0.0
+        for e in range(1, 5):
+            c.impulse[e] = 0.0
+
+
+@compiled
+def find_id(contacts: np.ndarray, count: int, id_: int, near: int) -> int:
+    """Index of the contact with this id among so many, searched from ``near`` on, as most are in
+    the same order; ``count`` if there is none.
     """
     for n in range(count):
         j = near + n
         if j >= count:
             j -= count
-        if contacts[j].key == key:
+        if contacts[j].id == id_:
             return j
     return count

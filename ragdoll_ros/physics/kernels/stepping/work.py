@@ -1,57 +1,60 @@
-"""What pushes, hands and drives give in a step: work, impulse and moment."""
+"""Work, impulse and moment that pushes, grabs and drives do in a step."""
 from __future__ import annotations
 
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..dynamics.forward import Work, pose
-from ..dynamics.mass import root_axes
-from ..maths.quaternion import cross, times, turned
-from ..system import HAND, HOLDS, TURNS, Room, System
-from .forces import mean_force, root_q, spring_point
-from .momentum import give
+from ..dynamics.kinematics import (
+    Kinematics,
+    forward_kinematics,
+    point_of_body,
+    root_motion_subspaces,
+    root_position,
+    velocity_at,
+)
+from ..dynamics.loads import ANGULAR_DRIVE, GRAB, JOINT_SPRING, load_in_world
+from ..maths.vectors import add, dot, put, scale, vec
+from ..system import System
+from ..workspace import Workspace
+from .momentum import add_impulse
+from .springs import mean_spring_force
 
 
 @compiled
-def enter_work(s: System, r: Room, v: np.ndarray, end_v: np.ndarray, h: float,
-               loads: np.ndarray, springs: np.ndarray, since: float) -> None:
-    """Book the work, J, of loads, hands and drives in a step of h s, and their impulses in
-    r.given; that of forces along the world's axes is that of reached() alone.
+def account_work(s: System, ws: Workspace, v: np.ndarray, v_end: np.ndarray, h: float,
+                 loads: np.ndarray, springs: np.ndarray, since: float) -> None:
+    """Book the work, J, of loads, grabs and drives in a step of h s, and enter their impulses into
+    step.external. The work of forces along the world's axes is that of load_potential() alone.
     """
-    middle, mean = r.states[0], r.vectors[0]
+    kin, q, mean, stats = ws.step.middle, ws.step.q_middle, ws.step.v_middle, ws.stats[0]
     for j in range(len(v)):
-        mean[j] = (v[j] + end_v[j]) / 2
-    pose(s.tree, middle, mean, r.work)
+        mean[j] = (v[j] + v_end[j]) / 2
+    forward_kinematics(s.tree, q, mean, kin)
     for k in range(len(loads)):
-        r.tally[0].pushed += h * power(s.tree, r.work, loads[k], loads[k, 10] == 0)
-        give_load(s, r, middle, loads[k], h)
+        stats.work_pushes += h * load_power(s.tree, kin, loads[k], loads[k].local == 0)
+        add_load_impulse(s, ws, kin, q, loads[k], h)
     if len(springs):
-        root_axes(s.tree, middle, r.work.axes)
+        root_motion_subspaces(s.tree, q, kin)
     for k in range(len(springs)):
-        fx, fy, fz, ux, uy, uz = mean_force(
-            s.tree, s.up, s.last, r.work, middle, root_q(s, springs[k]), v, end_v, springs[k],
-            since + h / 2, h)
-        done = h * (fx * ux + fy * uy + fz * uz)
-        i = int(springs[k, 0])
-        if springs[k, 18] == HAND or springs[k, 18] == HOLDS:
-            r.tally[0].handed += done
+        spring = springs[k]
+        force, velocity = mean_spring_force(s, kin, q, v, v_end, spring, since + h / 2, h)
+        done = h * dot(force, velocity)
+        if spring.kind == GRAB or spring.kind == JOINT_SPRING:
+            stats.work_grabs += done
         else:
-            r.tally[0].pushed += done
-        if springs[k, 18] == HOLDS:
-            continue
-        if springs[k, 18] == TURNS:
-            moment = r.given[s.doll_of[i]].moment
-            moment[0], moment[1], moment[2] = moment[0] + h * fx, moment[1] + h * fy, (
-                moment[2] + h * fz)
-            continue
-        x, y, z = spring_point(s.tree[i], r.work, i, springs[k, 1:4])
-        root = s.tree[s.root_of[i]].q
-        give(r.given[s.doll_of[i]], h, middle[root] + x, middle[root + 1] + y,
-             middle[root + 2] + z, fx, fy, fz)
+            stats.work_pushes += done
+        i = spring.body
+        external = ws.step.external[s.body_doll[i]]
+        if spring.kind == ANGULAR_DRIVE:
+            put(external.moment, add(vec(external.moment), scale(h, force)))
+        elif spring.kind != JOINT_SPRING:
+            arm = point_of_body(s.tree[i], kin, i, spring.point)
+            at = add(root_position(q, s.tree[s.body_root[i]].q_start), arm)
+            add_impulse(external, h, at, force)
 
 
 @compiled
-def record_of(tree: np.ndarray, bone: int) -> int:
+def body_of_bone(tree: np.ndarray, bone: int) -> int:
     """Record of a bone of the scene."""
     for i in range(len(tree)):
         if tree[i].bone == bone:
@@ -60,57 +63,41 @@ def record_of(tree: np.ndarray, bone: int) -> int:
 
 
 @compiled
-def turned_load(bone: np.record, work: Work, i: int,
-                load: np.ndarray) -> tuple[float, float, float, float, float, float]:
-    """Force, N, and torque, N m, of a load on bone i along the world's axes."""
-    if load[10] == 0:
-        return load[1], load[2], load[3], load[4], load[5], load[6]
-    t, b = work.turns[i], bone.bind
-    x, y, z, w = times(t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3])
-    fx, fy, fz = turned(x, y, z, w, load[1], load[2], load[3])
-    nx, ny, nz = turned(x, y, z, w, load[4], load[5], load[6])
-    return fx, fy, fz, nx, ny, nz
+def add_load_impulse(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, load: np.record,
+                     h: float) -> None:
+    """Enter the impulse of a load in h s into step.external."""
+    i = body_of_bone(s.tree, load.bone)
+    arm = point_of_body(s.tree[i], kin, i, load.point)
+    force, torque = load_in_world(s.tree[i], kin, i, load)
+    external = ws.step.external[s.body_doll[i]]
+    at = add(root_position(q, s.tree[s.body_root[i]].q_start), arm)
+    add_impulse(external, h, at, force)
+    put(external.moment, add(vec(external.moment), scale(h, torque)))
 
 
 @compiled
-def give_load(s: System, r: Room, q: np.ndarray, load: np.ndarray, h: float) -> None:
-    """Enter what a load gives in h s."""
-    i = record_of(s.tree, int(load[0]))
-    x, y, z = spring_point(s.tree[i], r.work, i, load[7:10])
-    fx, fy, fz, nx, ny, nz = turned_load(s.tree[i], r.work, i, load)
-    root, given = s.tree[s.root_of[i]].q, r.given[s.doll_of[i]]
-    give(given, h, q[root] + x, q[root + 1] + y, q[root + 2] + z, fx, fy, fz)
-    given.moment[0] += h * nx
-    given.moment[1] += h * ny
-    given.moment[2] += h * nz
-
-
-@compiled
-def reached(s: System, r: Room, q: np.ndarray, loads: np.ndarray) -> float:
-    """Sum of F x, J, over forces along the world's axes, x where they act at q: what it grows by is
-    the work of a steady force, whatever the way. Work is posed at q.
+def load_potential(s: System, kin: Kinematics, q: np.ndarray, loads: np.ndarray) -> float:
+    """Sum of F x, J, over forces along the world's axes, x where they act at q: its growth is the
+    work of a constant force, whatever the path. ``kin`` is that of q.
     """
     total = 0.0
     for k in range(len(loads)):
         load = loads[k]
-        if load[10] == 0:
-            i = record_of(s.tree, int(load[0]))
-            x, y, z = spring_point(s.tree[i], r.work, i, load[7:10])
-            root = s.tree[s.root_of[i]].q
-            total += (load[1] * (q[root] + x) + load[2] * (q[root + 1] + y)
-                      + load[3] * (q[root + 2] + z))
+        if load.local == 0:
+            i = body_of_bone(s.tree, load.bone)
+            arm = point_of_body(s.tree[i], kin, i, load.point)
+            total += dot(vec(load.force),
+                         add(root_position(q, s.tree[s.body_root[i]].q_start), arm))
     return total
 
 
 @compiled
-def power(tree: np.ndarray, work: Work, load: np.ndarray, turning: bool) -> float:
-    """Power, W, of a load on what moves as work says; ``turning``: of its torque alone."""
-    i = record_of(tree, int(load[0]))
-    move = work.moves[i]
-    x, y, z = spring_point(tree[i], work, i, load[7:10])
-    fx, fy, fz, nx, ny, nz = turned_load(tree[i], work, i, load)
-    ux, uy, uz = cross(move[0], move[1], move[2], x, y, z)
-    if turning:
-        fx = fy = fz = 0.0
-    return (fx * (move[3] + ux) + fy * (move[4] + uy) + fz * (move[5] + uz)
-            + nx * move[0] + ny * move[1] + nz * move[2])
+def load_power(tree: np.ndarray, kin: Kinematics, load: np.record, torque_only: bool) -> float:
+    """Power, W, of a load, or of its torque alone, at the velocities of ``kin``."""
+    i = body_of_bone(tree, load.bone)
+    velocity = velocity_at(kin, i, point_of_body(tree[i], kin, i, load.point))
+    force, torque = load_in_world(tree[i], kin, i, load)
+    if torque_only:
+        force = 0.0, 0.0, 0.0
+    turn = kin.spatial_velocities[i]
+    return (dot(force, velocity) + torque[0] * turn[0] + torque[1] * turn[1] + torque[2] * turn[2])

@@ -16,7 +16,7 @@ from sensor_msgs.msg import JointState
 from ....model.scene import SECOND, Scene
 from ....model.state import State
 from ....recordings.rods import Rods
-from ....ros.messages.serialized import poses_in
+from ....ros.messages.serialized import deserialize_pose_array
 from ....ros.outputs import LATCHED
 from ..source import Frame, Wanted
 from .hands import RemoteHands
@@ -35,7 +35,7 @@ class Topic(NamedTuple):
 
 
 def _positions(data: bytes, _: Scene | None) -> np.ndarray:
-    return poses_in(data)[1][:, :3]
+    return deserialize_pose_array(data)[1][:, :3]
 
 
 def _angles(message: JointState, scene: Scene | None) -> np.ndarray:
@@ -44,7 +44,8 @@ def _angles(message: JointState, scene: Scene | None) -> np.ndarray:
     return np.array(message.position)
 
 
-TOPICS = {'poses': Topic(PoseArray, '{}/poses', lambda data, _: poses_in(data), LATCHED),
+TOPICS = {'poses': Topic(PoseArray, '{}/poses', lambda data, _: deserialize_pose_array(data),
+                         LATCHED),
           'contacts': Topic(PoseArray, '{}/contacts', _positions),
           'swings': Topic(PoseArray, '{}/swings', _positions),
           'angles': Topic(JointState, 'joint_states', _angles, raw=False)}
@@ -131,7 +132,7 @@ class RemoteFrames:
         self._pushes.time = (stamp - zero) / SECOND * pace
         masses, rods = self._values.get('swings'), None
         if masses is not None and len(masses) == self._rods.count:
-            rods = self._rods.between(masses, state)
+            rods = self._rods.ends(masses, state)
         return Frame(scene, self._pushes.time, state, self._pushes.pushes,
                      self._hands.held(scene, state), rods, self._values.get('contacts'),
                      self._values.get('angles'))

@@ -7,7 +7,7 @@ from ....model.scene import Scene
 
 
 class Silent:
-    """Stands for the node's tally: what is refused or clamped, the node counts and tells."""
+    """Stands for the node's InputCounts: what is refused or clamped, the node counts and tells."""
 
     def refuse(self, source: str, reason: object) -> None:
         """Say nothing."""
@@ -17,7 +17,7 @@ class Silent:
 
 
 class HeardPushes:
-    """Stands for the node's simulation where messages become pushes (ros/inputs.py)."""
+    """Stands for the node's simulation as the target of ros/inputs/subscriptions.py."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene

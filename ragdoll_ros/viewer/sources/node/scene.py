@@ -13,7 +13,7 @@ from ....fit.robots.robot import doll_from_urdf
 from ....model import errors
 from ....model.ragdoll import WORLD
 from ....model.scene import Ground, Placement, Scene
-from ....ros.parameters import BONE_NAMES, SPECS, Settings
+from ....ros.parameters.node_settings import BONE_NAMES, SPECS, NodeSettings
 from .services import Ask
 
 GUESSED = ('The shapes are those of `robot_description`, as the scene `{}` is not here or another '
@@ -51,7 +51,7 @@ class RemoteScene:
 
     def __init__(self, ask: Ask, node: str, learned: Callable[[], None]) -> None:
         self.scene: Scene | None = None
-        self.settings = Settings()
+        self.settings = NodeSettings()
         self.note = self.problem = ''
         self._ask, self._node, self._learned = ask, node, learned
         self._description: str | None = None
@@ -82,7 +82,7 @@ class RemoteScene:
         names = values.pop(BONE_NAMES)
         if self._description is None or names is None or None in values.values():
             return
-        self.settings = Settings(**values)
+        self.settings = NodeSettings(**values)
         try:
             scene, self.note = scene_of_node(self.settings.scene, names, self._description,
                                              self.settings.frame_id)

@@ -27,7 +27,7 @@ from ....model import errors
 from ....model.scene import Scene
 from ....model.vectors import Vector
 from ....ros.diagnostics import status_name
-from ....ros.inputs import Inputs
+from ....ros.inputs.subscriptions import PushSubscriptions
 from ....ros.outputs import LATCHED
 from ..source import Frame, Report, Source, Wanted
 from .force import RemoteForce
@@ -75,7 +75,7 @@ class Remote(Source):
         self._frames = RemoteFrames(self._node, NAME, self._hands)
         self._known = RemoteScene(self._ask, self._full, self._go_on)
         self._pushes: HeardPushes | None = None
-        self._inputs: Inputs | None = None
+        self._inputs: PushSubscriptions | None = None
         self._force = RemoteForce(self._node, NAME)
         self._wanted = Wanted()
         self._told = Report()
@@ -211,7 +211,7 @@ class Remote(Source):
             self._end(self._inputs.subscriptions)
             self._inputs = None
         elif wanted:
-            self._inputs = self._inputs or Inputs(self._node, Silent(), NAME)
+            self._inputs = self._inputs or PushSubscriptions(self._node, Silent(), NAME)
             self._inputs.simulation, self._inputs.settings = self._pushes, self._known.settings
 
     def _end(self, subscriptions: list[Subscription]) -> None:

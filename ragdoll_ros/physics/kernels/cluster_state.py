@@ -1,0 +1,82 @@
+"""ClusterState: what of a cluster of dolls is carried from tick to tick."""
+from __future__ import annotations
+
+import collections
+
+import numpy as np
+
+from .compiling.bundle import bundle_type
+from .dynamics.loads import LOAD, SPRING
+from .system import System, blank_system, coordinate_count, gap_count
+
+CONTACT = np.dtype([
+    ('kind', np.int64), ('body_a', np.int64), ('body_b', np.int64), ('dof', np.int64),
+    ('limit_sign', float), ('id', np.int64), ('patch', np.int64), ('island', np.int64),
+    ('first_row', np.int64), ('dof_count', np.int64), ('point', float, 3),
+    ('friction_point', float, 3), ('normal', float, 3), ('tangents', float, (2, 3)),
+    ('gap', float), ('friction', float), ('rolling_friction', float), ('restitution', float),
+    ('normal_velocity', float), ('impulse', float, 5), ('persistent', np.int64),
+    ('start_velocity', float, 5)], align=True)
+"""A contact of two bodies (``body_b`` -1: the ground), or a joint at a limit.
+
+kind: see contact_kind.py. dof, limit_sign: of a limit, its degree of freedom and the direction back
+inside. id: the same from step to step; patch: the same for all points of one contact patch. point,
+where the normal force acts, and friction_point, where friction acts: world, m. normal: from b to a;
+tangents: two directions across it. gap: m or rad. rolling_friction: m. normal_velocity: before the
+step, m/s. impulse: along the rows, N s or N m s. persistent: whether it existed as the step began,
+with the velocities start_velocity along its rows. island, first_row, dof_count: of the solver."""
+
+DOLL_SUMS = np.dtype([
+    ('energy', float), ('kinetic', float), ('center', float, 3), ('momentum', float, 3),
+    ('angular_momentum', float, 3), ('inertia', float, (3, 3))])
+"""Sums over a doll, in the order of the arrays that engines hand out: total and kinetic energy, J;
+center of mass, m; momentum; angular momentum about the center of mass; inertia about it with all
+joints locked."""
+
+DENSE_STEP = np.dtype([
+    ('valid', np.int64), ('first_rate_known', np.int64), ('elapsed', float), ('length', float),
+    ('next_length', float), ('event_time', float), ('error', float)], align=True)
+"""A step of flight with dense output: whether there is one; whether the state derivative at its
+start is known; time gone along it, s; its length, s; the next one's, from the error; the time of
+its first contact, or infinity; its estimated error, m or rad."""
+
+STEP_STATS = np.dtype([
+    ('flight_steps', np.int64), ('steps', np.int64), ('impacts', np.int64), ('sweeps', np.int64),
+    ('unsolved', np.int64), ('contacts_dropped', np.int64), ('toi_failures', np.int64),
+    ('restitution_reduced', np.int64), ('energy_gains', np.int64), ('contact_count', np.int64),
+    ('ended_without_impact', np.int64), ('last_dt', float), ('next_dt', float),
+    ('work_pushes', float), ('work_grabs', float), ('work_position_correction', float),
+    ('gaps_current', np.int64)], align=True)
+"""Since the start: flight steps, contact steps, impacts, Gauss-Seidel sweeps; islands that stayed
+unsolved, contacts dropped for want of space, searches for a time of impact that failed, impacts
+whose restitution was reduced to gain no energy, steps that gained some all the same. Of the last
+step: its contacts, whether it ended without an impact, its length and the longest that the next may
+have, s (0: any). Work of pushes, of grabs, and of position correction beyond what the motion paid
+for, J. ``gaps_current``: whether the gaps are those of now."""
+
+ClusterState = collections.namedtuple(
+    'ClusterState', 'q v dense_output end_rates dense_step stats excluded contacts gaps '
+    'contact_accelerations bone_states doll_sums loads springs')
+"""The state of a cluster. ``q`` (nq,), ``v`` (nv,): generalized coordinates and velocities, angular
+velocities of roots along the roots' own axes. ``dense_step`` (1,), with its polynomial
+``dense_output`` (8, nq + nv) and the state derivatives at its ends, ``end_rates`` (2, nq + nv).
+``stats`` (1,). ``excluded`` (p,): flags of the pairs within dolls, see system.py. ``contacts``: of
+the last step. ``gaps``: see contact/gaps.py. ``contact_accelerations`` (nv,): by contacts in the
+last step, zero unless all of them persist. Output: ``bone_states`` (n, 13), ``doll_sums`` (d,).
+Input: ``loads``, ``springs``."""
+
+
+def make_cluster_state(system: System, contacts: int = 0) -> ClusterState:
+    """At the origin, at rest, with room for so many contacts."""
+    nv, nq = len(system.dof_parent), coordinate_count(system)
+    return ClusterState(
+        q=np.zeros(nq), v=np.zeros(nv), dense_output=np.zeros((8, nq + nv)),
+        end_rates=np.zeros((2, nq + nv)), dense_step=np.zeros(1, DENSE_STEP),
+        stats=np.zeros(1, STEP_STATS), excluded=np.zeros(len(system.pairs), np.int64),
+        contacts=np.zeros(contacts, CONTACT), gaps=np.zeros(gap_count(system)),
+        contact_accelerations=np.zeros(nv), bone_states=np.zeros((len(system.tree), 13)),
+        doll_sums=np.zeros(len(system.doll_masses), DOLL_SUMS), loads=np.zeros(0, LOAD),
+        springs=np.zeros(0, SPRING))
+
+
+CLUSTER_STATE = bundle_type(make_cluster_state(blank_system()))

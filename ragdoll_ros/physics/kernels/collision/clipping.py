@@ -1,0 +1,68 @@
+"""Sutherland-Hodgman clipping: a polygon clipped by the sides of a convex polygon.
+
+Sutherland, Hodgman, Reentrant polygon clipping, 1974.
+"""
+from __future__ import annotations
+
+import numpy as np
+
+from ..compiling.decorators import compiled
+from ..maths.vectors import Vec3, add_scaled, cross, dot, put, scale, sub, vec
+from .features import MAX_CORNERS
+
+MAX_CLIPPED = 20
+"""Vertices of a clipped polygon: 8 of a cap, 8 sides, and a few that rounding may add."""
+
+
+@compiled
+def clip_polygon(reference: np.ndarray, count: int, n: Vec3, polygon: np.ndarray, number: int,
+                 scratch: np.ndarray) -> int:
+    """Clip a polygon (number) in place by the sides, an even count, of another one, seen along n.
+
+    Both are arrays of CLIP_VERTEX. The feature id of a vertex is that of the side that leaves it:
+    0 to 7 the polygon's own, from MAX_CORNERS on the reference's. Returns the vertices left.
+    """
+    turn = _winding(reference, n)
+    source, target = polygon, scratch
+    for j in range(count):
+        k = j + 1 if j + 1 < count else 0
+        corner = vec(reference[j].point)
+        # the side's plane holds n; inside is m x <= m corner
+        m = scale(turn, cross(sub(vec(reference[k].point), corner), n))
+        number = _clip_by_plane(source, number, m, dot(m, corner), MAX_CORNERS + j, target)
+        source, target = target, source
+        if number == 0:
+            break
+    return number
+
+
+@compiled
+def _winding(corners: np.ndarray, n: Vec3) -> float:
+    """1 if the corners go round n anticlockwise, else -1."""
+    origin = vec(corners[0].point)
+    a, b = sub(vec(corners[1].point), origin), sub(vec(corners[2].point), origin)
+    return 1.0 if dot(n, cross(a, b)) > 0 else -1.0
+
+
+@compiled
+def _clip_by_plane(polygon: np.ndarray, number: int, m: Vec3, offset: float, side: int,
+                   out: np.ndarray) -> int:
+    """The part of a polygon with m x <= offset; the new side gets the id ``side``."""
+    count = 0
+    previous = polygon[number - 1]
+    before = dot(m, vec(previous.point)) - offset
+    for i in range(number):
+        vertex = polygon[i]
+        now = dot(m, vec(vertex.point)) - offset
+        if (now <= 0) != (before <= 0) and count < MAX_CLIPPED:
+            start = vec(previous.point)
+            put(out[count].point, add_scaled(
+                start, before / (before - now), sub(vec(vertex.point), start)))
+            out[count].feature_id = previous.feature_id if now <= 0 else side
+            count += 1
+        if now <= 0 and count < MAX_CLIPPED:
+            put(out[count].point, vec(vertex.point))
+            out[count].feature_id = vertex.feature_id
+            count += 1
+        previous, before = vertex, now
+    return count

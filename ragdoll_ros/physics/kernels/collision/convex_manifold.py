@@ -1,0 +1,176 @@
+"""Contact manifolds of boxes and cylinders: one shape's face clipped by the sides of the other's.
+
+The reference face is the one more nearly perpendicular to the contact normal n. Polygons are seen
+and gaps measured along n, not along the face's normal, so that the deepest point is as deep as the
+shapes. Where no face is perpendicular to n, two edges, a vertex or a rim touch.
+"""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..compiling.decorators import compiled
+from ..maths.vectors import Vec3, add, add_scaled, column, dot, neg, put, scale, sub, vec
+from .clipping import MAX_CLIPPED, clip_polygon
+from .features import FEATURE_SINE, MAX_CORNERS, face_cosine, supporting_edge, supporting_face
+from .manifold import CLIP_VERTEX, merge_points, reduce_points
+from .separating_axis import FACE_BIAS, FACE_BIAS_RATIO, Axis, face_or_edge_axis, refine_axis
+from .shapes import BOX, CYLINDER, Shape, bounding_radius, support_point
+
+FACE_COSINE = math.sqrt(1 - FEATURE_SINE * FEATURE_SINE)
+
+PARALLEL_EDGES_SINE = 1e-3
+"""Sine between two edges up to which they touch at two points, not at one."""
+
+MERGE_RATIO = 1e-3
+"""Points closer than this part of the smaller bounding radius are merged."""
+
+FACE_TIE = 1e-10
+"""Faces whose cosines differ by less are equal: the reference is a, unless only b is a box."""
+
+DEPTH_TOLERANCE = 1e-10
+"""m: by how much the deepest point may differ from the shapes' penetration where the axis is not
+that of a face; where it is, by as much as the bias of faces."""
+
+CLOSEST_POINTS_ID = 2 * MAX_CORNERS * 2 * MAX_CORNERS - 1
+"""Feature id of the contact at the closest points, which no two sides of faces have."""
+
+
+@compiled
+def _contact_axis(a: Shape, b: Shape, c: Vec3, margin: float) -> Axis:
+    """The axis of the contact: a face's unless another one is clearly better."""
+    sat = face_or_edge_axis(a, b, c, 1.0, margin)
+    if sat[0] <= margin and (a.kind == CYLINDER or b.kind == CYLINDER):
+        refined = refine_axis(a, b, c, sat)
+        if refined[0] > sat[0] + FACE_BIAS + FACE_BIAS_RATIO * abs(sat[0]):
+            return refined
+    return sat
+
+
+@compiled
+def convex_manifold(a: Shape, b: Shape, margin: float, manifold: np.ndarray) -> int:
+    """Store the contact manifold of two shapes that are boxes or cylinders."""
+    origin = b.position
+    a = Shape(a.kind, a.size, sub(a.position, origin), a.rotation)
+    b = Shape(b.kind, b.size, (0.0, 0.0, 0.0), b.rotation)
+    s, n = _contact_axis(a, b, a.position, margin)
+    if s > margin:
+        return 0
+    scratch = np.empty(2 * MAX_CLIPPED + MAX_CORNERS, CLIP_VERTEX)
+    points = scratch[MAX_CLIPPED:2 * MAX_CLIPPED]
+    cosine_a, cosine_b = face_cosine(a, n), face_cosine(b, n)
+    cosine = max(cosine_a, cosine_b)
+    along_face = cosine > 1 - FACE_TIE
+    incident, reference, sign = b, a, -1.0
+    if cosine_b > cosine_a + (FACE_TIE if a.kind == BOX else -FACE_TIE):
+        incident, reference, sign = a, b, 1.0
+    if cosine >= FACE_COSINE:
+        count = _clip_faces(incident, reference, n, sign, scratch)
+    else:
+        count = _clip_edges(a, b, n, points)
+    least = math.inf
+    for i in range(count):
+        least = min(least, points[i].gap)
+    if least > s + (FACE_BIAS + FACE_BIAS_RATIO * abs(s) if along_face else DEPTH_TOLERANCE):
+        if along_face:
+            # a vertex or rim on the reference face
+            vertex = add(incident.position, support_point(incident, scale(-sign, n)))
+            middle = add_scaled(vertex, -(sign * s / 2), n)
+        else:
+            middle = _closest_on_edges(a, b, n, s)
+        put(points[count].point, middle)
+        points[count].gap, points[count].feature_id = s, CLOSEST_POINTS_ID
+        count += 1
+    distance = MERGE_RATIO * min(bounding_radius(a), bounding_radius(b))
+    count = reduce_points(points, merge_points(points, count, margin, distance))
+    for i in range(count):
+        contact, point = manifold[i], points[i]
+        put(contact.point, add(origin, vec(point.point)))
+        put(contact.normal, n)
+        contact.gap, contact.feature_id = point.gap, point.feature_id
+    return count
+
+
+@compiled
+def _clip_faces(incident: Shape, reference: Shape, n: Vec3, sign: float,
+                scratch: np.ndarray) -> int:
+    """Clip the incident face by the reference face; ``sign`` is 1 if n leaves the reference.
+
+    Stores the points after the first MAX_CLIPPED of ``scratch`` and returns their number.
+    """
+    polygon, points = scratch[:MAX_CLIPPED], scratch[MAX_CLIPPED:2 * MAX_CLIPPED]
+    corners = scratch[2 * MAX_CLIPPED:]
+    outward, inward = scale(sign, n), scale(-sign, n)
+    number, incident_face = supporting_face(incident, inward, (0.0, 0.0, 0.0), polygon)
+    deepest = sub(add(incident.position, support_point(incident, inward)), reference.position)
+    count, face = supporting_face(reference, outward, deepest, corners)
+    offset = sub(incident.position, reference.position)
+    for i in range(number):
+        put(polygon[i].point, add(vec(polygon[i].point), offset))
+        polygon[i].feature_id = i
+    number = clip_polygon(corners, count, n, polygon, number, points)
+    normal = column(reference.rotation, face // 2 if reference.kind == BOX else 2)
+    origin, cosine = vec(corners[0].point), dot(normal, n)
+    faces = ((6 if sign > 0 else 0) + face) * 6 + incident_face
+    for i in range(number):
+        vertex, side = polygon[i], polygon[i - 1 if i > 0 else number - 1].feature_id
+        height = dot(normal, sub(vec(vertex.point), origin)) / cosine
+        put(points[i].point, add_scaled(
+            add(reference.position, vec(vertex.point)), -(height / 2), n))
+        points[i].gap = sign * height
+        points[i].feature_id = (
+            faces * 2 * MAX_CORNERS + side) * 2 * MAX_CORNERS + vertex.feature_id
+    return number
+
+
+@compiled
+def _clip_edges(a: Shape, b: Shape, n: Vec3, points: np.ndarray) -> int:
+    """The ends of the overlap of two parallel edges, seen along n; none if they cross."""
+    middle, u = supporting_edge(a, neg(n))
+    other, v = supporting_edge(b, n)
+    offset = sub(add(middle, a.position), other)
+    rise, other_rise = dot(u, n), dot(v, n)
+    uu, vv = dot(u, u) - rise * rise, dot(v, v) - other_rise * other_rise
+    uv = dot(u, v) - rise * other_rise
+    if uu <= 0 or vv <= 0 or uu * vv - uv * uv > (
+            PARALLEL_EDGES_SINE * PARALLEL_EDGES_SINE * uu * vv):
+        return 0
+    height = dot(offset, n)
+    along = dot(offset, v) - height * other_rise
+    # a's points offset + t u are above b's at (along + t uv) / vv of v
+    ends = (vv - along) / uv, (-vv - along) / uv
+    lo, hi = max(min(ends[0], ends[1]), -1.0), min(max(ends[0], ends[1]), 1.0)
+    if lo > hi:
+        return 0
+    for k in range(2):
+        t = lo if k == 0 else hi
+        gap = height + t * rise - (along + t * uv) / vv * other_rise
+        put(points[k].point, add_scaled(
+            add_scaled(add(other, offset), t, u), -(gap / 2), n))
+        points[k].gap, points[k].feature_id = gap, k
+    return 2
+
+
+@compiled
+def _closest_on_edges(a: Shape, b: Shape, n: Vec3, s: float) -> Vec3:
+    """Midpoint, m, between the closest points of two crossing edges, or a vertex or rim and one."""
+    middle, u = supporting_edge(a, neg(n))
+    other, v = supporting_edge(b, n)
+    middle = add(middle, a.position)
+    offset = sub(other, middle)
+    rise, other_rise, height = dot(u, n), dot(v, n), dot(offset, n)
+    uu, vv = dot(u, u) - rise * rise, dot(v, v) - other_rise * other_rise
+    uv = dot(u, v) - rise * other_rise
+    du, dv = dot(offset, u) - height * rise, dot(offset, v) - height * other_rise
+    t = 0.0
+    if uu > 0 and vv > 0:
+        # the closest points of two segments, seen along n: Ericson 5.1.9
+        square = uu * vv - uv * uv
+        t = (du * vv - dv * uv) / square if square > 1e-12 * uu * vv else 0.0
+        t = min(max(t, -1.0), 1.0)
+        e = min(max((t * uv - dv) / vv, -1.0), 1.0)
+        t = min(max((du + e * uv) / uu, -1.0), 1.0)
+    if uu > 0 and vv <= 0:
+        return add_scaled(other, s / 2, n)
+    return add_scaled(add_scaled(middle, t, u), -s / 2, n)

@@ -1,0 +1,108 @@
+"""Supporting features of boxes and cylinders: the face, edge or vertex that a direction selects."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..compiling.decorators import compiled
+from ..maths.vectors import Vec3, add_scaled, column, put, scale, to_local, to_world
+from .shapes import BOX, Shape
+
+FEATURE_SINE = 0.1
+"""Sine of the angle up to which a face, an edge or a line of a side is perpendicular to n."""
+
+SIDE_COSINE = 0.7
+"""Cosine between n and a cylinder's axis up to which its side, not a cap, supports."""
+
+DIAGONAL = math.sqrt(0.5)
+OCTAGON = np.array(((1, 0), (DIAGONAL, DIAGONAL), (0, 1), (-DIAGONAL, DIAGONAL),
+                    (-1, 0), (-DIAGONAL, -DIAGONAL), (0, -1), (DIAGONAL, -DIAGONAL)))
+MAX_CORNERS = len(OCTAGON)
+"""Corners of a cap, on its rim; no face has more."""
+
+
+@compiled
+def supporting_face(shape: Shape, n: Vec3, t: Vec3, corners: np.ndarray) -> tuple[int, int]:
+    """Store the corners of the supporting face along a unit vector, from the centre, world.
+
+    Returns their number (4: face, 8: cap, 2: line of a side) and the face's id. A cap has the
+    corners of a regular octagon, except that the one closest to the support point is put there; if
+    all of the cap supports, the one closest to the direction ``t``.
+    """
+    size, (x, y, z) = shape.size, to_local(shape.rotation, n)
+    if shape.kind == BOX:
+        return 4, _box_face(shape, (x, y, z), corners)
+    across, end = math.sqrt(x * x + y * y), math.copysign(size[1], z)
+    if abs(z) <= SIDE_COSINE:
+        a, b = x * size[0] / across, y * size[0] / across
+        put(corners[0].point, to_world(shape.rotation, (a, b, -size[1])))
+        put(corners[1].point, to_world(shape.rotation, (a, b, size[1])))
+        return 2, 2
+    if across < 1e-9:
+        x, y, _ = to_local(shape.rotation, t)
+        across = math.sqrt(x * x + y * y)
+    deepest = 0
+    for k in range(1, MAX_CORNERS):
+        if x * OCTAGON[k, 0] + y * OCTAGON[k, 1] > (
+                x * OCTAGON[deepest, 0] + y * OCTAGON[deepest, 1]):
+            deepest = k
+    for k in range(MAX_CORNERS):
+        a, b = OCTAGON[k, 0], OCTAGON[k, 1]
+        if k == deepest and across > 1e-9:
+            a, b = x / across, y / across
+        put(corners[k].point, to_world(shape.rotation, (size[0] * a, size[0] * b, end)))
+    return MAX_CORNERS, 0 if z > 0 else 1
+
+
+@compiled
+def _box_face(shape: Shape, n: Vec3, corners: np.ndarray) -> int:
+    """Corners of the box's face most parallel to a vector of its frame; returns its id."""
+    size, axis, most = shape.size, 2, n[2]
+    if abs(n[0]) > abs(most):
+        axis, most = 0, n[0]
+    if abs(n[1]) > abs(most):
+        axis, most = 1, n[1]
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    middle = scale(math.copysign(size[axis], most), column(shape.rotation, axis))
+    for k in range(4):
+        a, b = size[i] * (1 if k == 0 or k == 3 else -1), size[j] * (1 if k < 2 else -1)
+        edge = add_scaled(middle, a, column(shape.rotation, i))
+        put(corners[k].point, add_scaled(edge, b, column(shape.rotation, j)))
+    return axis * 2 + (1 if most < 0 else 0)
+
+
+@compiled
+def face_cosine(shape: Shape, n: Vec3) -> float:
+    """Cosine between a unit vector and the closest normal of a box's face or a cylinder's cap."""
+    x, y, z = to_local(shape.rotation, n)
+    return max(abs(x), abs(y), abs(z)) if shape.kind == BOX else abs(z)
+
+
+@compiled
+def supporting_edge(shape: Shape, n: Vec3) -> tuple[Vec3, Vec3]:
+    """The supporting edge, or line of a side, along a unit vector: midpoint and half of it, world.
+
+    The midpoint is from the centre; of a vertex or a point of a rim the half is 0.
+    """
+    size, (x, y, z) = shape.size, to_local(shape.rotation, n)
+    a, b, c, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if shape.kind == BOX:
+        a, b, c = (math.copysign(size[0], x), math.copysign(size[1], y), math.copysign(size[2], z))
+        least = min(abs(x), abs(y), abs(z))
+        if least < FEATURE_SINE:
+            if abs(x) == least:
+                a, d = 0.0, size[0]
+            elif abs(y) == least:
+                b, e = 0.0, size[1]
+            else:
+                c, f = 0.0, size[2]
+    else:
+        across = math.sqrt(x * x + y * y)
+        if across > 0:
+            a, b = x * size[0] / across, y * size[0] / across
+        if abs(z) < FEATURE_SINE:
+            f = size[1]
+        else:
+            c = math.copysign(size[1], z)
+    return to_world(shape.rotation, (a, b, c)), to_world(shape.rotation, (d, e, f))

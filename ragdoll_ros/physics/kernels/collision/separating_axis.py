@@ -1,0 +1,141 @@
+"""Separating axes of boxes and cylinders (and of capsules' axes with them).
+
+Along a unit vector n from b to a two convex shapes are separated by s(n) = c n - h_a(n) - h_b(n),
+c the offset of their centres and h their support functions; the largest s over all n is positive
+if and only if they are disjoint, and else minus their penetration depth.
+
+Two boxes: it is along one of 15 axes, face normals and cross products of edges (SAT: Gottschalk,
+Lin, Manocha, OBBTree, 1996). With a cylinder it may also be where a rim meets an edge or a rim.
+Then these axes are the start of two searches, both with GJK on disjoint shapes (gjk.py):
+
+- of overlapping shapes the growth distance (Gilbert, Ong, 1994): scaled about their centres until
+  they touch, which tells the side to separate them to;
+- separated along n by a small gap, their closest points give a better n. s never decreases, and a
+  few of these steps end at a maximum.
+"""
+from __future__ import annotations
+
+import numpy as np
+
+from ..compiling.decorators import compiled
+from ..maths.vectors import Vec3, add_scaled, column, cross, divide, dot, neg, norm
+from .gjk import SIMPLEX_VERTEX, Direction, closest_direction
+from .shapes import BOX, CAPSULE, CYLINDER, Shape, bounding_radius, core_extent
+
+PARALLEL_SINE = 1e-8
+"""Sine between two edges below which face normals replace their cross product."""
+
+FACE_BIAS, FACE_BIAS_RATIO = 1e-7, 0.02
+"""m, and a part of s: how much better another axis must be than a face's normal. Between nearly
+parallel faces rounding alone would choose; what is missed is less than a contact's slop."""
+
+SHRINK_RATIO = 0.98
+"""Of the scale at which shapes touch: small enough for well-defined closest points."""
+
+GAP_RATIO = 1e-3
+"""Of the shapes' size: the gap at which their closest points are computed."""
+
+MAX_PENETRATION = 1e9
+"""m: more than any penetration."""
+
+COARSE_TOLERANCE, FINE_TOLERANCE = 1e-2, 1e-10
+"""Relative error of GJK's distance, in the search of a side and in the refinement."""
+
+Axis = tuple[float, Vec3]
+"""Separation s, m, and the unit vector n from b to a, world."""
+
+
+@compiled
+def separation_along(a: Shape, b: Shape, c: Vec3, n: Vec3) -> float:
+    """Separation s(n), m."""
+    return dot(c, n) - core_extent(a, n) - core_extent(b, n)
+
+
+@compiled
+def face_or_edge_axis(a: Shape, b: Shape, c: Vec3, bias: float, cutoff: float) -> Axis:
+    """SAT: the axis of largest separation among face normals and cross products of edges.
+
+    The axis of a capsule a counts as an edge. A ``bias`` of 1, not 0, prefers a's faces to b's and
+    these to edges. The first axis with a separation above ``cutoff`` ends the search.
+    """
+    s, axis = -MAX_PENETRATION, (0.0, 0.0, 0.0)
+    first_a, first_b = 0 if a.kind == BOX else 2, 0 if b.kind == BOX else 2
+    faces_a = 3 if a.kind == CAPSULE else first_a
+    bar = -MAX_PENETRATION
+    for body in range(2):
+        rotation = a.rotation if body == 0 else b.rotation
+        for k in range(faces_a if body == 0 else first_b, 3):
+            n = _towards(c, column(rotation, k))
+            found = separation_along(a, b, c, n)
+            if found > s and found > bar:
+                s, axis = found, n
+                if s > cutoff:
+                    return s, axis
+        bar = s + bias * (FACE_BIAS + FACE_BIAS_RATIO * abs(s))
+    for i in range(first_a, 3):
+        for j in range(first_b, 3):
+            n = cross(column(a.rotation, i), column(b.rotation, j))
+            length = norm(n)
+            if length < PARALLEL_SINE:
+                continue
+            n = _towards(c, divide(n, length))
+            found = separation_along(a, b, c, n)
+            if found > s and found > bar:
+                s, axis = found, n
+                if s > cutoff:
+                    return s, axis
+    return s, axis
+
+
+@compiled
+def _towards(c: Vec3, n: Vec3) -> Vec3:
+    """Return n or -n, whichever does not point against c."""
+    return neg(n) if dot(n, c) < 0 else n
+
+
+@compiled
+def refine_axis(a: Shape, b: Shape, c: Vec3, start: Axis) -> Axis:
+    """The axis of largest separation of all, from the best face or edge axis."""
+    # a bare 0 is a type of its own to numba, for which it would compile all once more
+    simplex, count = np.empty(4, SIMPLEX_VERTEX), np.int64(0)
+    gap = GAP_RATIO * (bounding_radius(a) + bounding_radius(b))
+    s, axis = start
+    if s < 0:
+        count, n = _growth_axis(a, b, c, axis, simplex)
+        found = separation_along(a, b, c, n)
+        if found > s:
+            s, axis = found, n
+    for _ in range(20):
+        apart = add_scaled(c, max(gap - s, 0.0), axis)
+        count, n = closest_direction(a, b, apart, 1.0, FINE_TOLERANCE, simplex, count, axis)
+        found = separation_along(a, b, c, n)
+        if found <= s:
+            break
+        gain, s, axis = found - s, found, n
+        if gain < 1e-13:
+            break
+    return s, axis
+
+
+@compiled
+def max_separation_axis(a: Shape, b: Shape, c: Vec3, cutoff: float) -> Axis:
+    """The axis of largest separation of all, or one with a separation above ``cutoff``."""
+    start = face_or_edge_axis(a, b, c, 0.0, cutoff)
+    if start[0] <= cutoff and (a.kind == CYLINDER or b.kind == CYLINDER):
+        return refine_axis(a, b, c, start)
+    return start
+
+
+@compiled
+def _growth_axis(a: Shape, b: Shape, c: Vec3, n: Vec3, simplex: np.ndarray) -> Direction:
+    """The axis along which shapes that grow about their centres touch: Dinkelbach's iteration."""
+    largest, count, best = 0.0, np.int64(0), n
+    for _ in range(6):
+        offset = dot(c, n)
+        growth = offset / (offset - separation_along(a, b, c, n))
+        if growth <= 1.001 * largest:
+            break
+        largest, best = growth, n
+        count, n = closest_direction(
+            a, b, c, SHRINK_RATIO * growth, COARSE_TOLERANCE, simplex, count, n)
+    return count, best

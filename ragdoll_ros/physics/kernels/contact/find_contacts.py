@@ -1,0 +1,155 @@
+"""Contacts at a pose: the points of contact patches, joints at limits, and where friction acts."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..collision.narrow_phase import collide
+from ..collision.shapes import CYLINDER
+from ..compiling.decorators import compiled
+from ..contact_kind import FRICTIONAL, LIMIT, ROLLING
+from ..dynamics.kinematics import Kinematics
+from ..maths.vectors import add_scaled, column, cross, divide, dot, norm, put, sub, vec
+from ..system import System
+from ..workspace import Contacts, Workspace
+from .gaps import TOUCHING, ground_point, placed_shape
+from .patch import contract_friction_points
+
+IDS_PER_PAIR = 4096
+"""Numbers that the points of one pair have for their ids."""
+
+
+@compiled
+def find_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, gaps: np.ndarray,
+                  margin: float) -> int:
+    """Enter the contacts at q whose gap in ``gaps`` says that they touch; of a pair the points that
+    are nearer than ``margin`` m. Returns their number. ``kin`` is that of q, with its geoms.
+    """
+    m, n, contacts = 0, 0, ws.contacts.found
+    for k in range(len(s.geoms)):
+        if s.ground_offset[0] > -math.inf:
+            for j in range(s.geoms[k].point_count):
+                if gaps[n + j] <= TOUCHING and m < len(contacts):
+                    enter_ground_contact(s, kin, k, j, n + j, contacts[m])
+                    m += 1
+        n += s.geoms[k].point_count
+    for k in range(len(s.joint_limits)):
+        for side in range(2):
+            if gaps[n + side] <= TOUCHING and m < len(contacts):
+                enter_limit(s, q, k, side, n + side, contacts[m])
+                m += 1
+        n += 2
+    for k in range(len(s.pairs)):
+        if gaps[n + k] <= TOUCHING:
+            m = add_pair_contacts(s, ws.contacts, kin, k, m, margin,
+                                  n + len(s.pairs) + IDS_PER_PAIR * k)
+    set_friction_points(s, ws.contacts, kin, m)
+    return m
+
+
+@compiled
+def enter_ground_contact(s: System, kin: Kinematics, k: int, point: int, id_: int,
+                         c: np.record) -> None:
+    """Enter the contact of a point of geom k with the ground."""
+    geom, normal = s.geoms[k], vec(s.ground_normal)
+    c.kind = ROLLING if geom.rolling_friction > 0 else FRICTIONAL
+    c.body_a, c.body_b, c.id, c.patch = geom.body, -1, id_, k
+    put(c.point, ground_point(geom, point, kin.geom_positions[k], kin.geom_rotations[k], normal))
+    put(c.normal, normal)
+    high = -s.ground_offset[0]
+    for e in range(3):
+        high += c.point[e] * c.normal[e]
+    c.gap = high
+    c.friction, c.rolling_friction = geom.friction, geom.rolling_friction
+    c.restitution = geom.restitution
+
+
+@compiled
+def enter_limit(s: System, q: np.ndarray, k: int, side: int, id_: int, c: np.record) -> None:
+    """Enter a joint at its lower (0) or upper (1) limit."""
+    limit = s.joint_limits[k]
+    c.kind, c.id, c.patch = LIMIT, id_, -1
+    c.body_a, c.body_b, c.dof = s.dof_body[limit.dof], -1, limit.dof
+    c.limit_sign = 1.0 if side == 0 else -1.0
+    c.gap = q[limit.q] - limit.lower if side == 0 else limit.upper - q[limit.q]
+    c.friction = c.rolling_friction = c.restitution = 0.0
+
+
+@compiled
+def add_pair_contacts(s: System, contacts: Contacts, kin: Kinematics, k: int, m: int,
+                      margin: float, first_id: int) -> int:
+    """Add the points of the patch of pair k to m contacts; returns their number then."""
+    pair = s.pairs[k]
+    a, b = s.geoms[pair.a], s.geoms[pair.b]
+    found = collide(placed_shape(s, kin, pair.a), placed_shape(s, kin, pair.b), margin,
+                    contacts.manifold)
+    for j in range(found):
+        if m >= len(contacts.found):
+            break
+        c, at = contacts.found[m], contacts.manifold[j]
+        c.kind = ROLLING if pair.rolling_friction > 0 else FRICTIONAL
+        c.body_a, c.body_b, c.id = a.body, b.body, first_id + at.feature_id
+        c.patch = len(s.geoms) + k
+        put(c.point, vec(at.point))
+        put(c.normal, vec(at.normal))
+        c.gap, c.friction, c.rolling_friction = at.gap, pair.friction, pair.rolling_friction
+        c.restitution = pair.restitution
+        m += 1
+    return m
+
+
+@compiled
+def set_friction_points(s: System, contacts: Contacts, kin: Kinematics, m: int) -> None:
+    """Enter tangents and friction points of m contacts. In a patch, friction acts nearer to its
+    center than the normal forces.
+
+    Under a uniform pressure p, friction against turning about the center has the moment mu times
+    the integral of p times the distance: its lever arm is the mean distance over the patch, not
+    that of its corners.
+    """
+    found, begin = contacts.found, 0
+    while begin < m:
+        patch, end = found[begin].patch, begin + 1
+        while end < m and found[end].patch == patch and patch >= 0:
+            end += 1
+        if found[begin].kind == LIMIT:
+            begin = end
+            continue
+        for e in range(begin, end):
+            c = found[e]
+            set_tangents(c)
+            put(c.friction_point, vec(c.point))
+        if end - begin > 2 and patch < len(s.geoms) and s.geoms[patch].kind == CYLINDER:
+            contract_to_disc(s.geoms[patch], patch, kin, found, begin, end)
+        elif end - begin > 1:
+            contract_friction_points(contacts, begin, end)
+        begin = end
+
+
+@compiled
+def contract_to_disc(geom: np.record, k: int, kin: Kinematics, contacts: np.ndarray, begin: int,
+                     end: int) -> None:
+    """Set the friction points of the face of a cylinder, geom k, that stands on the ground to two
+    thirds of its radius, the mean distance of a disc's points from its center.
+    """
+    axis = column(kin.geom_rotations[k], 2)
+    side = dot(axis, vec(contacts[begin].normal))
+    low = -geom.size[1] if side > 0 else geom.size[1]
+    center = add_scaled(vec(kin.geom_positions[k]), low, axis)
+    for e in range(begin, end):
+        c = contacts[e]
+        put(c.friction_point, add_scaled(center, 2 / 3, sub(vec(c.point), center)))
+
+
+@compiled
+def set_tangents(c: np.record) -> None:
+    """Enter two directions across a contact's normal."""
+    n = vec(c.normal)
+    if abs(n[2]) > 0.7:
+        t = 1 - n[0] * n[0], -n[0] * n[1], -n[0] * n[2]
+    else:
+        t = -n[2] * n[0], -n[2] * n[1], 1 - n[2] * n[2]
+    t = divide(t, norm(t))
+    put(c.tangents[0], t)
+    put(c.tangents[1], cross(n, t))

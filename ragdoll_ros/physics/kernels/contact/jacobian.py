@@ -1,0 +1,115 @@
+"""Rows of contacts: their Jacobians, of normal, tangents and rolling."""
+from __future__ import annotations
+
+import numpy as np
+
+from ..compiling.decorators import compiled
+from ..contact_kind import LIMIT, ROLLING
+from ..dynamics.kinematics import Kinematics, linear, root_position, velocity_at
+from ..maths.vectors import Vec3, add, cross, dot, sub, vec
+from ..system import System
+from ..workspace import Island
+
+
+@compiled
+def contact_jacobian(s: System, kin: Kinematics, q: np.ndarray, island: Island, c: np.record,
+                     index: int, v: np.ndarray, v_free: np.ndarray) -> None:
+    """Enter the Jacobian of contact ``index`` into island.Y from row c.first_row on, and the
+    degrees of freedom that it depends on, descending, into island.support; its velocities under
+    ``v_free`` into island.rhs, under v into island.start_velocity.
+    """
+    row, Y, support = c.first_row, island.Y, island.support[index]
+    b, was = island.rhs, island.start_velocity
+    for k in range(c.kind):
+        b[row + k] = was[row + k] = 0.0
+    n = 0
+    if c.kind == LIMIT:
+        j, own = c.dof, Y[row]
+        b[row], was[row] = c.limit_sign * v_free[j], c.limit_sign * v[j]
+        while j >= 0:
+            support[n], own[n] = j, 0.0
+            n, j = n + 1, s.dof_parent[j]
+        own[0], c.dof_count = c.limit_sign, n
+        return
+    i, k = s.body_last_dof[c.body_a], -1
+    if c.body_b >= 0:
+        k = s.body_last_dof[c.body_b]
+    while i >= 0 or k >= 0:
+        j = max(i, k)
+        support[n] = j
+        for e in range(row, row + c.kind):
+            Y[e, n] = 0.0
+        if i == j:
+            add_jacobian_column(kin.motion_subspaces[j], root_of(s, q, c.body_a), c, 1.0, Y, n)
+            i = s.dof_parent[i]
+        if k == j:
+            add_jacobian_column(kin.motion_subspaces[j], root_of(s, q, c.body_b), c, -1.0, Y, n)
+            k = s.dof_parent[k]
+        for e in range(row, row + c.kind):
+            b[e] += Y[e, n] * v_free[j]
+            was[e] += Y[e, n] * v[j]
+        n += 1
+    c.dof_count = n
+
+
+@compiled
+def root_of(s: System, q: np.ndarray, body: int) -> Vec3:
+    """Position, m, of the root of a body's doll."""
+    return root_position(q, s.tree[s.body_root[body]].q_start)
+
+
+@compiled
+def add_jacobian_column(axis: np.ndarray, root: Vec3, c: np.record, sign: float, Y: np.ndarray,
+                        j: int) -> None:
+    """Add what a degree of freedom with motion subspace ``axis``, about ``root``, contributes to
+    column j of a contact's rows.
+    """
+    row, turn = c.first_row, vec(axis)
+    n, t, w = vec(c.normal), vec(c.tangents[0]), vec(c.tangents[1])
+    at_point = add(linear(axis), cross(turn, sub(vec(c.point), root)))
+    Y[row, j] += sign * dot(n, at_point)
+    at_friction = add(linear(axis), cross(turn, sub(vec(c.friction_point), root)))
+    Y[row + 1, j] += sign * dot(t, at_friction)
+    Y[row + 2, j] += sign * dot(w, at_friction)
+    if c.kind == ROLLING:
+        Y[row + 3, j] += sign * dot(t, turn)
+        Y[row + 4, j] += sign * dot(w, turn)
+
+
+@compiled
+def apply_inverse_factor(dof_parent: np.ndarray, L: np.ndarray, island: Island, index: int,
+                         c: np.record) -> None:
+    """Replace the rows J of contact ``index`` by J L^-1, where L^T L is the mass matrix."""
+    Y, place, support = island.Y, island.place, island.support[index]
+    for n in range(c.dof_count):
+        place[support[n]] = n
+    for e in range(c.first_row, c.first_row + c.kind):
+        for n in range(c.dof_count):
+            i = support[n]
+            Y[e, n] /= L[i, i]
+            f, j = Y[e, n], dof_parent[i]
+            while j >= 0:
+                Y[e, place[j]] -= L[i, j] * f
+                j = dof_parent[j]
+
+
+@compiled
+def contact_velocities(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray,
+                       c: np.record) -> None:
+    """Enter the velocities along a contact's rows into c.start_velocity; ``kin``: of q and v."""
+    start = c.start_velocity
+    if c.kind == LIMIT:
+        start[0] = c.limit_sign * v[c.dof]
+        return
+    n, t, w = vec(c.normal), vec(c.tangents[0]), vec(c.tangents[1])
+    for e in range(5):
+        start[e] = 0.0
+    for side in range(2 if c.body_b >= 0 else 1):
+        i, sign = (c.body_a, 1.0) if side == 0 else (c.body_b, -1.0)
+        root, turn = root_of(s, q, i), vec(kin.spatial_velocities[i])
+        start[0] += sign * dot(n, velocity_at(kin, i, sub(vec(c.point), root)))
+        at_friction = velocity_at(kin, i, sub(vec(c.friction_point), root))
+        start[1] += sign * dot(t, at_friction)
+        start[2] += sign * dot(w, at_friction)
+        start[3] += sign * dot(t, turn)
+        start[4] += sign * dot(w, turn)

@@ -1,0 +1,254 @@
+"""Kinematics of all bodies of a kinematic tree, from the roots to the leaves.
+
+Spatial vectors have their angular part first. They are expressed along the world's axes about the
+point where the doll's root is at that instant: no transform from body to body is needed, and no
+digits are lost far from the origin. A joint of several axes is a chain of hinges without mass in
+between. Velocities v of roots: linear along the world's axes, angular along the root's own.
+"""
+from __future__ import annotations
+
+import collections
+import math
+
+import numpy as np
+
+from ..compiling.decorators import compiled
+from ..maths.transcendental import sine_and_cosine
+from ..maths.vectors import (
+    Quat,
+    Vec3,
+    add,
+    cross,
+    put,
+    quat,
+    quat_mul,
+    quat_rotate,
+    quat_to_matrix,
+    vec,
+)
+
+Kinematics = collections.namedtuple(
+    'Kinematics', 'orientations positions spatial_velocities motion_subspaces inertias '
+    'geom_positions geom_rotations')
+"""What follows from q and v, for n bodies, nv degrees of freedom and g geoms: orientations (n, 4)
+relative to the bind pose; positions (n, 3) of centers of mass from the root, m; spatial_velocities
+(n, 6); motion_subspaces (nv, 6) of the joints' axes; inertias (n, 6) about centers of mass along
+the world's axes (xx, xy, xz, yy, yz, zz); geom_positions (g, 3) m and geom_rotations (g, 3, 3) in
+the world. forward_kinematics() fills the first four, for joints; the others are filled where they
+are needed, by rotate_inertias() and place_geoms()."""
+
+
+def make_kinematics(bodies: int, dofs: int, geoms: int) -> Kinematics:
+    """Arrays of these sizes."""
+    return Kinematics(np.zeros((bodies, 4)), np.zeros((bodies, 3)), np.zeros((bodies, 6)),
+                      np.zeros((dofs, 6)), np.zeros((bodies, 6)), np.zeros((geoms, 3)),
+                      np.zeros((geoms, 3, 3)))
+
+
+@compiled
+def put_spatial(row: np.ndarray, angular: Vec3, linear: Vec3) -> None:
+    """Store a spatial vector in a row (6,)."""
+    row[0], row[1], row[2] = angular
+    row[3], row[4], row[5] = linear
+
+
+@compiled
+def linear(row: np.ndarray) -> Vec3:
+    """Linear part of a spatial vector (6,); vec() gives the angular part."""
+    return row[3], row[4], row[5]
+
+
+@compiled
+def root_orientation(q: np.ndarray, start: int) -> Quat:
+    """Orientation of a root whose coordinates begin at ``start``."""
+    return q[start + 3], q[start + 4], q[start + 5], q[start + 6]
+
+
+@compiled
+def root_position(q: np.ndarray, start: int) -> Vec3:
+    """Position, m, of a root whose coordinates begin at ``start``."""
+    return q[start], q[start + 1], q[start + 2]
+
+
+@compiled
+def combine_axes(axes: np.ndarray, a: Vec3) -> Vec3:
+    """Sum of the rows of ``axes`` (3, 3), each times a number."""
+    return (axes[0, 0] * a[0] + axes[1, 0] * a[1] + axes[2, 0] * a[2],
+            axes[0, 1] * a[0] + axes[1, 1] * a[1] + axes[2, 1] * a[2],
+            axes[0, 2] * a[0] + axes[1, 2] * a[1] + axes[2, 2] * a[2])
+
+
+@compiled
+def forward_kinematics(tree: np.ndarray, q: np.ndarray, v: np.ndarray, kin: Kinematics) -> None:
+    """Enter orientations, positions, spatial velocities and joints' motion subspaces at q, v."""
+    orientations, positions = kin.orientations, kin.positions
+    velocities, subspaces = kin.spatial_velocities, kin.motion_subspaces
+    for i in range(len(tree)):
+        body = tree[i]
+        at, dof, parent = body.q_start, body.v_start, body.parent
+        if parent < 0:
+            turn, bind = root_orientation(q, at), body.inertial_orientation
+            put_spatial(velocities[i], quat_rotate(turn, (v[dof + 3], v[dof + 4], v[dof + 5])),
+                        (v[dof], v[dof + 1], v[dof + 2]))
+            put(positions[i], (0.0, 0.0, 0.0))
+            put_quat(orientations[i], quat_mul(turn, (-bind[0], -bind[1], -bind[2], bind[3])))
+            continue
+        turn = quat(orientations[parent])
+        joint = add(vec(positions[parent]), quat_rotate(turn, vec(body.parent_to_joint)))
+        for k in range(6):
+            velocities[i, k] = velocities[parent, k]
+        if body.has_quaternion:
+            # frame * q * frame^-1: the joint's frame is not that of the doll
+            x, y, z = combine_axes(body.joint_axes, (q[at], q[at + 1], q[at + 2]))
+            turn = quat_mul(turn, (x, y, z, q[at + 3]))
+        for k in range(body.dof_count):
+            local = vec(body.joint_axes[k])
+            axis = quat_rotate(turn, local)
+            put_spatial(subspaces[dof], axis, cross(joint, axis))
+            for j in range(6):
+                velocities[i, j] += subspaces[dof, j] * v[dof]
+            if not body.has_quaternion:
+                sine, cosine = sine_and_cosine(q[at + k] / 2)
+                x, y, z = local
+                turn = quat_mul(turn, (x * sine, y * sine, z * sine, cosine))
+            dof += 1
+        put_quat(orientations[i], turn)
+        put(positions[i], add(joint, quat_rotate(turn, vec(body.joint_to_com))))
+
+
+@compiled
+def put_quat(row: np.ndarray, q: Quat) -> None:
+    """Store a quaternion in a row (4,)."""
+    row[0], row[1], row[2], row[3] = q
+
+
+@compiled
+def update_velocities(tree: np.ndarray, q: np.ndarray, v: np.ndarray, kin: Kinematics) -> None:
+    """Enter the spatial velocities at v, where the rest of ``kin`` is that of q already."""
+    velocities = kin.spatial_velocities
+    for i in range(len(tree)):
+        body, own = tree[i], velocities[i]
+        dof = body.v_start
+        if body.parent < 0:
+            put_spatial(own, quat_rotate(root_orientation(q, body.q_start),
+                                         (v[dof + 3], v[dof + 4], v[dof + 5])),
+                        (v[dof], v[dof + 1], v[dof + 2]))
+        else:
+            for j in range(6):
+                own[j] = velocities[body.parent, j]
+            for k in range(dof, dof + body.dof_count):
+                axis, rate = kin.motion_subspaces[k], v[k]
+                for j in range(6):
+                    own[j] += axis[j] * rate
+
+
+@compiled
+def root_motion_subspaces(tree: np.ndarray, q: np.ndarray, kin: Kinematics) -> None:
+    """Enter the motion subspaces of the roots' six degrees of freedom."""
+    for i in range(len(tree)):
+        if tree[i].parent < 0:
+            turn, dof = root_orientation(q, tree[i].q_start), tree[i].v_start
+            for k in range(3):
+                x, y, z = 1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0
+                put_spatial(kin.motion_subspaces[dof + k], (0.0, 0.0, 0.0), (x, y, z))
+                put_spatial(kin.motion_subspaces[dof + 3 + k], quat_rotate(turn, (x, y, z)),
+                            (0.0, 0.0, 0.0))
+
+
+@compiled
+def inertial_frame(body: np.record, kin: Kinematics, i: int) -> Quat:
+    """Orientation in the world of the principal axes of body i."""
+    return quat_mul(quat(kin.orientations[i]), quat(body.inertial_orientation))
+
+
+@compiled
+def rotate_inertias(tree: np.ndarray, kin: Kinematics, matrix: np.ndarray) -> None:
+    """Enter the bodies' inertias along the world's axes. ``matrix`` (3, 3): scratch."""
+    for i in range(len(tree)):
+        body = tree[i]
+        quat_to_matrix(inertial_frame(body, kin, i), matrix)
+        a, b, c = vec(body.inertia)
+        n = 0
+        for j in range(3):
+            for k in range(j, 3):
+                kin.inertias[i, n] = (
+                    matrix[j, 0] * a * matrix[k, 0] + matrix[j, 1] * b * matrix[k, 1]
+                    + matrix[j, 2] * c * matrix[k, 2])
+                n += 1
+
+
+@compiled
+def point_of_body(body: np.record, kin: Kinematics, i: int, point: np.ndarray) -> Vec3:
+    """A point (3,) m of body i, along its own axes from its center of mass, from the root, m."""
+    return add(vec(kin.positions[i]), quat_rotate(inertial_frame(body, kin, i), vec(point)))
+
+
+@compiled
+def velocity_at(kin: Kinematics, i: int, arm: Vec3) -> Vec3:
+    """Velocity, m/s, of the point of body i that is ``arm`` m from the root."""
+    own = kin.spatial_velocities[i]
+    return add(linear(own), cross(vec(own), arm))
+
+
+@compiled
+def body_velocity(kin: Kinematics, i: int) -> tuple[Vec3, float]:
+    """Velocity, m/s, of the center of mass of body i, and its angular speed, rad/s."""
+    own = kin.spatial_velocities[i]
+    return (velocity_at(kin, i, vec(kin.positions[i])),
+            math.sqrt(own[0] ** 2 + own[1] ** 2 + own[2] ** 2))
+
+
+@compiled
+def inertia_times(inertia: np.ndarray, w: Vec3) -> Vec3:
+    """Product of an inertia (6,) with a vector."""
+    return (inertia[0] * w[0] + inertia[1] * w[1] + inertia[2] * w[2],
+            inertia[1] * w[0] + inertia[3] * w[1] + inertia[4] * w[2],
+            inertia[2] * w[0] + inertia[4] * w[1] + inertia[5] * w[2])
+
+
+@compiled
+def integrate_positions(tree: np.ndarray, q: np.ndarray, v: np.ndarray, h: float,
+                        out: np.ndarray) -> None:
+    """Enter into ``out`` the coordinates that steady velocities v lead to in h s."""
+    for i in range(len(tree)):
+        body = tree[i]
+        at, dof = body.q_start, body.v_start
+        if body.parent < 0:
+            for k in range(3):
+                out[at + k] = q[at + k] + h * v[dof + k]
+            at, dof = at + 3, dof + 3
+        if body.has_quaternion:
+            a, b, c = v[dof] * h, v[dof + 1] * h, v[dof + 2] * h
+            angle = math.sqrt(a * a + b * b + c * c)
+            sine, cosine = sine_and_cosine(angle / 2)
+            share = 0.5 - angle * angle / 48 if angle < 1e-3 else sine / angle
+            x, y, z, w = quat_mul(quat(q[at:at + 4]), (a * share, b * share, c * share, cosine))
+            n = math.sqrt(x * x + y * y + z * z + w * w)
+            put_quat(out[at:at + 4], (x / n, y / n, z / n, w / n))
+        else:
+            for k in range(body.dof_count):
+                out[at + k] = q[at + k] + h * v[dof + k]
+
+
+@compiled
+def normalize(tree: np.ndarray, q: np.ndarray) -> None:
+    """Normalize all quaternions in q."""
+    for i in range(len(tree)):
+        if tree[i].has_quaternion:
+            at = tree[i].q_start + (3 if tree[i].parent < 0 else 0)
+            size = math.sqrt(q[at] ** 2 + q[at + 1] ** 2 + q[at + 2] ** 2 + q[at + 3] ** 2)
+            for k in range(at, at + 4):
+                q[k] /= size
+
+
+@compiled
+def place_geoms(tree: np.ndarray, body_root: np.ndarray, geoms: np.ndarray, q: np.ndarray,
+                kin: Kinematics) -> None:
+    """Enter positions and rotations of all geoms in the world."""
+    for k in range(len(geoms)):
+        geom = geoms[k]
+        i = geom.body
+        turn, root = quat(kin.orientations[i]), root_position(q, tree[body_root[i]].q_start)
+        put(kin.geom_positions[k], add(add(root, vec(kin.positions[i])),
+                                       quat_rotate(turn, vec(geom.position))))
+        quat_to_matrix(quat_mul(turn, quat(geom.orientation)), kin.geom_rotations[k])

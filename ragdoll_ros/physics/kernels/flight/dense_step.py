@@ -1,0 +1,156 @@
+"""A step of flight with dense output: Hairer's DOP853, of order 8, evaluated tick by tick."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..cluster_state import ClusterState
+from ..compiling.decorators import compiled
+from ..dynamics.forward_dynamics import state_derivative
+from ..dynamics.kinematics import body_velocity, forward_kinematics, normalize
+from ..maths.vectors import divide, dot, norm, put, sub, vec
+from ..system import System
+from ..workspace import Workspace
+from .dop853 import CONTINUED, STAGES, step_error, weighted_sum
+
+SAFETY, MIN_GROWTH, MAX_GROWTH = 0.8, 0.2, 2.0
+"""Share of the longest step that the tolerance allows, and bounds of a step over the last."""
+
+IMPROVED = 0.5
+"""Share of a step's error that a shorter one must come below; else what is left is rounding."""
+
+FIRST_ANGLE = 0.2
+"""rad that the fastest body turns in the first step that is tried."""
+
+MAX_TRIES = 30
+"""Lengths of a step that are tried."""
+
+ACCELERATION_FACTOR = 1.5
+"""Times the mean acceleration over a step that accelerations within it may reach."""
+
+
+@compiled
+def dop853_step(s: System, ws: Workspace, cluster: ClusterState, h: float) -> float:
+    """Enter the step of h s from cluster.q and cluster.v. Returns its error, m or rad."""
+    tree, flight = s.tree, ws.flight
+    q, v, dense, rates, k, y = (cluster.q, cluster.v, cluster.dense_output, cluster.end_rates,
+                                flight.stages, flight.derivative)
+    nq, size = len(q), len(q) + len(v)
+    start = dense[0]
+    for j in range(nq):
+        start[j] = q[j]
+    for j in range(nq, size):
+        start[j] = v[j - nq]
+    normalize(tree, start[:nq])
+    if cluster.dense_step[0].first_rate_known:
+        for j in range(size):
+            k[0, j] = rates[0, j]
+    else:
+        state_derivative(tree, s.gravity, cluster.loads, start[:nq], start[nq:], flight.kinematics,
+                         ws.step.dynamics, k[0])
+    for stage in range(1, 16):
+        weighted_sum(STAGES[stage], stage, k, h, y)
+        for j in range(size):
+            y[j] += start[j]
+        normalize(tree, y[:nq])
+        if stage == 12:
+            for j in range(size):
+                dense[1, j] = y[j]
+        state_derivative(tree, s.gravity, cluster.loads, y[:nq], y[nq:], flight.kinematics,
+                         ws.step.dynamics, k[stage])
+    for j in range(size):
+        dense[1, j] -= start[j]
+        dense[2, j] = h * k[0, j] - dense[1, j]
+        dense[3, j] = 2 * dense[1, j] - h * (k[12, j] + k[0, j])
+        rates[0, j], rates[1, j] = k[0, j], k[12, j]
+    for row in range(4):
+        weighted_sum(CONTINUED[row], 16, k, h, dense[4 + row])
+    return step_error(k, h, nq, y)
+
+
+@compiled
+def evaluate_dense_step(tree: np.ndarray, cluster: ClusterState, time: float, q: np.ndarray,
+                        v: np.ndarray) -> None:
+    """Enter coordinates and velocities at an instant of the step, s from its start."""
+    nq, dense = len(q), cluster.dense_output
+    share = time / cluster.dense_step[0].length
+    for j in range(nq + len(v)):
+        y = 0.0
+        for row in range(7, 0, -1):
+            y = (y + dense[row, j]) * (share if row % 2 else 1 - share)
+        y += dense[0, j]
+        if j < nq:
+            q[j] = y
+        else:
+            v[j - nq] = y
+    normalize(tree, q)
+
+
+@compiled
+def begin_dense_step(s: System, ws: Workspace, cluster: ClusterState, tolerance: float,
+                     longest: float) -> bool:
+    """Make a step from cluster.q and cluster.v, as long as its error allows, at most ``longest`` s.
+    Returns whether one was found whose error is at most ``tolerance``, m or rad.
+    """
+    step = cluster.dense_step[0]
+    if step.next_length <= 0:
+        step.next_length = first_length(s, ws, cluster)
+    h, before = min(longest, step.next_length), math.inf
+    for _ in range(MAX_TRIES):
+        error = dop853_step(s, ws, cluster, h)
+        ws.stats[0].flight_steps += 1
+        ratio = error / tolerance
+        growth = SAFETY / math.sqrt(math.sqrt(math.sqrt(ratio))) if ratio > 0 else MAX_GROWTH
+        good = ratio <= 1 or (IMPROVED * before < error < math.inf)
+        step.length, step.error = h, error
+        step.next_length = h * min(MAX_GROWTH, max(MIN_GROWTH, growth))
+        if good:
+            step.valid, step.elapsed, step.event_time = 1, 0.0, math.inf
+            return True
+        before, h = error, min(h * MIN_GROWTH if error == math.inf else step.next_length, longest)
+        step.first_rate_known = 1 if math.isfinite(cluster.end_rates[0, 0]) else 0
+    step.valid = 0
+    return False
+
+
+@compiled
+def first_length(s: System, ws: Workspace, cluster: ClusterState) -> float:
+    """Length, s, of the first step that is tried."""
+    kin, fast = ws.flight.kinematics, 1e-9
+    forward_kinematics(s.tree, cluster.q, cluster.v, kin)
+    for i in range(len(s.tree)):
+        turn = vec(kin.spatial_velocities[i])
+        fast = max(fast, dot(turn, turn))
+    return FIRST_ANGLE / math.sqrt(fast)
+
+
+@compiled
+def acceleration_bounds(s: System, ws: Workspace, cluster: ClusterState) -> tuple[float, float]:
+    """Acceleration, m/s^2, that no point exceeds in the step, and that none exceeds relative to
+    free fall, from the velocities at its ends.
+    """
+    flight, h, motion = ws.flight, cluster.dense_step[0].length, ws.flight.motion
+    kin, gravity = flight.kinematics, vec(s.gravity)
+    evaluate_dense_step(s.tree, cluster, 0.0, flight.q, flight.v)
+    forward_kinematics(s.tree, flight.q, flight.v, kin)
+    for i in range(len(s.tree)):
+        velocity, motion[i].angular_speed = body_velocity(kin, i)
+        put(motion[i].velocity, velocity)
+        motion[i].reach = 0.0
+    evaluate_dense_step(s.tree, cluster, h, flight.q, flight.v)
+    forward_kinematics(s.tree, flight.q, flight.v, kin)
+    for k in range(len(s.geoms)):
+        i = s.geoms[k].body
+        motion[i].reach = max(motion[i].reach, s.geoms[k].reach)
+    most = falling = 0.0
+    for i in range(len(s.tree)):
+        velocity, w = body_velocity(kin, i)
+        own, reach = motion[i], motion[i].reach
+        change = divide(sub(velocity, vec(own.velocity)), h)
+        turning = (abs(w - own.angular_speed) / h * reach
+                   + 2 * max(w, own.angular_speed) ** 2 * reach)
+        most = max(most, norm(change) + turning)
+        falling = max(falling, norm(sub(change, gravity)) + turning)
+    g = norm(gravity)
+    return ACCELERATION_FACTOR * (most + g) + 1e-3, ACCELERATION_FACTOR * falling + 1e-3

@@ -1,0 +1,186 @@
+"""Impulses of all contacts and limits, at an impact or over a step, island by island.
+
+An island is a set of dolls that contacts join. Islands do not act on each other and are solved one
+by one.
+"""
+from __future__ import annotations
+
+import numpy as np
+
+from ..compiling.decorators import compiled
+from ..contact.gaps import DEEP_PENETRATION
+from ..contact.jacobian import apply_inverse_factor, contact_jacobian
+from ..contact_kind import LIMIT
+from ..dynamics.kinematics import Kinematics
+from ..dynamics.mass_matrix import solve_lower
+from ..system import MAX_DENSE_ROWS, System
+from ..workspace import Workspace
+from .large_island import solve_large
+from .small_island import solve_small
+
+CORRECTED_SHARE = 0.5
+"""Share of a penetration that position correction removes in one step."""
+
+MAX_SEPARATION_SPEED = 0.3
+"""m/s at which deep penetrations are corrected at most, so that other bodies have time to yield."""
+
+MAX_LIMIT_SPEED = 1.0
+"""rad/s at which a joint far outside its limits is brought back at most."""
+
+PAIR_COMPLIANCE, DEEP_PAIR_COMPLIANCE = 1e-4, 0.01
+"""Compliance, as a share of W's diagonal, of position correction between bodies, and between bodies
+with DEEP_PENETRATION: a limit or the ground, which do not yield, may be in the way."""
+
+SEPARATING = 1e-3
+"""m/s or rad/s: contacts that separate faster as a step begins have no friction in it."""
+
+SLOP = 1e-8
+"""m or rad of penetration that is not corrected, and of gap that is not closed: the points of a
+resting face differ by as much, and the impulses to level them would be determined by nothing."""
+
+
+@compiled
+def label_islands(s: System, ws: Workspace, m: int) -> None:
+    """Enter the island of each of m contacts: the least of the numbers of its dolls."""
+    label, contacts = ws.island.label, ws.contacts.found
+    for d in range(len(label)):
+        label[d] = d
+    for i in range(m):
+        c = contacts[i]
+        if c.body_b >= 0:
+            a, b = label[s.body_doll[c.body_a]], label[s.body_doll[c.body_b]]
+            if a != b:
+                low, high = min(a, b), max(a, b)
+                for d in range(len(label)):
+                    if label[d] == high:
+                        label[d] = low
+    for i in range(m):
+        contacts[i].island = label[s.body_doll[contacts[i].body_a]]
+
+
+@compiled
+def solve_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, v: np.ndarray,
+                   v_free: np.ndarray, m: int, h: float, tolerance: float) -> None:
+    """Enter into ws.step the change of velocity by m contacts, v_change (nv,), where v becomes
+    ``v_free`` without them in h s, and the displacement of position correction, correction (nv,).
+
+    h = 0: an impact. ``kin`` is that of q, dynamics.H the factor of the mass matrix there.
+    ``tolerance``: m/s of the residual of small islands.
+    """
+    contacts, island, L = ws.contacts.found, ws.island, ws.step.dynamics.H
+    change, correction = ws.step.v_change, ws.step.correction
+    for j in range(len(change)):
+        change[j] = correction[j] = 0.0
+    label_islands(s, ws, m)
+    for begin in range(m):
+        number = contacts[begin].island
+        if number < 0:
+            continue
+        count, rows = collect_island(ws, begin, m, number)
+        for k in range(count):
+            i = island.members[k].contact
+            contact_jacobian(s, kin, q, island, contacts[i], i, v, v_free)
+            apply_inverse_factor(s.dof_parent, L, island, i, contacts[i])
+        solve_island(s, ws, count, rows, h, tolerance)
+    solve_lower(L, s.dof_parent, change)
+    if h > 0:
+        solve_lower(L, s.dof_parent, correction)
+
+
+@compiled
+def collect_island(ws: Workspace, begin: int, m: int, number: int) -> tuple[int, int]:
+    """Enter the contacts of an island as its members, and number their rows. Returns how many there
+    are of each. Contacts for which there is no room are counted and left out.
+    """
+    count = rows = 0
+    for i in range(begin, m):
+        c = ws.contacts.found[i]
+        if c.island != number:
+            continue
+        c.island = -1 - number
+        if rows + c.kind > len(ws.island.Y):
+            ws.stats[0].contacts_dropped += 1
+            continue
+        c.first_row = rows
+        member = ws.island.members[count]
+        member.contact, member.kind, member.row = i, c.kind, rows
+        member.friction, member.rolling_friction = c.friction, c.rolling_friction
+        rows += c.kind
+        count += 1
+    return count, rows
+
+
+@compiled
+def assemble_rhs(s: System, ws: Workspace, m: int, n: int, h: float) -> tuple[bool, bool]:
+    """Enter the right-hand side of an island: its rows' velocities without impulses, and what of
+    these impulses are to answer; the curvature bias; the impulses to start from; the penetration to
+    be corrected. Returns whether a contact has restitution, and whether one has penetration.
+    """
+    island = ws.island
+    b, was, curve = island.rhs, island.start_velocity, island.curvature
+    has_restitution = has_penetration = False
+    for j in range(n):
+        island.free_velocity[j], curve[j] = b[j], 0.0
+    for k in range(m):
+        member = island.members[k]
+        c = ws.contacts.found[member.contact]
+        row = c.first_row
+        member.correction = member.correction_compliance = member.compliance = 0.0
+        member.separating = 0
+        c.normal_velocity = was[row]
+        bounces = c.restitution > 0 and c.normal_velocity < -s.restitution_speed[0]
+        if h == 0.0:
+            if bounces:
+                b[row] += c.restitution * c.normal_velocity
+                has_restitution = True
+        elif c.persistent:
+            member.separating = 1 if c.start_velocity[0] > SEPARATING else 0
+            for e in range(c.kind):
+                curve[row + e] = was[row + e] - c.start_velocity[e]
+            b[row] += max(0.0, c.gap - SLOP) / h
+        elif bounces and not ws.step.scalars[0].seeks_impacts:
+            b[row] += c.restitution * c.normal_velocity
+        elif c.gap > 0:
+            b[row] += c.gap / h
+        if h > 0 and c.gap < 0:
+            set_correction(ws, member, c, h)
+            has_penetration |= member.correction > 0
+        for e in range(c.kind):
+            island.impulses[row + e] = c.impulse[e]
+    return has_restitution, has_penetration
+
+
+@compiled
+def set_correction(ws: Workspace, member: np.record, c: np.record, h: float) -> None:
+    """Enter how much of the penetration of a contact is corrected in h s."""
+    fastest = MAX_LIMIT_SPEED if c.kind == LIMIT else MAX_SEPARATION_SPEED
+    member.correction = min(CORRECTED_SHARE * max(0.0, -c.gap - SLOP), fastest * h)
+    if not ws.step.scalars[0].seeks_impacts and not c.persistent:
+        member.correction = -c.gap
+    if c.body_b >= 0:
+        member.correction_compliance = (
+            DEEP_PAIR_COMPLIANCE if c.gap < -DEEP_PENETRATION else PAIR_COMPLIANCE)
+
+
+@compiled
+def solve_island(s: System, ws: Workspace, m: int, n: int, h: float, tolerance: float) -> None:
+    """Solve one island for its impulses, and add what they do to v_change and correction, both
+    still to be multiplied by L^-1.
+    """
+    island, change, correction = ws.island, ws.step.v_change, ws.step.correction
+    has_restitution, has_penetration = assemble_rhs(s, ws, m, n, h)
+    if n > MAX_DENSE_ROWS:
+        solve_large(ws, m, n, has_restitution, has_penetration)
+    else:
+        solve_small(ws, m, n, h, tolerance, has_restitution, has_penetration)
+    for k in range(m):
+        i = island.members[k].contact
+        c, support = ws.contacts.found[i], island.support[i]
+        for e in range(c.kind):
+            row = c.first_row + e
+            c.impulse[e] = island.impulses[row]
+            for x in range(c.dof_count):
+                if c.impulse[e] != 0.0:
+                    change[support[x]] += island.Y[row, x] * c.impulse[e]
+                if has_penetration and e == 0:
+                    correction[support[x]] += island.Y[row, x] * island.correction[row]

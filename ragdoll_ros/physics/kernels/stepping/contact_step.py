@@ -1,0 +1,212 @@
+"""A step with contacts, by Moreau's centered scheme.
+
+Forces, contacts and their rows are those at the middle of the step, so that it is of order 2 where
+no contact begins or ends (Moreau 1988; Studer, Numerics of Unilateral Contacts and Friction, 2009).
+Half of what contacts change is a part of the velocities there: what they changed in the step before
+stands in for it. Joint damping, springs and drives are taken implicitly at the middle as well. Then
+penetrations are corrected, and momentum is conserved where the ground bears nothing.
+"""
+from __future__ import annotations
+
+import numpy as np
+
+from ..cluster_state import ClusterState
+from ..compiling.decorators import compiled
+from ..contact.find_contacts import find_contacts
+from ..contact.gaps import TOUCHING, update_kinematics_and_gaps
+from ..contact.jacobian import contact_velocities
+from ..contact_kind import LIMIT
+from ..dynamics.bias_forces import bias_forces
+from ..dynamics.kinematics import (
+    forward_kinematics,
+    integrate_positions,
+    place_geoms,
+    root_motion_subspaces,
+    rotate_inertias,
+    update_velocities,
+)
+from ..dynamics.mass_matrix import factor_ltl, mass_matrix, solve_lower, solve_upper
+from ..impulses.solve_contacts import solve_contacts
+from ..system import NO_SLIP, System
+from ..workspace import Workspace
+from .momentum import add_contact_impulses, conserve_momentum, sum_dolls
+from .position_correction import (
+    clip_to_joint_limits,
+    correction_energy,
+    enter_correction_bounds,
+    limit_correction_energy,
+)
+from .springs import add_implicit_stiffness, add_spring_force, saturate_springs, theta_weight
+from .warm_start import warm_start
+from .work import account_work, load_potential
+
+STEP_TOLERANCE = 1e-8
+"""m/s to which contacts are solved."""
+
+SLOW = 0.02
+"""m/s, and SLOW_TURN rad/s: contacts that close more slowly begin with the next step, without
+restitution; their time of impact is not sought."""
+
+SLOW_TURN = 0.1
+
+MAX_PENETRATION = 5e-4
+"""m into the ground or a body to which a step may press."""
+
+STEADY = 1.0
+"""m/s^2 or rad/s^2, over a step: contacts that close faster do not persist as they are."""
+
+
+@compiled
+def begin_contact_step(s: System, ws: Workspace, cluster: ClusterState) -> None:
+    """Note the contacts and their velocities as a step begins, and the sums over the dolls."""
+    q, v, kin, scalars = cluster.q, cluster.v, ws.step.start, ws.step.scalars[0]
+    forward_kinematics(s.tree, q, v, kin)
+    sum_dolls(s, ws, kin, q, ws.step.sums_before)
+    scalars.start_load_potential = load_potential(s, kin, q, cluster.loads)
+    place_geoms(s.tree, s.body_root, s.geoms, q, kin)
+    m = find_contacts(s, ws, kin, q, ws.gaps, TOUCHING)
+    for i in range(m):
+        contact_velocities(s, kin, q, v, ws.contacts.found[i])
+        ws.contacts.start[i] = ws.contacts.found[i]
+    scalars.start_contact_count = m
+
+
+@compiled
+def contact_step(s: System, ws: Workspace, cluster: ClusterState, h: float, since: float) -> int:
+    """Take a step of h s to step.q_end and step.v_end. Returns the number of contacts. The position
+    correction is still to be applied.
+
+    Rows at the middle contain the curvature term h/2 dJ/dt v of J v; the target row velocity is
+    minus that term, for J v to be zero at the end. ``since``: s since the springs' targets were at
+    spring.target.
+    """
+    q, v, step, kin = cluster.q, cluster.v, ws.step, ws.step.middle
+    integrate_positions(s.tree, q, v, h / 2, step.q_middle)
+    forward_kinematics(s.tree, step.q_middle, v, kin)
+    unconstrained_velocity(s, ws, cluster, h, since + h / 2)
+    place_geoms(s.tree, s.body_root, s.geoms, step.q_middle, kin)
+    m = find_contacts(s, ws, kin, step.q_middle, ws.contacts.gaps_active, SLOW * h)
+    step.scalars[0].residual = 0.0
+    if m:
+        warm_start(s, ws, m, cluster.contacts, h)
+        solve_contacts(s, ws, kin, step.q_middle, v, step.v_free, m, h, STEP_TOLERANCE)
+        for j in range(len(v)):
+            step.v_end[j] = step.v_free[j] + step.v_change[j]
+    else:
+        for j in range(len(v)):
+            step.v_end[j], step.correction[j] = step.v_free[j], 0.0
+    persist = m > 0 and all_persist(ws, m, h)
+    for j in range(len(v)):
+        cluster.contact_accelerations[j] = step.v_change[j] / h if persist else 0.0
+    integrate_positions(s.tree, step.q_middle, step.v_end, h / 2, step.q_end)
+    clip_to_joint_limits(s, step.q_end, step.correction)
+    step.scalars[0].correction_energy = (
+        correction_energy(s, ws, kin, step.correction) if m else 0.0)
+    ws.stats[0].steps += 1
+    return m
+
+
+@compiled
+def all_persist(ws: Workspace, m: int, h: float) -> bool:
+    """Whether all contacts of a step of h s existed before, and neither close nor open."""
+    for i in range(m):
+        c = ws.contacts.found[i]
+        if not c.persistent or abs(c.start_velocity[0]) > STEADY * h:
+            return False
+        if c.kind != LIMIT and c.friction >= NO_SLIP and (
+                max(abs(c.start_velocity[1]), abs(c.start_velocity[2])) > STEADY * h):
+            return False
+    return True
+
+
+@compiled
+def unconstrained_velocity(s: System, ws: Workspace, cluster: ClusterState, h: float,
+                           time: float) -> None:
+    """Enter into step.v_free the velocities after h s without contacts, and into dynamics.H the
+    factor of the mass matrix with implicit terms. step.middle is that of step.q_middle and v.
+
+    Forces are evaluated twice: at v, and at the velocities of the step's middle that this leads to,
+    with contact_accelerations for the contacts. ``time``: s since the springs' targets were at
+    spring.target.
+    """
+    v, springs, step, kin, dyn = cluster.v, cluster.springs, ws.step, ws.step.middle, (
+        ws.step.dynamics)
+    change, middle = step.v_change, step.v_middle
+    root_motion_subspaces(s.tree, step.q_middle, kin)
+    rotate_inertias(s.tree, kin, dyn.matrix)
+    for k in range(len(springs)):
+        springs[k].saturated = 0
+    for turn in range(2 if len(springs) else 1):
+        implicit_mass_matrix(s, ws, springs, h)
+        for stage in range(2):
+            if stage or turn:
+                for j in range(len(v)):
+                    middle[j] = v[j] + (
+                        (change[j] + h * cluster.contact_accelerations[j]) / 2 if stage else 0.0)
+                update_velocities(s.tree, step.q_middle, middle, kin)
+            bias_forces(s.tree, s.gravity, cluster.loads, middle if stage else v, kin, dyn, change)
+            for k in range(len(springs)):
+                add_spring_force(s, kin, step.q_middle, v, springs[k], time, change)
+            for j in range(len(v)):
+                change[j] = h * (change[j] - s.dof_damping[j] * v[j])
+            solve_upper(dyn.H, s.dof_parent, change)
+            solve_lower(dyn.H, s.dof_parent, change)
+        for j in range(len(v)):
+            step.v_free[j] = v[j] + change[j]
+        if turn or not saturate_springs(s, kin, step.q_middle, v, step.v_free, springs, time, h):
+            break
+
+
+@compiled
+def implicit_mass_matrix(s: System, ws: Workspace, springs: np.ndarray, h: float) -> None:
+    """Enter into dynamics.H the factor of the mass matrix at the middle, with what joint damping
+    and springs add to it in a step of h s.
+    """
+    dyn, kin = ws.step.dynamics, ws.step.middle
+    mass_matrix(s.tree, s.dof_parent, s.dof_body, kin, dyn)
+    for j in range(len(s.dof_damping)):
+        dyn.H[j, j] += h * theta_weight(h * s.dof_damping[j] / dyn.H[j, j]) * s.dof_damping[j]
+    for k in range(len(springs)):
+        add_implicit_stiffness(s, kin, dyn.H, springs[k], h)
+    factor_ltl(dyn.H, s.dof_parent)
+
+
+@compiled
+def finish_step(s: System, ws: Workspace, cluster: ClusterState, h: float, since: float,
+                m: int) -> None:
+    """Book the work of a step of h s with m contacts, apply the position correction, and conserve
+    the momentum of dolls that are not on the ground; then enter gaps and sums at the end.
+    """
+    step, kin, q, v = ws.step, ws.step.end, ws.step.q_end, ws.step.v_end
+    clear_external(step.external)
+    add_contact_impulses(s, ws, m)
+    if len(cluster.loads) or len(cluster.springs):
+        account_work(s, ws, cluster.v, v, h, cluster.loads, cluster.springs, since)
+    forward_kinematics(s.tree, q, v, kin)
+    sum_dolls(s, ws, kin, q, step.sums_after)
+    some_free = False
+    for d in range(len(step.external)):
+        some_free |= not step.external[d].on_ground
+        for k in range(3):
+            step.external[d].center[k] = step.sums_after[d].center[k]
+    limit_correction_energy(s, ws, m, step.correction)
+    integrate_positions(s.tree, q, step.correction, 1.0, q)
+    if some_free:
+        forward_kinematics(s.tree, q, v, kin)
+        sum_dolls(s, ws, kin, q, step.sums_after)
+        conserve_momentum(s, ws, h, q, v)
+    enter_correction_bounds(s, kin, q, step.correction, ws.contacts.motion)
+    update_kinematics_and_gaps(s, ws, kin, q, v, ws.gaps, h, ws.contacts.gaps_end)
+    sum_dolls(s, ws, kin, q, step.sums_after)
+    ws.stats[0].work_pushes += (load_potential(s, kin, q, cluster.loads)
+                                - step.scalars[0].start_load_potential)
+
+
+@compiled
+def clear_external(external: np.ndarray) -> None:
+    """Let nothing act on any doll (d,) from outside."""
+    for d in range(len(external)):
+        own = external[d]
+        own.on_ground = own.touches_other = 0
+        for k in range(3):
+            own.impulse[k] = own.moment[k] = 0.0

@@ -1,0 +1,154 @@
+"""Time of impact within a step: lengths of the step are tried until one ends at the impact.
+
+Geoms that are apart when a step begins may meet before it ends. A length at which nothing has met
+and one at which something has bracket the time of impact, which is approached by regula falsi with
+Anderson and Bjoerck's weights (BIT 13, 1973), and by bisection where that lags, as between two gaps
+of which one is not straight. A joint's rate is known: the first length ends where the joint is at
+its limit at that rate, the next is along a parabola that begins with it.
+"""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..compiling.decorators import compiled
+from ..contact.gaps import EXCLUDED, TOUCHING, first_joint_limit_gap, is_joint_limit_gap
+from ..system import System
+from ..workspace import Workspace
+from .contact_step import SLOW, SLOW_TURN
+
+OVERSHOT = -1e-7
+"""m or rad: a gap that is less at a step's end has closed on the way."""
+
+SHORTEST = 1e-9
+"""s: no step is made shorter to find an impact."""
+
+MAX_CHORDS = 2
+"""Chords that may leave the bracket wider than half, before it is bisected."""
+
+
+@compiled
+def is_fast_impact(s: System, ws: Workspace, j: int, h: float) -> bool:
+    """Whether gap j closed in the step of h s just taken, too fast for the next one to begin it."""
+    slow = SLOW_TURN if is_joint_limit_gap(s, ws.gaps, j) else SLOW
+    end = ws.contacts.gaps_end[j]
+    return ws.gaps[j] > TOUCHING and end <= TOUCHING and ws.gaps[j] - end > slow * h
+
+
+@compiled
+def impacts_at_end(s: System, ws: Workspace, h: float) -> tuple[bool, bool, bool]:
+    """Of the gaps that closed fast in the step of h s just taken, or whose time of impact is
+    sought: whether one is overshot at its end; whether there is any; whether any closed fast.
+    """
+    overshot = landed = fast = False
+    for j in range(len(ws.gaps)):
+        quick, end = is_fast_impact(s, ws, j, h), ws.contacts.gaps_end[j]
+        if quick or (ws.step.gaps_high[j] < 0 and end <= TOUCHING):
+            fast |= quick
+            landed = True
+            overshot |= end < OVERSHOT
+    return overshot, landed, fast
+
+
+@compiled
+def open_bracket(ws: Workspace) -> None:
+    """Begin to seek a time of impact: all that is known is that it is after the start."""
+    bracket = ws.step.bracket[0]
+    bracket.low, bracket.high, bracket.moved = 0.0, math.inf, 0
+    bracket.halved_width, bracket.chords = math.inf, 0
+    for j in range(len(ws.gaps)):
+        ws.step.gaps_low[j], ws.step.gaps_high[j] = ws.gaps[j], EXCLUDED
+
+
+@compiled
+def update_bracket(s: System, ws: Workspace, h: float, overshot: bool, landed: bool) -> bool:
+    """Let a step of h s, at whose end something is ``overshot`` or not, be an end of the bracket.
+    Returns whether the time of impact is still to be sought between its ends.
+
+    The gaps at an end that stays twice are weighted: anderson_bjorck_weight().
+    """
+    bracket, low, high, end = (ws.step.bracket[0], ws.step.gaps_low, ws.step.gaps_high,
+                               ws.contacts.gaps_end)
+    if overshot:
+        for j in range(len(ws.gaps)):
+            gap = EXCLUDED
+            if end[j] < OVERSHOT and (high[j] < 0 or is_fast_impact(s, ws, j, h)):
+                gap = end[j]
+            if bracket.moved > 0:
+                low[j] *= anderson_bjorck_weight(high[j], gap)
+            high[j] = gap
+        bracket.high, bracket.moved = h, 1
+        return h > SHORTEST
+    if landed or not bracket.high - h > SHORTEST or h <= bracket.low:
+        return False
+    for j in range(len(ws.gaps)):
+        if bracket.moved < 0:
+            high[j] *= anderson_bjorck_weight(low[j], end[j])
+        low[j] = end[j]
+    bracket.low, bracket.moved = h, -1
+    return bracket.high < math.inf
+
+
+@compiled
+def anderson_bjorck_weight(before: float, now: float) -> float:
+    """Weight of the far end of a chord when the near end moves from a value to one of the same
+    sign; a half where that says nothing.
+    """
+    share = 1 - now / before if before != 0.0 and (now < 0) == (before < 0) else 0.5
+    return share if share > 0 else 0.5
+
+
+@compiled
+def next_trial_step(s: System, ws: Workspace, v: np.ndarray) -> float:
+    """Length of a step, s, at whose end the first of the gaps closes that the bracket contains;
+    ``v`` are the velocities at its start.
+    """
+    bracket, high, share = ws.step.bracket[0], ws.step.gaps_high, 1.0
+    low, width = bracket.low, bracket.high - bracket.low
+    first = bracket.halved_width == math.inf
+    bracket.chords += 1
+    late = bracket.chords > MAX_CHORDS
+    if late or width <= bracket.halved_width / 2:
+        bracket.halved_width, bracket.chords = width, 0
+    if late:
+        return low + width / 2
+    for j in range(len(ws.gaps)):
+        if high[j] < 0:
+            above = max(0.0, ws.step.gaps_low[j])
+            if not first or not is_joint_limit_gap(s, ws.gaps, j):
+                share = min(share, above / (above - high[j]))
+            else:
+                share = min(share, parabola_root(
+                    above, limit_gap_rate(s, ws, v, j) * width, high[j]))
+    return max(SHORTEST, low + share * width)
+
+
+@compiled
+def parabola_root(start: float, slope: float, end: float) -> float:
+    """Where in 0 to 1 a parabola is zero that is ``start`` > 0 at 0, with this slope there, and
+    ``end`` < 0 at 1.
+    """
+    bend = end - start - slope
+    return 2 * start / (math.sqrt(slope * slope - 4 * bend * start) - slope)
+
+
+@compiled
+def limit_gap_rate(s: System, ws: Workspace, v: np.ndarray, j: int) -> float:
+    """Rate, rad/s, at which gap j, a joint's from a limit, opens."""
+    k = j - first_joint_limit_gap(s, ws.gaps)
+    rate = v[s.joint_limits[k // 2].dof]
+    return -rate if k % 2 else rate
+
+
+@compiled
+def step_to_joint_limit(s: System, ws: Workspace, v: np.ndarray, h: float) -> float:
+    """Length of a step, at most h s, at whose end the first joint that approaches a limit fast is
+    there, at its present rate.
+    """
+    first = first_joint_limit_gap(s, ws.gaps)
+    for j in range(first, first + 2 * len(s.joint_limits)):
+        rate = -limit_gap_rate(s, ws, v, j)
+        if rate > SLOW_TURN and ws.gaps[j] > TOUCHING and ws.gaps[j] < h * rate:
+            h = max(SHORTEST, ws.gaps[j] / rate)
+    return h

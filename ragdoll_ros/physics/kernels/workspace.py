@@ -1,0 +1,157 @@
+"""Workspace: scratch of the kernels, in one bundle for each stage of a step."""
+from __future__ import annotations
+
+import collections
+
+import numpy as np
+
+from .cluster_state import CONTACT, DOLL_SUMS, ClusterState, make_cluster_state
+from .compiling.bundle import bundle_type
+from .dynamics.forward_dynamics import make_dynamics
+from .dynamics.kinematics import make_kinematics
+from .system import (
+    CONTACT_POINT,
+    MAX_DENSE_ROWS,
+    MAX_MANIFOLD_POINTS,
+    System,
+    blank_system,
+    coordinate_count,
+    tree_depth,
+)
+
+MOTION = np.dtype([('speed', float), ('angular_speed', float), ('correction', float),
+                   ('correction_angle', float)], align=True)
+"""Bounds on how far points of a body move in a step: speed of the center of mass, m/s, and angular
+speed, rad/s, at its end; what position correction moves, m, and turns, rad, it by."""
+
+FLIGHT_MOTION = np.dtype([('velocity', float, 3), ('angular_speed', float), ('reach', float)],
+                         align=True)
+"""Of a body at the start of a step of flight: velocity of the center of mass, m/s, angular speed,
+rad/s, and its largest reach, m."""
+
+EXTERNAL_IMPULSE = np.dtype([
+    ('impulse', float, 3), ('moment', float, 3), ('center', float, 3), ('on_ground', np.int64),
+    ('touches_other', np.int64)], align=True)
+"""What a step gives a doll from outside: impulse, N s, and its moment about the world's origin;
+its center of mass before position correction, m; whether the ground holds it; whether another doll
+touches it."""
+
+BRACKET = np.dtype([('low', float), ('high', float), ('moved', np.int64), ('halved_width', float),
+                    ('chords', np.int64)], align=True)
+"""Bracket of a time of impact, step lengths in s: ``low``, at which nothing has met, and ``high``,
+at which something has; which of them moved last, -1 or 1 (0: neither); its width when it was last
+halved, and the chords since."""
+
+STEP_SCALARS = np.dtype([
+    ('start_contact_count', np.int64), ('seeks_impacts', np.int64), ('correction_energy', float),
+    ('start_load_potential', float), ('residual', float)], align=True)
+"""Of a contact step: contacts at its start; whether it ends at impacts; potential energy that
+position correction adds, J; load_potential() at its start, J; the largest residual velocity of its
+large islands, m/s."""
+
+MEMBER = np.dtype([
+    ('contact', np.int64), ('kind', np.int64), ('row', np.int64), ('friction', float),
+    ('rolling_friction', float), ('correction', float), ('correction_compliance', float),
+    ('compliance', float), ('separating', np.int64)], align=True)
+"""A contact of the island that is solved: its index among all contacts; its kind and first row;
+coefficients of friction; the penetration, m or rad, that position correction is to remove;
+compliances, as shares of the diagonal of W, of position correction and of impulses; whether it
+separates as the step begins."""
+
+Contacts = collections.namedtuple(
+    'Contacts', 'found start gaps_end gaps_active manifold motion joint_outside angles u v')
+"""Contacts (c,) that are ``found`` at a pose, and those at the ``start`` of the step. Gaps:
+``gaps_end`` at the end of a step, ``gaps_active``, which tell what may touch in it. ``manifold``:
+of one pair. ``motion`` (n,); ``joint_outside`` (n,): whether the joint of a body is outside its
+limits. ``angles``, ``u``, ``v`` (c,): the corners of a patch in order, see patch.py."""
+
+Island = collections.namedtuple(
+    'Island', 'members label Y YT support place W G blocks rhs impulses free_velocity '
+    'start_velocity curvature correction soft velocity residual direction best active places '
+    'is_normal normal_rhs normal_impulses normal_row row_impulses row_direction z z_previous '
+    'z_direction')
+"""An island of m contacts (``members``) and their rows, and scratch to solve it.
+
+``label`` (d,): island of each doll. Rows ``Y`` = J L^-1 have entries for the degrees of freedom
+that they depend on, listed in ``support``, alone; columns of ``YT`` are for all. ``place`` (nv,):
+where a degree of freedom stands in a row. ``W`` = Y Y^T and ``G``, flat (rows * rows): of a small
+island; ``blocks`` (m, 5, 5): diagonal blocks of W of a large one. Of each row: ``rhs`` b of
+u = W p + b; ``impulses`` p; ``free_velocity`` without impulses; ``start_velocity`` at the step's
+start; ``curvature`` bias; ``correction`` impulses; ``soft`` impulses without restitution. The
+others are scratch of the solvers that use them; ``z`` (nv,) = Y^T p."""
+
+Step = collections.namedtuple(
+    'Step', 'scalars start middle end dynamics q_middle q_end v_end v_free v_middle v_change '
+    'correction sums_before sums_after external bracket gaps_low gaps_high spin')
+"""A contact step or an impact: its kinematics at ``start``, ``middle`` and ``end``; coordinates and
+velocities there; ``v_free`` without contacts, ``v_change`` by contacts; ``correction`` (nv,): the
+displacement of position correction. ``sums_before``, ``sums_after``, ``external`` (d,): of the
+dolls. ``bracket`` (1,) with the gaps at its ends. ``spin`` (3,) rad/s: scratch."""
+
+Flight = collections.namedtuple(
+    'Flight', 'kinematics q v stages derivative armed motion')
+"""A step of flight: ``kinematics``, ``q`` and ``v`` at an instant of it; state derivatives of all
+``stages`` (16, nq + nv) and a ``derivative`` (nq + nv,); ``armed``: gaps that count as contacts
+when they close; ``motion`` (n,)."""
+
+Workspace = collections.namedtuple('Workspace', 'contacts island step flight stats excluded gaps')
+"""Scratch for clusters of one system; ``stats``, ``excluded`` and ``gaps`` are the cluster's."""
+
+
+def make_workspace(system: System, cluster: ClusterState) -> Workspace:
+    """For a cluster of a system, with room for as many contacts as the cluster has."""
+    bodies, nv, nq = len(system.tree), len(system.dof_parent), coordinate_count(system)
+    dolls, contacts, gaps = len(system.doll_masses), len(cluster.contacts), len(cluster.gaps)
+    rolls = max(system.geoms['rolling_friction'].max(initial=0.0),
+                system.pairs['rolling_friction'].max(initial=0.0)) > 0
+
+    def kinematics() -> object:
+        return make_kinematics(bodies, nv, len(system.geoms))
+
+    step = Step(
+        scalars=np.zeros(1, STEP_SCALARS), start=kinematics(), middle=kinematics(),
+        end=kinematics(), dynamics=make_dynamics(bodies, nv), q_middle=np.zeros(nq),
+        q_end=np.zeros(nq), v_end=np.zeros(nv), v_free=np.zeros(nv), v_middle=np.zeros(nv),
+        v_change=np.zeros(nv), correction=np.zeros(nv), sums_before=np.zeros(dolls, DOLL_SUMS),
+        sums_after=np.zeros(dolls, DOLL_SUMS), external=np.zeros(dolls, EXTERNAL_IMPULSE),
+        bracket=np.zeros(1, BRACKET), gaps_low=np.zeros(gaps), gaps_high=np.zeros(gaps),
+        spin=np.zeros(3))
+    flight = Flight(
+        kinematics=kinematics(), q=np.zeros(nq), v=np.zeros(nv), stages=np.zeros((16, nq + nv)),
+        derivative=np.zeros(nq + nv), armed=np.zeros(gaps), motion=np.zeros(bodies, FLIGHT_MOTION))
+    found = Contacts(
+        found=np.zeros(contacts, CONTACT), start=np.zeros(contacts, CONTACT),
+        gaps_end=np.zeros(gaps), gaps_active=np.zeros(gaps),
+        manifold=np.zeros(MAX_MANIFOLD_POINTS, CONTACT_POINT), motion=np.zeros(bodies, MOTION),
+        joint_outside=np.zeros(bodies, np.int64), angles=np.zeros(max(contacts, 8)),
+        u=np.zeros(max(contacts, 8)), v=np.zeros(max(contacts, 8)))
+    return Workspace(
+        contacts=found, island=_make_island(system, contacts, contacts * (5 if rolls else 3)),
+        step=step, flight=flight, stats=cluster.stats, excluded=cluster.excluded,
+        gaps=cluster.gaps)
+
+
+def _make_island(system: System, contacts: int, rows: int) -> Island:
+    """With room for so many contacts and rows."""
+    nv, few = len(system.dof_parent), min(rows, MAX_DENSE_ROWS)
+    wide = min(nv, 2 * tree_depth(system)) + 1
+
+    def each_row() -> np.ndarray:
+        return np.zeros(max(rows, 8))
+
+    return Island(
+        members=np.zeros(contacts, MEMBER), label=np.zeros(len(system.doll_masses), np.int64),
+        Y=np.zeros((rows, wide)), YT=np.zeros((nv, few)),
+        support=np.zeros((contacts, wide), np.int64), place=np.zeros(nv, np.int64),
+        W=np.zeros(few * few), G=np.zeros(few * few), blocks=np.zeros((contacts, 5, 5)),
+        rhs=each_row(), impulses=each_row(), free_velocity=each_row(), start_velocity=each_row(),
+        curvature=each_row(), correction=each_row(), soft=each_row(), velocity=each_row(),
+        residual=each_row(), direction=each_row(), best=each_row(),
+        active=np.zeros(2 * max(rows, 8)), places=np.zeros(max(rows, 8), np.int64),
+        is_normal=np.zeros(max(rows, 8), np.int64), normal_rhs=each_row(),
+        normal_impulses=each_row(), normal_row=np.zeros(max(rows, 8), np.int64),
+        row_impulses=each_row(), row_direction=each_row(), z=np.zeros(nv), z_previous=np.zeros(nv),
+        z_direction=np.zeros(nv))
+
+
+WORKSPACE = bundle_type(make_workspace(blank_system(), make_cluster_state(blank_system())))

@@ -1,0 +1,1 @@
+"""Inertial sensors: the parameter `imus` and the Imu publishers."""

@@ -1,0 +1,49 @@
+"""The parameter ``imus``: each entry names a bone and where on it the sensor is mounted."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.validate_topic_name import validate_topic_name
+
+from ...model import errors, rotation
+from ...physics.sensors.imu import ImuMount
+
+
+def parse_mount(text: str, bones: Sequence[str]) -> ImuMount:
+    """Parse 'bone', 'bone x y z' (m) or 'bone x y z roll pitch yaw' (rad), in the bone's frame.
+
+    Raises UnknownBone for another text, NotFinite for a number that is not finite.
+    """
+    words = text.split()
+    for count in (0, 3, 6):
+        name = ' '.join(words[:len(words) - count])
+        if name in bones:
+            try:
+                x, y, z, *angles = map(float, words[len(words) - count:] or [0.0] * 3)
+                errors.check_finite('imus', (x, y, z, *angles))
+            except errors.ModelError:
+                raise
+            except ValueError:
+                break
+            orientation = rotation.from_rpy(*angles) if angles else rotation.IDENTITY
+            return ImuMount(name, (x, y, z), tuple(orientation))
+    raise errors.UnknownBone('imus', text, f'{errors.one_of(bones, text)}, alone or followed by '
+                             'x y z or x y z roll pitch yaw')
+
+
+def check_imus(imus: Sequence[str], bones: Sequence[str]) -> None:
+    """Raise a ModelError unless each entry is a valid mount, with one sensor per bone."""
+    mounted = [parse_mount(text, bones).bone for text in filter(str.strip, imus)]
+    for bone in mounted:
+        try:
+            validate_topic_name(imu_topic(bone))
+        except InvalidTopicNameException:
+            raise errors.WrongForm('imus', bone, 'a name that a topic may contain') from None
+        if mounted.count(bone) > 1:
+            raise errors.DuplicateName('imus', bone, 'one sensor on a bone')
+
+
+def imu_topic(bone: str) -> str:
+    """Topic of a bone's sensor."""
+    return f'~/imu/{bone}/data_raw'

@@ -1,0 +1,34 @@
+"""Counters of refused and clamped input."""
+from __future__ import annotations
+
+from collections import Counter
+
+from rclpy.impl.rcutils_logger import RcutilsLogger
+
+WARNING_PERIOD = 1.0
+"""s: throttle of the warnings."""
+
+
+class InputCounts:
+    """Counts refused and clamped inputs by source; logs a throttled warning for each."""
+
+    def __init__(self, logger: RcutilsLogger) -> None:
+        self.refused: Counter[str] = Counter()
+        self.clamped: Counter[str] = Counter()
+        self.last_reason = ''
+        """Why the last input was refused or clamped."""
+        self._logger = logger
+
+    def refuse(self, source: str, reason: object) -> None:
+        """Count an input that was ignored."""
+        self.refused[source] += 1
+        self._warn(f'{source} refused: {reason}')
+
+    def clamp(self, source: str, reason: object) -> None:
+        """Count an input that was limited."""
+        self.clamped[source] += 1
+        self._warn(f'{source} clamped: {reason}')
+
+    def _warn(self, text: str) -> None:
+        self.last_reason = text
+        self._logger.warning(text, throttle_duration_sec=WARNING_PERIOD)

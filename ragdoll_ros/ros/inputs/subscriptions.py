@@ -1,0 +1,118 @@
+"""Subscriptions that push: Wrench and WrenchStamped become a Push, Twist becomes a Drive.
+
+Input that is not finite or names an unknown bone is refused; a vector that is too long is clamped
+and keeps its direction. Both are counted.
+"""
+from __future__ import annotations
+
+from typing import Protocol
+
+from geometry_msgs.msg import Twist, Vector3, Wrench, WrenchStamped
+from rclpy.node import Node
+
+from ...model import errors
+from ...model.drive import MAX_FORCE, MAX_SPEED, MAX_TORQUE, Drive
+from ...model.push import Push
+from ...model.ragdoll import WORLD
+from ...model.scene import Scene
+from ...model.vectors import Vector, clamp_norm
+from ..parameters.node_settings import NodeSettings
+from .input_counts import InputCounts
+
+TORQUE_ARM = 0.1
+"""m: the largest torque is max_force times this."""
+
+
+class PushTarget(Protocol):
+    """What is pushed: a simulation, or a stand-in in a process that only listens."""
+
+    scene: Scene
+
+    def push(self, push: Push | Drive, channel: str) -> None:
+        """Apply a push or drive; it replaces the last one of its channel."""
+
+    def release(self, channel: str) -> None:
+        """End the push of a channel."""
+
+
+class PushSubscriptions:
+    """Subscriptions to ~/force, cmd_vel and ~/push; each topic is a channel of pushes.
+
+    ``name`` is the name of the node that is pushed, for another node that listens as well. All are
+    reliable: a best-effort subscription lost 3 of 40 messages that were sent right after matching.
+    """
+
+    def __init__(self, node: Node, counts: InputCounts, name: str = '~') -> None:
+        self._counts = counts
+        self.simulation: PushTarget
+        self.settings: NodeSettings
+        self.subscriptions = [
+            node.create_subscription(Wrench, f'{name}/force', self.on_force, 10),
+            node.create_subscription(Twist, 'cmd_vel', self.on_cmd_vel, 10),
+            node.create_subscription(WrenchStamped, f'{name}/push', self.on_push, 10)]
+
+    def on_force(self, message: Wrench) -> None:
+        """Push the pushed bone in the world frame; a zero wrench ends the push."""
+        self._push('~/force', 'force', self.settings.pushed_bone, message)
+
+    def on_cmd_vel(self, message: Twist) -> None:
+        """Drive the pushed bone towards a velocity in the world frame.
+
+        A part (linear or angular) that is zero is not driven: a doll is passive, and a command to
+        turn does not hold it in the air. A zero twist ends the drive.
+        """
+        settings = self.settings
+        try:
+            linear, angular = (self._limited('cmd_vel', name, vector, MAX_SPEED, 'the limit')
+                               for name, vector in (('linear', message.linear),
+                                                    ('angular', message.angular)))
+            if any(linear) or any(angular):
+                self.simulation.push(Drive(
+                    settings.pushed_bone, linear if any(linear) else None,
+                    angular if any(angular) else None,
+                    settings.force_per_speed, settings.torque_per_speed,
+                    min(MAX_FORCE, settings.max_force),
+                    min(MAX_TORQUE, settings.max_force * TORQUE_ARM),
+                    duration=settings.cmd_vel_timeout), 'cmd_vel')
+            else:
+                self.simulation.release('cmd_vel')
+        except errors.ModelError as error:
+            self._counts.refuse('cmd_vel', error)
+
+    def on_push(self, message: WrenchStamped) -> None:
+        """Push the pushed bone in the world frame, or the bone of frame_id in its own frame."""
+        settings, frame = self.settings, message.header.frame_id
+        local = frame not in (WORLD, settings.frame_id)
+        if local and frame not in self.simulation.scene.bone_names:
+            expected = ', '.join((WORLD, *self.simulation.scene.bone_names))
+            self._counts.refuse('~/push', errors.UnknownBone(
+                'header.frame_id', frame, f'one of {expected}'))
+            return
+        bone = frame if local else settings.pushed_bone
+        self._push('~/push', f'push {frame if local else WORLD}', bone, message.wrench, local)
+
+    def _push(self, source: str, channel: str, bone: str, wrench: Wrench,
+              local: bool = False) -> None:
+        """Apply a wrench for push_timeout; ``local``: in the bone's own frame."""
+        limit = self.settings.max_force
+        try:
+            force = self._limited(source, 'force', wrench.force, limit, 'max_force')
+            torque = self._limited(source, 'torque', wrench.torque, limit * TORQUE_ARM,
+                                   'max_force')
+            if any(force) or any(torque):
+                self.simulation.push(Push(bone, force, torque, local=local,
+                                          duration=self.settings.push_timeout), channel)
+            else:
+                self.simulation.release(channel)
+        except errors.ModelError as error:
+            self._counts.refuse(source, error)
+
+    def _limited(self, source: str, name: str, vector: Vector3, limit: float,
+                 limit_name: str) -> Vector:
+        """The vector, shortened to ``limit``. NotFinite if the message is not finite."""
+        values = (vector.x, vector.y, vector.z)
+        errors.check_finite(name, values)
+        result, length = clamp_norm(values, limit)
+        if length > limit:
+            self._counts.clamp(source, f'{name} of {length:g} to {limit_name}, {limit:g}')
+        return result

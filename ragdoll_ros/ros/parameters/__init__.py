@@ -1,0 +1,1 @@
+"""The parameters of the node: declaration, validation, callbacks."""

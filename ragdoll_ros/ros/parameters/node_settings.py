@@ -1,0 +1,148 @@
+"""Parameter values of the node: names, defaults, descriptions, ranges and validation."""
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
+from ...model import errors
+from ...model.drive import FORCE_PER_SPEED, TORQUE_PER_SPEED
+from ...model.ragdoll import WORLD
+from ...model.scene import STEP_RANGE, Scene
+from ...physics.accuracy import ACCURACIES
+from ...physics.engine.registry import ENGINES, check_engine
+from ...physics.sensors.imu import ImuErrors
+from ...physics.simulation import MAX_WORKERS
+from ..imu.imu_parameters import check_imus
+from ..messages.tf import PUBLISH_TF
+
+
+def _parameter(default: object, description: str, limits: tuple[float, float] | None = None,
+               constraints: str = '', scene_default: Callable | None = None) -> object:
+    """A parameter; ``scene_default(scene)`` returns the default of a scene that has its own."""
+    return dataclasses.field(default=default, metadata={
+        'description': description, 'range': limits, 'constraints': constraints,
+        'scene_default': scene_default})
+
+
+@dataclass(frozen=True)
+class NodeSettings:
+    """Values of all parameters that can be set; see the descriptions."""
+
+    scene: str = _parameter(
+        'drop', 'Scene to simulate: a name in config/ or a path; a doll stands above the ground',
+        constraints='a file or the name of a shipped one; setting it again reloads it')
+    rate: float = _parameter(
+        100.0, 'Ticks and messages per second of simulated time, Hz',
+        (1 / STEP_RANGE[1], 1 / STEP_RANGE[0]), scene_default=lambda scene: 1 / scene.step)
+    real_time_factor: float = _parameter(
+        1.0, 'Simulated time per wall time', (0.001, 100.0),
+        scene_default=lambda scene: min(max(scene.pace, 0.001), 100.0))
+    start_paused: bool = _parameter(False, 'Start paused, until ~/pause resumes')
+    pushed_bone: str = _parameter(
+        '', 'Bone that ~/force and cmd_vel push', constraints='one of bone_names',
+        scene_default=lambda scene: scene.qualified(scene.dolls[0], scene.dolls[0].doll.root.name))
+    push_timeout: float = _parameter(
+        0.1, 'Simulated time that a push acts unless the next one comes first, s', (0.001, 60.0))
+    cmd_vel_timeout: float = _parameter(
+        0.6, 'Simulated time that a message on cmd_vel acts, s', (0.001, 60.0))
+    force_per_speed: float = _parameter(
+        FORCE_PER_SPEED, 'Force per velocity error of the pushed bone to cmd_vel, N/(m/s)',
+        (0.0, 1e5))
+    torque_per_speed: float = _parameter(
+        TORQUE_PER_SPEED, 'Torque per angular velocity error, N m/(rad/s)', (0.0, 1e4))
+    max_force: float = _parameter(
+        10000.0, 'Largest force, N, and ten times the largest torque, N m; input is clamped to it',
+        (0.0, 1e5))
+    frame_id: str = _parameter(WORLD, 'Name of the world frame in all messages',
+                               constraints='not in bone_names, no leading slash')
+    publish_clock: bool = _parameter(
+        False, 'Publish simulated time on /clock and stamp messages with it')
+    publish_tf: str = _parameter(
+        'all', 'Frames on /tf: of all links, of the root links only, or none',
+        constraints='one of ' + ', '.join(PUBLISH_TF))
+    dump_directory: str = _parameter(
+        '', "Directory for dumps of the states before a bad one; empty: ROS's log directory")
+    accuracy: str = _parameter('normal', 'Accuracy of the simulation',
+                               constraints='one of ' + ', '.join(ACCURACIES))
+    engine: str = _parameter('auto', 'Physics engine; a change restarts the scene',
+                             constraints='one of ' + ', '.join(ENGINES))
+    workers: int = _parameter(
+        1, 'Threads for dolls that do not touch, 0: one per core; a change restarts the scene',
+        (0, MAX_WORKERS))
+    imus: tuple[str, ...] = _parameter(
+        ('',), 'Bones with an inertial sensor, each published on ~/imu/<bone>/data_raw: '
+        "'bone', 'bone x y z' (m from its centre of mass, bone frame) or "
+        "'bone x y z roll pitch yaw' (rad)",
+        constraints='bones of bone_names; an empty string is none')
+    imu_rate: float = _parameter(
+        100.0, 'Samples of each inertial sensor per second of simulated time, Hz', (1.0, 1000.0),
+        constraints='a multiple of rate, where there are imus')
+    imu_noise_acceleration: float = _parameter(
+        0.0, "Standard deviation of a sample's specific force, m/s^2", (0.0, 1000.0))
+    imu_noise_rate: float = _parameter(
+        0.0, "Standard deviation of a sample's angular rate, rad/s", (0.0, 1000.0))
+    imu_bias: tuple[float, ...] = _parameter(
+        (0.0,) * 6, 'Bias of each sample: x, y, z, m/s^2, and x, y, z, rad/s',
+        constraints='6 numbers')
+    imu_range: tuple[float, ...] = _parameter(
+        (0.0, 0.0), 'Limits at which samples saturate: m/s^2 and rad/s; 0: unlimited',
+        constraints='2 numbers, zero or above')
+    imu_seed: int = _parameter(
+        0, "Seed of the sensors' noise", (0, 2 ** 31 - 1))
+
+    @property
+    def step(self) -> float:
+        """Length of a tick, s, clipped to STEP_RANGE against rounding of the rate."""
+        return min(max(1 / self.rate, STEP_RANGE[0]), STEP_RANGE[1])
+
+    @property
+    def samples_per_tick(self) -> int:
+        """Samples of the inertial sensors in a tick; 1 without sensors."""
+        return round(self.imu_rate / self.rate) if any(self.imus) else 1
+
+    @property
+    def imu_flaws(self) -> ImuErrors:
+        """Noise, bias and range of each sensor. Raises a ModelError for invalid ones."""
+        try:
+            return ImuErrors(self.imu_noise_acceleration, self.imu_noise_rate, self.imu_bias,
+                         self.imu_range)
+        except errors.ModelError as error:
+            raise type(error)(f'imu_{error.path}', error.value, error.expected) from None
+
+
+SPECS = {field.name: field for field in fields(NodeSettings)}
+"""Dataclass field of each parameter; its metadata has the parts of the descriptor."""
+
+BONE_NAMES = 'bone_names'
+
+
+def scene_defaults(scene: Scene) -> dict:
+    """Defaults that come from the scene, by parameter."""
+    return {name: spec.metadata['scene_default'](scene) for name, spec in SPECS.items()
+            if spec.metadata['scene_default']}
+
+
+def check(settings: NodeSettings, scene: Scene) -> None:
+    """Raise a RagdollError for values that a descriptor's range cannot exclude."""
+    if settings.accuracy not in ACCURACIES:
+        raise errors.OutOfRange('accuracy', settings.accuracy, 'one of ' + ', '.join(ACCURACIES))
+    if settings.publish_tf not in PUBLISH_TF:
+        raise errors.OutOfRange('publish_tf', settings.publish_tf,
+                                'one of ' + ', '.join(PUBLISH_TF))
+    check_engine(settings.engine)
+    names = scene.bone_names
+    if settings.pushed_bone not in names:
+        raise errors.UnknownBone('pushed_bone', settings.pushed_bone,
+                                 errors.one_of(names, settings.pushed_bone))
+    frame = settings.frame_id
+    if not frame or frame.startswith('/'):
+        raise errors.OutOfRange('frame_id', frame, 'a name without a leading slash')
+    if frame in names:
+        raise errors.DuplicateName('frame_id', frame, 'a name that is no bone')
+    settings.imu_flaws  # noqa: B018 - raises for invalid values
+    check_imus(settings.imus, names)
+    samples = settings.imu_rate / settings.rate
+    if any(settings.imus) and (samples < 1 - 1e-9 or abs(samples / round(samples) - 1) > 1e-9):
+        raise errors.OutOfRange('imu_rate', settings.imu_rate,
+                                f'a multiple of rate, {settings.rate:g}')

@@ -1,0 +1,1 @@
+"""Signals and the rclpy context of a process."""

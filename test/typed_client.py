@@ -1,0 +1,97 @@
+"""A typed program that uses every public name: checked by mypy --strict, and run, in test_public.
+
+Each `type: ignore` is an error that mypy must find, as an unused one is an error in turn.
+"""
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+import ragdoll_ros
+from ragdoll_ros import (
+    Bone,
+    Box,
+    Capsule,
+    Compound,
+    Cylinder,
+    Drive,
+    Ground,
+    Joint,
+    Part,
+    Placement,
+    Push,
+    Ragdoll,
+    RagdollError,
+    Recorder,
+    Riders,
+    Scene,
+    Simulation,
+    Sphere,
+    State,
+    load_doll,
+    load_scene,
+    person,
+    save_doll,
+    save_recording,
+    save_scene,
+)
+
+
+def pendulum() -> Ragdoll:
+    """Two bones and a hinge."""
+    weight = Compound((Part(Sphere(0.1)), Part(Box((0.1, 0.1, 0.1)), position=(0.0, 0.0, 0.0))))
+    bones = (Bone('beam', Capsule(0.05, 0.4), 1.0, (0.0, 0.0, 0.0)),
+             Bone('weight', weight, mass=2.0, position=(0.0, 0.0, -0.6)))
+    hinge = Joint('beam', 'weight', 'hinge', (0.0, 0.0, -0.3), ((0.0, 1.0, 0.0),), ((-1.0, 1.0),))
+    return Ragdoll('pendulum', bones, (hinge,))
+
+
+def fall(scene: Scene, folder: Path) -> State:
+    """Three ticks with a push and a drive, written to a file."""
+    recorder, riders = Recorder(scene), Riders(scene)
+    with Simulation(scene, accuracy='normal', engine='auto', workers=1) as simulation:
+        simulation.push(Push(scene.bone_names[0], force=(100.0, 0.0, 0.0)))
+        simulation.push(Drive(scene.bone_names[0], velocity=(1.0, 0.0, 0.0)), channel='drive')
+        simulation.grab('hand', scene.bone_names[0], (0.0, 0.0, 0.0))
+        simulation.let_go('hand')
+        for _ in range(3):
+            state: State = simulation.advance()
+            recorder.take(simulation)
+        nanoseconds: int = simulation.time
+        asleep: bool = simulation.asleep
+        measures: dict[str, float] = simulation.measures()
+    assert nanoseconds and not asleep and measures
+    names: tuple[str, ...] = riders.names
+    positions: np.ndarray = riders.poses(state).position
+    assert len(names) == len(positions)
+    paths: list[Path] = save_recording(recorder.recording(), folder / 'fall.csv')
+    assert paths == [folder / 'fall.csv']
+    return state
+
+
+def main(folder: Path) -> None:
+    """Use every name."""
+    save_doll(pendulum(), folder / 'pendulum.yaml')
+    doll: Ragdoll = load_doll(str(folder / 'pendulum.yaml'))
+    assert doll == pendulum()
+    stand = Ragdoll('stand', (Bone('stand', Cylinder(0.2, 0.1), 5.0, (0.0, 0.0, 0.05)),))
+    scene = Scene('pair', (Placement(doll, position=(0.0, 0.0, 2.0)), Placement(stand),
+                           Placement(person(1.75, 70.0, 'female'), position=(1.0, 0.0, 0.0))),
+                  Ground())
+    save_scene(scene, folder / 'pair.yaml')
+    state = fall(load_scene(str(folder / 'pair.yaml')), folder)
+    rows: tuple[int, ...] = state.positions.shape
+    assert rows == (len(scene.bone_names), 3) and state.linear_velocities.shape == rows
+    try:
+        Push('torso', duration=-1.0)
+    except RagdollError as error:
+        assert 'duration' in str(error)
+
+
+def wrong(state: State) -> None:
+    """What mypy must refuse; never called."""
+    ragdoll_ros.Nonsense  # type: ignore[attr-defined]  # noqa: B018
+    state.nonsense  # type: ignore[attr-defined]  # noqa: B018
+    Sphere('wide')  # type: ignore[arg-type]
+    load_scene()  # type: ignore[call-arg]
