@@ -1,10 +1,9 @@
-"""Short pieces of the default drop, each begun anew at an instant of a run of it.
+"""Short segments of the default drop, each restarted from an instant of a reference run.
 
-Through impacts two runs part for ever, so a long run says little about a method. After Erez,
-Tassa and Todorov (ICRA 2015): take many instants of a trajectory, run each method a tenth of a
-second from there, and compare with a reference from the same state. They compared each engine with
-itself; here that stands beside the difference to one reference for all. They left out how far
-joints come apart; it stands here too.
+Impacts are chaotic, so a long run says little about a method. After Erez, Tassa and Todorov (ICRA
+2015): take many instants of a trajectory, run each method for 0.1 s from there, and compare with a
+reference from the same state. They compared each engine with itself; here the error is against one
+reference for all, and self-convergence and joint gaps are given in addition.
 """
 from __future__ import annotations
 
@@ -16,24 +15,23 @@ from ...files.scene import load_scene
 from ...model.coordinates import GeneralizedState
 from ...physics.accuracy import ACCURACIES
 from ..cases.trial import Trial
-from ..measure import Measure, compare
-from ..methods import Method, bullet, by_name, mujoco, reference, run, simulated
-from ..results.runner import Job, Options, Row
+from ..methods import Method, bullet, by_name, mujoco, reference, run, start_simulation
+from ..metrics import Metrics, compare
+from ..results.runner import Job, Row, RunOptions
 from ..trajectory import Trajectory
 
 NAME = 'pieces'
 LENGTH = 0.1
 """s"""
 
-FINE, PARTS = 128, 100
-"""Substeps of PyBullet and MuJoCo at their finest; parts of normal's step that the reference's
-is."""
+FINEST_SUBSTEPS, REFINEMENT = 128, 100
+"""Substeps of PyBullet and MuJoCo at their finest; step of `normal` over the reference's."""
 
 FIRST, LAST = 0.25, 1.3
-"""s: instants between which pieces begin: from just before the first touch until it lies still."""
+"""s: segments begin between these, from before the first contact until the doll lies still."""
 
 
-def jobs(options: Options) -> list[Job]:
+def jobs(options: RunOptions) -> list[Job]:
     """One timed job for each method."""
     count = 6 if options.quick else 60
     fixed = (4, 10) if options.quick else (1, 2, 4, 10, 16, 32)
@@ -44,12 +42,12 @@ def jobs(options: Options) -> list[Job]:
 
 
 @functools.cache
-def beginnings(count: int) -> list[Trial]:
-    """Pieces of the default drop at ``count`` instants of a run at exact."""
+def segments(count: int) -> list[Trial]:
+    """Segments of the default drop from ``count`` instants of a run at `exact`."""
     scene, found = load_scene('drop'), []
     wanted = np.rint(np.linspace(FIRST, LAST, count) / scene.step).astype(int)
     states = {}
-    with simulated(Trial(scene, LAST), 'exact') as simulation:
+    with start_simulation(Trial(scene, LAST), 'exact') as simulation:
         for tick in range(wanted[-1] + 1):
             here = simulation.coordinates
             states[tick] = GeneralizedState(here.q.copy(), here.v.copy())
@@ -60,32 +58,33 @@ def beginnings(count: int) -> list[Trial]:
 
 
 def finest(family: str) -> Method:
-    """An engine at its finest; for ours, and any other name, the reference."""
-    return {'PyBullet': bullet(FINE), 'MuJoCo implicitfast': mujoco('implicitfast', FINE)}.get(
-        family, reference(PARTS))
+    """The engine of a family at its finest; the reference for ours and all other names."""
+    return {'PyBullet': bullet(FINEST_SUBSTEPS),
+            'MuJoCo implicitfast': mujoco('implicitfast', FINEST_SUBSTEPS)}.get(
+        family, reference(REFINEMENT))
 
 
 @functools.cache
 def truths(method: str, count: int) -> list[Trajectory]:
-    """The pieces by a method."""
-    return [run(by_name(method), trial).trajectory for trial in beginnings(count)]
+    """Trajectories of the segments by a method."""
+    return [run(by_name(method), trial).trajectory for trial in segments(count)]
 
 
 def measure(name: str, count: int) -> list[Row]:
-    """Errors at the worst instant of each piece: median and 90th percentile over the pieces."""
+    """Largest error of each segment: median and 90th percentile over all segments."""
     method, found, cpu = by_name(name), [], 0.0
     for trial, truth, itself in zip(
-            beginnings(count), truths(reference(PARTS).name, count),
+            segments(count), truths(reference(REFINEMENT).name, count),
             truths(finest(method.family).name, count), strict=True):
         result = run(method, trial)
-        scales, error = Measure(trial.scene), compare(result.trajectory, truth)
+        metrics, error = Metrics(trial.scene), compare(result.trajectory, truth)
         found.append((error['position_worst_m'], error['angle_worst_rad'],
                       compare(result.trajectory, itself)['position_worst_m'],
-                      scales.joint_gap(result.trajectory), scales.sinking(result.trajectory)))
+                      metrics.joint_gap(result.trajectory), metrics.penetration(result.trajectory)))
         cpu += result.costs.sum()
     errors, angles, owns, gaps, sunk = np.array(found).T
     return [{'method': name, 'label': method.label, 'family': method.family, 'pieces': count,
-             'reference': reference(PARTS).label, 'cpu_s_per_s': float(cpu / (count * LENGTH)),
+             'reference': reference(REFINEMENT).label, 'cpu_s_per_s': float(cpu / (count * LENGTH)),
              'position_median_m': float(np.median(errors)),
              'position_p90_m': float(np.percentile(errors, 90)),
              'angle_median_rad': float(np.median(angles)),

@@ -1,4 +1,4 @@
-"""The report's pictures of contacts: errors over steps, and clouds of drops."""
+"""Plots of contacts: errors over step size, and distributions of drops."""
 from __future__ import annotations
 
 import math
@@ -9,13 +9,13 @@ from ..results.figures import Figures, number, sound
 
 STYLES = {'core': ('#1f5fbf', 'D'), 'PyBullet': ('#e69f00', 'o'),
           'MuJoCo implicitfast': ('#4f9d69', '^')}
-"""Colour and mark of each engine."""
+"""Colour and marker of each engine."""
 
 COLUMNS = 4
 
 
 def draw_convergence(figures: Figures, plt: object) -> object:
-    """Errors over steps, a diagram for each motion; dotted: order 1."""
+    """Error over step size for each motion; dotted: order 1."""
     rows = sound(figures.get('convergence', ()))
     names = list(dict.fromkeys(row['motion'] for row in rows))
     if not names:
@@ -42,17 +42,17 @@ def draw_convergence(figures: Figures, plt: object) -> object:
     return figure
 
 
-CLOUDS = (('energy_0.5s', 'share of energy left at 0.5 s'), ('energy_1s', 'at 1 s'),
-          ('slide_m', 'slide, m'), ('settled_s', 'settled after, s'))
+QUANTITIES = (('energy_0.5s', 'relative energy at 0.5 s'), ('energy_1s', 'at 1 s'),
+          ('slide_m', 'slide, m'), ('settled_s', 'settling time, s'))
 
 
 def draw_drops(figures: Figures, plt: object) -> object:
-    """Shares of random drops that stay below a value, for each method; black: the reference."""
+    """Cumulative distributions of random drops by each method; black: the reference."""
     rows = [row for row in sound(figures.get('drops', ())) if row['population'] == 'random']
     if not rows:
         return None
-    figure, grid = plt.subplots(1, len(CLOUDS), figsize=(14, 3.4), layout='constrained')
-    for axes, (key, text) in zip(grid, CLOUDS, strict=True):
+    figure, grid = plt.subplots(1, len(QUANTITIES), figsize=(14, 3.4), layout='constrained')
+    for axes, (key, text) in zip(grid, QUANTITIES, strict=True):
         for index, row in enumerate(rows):
             values = np.sort([number(value) for value in row['values'][key]])
             values = values[np.isfinite(values)]

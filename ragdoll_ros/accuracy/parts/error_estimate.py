@@ -1,7 +1,7 @@
-"""The live error estimate against the truth: the error that each single tick of a flight adds.
+"""The simulation's local error estimate against the true local error of each tick in flight.
 
-The truth of a tick starts from where the simulation stood before it: the equations of motion,
-integrated at 1e-12 over that tick alone. Ticks count where the simulation trusts its estimate.
+The truth of a tick starts from the simulation's state before it: the equations of motion integrated
+at 1e-12 over that tick. Ticks count if the simulation reports its estimate as trusted.
 """
 from __future__ import annotations
 
@@ -9,33 +9,33 @@ import functools
 
 import numpy as np
 
-from ..methods import simulated
+from ..methods import start_simulation
 from ..references.articulated import Articulated
-from ..results.runner import Job, Options, Row
-from .precision import motions
+from ..results.runner import Job, Row, RunOptions
+from .work_precision import motions
 
 NAME = 'estimate'
 MOTIONS = ('flight_gentle', 'flight_fast', 'flight_long')
 FACTOR = 3.0
 NOISE = 3e-14
 """m: rounding of positions and of the truth. Ticks whose error and estimate are both within a
-FACTOR of it tell nothing, and do not count."""
+FACTOR of it do not count."""
 
 
-def jobs(options: Options) -> list[Job]:
-    """One job for each setting."""
+def jobs(options: RunOptions) -> list[Job]:
+    """One job for each accuracy."""
     names = MOTIONS[:2] if options.quick else MOTIONS
     return [Job(NAME, f'live estimate, {accuracy}', functools.partial(measure, accuracy, names),
                 2.0 * len(names)) for accuracy in ('draft', 'normal', 'exact')]
 
 
 def measure(accuracy: str, names: tuple[str, ...]) -> list[Row]:
-    """True and estimated errors of all flight ticks of some motions."""
+    """True and estimated local errors of all ticks of some flights."""
     true, estimated, distrusted = [], [], 0
     for name in names:
         trial = motions()[name].trial
         tree = Articulated(trial.scene.dolls[0].doll, trial.scene.gravity)
-        simulation, tick = simulated(trial, accuracy), trial.scene.step
+        simulation, tick = start_simulation(trial, accuracy), trial.scene.step
         for _ in range(round(trial.duration / tick)):
             before = simulation.coordinates
             truth = tree.trajectory(before.q, before.v, (0.0, tick)).positions[-1]

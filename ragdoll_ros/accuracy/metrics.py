@@ -1,8 +1,7 @@
-"""What is measured on a motion: energy, momentum, gaps, overshoot, sinking, settling.
+"""Metrics of a trajectory: energy, momentum, joint gaps, limit overshoot, penetration, settling.
 
-Written apart from mechanics.py, by which the simulation steers itself. Everything is taken from
-poses and velocities of the bones, in the same way for every method. Arrays run over t instants and
-n bones.
+Computed from poses and velocities of the bones alone, in the same way for every method, without
+code of the simulation. Arrays run over t instants and n bones.
 """
 from __future__ import annotations
 
@@ -16,20 +15,19 @@ from ..model.scene import Placement, Scene
 from .cases.trial import Trial
 from .trajectory import Trajectory
 
-End = tuple[int, np.ndarray, np.ndarray]
-"""A bone at a joint: its index, the anchor (m) from its centre along its own axes, and the
-quaternion from the doll's axes to the bone's."""
+JointEnd = tuple[int, np.ndarray, np.ndarray]
+"""A bone at a joint: its index, the anchor (m) in the bone's frame, and the quaternion from the
+bone's axes to the doll's."""
 
 REST_SPEED = 0.01
-"""m/s: slower than this, for good, counts as settled."""
+"""m/s: a trajectory has settled when all bones stay slower."""
+
+RECOVERED = math.radians(0.2)
+"""Overshoot, rad, below which a joint that starts past its limit counts as recovered."""
 
 
-BACK = math.radians(0.2)
-"""rad past a limit from which a joint counts as back."""
-
-
-class Measure:
-    """Yardsticks of one scene."""
+class Metrics:
+    """Metrics of trajectories of one scene."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -47,7 +45,7 @@ class Measure:
                 + np.einsum('nd,tnd,tnd->t', self._inertias, body, body)) / 2
 
     def energy(self, trajectory: Trajectory) -> np.ndarray:
-        """Kinetic and potential energy (t,) J; height counts from the ground, or from z = 0."""
+        """Kinetic and potential energy (t,) J; zero height is the ground, or z = 0."""
         zero = np.zeros(3)
         if self.scene.ground is not None:
             zero = np.array(self.scene.ground.normal) * self.scene.ground.offset
@@ -63,7 +61,7 @@ class Measure:
         return sum(self._angular_momenta(trajectory)).sum(axis=1)
 
     def _angular_momenta(self, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
-        """Of each bone (t, n, 3) N m s: of its centre about that of all, and about its own."""
+        """Orbital and spin angular momenta of the bones, (t, n, 3) N m s each."""
         centre = np.einsum('n,tnd->td', self._masses, trajectory.positions) / self._masses.sum()
         arms = trajectory.positions - centre[:, None]
         orbital = np.cross(arms, self._masses[:, None] * trajectory.linear_velocities)
@@ -71,11 +69,11 @@ class Measure:
         return orbital, own
 
     def work(self, trial: Trial, trajectory: Trajectory) -> np.ndarray:
-        """Work (t,) J that the pushes have done so far.
+        """Cumulative work (t,) J of the pushes.
 
-        Force times displacement is exact, as the force is steady within a tick. The integral of
-        the angular velocity w is the tick's rotation vector plus t^2 / 12 w_start x w_end
-        (Magnus' series).
+        Force times displacement is exact, as the force is constant within a tick. The integral of
+        the angular velocity w is the tick's rotation vector plus t^2 / 12 w_start x w_end (Magnus
+        series).
         """
         work = np.zeros(len(trajectory.times))
         for push in trial.pushes:
@@ -94,24 +92,24 @@ class Measure:
             work[1:] += np.cumsum(gained * acts)
         return work
 
-    def energy_excess(self, trial: Trial, trajectory: Trajectory, given: float = 0.0) -> float:
-        """Energy from nothing: the largest rise of E - W above what it had come down to.
+    def energy_excess(self, trial: Trial, trajectory: Trajectory,
+                      released: float = 0.0) -> float:
+        """Energy gain: the largest rise of E - W above its running minimum, over max(E0 + W).
 
-        As a share of max(E0 + W); ``given``, J, is what the start itself may give back. NaN where
-        there is no energy to compare it with.
+        ``released``, J, is energy that the start itself may release. NaN if max(E0 + W) <= 0.
         """
         energy, work = self.energy(trajectory), self.work(trial, trajectory)
-        own = np.maximum.accumulate(energy[0] + given + work)
+        own = np.maximum.accumulate(energy[0] + released + work)
         if not own[-1] > 0:
             return math.nan
         left = energy - work
-        risen = left - np.minimum.accumulate(left) - given
+        risen = left - np.minimum.accumulate(left) - released
         with np.errstate(invalid='ignore', divide='ignore'):
             shares = np.where(own > 0, risen / own, 0.0)
         return max(0.0, float(shares.max())) if np.isfinite(shares).all() else math.inf
 
     def momentum_drift(self, trial: Trial, trajectory: Trajectory) -> float:
-        """Worst momentum that no force accounts for, as a share of sum m |v|."""
+        """Largest momentum not accounted for by forces, over the largest sum of m |v|."""
         expected = self._masses.sum() * self._gravity * trajectory.times[:, None]
         for push in trial.pushes:
             acted = np.clip(trajectory.times - push.start, 0, push.duration)
@@ -122,14 +120,14 @@ class Measure:
         return _share(np.abs(momentum - momentum[0] - expected).max(), scale)
 
     def angular_momentum_drift(self, trajectory: Trajectory) -> float:
-        """Worst change of angular momentum about the centre of mass, as a share of sum |L|."""
+        """Largest change of angular momentum about the centre of mass, over the sum of |L|."""
         total = self.angular_momentum(trajectory)
         scale = sum(np.linalg.norm(part, axis=-1)
                     for part in self._angular_momenta(trajectory)).sum(axis=1).max()
         return _share(np.abs(total - total[0]).max(), scale)
 
     def joint_gap(self, trajectory: Trajectory) -> float:
-        """Worst distance in m between the two ends of a joint."""
+        """Largest distance, m, between the two anchors of a joint."""
         worst = 0.0
         for _, ends in self._joints:
             parent, child = (trajectory.positions[:, bone]
@@ -149,11 +147,11 @@ class Measure:
         return np.stack(columns, axis=-1) if columns else np.zeros((len(trajectory.times), 0))
 
     def overshoot(self, trajectory: Trajectory) -> float:
-        """Worst angle in rad past a limit; 0 where none is passed."""
+        """Largest angle past a joint limit, rad; 0 if none is passed."""
         return float(self.overshoots(trajectory).max())
 
     def overshoots(self, trajectory: Trajectory) -> np.ndarray:
-        """Angle (t,) rad of the joint that is furthest past a limit; 0 where none is."""
+        """Largest angle past a joint limit at each instant, (t,) rad; 0 if none is passed."""
         limits = [pair or (-math.inf, math.inf) for joint, _ in self._joints
                   for pair in joint.angle_limits]
         if not limits:
@@ -162,14 +160,15 @@ class Measure:
         angles = self.joint_angles(trajectory)
         return np.maximum(angles - upper, lower - angles).max(axis=1).clip(min=0.0)
 
-    def since_back(self, trajectory: Trajectory) -> Trajectory:
-        """What comes after all joints that start past their limits are back; all, if never."""
+    def after_limit_recovery(self, trajectory: Trajectory) -> Trajectory:
+        """The part after all joints that start past their limits have recovered; all, if never."""
         past = self.overshoots(trajectory)
-        back = int(np.argmax(past <= BACK)) if past[0] > BACK and (past <= BACK).any() else 0
+        inside = past <= RECOVERED
+        back = int(np.argmax(inside)) if not inside[0] and inside.any() else 0
         return trajectory.part(slice(back, None))
 
-    def sinking(self, trajectory: Trajectory) -> float:
-        """Deepest place in m of any bone's lowest point below the ground; 0 above it."""
+    def penetration(self, trajectory: Trajectory) -> float:
+        """Largest penetration of any bone into the ground, m; 0 if none."""
         ground = self.scene.ground
         if ground is None:
             return 0.0
@@ -181,21 +180,21 @@ class Measure:
         return deepest
 
     def settling_time(self, trajectory: Trajectory) -> float:
-        """Instant in s after which every bone stays slower than REST_SPEED; infinity: never."""
+        """Time, s, after which every bone stays slower than REST_SPEED; infinity if never."""
         speeds = np.linalg.norm(trajectory.linear_velocities, axis=-1).max(axis=1)
         fast = np.flatnonzero(~(speeds < REST_SPEED))
         if not len(fast):
             return 0.0
         return float(trajectory.times[fast[-1] + 1]) if fast[-1] + 1 < len(speeds) else math.inf
 
-    def _end(self, placement: Placement, name: str, anchor: tuple[float, float, float]) -> End:
+    def _end(self, placement: Placement, name: str, anchor: tuple[float, float, float]) -> JointEnd:
         bone = placement.doll.bone(name)
         return (self.scene.bone_index(self.scene.qualified(placement, name)),
                 bone.pose.apply_inverse(anchor), rotation.inverse(bone.orientation))
 
 
 def compare(trajectory: Trajectory, truth: Trajectory) -> dict[str, float]:
-    """Worst and RMS distance (m) of all centres of mass, worst and RMS angle (rad) of all bones."""
+    """Largest and RMS error of positions (m) and of orientations (rad), over bones and time."""
     apart = np.linalg.norm(trajectory.positions - truth.positions, axis=-1)
     angles = rotation.angle_between(trajectory.orientations, truth.orientations)
     return {'position_worst_m': float(apart.max()), 'position_rms_m': _rms(apart),
@@ -203,7 +202,7 @@ def compare(trajectory: Trajectory, truth: Trajectory) -> dict[str, float]:
 
 
 def _body_rates(trajectory: Trajectory) -> np.ndarray:
-    """Angular velocities (t, n, 3) rad/s along the bones' own axes."""
+    """Angular velocities (t, n, 3) rad/s in the bones' axes."""
     return rotation.rotate(rotation.inverse(trajectory.orientations), trajectory.angular_velocities)
 
 
@@ -216,7 +215,7 @@ def _share(value: float, scale: float) -> float:
 
 
 def _angles(joint: Joint, relative: np.ndarray) -> list[np.ndarray]:
-    """Angles of one joint from rotations (t, 3, 3) of the child relative to the parent."""
+    """Angles of a joint from rotations (t, 3, 3) of the child relative to the parent."""
     if joint.kind == 'fixed':
         return []
     if joint.kind == 'hinge':

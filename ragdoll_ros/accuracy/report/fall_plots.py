@@ -1,17 +1,17 @@
-"""The report's pictures of faints beside what is known of real falls."""
+"""Plots of fainting falls, compared with real falls."""
 from __future__ import annotations
 
 import numpy as np
 
 from ...people.real_falls import DESCENT, IMPACT_SPEEDS, Known
-from ..parts.faints import joined
+from ..parts.fainting_falls import joined
 from ..results.figures import Figures, sound
 
 BLUE, ORANGE = '#1f5fbf', '#e69f00'
 
 
-def draw_faints(figures: Figures, plt: object) -> object:
-    """How many faints hit how fast, and after how long; bands: real falls, mean and SD."""
+def draw_fainting_falls(figures: Figures, plt: object) -> object:
+    """Histograms of impact speeds and descent times; bands: mean and SD of real falls."""
     rows = sound(figures.get('faints', ()))
     if not rows:
         return None
@@ -19,18 +19,18 @@ def draw_faints(figures: Figures, plt: object) -> object:
     figure, grid = plt.subplots(1, 4, figsize=(14, 3.2), layout='constrained')
     shown = [(part, f'{part}: vertical speed at impact, m/s', known)
              for part, known in IMPACT_SPEEDS.items()]
-    for axes, (key, text, known) in zip(
-            grid, [*shown, ('descent', 'onset to impact of the pelvis, s', DESCENT)], strict=True):
+    shown.append(('descent', 'descent: onset to impact of the pelvis, s', DESCENT))
+    for axes, (key, text, known) in zip(grid, shown, strict=True):
         own = values[key][np.isfinite(values[key])]
-        axes.hist(own, bins=30, color=BLUE, alpha=0.8, label=f'faints: {len(own)}')
+        axes.hist(own, bins=30, color=BLUE, alpha=0.8, label=f'simulated: {len(own)}')
         _band(axes.axvspan, axes.axvline, known)
-        axes.set(xlabel=text, ylabel='faints')
+        axes.set(xlabel=text, ylabel='falls')
         axes.legend(fontsize=8)
     return figure
 
 
-def draw_directions(figures: Figures, plt: object) -> object:
-    """Speeds at impact over the direction of the lean."""
+def draw_fall_directions(figures: Figures, plt: object) -> object:
+    """Impact speeds over the direction of the lean."""
     rows = sound(figures.get('faints', ()))
     if not rows:
         return None

@@ -1,4 +1,4 @@
-"""The nine classes of starts: energy from nothing, overshoot, sinking, and what it costs."""
+"""The nine classes of random starts: energy gain, overshoot, penetration, and CPU time."""
 from __future__ import annotations
 
 import dataclasses
@@ -11,10 +11,10 @@ from ...physics.accuracy import ACCURACIES
 from ..cases.starts import CLASSES, trial
 from ..cases.trial import Trial
 from ..crowds.depth import BoneDepth
-from ..measure import Measure
 from ..methods import Result, bullet, by_name, ours, run
-from ..results.goals import EXCESS
-from ..results.runner import Job, Options, Row
+from ..metrics import Metrics
+from ..results.criteria import EXCESS
+from ..results.runner import Job, Row, RunOptions
 from ..trajectory import Trajectory
 
 NAME = 'classes'
@@ -22,26 +22,27 @@ RATIOS = 'ratios'
 WORST = ('excess', 'overshoot_rad', 'sinking_m', 'depth_m', 'gap_m', 'speed_m_s')
 
 RESTING, REST_SPEED = 15.0, 1e-3
-"""s after a start's own time at which ours is to be asleep, all bones slower than so many m/s."""
+"""Our simulation must be asleep so many s after the trial's end, all bones slower than m/s."""
 
 BASELINE = 10
-"""Substeps of the PyBullet that CPU times are compared with."""
+"""PyBullet's substeps in the baseline of CPU times."""
 
 CHEAPER = 4
-"""Substeps at which PyBullet is the price to beat: half as dear, and as near on the ground."""
+"""PyBullet's substeps in a second baseline: half the cost, equal accuracy on the ground."""
 
 REPEATS = 3
 
 CHUNK = 10
-"""Starts in one job."""
+"""Starts per job."""
 
 OTHERS = ('quickstart', f'bullet-{BASELINE}', f'bullet-{CHEAPER}', 'bullet-20',
           'mujoco-implicitfast-10')
 
 QUICK_CLASSES = ('push .1 to 3 s', 'spin 20 rad/s', 'drop 2 m', 'start outside')
 
-def jobs(options: Options) -> list[Job]:
-    """Our settings and the others on all classes; the CPU ratios."""
+
+def jobs(options: RunOptions) -> list[Job]:
+    """Jobs of our accuracies and the other methods on all classes, and of CPU ratios."""
     made = []
     for name in CLASSES:
         for method in [f'ours-{accuracy}' for accuracy in ACCURACIES]:
@@ -63,7 +64,7 @@ def chunks(class_name: str, method: str, count: int) -> list[Job]:
 
 
 def measure_class(class_name: str, method_name: str, first: int, end: int) -> list[Row]:
-    """Worst figures of the starts first ... end - 1 of a class."""
+    """Worst figures of starts first ... end - 1 of a class."""
     method, found = by_name(method_name), []
     for number in range(first, end):
         start = trial(class_name, number)
@@ -71,38 +72,36 @@ def measure_class(class_name: str, method_name: str, first: int, end: int) -> li
         whole = dataclasses.replace(start, duration=start.duration + RESTING)
         result = run(method, whole if method.family == 'ours' else start)
         found.append({'number': number, 'cpu_s': float(result.costs[:ticks].sum()),
-                      'simulated_s': start.duration,
-                      'restless': restless(result),
+                      'simulated_s': start.duration, 'restless': restless(result),
                       **worst(start, result.trajectory.part(slice(ticks + 1)))})
     return [gathered(class_name, method_name, found)]
 
 
 def restless(result: Result) -> bool:
-    """Whether one of our simulations has not come to rest and fallen asleep in the end."""
-    if not result.told:
+    """Whether one of our simulations is not at rest and asleep at the end."""
+    if not result.measures:
         return False
     speeds = np.linalg.norm(result.trajectory.linear_velocities[-1], axis=-1)
-    return not (speeds.max() < REST_SPEED and result.told['asleep'])
+    return not (speeds.max() < REST_SPEED and result.measures['asleep'])
 
 
 def worst(start: Trial, trajectory: Trajectory) -> dict[str, float]:
-    """The worst of each figure; where joints start past their limits, or bones in each other, most
-    count from when all are back: what brings them back is booked by the engine.
-    """
+    """Worst figures of a trajectory, most of them after the recovery of limits and overlaps."""
     if not trajectory.finite:
         return dict.fromkeys(WORST, math.inf) | {'settled_s': math.inf}
-    measure = Measure(start.scene)
-    inside, depth = BoneDepth(start.scene).since_apart(measure.since_back(trajectory))
-    return {'excess': measure.energy_excess(start, inside),
-            'overshoot_rad': measure.overshoot(inside), 'sinking_m': measure.sinking(trajectory),
-            'depth_m': depth,
-            'gap_m': measure.joint_gap(trajectory),
+    metrics = Metrics(start.scene)
+    recovered = metrics.after_limit_recovery(trajectory)
+    inside, depth = BoneDepth(start.scene).after_separation(recovered)
+    return {'excess': metrics.energy_excess(start, inside),
+            'overshoot_rad': metrics.overshoot(inside),
+            'sinking_m': metrics.penetration(trajectory), 'depth_m': depth,
+            'gap_m': metrics.joint_gap(trajectory),
             'speed_m_s': float(np.linalg.norm(trajectory.linear_velocities, axis=-1).max()),
-            'settled_s': measure.settling_time(trajectory)}
+            'settled_s': metrics.settling_time(trajectory)}
 
 
 def gathered(class_name: str, method: str, found: list[Row]) -> Row:
-    """One row out of many: the worst of each figure, and the start that has it."""
+    """Aggregate rows of single starts: the worst of each figure and the number of its start."""
     worst = max(found, key=lambda row: row['excess'])
     return {'class': class_name, 'method': method, 'starts': len(found),
             'bad': sum(not row['excess'] <= EXCESS for row in found),
@@ -115,7 +114,7 @@ def gathered(class_name: str, method: str, found: list[Row]) -> Row:
 
 
 def merged(rows: list[Row]) -> list[Row]:
-    """One row for each class and method, whose rows came from several jobs."""
+    """Aggregate rows of several jobs: one row for each class and method."""
     joined: dict[tuple, Row] = {}
     for row in rows:
         if 'failed' in row:
@@ -136,10 +135,10 @@ def merged(rows: list[Row]) -> list[Row]:
 
 
 def time_class(class_name: str, count: int) -> list[Row]:
-    """CPU of our settings and of PyBullet at N = 4 over that at N = 10, start by start in turn.
+    """CPU time of our accuracies and of PyBullet at N = 4 over that of PyBullet at N = 10.
 
-    Each run is done REPEATS times, and each of its ticks counts with its least cost: what others
-    take of a busy machine is no cost of a method.
+    Methods alternate. Each tick counts with its least cost of REPEATS runs, which excludes the
+    load of other processes.
     """
     methods = [bullet(BASELINE), *map(ours, ACCURACIES), bullet(CHEAPER)]
     sums = dict.fromkeys((method.name for method in methods), 0.0)

@@ -1,4 +1,4 @@
-"""The default drop and a free spin: energy over time, cost in real time."""
+"""Energy over time of the default drop and of a free spin; tick costs of the drop."""
 from __future__ import annotations
 
 import functools
@@ -10,17 +10,17 @@ from ...files.scene import load_scene
 from ...model import rotation
 from ...model.scene import Placement
 from ..cases.trial import Trial, posed
-from ..measure import Measure
 from ..methods import bullet, mujoco, ours, quickstart, run
-from ..motions.motion import alone, without_damping, without_limits
-from ..results.runner import Job, Options, Row
+from ..metrics import Metrics
+from ..motions.motion import airborne_scene, without_damping, without_limits
+from ..results.runner import Job, Row, RunOptions
 
 NAME = 'energy'
 COST = 'real_time'
 
 
-def jobs(options: Options) -> list[Job]:
-    """Energy over time by three methods; the drop's tick costs."""
+def jobs(options: RunOptions) -> list[Job]:
+    """Jobs of energy over time and of the drop's tick costs."""
     made = [Job(NAME, f'energy, {scene}', functools.partial(energies, scene), 3)
             for scene in ('drop', 'spin')]
     made.append(Job(COST, 'the default drop in real time', functools.partial(
@@ -34,25 +34,26 @@ def falling() -> Trial:
 
 
 def spinning() -> Trial:
-    """A doll that nothing touches or brakes, spun at 10 rad/s: its energy cannot change."""
+    """A doll spun at 10 rad/s without contacts and damping: its energy is constant."""
     placed = {'spin': tuple(10 * rotation.normalized(np.array((1.0, 2.0, 2.0))))}
     doll = without_limits(without_damping(load_doll('doll')))
-    return Trial(alone(doll, (0.0, 0.0, 0.0), **placed), 3.0, posed(Placement(doll, **placed)))
+    return Trial(airborne_scene(doll, (0.0, 0.0, 0.0), **placed), 3.0,
+                 posed(Placement(doll, **placed)))
 
 
 def energies(scene: str) -> list[Row]:
-    """Energy as a share of that at the start, at every tick."""
+    """Energy relative to that at the start, at every tick, by three methods."""
     trial, rows = {'drop': falling, 'spin': spinning}[scene](), []
     for method in (quickstart(), bullet(1), ours('normal')):
         trajectory = run(method, trial).trajectory
-        energy = Measure(trial.scene).energy(trajectory)
+        energy = Metrics(trial.scene).energy(trajectory)
         rows.append({'scene': scene, 'method': method.name, 'label': method.label,
                      'time_s': trajectory.times.tolist(), 'energy': (energy / energy[0]).tolist()})
     return rows
 
 
 def tick_costs(repeats: int) -> list[Row]:
-    """Cost of the ticks of the default drop, 3 s."""
+    """Tick costs of the default drop, 3 s."""
     rows, trial = [], falling()
     for method in (*map(ours, ('draft', 'normal', 'exact')), bullet(10), bullet(4),
                    bullet(1), quickstart(), mujoco('implicitfast', 10),
@@ -62,6 +63,5 @@ def tick_costs(repeats: int) -> list[Row]:
         rows.append({'method': method.name, 'label': method.label, 'tick_s': tick,
                      'cpu_s_per_s': float(costs.sum() / trial.duration),
                      'p50_s': float(np.median(costs)), 'p99_s': float(np.percentile(costs, 99)),
-                     'worst_s': float(costs.max()),
-                     'over_budget': float((costs > tick).mean())})
+                     'worst_s': float(costs.max()), 'over_budget': float((costs > tick).mean())})
     return rows

@@ -1,4 +1,4 @@
-"""The report's yardsticks on motions whose figures are known."""
+"""Metrics of the report on motions with known figures."""
 import dataclasses
 import functools
 import math
@@ -8,8 +8,8 @@ import pytest
 
 pytest.importorskip('scipy')
 
-from ragdoll_ros.accuracy.cases.trial import Trial, angle_places, posed
-from ragdoll_ros.accuracy.measure import Measure, compare
+from ragdoll_ros.accuracy.cases.trial import Trial, angle_indices, posed
+from ragdoll_ros.accuracy.metrics import Metrics, compare
 from ragdoll_ros.accuracy.motions.motion import without_damping
 from ragdoll_ros.accuracy.references.articulated import Articulated
 from ragdoll_ros.accuracy.trajectory import Trajectory
@@ -28,7 +28,7 @@ DOLL = without_damping(load_doll('doll'))
 @functools.cache
 def moving_doll(seed=0, gravity=(0, 0, -9.8), duration=.2):
     rng = np.random.default_rng(seed)
-    places = angle_places(DOLL)
+    places = angle_indices(DOLL)
     placement = Placement(DOLL, position=(0, 0, 1), velocity=(1, 2, 3), spin=(1, -2, 3))
     angles = {name: rng.uniform(-.5, .5) for name in places}
     start = posed(placement, angles, {name: rng.normal() * 3 for name in places})
@@ -41,12 +41,12 @@ def moving_doll(seed=0, gravity=(0, 0, -9.8), duration=.2):
 def test_energy_and_momentum_are_those_of_the_mechanics_module():
     """What the simulation steers itself by, judged by sums written apart: to rounding."""
     scene, _, moved = moving_doll()
-    measure, mechanics = Measure(scene), DollSums(scene)
+    metrics, mechanics = Metrics(scene), DollSums(scene)
     motions = [mechanics.totals(moved.at(i)) for i in range(len(moved.times))]
     for own, theirs in (
-            (measure.energy(moved), [motion.energy[0] for motion in motions]),
-            (measure.momentum(moved), [motion.momentum[0] for motion in motions]),
-            (measure.angular_momentum(moved), [motion.angular_momentum[0] for motion in motions])):
+            (metrics.energy(moved), [motion.energy[0] for motion in motions]),
+            (metrics.momentum(moved), [motion.momentum[0] for motion in motions]),
+            (metrics.angular_momentum(moved), [motion.angular_momentum[0] for motion in motions])):
         assert own == pytest.approx(np.array(theirs), rel=1e-10, abs=1e-10)
 
 
@@ -65,21 +65,21 @@ def test_a_rigid_motion_has_the_energy_and_momentum_that_koenig_says():
         moment += bone.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     rigid = Trajectory(np.zeros(1), positions[None], moved.orientations[-1:],
                        (velocity + np.cross(omega, arms))[None], np.tile(omega, (1, 10, 1)))
-    measure, mass = Measure(scene), masses.sum()
+    metrics, mass = Metrics(scene), masses.sum()
     kinetic = mass * velocity @ velocity / 2 + omega @ moment @ omega / 2
-    assert measure.energy(rigid)[0] == pytest.approx(kinetic + mass * 9.8 * centre[2], rel=1e-12)
-    assert measure.momentum(rigid)[0] == pytest.approx(mass * velocity, rel=1e-12)
-    assert measure.angular_momentum(rigid)[0] == pytest.approx(moment @ omega, rel=1e-11)
+    assert metrics.energy(rigid)[0] == pytest.approx(kinetic + mass * 9.8 * centre[2], rel=1e-12)
+    assert metrics.momentum(rigid)[0] == pytest.approx(mass * velocity, rel=1e-12)
+    assert metrics.angular_momentum(rigid)[0] == pytest.approx(moment @ omega, rel=1e-11)
 
 
 def test_the_reference_has_no_error_by_these_measures():
     scene, _, moved = moving_doll()
-    measure, trial = Measure(scene), Trial(scene, .2)
-    assert abs(measure.energy_excess(trial, moved)) < 1e-9
-    assert measure.momentum_drift(trial, moved) < 1e-9
-    assert measure.angular_momentum_drift(moved) < 1e-9
-    assert measure.joint_gap(moved) < 1e-12
-    assert measure.sinking(moved) == 0
+    metrics, trial = Metrics(scene), Trial(scene, .2)
+    assert abs(metrics.energy_excess(trial, moved)) < 1e-9
+    assert metrics.momentum_drift(trial, moved) < 1e-9
+    assert metrics.angular_momentum_drift(moved) < 1e-9
+    assert metrics.joint_gap(moved) < 1e-12
+    assert metrics.penetration(moved) == 0
 
 
 def test_energy_put_in_by_hand_is_seen():
@@ -89,8 +89,8 @@ def test_energy_put_in_by_hand_is_seen():
     factor[7] = math.sqrt(1.01)
     faster = dataclasses.replace(moved, linear_velocities=moved.linear_velocities * factor,
                                  angular_velocities=moved.angular_velocities * factor)
-    assert Measure(scene).energy_excess(Trial(scene, .2), faster) == pytest.approx(.01, rel=1e-6)
-    assert Measure(scene).angular_momentum_drift(faster) > 1e-4
+    assert Metrics(scene).energy_excess(Trial(scene, .2), faster) == pytest.approx(.01, rel=1e-6)
+    assert Metrics(scene).angular_momentum_drift(faster) > 1e-4
 
 
 def test_energy_that_comes_back_after_a_loss_counts():
@@ -100,10 +100,10 @@ def test_energy_that_comes_back_after_a_loss_counts():
     factor[5:], factor[10:] = math.sqrt(0.99), math.sqrt(0.995)
     slower = dataclasses.replace(moved, linear_velocities=moved.linear_velocities * factor,
                                  angular_velocities=moved.angular_velocities * factor)
-    measure, trial = Measure(scene), Trial(scene, .2)
-    assert measure.energy_excess(trial, slower) == pytest.approx(.005, rel=1e-6)
-    energy = measure.energy(moved)[0]
-    assert measure.energy_excess(trial, slower, .002 * energy) == pytest.approx(
+    metrics, trial = Metrics(scene), Trial(scene, .2)
+    assert metrics.energy_excess(trial, slower) == pytest.approx(.005, rel=1e-6)
+    energy = metrics.energy(moved)[0]
+    assert metrics.energy_excess(trial, slower, .002 * energy) == pytest.approx(
         .003 / 1.002, rel=1e-6)
 
 
@@ -118,10 +118,10 @@ def test_a_push_pays_for_the_energy_it_brings():
         start.q, start.v, Trial(scene, .2).times(), breaks=(.05, .15),
         wrenches=lambda t, _: (force * (.05 <= t < .15), 0 * force))
     trial = Trial(scene, .2, start, (push,))
-    assert abs(Measure(scene).work(trial, moved)[-1]) > 1
-    assert abs(Measure(scene).energy_excess(trial, moved)) < 1e-9
-    assert Measure(scene).momentum_drift(trial, moved) < 1e-9
-    assert abs(Measure(scene).energy_excess(dataclasses.replace(trial, pushes=()), moved)) > 1e-3
+    assert abs(Metrics(scene).work(trial, moved)[-1]) > 1
+    assert abs(Metrics(scene).energy_excess(trial, moved)) < 1e-9
+    assert Metrics(scene).momentum_drift(trial, moved) < 1e-9
+    assert abs(Metrics(scene).energy_excess(dataclasses.replace(trial, pushes=()), moved)) > 1e-3
 
 
 def test_angles_come_back_from_the_poses():
@@ -139,11 +139,11 @@ def test_angles_come_back_from_the_poses():
     tree = Articulated(doll)
     start = posed(scene.dolls[0], angles)
     moved = Trajectory.of([0], [tree.state(start.q, start.v)])
-    assert Measure(scene).joint_angles(moved)[0] == pytest.approx(list(angles.values()), abs=1e-12)
-    assert Measure(scene).overshoot(moved) == pytest.approx(.3, abs=1e-9)
-    assert Measure(scene).joint_gap(moved) < 1e-12
+    assert Metrics(scene).joint_angles(moved)[0] == pytest.approx(list(angles.values()), abs=1e-12)
+    assert Metrics(scene).overshoot(moved) == pytest.approx(.3, abs=1e-9)
+    assert Metrics(scene).joint_gap(moved) < 1e-12
     apart = dataclasses.replace(moved, positions=moved.positions * [[[1], [1], [1], [1.01]]])
-    assert Measure(scene).joint_gap(apart) == pytest.approx(.01 * moved.positions[0, 3, 0], rel=.5)
+    assert Metrics(scene).joint_gap(apart) == pytest.approx(.01 * moved.positions[0, 3, 0], rel=.5)
 
 
 def test_sinking_and_settling_of_a_ball():
@@ -155,10 +155,10 @@ def test_sinking_and_settling_of_a_ball():
     linear[:6] = 1.0
     still = np.tile(rotation.IDENTITY, (11, 1, 1))
     moved = Trajectory(times, positions, still, linear, np.zeros((11, 1, 3)))
-    assert Measure(scene).sinking(moved) == pytest.approx(.03)
-    assert Measure(scene).settling_time(moved) == pytest.approx(.6)
+    assert Metrics(scene).penetration(moved) == pytest.approx(.03)
+    assert Metrics(scene).settling_time(moved) == pytest.approx(.6)
     restless = dataclasses.replace(moved, linear_velocities=np.ones((11, 1, 3)))
-    assert Measure(scene).settling_time(restless) == math.inf
+    assert Metrics(scene).settling_time(restless) == math.inf
 
 
 def test_comparison_names_the_worst_and_the_mean():

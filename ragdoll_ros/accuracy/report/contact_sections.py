@@ -1,13 +1,12 @@
-"""What the page says of contacts: errors against steps, rebounds, clouds of drops."""
+"""Sections about contacts: convergence, restitution, segments, drops, collisions."""
 from __future__ import annotations
 
 from ..results.figures import Row, number
-from ..results.section import Section
-from ..results.tables import table
+from ..results.markdown import Section, table
 
 
 def convergence_tables(rows: list[Row]) -> list[str]:
-    """A table for each motion: error at h, h/2 ... h/64, an engine a line."""
+    """A table for each motion: error at h, h/2 ... h/64, one line per engine."""
     blocks = []
     for motion in dict.fromkeys(row['motion'] for row in rows):
         own = [row for row in rows if row['motion'] == motion]
@@ -16,15 +15,15 @@ def convergence_tables(rows: list[Row]) -> list[str]:
                   **{str(k): error for k, error in enumerate(row['errors'])}} for row in own]
         halves = [(str(k), f'h/{2 ** k}' if k else f'h: error {unit}', '{:.0e}')
                   for k in range(len(own[0]['errors']))]
-        blocks += [f'### {own[0]["title"]}, error against step', table(lines, (
+        blocks += [f'### {own[0]["title"]}, error against step size', table(lines, (
             ('label', 'engine', '{}'), ('h', 'h ms', 'ms'), *halves,
             ('order', 'slope', '{:.2f}'),
-            ('itself', 'beside it: h/32 against itself at h/64', '{:.0e}')))]
+            ('itself', 'self-convergence: h/32 against h/64', '{:.0e}')))]
     return blocks
 
 
 def restitution_tables(rows: list[Row]) -> list[str]:
-    """What restitution the first bounce has, then the worst height of all: a line each body."""
+    """Restitution of the first bounce and largest apex error, one line per method and body."""
     wanted = list(dict.fromkeys(row['restitution'] for row in rows))
     lines: dict[tuple, Row] = {}
     for row in rows:
@@ -36,27 +35,27 @@ def restitution_tables(rows: list[Row]) -> list[str]:
     first = (('label', 'method', '{}'), ('body', 'body', '{}'))
     return [table(lines.values(), (*first, *((f'found {e}', f'e = {e:g}', '{:.4f}')
                                              for e in wanted))),
-            '### Every apex after an approach of 0.05 m/s or more: worst relative error',
+            '### Largest relative error of all apexes after an approach of 0.05 m/s or more',
             table(lines.values(), (*first, *((f'worst {e}', f'e = {e:g}', '{:.0e}')
                                              for e in wanted),
-                                   ('seen', 'apexes seen', '{}'), ('flights', 'of', '{}')))]
+                                   ('seen', 'apexes measured', '{}'), ('flights', 'of', '{}')))]
 
 
 RESTITUTION = Section(
     'restitution', 'Restitution of single bodies',
-    'Let go level from 1 m. First what the first bounce makes of the restitution that is asked '
-    'for.', body=restitution_tables)
+    'Released level at 1 m. The first table has the measured restitution of the first bounce.',
+    body=restitution_tables)
 
 CONVERGENCE = Section(
-    'convergence', 'On the ground: error against step',
-    'The truths are closed forms and event-driven integrations that share no code with an engine. '
-    'A slope near 0 is an engine that comes to something else, however small its difference to '
-    'itself.', body=convergence_tables,
-    above=(('convergence', 'Error over step, motion by motion'),))
+    'convergence', 'Convergence of motions with contacts',
+    'The references are closed forms and event-driven integrations that share no code with an '
+    'engine. A slope near 0 means that an engine converges to another solution, however small '
+    'its difference to its own finest run.', body=convergence_tables,
+    above=(('convergence', 'Error over step size, by motion'),))
 
 
-def pieces_table(rows: list[Row]) -> list[str]:
-    """Errors of short pieces, and CPU over that of PyBullet at N = 10 on the same ones."""
+def segments_table(rows: list[Row]) -> list[str]:
+    """Errors of short segments, and CPU time over that of PyBullet at N = 10."""
     base = next((number(row['cpu_s_per_s']) for row in rows if row['method'] == 'bullet-10'), None)
     lines = [{**row, 'ratio': base and number(row['cpu_s_per_s']) / base} for row in rows]
     names = ', '.join(dict.fromkeys(row['reference'] for row in rows if 'reference' in row))
@@ -65,27 +64,27 @@ def pieces_table(rows: list[Row]) -> list[str]:
         ('ratio', 'over PyBullet N = 10', '{:.2f}'),
         ('position_median_m', 'position mm, median', 'mm'), ('position_p90_m', '90 %', 'mm'),
         ('angle_median_rad', 'angle °, median', 'deg'),
-        ('gap_worst_m', 'worst joint gap m', '{:.0e}'),
-        ('sinking_worst_m', 'worst sinking mm', 'mm'),
-        ('own_median_m', 'beside it: against the same engine at its finest mm, median', 'mm'),
+        ('gap_worst_m', 'largest joint gap m', '{:.0e}'),
+        ('sinking_worst_m', 'largest penetration mm', 'mm'),
+        ('own_median_m', 'self-convergence: against its finest mm, median', 'mm'),
         ('own_p90_m', '90 %', 'mm')))]
 
 
-PIECES = Section(
-    'pieces', 'Through contacts: short pieces',
-    '0.1 s each, begun at instants of the default drop, with self-collision (after Erez, Tassa '
-    'and Todorov, ICRA 2015), all against one reference. The last two columns are no errors: each '
-    'engine against itself at its finest.', body=pieces_table,
+SEGMENTS = Section(
+    'pieces', 'Short segments through contacts',
+    'Segments of 0.1 s from instants of the default drop, with self-collision (after Erez, Tassa '
+    'and Todorov, ICRA 2015), against one reference. The last two columns are no errors: they '
+    'compare each engine with its own finest run.', body=segments_table,
     below=(('pieces', 'Error over CPU time through contacts'),))
 
 
-DROP_HEADS = {'energy_0.3s': 'energy left at 0.3 s', 'energy_0.5s': 'at 0.5 s',
-              'energy_1s': 'at 1 s', 'slide_m': 'slide m', 'settled_s': 'settled after s',
-              'spread_m': 'bones apart m'}
+DROP_HEADS = {'energy_0.3s': 'relative energy at 0.3 s', 'energy_0.5s': 'at 0.5 s',
+              'energy_1s': 'at 1 s', 'slide_m': 'slide m', 'settled_s': 'settling time s',
+              'spread_m': 'spread of bones m'}
 
 
 def drop_tables(rows: list[Row]) -> list[str]:
-    """Means with standard errors, and p against the reference; a table each population."""
+    """Means with standard errors and p-values; one table per population."""
     blocks = []
     for population in dict.fromkeys(row['population'] for row in rows):
         own = [row for row in rows if row['population'] == population]
@@ -100,18 +99,18 @@ def drop_tables(rows: list[Row]) -> list[str]:
 
 
 DROPS = Section(
-    'drops', 'Many drops as a cloud',
+    'drops', 'Statistics of many drops',
     'A fall is chaotic, the distribution of many is not. Means with their standard errors; p is '
-    'that of the two-sample test of Kolmogorov and Smirnov against the reference: where it is '
-    'small, the clouds differ.', body=drop_tables,
-    below=(('drops', 'Random drops as distributions'),))
+    'that of the two-sample Kolmogorov-Smirnov test against the reference: where it is small, the '
+    'distributions differ.', body=drop_tables,
+    below=(('drops', 'Distributions of random drops'),))
 
 
 COLLISIONS = Section(
     'collisions', 'Two dolls that collide in the air',
-    'What is lost of momentum, as a share of the sum of all m |v|, and of angular momentum about '
-    'the common centre; depths by a judge that moves no bone.', (
+    'Drift of momentum, over the sum of all m |v|, and of angular momentum about the common centre '
+    'of mass; penetration of bones by the distance functions of MuJoCo.', (
         ('label', 'method', '{}'), ('speed_m_s', 'm/s', '{:g}'),
-        ('momentum_drift', 'momentum', '{:.0e}'),
-        ('angular_momentum_drift', 'angular m.', '{:.0e}'),
-        ('depth_m', 'bone in bone mm', 'mm'), ('energy_excess', 'energy excess', '{:.0e}')))
+        ('momentum_drift', 'momentum drift', '{:.0e}'),
+        ('angular_momentum_drift', 'angular m. drift', '{:.0e}'),
+        ('depth_m', 'bone penetration mm', 'mm'), ('energy_excess', 'energy excess', '{:.0e}')))

@@ -1,19 +1,19 @@
-"""Speed against error: every motion whose truth is known, by every method."""
+"""Work-precision: CPU time and error of every method on every reference motion."""
 from __future__ import annotations
 
 import functools
 
 import numpy as np
 
-from ..measure import Measure, compare
-from ..methods import Method, Result, by_name, every_method, median_run
+from ..methods import Method, Result, all_methods, by_name, median_run
+from ..metrics import Metrics, compare
 from ..motions.contact import contact_motions
 from ..motions.flight import flight_motions
 from ..motions.impacts import impact_motions
 from ..motions.mechanisms import mechanism_motions
-from ..motions.motion import Motion
+from ..motions.motion import ReferenceMotion
 from ..motions.planar_doll import planar_motions
-from ..results.runner import Job, Options, Row
+from ..results.runner import Job, Row, RunOptions
 from ..trajectory import Trajectory
 
 NAME = 'precision'
@@ -21,11 +21,11 @@ QUICK_MOTIONS = ('free_fall', 'projectile', 'pendulum_large', 'tumbling_box', 'f
                  'flight_fast', 'bounce', 'rod_slides', 'rocking_block')
 
 
-def jobs(options: Options) -> list[Job]:
+def jobs(options: RunOptions) -> list[Job]:
     """One timed job for each motion."""
     names = [motion.name for motion in motions().values()
              if not options.quick or motion.name in QUICK_MOTIONS]
-    methods = [method.name for method in every_method((1, 4, 16) if options.quick
+    methods = [method.name for method in all_methods((1, 4, 16) if options.quick
                                                       else (1, 2, 4, 8, 16, 32))]
     repeats = 1 if options.quick else 5
     return [Job(NAME, name, functools.partial(measure_all, name, methods, repeats),
@@ -34,15 +34,15 @@ def jobs(options: Options) -> list[Job]:
 
 
 @functools.cache
-def motions() -> dict[str, Motion]:
-    """All motions by name, simple ones first, built once in each process."""
+def motions() -> dict[str, ReferenceMotion]:
+    """All reference motions by name, simple ones first; cached."""
     return {motion.name: motion
             for motion in (*flight_motions(), *mechanism_motions(), *contact_motions(),
                            *impact_motions(), *planar_motions())}
 
 
 def measure_all(motion_name: str, method_names: list[str], repeats: int) -> list[Row]:
-    """Run a motion by all methods, the same number of times each."""
+    """Run a motion by all methods, ``repeats`` times each."""
     motion, truths, rows = motions()[motion_name], {}, []
     for name in method_names:
         method = by_name(name)
@@ -54,23 +54,23 @@ def measure_all(motion_name: str, method_names: list[str], repeats: int) -> list
     return rows
 
 
-def figures(motion: Motion, method: Method, result: Result, truth: Trajectory) -> Row:
-    """All figures of one motion by one method; None where one makes no sense."""
+def figures(motion: ReferenceMotion, method: Method, result: Result, truth: Trajectory) -> Row:
+    """All figures of a motion by a method."""
     trajectory, trial = result.trajectory, motion.trial
-    measure = Measure(trial.scene)
+    metrics = Metrics(trial.scene)
     row: Row = {'motion': motion.name, 'title': motion.title, 'reference': motion.reference,
-                'yardstick': motion.yardstick, 'method': method.name, 'label': method.label,
+                'yardstick': motion.error_key, 'method': method.name, 'label': method.label,
                 'family': method.family, 'substeps': method.substeps,
-                'cpu_s_per_s': result.rate,
+                'cpu_s_per_s': result.cpu_s_per_s,
                 'tick_p99_s': float(np.percentile(result.costs, 99)),
                 'finite': trajectory.finite, **compare(trajectory, truth)}
-    row['energy_excess'] = measure.energy_excess(trial, trajectory)
-    row['joint_gap_m'] = measure.joint_gap(trajectory)
-    row['limit_overshoot_rad'] = measure.overshoot(trajectory)
+    row['energy_excess'] = metrics.energy_excess(trial, trajectory)
+    row['joint_gap_m'] = metrics.joint_gap(trajectory)
+    row['limit_overshoot_rad'] = metrics.overshoot(trajectory)
     if trial.scene.ground is not None:
-        row['sinking_m'] = measure.sinking(trajectory)
-    if motion.in_air:
-        row['momentum_drift'] = measure.momentum_drift(trial, trajectory)
+        row['sinking_m'] = metrics.penetration(trajectory)
+    if motion.in_flight:
+        row['momentum_drift'] = metrics.momentum_drift(trial, trajectory)
         if not trial.pushes:
-            row['angular_momentum_drift'] = measure.angular_momentum_drift(trajectory)
+            row['angular_momentum_drift'] = metrics.angular_momentum_drift(trajectory)
     return {**row, **motion.extra(trajectory)}
