@@ -171,10 +171,15 @@ def test_arrows_pressed_together_add_up(page):
 
 
 def buttons_and_keys(page):
-    """Labels of all that can be used on a page, and all commands by which it can be."""
+    """Labels of all that can be used on a page, and all commands by which it can be.
+
+    Of copies, made at once: viser's threads change what they copy.
+    """
     gui = page.server.gui
-    shown = {handle.label for handle in gui._gui_input_handle_from_uuid.values() if handle.visible}
-    return shown, {handle.label for handle in gui._command_handle_from_uuid.values()}
+    handles = list(gui._gui_input_handle_from_uuid.values())
+    commands = list(gui._command_handle_from_uuid.values())
+    return ({handle.label for handle in handles if handle.visible},
+            {command.label for command in commands})
 
 
 def test_a_recording_offers_nothing_that_it_cannot_do():
@@ -188,7 +193,7 @@ def test_a_recording_offers_nothing_that_it_cannot_do():
         assert changes < shown and pushes < keys and 'Reset' in shown
     with served(PlaybackSource(run)) as page:
         page.open()
-        wait(lambda: page.stage)
+        wait(lambda: page.editor)  # the last part of a page that is made
         shown, keys = buttons_and_keys(page)
         assert not changes & shown and not pushes & keys and {'Pause', 'Reset', 'Time'} < shown
 

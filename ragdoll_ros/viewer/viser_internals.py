@@ -16,8 +16,9 @@ CLIENT_NAMES = ('__viserMutable', 'sendMessage', 'scene', 'nodeRefFromName', 'ca
                 'cameraControl', 'requestRender', 'GuiUpdateMessage', 'Uploading ')
 """What browser/*.js uses of viser's own client: its mutable state, a message, a notice's text."""
 
-COMPONENTS = ('Flex', 'TextInput', 'Loader', 'Notification')
-"""Mantine's components whose classes .mantine-<name>-root browser/* selects."""
+CLIENT_PACKAGES = {'@mantine/core': '^9.', '@mantine/notifications': '^9.',
+                   '@react-three/fiber': '^9.', 'three': '^0.'}
+"""Libraries of the client on whose class names, event filter or objects browser/* relies."""
 
 
 def handle_id(handle: viser.GuiInputHandle) -> str:
