@@ -66,7 +66,7 @@ def test_a_minute_of_scrubbing_costs_the_node_nothing(ros):
     """
     with bench(1, twin=True) as node, served(NodeSource([])) as page:
         client = page.open()
-        wait(lambda: page.timeline.cut is not None and page.timeline.cut.duration > 5)
+        wait(lambda: page.timeline.clip is not None and page.timeline.clip.duration > 5)
         live = [node.measure() for _ in range(3)]
         stop = threading.Event()
 

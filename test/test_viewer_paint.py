@@ -142,7 +142,7 @@ def test_limbs_have_their_colours_on_the_page(run):
     with served(PlaybackSource(recording)) as page, chromium() as browser:
         view = View(browser, f'http://127.0.0.1:{page.server.get_port()}')
         view.page.set_viewport_size({'width': 1280, 'height': 800})
-        view.wait(lambda: page.timeline.cut is not None)
+        view.wait(lambda: page.timeline.clip is not None)
         page.timeline.go_to(0.4)
         view.wait(lambda: page.frame is not None and page.frame.time == 0.4)
         view.wait(lambda: view.page.evaluate(PAINTED))

@@ -20,7 +20,7 @@ from ....ros.messages.serialized import poses_in
 from ....ros.outputs import LATCHED
 from ..source import Frame, RequestedData
 from .hands import NodeHands
-from .latest_message import LatestMessage
+from .newest_message import NewestMessage
 from .observed_pushes import ObservedPushes
 
 
@@ -57,7 +57,7 @@ class NodeFrames:
     def __init__(self, node: Node, name: str, hands: NodeHands) -> None:
         self._node, self._name, self._hands = node, name, hands
         self._lock = threading.Lock()
-        self._topics: dict[str, LatestMessage] = {}
+        self._topics: dict[str, NewestMessage] = {}
         self._values: dict[str, object] = {}
         self._pushes: ObservedPushes | None = None
         self._rods: Rods | None = None
@@ -85,7 +85,7 @@ class NodeFrames:
                 self._changes += 1
             for kind in kinds - self._topics.keys():
                 topic = TOPICS[kind]
-                self._topics[kind] = LatestMessage(self._node, topic.message,
+                self._topics[kind] = NewestMessage(self._node, topic.message,
                                             topic.name.format(self._name), topic.qos, topic.raw)
 
     def set_scene(self, pushes: ObservedPushes) -> None:

@@ -1,4 +1,4 @@
-"""Subscription of which only the latest message counts, taken when it is needed."""
+"""Subscription of which only the newest message counts, taken when it is needed."""
 from __future__ import annotations
 
 from rclpy.callback_groups import CallbackGroup
@@ -7,7 +7,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 
-class LatestMessage:
+class NewestMessage:
     """Subscribes without an executor.
 
     An executor wakes for each message, 100 times a second, and goes through all entities of its
