@@ -50,7 +50,7 @@ COUNT = itertools.count()
 
 HANDLE = """() => {
   const nodes = window.__viserMutable.nodeRefFromName;
-  const names = Object.keys(nodes).filter(name => /^.editor.*.own$/.test(name) && nodes[name]);
+  const names = Object.keys(nodes).filter(name => /^.editor.*.frame$/.test(name) && nodes[name]);
   if (names.length !== 1) return null;
   nodes[names[0]].updateWorldMatrix(true, false);
   const root = nodes[''].matrixWorld.clone().invert();
