@@ -47,9 +47,8 @@ class PushKeys:
         self.key_events = add_listener(gui, 'keys', 'arrow_keys.js', lambda page, down: self.take(
             page, down.split(), time.monotonic()))
         buttons = gui.add_button_group(
-            'Push', tuple(ARROWS), visible=can_push, hint='as seen from the front of the doll: '
-            'left, away from you, towards you, right; arrow keys do the same, and repeat while '
-            'held')
+            'Push', tuple(ARROWS), visible=can_push, hint='as seen from the front: left, away from '
+            'you, towards you, right; arrow keys do the same, and repeat while held')
         self.strength = gui.add_slider('Strength, N', *STRENGTHS, step=STEP,
                                        initial_value=STRENGTH, visible=can_push, hint='of a push')
         self._effect = gui.add_html('', visible=can_push)

@@ -103,8 +103,7 @@ def _send_screenshot(event: viser.GuiEvent) -> None:
     try:
         image = client.get_render(*size, transport_format='png', timeout=RENDER_TIMEOUT)
     except TimeoutError:
-        client.add_notification('No screenshot',
-                                f'The page did not render within {RENDER_TIMEOUT:g} s.')
+        client.add_notification('No screenshot', f'No image within {RENDER_TIMEOUT:g} s.')
         return
     content = iio.imwrite('<bytes>', _on_white(image), extension='.png')
     client.send_file_download('ragdoll.png', content, save_immediately=True)

@@ -51,7 +51,6 @@ class SettingsPanel:
 
     def __init__(self, server: viser.ViserServer, source: Source) -> None:
         self.source = source
-        self._loop = server.get_event_loop()
         self._scene: Scene | None = None
         self._shown_accuracy = ''
         self._next_update = 0.0

@@ -34,8 +34,7 @@ class StartWhenVisible:
                      and now - self._begin >= self._timeout)
         if self._is_drawn or timed_out:
             self.is_done = self._source.pause(False)
-        elif clients and has_frame and (
-                self._rendering is None or not self._rendering.is_alive()):
+        elif clients and has_frame and not (self._rendering and self._rendering.is_alive()):
             self._rendering = threading.Thread(target=self._render, args=(clients[-1],),
                                                daemon=True)
             self._rendering.start()

@@ -1,7 +1,7 @@
 """Loads the scripts and style sheets of this folder, as HTML for the panel or as text.
 
-Viser has no call for either. Its panel inserts HTML without running <script> elements; the error
-handler of an image that cannot be loaded does run, whenever the panel is shown.
+Viser has no call for either, and <script> elements in the panel's HTML do not run; the error
+handler of an image that cannot be loaded does, whenever the panel is shown.
 """
 from __future__ import annotations
 

@@ -110,9 +110,9 @@ def _other_word(match: re.Match) -> str:
 def _at_mirrored_place(doll: Ragdoll, bone: Bone) -> str | None:
     """Name of the bone nearest to the mirrored place; None if too far, or the bone itself."""
     places = np.array([each.position for each in doll.bones])
-    wanted = _point(bone.position, doll.root.position[1])
-    nearest = int(np.argmin(np.linalg.norm(places - wanted, axis=1)))
+    target = _point(bone.position, doll.root.position[1])
+    nearest = int(np.argmin(np.linalg.norm(places - target, axis=1)))
     size = float(np.ptp(places, axis=0).max())
-    if doll.bones[nearest] is bone or math.dist(places[nearest], wanted) > TOLERANCE * size:
+    if doll.bones[nearest] is bone or math.dist(places[nearest], target) > TOLERANCE * size:
         return None
     return doll.bones[nearest].name

@@ -105,7 +105,7 @@ class EditorPanel:
     def show_editing(self, editing: bool) -> None:
         """Label the button 'Edit', or 'Run' while editing."""
         self.edit.label = 'Run' if editing else 'Edit'
-        self.edit.icon = 'arrow-big-down-lines' if editing else 'pencil'
+        self.edit.icon = 'player-play' if editing else 'pencil'
 
 
 def _set_options(dropdown: viser.GuiDropdownHandle, options: tuple[str, ...],

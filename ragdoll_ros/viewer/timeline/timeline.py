@@ -65,9 +65,8 @@ class Timeline:
                 'Playback', (BACK, PLAY, FORWARD, LIVE),
                 hint='J, K, L: previous frame, play or pause, next frame; Live: the newest frame')
             self.speed = gui.add_dropdown('Speed', tuple(SPEEDS), initial_value='1')
-            self.export = gui.add_button(
-                'Export', icon=viser.Icon.DOWNLOAD,
-                hint='the whole timeline as run.zip: MCAP, glTF, BVH, CSV')
+            self.export = gui.add_button('Export', icon=viser.Icon.DOWNLOAD, hint='the whole '
+                                         'timeline as run.zip: MCAP, glTF, BVH, CSV')
         self.slider.on_update(self._on_slider)
         self.buttons.on_click(lambda event: self._press(event.target.value))
         self.speed.on_update(lambda _: self._set_speed())

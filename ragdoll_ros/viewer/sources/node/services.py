@@ -49,7 +49,7 @@ class NodeServices:
 
     def set_parameter(self, name: str, value: object,
                       on_response: Callable[[object], None] | None = None) -> bool:
-        """Set a parameter without waiting; the node's diagnostics tell of a refusal, too."""
+        """Set a parameter without waiting; the node's diagnostics report a refusal, too."""
         return self._send(self._set, SetParametersAtomically.Request(
             parameters=[Parameter(name, value=value).to_parameter_msg()]), on_response)
 
