@@ -122,7 +122,7 @@ def parser() -> argparse.ArgumentParser:
                         'node has a parameter for it')
     parser.add_argument('--host', default=HOST, help='address to serve at (%(default)s: this '
                         'machine alone; 0.0.0.0: whoever reaches this machine may steer)')
-    parser.add_argument('--port', type=port, help=f'port to serve at ({PORT}, or the next free one)')
+    parser.add_argument('--port', type=port, help=f'port ({PORT}, or the next free one)')
     parser.add_argument('--start-after', type=seconds, metavar='S', help='resume a node that was '
                         'started with start_paused once a page shows it, or after S seconds '
                         'without a page')
