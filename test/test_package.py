@@ -275,6 +275,10 @@ def test_wheel_holds_config_twice_and_nothing_foreign(wheel):
     for part in ('ragdoll_ros/config/', '.data/data/share/ragdoll_ros/config/'):
         assert {Path(name).name for name in names if part in f'/{name}'} >= shipped, part
     assert 'ragdoll_ros/py.typed' in names
+    page = {path.name for path in (ROOT / 'ragdoll_ros/viewer/browser').iterdir()
+            if path.suffix in ('.js', '.css')}
+    assert page and {Path(name).name for name in names
+                     if name.startswith('ragdoll_ros/viewer/browser/')} >= page
     # Beside the package, its metadata and its data, a wheel's top level must hold nothing.
     assert {name.split('/')[0].split('-')[0] for name in names} == {'ragdoll_ros'}
     tests = {path.name for path in (ROOT / 'test').iterdir()}

@@ -1,6 +1,6 @@
-"""Where the page's files live: scenes are saved into one folder, and nothing leaves or leads out.
+"""The folder of the page's files; no other files can be read or written.
 
-Whoever reaches the page may send anything: what cannot be is refused with a ModelError in words.
+Whoever reaches the page may send anything: invalid files and names raise a ModelError.
 """
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ LARGEST_UPLOAD = 100_000_000
 CHARACTERS = ('.glb', '.gltf', '.vrm', '.urdf')
 DOLLS = ('.yaml', '.yml')
 
-Progress = Callable[[float, str], None]
-"""Takes the part that is done, 0 to 1, and what is being done."""
+ProgressCallback = Callable[[float, str], None]
+"""Takes the fraction that is done, and the name of the step."""
 
 
-class Folder:
+class SceneFolder:
     """One folder of scenes and characters."""
 
     def __init__(self, path: str | Path = '.') -> None:
         self.path = Path(path).resolve()
 
     def find(self, text: str) -> Path:
-        """Path of a YAML file in this folder by what was typed, ``.yaml`` added where missing."""
+        """Path of a YAML file in this folder for a typed name; ``.yaml`` is added if missing."""
         name = text.strip()
         try:
             path = (self.path / name).resolve()
@@ -51,13 +51,13 @@ class Folder:
         return path
 
     def save(self, scene: Scene, text: str) -> Path:
-        """Write a scene; OSError where that fails."""
+        """Save a scene; OSError."""
         path = self.find(text)
         save_scene(scene, path)
         return path
 
     def saved(self) -> list[tuple[str, datetime]]:
-        """Names of the YAML files here with the local times of their last change, newest first."""
+        """Names and local modification times of the YAML files here, newest first."""
         found = []
         for path in self.path.iterdir() if self.path.is_dir() else ():
             with suppress(OSError):
@@ -66,7 +66,7 @@ class Folder:
         return sorted(found, key=lambda file: (file[1], file[0]), reverse=True)
 
     def load(self, text: str) -> Scene:
-        """Read a scene of this folder, or of config/ by its name alone."""
+        """Load a scene of this folder, or a shipped one by its name."""
         name = text.strip().removesuffix('.yaml')
         path = self.find(text)
         if not path.is_file() and name in scene_names():
@@ -74,12 +74,12 @@ class Folder:
         return load_scene(str(path))
 
     def text(self, scene: Scene) -> bytes:
-        """A scene's YAML as it would be saved here."""
+        """A scene as YAML, as it would be saved here."""
         return scene_text(scene, self.path).encode()
 
     def read(self, name: str, content: bytes) -> Scene:
-        """Scene of a YAML file that was sent, as if it lay here."""
-        name = plain(name)
+        """Scene of an uploaded YAML file, as if it were in this folder."""
+        name = safe_name(name)
         try:
             _check_size(content)
             data = yaml_text.parse(content)
@@ -91,13 +91,13 @@ class Folder:
         except errors.ModelErrors as error:
             raise errors.ModelErrors(name, error.errors) from None
 
-    def fit(self, name: str, content: bytes, progress: Progress) -> tuple[Scene, list[Verdict]]:
-        """Scene of a doll that is fitted, as ragdoll_fit does, to each character that was sent.
+    def fit(self, name: str, content: bytes,
+            progress: ProgressCallback) -> tuple[Scene, list[Verdict]]:
+        """Scene of dolls fitted to the characters of an uploaded file, and a verdict on each.
 
-        They hang above level ground; their file stays here, and they name that. And what
-        ragdoll_fit thinks of each.
+        The dolls hang above level ground and refer to the file, which is kept in this folder.
         """
-        name = plain(name)
+        name = safe_name(name)
         suffix = Path(name).suffix.lower()
         try:
             if suffix not in CHARACTERS:
@@ -106,13 +106,13 @@ class Folder:
             with tempfile.TemporaryDirectory() as inbox:
                 path = Path(inbox, name)
                 path.write_bytes(content)
-                placements, verdicts = _fitted(path, progress)
+                placements, verdicts = _fit(path, progress)
         except errors.ModelError as error:
             raise errors.ModelErrors(name, [error]) from None
         except errors.ModelErrors as error:
-            raise errors.ModelErrors(name, [_alone(error) for error in error.errors]) from None
+            raise errors.ModelErrors(name, [_with_advice(each) for each in error.errors]) from None
         if suffix != '.urdf':
-            progress(0.9, 'keeping the character')
+            progress(0.9, 'saving the character')
             model = str(self._keep(name, content))
             placements = [dataclasses.replace(placement, doll=dataclasses.replace(
                 placement.doll, model=model)) for placement in placements]
@@ -120,7 +120,7 @@ class Folder:
         return all_above_ground(scene, placements), verdicts
 
     def _check_dolls(self, data: object) -> None:
-        """Refuse dolls that lie neither here nor in config/: no other file is read."""
+        """Raise Unreadable for dolls that are neither here nor in config/."""
         for place, source in _dolls_of(data):
             if not isinstance(source, str) or source in scene_names():
                 continue
@@ -132,7 +132,7 @@ class Folder:
                 raise errors.Unreadable(place, source, f'a file of {self.path}, or the doll itself')
 
     def _check_models(self, data: object) -> None:
-        """Refuse characters that do not lie here."""
+        """Raise Unreadable for characters that are not here."""
         for place, doll in [('', data), *_dolls_of(data)]:
             model = doll.get('model') if isinstance(doll, dict) else None
             if not isinstance(model, str):
@@ -145,7 +145,7 @@ class Folder:
                 raise errors.Unreadable('model', model, f'a file inside {self.path}').at(place)
 
     def _keep(self, name: str, content: bytes) -> Path:
-        """Write a character, under another name where one stands that is another's."""
+        """Save a character, with a number in its name if another file has that name."""
         path = Path(self.path, name)
         for number in range(2, 10_000):
             try:
@@ -156,19 +156,19 @@ class Folder:
                 if path.is_file() and path.read_bytes() == content:
                     return path
             path = Path(self.path, f'{Path(name).stem}_{number}{Path(name).suffix}')
-        raise errors.Unreadable('', name, f'a name that is free in {self.path}')
+        raise errors.Unreadable('', name, f'an unused name in {self.path}')
 
 
 def _dolls_of(data: object) -> Iterator[tuple[str, object]]:
-    """Place and value of each ``doll`` in what may be a scene."""
+    """Path and value of each ``doll`` in parsed data that may be a scene."""
     dolls = data.get('dolls') if isinstance(data, dict) else None
     for index, entry in enumerate(dolls if isinstance(dolls, list) else ()):
         if isinstance(entry, dict):
             yield f'dolls[{index}].doll', entry.get('doll')
 
 
-def plain(name: str) -> str:
-    """A file's name without folders and without what is no letter, digit, dot or dash."""
+def safe_name(name: str) -> str:
+    """A file's name without folders, and with _ for all but letters, digits and ._- ."""
     name = name.replace('\\', '/').rsplit('/', 1)[-1]
     stem, dot, suffix = ''.join(c if c.isalnum() or c in '._- ' else '_' for c in name)[-90:] \
         .strip().rpartition('.')
@@ -180,8 +180,8 @@ def _check_size(content: bytes) -> None:
         raise errors.Unreadable('', f'{len(content)} bytes', f'at most {LARGEST_UPLOAD}')
 
 
-def _fitted(path: Path, progress: Progress) -> tuple[list[Placement], list[Verdict]]:
-    # Here, as matters of files that few pages need.
+def _fit(path: Path, progress: ProgressCallback) -> tuple[list[Placement], list[Verdict]]:
+    # Imported here, because few pages need them.
     from ...fit.judging.verdict import judge
     from ...fit.pipeline import fit_characters
     from ...fit.reading.character import read_character
@@ -193,12 +193,12 @@ def _fitted(path: Path, progress: Progress) -> tuple[list[Placement], list[Verdi
     character = read_character(path)
     progress(0.4, f'fitting {len(character.bone_names)} bones, {len(character.vertices)} vertices')
     fits = fit_characters(character)
-    progress(0.7, 'letting it fall')
+    progress(0.7, 'simulating a fall')
     return [fit.placed() for fit in fits], [judge(fit.doll, fit) for fit in fits]
 
 
-def _alone(error: errors.ModelError) -> errors.ModelError:
-    """The error, saying of a file that points to others that it has to come alone."""
+def _with_advice(error: errors.ModelError) -> errors.ModelError:
+    """The error, with advice where a file refers to others, which are not uploaded."""
     if error.path.endswith('.uri') and not str(error.value).startswith('data:'):
         return type(error)(error.path, error.value,
                            'all in one file: export it as .glb, or with its buffers embedded')

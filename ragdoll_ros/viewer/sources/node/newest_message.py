@@ -1,4 +1,4 @@
-"""A topic of which the newest message alone counts: it is taken when something asks for it."""
+"""Subscription of which only the newest message counts, taken when it is needed."""
 from __future__ import annotations
 
 from rclpy.callback_groups import CallbackGroup
@@ -7,11 +7,11 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 
-class Newest:
-    """Subscribes past the node's executor.
+class NewestMessage:
+    """Subscribes without an executor.
 
-    An executor would wake for each message, 100 times a second, and go through all that its node
-    has each time: 0.6 ms where taking a message is 10 us, and a page draws only 60 times.
+    An executor wakes for each message, 100 times a second, and goes through all entities of its
+    node each time: 0.6 ms, where taking a message costs 10 us, and a page draws only at 60 Hz.
     """
 
     def __init__(self, node: Node, kind: type, topic: str, qos: QoSProfile | int = 1,
@@ -20,16 +20,13 @@ class Newest:
             kind, topic, lambda _: None, qos, callback_group=_NotExecuted(), raw=raw)
 
     def take(self) -> object | None:
-        """The message that came since the last call, bytes if raw; None if there is none.
-
-        With a ``qos`` of depth 1 that is the last of those that came.
-        """
+        """The latest message since the last call, bytes if raw, at a depth of 1; None if none."""
         subscription = self.subscription
         try:
             with subscription.handle:
                 taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
         except InvalidHandle:
-            # The other thread has ended the subscription.
+            # The other thread has destroyed the subscription.
             return None
         return None if taken is None else taken[0]
 

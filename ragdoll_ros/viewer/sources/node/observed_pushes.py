@@ -1,4 +1,4 @@
-"""Pushes that a node is sent, by whomever: taken from the topics, as the node takes them."""
+"""Pushes that any publisher sends to a node, read from the same topics as the node does."""
 from __future__ import annotations
 
 from ....model.drive import Drive
@@ -6,27 +6,27 @@ from ....model.push import Push
 from ....model.scene import Scene
 
 
-class Silent:
-    """Stands for the node's InputCounts: what is refused or clamped, the node counts and tells."""
+class NoInputCounts:
+    """Input counts for ros/inputs that count nothing: the node itself reports them."""
 
     def refuse(self, source: str, reason: object) -> None:
-        """Say nothing."""
+        """Do nothing."""
 
     def clamp(self, source: str, reason: object) -> None:
-        """Say nothing."""
+        """Do nothing."""
 
 
-class HeardPushes:
-    """Stands for the node's simulation as the target of ros/inputs/subscriptions.py."""
+class ObservedPushes:
+    """Takes the place of the node's simulation in ros/inputs/subscriptions.py."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.time = 0.0
-        """s simulated, of the newest poses."""
+        """Simulated time of the newest poses, s."""
         self._pushes: dict[str, tuple[float, Push]] = {}
 
     def push(self, push: Push | Drive, channel: str) -> None:
-        """A push acts from now on in place of the last one of its channel."""
+        """Start a push in place of the last one of its channel."""
         self._pushes[channel] = (self.time, push.at_rest if isinstance(push, Drive) else push)
 
     def release(self, channel: str) -> None:
@@ -35,6 +35,6 @@ class HeardPushes:
 
     @property
     def pushes(self) -> tuple[Push, ...]:
-        """Pushes that act now; a time that went backwards is a reset and ends all."""
+        """Pushes that act now; a time before a push's start, after a reset, ends it."""
         return tuple(push for start, push in list(self._pushes.values())
                      if start <= self.time < start + push.duration)
