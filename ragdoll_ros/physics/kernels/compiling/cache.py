@@ -33,7 +33,7 @@ PATIENCE = 1.0
 KERNELS, SOURCES = __package__.rpartition('.')[0], Path(__file__).parent.parent
 """The package of all kernels, and its folder."""
 
-OURS = re.compile(r'[\w.]+-[0-9a-f]{16}-[0-9a-f]{8}\.nbc(\.\d+)?'  # begun by a process of a number
+OURS = re.compile(r'[\w.]+-[0-9a-f]{16}-[0-9a-f]{8}\.nbc(\.\d+)?'  # temporary by a process of a number
                   r'|[\w.]+-\d+\.py\d+\w*(\.\d+)?\.nb[ic]')  # as numba itself names them
 
 
@@ -133,12 +133,12 @@ def _keep(path: Path, content: bytes) -> None:
     for other in path.parent.iterdir():
         if OURS.fullmatch(other.name) and f'-{DIGEST}-' not in other.name:
             other.unlink(missing_ok=True)
-    begun = path.with_name(f'{path.name}.{os.getpid()}')
+    temporary = path.with_name(f'{path.name}.{os.getpid()}')
     try:
-        begun.write_bytes(content)
-        begun.replace(path)
+        temporary.write_bytes(content)
+        temporary.replace(path)
     finally:
-        begun.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
 
 
 def keep(dispatcher: Dispatcher) -> None:

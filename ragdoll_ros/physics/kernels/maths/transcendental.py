@@ -26,12 +26,12 @@ def sine_and_cosine(angle: float) -> tuple[float, float]:
         return series(angle)
     quarters = math.floor(angle * (2 / math.pi) + 0.5)
     s, c = series((angle - quarters * QUARTER) - quarters * REST)
-    turned = quarters - 4 * math.floor(quarters / 4)
-    if turned == 1:
+    swapped = quarters - 4 * math.floor(quarters / 4)
+    if swapped == 1:
         return c, -s
-    if turned == 2:
+    if swapped == 2:
         return -s, -c
-    if turned == 3:
+    if swapped == 3:
         return -c, s
     return s, c
 
