@@ -33,7 +33,7 @@ PATIENCE = 1.0
 KERNELS, SOURCES = __package__.rpartition('.')[0], Path(__file__).parent.parent
 """The package of all kernels, and its folder."""
 
-OURS = re.compile(r'[\w.]+-[0-9a-f]{16}-[0-9a-f]{8}\.nbc(\.\d+)?'  # temporary by a process of a number
+OURS = re.compile(r'[\w.]+-[0-9a-f]{16}-[0-9a-f]{8}\.nbc(\.\d+)?'  # written by a process, as path.pid
                   r'|[\w.]+-\d+\.py\d+\w*(\.\d+)?\.nb[ic]')  # as numba itself names them
 
 

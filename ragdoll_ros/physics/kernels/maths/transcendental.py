@@ -26,12 +26,12 @@ def sine_and_cosine(angle: float) -> tuple[float, float]:
         return series(angle)
     quarters = math.floor(angle * (2 / math.pi) + 0.5)
     s, c = series((angle - quarters * QUARTER) - quarters * REST)
-    swapped = quarters - 4 * math.floor(quarters / 4)
-    if swapped == 1:
+    quadrant = quarters - 4 * math.floor(quarters / 4)
+    if quadrant == 1:
         return c, -s
-    if swapped == 2:
+    if quadrant == 2:
         return -s, -c
-    if swapped == 3:
+    if quadrant == 3:
         return -c, s
     return s, c
 
