@@ -1,1 +1,1 @@
-"""What contacts and limits answer: Newton's, Signorini's and Coulomb's laws, solved."""
+"""Impulses of contacts and limits, by Newton's, Signorini's and Coulomb's laws."""
