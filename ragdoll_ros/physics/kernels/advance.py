@@ -103,7 +103,7 @@ def refresh_gaps(s: System, ws: Workspace, cluster: ClusterState) -> None:
 @compiled
 def try_flight(s: System, ws: Workspace, cluster: ClusterState, left: float, nominal: float,
                tolerance: float) -> None:
-    """If everything separates, begin a dense step, at most ``left`` s if loads act."""
+    """Begin a dense step, with its first contact, if everything separates; ws.gaps are current."""
     longest = min(left, LONGEST_FLIGHT) if len(cluster.loads) else LONGEST_FLIGHT
     if can_fly(s, ws, cluster, nominal) and begin_dense_step(s, ws, cluster, tolerance, longest):
         find_first_contact(s, ws, cluster)

@@ -57,8 +57,8 @@ start; a joint between its bodies is outside its limits."""
 
 COMPLIANCE, IMPACT_COMPLIANCE = 1e-8, 1e-10
 """Compliance of contacts and limits, as a share of the diagonal of W = J H^-1 J^T, in steps and at
-impacts. It makes impulses of redundant contacts unique, and keeps them small where contacts jam. A
-body at rest on a slope creeps by some 1e-10 m/s; an impact misses its velocity by as large a share.
+impacts. It makes impulses of redundant contacts unique and keeps them small where contacts jam.
+Bodies at rest on slopes creep by some 1e-10 m/s; impacts miss their velocity by as large a share.
 """
 
 MAX_DENSE_ROWS = 96

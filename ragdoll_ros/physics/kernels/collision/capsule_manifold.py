@@ -136,11 +136,9 @@ def capsule_separation(a: Shape, b: Shape) -> float:
 @compiled
 def capsule_manifold(a: Shape, b: Shape, margin: float, sign: float,
                      manifold: np.ndarray) -> int:
-    """Write the manifold of a sphere or capsule a with any shape b to ``manifold``; arguments and
-    return value as collide(). ``sign``: factor of the normals, -1 if the caller has swapped a and
-    b.
-
-    Points: the deepest, and where the axis enters and leaves the space above the face below it.
+    """Write the manifold of a sphere or capsule a with any shape b to ``manifold``, as collide().
+    ``sign``: factor of the normals, -1 if the caller has swapped the shapes. Points: the deepest,
+    and where the axis enters and leaves the space above the face below it.
     """
     c, radius, half = sub(a.position, b.position), a.size[0], a.size[1]
     p, u = to_local(b.rotation, c), to_local(b.rotation, column(a.rotation, 2))

@@ -18,11 +18,10 @@ MAX_CLIPPED = 20
 def clip_polygon(reference: np.ndarray, reference_count: int, n: Vec3, polygon: np.ndarray,
                  polygon_count: int, scratch: np.ndarray) -> int:
     """Clip ``polygon`` (polygon_count) in place by the sides of the convex polygon ``reference``,
-    seen along n. Returns the number of vertices left.
-
-    All are arrays of CLIP_VERTEX, polygon and ``scratch`` with room for MAX_CLIPPED.
-    ``reference_count`` must be even, as each side swaps these two. The feature id of a vertex is
-    that of the side that leaves it: 0 to 7 the polygon's own, from MAX_CORNERS on the reference's.
+    seen along n. Returns the number of vertices left. All are CLIP_VERTEX; ``reference_count`` must
+    be even, as each side swaps polygon and ``scratch``, both (MAX_CLIPPED,). A vertex has the
+    feature id of the side that leaves it: 0 to 7 the polygon's, from MAX_CORNERS on the
+    reference's.
     """
     turn = _winding(reference, n)
     source, target = polygon, scratch
@@ -50,7 +49,8 @@ def _winding(corners: np.ndarray, n: Vec3) -> float:
 @compiled
 def _clip_by_plane(polygon: np.ndarray, polygon_count: int, m: Vec3, offset: float, side: int,
                    out: np.ndarray) -> int:
-    """Write the part with m x <= ``offset`` to ``out``, its new side with id ``side``; its count.
+    """Write the part of a polygon with m x <= ``offset`` to ``out``; its new side gets the feature
+    id ``side``. Returns its number of vertices, at most MAX_CLIPPED.
     """
     count = 0
     previous = polygon[polygon_count - 1]

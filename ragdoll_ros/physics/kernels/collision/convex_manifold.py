@@ -154,7 +154,7 @@ def _clip_edges(a: Shape, b: Shape, n: Vec3, points: np.ndarray) -> int:
 
 @compiled
 def _closest_on_edges(a: Shape, b: Shape, n: Vec3, s: float) -> Vec3:
-    """Midpoint, m, of the closest points of the supporting edges, vertices or rims of a and b."""
+    """Midpoint, m, from b's center, of the closest points of the supporting edges or vertices."""
     middle, u = supporting_edge(a, neg(n))
     other, v = supporting_edge(b, n)
     middle = add(middle, a.position)

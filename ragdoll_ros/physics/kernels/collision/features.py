@@ -26,10 +26,8 @@ MAX_CORNERS = len(OCTAGON)
 def supporting_face(shape: Shape, n: Vec3, t: Vec3, corners: np.ndarray) -> tuple[int, int]:
     """Write the corners of the face that supports along the unit vector n (world) to ``corners``,
     from the shape's center, m, world axes. Returns their number (4: face, 8: cap, 2: line of a
-    side) and the face's id.
-
-    A cap has the corners of a regular octagon, except that the one closest to the support point is
-    put there; if all of the cap supports, the one closest to the direction ``t``.
+    side) and the face's id. A cap has the corners of a regular octagon, except that the one closest
+    to the support point is put there; if all of the cap supports, that closest to direction ``t``.
     """
     size, (x, y, z) = shape.size, to_local(shape.rotation, n)
     if shape.kind == BOX:

@@ -31,12 +31,11 @@ Nearest = tuple[float, Vec3, int]
 @compiled
 def closest_direction(a: Shape, b: Shape, c: Vec3, ratio: float, tolerance: float,
                       simplex: np.ndarray, count: int, n: Vec3) -> Direction:
-    """Unit vector from b to a between their closest points, and the number of vertices of the last
-    simplex. Both shapes, scaled by ``ratio`` about their centers, must be disjoint.
+    """Unit vector from b to a between their closest points; both, scaled by ``ratio``, are
+    disjoint. Returns the number of vertices of the last simplex, and the vector.
 
-    c: offset of a's center from b's, m; ``tolerance``: relative error of the distance. The
-    iteration starts with n and the first ``count`` vertices of an earlier ``simplex`` (4,), which
-    is overwritten.
+    c: offset of a's center from b's, m; ``tolerance``: relative error of the distance. It starts
+    with n and the first ``count`` vertices of an earlier ``simplex`` (4,), which is overwritten.
     """
     square, v = math.inf, n
     for k in range(count):
@@ -61,8 +60,8 @@ def closest_direction(a: Shape, b: Shape, c: Vec3, ratio: float, tolerance: floa
 
 @compiled
 def _nearest(simplex: np.ndarray, count: int) -> tuple[int, Vec3]:
-    """Reduce a simplex to the vertices that its point nearest to the origin is made of. Returns
-    their number and the point.
+    """Reduce a simplex to the vertices of its point nearest to the origin; their number and the
+    point.
 
     In a tetrahedron that point is on a face, as the origin is outside, and not on that without the
     last vertex, which came because it was nearer.
@@ -89,9 +88,7 @@ def _nearest(simplex: np.ndarray, count: int) -> tuple[int, Vec3]:
 
 @compiled
 def _nearest_on_segment(simplex: np.ndarray, i: int, j: int) -> Nearest:
-    """Nearest to the origin on the edge between vertices i and j: squared distance, point, bits of
-    the vertices used.
-    """
+    """Nearest to the origin on the edge i j: squared distance, point, bits of the vertices used."""
     a = vec(simplex[i].point)
     edge = sub(vec(simplex[j].point), a)
     t, square = -dot(a, edge), dot(edge, edge)

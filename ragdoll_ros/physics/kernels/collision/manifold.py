@@ -18,8 +18,8 @@ CLIP_VERTEX = np.dtype([('point', float, 3), ('gap', float), ('feature_id', np.i
 
 @compiled
 def merge_points(points: np.ndarray, count: int, margin: float, distance: float) -> int:
-    """Drop points with gap > ``margin``, and of two within ``distance`` the shallower; the rest's
-    count.
+    """Drop points whose gap exceeds ``margin``, m, and of two within ``distance``, m, the
+    shallower, in place. Returns the number left.
     """
     kept = 0
     for i in range(count):

@@ -155,8 +155,8 @@ def aba_backward(body: np.record, i: int, v: np.ndarray, kin: Kinematics, dyn: D
 
 @inlined
 def aba_forward(body: np.record, i: int, kin: Kinematics, dyn: Dynamics, out: np.ndarray) -> None:
-    """Third pass: replace dyn.bias_forces[i] by the acceleration; write the joint's dv/dt to
-    ``out``.
+    """Third pass, after the parent of body i: dyn.bias_forces[i] becomes its spatial acceleration;
+    write dv/dt of its joint to ``out`` (nv,).
     """
     acceleration = dyn.bias_forces[i]
     for k in range(6):

@@ -50,11 +50,9 @@ def time_without_contact(s: System, ws: Workspace, kin: Kinematics, q: np.ndarra
                          gaps: np.ndarray, acceleration: float,
                          acceleration_in_free_fall: float, end_rates: np.ndarray) -> float:
     """Least time, s, until a gap may close; ``kin`` is that of q and v, with its geoms. Reads
-    flight.armed, overwrites contacts.manifold.
-
-    No point exceeds ``acceleration``, m/s^2, nor ``acceleration_in_free_fall``, relative to free
-    fall, which a pair counts twice. ``end_rates`` (2, nq + nv): state derivatives at the ends of
-    the step, for those of the limited joints.
+    flight.armed, overwrites contacts.manifold. No point exceeds ``acceleration``, m/s^2, nor
+    ``acceleration_in_free_fall``, relative to free fall, which a pair counts twice. ``end_rates``
+    (2, nq + nv): state derivatives at the ends of the step, for those of the limited joints.
     """
     least, n, armed = math.inf, 0, ws.flight.armed
     for k in range(len(s.geoms)):

@@ -103,8 +103,8 @@ def initial_active_set(island: Island, m: int, p: np.ndarray) -> int:
 @compiled
 def factor_rows(W: np.ndarray, n: int, places: np.ndarray, start: int, count: int,
                 U: np.ndarray) -> bool:
-    """Factor W at ``places``, U^T U, from row ``start`` on. Returns whether it is positive
-    definite.
+    """Write rows ``start`` to ``count`` - 1 of the factor U^T U of W at ``places`` to U. Returns
+    whether it is positive definite.
     """
     for i in range(start, count):
         at = places[i] * n
@@ -117,7 +117,8 @@ def factor_rows(W: np.ndarray, n: int, places: np.ndarray, start: int, count: in
 
 @compiled
 def append_column(W: np.ndarray, U: np.ndarray, n: int, places: np.ndarray, end: int) -> None:
-    """Write the column of row places[end] to the rows of U above; factor_rows() does its own row.
+    """Write the column of row places[end] to rows 0 to end - 1 of the factor U; its diagonal entry
+    is left to factor_rows().
     """
     at = places[end] * n
     for k in range(end):
@@ -129,8 +130,7 @@ def append_column(W: np.ndarray, U: np.ndarray, n: int, places: np.ndarray, end:
 
 @compiled
 def remove_column(U: np.ndarray, n: int, places: np.ndarray, drop: int, count: int) -> None:
-    """Remove entry ``drop`` of ``places``, and its column from the rows of U above; ``count`` stay.
-    """
+    """Remove ``places[drop]``, leaving ``count``, and its column from the rows of U above."""
     for j in range(drop, count):
         places[j] = places[j + 1]
     for k in range(drop):

@@ -64,8 +64,7 @@ def solve_large(ws: Workspace, m: int, n: int, has_restitution: bool,
 
 @compiled
 def diagonal_blocks(ws: Workspace, m: int, compliance: float) -> None:
-    """Write the diagonal blocks of W to island.blocks, with 1 + ``compliance`` on their diagonals.
-    """
+    """Write W's diagonal blocks to island.blocks, their diagonals times 1 + ``compliance``."""
     island = ws.island
     for k in range(m):
         c, block = ws.contacts.found[island.members[k].contact], island.blocks[k]
@@ -102,7 +101,7 @@ def row_velocity(ws: Workspace, k: int, e: int, b: np.ndarray, p: np.ndarray) ->
 
 @compiled
 def change_impulse(ws: Workspace, k: int, e: int, change: float, p: np.ndarray) -> float:
-    """Add ``change`` to the impulse of row e of member k; the change of its velocity."""
+    """Change an impulse in p, and island.z. Returns the row's change of velocity, m/s or rad/s."""
     island, member = ws.island, ws.island.members[k]
     row, support = member.row + e, island.support[member.contact]
     p[row] += change

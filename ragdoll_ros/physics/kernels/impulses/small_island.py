@@ -32,7 +32,6 @@ def solve_small(ws: Workspace, m: int, n: int, h: float, tolerance: float, has_r
                 has_penetration: bool) -> None:
     """Solve an island of m contacts and n rows over h s, or at an impact, h = 0, for
     island.impulses; if ``has_penetration``, also for island.correction. After assemble_rhs().
-
     ``has_restitution``: the right-hand side asks for restitution, which may add energy.
     """
     island, b, p, u, soft = (ws.island, ws.island.rhs, ws.island.impulses, ws.island.free_velocity,

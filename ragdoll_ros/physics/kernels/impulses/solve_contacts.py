@@ -63,11 +63,11 @@ def solve_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, v: 
                    v_free: np.ndarray, m: int, h: float, tolerance: float) -> None:
     """Solve m contacts over h s in which v becomes ``v_free`` without them. Writes to ws.step their
     change of velocity, v_change (nv,), and the displacement of position correction, correction
-    (nv,).
+    (nv,). Contacts are read from ws.contacts.found; impulses start from there and are written
+    there.
 
-    Contacts are read from ws.contacts.found; impulses start from there and are written there. h =
-    0: an impact. ``kin`` is that of q, with the roots' motion subspaces; dynamics.H the factor of
-    the mass matrix there. ``tolerance``: m/s of the residual of small islands.
+    h = 0: an impact. ``kin``: of q, with the roots' motion subspaces; dynamics.H: factor of the
+    mass matrix. ``tolerance``: m/s of the residual of small islands.
     """
     contacts, island, L = ws.contacts.found, ws.island, ws.step.dynamics.H
     change, correction = ws.step.v_change, ws.step.correction
@@ -155,8 +155,7 @@ def assemble_rhs(s: System, ws: Workspace, m: int, n: int, h: float) -> tuple[bo
 
 @compiled
 def set_correction(ws: Workspace, member: np.record, c: np.record, h: float) -> None:
-    """Write how much of a penetration is corrected in h s, m or rad, and how softly, to ``member``.
-    """
+    """Write to ``member`` how much of a penetration to correct in h s, and its compliance."""
     fastest = MAX_LIMIT_SPEED if c.kind == LIMIT else MAX_SEPARATION_SPEED
     member.correction = min(CORRECTED_SHARE * max(0.0, -c.gap - SLOP), fastest * h)
     if not ws.step.scalars[0].seeks_impacts and not c.persistent:

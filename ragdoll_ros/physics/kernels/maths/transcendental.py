@@ -20,7 +20,7 @@ C4, C6, C8, C10, C12, C14, C16, C18 = ((-1) ** k / math.factorial(2 * k) for k i
 
 @compiled
 def sine_and_cosine(angle: float) -> tuple[float, float]:
-    """Both of an angle, rad; error 3e-16, past a million turns the angle's own."""
+    """Sine and cosine of an angle, rad; error 3e-16, past a million turns the angle's own."""
     if abs(angle) < math.pi / 4:
         return series(angle)
     quarters = math.floor(angle * (2 / math.pi) + 0.5)

@@ -49,8 +49,7 @@ STEADY = 1.0
 @compiled
 def begin_contact_step(s: System, ws: Workspace, cluster: ClusterState) -> None:
     """Write the contacts that touch by ws.gaps, with their velocities, to contacts.start, their
-    number and the load potential to step.scalars, and step.sums_before. step.start becomes that of
-    now.
+    number and the load potential to step.scalars, and step.sums_before. Overwrites step.start.
     """
     q, v, kin, scalars = cluster.q, cluster.v, ws.step.start, ws.step.scalars[0]
     forward_kinematics(s.tree, q, v, kin)
@@ -67,11 +66,10 @@ def begin_contact_step(s: System, ws: Workspace, cluster: ClusterState) -> None:
 @compiled
 def contact_step(s: System, ws: Workspace, cluster: ClusterState, h: float, since: float) -> int:
     """Compute a step of h s, after begin_contact_step(): write step.q_end, without position
-    correction, step.v_end, step.correction, and the contacts with their impulses, whose number is
-    returned.
+    correction, step.v_end, step.correction, and contacts.found with impulses. Returns their number.
 
     Rows at the middle contain the curvature term h/2 dJ/dt v of J v; the target row velocity is
-    minus that term, for J v to be zero at the end. ``since``: s since the springs' targets were at
+    minus that term, for J v to be 0 at the end. ``since``: s since springs' targets were at
     spring.target.
     """
     q, v, step, kin = cluster.q, cluster.v, ws.step, ws.step.middle

@@ -18,7 +18,7 @@ from .springs import mean_spring_force
 def account_work(s: System, ws: Workspace, v: np.ndarray, v_end: np.ndarray, h: float,
                  loads: np.ndarray, springs: np.ndarray, since: float) -> None:
     """Add the work, J, of loads, grabs and drives in a step of h s to stats.work_pushes and
-    work_grabs, their impulses to step.external. Forces along the world's axes do theirs in
+    work_grabs, their impulses to step.external. Forces along the world's axes work in
     load_potential(). step.middle and step.v_middle become those of the mean of v and ``v_end``.
     """
     kin, q, mean, stats = ws.step.middle, ws.step.q_middle, ws.step.v_middle, ws.stats[0]
