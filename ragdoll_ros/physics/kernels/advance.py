@@ -25,7 +25,8 @@ One tick of a cluster, and what its stages read and write:
       write_bone_states, sum_dolls   q, v -> bone_states, doll_sums
 
 The broad phase is in engine/rigid/broad_phase.py, sleep in physics/sleeping.py. In all
-kernels s is the System, ws the Workspace, kin a Kinematics, m a number of contacts, h a step in s.
+kernels s is the System, ws the Workspace, kin a Kinematics, m a number of contacts, n of their
+rows, h the length of a step, s; ``found``: ws.contacts.found, ``dynamics``: ws.step.dynamics.
 """
 from __future__ import annotations
 

@@ -60,8 +60,8 @@ def closest_direction(a: Shape, b: Shape, c: Vec3, ratio: float, tolerance: floa
 
 @compiled
 def _nearest(simplex: np.ndarray, count: int) -> tuple[int, Vec3]:
-    """Reduce a simplex to the vertices of its point nearest to the origin; their number and the
-    point.
+    """Reduce a simplex to the vertices of its point nearest to the origin. Returns their number and
+    the point.
 
     In a tetrahedron that point is on a face, as the origin is outside, and not on that without the
     last vertex, which came because it was nearer.

@@ -129,7 +129,7 @@ def max_separation_axis(a: Shape, b: Shape, c: Vec3, cutoff: float) -> Axis:
 @compiled
 def _growth_axis(a: Shape, b: Shape, c: Vec3, n: Vec3, simplex: np.ndarray) -> Direction:
     """Axis along which overlapping shapes touch when scaled: Dinkelbach's iteration from the guess
-    n. Returns the vertices of ``simplex`` (4,), which is overwritten, and the axis.
+    n. Returns the number of vertices of ``simplex`` (4,), which is overwritten, and the axis.
     """
     largest, count, best = 0.0, np.int64(0), n
     for _ in range(6):

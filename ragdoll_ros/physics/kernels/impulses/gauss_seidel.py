@@ -1,4 +1,4 @@
-"""One Gauss-Seidel sweep over the contacts of a small island, by its W.
+"""One Gauss-Seidel sweep over the contacts of a small island, by its W; symbols as in solver.py.
 
 Non-smooth contact dynamics (Moreau 1988; Jean, CMAME 177, 1999).
 """

@@ -1,4 +1,4 @@
-"""Semi-smooth Newton method on all rows of an island at once.
+"""Semi-smooth Newton method on all rows of an island at once; symbols as in solver.py.
 
 The function is Alart and Curnier's (CMAME 92, 1991). Impulses that several contacts of one face
 bear together are nearly undetermined, and a full step along them leaves every friction cone. So

@@ -1,11 +1,12 @@
 """Impulses of a small island of contacts and limits, by Signorini's and Coulomb's laws exactly.
 
-Unknown are the impulses p, rows of 1 (a limit), 3 (a contact: normal and two tangents) or 5 (the
-same and two of rolling). The velocities after are u = W p + b. The complementarity problem:
+Unknown are the impulses p of m contacts, n rows: 1 (a limit), 3 (a contact: normal, two tangents)
+or 5 (also two of rolling). The velocities after are u = W p + b, with W flat (n * n), b those
+without impulses. The complementarity problem:
 u_n >= 0, p_n >= 0, u_n p_n = 0; |p_t| <= mu p_n, and where u_t is not zero p_t = -mu p_n u_t/|u_t|.
 
-Where friction is zero or unlimited, the active set method solves it. Else Gauss-Seidel
-sweeps come near, and where they stall, as with mass ratios of 1:1000, Newton's method finishes.
+Where friction is zero or unlimited, the active set method solves it. Else Gauss-Seidel sweeps come
+near, and where they stall, as with mass ratios of 1:1000, Newton's method finishes.
 """
 from __future__ import annotations
 

@@ -111,7 +111,9 @@ def begin_trials(ws: Workspace) -> None:
 @compiled
 def accept_step(ws: Workspace, cluster: ClusterState, m: int, length: float,
                 warm: bool) -> None:
-    """Copy the step's end to the cluster, and if ``warm`` its contacts for the next warm start."""
+    """Copy the step's end to the cluster, and if ``warm`` its m contacts and its ``length``, s, for
+    the warm start of the next step.
+    """
     if warm:
         for i in range(m):
             cluster.contacts[i] = ws.contacts.found[i]
@@ -179,8 +181,8 @@ def tolerated_energy_gain(s: System, ws: Workspace, m: int, h: float, kinetic: f
 
 @compiled
 def penetrates_further(s: System, ws: Workspace) -> bool:
-    """Whether something that touched is deep at the step's end, and deeper by a tenth of the
-    tolerance.
+    """Whether something that touched ends deeper than MAX_PENETRATION or BEYOND_LIMIT, and by a
+    tenth of it deeper than at the start.
     """
     for j in range(len(ws.gaps)):
         most = BEYOND_LIMIT if is_joint_limit_gap(s, ws.gaps, j) else MAX_PENETRATION
