@@ -14,13 +14,13 @@ from ..system import System
 from ..workspace import Workspace
 
 TOLERANCE = 1e-10
-"""m/s to which contacts are solved."""
+"""m/s: tolerance of the contact solve."""
 
 
 @compiled
 def impact(s: System, ws: Workspace, q: np.ndarray, v: np.ndarray, bounces: bool) -> int:
-    """Change v by the impulses of everything that touches at q by ws.gaps. Returns the number of
-    contacts. ``bounces``: whether there is restitution.
+    """Add to v the change by the impulses of everything that touches at q by ws.gaps. Returns the
+    number of contacts. ``bounces``: whether there is restitution.
     """
     kin, dyn, contacts = ws.step.start, ws.step.dynamics, ws.contacts.found
     forward_kinematics(s.tree, q, v, kin)
