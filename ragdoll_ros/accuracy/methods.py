@@ -13,16 +13,25 @@ import numpy as np
 from ..model import errors
 from ..model.state import State
 from ..physics import kernels
-from ..physics.accuracy import ACCURACIES, Accuracy
+from ..physics.accuracy import ACCURACIES, NORMAL, Accuracy
 from ..physics.engine.protocol import Engine
+from ..physics.engine.registry import resolve_engine
 from ..physics.engine.substepped.bullet import BulletEngine
 from ..physics.engine.substepped.mujoco import MujocoEngine
 from ..physics.simulation import Simulation
-from . import step_sizes
 from .cases.trial import Trial
 from .quickstart import STEP as QUICKSTART_STEP
 from .quickstart import Quickstart
 from .trajectory import Trajectory
+
+TICK = 0.01
+"""s: substeps are counted per tick of this length."""
+
+RIGID = 'rigid'
+"""Name of this package's own engine, which solves impacts at their time of impact."""
+
+MIN_FLIGHT_ERROR = 1e-13
+"""m or rad: smaller error estimates in flight are rounding."""
 
 
 class MethodRun(Protocol):
@@ -75,7 +84,7 @@ class _FixedSteps:
     def __init__(self, trial: Trial, substeps: int, make: Callable[..., Engine]) -> None:
         self._trial = trial
         self._tick, self._count = trial.scene.step, 0
-        self._engine = make(trial.scene, step_sizes.fixed_steps(self._tick / substeps))
+        self._engine = make(trial.scene, fixed_steps(self._tick / substeps))
         if trial.start is not None:
             self._engine.set_coordinates(trial.start)
 
@@ -92,6 +101,27 @@ class _FixedSteps:
 
     def close(self) -> None:
         self._engine.close()
+
+
+@functools.cache
+def has_rigid_engine() -> bool:
+    """Whether the rigid engine can be created here."""
+    try:
+        resolve_engine(RIGID)
+    except (errors.RagdollError, ImportError):
+        return False
+    return True
+
+
+def contact_step(setting: str = 'normal') -> float:
+    """Largest step, s, of the rigid engine at a setting while in contact."""
+    return ACCURACIES[setting].step
+
+
+def fixed_steps(step: float) -> Accuracy:
+    """Accuracy with steps of ``step`` s, without energy correction and sleep, which hide errors."""
+    return dataclasses.replace(NORMAL, step=step, substeps=TICK / step, energy=False, sleep=False,
+                               flight_error=MIN_FLIGHT_ERROR)
 
 
 def start_simulation(trial: Trial, accuracy: str | Accuracy, engine: str = 'auto') -> Simulation:
@@ -140,7 +170,7 @@ def ours(accuracy: str | Accuracy, name: str | None = None, engine: str = 'auto'
 def core(step: float) -> Method:
     """The rigid engine with fixed steps of ``step`` s."""
     return Method(f'core-{step:g}', f'core, steps of {step * 1e6:g} µs', 'core', functools.partial(
-        start_simulation, accuracy=step_sizes.fixed_steps(step), engine=step_sizes.RIGID))
+        start_simulation, accuracy=fixed_steps(step), engine=RIGID))
 
 
 def reference(refinement: int) -> Method:
@@ -148,7 +178,7 @@ def reference(refinement: int) -> Method:
 
     PyBullet at 128 substeps where the rigid engine is not available; the label names it.
     """
-    return (core(step_sizes.contact_step() / refinement) if step_sizes.has_rigid_engine()
+    return (core(contact_step() / refinement) if has_rigid_engine()
             else bullet(128))
 
 

@@ -13,7 +13,7 @@ from ..model.vectors import finite_floats, unit_vector
 from ..people.person import HEIGHTS, MASSES
 from ..physics.simulation import MAX_SAMPLES_PER_TICK
 from .distribution import choices, distribution_errors, support
-from .imu_samples import flaws_of
+from .fall import flaws_of
 
 RATE = 100
 """Default frames per second."""

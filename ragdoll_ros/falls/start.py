@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import rotation
-from ..model.angle import sine_and_cosine
 from ..model.coordinates import DofLayout, GeneralizedState
 from ..model.push import Push
 from ..model.ragdoll import Ragdoll
+from ..model.rotation import sine_and_cosine
 from ..model.scene import SECOND, Ground, Material, Placement, Scene
 from .recipe import Recipe
 

@@ -19,7 +19,7 @@ from ..model.skeleton import Riders
 from ..model.skin import Skin
 from ..model.state import State
 from .reading.character import Character, read_character
-from .reading.subset import subset_character
+from .skeleton.split_characters import subset_character
 
 SCALE_TOLERANCE = 1e-3
 """Relative difference of skin and doll from which on the skin is read again at the doll's scale."""

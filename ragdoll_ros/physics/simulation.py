@@ -24,7 +24,7 @@ from .engine.registry import resolve_engine
 from .ground_heights import GroundHeights, JointGap
 from .sleeping import SleepDetector
 from .swing.pose import SwingState
-from .swing.simulation import SwingSimulation
+from .swing.swings import SwingSimulation
 
 MAX_SAMPLES_PER_TICK = 200  # those of a sensor of 1 kHz in the longest tick
 MAX_WORKERS = 64  # threads, each with its own workspace

@@ -12,8 +12,7 @@ from ...model.ragdoll import Bone, Ragdoll
 from ...model.scene import Ground, Material, Placement, Scene
 from ...model.shapes import Box, Sphere
 from . import starts
-from .hard_case import HardCase, Requirements, drop
-from .trial import Trial, posed
+from .trial import HardCase, Requirements, Trial, drop, posed
 
 COLLISIONS = (2.0, 6.0, 20.0, 60.0)
 """Approach speeds, m/s, of two dolls in the air."""

@@ -12,8 +12,7 @@ from ...model.ragdoll import Bone, Joint, Ragdoll
 from ...model.shapes import Box, Capsule, Cylinder, Sphere
 from . import starts
 from .contact_cases import contact_cases
-from .hard_case import HardCase, Requirements, drop
-from .trial import Trial, posed
+from .trial import HardCase, Requirements, Trial, drop, posed
 
 
 def hard_cases() -> list[HardCase]:

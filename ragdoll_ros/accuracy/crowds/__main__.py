@@ -13,8 +13,7 @@ import time
 
 import numpy as np
 
-from ...files.repeat import repeated_placements
-from ...files.scene import load_scene
+from ...files.scene import load_scene, repeated_placements
 from ...model.push import Push
 from ...model.scene import Placement, Scene
 from ...physics.accuracy import ACCURACIES

@@ -10,8 +10,7 @@ import subprocess
 import sys
 from collections import Counter
 
-from ...files.repeat import repeated_placements
-from ...files.scene import load_scene
+from ...files.scene import load_scene, repeated_placements
 from ...model.push import Push
 from ...model.scene import Placement, Scene
 from ...physics.simulation import Simulation

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..results.criteria import EXCESS
 from ..results.figures import Figures, Row, number, sound
-from .contact_plots import draw_convergence, draw_drops
-from .fall_plots import draw_fainting_falls, draw_fall_directions
+from .contact_plots import draw_convergence, draw_drops, draw_fainting_falls, draw_fall_directions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

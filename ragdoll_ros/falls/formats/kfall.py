@@ -16,8 +16,7 @@ import numpy as np
 
 from ...model import rotation
 from ...model.errors import WrongForm
-from ..fall import Fall
-from ..imu_samples import fall_samples, sensor_orientations
+from ..fall import Fall, fall_samples, sensor_orientations
 from ..recipe import Recipe
 
 SENSOR = 'sensor_data/SA{shard:06d}/S{shard:06d}T01R{trial:02d}.csv'

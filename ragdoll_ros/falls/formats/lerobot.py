@@ -20,8 +20,7 @@ import pyarrow as pa
 import pyarrow.parquet as parquet
 
 from ...model.errors import WrongForm
-from ..fall import Fall
-from ..imu_samples import NAMES, samples_by_frame
+from ..fall import SAMPLE_NAMES, Fall, samples_by_frame
 from ..recipe import Recipe
 
 FILES_PER_CHUNK = 1000
@@ -119,8 +118,9 @@ def _each(bones: tuple[str, ...], parts: tuple[str, ...]) -> list[str]:
 def _sample_names(recipe: Recipe) -> tuple[str, ...]:
     """Names of a sensor's numbers in a frame, numbered if it has several samples."""
     if recipe.samples_per_frame == 1:
-        return NAMES
-    return tuple(f'{name}_{sample}' for sample in range(recipe.samples_per_frame) for name in NAMES)
+        return SAMPLE_NAMES
+    return tuple(f'{name}_{sample}' for sample in range(recipe.samples_per_frame)
+                 for name in SAMPLE_NAMES)
 
 
 def _array(column: Column) -> pa.Array:

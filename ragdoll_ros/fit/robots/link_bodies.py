@@ -18,8 +18,7 @@ from ...model.compound import Compound, principal_axes
 from ...model.pose import Pose
 from ...model.ragdoll import Bone
 from ...model.shapes import Box, Capsule, Part, Shape
-from .mesh_file import read_mesh
-from .mesh_path import find_mesh
+from .mesh_file import find_mesh, read_mesh
 from .mesh_shapes import fit_mesh
 
 PlacedShape = tuple[Shape, Pose]

@@ -15,8 +15,7 @@ from ....model.state import State
 from ...rigid_body import cross
 from ..doll_totals import DollSums, DollTotals
 from ..protocol import Wrenches
-from .energy_account import EnergyAccount
-from .work import mean_wrench
+from .energy_account import EnergyAccount, mean_wrench
 
 TOLERANCE = 5e-4
 """Relative energy excess that is not corrected: half of the documented bound of 0.1 %."""

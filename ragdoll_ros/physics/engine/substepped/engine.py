@@ -14,9 +14,8 @@ from ...accuracy import Accuracy
 from ...ground_heights import GroundHeights
 from ..doll_totals import DollSums, DollTotals
 from ..protocol import GROUND, Drives, Springs, Wrenches, allowed_penetration
-from .energy_account import EnergyAccount
+from .energy_account import EnergyAccount, steady_time, work
 from .explicit_springs import CONSTANT_FORCE_TIME, SpringWrench, drive_wrenches, spring_wrenches
-from .work import steady_time, work
 
 SPAN = 0.01
 """s: Accuracy.substeps counts substeps in this time. Also the longest interval under loads, and the
