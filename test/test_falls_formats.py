@@ -12,10 +12,10 @@ from falls_recipes import DROP, SHOVE, recipe
 from ragdoll_ros import load_doll
 from ragdoll_ros.falls import generate, load_recipe
 from ragdoll_ros.falls.command import main
-from ragdoll_ros.falls.dataset_builder import build_dataset
 from ragdoll_ros.falls.fall import fall_samples, samples_by_frame
 from ragdoll_ros.falls.formats.registry import FORMATS
 from ragdoll_ros.falls.formats.settled import ALIKE, different
+from ragdoll_ros.falls.manifest import build_dataset
 from ragdoll_ros.falls.shard import DatasetJob, make_shard
 from ragdoll_ros.files.urdf import to_urdf
 from ragdoll_ros.fit.command import main as fit

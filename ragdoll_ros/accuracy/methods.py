@@ -178,8 +178,7 @@ def reference(refinement: int) -> Method:
 
     PyBullet at 128 substeps where the rigid engine is not available; the label names it.
     """
-    return (core(contact_step() / refinement) if has_rigid_engine()
-            else bullet(128))
+    return (core(contact_step() / refinement) if has_rigid_engine() else bullet(128))
 
 
 def quickstart() -> Method:

@@ -92,8 +92,7 @@ class Metrics:
             work[1:] += np.cumsum(gained * acts)
         return work
 
-    def energy_excess(self, trial: Trial, trajectory: Trajectory,
-                      released: float = 0.0) -> float:
+    def energy_excess(self, trial: Trial, trajectory: Trajectory, released: float = 0.0) -> float:
         """Energy gain: the largest rise of E - W above its running minimum, over max(E0 + W).
 
         ``released``, J, is energy that the start itself may release. NaN if max(E0 + W) <= 0.

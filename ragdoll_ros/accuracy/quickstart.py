@@ -89,8 +89,7 @@ class Quickstart:
         plane = pybullet.createCollisionShape(
             pybullet.GEOM_PLANE, planeNormal=ground.normal, physicsClientId=self._client)
         self._plane = pybullet.createMultiBody(
-            0, plane, -1, [n * ground.offset for n in ground.normal],
-            physicsClientId=self._client)
+            0, plane, -1, [n * ground.offset for n in ground.normal], physicsClientId=self._client)
 
     def _find_links(self) -> None:
         links, self._joints = {}, {}

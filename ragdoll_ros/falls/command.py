@@ -10,9 +10,8 @@ from pathlib import Path
 
 from ..model.errors import RagdollError
 from . import cluster, describe, pool
-from .dataset_builder import build_dataset
 from .formats.registry import FORMATS
-from .manifest import Manifest
+from .manifest import Manifest, build_dataset
 from .recipe import load_recipe
 from .shard import DatasetJob
 

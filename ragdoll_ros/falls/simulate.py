@@ -9,8 +9,8 @@ from ..model.coordinates import GeneralizedState
 from ..model.errors import RagdollError
 from ..people import standing
 from ..people.fall_phases import ONSET_DURATION, Phases, find_phases
-from ..physics.ground_heights import GroundHeights
 from ..physics.guard import Guard
+from ..physics.rigid_body import GroundHeights
 from ..physics.simulation import Simulation
 from .fall import Fall
 from .recipe import Recipe
@@ -47,8 +47,7 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
         excess = simulation.energy_excess if frames.valid else np.nan
     states, touching = frames.states[:frames.valid], frames.touching[:frames.valid]
     phases = find_phases(
-        scene, states, touching, recipe.data['feet'],
-        round(ONSET_DURATION * recipe.rate),
+        scene, states, touching, recipe.data['feet'], round(ONSET_DURATION * recipe.rate),
         **recipe.data['phases']) if frames.valid else Phases()
     return Fall(start.number, start.drawn, scene, np.arange(recipe.frames) / recipe.rate,
                 frames.states, frames.angles, frames.rates, frames.touching, recipe.imus,

@@ -104,8 +104,7 @@ def _angles(doll: Ragdoll, start: dict) -> dict[str, float]:
               for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
     angles = {name: limits[name][0] + share * (limits[name][1] - limits[name][0])
               for name, share in start['angle_shares'].items()}
-    return {**angles, **{name: math.radians(angle)
-                         for name, angle in start['angles_deg'].items()}}
+    return {**angles, **{name: math.radians(angle) for name, angle in start['angles_deg'].items()}}
 
 
 def _push(drawn: dict, heading: np.ndarray) -> Push:

@@ -108,8 +108,7 @@ def build_scene(data: object, path: Path) -> tuple[Scene | None, list[ModelError
             parts[key] = try_build(found, key, part, **data[key])
     if found:
         return None, found
-    plain = {key: data[key] for key in ('gravity', 'step', 'pace', 'self_collision')
-             if key in data}
+    plain = {key: data[key] for key in ('gravity', 'step', 'pace', 'self_collision') if key in data}
     scene = try_build(found, '', Scene, data.get('name', path.stem), tuple(placements),
                       **parts, **plain)
     return scene, found

@@ -19,7 +19,7 @@ from ..model.swing import Swing
 from .bodies.masses import share_mass
 from .bodies.overlap import colliding_overlaps
 from .bodies.subdivide import subdivide
-from .bodies.trim import trim_overlaps
+from .bodies.trim import place_anchors, trim_overlaps
 from .joints.folding import note_guesses
 from .joints.make_joint import make_joint, with_damping
 from .reading.character import Character
@@ -28,7 +28,6 @@ from .reading.spring_to_swing import swing_from_spring
 from .roles.names import roles_of
 from .shapes.axes import Axes, fit_axes
 from .shapes.fitting import DECIMALS, TOLERANCE, FittedShape, fit_best, fit_shape
-from .skeleton.anchors import place_anchors
 from .skeleton.forced_bodies import find_forced_bodies
 from .skeleton.groups import BodyGroup, group_bones, mirrored_group, vertices_by_bone
 from .skeleton.skin_tree import SkinTree, find_skin_tree
@@ -253,8 +252,7 @@ def _body_fit(character: Character, group: BodyGroup, fitted: FittedShape, axes:
                    len(points), int(np.count_nonzero(off <= TOLERANCE)), axes)
 
 
-def _skeleton_frames(character: Character,
-                     carrier: dict[int, Bone]) -> tuple[SkeletonFrame, ...]:
+def _skeleton_frames(character: Character, carrier: dict[int, Bone]) -> tuple[SkeletonFrame, ...]:
     """Frame of every bone of the skeleton, fixed to a body, in the skeleton's order.
 
     ``carrier`` maps the index of a character's bone to that body.

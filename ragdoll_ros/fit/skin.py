@@ -15,8 +15,7 @@ import numpy as np
 from ..model import errors, rotation
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Placement, Scene
-from ..model.skeleton import Riders
-from ..model.skin import Skin
+from ..model.skeleton import Riders, Skin
 from ..model.state import State
 from .reading.character import Character, read_character
 from .skeleton.split_characters import subset_character

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..model import errors
-from ..model.skin import Skin
+from ..model.skeleton import Skin
 from .bvh_file import bvh_text
 from .gltf.gltf_file import gltf_bytes
 from .mcap_file import recording_bytes

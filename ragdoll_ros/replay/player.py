@@ -86,8 +86,7 @@ class Player:
         scene, fields = self._run.scene(event), event.fields
         try:
             self.simulation = Simulation(
-                scene, float(fields['step']),
-                self._accuracy or accuracy_from(fields['accuracy']),
+                scene, float(fields['step']), self._accuracy or accuracy_from(fields['accuracy']),
                 self._engine or str(fields['engine']))
             self.simulation.samples_per_tick = int(fields.get('parts', 1))
         except errors.RagdollError:

@@ -85,6 +85,5 @@ def _event(index: int, text: str) -> Event:
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         counts = False
     if not counts or not isinstance(kind, str):
-        raise errors.WrongForm(f'events[{index}]', text,
-                               'a JSON object with number, tick and kind')
+        raise errors.WrongForm(f'events[{index}]', text, 'a JSON object with number, tick and kind')
     return Event(number, tick, kind, fields)

@@ -19,7 +19,7 @@ from ...model.state import State
 from ...physics.accuracy import Accuracy
 from ...physics.engine.substepped.bullet import BulletEngine
 from ...physics.engine.substepped.mujoco import MujocoEngine
-from ...physics.ground_heights import GroundHeights
+from ...physics.rigid_body import GroundHeights
 from ...physics.simulation import Simulation
 from .depth import BoneDepth
 

@@ -65,5 +65,4 @@ def measure(motion_name: str, halvings: int) -> list[Row]:
 
 
 def _step(method: Method) -> float:
-    return TICK / method.substeps if method.substeps else float(
-        method.name.removeprefix('core-'))
+    return TICK / method.substeps if method.substeps else float(method.name.removeprefix('core-'))

@@ -20,7 +20,7 @@ from ...model.scene import SECOND, Material, Placement, Scene
 from ...people import person, standing
 from ...people.fall_phases import ONSET_DURATION, bone_impacts, find_phases, part_impact
 from ...people.real_falls import DESCENT, IMPACT_SPEEDS, SHARE_THAT_HITS, Known
-from ...physics.ground_heights import GroundHeights
+from ...physics.rigid_body import GroundHeights
 from ...physics.simulation import Simulation
 from ..results.figures import Row
 from ..results.markdown import table

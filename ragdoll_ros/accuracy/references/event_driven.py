@@ -93,8 +93,7 @@ def _at_rest(figure: PlanarRods, y: np.ndarray, closed: np.ndarray) -> np.ndarra
     return np.concatenate([y[:len(change)], speeds + change])
 
 
-def _modes(figure: PlanarRods, y: np.ndarray, resting: np.ndarray, hint: Hint,
-           ) -> tuple[str, ...]:
+def _modes(figure: PlanarRods, y: np.ndarray, resting: np.ndarray, hint: Hint) -> tuple[str, ...]:
     """Modes of all feet after an event; ``hint`` restricts those of the foot of the event."""
     places, modes = np.flatnonzero(resting), [OPEN] * len(figure.feet)
     if not len(places):

@@ -84,8 +84,7 @@ def note_guesses(character: Character, groups: list[BodyGroup],
     folds, balls = [], []
     for index, (group, along) in enumerate(zip(groups, directions, strict=True)):
         above, leg = parent_direction(character, groups, index), _leg(groups, index)
-        if group.role or above is None or len(leg) < 2 or not _is_paired(
-                character, groups, leg[0]):
+        if group.role or above is None or len(leg) < 2 or not _is_paired(character, groups, leg[0]):
             continue
         fold = leg_fold(character, groups, index, along)
         if fold is not None and fold.guessed:
@@ -131,8 +130,7 @@ def _is_front(character: Character, groups: list[BodyGroup], first: int) -> bool
     starts = [_leg(groups, index)[0] for index, group in enumerate(groups)
               if index not in inner and group.parent >= 0
               and _goes_down(character, groups, index)]
-    places = [groups[start].anchor[0] for start in starts
-              if _is_paired(character, groups, start)]
+    places = [groups[start].anchor[0] for start in starts if _is_paired(character, groups, start)]
     if not places or max(places) - min(places) < MIN_PAIR_DISTANCE * character.extent:
         return None
     return bool(groups[first].anchor[0] > (max(places) + min(places)) / 2)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...model import errors, rotation
 from ...model.ragdoll import WORLD
-from ...model.skin import Appearance
+from ...model.skeleton import Appearance
 from ..roles.names import plain_name, side_of
 from .draco import decompress
 from .gltf_file import GltfFile

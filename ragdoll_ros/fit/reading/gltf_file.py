@@ -132,8 +132,7 @@ class GltfFile:
             path = resolve_uri(self.path.parent, uri, where)
             buffer = Buffer(path.stat().st_size, path)
         if length > buffer.size:
-            raise errors.OutOfRange(f'{where}.byteLength', length,
-                                    f'at most {buffer.size} bytes')
+            raise errors.OutOfRange(f'{where}.byteLength', length, f'at most {buffer.size} bytes')
         return buffer
 
     def _read_text(self) -> bytes:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from ...model import errors
-from ...model.skin import Texture
+from ...model.skeleton import Texture
 from .gltf_file import GltfFile, decode_data_uri, get_count, resolve_uri
 
 MAX_IMAGE_BYTES = 64_000_000

@@ -44,8 +44,7 @@ def soft_chains(character: Character, tree: SkinTree, roles: tuple[str | None, .
         # A single bone, such as an ear or a jaw, is part of its parent's body.
         if len(chain) > 1 and carrier not in taken:
             springs.append(_spring(character, chain, carrier,
-                                   [tree.anchors[each][0] for each in chain],
-                                   clusters[chain[-1]]))
+                                   [tree.anchors[each][0] for each in chain], clusters[chain[-1]]))
             taken |= set(chain)
     return springs
 

@@ -14,7 +14,7 @@ import numpy as np
 from ...model.compound import Compound
 from ...model.ragdoll import DEFAULT_COLOR, Bone
 from ...model.shapes import Shape
-from ...model.skin import Skin
+from ...model.skeleton import Skin
 from ..recording import Recording
 from ..y_up import orientations_y_up, points_y_up
 from .glb import ATTRIBUTES, Glb

@@ -365,8 +365,7 @@ def _systems(scene: Scene) -> list[System]:
     made: dict[int, System] = {}
     for placement in scene.dolls:
         if id(placement.doll) not in made:
-            made[id(placement.doll)] = build_system(
-                dataclasses.replace(scene, dolls=(placement,)))
+            made[id(placement.doll)] = build_system(dataclasses.replace(scene, dolls=(placement,)))
     return [made[id(placement.doll)] for placement in scene.dolls]
 
 
@@ -381,8 +380,7 @@ def _points(contacts: np.ndarray, bone_of_body: np.ndarray, first: np.ndarray,
     contacts, first, dt = contacts.take(found), first[found], dt[found]
     bones = np.empty((len(contacts), 2), np.int64)
     bones[:, 0] = bone_of_body[first + contacts['body_a']]
-    bones[:, 1] = np.where(contacts['body_b'] < 0, GROUND,
-                           bone_of_body[first + contacts['body_b']])
+    bones[:, 1] = np.where(contacts['body_b'] < 0, GROUND, bone_of_body[first + contacts['body_b']])
     return contacts, bones, np.where(dt > 0, dt, 1.0)
 
 

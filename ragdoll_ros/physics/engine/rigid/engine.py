@@ -14,7 +14,7 @@ from ....model.coordinates import DofLayout, GeneralizedState
 from ....model.scene import Scene
 from ....model.state import State
 from ...accuracy import Accuracy
-from ...ground_heights import GroundHeights
+from ...rigid_body import GroundHeights
 from ...kernels.system import JOINT_OUTSIDE_LIMITS, OVERLAPPING
 from ..doll_totals import DollTotals
 from ..protocol import GROUND, Contacts, Drives, Springs, Wrenches, allowed_penetration
@@ -141,8 +141,7 @@ class RigidEngine:
     @property
     def energy_excess(self) -> float:
         """Energy, J, above that at the start and all work since."""
-        return (float(self._doll_totals.energy.sum()) - self._start_energy
-                - self._clusters.work())
+        return (float(self._doll_totals.energy.sum()) - self._start_energy - self._clusters.work())
 
     def measures(self) -> dict[str, float]:
         """What went wrong since the start, and what was done: names end in their units."""

@@ -33,8 +33,7 @@ class ConservationProjection:
         self._own_groups = np.arange(len(scene.dolls))
 
     def with_momentum(self, coordinates: GeneralizedState, states: tuple[State, State],
-                      duration: float, wrenches: Wrenches,
-                      touched: np.ndarray) -> GeneralizedState:
+                      duration: float, wrenches: Wrenches, touched: np.ndarray) -> GeneralizedState:
         """Restore the momenta of dolls without contacts; ``touched`` (d,) bool.
 
         ``states``: before and after ``duration`` s under ``wrenches``. The missing momentum is

@@ -11,7 +11,7 @@ from ....model.coordinates import DofLayout, GeneralizedState
 from ....model.scene import Scene
 from ....model.state import State
 from ...accuracy import Accuracy
-from ...ground_heights import GroundHeights
+from ...rigid_body import GroundHeights
 from ..doll_totals import DollSums, DollTotals
 from ..protocol import GROUND, Drives, Springs, Wrenches, allowed_penetration
 from .energy_account import EnergyAccount, steady_time, work
