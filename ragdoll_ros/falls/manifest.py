@@ -160,7 +160,7 @@ def build_dataset(job: DatasetJob, folder: Path, make: ShardMaker, resume: bool 
             on_progress(manifest, len(shard.falls))
     finally:
         getattr(shards, 'close', lambda: None)()
-    last = resolve_format(job.format).last_files(job.recipe, job.count, folder)
-    write_files(folder, last)
+    last_files = getattr(resolve_format(job.format), 'last_files', lambda *_: {})
+    write_files(folder, last_files(job.recipe, job.count, folder))
     manifest.write_sorted()
     return manifest

@@ -78,7 +78,11 @@ class Player:
         elif event.kind == 'state':
             self._check(event.fields.get('sha256'))
         elif event.kind != 'accuracy' or self._accuracy is None:
-            self._repeat(event)
+            try:
+                apply_event(self.simulation, event.kind, event.fields)
+            except errors.ModelError as error:
+                raise error.at(f'event {event.number}') from None
+            self.events_repeated += 1
 
     def _begin(self, event: Event) -> None:
         """Build the simulation of a start event."""
@@ -97,13 +101,6 @@ class Player:
         self.tick = event.tick
         if 'state' in fields:
             self._check(fields['state'])
-
-    def _repeat(self, event: Event) -> None:
-        try:
-            apply_event(self.simulation, event.kind, event.fields)
-        except errors.ModelError as error:
-            raise error.at(f'event {event.number}') from None
-        self.events_repeated += 1
 
     def _check(self, digest: str) -> None:
         self.checks.append(Check(self.tick, state_digest(self.simulation.state) == digest))

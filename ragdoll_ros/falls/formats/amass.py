@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import io
 import json
-from pathlib import Path
 
 import numpy as np
 
@@ -23,11 +22,6 @@ NAME = 'amass/fall_{number:07d}.npz'
 def shard_files(recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, bytes]:
     """One file per fall."""
     return {NAME.format(number=fall.number): _written(recipe, fall) for fall in falls}
-
-
-def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
-    """None: each file is complete."""
-    return {}
 
 
 def _written(recipe: Recipe, fall: Fall) -> bytes:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import csv
 import io
-from pathlib import Path
 
 import numpy as np
 
@@ -39,14 +38,11 @@ def shard_files(recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, byte
     """One file per fall, and the shard's labels."""
     files = {SENSOR.format(shard=shard, trial=trial): _table(COLUMNS, _rows(recipe, fall))
              for trial, fall in enumerate(falls, 1)}
-    labels = [('F01 (1)', recipe.name, trial, *_label_samples(fall), fall.number, fall.failure)
+    labels = [('F01 (1)', recipe.name, trial,
+               *('' if frame is None else frame * fall.samples_per_frame
+                 for frame in (fall.phases.onset, fall.phases.impact)), fall.number, fall.failure)
               for trial, fall in enumerate(falls, 1)]
     return {**files, LABELS.format(shard=shard): _table(LABEL_COLUMNS, labels)}
-
-
-def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
-    """None: each shard is complete."""
-    return {}
 
 
 def _rows(recipe: Recipe, fall: Fall) -> list[list[float]]:
@@ -58,12 +54,6 @@ def _rows(recipe: Recipe, fall: Fall) -> list[list[float]]:
                             np.degrees(np.array(angles).reshape(-1, 3))], axis=1)
     return [[f'{time:.6f}', place, *(f'{number:.6f}' for number in row)]
             for place, (time, row) in enumerate(zip(times, table.tolist(), strict=True))]
-
-
-def _label_samples(fall: Fall) -> list[object]:
-    """Sample numbers of onset and impact."""
-    return ['' if frame is None else frame * fall.samples_per_frame
-            for frame in (fall.phases.onset, fall.phases.impact)]
 
 
 def _table(header: tuple[str, ...], rows: list) -> bytes:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import io
 import json
-from pathlib import Path
 
 import numpy as np
 from mcap_ros2.writer import Writer
@@ -54,11 +53,6 @@ DEFINITIONS = {
 def shard_files(recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, bytes]:
     """One file per fall."""
     return {NAME.format(number=fall.number): _written(recipe, fall) for fall in falls}
-
-
-def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
-    """None: each file is complete."""
-    return {}
 
 
 def _written(recipe: Recipe, fall: Fall) -> bytes:

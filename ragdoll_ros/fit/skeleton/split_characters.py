@@ -23,7 +23,7 @@ def split_characters(character: Character) -> list[tuple[Character, Pose]]:
 
     Bones of one tree of the file, and bones that move skin together, belong to one character. A
     single character keeps the file's frame. Several are named after the file and numbered; the
-    frame of each is at its centre, on the file's ground, and faces as the character does.
+    frame of each is at the median of its bones, on the file's ground, and faces as it does.
     """
     islands = _connected_components(character)
     if not islands.any() or not character.weights.any():
@@ -35,16 +35,11 @@ def split_characters(character: Character) -> list[tuple[Character, Pose]]:
     found = []
     for number, owner in enumerate(order, 1):
         part = subset_character(character, owners == owner)
-        frame = _character_frame(part)
+        yaw = np.radians(yaw_to_front(part.bone_names, part.positions))
+        frame = Pose(np.median(part.positions, axis=0) * (1, 1, 0),
+                     rotation.from_axis_angle((0, 0, 1), -yaw))
         found.append((replace(to_frame(part, frame), name=f'{character.name}_{number}'), frame))
     return found
-
-
-def _character_frame(character: Character) -> Pose:
-    """Frame at the median of a character's bones, at height 0, that faces as the character does."""
-    median = np.median(character.positions, axis=0) * (1, 1, 0)
-    yaw = np.radians(yaw_to_front(character.bone_names, character.positions))
-    return Pose(median, rotation.from_axis_angle((0, 0, 1), -yaw))
 
 
 def _assign_characters(character: Character, islands: np.ndarray) -> np.ndarray:
