@@ -54,39 +54,32 @@ class RigidEngine:
 
     @property
     def state(self) -> State:
-        """Poses and velocities of all bones now."""
         return self._state
 
     @property
     def coordinates(self) -> GeneralizedState:
-        """Generalised coordinates and velocities of all dolls now."""
         q, v = self._clusters.q.copy(), self._clusters.v.copy()
         v[self._spins] = rotation.rotate(q[self.layout.root_orientations], v[self._spins])
         return GeneralizedState(q, v)
 
     @property
     def joint_angles(self) -> np.ndarray:
-        """Joint angles (k,) rad now."""
         return self.layout.joint_angles(self._clusters.q)
 
     @property
     def joint_rates(self) -> np.ndarray:
-        """What they change by (k,), rad/s."""
         # The roots' spins, which v has along the roots' own axes, are none of the joints'.
         return self.layout.joint_rates(GeneralizedState(self._clusters.q, self._clusters.v))
 
     @property
     def doll_totals(self) -> DollTotals:
-        """Sums over each doll now."""
         return self._doll_totals
 
     @property
     def cluster_of_doll(self) -> np.ndarray:
-        """Number (d,) of what each doll goes on with: dolls of one number fall asleep together."""
         return self._clusters.of_doll
 
     def set_coordinates(self, coordinates: GeneralizedState) -> None:
-        """Put all dolls there and begin; see Engine."""
         clusters, q, v = self._clusters, self._clusters.q, self._clusters.v
         q[:], v[:] = coordinates.q, coordinates.v
         orientations = rotation.inverse(q[self.layout.root_orientations])
@@ -104,7 +97,6 @@ class RigidEngine:
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
                 drives: Drives = ()) -> None:
-        """Go on by ``duration`` s; see Engine."""
         clusters, actions = self._clusters, (wrenches, springs, drives)
         self._last_start = clusters.q.copy(), clusters.v.copy(), duration, actions
         of_doll = self.cluster_of_doll
@@ -114,14 +106,12 @@ class RigidEngine:
         self._advance(duration, actions, self.accuracy)
 
     def put_to_sleep(self, dolls: np.ndarray) -> None:
-        """Bring dolls (d,) to rest where they are; the energy that is left is lost for good."""
         self._clusters.stop(dolls)
         self.sleeping[dolls] = True
         self._last_start = None
         self._refresh()
 
     def dolls_on_ground(self) -> np.ndarray:
-        """Which dolls (d,) rest on the ground."""
         contacts, bones, _ = self._clusters.contacts()
         found = np.zeros(len(self.scene.dolls), bool)
         on = (bones[:, 1] == GROUND) & (contacts['impulse'][:, 0] > 0)
@@ -129,22 +119,18 @@ class RigidEngine:
         return found
 
     def contacts(self) -> Contacts:
-        """What touches now."""
         found, bones, dt = self._clusters.contacts()
         return Contacts(bones[:, 0], bones[:, 1], found['point'], found['normal'], -found['gap'],
                         found['impulse'][:, 0] / dt)
 
     def bones_on_ground(self) -> np.ndarray:
-        """Which bones (n,) touch the ground now."""
         return self._clusters.on_ground()
 
     @property
     def energy_excess(self) -> float:
-        """Energy, J, above that at the start and all work since."""
         return (float(self._doll_totals.energy.sum()) - self._start_energy - self._clusters.work())
 
     def measures(self) -> dict[str, float]:
-        """What went wrong since the start, and what was done: names end in their units."""
         stats = self._clusters.totals()
         return {
             'energy_excess_J': self.energy_excess,
@@ -156,11 +142,9 @@ class RigidEngine:
             'impacts': int(stats['impacts']), 'unsolved_total': int(stats['unsolved'])}
 
     def save(self) -> object:
-        """A snapshot that restore brings back to the bit."""
         return self._clusters.save(), self.sleeping.copy(), self._age, self._start_energy
 
     def restore(self, snapshot: tuple) -> None:
-        """Go back to a snapshot."""
         saved, self.sleeping[:], self._age, self._start_energy = snapshot
         self._clusters.restore(saved)
         self._last_start = None
@@ -170,11 +154,9 @@ class RigidEngine:
         """Nothing to release: the memory goes with the object."""
 
     def checkpoint(self) -> object:
-        """Where all is and what the accounts say: far cheaper than save()."""
         return self._clusters.checkpoint(), self.sleeping.copy(), self._start_energy
 
     def restore_checkpoint(self, checkpoint: tuple) -> None:
-        """Go on from a checkpoint; see Engine."""
         saved, self.sleeping[:], self._start_energy = checkpoint
         self._clusters.restore_checkpoint(saved)
         self._age = MAX_AGE
@@ -182,7 +164,6 @@ class RigidEngine:
         self._refresh()
 
     def close(self) -> None:
-        """End the threads."""
         self._clusters.close()
 
     def _update_clusters(self, duration: float) -> None:
