@@ -159,12 +159,11 @@ def median_run(method: Method, trial: Trial, repeats: int) -> Result:
     return dataclasses.replace(results[0], costs=costs)
 
 
-def ours(accuracy: str | Accuracy, name: str | None = None, engine: str = 'auto') -> Method:
+def ours(accuracy: str | Accuracy, name: str | None = None) -> Method:
     """Our simulation at a named accuracy, or with a given one."""
     name = name or f'ours-{accuracy}'
-    order = kernels.ORDER if engine == 'auto' and kernels.ready() else 1
     return Method(name, name.replace('-', ' '), 'ours', functools.partial(
-        start_simulation, accuracy=accuracy, engine=engine), order=order)
+        start_simulation, accuracy=accuracy), order=kernels.ORDER if kernels.ready() else 1)
 
 
 def core(step: float) -> Method:

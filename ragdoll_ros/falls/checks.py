@@ -36,11 +36,8 @@ def value_errors(data: dict, dolls: list[Ragdoll], found: list[ModelError]) -> l
     """Errors of the data beside those ``found`` so far; ``dolls`` are those it names."""
     more = [error for key, part in data.items() if not has_error_under(found, key)
             for error in distribution_errors(part, key)]
-    more += list(_out_of_range(data, [*found, *more]))
-    more += list(_wrong_people(data, [*found, *more]))
-    more += list(_wrong_limp(data, [*found, *more]))
-    more += list(_wrong_rate(data, [*found, *more]))
-    more += list(_wrong_imus(data, [*found, *more]))
+    for check in (_out_of_range, _wrong_people, _wrong_limp, _wrong_rate, _wrong_imus):
+        more += list(check(data, [*found, *more]))
     if dolls and not any(has_error_under([*found, *more], key)
                          for key in ('feet', 'start', 'pushes', 'limp', 'record')):
         more += _unknown_names(data, dolls)

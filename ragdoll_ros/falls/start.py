@@ -60,8 +60,10 @@ def start_of(recipe: Recipe, number: int) -> Start:
     drawn = recipe.draw(number)
     doll, start = recipe.doll(drawn['who']), drawn['start']
     heading = rotation.from_axis_angle((0, 0, 1), math.radians(start['heading_deg']))
+    sine, cosine = sine_and_cosine(math.radians(start['lean_towards_deg']))
+    lean = rotation.from_axis_angle((-sine, cosine, 0.0), math.radians(start['lean_deg']))
     orientation = (_uniform_orientation(*start['shares']) if start['tumbled']
-                   else rotation.multiply(heading, _lean(start)))
+                   else rotation.multiply(heading, lean))
     faced = orientation if start['tumbled'] else heading
     placement = Placement(doll, orientation=tuple(orientation),
                           velocity=tuple(rotation.rotate(faced, start['velocity'])),
@@ -74,12 +76,6 @@ def start_of(recipe: Recipe, number: int) -> Start:
                  tuple(_push(push, heading) for push in drawn['pushes']),
                  tuple(sorted((JointRelease(round(each['at'] * SECOND), each.get('angles'))
                                for each in drawn['limp']), key=lambda limp: limp.at)))
-
-
-def _lean(start: dict) -> np.ndarray:
-    """Rotation (4,) that tilts the upright doll towards a horizontal direction."""
-    sine, cosine = sine_and_cosine(math.radians(start['lean_towards_deg']))
-    return rotation.from_axis_angle((-sine, cosine, 0.0), math.radians(start['lean_deg']))
 
 
 def _uniform_orientation(first: float, second: float, third: float) -> np.ndarray:

@@ -53,7 +53,7 @@ def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
         'total_frames': count * recipe.frames, 'total_tasks': 1, 'chunks_size': FILES_PER_CHUNK,
         'data_files_size_in_mb': 100, 'video_files_size_in_mb': 200, 'fps': recipe.rate,
         'splits': {'train': f'0:{count}'}, 'data_path': DATA, 'video_path': None,
-        'features': _features(recipe, folder / DATA.format(chunk_index=0, file_index=0))}
+        'features': _features(folder / DATA.format(chunk_index=0, file_index=0))}
     return {'meta/info.json': _json(info), 'meta/stats.json': _json(stats),
             'meta/tasks.parquet': _tasks(recipe.name)}
 
@@ -190,7 +190,7 @@ def _whole_stats(paths: list[Path], keys: list[str]) -> dict:
     return whole
 
 
-def _features(recipe: Recipe, path: Path) -> dict:
+def _features(path: Path) -> dict:
     """LeRobot's description of each column."""
     schema = parquet.read_schema(path)
     names = json.loads(schema.metadata[b'names'])

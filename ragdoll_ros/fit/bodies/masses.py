@@ -87,8 +87,10 @@ def skin_volumes(character: Character, carriers: np.ndarray, count: int) -> np.n
 
     Near zero where the skin is open or flat.
     """
-    points, places = _weld_vertices(character)
-    triangles = places[character.triangles]
+    vertices = character.vertices - character.vertices.mean(axis=0)
+    _, first, places = np.unique(np.round(vertices / (WELD_TOLERANCE * character.extent)), axis=0,
+                                 return_index=True, return_inverse=True)
+    points, triangles = vertices[first], places.ravel()[character.triangles]
     # A triangle across a boundary belongs to the body with two corners, else to the first corner's.
     corner = carriers[character.triangles]
     owners = np.where(corner[:, 1] == corner[:, 2], corner[:, 1], corner[:, 0])
@@ -101,14 +103,6 @@ def skin_volumes(character: Character, carriers: np.ndarray, count: int) -> np.n
         volumes[body] = sum(_volume(cone) for cone in cones)
     # A mirrored skin has its triangles inside out.
     return volumes * (np.sign(volumes.sum()) or 1.0)
-
-
-def _weld_vertices(character: Character) -> tuple[np.ndarray, np.ndarray]:
-    """Unique points (p, 3) m about their mean, and the point index (v,) of each vertex."""
-    vertices = character.vertices - character.vertices.mean(axis=0)
-    _, first, places = np.unique(np.round(vertices / (WELD_TOLERANCE * character.extent)), axis=0,
-                                 return_index=True, return_inverse=True)
-    return vertices[first], places.ravel()
 
 
 def _boundary_edges(triangles: np.ndarray, owners: np.ndarray,

@@ -54,7 +54,10 @@ def place_anchors(groups: list[BodyGroup], fits: list[FittedShape],
     for index, group in jointed:
         for k in (index, group.parent):
             if _anchor_distance(fits[k], frames[k], group.anchor) <= MAX_EXTENSION:
-                extended[k] = _extend_to_anchor(extended[k], frames[k], group.anchor)
+                old, frame = extended[k], frames[k]
+                new = extend_to(old.shape, (group.anchor - old.centre) @ frame)
+                extended[k] = dataclasses.replace(
+                    new, centre=old.centre + frame @ new.centre, coverage=old.coverage)
     return extended
 
 
@@ -66,12 +69,6 @@ def _anchor_distance(fit: FittedShape, frame: np.ndarray, point: np.ndarray) -> 
 def relative_distance(shape: Shape, points: np.ndarray) -> np.ndarray:
     """Signed distance (k,) of points (k, 3) in a shape's frame over its longest extent."""
     return shape.signed_distance(points) / (2 * max(shape.half_extents))
-
-
-def _extend_to_anchor(fit: FittedShape, frame: np.ndarray, point: np.ndarray) -> FittedShape:
-    extended = extend_to(fit.shape, (point - fit.centre) @ frame)
-    centre = fit.centre + frame @ extended.centre
-    return dataclasses.replace(extended, centre=centre, coverage=fit.coverage)
 
 
 def trim_overlaps(groups: list[BodyGroup], fits: list[FittedShape],
@@ -93,18 +90,13 @@ def trim_overlaps(groups: list[BodyGroup], fits: list[FittedShape],
         cuts = [cut for pair in pairs for cut in _cuts(bones, pair, most[pair])]
         for index, direction, depth in cuts:
             cut = _cut(bones[index], direction, depth)
-            if _reaches_joints(cut, anchors[index]):
+            distances = relative_distance(cut.shape, cut.pose.apply_inverse(anchors[index]))
+            if (distances <= ANCHOR_TOLERANCE).all():
                 bones[index] = cut
         if not cuts:
             break
     return [dataclasses.replace(fit, shape=bone.shape, centre=np.array(bone.position))
             for fit, bone in zip(fits, bones, strict=True)]
-
-
-def _reaches_joints(bone: Bone, anchors: np.ndarray) -> bool:
-    """Whether a body still reaches the anchors (k, 3) of its joints."""
-    distances = relative_distance(bone.shape, bone.pose.apply_inverse(anchors))
-    return bool((distances <= ANCHOR_TOLERANCE).all())
 
 
 def _cuts(bones: list[Bone], pair: tuple[int, int],

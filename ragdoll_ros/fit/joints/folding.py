@@ -128,15 +128,14 @@ def _is_front(character: Character, groups: list[BodyGroup], first: int) -> bool
     inner = {group.parent for group in groups}
     # Limbs of several bodies that point down from the trunk.
     starts = [_leg(groups, index)[0] for index, group in enumerate(groups)
-              if index not in inner and group.parent >= 0
-              and _goes_down(character, groups, index)]
+              if index not in inner and group.parent >= 0 and _goes_down(groups, index)]
     places = [groups[start].anchor[0] for start in starts if _is_paired(character, groups, start)]
     if not places or max(places) - min(places) < MIN_PAIR_DISTANCE * character.extent:
         return None
     return bool(groups[first].anchor[0] > (max(places) + min(places)) / 2)
 
 
-def _goes_down(character: Character, groups: list[BodyGroup], end: int) -> bool:
+def _goes_down(groups: list[BodyGroup], end: int) -> bool:
     """Whether a limb of several bodies points down within MIN_STEEPNESS."""
     leg = _leg(groups, end)
     step = groups[end].anchor - groups[leg[0]].anchor
