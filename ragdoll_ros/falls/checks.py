@@ -4,7 +4,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from ..files.building import has_error_under
+from ..files.schema import has_error_under
 from ..model import errors
 from ..model.errors import ModelError
 from ..model.ragdoll import Ragdoll

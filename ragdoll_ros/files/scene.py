@@ -18,9 +18,8 @@ from ..model.errors import ModelError, OutOfRange
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Ground, Material, Placement, Scene, above_ground
 from . import config, yaml_text
-from .building import has_error_under, read_by_name, try_build, value_or_raise
 from .doll import build_doll, doll_data
-from .schema import schema_errors
+from .schema import has_error_under, read_by_name, schema_errors, try_build, value_or_raise
 
 MOST_DOLLS = 1000
 

@@ -13,8 +13,7 @@ import numpy as np
 
 from ..model import rotation
 from ..model.ragdoll import Ragdoll
-from .recording import Recording
-from .y_up import orientations_y_up, points_y_up
+from .recording import Recording, orientations_y_up, points_y_up
 
 CENTIMETRES = 100.0
 

@@ -21,8 +21,7 @@ from ..model.ragdoll import WORLD
 from ..model.rotation import IDENTITY
 from ..model.scene import SECOND, Scene
 from ..model.state import State
-from .recording import RecordedPose, Recorder, Recording
-from .rods import Rods
+from .recording import RecordedPose, Recorder, Recording, Rods
 
 TOPIC_TYPES = {'scene': cdr.STRING, 'poses': cdr.POSE_ARRAY, 'swings': cdr.POSE_ARRAY}
 

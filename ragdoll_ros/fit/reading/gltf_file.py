@@ -73,7 +73,9 @@ class GltfFile:
         if not binary and self.path.suffix.lower() == '.glb':
             raise errors.Unreadable('byte 0', head.decode('ascii', 'backslashreplace'),
                                     'glTF, as a .glb begins')
-        text, self._chunk = self._read_chunks() if binary else (self._read_text(), None)
+        if not binary and self.size > MAX_JSON_BYTES:
+            raise errors.Unreadable('', f'{self.size} bytes', f'at most {MAX_JSON_BYTES} of JSON')
+        text, self._chunk = self._read_chunks() if binary else (self.path.read_bytes(), None)
         self.json = _parse(text)
         self._buffers: dict[int, Buffer] = {}
 
@@ -98,7 +100,11 @@ class GltfFile:
         if offset < 0 or offset + size > length:
             raise errors.OutOfRange(where, f'bytes {offset} to {offset + size}',
                                     f'within the {length} bytes of {place}')
-        buffer = self._buffer(view.get('buffer'), place)
+        number = view.get('buffer')
+        entry = self.entry('buffers', number, place)
+        if number not in self._buffers:
+            self._buffers[number] = self._open_buffer(entry, f'buffers[{number}]')
+        buffer = self._buffers[number]
         if start + length > buffer.size:
             raise errors.OutOfRange(place, f'bytes {start} to {start + length}',
                                     f'within the {buffer.size} bytes of the buffer')
@@ -111,12 +117,6 @@ class GltfFile:
         buffers.append({'byteLength': len(data)})
         views.append({'buffer': len(buffers) - 1, 'byteLength': len(data)})
         return len(views) - 1
-
-    def _buffer(self, index: object, where: str) -> Buffer:
-        entry = self.entry('buffers', index, where)
-        if index not in self._buffers:
-            self._buffers[index] = self._open_buffer(entry, f'buffers[{index}]')
-        return self._buffers[index]
 
     def _open_buffer(self, entry: dict, where: str) -> Buffer:
         length, uri = get_count(entry, 'byteLength', where), entry.get('uri')
@@ -134,11 +134,6 @@ class GltfFile:
         if length > buffer.size:
             raise errors.OutOfRange(f'{where}.byteLength', length, f'at most {buffer.size} bytes')
         return buffer
-
-    def _read_text(self) -> bytes:
-        if self.size > MAX_JSON_BYTES:
-            raise errors.Unreadable('', f'{self.size} bytes', f'at most {MAX_JSON_BYTES} of JSON')
-        return self.path.read_bytes()
 
     def _read_chunks(self) -> tuple[bytes, Buffer | None]:
         """Bytes of the JSON chunk, and the binary chunk if there is one."""

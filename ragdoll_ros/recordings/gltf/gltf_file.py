@@ -1,6 +1,6 @@
 """Recordings as glTF 2.0 animations.
 
-Y up, facing +Z, metres (y_up.py). Each doll is a node, each bone a child node with a mesh at the
+Y up, facing +Z, metres (points_y_up). Each doll is a node, each bone a child node with a mesh at the
 bone's centre of mass, in its axes. The animation has poses, not joint angles, so that errors do not
 add up along a limb.
 """
@@ -15,8 +15,7 @@ from ...model.compound import Compound
 from ...model.ragdoll import DEFAULT_COLOR, Bone
 from ...model.shapes import Shape
 from ...model.skeleton import Skin
-from ..recording import Recording
-from ..y_up import orientations_y_up, points_y_up
+from ..recording import Recording, orientations_y_up, points_y_up
 from .glb import ATTRIBUTES, Glb
 from .gltf_skin import add_material, add_skin
 

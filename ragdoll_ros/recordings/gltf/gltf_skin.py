@@ -6,7 +6,7 @@ import numpy as np
 from ...model import rotation
 from ...model.pose import Pose
 from ...model.skeleton import Appearance, Skin
-from ..y_up import orientations_y_up, points_y_up
+from ..recording import orientations_y_up, points_y_up
 from .glb import ATTRIBUTES, INDICES, Glb
 
 ROUGHNESS = 0.8
