@@ -5,8 +5,6 @@ the bind pose. The root is at the root bone's centre of mass; each further joint
 child's name. Channels are Z, Y, X: R = Rz Ry Rx in the parent's axes. Only the root has a position,
 so that gaps of joints are lost.
 """
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

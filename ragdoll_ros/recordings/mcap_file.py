@@ -4,8 +4,6 @@ Three topics of the node: /ragdoll/scene once; /ragdoll/poses, the bones at each
 with simulated time since the first; /ragdoll/swings, the masses of the swings, if recorded. A
 `ros2 bag record` of a node's topics of these names is a recording too.
 """
-from __future__ import annotations
-
 import io
 import sys
 from pathlib import Path

@@ -161,18 +161,18 @@ class Rods:
     """Start of each rod of a scene's swings: on a bone, or the mass before it."""
 
     def __init__(self, scene: Scene) -> None:
-        bones, roots, firsts, free = [], [], [], []
+        mounts, firsts = mount_swings(scene), []
+        free: list[int] = []
         self.count = 0
         """Masses of all swings."""
-        for mount in mount_swings(scene):
+        for mount in mounts:
             links = len(mount.swing.links)
-            bones.append(mount.bone)
-            roots.append(mount.root)
             firsts.append(self.count)
             if mount.swing.mode == 'free':
                 free += range(self.count, self.count + links)
             self.count += links
-        self._bones, self._roots = np.array(bones, int), np.array(roots).reshape(-1, 3)
+        self._bones = np.array([mount.bone for mount in mounts], int)
+        self._roots = np.array([mount.root for mount in mounts]).reshape(-1, 3)
         self._firsts, self._free = np.array(firsts, int), np.array(free, int)
 
     def ends(self, masses: np.ndarray, state: State) -> np.ndarray:

@@ -1,6 +1,4 @@
 """Writing a recording in the format of the file's suffix."""
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Callable, Mapping

@@ -1,11 +1,9 @@
 """Recordings as glTF 2.0 animations.
 
-Y up, facing +Z, metres (points_y_up). Each doll is a node, each bone a child node with a mesh at the
-bone's centre of mass, in its axes. The animation has poses, not joint angles, so that errors do not
-add up along a limb.
+Y up, facing +Z, metres. Each doll is a node, each bone a child node with a mesh at the bone's
+centre of mass, in its axes. The animation has poses, not joint angles, so that errors do not add up
+along a limb.
 """
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

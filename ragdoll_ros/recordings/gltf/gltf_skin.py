@@ -1,6 +1,4 @@
 """A doll's skin in a glTF file: surface, materials, images, joints and weights."""
-from __future__ import annotations
-
 import numpy as np
 
 from ...model import rotation
