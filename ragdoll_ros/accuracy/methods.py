@@ -1,6 +1,4 @@
 """Methods that the report compares: engines with their settings."""
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Callable, Iterable

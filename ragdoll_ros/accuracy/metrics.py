@@ -3,8 +3,6 @@
 Computed from poses and velocities of the bones alone, in the same way for every method, without
 code of the simulation. Arrays run over t instants and n bones.
 """
-from __future__ import annotations
-
 import math
 
 import numpy as np

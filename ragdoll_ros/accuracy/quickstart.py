@@ -3,8 +3,6 @@
 Inertia, damping, joint motors, contact margins and solver are PyBullet's defaults, on purpose
 unlike in physics/engine/substepped/bullet.py.
 """
-from __future__ import annotations
-
 import os
 import tempfile
 

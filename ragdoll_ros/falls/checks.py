@@ -1,6 +1,4 @@
 """Validate a recipe's values, beyond its schema."""
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -1,6 +1,4 @@
 """Generate a data set of falls: drawn from a recipe, simulated on all cores."""
-from __future__ import annotations
-
 import argparse
 import os
 import sys

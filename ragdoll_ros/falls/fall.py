@@ -1,6 +1,4 @@
 """One fall: its start, frames, phases, impacts, and the samples of its inertial sensors."""
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, fields
 from functools import cached_property

@@ -1,6 +1,4 @@
 """Pictures of a data set: impact speeds, timing, directions, and a contact sheet of falls."""
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

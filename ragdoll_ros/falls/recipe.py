@@ -2,8 +2,6 @@
 
 Its schema is config/recipe.schema.json.
 """
-from __future__ import annotations
-
 import hashlib
 import json
 from dataclasses import dataclass

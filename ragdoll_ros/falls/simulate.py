@@ -1,6 +1,4 @@
 """Simulate a fall from its start and record its frames."""
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 
 import numpy as np

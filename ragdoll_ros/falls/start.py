@@ -1,6 +1,4 @@
 """Initial conditions of a fall from its drawn values: scene, coordinates, pushes."""
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

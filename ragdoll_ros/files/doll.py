@@ -1,6 +1,4 @@
 """Dolls as YAML files (config/doll.schema.json): reading with all errors at once, writing."""
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Callable, Sequence

@@ -8,8 +8,6 @@ joint. Approximations:
 - friction is finite; MuJoCo takes the larger of a pair, so each bone has the combined coefficient
   with the ground, and the ground zero.
 """
-from __future__ import annotations
-
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Collection, Iterable

@@ -2,8 +2,6 @@
 
 `repeat:` of a doll gives copies on a grid, scattered, or both.
 """
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math
@@ -181,7 +179,7 @@ def repeated_placements(first: Placement, repeat: dict) -> list[Placement]:
     for k in range(count):
         cell = np.array([k % wide, k // wide % deep, k // (wide * deep)])
         place = np.array(first.position) + cell * grid + spread * rng.uniform(-0.5, 0.5, 3)
-        turn: tuple[float, ...] = first.orientation
+        turn: Any = first.orientation
         if repeat.get('turned') == 'yaw':
             place, turn = _yawed(first, place, rng.uniform(0, math.pi))
         elif repeat.get('turned'):

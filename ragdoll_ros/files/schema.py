@@ -1,6 +1,4 @@
 """Validation of a file's data against its JSON schema; models built from it, with every error."""
-from __future__ import annotations
-
 import functools
 import json
 import re

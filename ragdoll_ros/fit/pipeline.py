@@ -2,8 +2,6 @@
 
 All in the bind pose, in the doll's frame, which is the character's.
 """
-from __future__ import annotations
-
 import glob
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace

@@ -4,8 +4,6 @@ All riders of a bone move as one rigid body, so a page or a file needs only the 
 riders: with the pose T_b of bone b and the sum W_b of its riders' weights, a vertex v of the bind
 pose is at sum of W_b T_b inv(T_b in the bind pose) v (model/skeleton.py, summed by bone).
 """
-from __future__ import annotations
-
 import functools
 import os
 from collections.abc import Callable

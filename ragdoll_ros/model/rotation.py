@@ -2,8 +2,6 @@
 
 Functions take stacked input: quaternions (..., 4), vectors (..., 3), matrices (..., 3, 3).
 """
-from __future__ import annotations
-
 import math
 from decimal import Context, Decimal, localcontext
 

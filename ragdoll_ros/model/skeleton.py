@@ -4,8 +4,6 @@ Linear blend skinning: a vertex v of the bind pose (doll's frame) moves to the s
 v, with P_j the pose of rider j and R_j its initial pose. With a glTF file's inverse bind matrices
 M_j, in metres, it is the sum of w_j P_j M_j v.
 """
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -4,8 +4,6 @@ It stands: arms down, palms forwards, soles on z = 0, x forwards. Masses, centre
 the table's, normalised to the total mass; lengths are the table's shares of the height, the neck is
 the remainder (see model/anthropometry.py). Shapes are for collision only and have no mass.
 """
-from __future__ import annotations
-
 import numpy as np
 
 from ..model import errors

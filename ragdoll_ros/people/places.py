@@ -1,6 +1,4 @@
 """Landmarks of a standing person: heights from segment lengths, breadths from girths."""
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

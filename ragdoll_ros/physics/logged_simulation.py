@@ -5,8 +5,6 @@ lists. The caller of advance() counts the ticks between events. The same scene a
 at the same ticks give the same states to the bit. Event names are part of the log format: they do
 not change with the names in the code.
 """
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 from collections.abc import Callable, Sequence

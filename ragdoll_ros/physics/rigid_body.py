@@ -1,6 +1,4 @@
 """Kinematics of rigid bodies: points, heights above the ground, joint gaps, damping rates."""
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,6 +1,4 @@
 """SleepDetector: which dolls have been still for long enough to sleep."""
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 

@@ -1,6 +1,4 @@
 """Replay a recorded run of the node to the bit: check it, compare it, save it, publish it."""
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Iterator

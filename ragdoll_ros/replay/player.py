@@ -1,6 +1,4 @@
 """Repeating a run: the same events at the same ticks, with a check of the states."""
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 

@@ -1,6 +1,4 @@
 """A run read from a bag: its events in order and its scenes."""
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,6 +1,4 @@
 """Hard contact cases: mass ratios, stacks, piles, collisions of dolls, extreme friction."""
-from __future__ import annotations
-
 import dataclasses
 import math
 

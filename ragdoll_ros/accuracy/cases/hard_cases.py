@@ -1,6 +1,4 @@
 """Hard cases: scenes that break simulations, each with its requirements."""
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math

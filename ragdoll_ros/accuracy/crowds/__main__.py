@@ -3,8 +3,6 @@
 Except in the pile and the digests, dolls are 2.5 m apart and do not touch. Compare ratios: absolute
 times depend on the machine.
 """
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import math

@@ -2,8 +2,6 @@
 
 Sixty dolls: some collide, some are pushed, some sleep and are woken, one is far from all others.
 """
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import subprocess

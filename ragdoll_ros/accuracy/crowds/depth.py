@@ -1,6 +1,4 @@
 """Penetration depths of bones by MuJoCo's distance functions, independent of all engines."""
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

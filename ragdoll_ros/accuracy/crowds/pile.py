@@ -3,8 +3,6 @@
 Penetration is measured independently of the engines: by MuJoCo's distance functions, and by the
 shapes' heights above the ground.
 """
-from __future__ import annotations
-
 import itertools
 import math
 import time

@@ -1,6 +1,4 @@
 """Reference motions with impacts, and on edges and faces: rocking, tipping, spinning."""
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable

@@ -1,6 +1,4 @@
 """Two dolls that collide in the air: conservation of momentum, and penetration of bones."""
-from __future__ import annotations
-
 import functools
 import math
 

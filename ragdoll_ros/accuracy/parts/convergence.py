@@ -3,8 +3,6 @@
 Self-convergence proves less: an engine may converge to another restitution or to compliant
 contacts. So the difference to its own finest run is only given in addition.
 """
-from __future__ import annotations
-
 import functools
 
 from ..methods import TICK, Method, bullet, contact_step, core, has_rigid_engine, mujoco, run

@@ -1,6 +1,4 @@
 """CPU time per tick of scenes, from complex to simple."""
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Callable

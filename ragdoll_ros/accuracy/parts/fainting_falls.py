@@ -3,8 +3,6 @@
 People stand and lean a little, their joints held by springs; then the springs of ankles, knees,
 hips and trunk are released one after the other in random order, those of the arms with the first.
 """
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

@@ -1,6 +1,4 @@
 """Hard cases: each is run and checked against its requirements."""
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

@@ -1,6 +1,4 @@
 """Motions in closed form, or with forces in closed form."""
-from __future__ import annotations
-
 import math
 
 import numpy as np

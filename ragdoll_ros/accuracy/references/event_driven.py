@@ -4,8 +4,6 @@ Between events DOP853 at 1e-12 with fixed contact modes (contact_modes.py). Even
 a lift-off, the begin and the end of sliding. At a touch-down all closed feet obey Newton's law,
 w_n = -e w_n before, and Moreau's friction law.
 """
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import numpy as np

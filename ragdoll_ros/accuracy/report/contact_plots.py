@@ -1,6 +1,4 @@
 """Plots of contacts: errors over step size, distributions of drops, and fainting falls."""
-from __future__ import annotations
-
 import math
 
 import numpy as np

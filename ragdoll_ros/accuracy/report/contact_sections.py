@@ -1,6 +1,4 @@
 """Sections about contacts: convergence, restitution, segments, drops, collisions."""
-from __future__ import annotations
-
 from ..results.figures import Row, number
 from ..results.markdown import Section, table
 

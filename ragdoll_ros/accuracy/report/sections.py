@@ -1,6 +1,4 @@
 """The Markdown page: its sections, with every figure from the JSON."""
-from __future__ import annotations
-
 from ..cases.hard_cases import hard_cases
 from ..parts.fainting_falls import falls_tables
 from ..results.criteria import ROUNDING, criteria

@@ -1,6 +1,4 @@
 """Acceptance criteria of impacts and contacts."""
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

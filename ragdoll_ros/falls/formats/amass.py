@@ -5,8 +5,6 @@ rad, relative to the bind pose: of the root in the world, of every other bone re
 parent. joint_names are their bones, those of this doll and not of SMPL. onset, impact (first
 contact) and rest are the frames of Phases, -1 if there is none.
 """
-from __future__ import annotations
-
 import io
 import json
 

@@ -6,8 +6,6 @@ Columns: time s, frame, acceleration g, rate deg/s, Euler angles deg (roll, pitc
 sensor in the world). A shard stands for a subject, a fall for a trial of task 1. Labels are sample
 numbers of Phases.onset and Phases.impact, the first contact. The sensor's axes are the recipe's.
 """
-from __future__ import annotations
-
 import csv
 import io
 

@@ -8,8 +8,6 @@ indices of a shard follow from its number.
 Labels in meta/episodes: onset, impact (first contact) and rest are the frames of Phases;
 impact_frames and impact_speeds (m/s downwards) are those of each bone's first contact.
 """
-from __future__ import annotations
-
 import io
 import json
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ sensor_msgs/JointState, /ragdoll/imu/<name>/data_raw a sensor_msgs/Imu, /ragdoll
 std_msgs/String with the doll's URDF. The metadata record `fall` holds the phases as frame numbers
 and the drawn values. Stamps count from the fall's start.
 """
-from __future__ import annotations
-
 import io
 import json
 

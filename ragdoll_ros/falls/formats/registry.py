@@ -1,6 +1,4 @@
 """Registry of the formats."""
-from __future__ import annotations
-
 import importlib
 from pathlib import Path
 from typing import Protocol

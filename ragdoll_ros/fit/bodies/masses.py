@@ -5,8 +5,6 @@ triangles form an open surface. A triangle fan caps each boundary with a neighbo
 share the fan's centre, so that the volumes add up to that of the whole skin. Another fan caps what
 remains open where three bodies meet.
 """
-from __future__ import annotations
-
 import numpy as np
 
 from ...model import errors

@@ -5,8 +5,6 @@ An anchor is the child bone's root where both bodies reach it, else where the sk
 Two thighs touch at the crotch; as bodies they would push each other apart at the start. Deep
 overlaps stay and are excluded from collision (see colliding_overlaps).
 """
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

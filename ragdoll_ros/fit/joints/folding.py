@@ -3,8 +3,6 @@
 A knee folds backwards and the hock below it forwards; an elbow forwards and the wrist below it
 backwards. So for a straight leg the pair (hind or front) and the order within the leg decide.
 """
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,6 +1,4 @@
 """Plausibility of a well-formed doll: size, densities, bend directions, masses of a person."""
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

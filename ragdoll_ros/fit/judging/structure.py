@@ -2,8 +2,6 @@
 
 The mirror plane is normal to y, at the median of the bodies.
 """
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,6 +1,4 @@
 """Verdict on a doll: good, doubtful or wrong, with the findings of all checks."""
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

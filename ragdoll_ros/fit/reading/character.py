@@ -1,6 +1,4 @@
 """A rigged, skinned character in REP 103 axes: x forward, y left, z up; metres."""
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -4,8 +4,6 @@ Reads the JSON and the requested bytes only, and trusts nothing: lengths are che
 file's size, and JSON values where they are read. Section 4.4 of the glTF 2.0 specification has
 the chunks.
 """
-from __future__ import annotations
-
 import base64
 import binascii
 import json

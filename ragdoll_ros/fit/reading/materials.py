@@ -3,8 +3,6 @@
 Section 5.19 of glTF 2.0, KHR_materials_unlit and KHR_texture_transform, with the first set of
 texture coordinates. Invalid parts are ignored: no character is refused for its appearance.
 """
-from __future__ import annotations
-
 import math
 
 from ...model import errors

@@ -4,8 +4,6 @@ The inertia is that of the link and of the links merged into it. It is omitted w
 of a uniform solid of the shapes to 1e-6; a missing or unphysical inertia is replaced by that of the
 solid.
 """
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path

@@ -4,8 +4,6 @@ A URDF names them by package://, model://, file:// or a relative path. Packages 
 ROS_PACKAGE_PATH and AMENT_PREFIX_PATH as in ROS, and in the folders above the URDF, because robots
 are also distributed without ROS.
 """
-from __future__ import annotations
-
 import contextlib
 import io
 import logging

@@ -1,6 +1,4 @@
 """Adjacency of bones by their skin: area that two bones move together, and distances."""
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

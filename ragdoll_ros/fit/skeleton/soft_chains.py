@@ -3,8 +3,6 @@
 Chains with such names become spring bones, and so do the thinnest branches of a character with
 more bodies than run in real time. They have VRM's default settings and do not collide.
 """
-from __future__ import annotations
-
 import numpy as np
 
 from ..reading.character import Character

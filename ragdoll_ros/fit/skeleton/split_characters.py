@@ -1,6 +1,4 @@
 """Several characters in one file: which bones belong to which, the frame of each, subsets."""
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,6 +1,4 @@
 """Joint springs: springs on joint angles, as of muscles that hold a pose until they go limp."""
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

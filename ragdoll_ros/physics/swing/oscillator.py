@@ -1,6 +1,4 @@
 """Exact solution of the damped oscillator for any stiffness, damping and step."""
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

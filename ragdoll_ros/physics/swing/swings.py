@@ -11,8 +11,6 @@ links: under gravity +1.2 % (n = 2), +1.8 % (n = 8); with springs alone +8 % (n 
 +60 % (8), +110 % (16). Energy of an undamped chain is not conserved: hair needs a damping of 0.3 or
 more. With less, a strand that is shaken hard moves chaotically.
 """
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Sequence

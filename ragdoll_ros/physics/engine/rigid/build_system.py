@@ -1,6 +1,4 @@
 """The system of a scene: the tables that the kernels read."""
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,6 +1,4 @@
 """Clusters: dolls that may touch soon are integrated as one system, every other doll alone."""
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from concurrent.futures import ThreadPoolExecutor

@@ -3,8 +3,6 @@
 The algorithm is in kernels/: advance.py. Here are the broad phase, the clusters, and the state and
 the measures that it hands out.
 """
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

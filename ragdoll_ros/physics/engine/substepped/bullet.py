@@ -4,8 +4,6 @@ Dolls are Featherstone multibodies read from URDF with explicit inertia. Univers
 hinges with a massless link between. Joint motors, link damping and velocity clamps, which PyBullet
 enables by default, are disabled.
 """
-from __future__ import annotations
-
 import math
 import os
 import tempfile

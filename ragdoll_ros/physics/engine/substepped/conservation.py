@@ -3,8 +3,6 @@
 Discrete steps violate all three. The projection compares each doll with its energy account and
 with the impulses of the loads, and corrects velocities by the smallest change that restores them.
 """
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,6 +1,4 @@
 """SubsteppedEngine: loads, work and energy account of engines with equal substeps."""
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
