@@ -199,10 +199,7 @@ def mujoco(integrator: str, substeps: int) -> Method:
                   order={'rk4': 4}.get(integrator, 1))
 
 
-SUBSTEPS = (1, 2, 4, 8, 16, 32)
-
-
-def all_methods(substeps: Iterable[int] = SUBSTEPS) -> list[Method]:
+def all_methods(substeps: Iterable[int] = (1, 2, 4, 8, 16, 32)) -> list[Method]:
     """Ours at three accuracies, the quickstart, PyBullet and MuJoCo with fixed substeps."""
     counts = tuple(substeps)
     return [*map(ours, ACCURACIES), quickstart(), *map(bullet, counts),

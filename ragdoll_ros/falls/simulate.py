@@ -93,7 +93,11 @@ def begin(simulation: Simulation, start: Start) -> None:
     """Place the doll with its lowest point at the clearance, queue pushes, hold joints."""
     scene = start.scene
     normal = np.array(scene.ground.normal)
-    high = start.coordinates(_above_ground(simulation, normal))
+    bound = simulation.coordinates
+    q = bound.q.copy()
+    # So far up that no bone penetrates the ground.
+    q[:3] += normal * 3 * scene.dolls[0].doll.extent
+    high = start.coordinates(GeneralizedState(q, bound.v))
     simulation.place(high)
     lowest = float(GroundHeights(scene)(simulation.state).min())
     lift = np.zeros_like(high.q)
@@ -104,11 +108,3 @@ def begin(simulation: Simulation, start: Start) -> None:
     if start.limp:
         for angle, spring in standing(scene.dolls[0].doll).items():
             simulation.hold(angle, *spring)
-
-
-def _above_ground(simulation: Simulation, normal: np.ndarray) -> GeneralizedState:
-    """The scene's own coordinates, raised so far that no bone penetrates the ground."""
-    bound = simulation.coordinates
-    q = bound.q.copy()
-    q[:3] += normal * 3 * simulation.scene.dolls[0].doll.extent
-    return GeneralizedState(q, bound.v)

@@ -78,8 +78,7 @@ SECTIONS = (
                 ('order_finest', 'between the finest two', '{:.2f}'),
                 ('points', 'points', '{}')),
             below=(('orders', 'Error over the tick'),)),
-    contact_sections.RESTITUTION, contact_sections.CONVERGENCE,
-    contact_sections.SEGMENTS,
+    contact_sections.RESTITUTION, contact_sections.CONVERGENCE, contact_sections.SEGMENTS,
     contact_sections.DROPS, contact_sections.COLLISIONS,
     Section('classes', 'Nine classes of starts',
             'Energy excess is the largest rise of E - work above its running minimum, over '

@@ -22,7 +22,6 @@ BEND_DIRECTIONS = {'shin': (-1, 'a knee that bends forwards'),
                    'thigh': (1, 'a hip that lifts the knee backwards')}
 """By role: sign of the child's motion along x about the first axis, and the fault if it differs."""
 
-
 MIN_BIND_BEND, MAX_OVEREXTENSION = math.radians(35), math.radians(20)
 """Bend in the bind pose that shows the fold direction (paws are bound hyperextended); rotation
 past straight that is doubtful, and wrong beyond twice that."""

@@ -21,7 +21,6 @@ from .spring_bones import SpringBone, drop_short_segments, read_springs, with_po
 TO_ROS = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
 """glTF has +Y up, +Z forward and +X left: its (z, x, y) is (x, y, z) here."""
 
-
 MAX_BONES = 1500
 """A detailed face has about 900."""
 

@@ -13,7 +13,6 @@ MARGIN = 0.05
 IMPACT_SPEEDUP = 2.0
 """Times the speed before that a bone may have after an impact."""
 
-
 NO_PAIRS = np.zeros((0, 2), np.int64)
 
 
