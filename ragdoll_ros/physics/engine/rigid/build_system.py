@@ -20,9 +20,6 @@ steps take it implicitly."""
 GROUND_POINTS = {'sphere': 1, 'capsule': 2, 'box': 8, 'cylinder': 10}
 """Points of each kind that may touch the ground, see kernels/contact/gaps.py."""
 
-Law = tuple[float, float, float]
-"""Friction, rolling friction (m), restitution."""
-
 
 def build_system(scene: Scene) -> System:
     """The system of a scene; its pairs are those within dolls."""
