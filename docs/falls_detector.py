@@ -14,7 +14,7 @@ import numpy as np
 from sklearn.ensemble import RandomForestClassifier
 
 from ragdoll_ros.falls import Fall, Phases, Recipe, generate, load_recipe
-from ragdoll_ros.falls.imu_samples import fall_samples
+from ragdoll_ros.falls.fall import fall_samples
 from ragdoll_ros.falls.recipe import recipe_of
 from ragdoll_ros.falls.simulate import begin
 from ragdoll_ros.falls.start import start_of

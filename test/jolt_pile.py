@@ -24,7 +24,7 @@ from ragdoll_ros.model.ragdoll import joint_axes
 from ragdoll_ros.model.scene import Scene
 from ragdoll_ros.model.shapes import Sphere
 from ragdoll_ros.model.state import State
-from ragdoll_ros.physics.ground_heights import GroundHeights
+from ragdoll_ros.physics.rigid_body import GroundHeights
 
 SCRIPT = Path(__file__).with_name('jolt_pile.mjs')
 

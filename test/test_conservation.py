@@ -21,7 +21,7 @@ from ragdoll_ros.physics.engine.protocol import AppliedWrench
 from ragdoll_ros.physics.engine.substepped.bullet import BulletEngine
 from ragdoll_ros.physics.engine.substepped.conservation import ConservationProjection
 from ragdoll_ros.physics.engine.substepped.energy_account import EnergyAccount
-from ragdoll_ros.physics.ground_heights import GroundHeights
+from ragdoll_ros.physics.rigid_body import GroundHeights
 from ragdoll_ros.physics.simulation import Simulation
 
 BALL = Ragdoll('ball', (Bone('ball', Sphere(0.1), 1.0, (0.0, 0.0, 0.0)),))

@@ -13,7 +13,7 @@ from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll
 from ragdoll_ros.model.scene import NO_SLIP, SECOND, Ground, Material, Placement, Scene, height
 from ragdoll_ros.model.shapes import Box, Capsule, Sphere
 from ragdoll_ros.physics.accuracy import EXACT, NORMAL
-from ragdoll_ros.physics.ground_heights import JointGap
+from ragdoll_ros.physics.rigid_body import JointGap
 from ragdoll_ros.physics.simulation import Simulation
 
 DROP = load_scene('drop')

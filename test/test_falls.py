@@ -17,7 +17,7 @@ from ragdoll_ros.model import rotation
 from ragdoll_ros.model.coordinates import DofLayout
 from ragdoll_ros.model.errors import ModelErrors, OutOfRange
 from ragdoll_ros.people.fall_phases import bone_impacts, find_phases, part_impact
-from ragdoll_ros.physics.ground_heights import GroundHeights
+from ragdoll_ros.physics.rigid_body import GroundHeights
 
 stats = pytest.importorskip('scipy.stats')
 

@@ -8,8 +8,8 @@ from falls_recipes import SHOVE, recipe
 
 from ragdoll_ros.falls import describe, generate
 from ragdoll_ros.falls.command import main
-from ragdoll_ros.falls.dataset_builder import build_dataset
 from ragdoll_ros.falls.dataset_summary import summarize
+from ragdoll_ros.falls.manifest import build_dataset
 from ragdoll_ros.falls.pictures import hull
 from ragdoll_ros.falls.shard import DatasetJob, make_shard
 from ragdoll_ros.people.real_falls import bones_of

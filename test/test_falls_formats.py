@@ -12,10 +12,10 @@ from falls_recipes import DROP, SHOVE, recipe
 from ragdoll_ros import load_doll
 from ragdoll_ros.falls import generate, load_recipe
 from ragdoll_ros.falls.command import main
-from ragdoll_ros.falls.dataset_builder import build_dataset
+from ragdoll_ros.falls.fall import fall_samples, samples_by_frame
 from ragdoll_ros.falls.formats.registry import FORMATS
 from ragdoll_ros.falls.formats.settled import ALIKE, different
-from ragdoll_ros.falls.imu_samples import fall_samples, samples_by_frame
+from ragdoll_ros.falls.manifest import build_dataset
 from ragdoll_ros.falls.shard import DatasetJob, make_shard
 from ragdoll_ros.files.urdf import to_urdf
 from ragdoll_ros.fit.command import main as fit
@@ -182,7 +182,7 @@ def test_mcaps_labels_by_mcap(shoved, written):
 def test_mcap_has_the_definitions_of_ros():
     """Those of the messages that ROS's own packages bring."""
     store = pytest.importorskip('rosbags.typesys')
-    from ragdoll_ros.falls.formats.definitions import DEFINITIONS
+    from ragdoll_ros.falls.formats.mcap import DEFINITIONS
     ros = store.get_typestore(store.Stores.ROS2_JAZZY)
     for kind, text in DEFINITIONS.items():
         ours = store.get_types_from_msg(text, kind)

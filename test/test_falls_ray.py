@@ -6,7 +6,7 @@ import pytest
 from falls_recipes import DROP, file_bytes, recipe
 
 from ragdoll_ros.falls import cluster
-from ragdoll_ros.falls.dataset_builder import build_dataset
+from ragdoll_ros.falls.manifest import build_dataset
 from ragdoll_ros.falls.shard import FALLS_PER_SHARD, DatasetJob, make_shard
 from ragdoll_ros.model.errors import Unreadable
 

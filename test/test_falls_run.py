@@ -15,8 +15,7 @@ import yaml
 from conftest import ROOT
 from falls_recipes import DROP, file_bytes, recipe
 
-from ragdoll_ros.falls.dataset_builder import build_dataset
-from ragdoll_ros.falls.manifest import FILE, Manifest
+from ragdoll_ros.falls.manifest import FILE, Manifest, build_dataset
 from ragdoll_ros.falls.pool import make_shards
 from ragdoll_ros.falls.shard import FALLS_PER_SHARD, DatasetJob, make_shard
 from ragdoll_ros.model.errors import Unreadable

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from fit_rigs import RIGS, fitted
 
-from ragdoll_ros.fit.bodies.skin_volume import skin_volumes
+from ragdoll_ros.fit.bodies.masses import skin_volumes
 from ragdoll_ros.fit.pipeline import FitOptions, fit_character
 from ragdoll_ros.fit.reading.character import Character, read_character
 

@@ -10,7 +10,7 @@ from ragdoll_ros import Bone, Ground, Placement, Ragdoll
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.scene import height
 from ragdoll_ros.model.shapes import Sphere
-from ragdoll_ros.physics.ground_heights import GroundHeights
+from ragdoll_ros.physics.rigid_body import GroundHeights
 
 LEVEL, TILTED = Ground(), Ground((0.3, -0.5, 0.8), -1.7)
 GROUNDS = pytest.mark.parametrize('ground', [LEVEL, TILTED, None], ids=['level', 'tilted', 'none'])

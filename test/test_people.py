@@ -13,7 +13,7 @@ from ragdoll_ros.model.coordinates import GeneralizedState
 from ragdoll_ros.model.scene import Placement
 from ragdoll_ros.people import person, standard
 from ragdoll_ros.people.command import main
-from ragdoll_ros.physics.ground_heights import GroundHeights
+from ragdoll_ros.physics.rigid_body import GroundHeights
 from ragdoll_ros.physics.simulation import Simulation
 
 DE_LEVA = {

@@ -17,8 +17,7 @@ from ragdoll_ros.model.scene import SECOND, Placement, above_ground
 from ragdoll_ros.model.shapes import Capsule
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.bvh_file import bvh_text
-from ragdoll_ros.recordings.gltf.gltf_file import gltf_bytes
-from ragdoll_ros.recordings.gltf.vertex_normals import crease_normals
+from ragdoll_ros.recordings.gltf.gltf_file import crease_normals, gltf_bytes
 from ragdoll_ros.recordings.recording import RecordedPose, Recorder
 from ragdoll_ros.recordings.save import FORMATS, csv_text, save_recording
 

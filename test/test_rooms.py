@@ -39,8 +39,8 @@ FLOORS = {
     'physics.kernels': ('compiling', 'maths', 'contact_kind', 'dynamics', 'system',
                         'cluster_state', 'collision', 'workspace', 'contact', 'impulses',
                         'stepping', 'flight', 'advance', 'loaded', '__main__'),
-    'fit': ('roles', 'shapes', 'reading', 'skeleton', 'bodies', 'joints', 'robots', 'attachments',
-            'skin', 'pipeline', 'judging', 'report', 'picture', 'command')}
+    'fit': ('roles', 'shapes', 'reading', 'skeleton', 'bodies', 'joints', 'robots', 'skin',
+            'pipeline', 'judging', 'report', 'picture', 'command')}
 """Of a room: each stands on those before it."""
 
 Edges = list[tuple[str, str]]

@@ -19,7 +19,7 @@ import dataclasses, hashlib, math, sys
 import numba
 from ragdoll_ros import Push, Simulation, load_scene
 from ragdoll_ros.accuracy.crowds.crowd_digests import of_workers
-from ragdoll_ros.files.repeat import repeated_placements
+from ragdoll_ros.files.scene import repeated_placements
 from ragdoll_ros.model.scene import Ground, Placement
 
 def digest(scene, ticks, workers=1):

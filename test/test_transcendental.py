@@ -3,7 +3,7 @@ import math
 
 import pytest
 
-from ragdoll_ros.model.angle import sine_and_cosine
+from ragdoll_ros.model.rotation import sine_and_cosine
 
 numba = pytest.importorskip('numba')
 from ragdoll_ros.physics.kernels.maths import transcendental  # noqa: E402

@@ -25,7 +25,7 @@ from ragdoll_ros.model.shapes import Box, Sphere
 from ragdoll_ros.model.skeleton import Riders
 from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.recordings.rods import Rods
+from ragdoll_ros.recordings.recording import Rods
 from ragdoll_ros.viewer.drawing import framing
 from ragdoll_ros.viewer.drawing.bodies import Bodies
 from ragdoll_ros.viewer.drawing.ground import CELL, FADE, grid_size

@@ -1,6 +1,4 @@
 """Methods that the report compares: engines with their settings."""
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Callable, Iterable
@@ -13,16 +11,25 @@ import numpy as np
 from ..model import errors
 from ..model.state import State
 from ..physics import kernels
-from ..physics.accuracy import ACCURACIES, Accuracy
+from ..physics.accuracy import ACCURACIES, NORMAL, Accuracy
 from ..physics.engine.protocol import Engine
+from ..physics.engine.registry import resolve_engine
 from ..physics.engine.substepped.bullet import BulletEngine
 from ..physics.engine.substepped.mujoco import MujocoEngine
 from ..physics.simulation import Simulation
-from . import step_sizes
 from .cases.trial import Trial
 from .quickstart import STEP as QUICKSTART_STEP
 from .quickstart import Quickstart
 from .trajectory import Trajectory
+
+TICK = 0.01
+"""s: substeps are counted per tick of this length."""
+
+RIGID = 'rigid'
+"""Name of this package's own engine, which solves impacts at their time of impact."""
+
+MIN_FLIGHT_ERROR = 1e-13
+"""m or rad: smaller error estimates in flight are rounding."""
 
 
 class MethodRun(Protocol):
@@ -75,7 +82,7 @@ class _FixedSteps:
     def __init__(self, trial: Trial, substeps: int, make: Callable[..., Engine]) -> None:
         self._trial = trial
         self._tick, self._count = trial.scene.step, 0
-        self._engine = make(trial.scene, step_sizes.fixed_steps(self._tick / substeps))
+        self._engine = make(trial.scene, fixed_steps(self._tick / substeps))
         if trial.start is not None:
             self._engine.set_coordinates(trial.start)
 
@@ -92,6 +99,27 @@ class _FixedSteps:
 
     def close(self) -> None:
         self._engine.close()
+
+
+@functools.cache
+def has_rigid_engine() -> bool:
+    """Whether the rigid engine can be created here."""
+    try:
+        resolve_engine(RIGID)
+    except (errors.RagdollError, ImportError):
+        return False
+    return True
+
+
+def contact_step(setting: str = 'normal') -> float:
+    """Largest step, s, of the rigid engine at a setting while in contact."""
+    return ACCURACIES[setting].step
+
+
+def fixed_steps(step: float) -> Accuracy:
+    """Accuracy with steps of ``step`` s, without energy correction and sleep, which hide errors."""
+    return dataclasses.replace(NORMAL, step=step, substeps=TICK / step, energy=False, sleep=False,
+                               flight_error=MIN_FLIGHT_ERROR)
 
 
 def start_simulation(trial: Trial, accuracy: str | Accuracy, engine: str = 'auto') -> Simulation:
@@ -129,18 +157,17 @@ def median_run(method: Method, trial: Trial, repeats: int) -> Result:
     return dataclasses.replace(results[0], costs=costs)
 
 
-def ours(accuracy: str | Accuracy, name: str | None = None, engine: str = 'auto') -> Method:
+def ours(accuracy: str | Accuracy, name: str | None = None) -> Method:
     """Our simulation at a named accuracy, or with a given one."""
     name = name or f'ours-{accuracy}'
-    order = kernels.ORDER if engine == 'auto' and kernels.ready() else 1
     return Method(name, name.replace('-', ' '), 'ours', functools.partial(
-        start_simulation, accuracy=accuracy, engine=engine), order=order)
+        start_simulation, accuracy=accuracy), order=kernels.ORDER if kernels.ready() else 1)
 
 
 def core(step: float) -> Method:
     """The rigid engine with fixed steps of ``step`` s."""
     return Method(f'core-{step:g}', f'core, steps of {step * 1e6:g} µs', 'core', functools.partial(
-        start_simulation, accuracy=step_sizes.fixed_steps(step), engine=step_sizes.RIGID))
+        start_simulation, accuracy=fixed_steps(step), engine=RIGID))
 
 
 def reference(refinement: int) -> Method:
@@ -148,8 +175,7 @@ def reference(refinement: int) -> Method:
 
     PyBullet at 128 substeps where the rigid engine is not available; the label names it.
     """
-    return (core(step_sizes.contact_step() / refinement) if step_sizes.has_rigid_engine()
-            else bullet(128))
+    return (core(contact_step() / refinement) if has_rigid_engine() else bullet(128))
 
 
 def quickstart() -> Method:
@@ -173,10 +199,7 @@ def mujoco(integrator: str, substeps: int) -> Method:
                   order={'rk4': 4}.get(integrator, 1))
 
 
-SUBSTEPS = (1, 2, 4, 8, 16, 32)
-
-
-def all_methods(substeps: Iterable[int] = SUBSTEPS) -> list[Method]:
+def all_methods(substeps: Iterable[int] = (1, 2, 4, 8, 16, 32)) -> list[Method]:
     """Ours at three accuracies, the quickstart, PyBullet and MuJoCo with fixed substeps."""
     counts = tuple(substeps)
     return [*map(ours, ACCURACIES), quickstart(), *map(bullet, counts),

@@ -3,8 +3,6 @@
 Computed from poses and velocities of the bones alone, in the same way for every method, without
 code of the simulation. Arrays run over t instants and n bones.
 """
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -92,8 +90,7 @@ class Metrics:
             work[1:] += np.cumsum(gained * acts)
         return work
 
-    def energy_excess(self, trial: Trial, trajectory: Trajectory,
-                      released: float = 0.0) -> float:
+    def energy_excess(self, trial: Trial, trajectory: Trajectory, released: float = 0.0) -> float:
         """Energy gain: the largest rise of E - W above its running minimum, over max(E0 + W).
 
         ``released``, J, is energy that the start itself may release. NaN if max(E0 + W) <= 0.

@@ -3,8 +3,6 @@
 Inertia, damping, joint motors, contact margins and solver are PyBullet's defaults, on purpose
 unlike in physics/engine/substepped/bullet.py.
 """
-from __future__ import annotations
-
 import os
 import tempfile
 
@@ -89,8 +87,7 @@ class Quickstart:
         plane = pybullet.createCollisionShape(
             pybullet.GEOM_PLANE, planeNormal=ground.normal, physicsClientId=self._client)
         self._plane = pybullet.createMultiBody(
-            0, plane, -1, [n * ground.offset for n in ground.normal],
-            physicsClientId=self._client)
+            0, plane, -1, [n * ground.offset for n in ground.normal], physicsClientId=self._client)
 
     def _find_links(self) -> None:
         links, self._joints = {}, {}

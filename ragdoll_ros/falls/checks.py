@@ -1,10 +1,8 @@
 """Validate a recipe's values, beyond its schema."""
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 
-from ..files.building import has_error_under
+from ..files.schema import has_error_under
 from ..model import errors
 from ..model.errors import ModelError
 from ..model.ragdoll import Ragdoll
@@ -13,7 +11,7 @@ from ..model.vectors import finite_floats, unit_vector
 from ..people.person import HEIGHTS, MASSES
 from ..physics.simulation import MAX_SAMPLES_PER_TICK
 from .distribution import choices, distribution_errors, support
-from .imu_samples import flaws_of
+from .fall import flaws_of
 
 RATE = 100
 """Default frames per second."""
@@ -36,11 +34,8 @@ def value_errors(data: dict, dolls: list[Ragdoll], found: list[ModelError]) -> l
     """Errors of the data beside those ``found`` so far; ``dolls`` are those it names."""
     more = [error for key, part in data.items() if not has_error_under(found, key)
             for error in distribution_errors(part, key)]
-    more += list(_out_of_range(data, [*found, *more]))
-    more += list(_wrong_people(data, [*found, *more]))
-    more += list(_wrong_limp(data, [*found, *more]))
-    more += list(_wrong_rate(data, [*found, *more]))
-    more += list(_wrong_imus(data, [*found, *more]))
+    for check in (_out_of_range, _wrong_people, _wrong_limp, _wrong_rate, _wrong_imus):
+        more += list(check(data, [*found, *more]))
     if dolls and not any(has_error_under([*found, *more], key)
                          for key in ('feet', 'start', 'pushes', 'limp', 'record')):
         more += _unknown_names(data, dolls)

@@ -1,6 +1,4 @@
 """Make shards on a Ray cluster, or with a local Ray instance."""
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 
 from ..model.errors import Unreadable

@@ -1,6 +1,4 @@
 """Generate a data set of falls: drawn from a recipe, simulated on all cores."""
-from __future__ import annotations
-
 import argparse
 import os
 import sys
@@ -10,9 +8,8 @@ from pathlib import Path
 
 from ..model.errors import RagdollError
 from . import cluster, describe, pool
-from .dataset_builder import build_dataset
 from .formats.registry import FORMATS
-from .manifest import Manifest
+from .manifest import Manifest, build_dataset
 from .recipe import load_recipe
 from .shard import DatasetJob
 
@@ -31,7 +28,11 @@ def main(arguments: list[str] | None = None) -> int:
     """Exit code of the command: 1 after an error in the run, 2 for a wrong call, 130 for Ctrl-C."""
     arguments = sys.argv[1:] if arguments is None else arguments
     if arguments[:1] == ['describe']:
-        return _describe(arguments[1:])
+        try:
+            return describe.main(arguments[1:])
+        except (RagdollError, OSError) as error:
+            print(error, file=sys.stderr)
+            return 2
     options = parser().parse_args(arguments)
     progress = ProgressLine(options.count)
     try:
@@ -56,14 +57,6 @@ def main(arguments: list[str] | None = None) -> int:
     progress.close()
     _print_result(manifest, options.out, progress.seconds)
     return 0
-
-
-def _describe(arguments: list[str]) -> int:
-    try:
-        return describe.main(arguments)
-    except (RagdollError, OSError) as error:
-        print(error, file=sys.stderr)
-        return 2
 
 
 def parser() -> argparse.ArgumentParser:

@@ -1,6 +1,4 @@
 """Summary of a data set, from its labels."""
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,6 +1,4 @@
 """Describe a data set: a page and pictures, compared with published figures of real falls."""
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 
 Each is sampled by inverse transform and takes exactly one number of the generator.
 """
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from statistics import NormalDist

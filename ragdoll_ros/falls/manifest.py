@@ -8,15 +8,20 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from ..files.run_scene import versions
 from ..model.errors import Unreadable
+from .formats.registry import resolve_format
 from .shard import FALLS_PER_SHARD, DatasetJob, Shard
 
 FILE = 'manifest.jsonl'
 PART = '.part'
 """Suffix of a file that is being written."""
+
+ShardMaker = Callable[[DatasetJob, Iterable[int]], Iterator[Shard]]
+"""Makes shards by their numbers and yields them in any order."""
 
 
 class Manifest:
@@ -133,3 +138,29 @@ def _has_hash(path: Path, digest: str) -> bool:
         return hashlib.sha256(path.read_bytes()).hexdigest() == digest
     except OSError:
         return False
+
+
+def build_dataset(job: DatasetJob, folder: Path, make: ShardMaker, resume: bool = False,
+                     on_progress: Callable[[Manifest, int], None] = lambda manifest, new: None,
+                     ) -> Manifest:
+    """Write all falls of a job into a folder; ``on_progress`` is called after each shard.
+
+    With ``resume``, complete shards in the folder are kept. Raises Unreadable if the folder holds
+    falls already or, with ``resume``, other falls; OSError if a file cannot be written, in which
+    case all earlier shards are kept.
+    """
+    if (folder / FILE).exists() and not resume:
+        raise Unreadable('', str(folder), 'a folder without falls, or --resume to go on')
+    manifest = (Manifest.resume if (folder / FILE).exists() else Manifest.begin)(folder, job)
+    on_progress(manifest, 0)
+    shards = make(job, [shard for shard in range(job.shards) if shard not in manifest.shards])
+    try:
+        for shard in shards:
+            manifest.add(shard)
+            on_progress(manifest, len(shard.falls))
+    finally:
+        getattr(shards, 'close', lambda: None)()
+    last_files = getattr(resolve_format(job.format), 'last_files', lambda *_: {})
+    write_files(folder, last_files(job.recipe, job.count, folder))
+    manifest.write_sorted()
+    return manifest

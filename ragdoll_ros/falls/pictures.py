@@ -1,6 +1,4 @@
 """Pictures of a data set: impact speeds, timing, directions, and a contact sheet of falls."""
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -107,12 +105,9 @@ def _draw_fall(axes: object, fall: Fall) -> None:
                                        alpha=0.15 + 0.75 * (place / EARLIER_POSES) ** 2))
         axes.set_aspect('equal')
         axes.autoscale_view()
-        title += ': failed' if fall.failure else f': {_direction(fall)}'
+        title += (': failed' if fall.failure else ': no impact' if fall.phases.impact is None
+                  else f': {fall.direction:.0f}°')
     axes.set_title(title, fontsize=8)
-
-
-def _direction(fall: Fall) -> str:
-    return 'no impact' if fall.phases.impact is None else f'{fall.direction:.0f}°'
 
 
 def _fall_direction(fall: Fall) -> np.ndarray:

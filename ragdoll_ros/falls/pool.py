@@ -1,6 +1,4 @@
 """Make shards in a pool of processes on this machine."""
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

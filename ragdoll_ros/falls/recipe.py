@@ -2,8 +2,6 @@
 
 Its schema is config/recipe.schema.json.
 """
-from __future__ import annotations
-
 import hashlib
 import json
 from dataclasses import dataclass
@@ -13,10 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from ..files import yaml_text
-from ..files.building import read_by_name, value_or_raise
 from ..files.config import find
 from ..files.doll import build_doll, doll_data
-from ..files.schema import schema_errors
+from ..files.schema import read_by_name, schema_errors, value_or_raise
 from ..model import errors
 from ..model.errors import ModelError
 from ..model.ragdoll import Ragdoll

@@ -3,8 +3,6 @@
 It depends on the recipe and the shard's number alone, so it is the same on every worker and in
 every order.
 """
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..model.errors import OutOfRange

@@ -1,6 +1,4 @@
 """Simulate a fall from its start and record its frames."""
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 
 import numpy as np
@@ -9,8 +7,8 @@ from ..model.coordinates import GeneralizedState
 from ..model.errors import RagdollError
 from ..people import standing
 from ..people.fall_phases import ONSET_DURATION, Phases, find_phases
-from ..physics.ground_heights import GroundHeights
 from ..physics.guard import Guard
+from ..physics.rigid_body import GroundHeights
 from ..physics.simulation import Simulation
 from .fall import Fall
 from .recipe import Recipe
@@ -47,8 +45,7 @@ def simulate(recipe: Recipe, start: Start) -> Fall:
         excess = simulation.energy_excess if frames.valid else np.nan
     states, touching = frames.states[:frames.valid], frames.touching[:frames.valid]
     phases = find_phases(
-        scene, states, touching, recipe.data['feet'],
-        round(ONSET_DURATION * recipe.rate),
+        scene, states, touching, recipe.data['feet'], round(ONSET_DURATION * recipe.rate),
         **recipe.data['phases']) if frames.valid else Phases()
     return Fall(start.number, start.drawn, scene, np.arange(recipe.frames) / recipe.rate,
                 frames.states, frames.angles, frames.rates, frames.touching, recipe.imus,
@@ -96,7 +93,11 @@ def begin(simulation: Simulation, start: Start) -> None:
     """Place the doll with its lowest point at the clearance, queue pushes, hold joints."""
     scene = start.scene
     normal = np.array(scene.ground.normal)
-    high = start.coordinates(_above_ground(simulation, normal))
+    bound = simulation.coordinates
+    q = bound.q.copy()
+    # So far up that no bone penetrates the ground.
+    q[:3] += normal * 3 * scene.dolls[0].doll.extent
+    high = start.coordinates(GeneralizedState(q, bound.v))
     simulation.place(high)
     lowest = float(GroundHeights(scene)(simulation.state).min())
     lift = np.zeros_like(high.q)
@@ -107,11 +108,3 @@ def begin(simulation: Simulation, start: Start) -> None:
     if start.limp:
         for angle, spring in standing(scene.dolls[0].doll).items():
             simulation.hold(angle, *spring)
-
-
-def _above_ground(simulation: Simulation, normal: np.ndarray) -> GeneralizedState:
-    """The scene's own coordinates, raised so far that no bone penetrates the ground."""
-    bound = simulation.coordinates
-    q = bound.q.copy()
-    q[:3] += normal * 3 * simulation.scene.dolls[0].doll.extent
-    return GeneralizedState(q, bound.v)

@@ -1,16 +1,14 @@
 """Initial conditions of a fall from its drawn values: scene, coordinates, pushes."""
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..model import rotation
-from ..model.angle import sine_and_cosine
 from ..model.coordinates import DofLayout, GeneralizedState
 from ..model.push import Push
 from ..model.ragdoll import Ragdoll
+from ..model.rotation import sine_and_cosine
 from ..model.scene import SECOND, Ground, Material, Placement, Scene
 from .recipe import Recipe
 
@@ -60,8 +58,10 @@ def start_of(recipe: Recipe, number: int) -> Start:
     drawn = recipe.draw(number)
     doll, start = recipe.doll(drawn['who']), drawn['start']
     heading = rotation.from_axis_angle((0, 0, 1), math.radians(start['heading_deg']))
+    sine, cosine = sine_and_cosine(math.radians(start['lean_towards_deg']))
+    lean = rotation.from_axis_angle((-sine, cosine, 0.0), math.radians(start['lean_deg']))
     orientation = (_uniform_orientation(*start['shares']) if start['tumbled']
-                   else rotation.multiply(heading, _lean(start)))
+                   else rotation.multiply(heading, lean))
     faced = orientation if start['tumbled'] else heading
     placement = Placement(doll, orientation=tuple(orientation),
                           velocity=tuple(rotation.rotate(faced, start['velocity'])),
@@ -74,12 +74,6 @@ def start_of(recipe: Recipe, number: int) -> Start:
                  tuple(_push(push, heading) for push in drawn['pushes']),
                  tuple(sorted((JointRelease(round(each['at'] * SECOND), each.get('angles'))
                                for each in drawn['limp']), key=lambda limp: limp.at)))
-
-
-def _lean(start: dict) -> np.ndarray:
-    """Rotation (4,) that tilts the upright doll towards a horizontal direction."""
-    sine, cosine = sine_and_cosine(math.radians(start['lean_towards_deg']))
-    return rotation.from_axis_angle((-sine, cosine, 0.0), math.radians(start['lean_deg']))
 
 
 def _uniform_orientation(first: float, second: float, third: float) -> np.ndarray:
@@ -104,8 +98,7 @@ def _angles(doll: Ragdoll, start: dict) -> dict[str, float]:
               for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
     angles = {name: limits[name][0] + share * (limits[name][1] - limits[name][0])
               for name, share in start['angle_shares'].items()}
-    return {**angles, **{name: math.radians(angle)
-                         for name, angle in start['angles_deg'].items()}}
+    return {**angles, **{name: math.radians(angle) for name, angle in start['angles_deg'].items()}}
 
 
 def _push(drawn: dict, heading: np.ndarray) -> Push:

@@ -3,8 +3,6 @@
 Of a truncated MCAP file every complete record is read, also within an uncompressed chunk; of SQLite
 every row on a complete page.
 """
-from __future__ import annotations
-
 import io
 import re
 import sqlite3

@@ -3,8 +3,6 @@
 A header of four bytes, the second odd for little-endian; from its end numbers are aligned to their
 size.
 """
-from __future__ import annotations
-
 import struct
 
 import numpy as np

@@ -1,6 +1,4 @@
 """Location of the shipped scenes, dolls and schemas, and look-up by name."""
-from __future__ import annotations
-
 import os
 import re
 from pathlib import Path

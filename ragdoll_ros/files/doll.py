@@ -1,30 +1,19 @@
 """Dolls as YAML files (config/doll.schema.json): reading with all errors at once, writing."""
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..model import ragdoll
 from ..model.compound import Compound
 from ..model.errors import ModelError, OutOfRange
-from ..model.ragdoll import (
-    Bone,
-    Joint,
-    Ragdoll,
-    SkeletonFrame,
-    angle_name_errors,
-    attachment_errors,
-    no_collision_errors,
-    tree_errors,
-)
+from ..model.ragdoll import Bone, Joint, Ragdoll, SkeletonFrame
 from ..model.rotation import IDENTITY
 from ..model.shapes import SHAPES, Part, Shape
 from ..model.swing import Link, Swing, strand
 from . import yaml_text
-from .building import Made, build_each, entries, read_by_name, value_or_raise
-from .schema import schema_errors
+from .schema import Made, build_each, entries, read_by_name, schema_errors, value_or_raise
 
 LARGEST_MASS_RATIO = 1e8
 """Largest ratio of two masses in a file. Robots have up to 6.1e7; at 2e8 a tick takes a second, as
@@ -84,15 +73,15 @@ def build_doll(data: object, path: Path = Path('doll')) -> tuple[Ragdoll | None,
     edges: list[Any] = [(entry.get('parent'), entry.get('child'))
                         for entry in entries(data, 'joints')]
     if all(isinstance(text, str) for text in [*names, *sum(edges, ())]):
-        found += tree_errors(names, edges)
+        found += ragdoll.tree_errors(names, edges)
         for key in ('swings', 'riders'):
             attached: list[Any] = [(entry.get('name'), entry.get('bone'))
                                    for entry in entries(data, key)]
             if all(isinstance(text, str) for text in sum(attached, ())):
-                found += attachment_errors(key, names, attached)
+                found += ragdoll.attachment_errors(key, names, attached)
         if not found:
-            found += no_collision_errors(names, data.get('no_collision', ()))
-            found += angle_name_errors(joints) + mass_errors(bones)
+            found += ragdoll.no_collision_errors(names, data.get('no_collision', ()))
+            found += ragdoll.angle_name_errors(joints) + mass_errors(bones)
     if found:
         return None, found
     model = str(path.parent / data['model']) if 'model' in data else None

@@ -8,8 +8,6 @@ joint. Approximations:
 - friction is finite; MuJoCo takes the larger of a pair, so each bone has the combined coefficient
   with the ground, and the ground zero.
 """
-from __future__ import annotations
-
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Collection, Iterable
@@ -20,7 +18,7 @@ from ..model import rotation
 from ..model.pose import Pose
 from ..model.ragdoll import Bone, Joint, joint_axes
 from ..model.scene import Placement, Scene, finite_friction
-from ..model.shapes import Part, Shape
+from ..model.shapes import Shape
 
 CONTACT_TIME = 0.02
 """s, time constant of a contact, MuJoCo's default; the engine sets one for its step."""
@@ -42,7 +40,9 @@ def to_mjcf(scene: Scene, excluded: Collection[frozenset[str]] = ()) -> str:
     for placement in scene.dolls:
         _add_doll(world, scene, placement)
     contact = ET.SubElement(root, 'contact')
-    for index, (a, b) in enumerate(sorted(map(sorted, {*_excluded_pairs(scene), *excluded}))):
+    own = {frozenset(scene.qualified(placement, name) for name in pair)
+           for placement in scene.dolls for pair in placement.doll.excluded_pairs}
+    for index, (a, b) in enumerate(sorted(map(sorted, own | {*excluded}))):
         ET.SubElement(contact, 'exclude', name=f'apart_{index}', body1=a, body2=b)
     ET.indent(root)
     return ET.tostring(root, encoding='unicode') + '\n'
@@ -63,11 +63,6 @@ def damping_ratio(restitution: float) -> float:
             math.pi - math.atan2(2 * ratio * rest, 1 - 2 * ratio ** 2))) if rest else 0.0
         low, high = (ratio, high) if left > restitution else (low, ratio)
     return max(0.01, high)
-
-
-def _excluded_pairs(scene: Scene) -> set[frozenset[str]]:
-    return {frozenset(scene.qualified(placement, name) for name in pair)
-            for placement in scene.dolls for pair in placement.doll.excluded_pairs}
 
 
 def _add_ground(world: ET.Element, scene: Scene) -> None:
@@ -105,18 +100,14 @@ def _add_bone(parent: ET.Element, scene: Scene, placement: Placement, bone: Bone
     # bit 0: collides with the ground and, with self_collision, with bones; bit 1: ground only
     mask = '1' if scene.self_collision else '2'
     for number, part in enumerate(bone.shape.parts, 1):
+        at = {} if part.is_centred else {'pos': _text(part.position),
+                                         'quat': _quaternion(part.orientation)}
         # A bone's own name has no slash.
         ET.SubElement(body, 'geom', name=name if number == 1 else f'{name}/{number}',
-                      type=part.kind, size=_text(_size(part.shape)), **_pose_attributes(part),
+                      type=part.kind, size=_text(_size(part.shape)), **at,
                       contype=mask, conaffinity='1' if scene.self_collision else '0',
                       **_material(scene, bone))
     return body
-
-
-def _pose_attributes(part: Part) -> dict[str, str]:
-    """Attributes of a part's pose in its body; none for the identity."""
-    return {} if part.is_centred else {'pos': _text(part.position),
-                                       'quat': _quaternion(part.orientation)}
 
 
 def _joints(joint: Joint, child: Bone) -> Iterable[dict[str, str]]:

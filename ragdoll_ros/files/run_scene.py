@@ -1,6 +1,4 @@
 """The scene of a run as YAML, with the versions of the libraries that computed it: ~/scene."""
-from __future__ import annotations
-
 import hashlib
 import platform
 import re

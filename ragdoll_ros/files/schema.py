@@ -1,17 +1,21 @@
-"""Validation of a file's data against the JSON schemas of scenes and dolls."""
-from __future__ import annotations
-
+"""Validation of a file's data against its JSON schema; models built from it, with every error."""
 import functools
 import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
 
 import jsonschema
 
 from ..model import errors
-from ..model.errors import ModelError
-from .config import config_folder
+from ..model.errors import ModelError, ModelErrors
+from . import config, yaml_text
 
 _NAMED = {'exclusiveMinimum': errors.NotPositive, 'minimum': errors.OutOfRange,
           'maximum': errors.OutOfRange}
+
+Made = TypeVar('Made')
 
 
 def schema_errors(schema: str, data: object) -> list[ModelError]:
@@ -68,5 +72,52 @@ def _expected(error: jsonschema.ValidationError) -> str:
 
 @functools.cache
 def _validator(name: str) -> jsonschema.Draft7Validator:
-    path = config_folder() / f'{name}.schema.json'
+    path = config.config_folder() / f'{name}.schema.json'
     return jsonschema.Draft7Validator(json.loads(path.read_text(encoding='utf-8')))
+
+
+def read_by_name(name: str) -> tuple[object, Path]:
+    """Data of a YAML file, given by path or shipped name, and its path. Raises ModelErrors."""
+    try:
+        path = config.find(name)
+        return yaml_text.read(path), path
+    except ModelError as error:
+        raise ModelErrors(str(name), [error]) from None
+
+
+def try_build(found: list[ModelError], where: str, make: Callable[..., Made], *args: object,
+              **kwargs: object) -> Made | None:
+    """Build a part; on a ModelError append it to ``found`` and return None."""
+    try:
+        return make(*args, **kwargs)
+    except ModelError as error:
+        found.append(error.at(where) if where else error)
+        return None
+
+
+def has_error_under(found: list[ModelError], where: str) -> bool:
+    """Whether an error is at a path or below it."""
+    return any(re.match(re.escape(where) + r'($|[.\[])', error.path) for error in found)
+
+
+def entries(data: dict, key: str) -> list[dict]:
+    """Mappings of the list ``data[key]``; empty if it is no list."""
+    values = data.get(key)
+    return [e for e in values if isinstance(e, dict)] if isinstance(values, list) else []
+
+
+def build_each(data: dict, key: str, make: Callable, found: list[ModelError]) -> list:
+    """Build every entry of a list that the schema accepts."""
+    made = []
+    for index, entry in enumerate(entries(data, key)):
+        where = f'{key}[{index}]'
+        if not has_error_under(found, where):
+            made.append(try_build(found, where, make, entry))
+    return made
+
+
+def value_or_raise(path: Path, made: Made | None, found: list[ModelError]) -> Made:
+    """What was built. Raises ModelErrors with all errors found."""
+    if found or made is None:
+        raise ModelErrors(str(path), found)
+    return made

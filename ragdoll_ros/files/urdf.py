@@ -10,8 +10,6 @@ spherical joint for a ball joint without limits (its own limits do not hold: mea
 0.5 rad). PyBullet measures that joint in the frame of the child's inertia, so it has a massless
 link in the joint's frame, to which the child is fixed. Effort and velocity are zero: no motor.
 """
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -2,8 +2,6 @@
 
 Transmissions, sensors, colours and what else has no part in the motion are not read.
 """
-from __future__ import annotations
-
 import codecs
 import math
 from dataclasses import dataclass, field

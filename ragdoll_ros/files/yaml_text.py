@@ -1,6 +1,4 @@
 """YAML to plain data and back, with limits on size and depth and the position of errors."""
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

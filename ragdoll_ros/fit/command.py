@@ -1,6 +1,4 @@
 """Fit a ragdoll to a rigged, skinned character, or convert a robot's URDF to a ragdoll."""
-from __future__ import annotations
-
 import argparse
 import math
 import sys

@@ -1,6 +1,4 @@
 """Picture of a doll in its bind pose: skin, bodies, joints and joint ranges."""
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -2,8 +2,6 @@
 
 All in the bind pose, in the doll's frame, which is the character's.
 """
-from __future__ import annotations
-
 import glob
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
@@ -12,22 +10,22 @@ import numpy as np
 
 from ..model import errors, rotation
 from ..model.pose import Pose
-from ..model.ragdoll import Bone, Ragdoll
+from ..model.ragdoll import Bone, Ragdoll, SkeletonFrame
 from ..model.scene import Placement
 from ..model.shapes import Shape
-from . import attachments
+from ..model.swing import Swing
 from .bodies.masses import share_mass
 from .bodies.overlap import colliding_overlaps
 from .bodies.subdivide import subdivide
-from .bodies.trim import trim_overlaps
+from .bodies.trim import place_anchors, trim_overlaps
 from .joints.folding import note_guesses
 from .joints.make_joint import make_joint, with_damping
 from .reading.character import Character
 from .reading.spring_bones import SpringBone, drop_short_segments
+from .reading.spring_to_swing import swing_from_spring
 from .roles.names import roles_of
 from .shapes.axes import Axes, fit_axes
 from .shapes.fitting import DECIMALS, TOLERANCE, FittedShape, fit_best, fit_shape
-from .skeleton.anchors import place_anchors
 from .skeleton.forced_bodies import find_forced_bodies
 from .skeleton.groups import BodyGroup, group_bones, mirrored_group, vertices_by_bone
 from .skeleton.skin_tree import SkinTree, find_skin_tree
@@ -133,9 +131,8 @@ def fit_character(character: Character, options: FitOptions | None = None) -> Fi
               for group in groups if group.fixed]
     carrier = {index: bone for group, bone in zip(groups, bones, strict=True)
                for index in group.bones}
-    swings = attachments.swings(character, carrier, notes)
-    doll = Ragdoll(character.name, tuple(bones), tuple(joints), swings,
-                   attachments.skeleton_frames(character, carrier))
+    doll = Ragdoll(character.name, tuple(bones), tuple(joints),
+                   _swings(character, carrier, notes), _skeleton_frames(character, carrier))
     doll = replace(doll, no_collision=colliding_overlaps(doll))
     return Fit(doll, given, tuple(bodies), tuple(notes))
 
@@ -251,3 +248,28 @@ def _body_fit(character: Character, group: BodyGroup, fitted: FittedShape, axes:
     off = bone.shape.signed_distance(bone.pose.apply_inverse(points))
     return BodyFit(bone, tuple(character.bone_names[b] for b in group.bones), group.role,
                    len(points), int(np.count_nonzero(off <= TOLERANCE)), axes)
+
+
+def _skeleton_frames(character: Character, carrier: dict[int, Bone]) -> tuple[SkeletonFrame, ...]:
+    """Frame of every bone of the skeleton, fixed to a body, in the skeleton's order.
+
+    ``carrier`` maps the index of a character's bone to that body.
+    """
+    frames = []
+    for index, name in enumerate(character.bone_names):
+        body = carrier[index]
+        pose = body.pose.relative(Pose(character.positions[index], character.orientations[index]))
+        frames.append(SkeletonFrame(name, body.name, *(np.round(part, 12) + 0.0 for part in pose)))
+    return tuple(frames)
+
+
+def _swings(character: Character, carrier: dict[int, Bone], notes: list[str]) -> tuple[Swing, ...]:
+    """The character's spring bones as swings; a note reports gravity that had to be clamped."""
+    made = []
+    for spring in character.springs:
+        swing, cut = swing_from_spring(spring, carrier[spring.carrier].name, character.scale)
+        made.append(swing)
+        if cut:
+            notes.append(f'gravity of spring {spring.name} is clamped to a factor of '
+                         f'{swing.gravity:g}')
+    return tuple(made)

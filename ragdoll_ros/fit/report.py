@@ -2,8 +2,6 @@
 
 See judging/verdict.py for the verdict.
 """
-from __future__ import annotations
-
 import textwrap
 
 from ..model.compound import Compound

@@ -4,8 +4,6 @@ All riders of a bone move as one rigid body, so a page or a file needs only the 
 riders: with the pose T_b of bone b and the sum W_b of its riders' weights, a vertex v of the bind
 pose is at sum of W_b T_b inv(T_b in the bind pose) v (model/skeleton.py, summed by bone).
 """
-from __future__ import annotations
-
 import functools
 import os
 from collections.abc import Callable
@@ -15,11 +13,10 @@ import numpy as np
 from ..model import errors, rotation
 from ..model.ragdoll import Ragdoll
 from ..model.scene import Placement, Scene
-from ..model.skeleton import Riders
-from ..model.skin import Skin
+from ..model.skeleton import Riders, Skin
 from ..model.state import State
 from .reading.character import Character, read_character
-from .reading.subset import subset_character
+from .skeleton.split_characters import subset_character
 
 SCALE_TOLERANCE = 1e-3
 """Relative difference of skin and doll from which on the skin is read again at the doll's scale."""

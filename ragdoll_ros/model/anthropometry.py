@@ -7,8 +7,6 @@ head, the foot from heel to toe. Percentiles and breadths: ANSUR II, the survey 
 2012 (Gordon et al., NATICK/TR-15/007), so of fit adults; breadths and circumferences are means over
 its men and women together.
 """
-from __future__ import annotations
-
 from dataclasses import dataclass
 from types import SimpleNamespace
 

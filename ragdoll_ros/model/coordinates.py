@@ -1,6 +1,4 @@
 """Generalised coordinates q and velocities v of all dolls of a scene, and their layout."""
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

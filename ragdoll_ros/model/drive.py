@@ -1,6 +1,4 @@
 """Drives: velocity controllers of a bone, with limited force and torque."""
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

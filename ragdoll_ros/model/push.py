@@ -1,6 +1,4 @@
 """Pushes: a constant force and torque on a bone for a time."""
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

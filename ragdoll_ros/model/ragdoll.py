@@ -177,8 +177,7 @@ class Joint:
         if not 0 <= self.damping < math.inf:
             raise errors.OutOfRange('damping', self.damping, 'zero or above, finite')
         if self.names and len(self.names) != kind.dof:
-            raise errors.WrongForm('names', list(self.names),
-                                   f'{kind.dof} for a {self.kind} joint')
+            raise errors.WrongForm('names', list(self.names), f'{kind.dof} for a {self.kind} joint')
         self._check_limits()
         if len(self.axes) == 2 and abs(np.dot(*self.axes)) > 1e-6:
             raise errors.WrongAxes('axes', self.axes, 'two perpendicular axes')

@@ -2,16 +2,37 @@
 
 Functions take stacked input: quaternions (..., 4), vectors (..., 3), matrices (..., 3, 3).
 """
-from __future__ import annotations
-
 import math
+from decimal import Context, Decimal, localcontext
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .angle import sine_and_cosine
-
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
+
+TWO_PI = Decimal('6.2831853071795864769252867665590057683943387987502')
+
+DIGITS_50 = Context(prec=50)
+
+LARGE_TURNS = 1e6
+
+
+def sine_and_cosine(angle: float) -> tuple[float, float]:
+    """Sine and cosine of a finite angle in rad, by the Taylor series in 50 digits, rounded once.
+
+    They have the same bits with every C library and processor: initial states are computed with
+    them, so that simulations agree to the bit across machines. An angle above LARGE_TURNS is first
+    reduced modulo a turn in float64.
+    """
+    if abs(angle) > LARGE_TURNS * math.tau:
+        angle = math.fmod(angle, math.tau)
+    with localcontext(DIGITS_50):
+        x, sums, term = Decimal(float(angle)) % TWO_PI, [Decimal(0), Decimal(0)], Decimal(1)
+        for k in range(64):
+            sums[k % 2] += -term if k & 2 else term
+            term *= x / (k + 1)
+    cosine, sine = map(float, sums)
+    return sine, cosine
 
 
 def _hamilton() -> np.ndarray:

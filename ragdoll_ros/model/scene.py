@@ -3,8 +3,6 @@
 SI units, world frame: x forward, y left, z up (REP 103). Quaternions are x, y, z, w.
 files/scene.py reads and writes it.
 """
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

@@ -11,8 +11,6 @@ Frozen, validated data. SI units; points and directions are in the doll's frame,
 
 The masses have full inertia in the world frame: the bone's motion acts on them.
 """
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from . import errors

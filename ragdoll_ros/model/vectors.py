@@ -1,6 +1,4 @@
 """Vectors and quaternions as plain tuples of floats: hashable, comparable, exact."""
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 

@@ -1,6 +1,4 @@
 """ragdoll_person: the doll of a person of a given height, mass and sex."""
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

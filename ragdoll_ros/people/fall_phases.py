@@ -3,8 +3,6 @@
 As in Choi et al. 2015, the descent lasts from the onset of the fall to the impact of the pelvis;
 speeds at impact are vertical, before the first contact with the ground.
 """
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -10,8 +10,6 @@ arm ends at 85 degrees, the limit of ball joints here; it goes higher by its pit
 there is only damping: passive torques that grow exponentially near its ends (Anderson 1999 as used
 by Falisse 2019) are replaced by the limits.
 """
-from __future__ import annotations
-
 import math
 
 from ..model.anthropometry import MEN

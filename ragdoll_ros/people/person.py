@@ -1,10 +1,10 @@
-"""A person of a height, mass and sex as a doll: 16 segments after de Leva 1996.
+"""A person of a height, mass and sex as a doll: 16 segments after de Leva 1996; its standing.
 
 It stands: arms down, palms forwards, soles on z = 0, x forwards. Masses, centres and inertias are
 the table's, normalised to the total mass; lengths are the table's shares of the height, the neck is
 the remainder (see model/anthropometry.py). Shapes are for collision only and have no mass.
 """
-from __future__ import annotations
+import numpy as np
 
 from ..model import errors
 from ..model.anthropometry import BODY, PERCENTILES, SAMPLES, SEXES, TRUNK, Segment, mass_fractions
@@ -27,6 +27,17 @@ COLORS = {'head': SKIN, 'forearm': SKIN, 'hand': SKIN, 'chest': (0.25, 0.45, 0.7
           'abdomen': (0.25, 0.45, 0.70, 1.0), 'upper_arm': (0.30, 0.52, 0.78, 1.0),
           'foot': (0.25, 0.25, 0.28, 1.0)}
 TROUSERS = (0.35, 0.38, 0.45, 1.0)
+
+GRAVITY = 9.8
+"""m/s^2"""
+
+ARMS = ('shoulder', 'elbow', 'wrist')
+
+ARM_STIFFNESS = 0.05
+"""Stiffness of the hanging arms over that of the other joints."""
+
+DAMPING_TIME = 0.05
+"""s: damping over stiffness."""
 
 
 def standard(sex: str, percentile: int = 50) -> tuple[float, float]:
@@ -67,6 +78,23 @@ def person(height: float, mass: float, sex: str, name: str = 'person') -> Ragdol
         bones.append(_bone(bone, part, segment, segment.length / sample.height * height,
                            share[part] * mass, at))
     return Ragdoll(name, tuple(bones), joints(at, height, mass))
+
+
+def standing(doll: Ragdoll) -> dict[str, tuple[float, float]]:
+    """Springs that hold a person upright: stiffness, N m/rad, and damping, N m s/rad, by angle.
+
+    For Simulation.hold. The stiffness is weight times height per rad. An inverted pendulum about
+    both ankles needs the weight times the height of the centre of mass for both together (Winter,
+    Patla et al. 1998, J Neurophysiol 80:1211).
+    """
+    height = float(np.ptp([bone.position[2] for bone in doll.bones]))
+    full = doll.mass * GRAVITY * height
+    found = {}
+    for joint in doll.joints:
+        for name in joint.angle_names:
+            stiffness = full * (ARM_STIFFNESS if name.endswith(ARMS) else 1.0)
+            found[name] = stiffness, DAMPING_TIME * stiffness
+    return found
 
 
 def _bone(name: str, part: str, segment: Segment, length: float, mass: float, at: Places) -> Bone:

@@ -1,6 +1,4 @@
 """Landmarks of a standing person: heights from segment lengths, breadths from girths."""
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -70,8 +68,7 @@ def places(height: float, mass: float, sex: str) -> Places:
     are at the height of the sternum, an arm's radius beside the chest; thighs fill the hip breadth.
     """
     sample = SAMPLES[sex]
-    lengths = {name: part.length / sample.height * height
-               for name, part in sample.segments.items()}
+    lengths = {name: part.length / sample.height * height for name, part in sample.segments.items()}
     wide = math.sqrt((mass / height) / (MASS / HEIGHT))
     ankle = ANKLE_HEIGHT * height
     hip = ankle + lengths['shin'] + lengths['thigh']
@@ -80,9 +77,8 @@ def places(height: float, mass: float, sex: str) -> Places:
     sternum = xiphoid + lengths['chest']
     thigh = radius((BODY.thigh + BODY.lower_thigh) / 2, wide)
     chest, _ = trunk_sides('chest', wide)
-    return Places(height, height / HEIGHT, wide, lengths, height - lengths['head'] - sternum,
-                  ankle, hip, waist, xiphoid, sternum,
-                  hip_y=BODY.hip_breadth / 2000 * wide - thigh,
+    return Places(height, height / HEIGHT, wide, lengths, height - lengths['head'] - sternum, ankle,
+                  hip, waist, xiphoid, sternum, hip_y=BODY.hip_breadth / 2000 * wide - thigh,
                   shoulder_y=chest / 2 + radius(BODY.biceps, wide))
 
 

@@ -1,6 +1,4 @@
 """Measurements of people's real falls, as published: references for simulated falls."""
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 CHOI = 'Choi et al. 2015 (10.1016/j.jbiomech.2015.02.025), 25 falls'

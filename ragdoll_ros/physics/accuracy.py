@@ -1,6 +1,4 @@
 """Accuracy: step sizes and tolerances of a simulation, and the named settings."""
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..model import errors

@@ -1,6 +1,4 @@
 """Guard detects diverged states and restores the last good one."""
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ lists. The caller of advance() counts the ticks between events. The same scene a
 at the same ticks give the same states to the bit. Event names are part of the log format: they do
 not change with the names in the code.
 """
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 from collections.abc import Callable, Sequence
@@ -63,12 +61,12 @@ class LoggedSimulation(Simulation):
     def grab(self, hand: str, bone: str, point: Sequence[float] = (0.0, 0.0, 0.0),
              target: Sequence[float] | None = None) -> None:
         super().grab(hand, bone, point, target)
-        self.on_event('grab', {'hand': hand, 'bone': bone, 'point': _floats(point),
-                               'target': None if target is None else _floats(target)})
+        self.on_event('grab', {'hand': hand, 'bone': bone, 'point': list(map(float, point)),
+                               'target': None if target is None else list(map(float, target))})
 
     def drag(self, hand: str, target: Sequence[float], within: float = DRAG_TIME) -> None:
         super().drag(hand, target, within)
-        self.on_event('drag', {'hand': hand, 'target': _floats(target), 'within': within})
+        self.on_event('drag', {'hand': hand, 'target': list(map(float, target)), 'within': within})
 
     def let_go(self, hand: str) -> None:
         super().let_go(hand)
@@ -92,7 +90,8 @@ class LoggedSimulation(Simulation):
             state = super().place(coordinates)
         finally:
             self.on_event = on_event
-        self.on_event('place', {'q': _floats(coordinates.q), 'v': _floats(coordinates.v)})
+        self.on_event('place', {key: list(map(float, value))
+                                for key, value in vars(coordinates).items()})
         return state
 
     def reset(self) -> State:
@@ -145,7 +144,3 @@ _ACTIONS: dict[str, Callable[..., object]] = {
     'go_back': lambda simulation: simulation.go_back(simulation.checkpoint()),
     # The fields of 'reset' are the conditions, for readers that start there.
     'reset': lambda simulation, **_: simulation.reset()}
-
-
-def _floats(values: Sequence[float]) -> list[float]:
-    return [float(value) for value in values]

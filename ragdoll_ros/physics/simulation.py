@@ -21,10 +21,10 @@ from .actions.joint_springs import JointSpring, JointSprings
 from .actions.push_queue import PushQueue
 from .engine.protocol import Contacts, Engine, Springs
 from .engine.registry import resolve_engine
-from .ground_heights import GroundHeights, JointGap
+from .rigid_body import GroundHeights, JointGap
 from .sleeping import SleepDetector
 from .swing.pose import SwingState
-from .swing.simulation import SwingSimulation
+from .swing.swings import SwingSimulation
 
 MAX_SAMPLES_PER_TICK = 200  # those of a sensor of 1 kHz in the longest tick
 MAX_WORKERS = 64  # threads, each with its own workspace
@@ -72,9 +72,8 @@ class Simulation:
     asleep: bool
     """Whether all dolls sleep, so that advance() does not integrate."""
 
-    def __init__(self, scene: Scene, step: float | None = None,
-                 accuracy: str | Accuracy = 'normal', engine: str | type[Engine] = 'auto',
-                 workers: int | str = 1) -> None:
+    def __init__(self, scene: Scene, step: float | None = None, accuracy: str | Accuracy = 'normal',
+                 engine: str | type[Engine] = 'auto', workers: int | str = 1) -> None:
         if workers == 'auto':
             workers = len(os.sched_getaffinity(0))
         errors.check_range('workers', cast(int, workers), 1, MAX_WORKERS)

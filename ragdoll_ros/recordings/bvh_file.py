@@ -5,16 +5,13 @@ the bind pose. The root is at the root bone's centre of mass; each further joint
 child's name. Channels are Z, Y, X: R = Rz Ry Rx in the parent's axes. Only the root has a position,
 so that gaps of joints are lost.
 """
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
 
 from ..model import rotation
 from ..model.ragdoll import Ragdoll
-from .recording import Recording
-from .y_up import orientations_y_up, points_y_up
+from .recording import Recording, orientations_y_up, points_y_up
 
 CENTIMETRES = 100.0
 
@@ -51,7 +48,8 @@ def _hierarchy(doll: Ragdoll, name: str, depth: int) -> Iterator[str]:
     at = _anchor(doll, name)
     indent, inner = '\t' * depth, '\t' * (depth + 1)
     places = 'Xposition Yposition Zposition ' if above is None else ''
-    yield f'{indent}{"ROOT" if above is None else "JOINT"} {_without_spaces(name)}'
+    # BVH does not allow white space in names.
+    yield f'{indent}{"ROOT" if above is None else "JOINT"} {"_".join(name.split())}'
     yield indent + '{'
     # The root's position is in its channels; readers differ in whether they add its offset.
     yield inner + _offset(at - (at if above is None else _anchor(doll, above)))
@@ -59,8 +57,9 @@ def _hierarchy(doll: Ragdoll, name: str, depth: int) -> Iterator[str]:
     for child in below:
         yield from _hierarchy(doll, child, depth + 1)
     if not below:
-        yield from (f'{inner}End Site', inner + '{', f'{inner}\t{_offset(_to_tip(doll, name))}',
-                    inner + '}')
+        # The tip is twice as far from the joint as the centre of mass.
+        tip = 2 * (np.array(doll.bone(name).position) - at)
+        yield from (f'{inner}End Site', inner + '{', f'{inner}\t{_offset(tip)}', inner + '}')
     yield indent + '}'
 
 
@@ -70,18 +69,8 @@ def _anchor(doll: Ragdoll, name: str) -> np.ndarray:
                          doll.bone(name).position))
 
 
-def _to_tip(doll: Ragdoll, name: str) -> np.ndarray:
-    """Vector (3,) m from a bone's joint to its end: twice that to its centre of mass."""
-    return 2 * (np.array(doll.bone(name).position) - _anchor(doll, name))
-
-
 def _offset(vector: np.ndarray) -> str:
     return 'OFFSET ' + ' '.join(f'{value:.7f}' for value in CENTIMETRES * points_y_up(vector))
-
-
-def _without_spaces(name: str) -> str:
-    """A name with underscores for white space, which BVH does not allow."""
-    return '_'.join(name.split())
 
 
 def _resampled(recording: Recording) -> tuple[float, np.ndarray, np.ndarray]:

@@ -4,24 +4,14 @@ Three topics of the node: /ragdoll/scene once; /ragdoll/poses, the bones at each
 with simulated time since the first; /ragdoll/swings, the masses of the swings, if recorded. A
 `ros2 bag record` of a node's topics of these names is a recording too.
 """
-from __future__ import annotations
-
 import io
 import sys
 from pathlib import Path
 
 import numpy as np
 
+from ..files import cdr
 from ..files.bag import read_messages
-from ..files.cdr import (
-    DEFINITIONS,
-    POSE_ARRAY,
-    STRING,
-    decode_poses,
-    decode_string,
-    encode_poses,
-    encode_string,
-)
 from ..files.run_scene import read_run_scene, run_scene_text
 from ..model import errors
 from ..model.errors import ModelError, ModelErrors
@@ -29,10 +19,9 @@ from ..model.ragdoll import WORLD
 from ..model.rotation import IDENTITY
 from ..model.scene import SECOND, Scene
 from ..model.state import State
-from .recording import RecordedPose, Recorder, Recording
-from .rods import Rods
+from .recording import RecordedPose, Recorder, Recording, Rods
 
-TOPIC_TYPES = {'scene': STRING, 'poses': POSE_ARRAY, 'swings': POSE_ARRAY}
+TOPIC_TYPES = {'scene': cdr.STRING, 'poses': cdr.POSE_ARRAY, 'swings': cdr.POSE_ARRAY}
 
 LARGEST_RECORDING = 1_000_000_000
 """Bytes; a minute of ten bones at 60 Hz is 2 MB."""
@@ -47,21 +36,22 @@ def recording_bytes(recording: Recording) -> bytes:
     stream = io.BytesIO()
     writer = Writer(stream)
     writer.start('ros2')
-    channels = {topic: writer.register_channel(
-        f'/ragdoll/{topic}', 'cdr', writer.register_schema(
-            kind, 'ros2msg', DEFINITIONS[kind].encode())) for topic, kind in TOPIC_TYPES.items()}
+    channels = {}
+    for topic, kind in TOPIC_TYPES.items():
+        schema = writer.register_schema(kind, 'ros2msg', cdr.DEFINITIONS[kind].encode())
+        channels[topic] = writer.register_channel(f'/ragdoll/{topic}', 'cdr', schema)
 
     def write(topic: str, stamp: int, data: bytes) -> None:
         writer.add_message(channels[topic], stamp, data, stamp)
 
-    write('scene', 0, encode_string(run_scene_text(recording.scene)))
+    write('scene', 0, cdr.encode_string(run_scene_text(recording.scene)))
     for index, time in enumerate(recording.times):
         stamp, pose = round(time * SECOND), recording.pose(index)
-        write('poses', stamp, encode_poses(stamp, WORLD, np.hstack(
+        write('poses', stamp, cdr.encode_poses(stamp, WORLD, np.hstack(
             [pose.positions, pose.orientations])))
         if pose.rods is not None:
             masses = pose.rods[:, 1]
-            write('swings', stamp, encode_poses(stamp, WORLD, np.hstack(
+            write('swings', stamp, cdr.encode_poses(stamp, WORLD, np.hstack(
                 [masses, np.tile(IDENTITY, (len(masses), 1))])))
     writer.finish()
     return stream.getvalue()
@@ -86,10 +76,10 @@ def _recording(path: Path) -> Recording:
     messages: dict[str, Stamped] = {'poses': [], 'swings': []}
     for topic, kind, data in read_messages(path, lambda text: print(text, file=sys.stderr)):
         last = topic.rpartition('/')[2]
-        if TOPIC_TYPES.get(last) == kind == STRING:
-            scenes.add(decode_string(data))
+        if TOPIC_TYPES.get(last) == kind == cdr.STRING:
+            scenes.add(cdr.decode_string(data))
         elif TOPIC_TYPES.get(last) == kind:
-            messages[last].append(decode_poses(data))
+            messages[last].append(cdr.decode_poses(data))
     if len(scenes) != 1 or not messages['poses']:
         raise errors.WrongForm('', f'{len(scenes)} scenes, {len(messages["poses"])} instants',
                                'one scene and its poses: ros2 bag record /ragdoll/scene '

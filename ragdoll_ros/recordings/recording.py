@@ -1,4 +1,8 @@
-"""Recordings: poses of a scene over time, with interpolation."""
+"""Recordings: poses of a scene over time, with interpolation, rods of swings, and Y up.
+
+glTF (2.0, 3.4) and BVH have Y up, facing +Z, left at +X: (x, y, z) there is (y, z, x) here, a
+rotation, so that quaternions' vector parts change likewise.
+"""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -8,6 +12,8 @@ import numpy as np
 
 from ..model import errors, rotation
 from ..model.scene import SECOND, Scene
+from ..model.state import State
+from ..physics.swing.mount import mount_swings
 
 if TYPE_CHECKING:
     from ..physics.simulation import Simulation
@@ -149,3 +155,43 @@ def _check(key: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
         raise errors.WrongForm(key, array.shape, f'the shape {shape}')
     if not np.isfinite(array).all():
         raise errors.NotFinite(key, array[~np.isfinite(array)][0], 'finite numbers')
+
+
+class Rods:
+    """Start of each rod of a scene's swings: on a bone, or the mass before it."""
+
+    def __init__(self, scene: Scene) -> None:
+        mounts, firsts = mount_swings(scene), []
+        free: list[int] = []
+        self.count = 0
+        """Masses of all swings."""
+        for mount in mounts:
+            links = len(mount.swing.links)
+            firsts.append(self.count)
+            if mount.swing.mode == 'free':
+                free += range(self.count, self.count + links)
+            self.count += links
+        self._bones = np.array([mount.bone for mount in mounts], int)
+        self._roots = np.array([mount.root for mount in mounts]).reshape(-1, 3)
+        self._firsts, self._free = np.array(firsts, int), np.array(free, int)
+
+    def ends(self, masses: np.ndarray, state: State) -> np.ndarray:
+        """Both ends (m, 2, 3) m of each rod, from the masses (m, 3) m and the bones' poses.
+
+        Of a free mass, which has no rod, both are its position.
+        """
+        begins = np.concatenate([masses[:1], masses[:-1]])
+        begins[self._firsts] = state.positions[self._bones] + rotation.rotate(
+            state.orientations[self._bones], self._roots)
+        begins[self._free] = masses[self._free]
+        return np.stack([begins, masses], axis=1)
+
+
+def points_y_up(points: np.ndarray) -> np.ndarray:
+    """Points or vectors (..., 3) with Y up."""
+    return np.asarray(points)[..., [1, 2, 0]]
+
+
+def orientations_y_up(orientations: np.ndarray) -> np.ndarray:
+    """Quaternions (..., 4) x, y, z, w with Y up."""
+    return np.asarray(orientations)[..., [1, 2, 0, 3]]

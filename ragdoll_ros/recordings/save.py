@@ -1,6 +1,4 @@
 """Writing a recording in the format of the file's suffix."""
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Callable, Mapping
@@ -9,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..model import errors
-from ..model.skin import Skin
+from ..model.skeleton import Skin
 from .bvh_file import bvh_text
 from .gltf.gltf_file import gltf_bytes
 from .mcap_file import recording_bytes

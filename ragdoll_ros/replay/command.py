@@ -1,6 +1,4 @@
 """Replay a recorded run of the node to the bit: check it, compare it, save it, publish it."""
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Iterator
@@ -41,10 +39,9 @@ def main(arguments: list[str] | None = None) -> int:
     at = arguments.index('--ros-args') if '--ros-args' in arguments else len(arguments)
     options, for_ros = parser().parse_args(arguments[:at]), arguments[at:]
     compares = options.engine or options.accuracy
-    if compares and options.publish:
-        parser().error('--publish: not with --engine or --accuracy, which compare')
-    if compares and options.save:
-        parser().error('--save: not with --engine or --accuracy, which compare')
+    for option in ('publish', 'save'):
+        if compares and getattr(options, option):
+            parser().error(f'--{option}: not with --engine or --accuracy, which compare')
     if for_ros and not options.publish:
         parser().error(f'{" ".join(for_ros)}: only with --publish')
     try:
@@ -106,7 +103,11 @@ def replay(run: ReplayedRun, options: argparse.Namespace, for_ros: list[str]) ->
     steps = recorder.record(player.ticks()) if options.save else player.ticks()
     try:
         if options.publish:
-            _publish(steps, options.pace, for_ros)
+            try:
+                from .published import publish
+            except ImportError as error:
+                raise errors.Unreadable('', str(error), NO_ROS) from None
+            publish(steps, options.pace, for_ros)
         else:
             for _ in steps:
                 pass
@@ -213,14 +214,6 @@ def save(recording: Recording, paths: list[Path]) -> None:
 def warn(text: str) -> None:
     """Print a warning."""
     print(f'warning: {text}', file=sys.stderr)
-
-
-def _publish(steps: Iterator[Simulation], pace: float, for_ros: list[str]) -> None:
-    try:
-        from .published import publish
-    except ImportError as error:
-        raise errors.Unreadable('', str(error), NO_ROS) from None
-    publish(steps, pace, for_ros)
 
 
 if __name__ == '__main__':

@@ -1,6 +1,4 @@
 """Repeating a run: the same events at the same ticks, with a check of the states."""
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -78,7 +76,11 @@ class Player:
         elif event.kind == 'state':
             self._check(event.fields.get('sha256'))
         elif event.kind != 'accuracy' or self._accuracy is None:
-            self._repeat(event)
+            try:
+                apply_event(self.simulation, event.kind, event.fields)
+            except errors.ModelError as error:
+                raise error.at(f'event {event.number}') from None
+            self.events_repeated += 1
 
     def _begin(self, event: Event) -> None:
         """Build the simulation of a start event."""
@@ -86,8 +88,7 @@ class Player:
         scene, fields = self._run.scene(event), event.fields
         try:
             self.simulation = Simulation(
-                scene, float(fields['step']),
-                self._accuracy or accuracy_from(fields['accuracy']),
+                scene, float(fields['step']), self._accuracy or accuracy_from(fields['accuracy']),
                 self._engine or str(fields['engine']))
             self.simulation.samples_per_tick = int(fields.get('parts', 1))
         except errors.RagdollError:
@@ -98,13 +99,6 @@ class Player:
         self.tick = event.tick
         if 'state' in fields:
             self._check(fields['state'])
-
-    def _repeat(self, event: Event) -> None:
-        try:
-            apply_event(self.simulation, event.kind, event.fields)
-        except errors.ModelError as error:
-            raise error.at(f'event {event.number}') from None
-        self.events_repeated += 1
 
     def _check(self, digest: str) -> None:
         self.checks.append(Check(self.tick, state_digest(self.simulation.state) == digest))

@@ -1,6 +1,4 @@
 """A run published in real time on the topics of a node `ragdoll`."""
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 

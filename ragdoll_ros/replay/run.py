@@ -1,6 +1,4 @@
 """A run read from a bag: its events in order and its scenes."""
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -85,6 +83,5 @@ def _event(index: int, text: str) -> Event:
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         counts = False
     if not counts or not isinstance(kind, str):
-        raise errors.WrongForm(f'events[{index}]', text,
-                               'a JSON object with number, tick and kind')
+        raise errors.WrongForm(f'events[{index}]', text, 'a JSON object with number, tick and kind')
     return Event(number, tick, kind, fields)

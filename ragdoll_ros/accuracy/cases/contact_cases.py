@@ -1,6 +1,4 @@
 """Hard contact cases: mass ratios, stacks, piles, collisions of dolls, extreme friction."""
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -12,8 +10,7 @@ from ...model.ragdoll import Bone, Ragdoll
 from ...model.scene import Ground, Material, Placement, Scene
 from ...model.shapes import Box, Sphere
 from . import starts
-from .hard_case import HardCase, Requirements, drop
-from .trial import Trial, posed
+from .trial import HardCase, Requirements, Trial, drop, posed
 
 COLLISIONS = (2.0, 6.0, 20.0, 60.0)
 """Approach speeds, m/s, of two dolls in the air."""

@@ -1,6 +1,4 @@
 """Random scenes, reproducible: any shapes, joints, masses, materials, motions."""
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,6 +1,4 @@
 """Hard cases: scenes that break simulations, each with its requirements."""
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math
@@ -12,8 +10,7 @@ from ...model.ragdoll import Bone, Joint, Ragdoll
 from ...model.shapes import Box, Capsule, Cylinder, Sphere
 from . import starts
 from .contact_cases import contact_cases
-from .hard_case import HardCase, Requirements, drop
-from .trial import Trial, posed
+from .trial import HardCase, Requirements, Trial, drop, posed
 
 
 def hard_cases() -> list[HardCase]:

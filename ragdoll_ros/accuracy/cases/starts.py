@@ -3,8 +3,6 @@
 A start is determined by its class and number. Joint angles are drawn from the inner part of their
 ranges, so that no bones overlap; the height of the lowest point is exact.
 """
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

@@ -3,8 +3,6 @@
 Except in the pile and the digests, dolls are 2.5 m apart and do not touch. Compare ratios: absolute
 times depend on the machine.
 """
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import math
@@ -13,8 +11,7 @@ import time
 
 import numpy as np
 
-from ...files.repeat import repeated_placements
-from ...files.scene import load_scene
+from ...files.scene import load_scene, repeated_placements
 from ...model.push import Push
 from ...model.scene import Placement, Scene
 from ...physics.accuracy import ACCURACIES

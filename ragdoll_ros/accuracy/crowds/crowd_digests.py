@@ -2,16 +2,13 @@
 
 Sixty dolls: some collide, some are pushed, some sleep and are woken, one is far from all others.
 """
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import subprocess
 import sys
 from collections import Counter
 
-from ...files.repeat import repeated_placements
-from ...files.scene import load_scene
+from ...files.scene import load_scene, repeated_placements
 from ...model.push import Push
 from ...model.scene import Placement, Scene
 from ...physics.simulation import Simulation

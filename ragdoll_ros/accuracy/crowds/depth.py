@@ -1,6 +1,4 @@
 """Penetration depths of bones by MuJoCo's distance functions, independent of all engines."""
-from __future__ import annotations
-
 import itertools
 
 import numpy as np
@@ -46,9 +44,10 @@ class BoneDepth:
         if not far.all():
             self._pose(positions, orientations)
         for index in np.flatnonzero(~far):
-            found[index] = max(0.0, *(-self._distance(int(one), int(other)) for one, other in
-                                      itertools.product(*map(self._geoms.__getitem__,
-                                                             self._pairs[index]))))
+            geoms = itertools.product(*(self._geoms[bone] for bone in self._pairs[index]))
+            found[index] = max(0.0, *(-self._mujoco.mj_geomDistance(
+                self._model, self._data, int(one), int(other), SEARCH_DISTANCE, None)
+                for one, other in geoms))
         return found
 
     def deepest(self, trajectory: Trajectory) -> float:
@@ -73,10 +72,6 @@ class BoneDepth:
             turns, self._places)
         self._data.geom_xmat[self._own] = rotation.matrix(
             rotation.multiply(turns, self._turns)).reshape(-1, 9)
-
-    def _distance(self, one: int, other: int) -> float:
-        return self._mujoco.mj_geomDistance(self._model, self._data, one, other,
-                                            SEARCH_DISTANCE, None)
 
 
 def _deepest(found: np.ndarray) -> float:

@@ -3,8 +3,6 @@
 Penetration is measured independently of the engines: by MuJoCo's distance functions, and by the
 shapes' heights above the ground.
 """
-from __future__ import annotations
-
 import itertools
 import math
 import time
@@ -19,7 +17,7 @@ from ...model.state import State
 from ...physics.accuracy import Accuracy
 from ...physics.engine.substepped.bullet import BulletEngine
 from ...physics.engine.substepped.mujoco import MujocoEngine
-from ...physics.ground_heights import GroundHeights
+from ...physics.rigid_body import GroundHeights
 from ...physics.simulation import Simulation
 from .depth import BoneDepth
 

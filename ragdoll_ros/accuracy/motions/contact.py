@@ -1,6 +1,4 @@
 """Contacts with a closed form: a bouncing ball, a block on a slope, a rolling ball."""
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,6 +1,4 @@
 """Reference motions in flight: falls, throws, a tumbling box, chains, the doll."""
-from __future__ import annotations
-
 import dataclasses
 import math
 

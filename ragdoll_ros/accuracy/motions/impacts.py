@@ -1,6 +1,4 @@
 """Reference motions with impacts, and on edges and faces: rocking, tipping, spinning."""
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable
@@ -12,7 +10,7 @@ from ...model.ragdoll import Bone, Ragdoll
 from ...model.scene import Ground, Material, Placement, Scene
 from ...model.shapes import Box, Cylinder, Shape, Sphere
 from ..cases.trial import Trial
-from ..references import impacts, sliding_disc
+from ..references import closed_forms, impacts
 from ..trajectory import Trajectory
 from .motion import ReferenceMotion, orientations_about
 
@@ -129,7 +127,7 @@ def thin_disc() -> ReferenceMotion:
     radius, thick, speed, rate, friction = 0.2, 0.002, 1.0, 10.0, 0.3
 
     def truth(times: np.ndarray) -> Trajectory:
-        slid, angles = sliding_disc.slide_and_spin(radius, friction, GRAVITY, speed, rate, times)
+        slid, angles = closed_forms.slide_and_spin(radius, friction, GRAVITY, speed, rate, times)
         centres = np.stack([slid, 0 * slid, 0 * slid + thick / 2], axis=1)
         return Trajectory.of_poses(times, centres[:, None],
                                    orientations_about((0.0, 0.0, 1.0), angles[:, None]))

@@ -3,8 +3,6 @@
 A doll's root is free, so the pivot is a root of 1e12 kg and 100 m radius. Gravity is off; instead a
 constant push of the bob's weight acts on its centre, so that the pivot moves by only 2e-11 m.
 """
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,6 +1,4 @@
 """A trial with its exact solution."""
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass

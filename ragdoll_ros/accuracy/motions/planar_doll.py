@@ -1,6 +1,4 @@
 """A planar doll of five rods that falls: simultaneous contacts with an exact solution."""
-from __future__ import annotations
-
 import numpy as np
 
 from ...model.coordinates import GeneralizedState

@@ -1,6 +1,4 @@
 """Two dolls that collide in the air: conservation of momentum, and penetration of bones."""
-from __future__ import annotations
-
 import functools
 import math
 
@@ -12,6 +10,7 @@ from ..metrics import Metrics
 from ..results.runner import Job, Row, RunOptions
 
 NAME = 'collisions'
+FIGURES = ('momentum_drift', 'angular_momentum_drift', 'depth_m', 'energy_excess')
 OTHERS = ('bullet-4', 'bullet-10', 'mujoco-implicitfast-4', 'mujoco-implicitfast-10')
 
 
@@ -36,6 +35,3 @@ def measure(name: str) -> list[Row]:
             'depth_m': BoneDepth(trial.scene).deepest(moved),
             'energy_excess': metrics.energy_excess(trial, moved)}))
     return rows
-
-
-FIGURES = ('momentum_drift', 'angular_momentum_drift', 'depth_m', 'energy_excess')

@@ -3,12 +3,9 @@
 Self-convergence proves less: an engine may converge to another restitution or to compliant
 contacts. So the difference to its own finest run is only given in addition.
 """
-from __future__ import annotations
-
 import functools
 
-from .. import step_sizes
-from ..methods import Method, bullet, core, mujoco, run
+from ..methods import TICK, Method, bullet, contact_step, core, has_rigid_engine, mujoco, run
 from ..metrics import compare
 from ..motions.contact import contact_motions
 from ..motions.impacts import impact_motions
@@ -44,8 +41,8 @@ def families(halvings: int) -> dict[str, list[Method]]:
     counts = [2 ** k for k in range(halvings + 1)]
     found = {'PyBullet': [*map(bullet, counts)],
              'MuJoCo implicitfast': [mujoco('implicitfast', count) for count in counts]}
-    if step_sizes.has_rigid_engine():
-        first = step_sizes.contact_step('draft')
+    if has_rigid_engine():
+        first = contact_step('draft')
         return {'core': [core(first / count) for count in counts], **found}
     return found
 
@@ -66,5 +63,4 @@ def measure(motion_name: str, halvings: int) -> list[Row]:
 
 
 def _step(method: Method) -> float:
-    return step_sizes.TICK / method.substeps if method.substeps else float(
-        method.name.removeprefix('core-'))
+    return TICK / method.substeps if method.substeps else float(method.name.removeprefix('core-'))

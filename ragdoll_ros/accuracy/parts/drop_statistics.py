@@ -3,8 +3,6 @@
 Two populations: drops of random orientation and pose, and the default drop tilted by milliradians.
 Samples are compared with the reference's by the two-sample Kolmogorov-Smirnov test.
 """
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

@@ -1,6 +1,4 @@
 """Energy over time of the default drop and of a free spin; tick costs of the drop."""
-from __future__ import annotations
-
 import functools
 
 import numpy as np

@@ -3,8 +3,6 @@
 The truth of a tick starts from the simulation's state before it: the equations of motion integrated
 at 1e-12 over that tick. Ticks count if the simulation reports its estimate as trusted.
 """
-from __future__ import annotations
-
 import functools
 
 import numpy as np

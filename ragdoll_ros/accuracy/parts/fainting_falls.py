@@ -3,8 +3,6 @@
 People stand and lean a little, their joints held by springs; then the springs of ankles, knees,
 hips and trunk are released one after the other in random order, those of the arms with the first.
 """
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math
@@ -20,7 +18,7 @@ from ...model.scene import SECOND, Material, Placement, Scene
 from ...people import person, standing
 from ...people.fall_phases import ONSET_DURATION, bone_impacts, find_phases, part_impact
 from ...people.real_falls import DESCENT, IMPACT_SPEEDS, SHARE_THAT_HITS, Known
-from ...physics.ground_heights import GroundHeights
+from ...physics.rigid_body import GroundHeights
 from ...physics.simulation import Simulation
 from ..results.figures import Row
 from ..results.markdown import table

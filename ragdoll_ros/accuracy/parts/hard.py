@@ -1,6 +1,4 @@
 """Hard cases: each is run and checked against its requirements."""
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math
@@ -14,9 +12,8 @@ from ...model.scene import Placement
 from ...model.shapes import Sphere
 from ...physics.simulation import Simulation
 from ..cases.fuzzed import fuzzed
-from ..cases.hard_case import SINKING, HardCase, Requirements
 from ..cases.hard_cases import hard_cases
-from ..cases.trial import Trial
+from ..cases.trial import SINKING, HardCase, Requirements, Trial
 from ..crowds.depth import BoneDepth
 from ..methods import by_name, run
 from ..metrics import Metrics

@@ -1,6 +1,4 @@
 """Order of convergence of each method: slope of the error over the tick."""
-from __future__ import annotations
-
 import dataclasses
 import functools
 import itertools

@@ -1,6 +1,4 @@
 """Single bodies that bounce: their apexes against the restitution."""
-from __future__ import annotations
-
 import functools
 import itertools
 import math

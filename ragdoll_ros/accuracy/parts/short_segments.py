@@ -5,8 +5,6 @@ Impacts are chaotic, so a long run says little about a method. After Erez, Tassa
 reference from the same state. They compared each engine with itself; here the error is against one
 reference for all, and self-convergence and joint gaps are given in addition.
 """
-from __future__ import annotations
-
 import functools
 
 import numpy as np

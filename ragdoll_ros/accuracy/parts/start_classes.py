@@ -1,6 +1,4 @@
 """The nine classes of random starts: energy gain, overshoot, penetration, and CPU time."""
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

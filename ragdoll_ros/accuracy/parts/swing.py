@@ -3,8 +3,6 @@
 For comparison VRM spring bones (VRMC_springBone-1.0: a Verlet step with drag, stiffness and gravity
 each times the frame's length), whose period depends on the frame rate.
 """
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable

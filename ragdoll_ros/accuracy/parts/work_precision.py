@@ -1,6 +1,4 @@
 """Work-precision: CPU time and error of every method on every reference motion."""
-from __future__ import annotations
-
 import functools
 
 import numpy as np

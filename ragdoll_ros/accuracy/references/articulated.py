@@ -10,8 +10,6 @@ dv/dt = 0 (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 3):
 integrated by DOP853 (Hairer, Norsett, Wanner) at 1e-12, without limits and contacts. The
 layout of coordinates is that of model/coordinates.py, joints depth first.
 """
-from __future__ import annotations
-
 import functools
 import itertools
 from collections.abc import Callable, Sequence

@@ -9,8 +9,6 @@ G the Delassus matrix, w accelerations or velocities after an impact. A contact 
 w_n >= 0) or closed (w_n = 0, n >= 0), and closed it sticks (w_t = 0, |t| <= mu n) or slides towards
 s (t = -s mu n, s w_t >= 0). Moreau's law: sliding is determined by the velocity afterwards.
 """
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 

@@ -4,8 +4,6 @@ Between events DOP853 at 1e-12 with fixed contact modes (contact_modes.py). Even
 a lift-off, the begin and the end of sliding. At a touch-down all closed feet obey Newton's law,
 w_n = -e w_n before, and Moreau's friction law.
 """
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -93,8 +91,7 @@ def _at_rest(figure: PlanarRods, y: np.ndarray, closed: np.ndarray) -> np.ndarra
     return np.concatenate([y[:len(change)], speeds + change])
 
 
-def _modes(figure: PlanarRods, y: np.ndarray, resting: np.ndarray, hint: Hint,
-           ) -> tuple[str, ...]:
+def _modes(figure: PlanarRods, y: np.ndarray, resting: np.ndarray, hint: Hint) -> tuple[str, ...]:
     """Modes of all feet after an event; ``hint`` restricts those of the foot of the event."""
     places, modes = np.flatnonzero(resting), [OPEN] * len(figure.feet)
     if not len(places):

@@ -2,8 +2,6 @@
 
 Shares no code with the engines. Planar motions: x forward, z up, angles about y, positive forwards.
 """
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,6 +1,4 @@
 """One integrator for all references: DOP853 at 1e-12 (Hairer, Norsett, Wanner 1993)."""
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -8,8 +8,6 @@ Then T = m/2 sum |x_i'|^2 + I/2 sum phi_i'^2 gives
 
 integrated by DOP853 at 1e-12. Shares no code with the engines.
 """
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

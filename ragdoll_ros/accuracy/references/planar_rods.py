@@ -8,8 +8,6 @@ y. Every point is the root's centre plus a sum of rods, p = c + sum_k b_k u(phi_
 Rods end in balls that touch the ground at their lowest points. Shares no code with the engines;
 event_driven.py integrates from event to event.
 """
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,6 +1,4 @@
 """`ragdoll_report`: run every part by every method, write JSON, Markdown and pictures."""
-from __future__ import annotations
-
 import argparse
 import importlib.util
 import sys

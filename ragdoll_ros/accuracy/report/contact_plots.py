@@ -1,10 +1,10 @@
-"""Plots of contacts: errors over step size, and distributions of drops."""
-from __future__ import annotations
-
+"""Plots of contacts: errors over step size, distributions of drops, and fainting falls."""
 import math
 
 import numpy as np
 
+from ...people.real_falls import DESCENT, IMPACT_SPEEDS, Known
+from ..parts.fainting_falls import joined
 from ..results.figures import Figures, number, sound
 
 STYLES = {'core': ('#1f5fbf', 'D'), 'PyBullet': ('#e69f00', 'o'),
@@ -12,6 +12,8 @@ STYLES = {'core': ('#1f5fbf', 'D'), 'PyBullet': ('#e69f00', 'o'),
 """Colour and marker of each engine."""
 
 COLUMNS = 4
+
+BLUE, ORANGE = '#1f5fbf', '#e69f00'
 
 
 def draw_convergence(figures: Figures, plt: object) -> object:
@@ -63,3 +65,43 @@ def draw_drops(figures: Figures, plt: object) -> object:
     grid[0].set_ylabel('share of drops below')
     figure.legend(*grid[0].get_legend_handles_labels(), loc='outside lower center', ncols=4)
     return figure
+
+
+def draw_fainting_falls(figures: Figures, plt: object) -> object:
+    """Histograms of impact speeds and descent times; bands: mean and SD of real falls."""
+    rows = sound(figures.get('faints', ()))
+    if not rows:
+        return None
+    values = joined(rows)
+    figure, grid = plt.subplots(1, 4, figsize=(14, 3.2), layout='constrained')
+    shown = [(part, f'{part}: vertical speed at impact, m/s', known)
+             for part, known in IMPACT_SPEEDS.items()]
+    shown.append(('descent', 'descent: onset to impact of the pelvis, s', DESCENT))
+    for axes, (key, text, known) in zip(grid, shown, strict=True):
+        own = values[key][np.isfinite(values[key])]
+        axes.hist(own, bins=30, color=BLUE, alpha=0.8, label=f'simulated: {len(own)}')
+        _band(axes.axvspan, axes.axvline, known)
+        axes.set(xlabel=text, ylabel='falls')
+        axes.legend(fontsize=8)
+    return figure
+
+
+def draw_fall_directions(figures: Figures, plt: object) -> object:
+    """Impact speeds over the direction of the lean."""
+    rows = sound(figures.get('faints', ()))
+    if not rows:
+        return None
+    values = joined(rows)
+    figure, grid = plt.subplots(1, 3, figsize=(12, 3.2), layout='constrained', sharex=True)
+    for axes, (part, known) in zip(grid, IMPACT_SPEEDS.items(), strict=True):
+        axes.plot(np.degrees(values['towards']), values[part], '.', color=BLUE, ms=3)
+        _band(axes.axhspan, axes.axhline, known)
+        axes.set(xlabel='lean, degrees from forwards to the left', title=part,
+                 ylabel='vertical speed at impact, m/s', xticks=range(-180, 181, 90))
+    return figure
+
+
+def _band(span: object, line: object, known: Known) -> None:
+    span(known.mean - known.deviation, known.mean + known.deviation, color=ORANGE, alpha=0.25,
+         label='real falls, ± 1 SD')
+    line(known.mean, color=ORANGE)

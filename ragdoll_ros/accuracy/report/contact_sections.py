@@ -1,6 +1,4 @@
 """Sections about contacts: convergence, restitution, segments, drops, collisions."""
-from __future__ import annotations
-
 from ..results.figures import Row, number
 from ..results.markdown import Section, table
 
@@ -77,7 +75,6 @@ SEGMENTS = Section(
     'compare each engine with its own finest run.', body=segments_table,
     below=(('pieces', 'Error over CPU time through contacts'),))
 
-
 DROP_HEADS = {'energy_0.3s': 'relative energy at 0.3 s', 'energy_0.5s': 'at 0.5 s',
               'energy_1s': 'at 1 s', 'slide_m': 'slide m', 'settled_s': 'settling time s',
               'spread_m': 'spread of bones m'}
@@ -104,7 +101,6 @@ DROPS = Section(
     'that of the two-sample Kolmogorov-Smirnov test against the reference: where it is small, the '
     'distributions differ.', body=drop_tables,
     below=(('drops', 'Distributions of random drops'),))
-
 
 COLLISIONS = Section(
     'collisions', 'Two dolls that collide in the air',

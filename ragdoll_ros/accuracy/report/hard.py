@@ -1,6 +1,4 @@
 """`python -m ragdoll_ros.accuracy.report.hard`, `make hard`: run the hard cases alone."""
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

@@ -1,6 +1,4 @@
 """`python -m ragdoll_ros.accuracy.report.many_starts`: a report of 10 008 random starts."""
-from __future__ import annotations
-
 import argparse
 import sys
 import time

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..results.criteria import EXCESS
 from ..results.figures import Figures, Row, number, sound
-from .contact_plots import draw_convergence, draw_drops
-from .fall_plots import draw_fainting_falls, draw_fall_directions
+from .contact_plots import draw_convergence, draw_drops, draw_fainting_falls, draw_fall_directions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -226,8 +225,7 @@ def draw_estimate(figures: Figures, plt: object) -> object:
 
 def _work_precision(axes: Axes, rows: Sequence[Row], error_key: str) -> None:
     """A work-precision plot: a line for each family, the Pareto front, the real-time line."""
-    points = [(row['family'], number(row['cpu_s_per_s']), number(row[error_key]))
-              for row in rows]
+    points = [(row['family'], number(row['cpu_s_per_s']), number(row[error_key])) for row in rows]
     points = [(family, x, max(y, SMALLEST)) for family, x, y in points
               if math.isfinite(y) and y < 1e3]
     for family in COLOURS:

@@ -1,6 +1,4 @@
 """The Markdown page: its sections, with every figure from the JSON."""
-from __future__ import annotations
-
 from ..cases.hard_cases import hard_cases
 from ..parts.fainting_falls import falls_tables
 from ..results.criteria import ROUNDING, criteria
@@ -80,8 +78,7 @@ SECTIONS = (
                 ('order_finest', 'between the finest two', '{:.2f}'),
                 ('points', 'points', '{}')),
             below=(('orders', 'Error over the tick'),)),
-    contact_sections.RESTITUTION, contact_sections.CONVERGENCE,
-    contact_sections.SEGMENTS,
+    contact_sections.RESTITUTION, contact_sections.CONVERGENCE, contact_sections.SEGMENTS,
     contact_sections.DROPS, contact_sections.COLLISIONS,
     Section('classes', 'Nine classes of starts',
             'Energy excess is the largest rise of E - work above its running minimum, over '

@@ -1,6 +1,4 @@
 """Acceptance criteria of impacts and contacts."""
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 
@@ -36,14 +34,11 @@ def _restitution(figures: Figures) -> Iterator[Row]:
     for accuracy, rows in by_setting(figures, 'restitution'):
         worst = float(np.max([number(row['worst']) for row in rows]))
         apexes = sum(row['seen'] for row in rows)
-        yield criterion(f'apexes of single bodies, {_span(rows)}, {accuracy}',
+        found = [row['restitution'] for row in rows]
+        span = f'e = {min(found):g} to {max(found):g}'
+        yield criterion(f'apexes of single bodies, {span}, {accuracy}',
                         f'relative error at most {APEX:g}', f'{apexes} apexes, largest {worst:.1e}',
                         worst <= APEX)
-
-
-def _span(rows: list[Row]) -> str:
-    found = [row['restitution'] for row in rows]
-    return f'e = {min(found):g} to {max(found):g}'
 
 
 def _closed_forms(figures: Figures) -> Iterator[Row]:
@@ -64,7 +59,8 @@ def _rocking(figures: Figures) -> Iterator[Row]:
 
 
 def _segments(figures: Figures) -> Iterator[Row]:
-    base = _cpu(figures, 'bullet-10')
+    base = next((number(row['cpu_s_per_s']) for row in figures.get('pieces', ())
+                 if row.get('method') == 'bullet-10'), None)
     for accuracy, rows in by_setting(figures, 'pieces', lambda row: 'reference' in row):
         median, most, ratio = SEGMENTS[accuracy]
         found = 1e3 * number(rows[0]['position_median_m']), 1e3 * number(rows[0]['position_p90_m'])
@@ -76,11 +72,6 @@ def _segments(figures: Figures) -> Iterator[Row]:
             over = number(rows[0]['cpu_s_per_s']) / base
             yield criterion(f'CPU of segments over PyBullet N = 10, {accuracy}',
                             f'at most {ratio:g}', f'{over:.2f}', over <= ratio)
-
-
-def _cpu(figures: Figures, method: str) -> float | None:
-    return next((number(row['cpu_s_per_s']) for row in figures.get('pieces', ())
-                 if row.get('method') == method), None)
 
 
 def _not_dominated(figures: Figures) -> Iterator[Row]:

@@ -1,6 +1,4 @@
 """Acceptance criteria, checked against the figures of a run."""
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterator

@@ -1,6 +1,4 @@
 """The report's data: a JSON file with every figure and the conditions of the run."""
-from __future__ import annotations
-
 import datetime
 import importlib.metadata
 import json

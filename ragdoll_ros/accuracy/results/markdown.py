@@ -1,6 +1,4 @@
 """Markdown tables and sections from rows of figures."""
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

@@ -1,6 +1,4 @@
 """Run the jobs of all parts: timed ones alone, the others in parallel."""
-from __future__ import annotations
-
 import concurrent.futures
 import multiprocessing
 import os

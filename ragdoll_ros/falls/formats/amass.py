@@ -5,11 +5,8 @@ rad, relative to the bind pose: of the root in the world, of every other bone re
 parent. joint_names are their bones, those of this doll and not of SMPL. onset, impact (first
 contact) and rest are the frames of Phases, -1 if there is none.
 """
-from __future__ import annotations
-
 import io
 import json
-from pathlib import Path
 
 import numpy as np
 
@@ -23,11 +20,6 @@ NAME = 'amass/fall_{number:07d}.npz'
 def shard_files(recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, bytes]:
     """One file per fall."""
     return {NAME.format(number=fall.number): _written(recipe, fall) for fall in falls}
-
-
-def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
-    """None: each file is complete."""
-    return {}
 
 
 def _written(recipe: Recipe, fall: Fall) -> bytes:

@@ -6,18 +6,14 @@ Columns: time s, frame, acceleration g, rate deg/s, Euler angles deg (roll, pitc
 sensor in the world). A shard stands for a subject, a fall for a trial of task 1. Labels are sample
 numbers of Phases.onset and Phases.impact, the first contact. The sensor's axes are the recipe's.
 """
-from __future__ import annotations
-
 import csv
 import io
-from pathlib import Path
 
 import numpy as np
 
 from ...model import rotation
 from ...model.errors import WrongForm
-from ..fall import Fall
-from ..imu_samples import fall_samples, sensor_orientations
+from ..fall import Fall, fall_samples, sensor_orientations
 from ..recipe import Recipe
 
 SENSOR = 'sensor_data/SA{shard:06d}/S{shard:06d}T01R{trial:02d}.csv'
@@ -40,14 +36,11 @@ def shard_files(recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, byte
     """One file per fall, and the shard's labels."""
     files = {SENSOR.format(shard=shard, trial=trial): _table(COLUMNS, _rows(recipe, fall))
              for trial, fall in enumerate(falls, 1)}
-    labels = [('F01 (1)', recipe.name, trial, *_label_samples(fall), fall.number, fall.failure)
+    labels = [('F01 (1)', recipe.name, trial,
+               *('' if frame is None else frame * fall.samples_per_frame
+                 for frame in (fall.phases.onset, fall.phases.impact)), fall.number, fall.failure)
               for trial, fall in enumerate(falls, 1)]
     return {**files, LABELS.format(shard=shard): _table(LABEL_COLUMNS, labels)}
-
-
-def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
-    """None: each shard is complete."""
-    return {}
 
 
 def _rows(recipe: Recipe, fall: Fall) -> list[list[float]]:
@@ -59,12 +52,6 @@ def _rows(recipe: Recipe, fall: Fall) -> list[list[float]]:
                             np.degrees(np.array(angles).reshape(-1, 3))], axis=1)
     return [[f'{time:.6f}', place, *(f'{number:.6f}' for number in row)]
             for place, (time, row) in enumerate(zip(times, table.tolist(), strict=True))]
-
-
-def _label_samples(fall: Fall) -> list[object]:
-    """Sample numbers of onset and impact."""
-    return ['' if frame is None else frame * fall.samples_per_frame
-            for frame in (fall.phases.onset, fall.phases.impact)]
 
 
 def _table(header: tuple[str, ...], rows: list) -> bytes:

@@ -8,8 +8,6 @@ indices of a shard follow from its number.
 Labels in meta/episodes: onset, impact (first contact) and rest are the frames of Phases;
 impact_frames and impact_speeds (m/s downwards) are those of each bone's first contact.
 """
-from __future__ import annotations
-
 import io
 import json
 from dataclasses import dataclass
@@ -20,8 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as parquet
 
 from ...model.errors import WrongForm
-from ..fall import Fall
-from ..imu_samples import NAMES, samples_by_frame
+from ..fall import SAMPLE_NAMES, Fall, samples_by_frame
 from ..recipe import Recipe
 
 FILES_PER_CHUNK = 1000
@@ -54,7 +51,7 @@ def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
         'total_frames': count * recipe.frames, 'total_tasks': 1, 'chunks_size': FILES_PER_CHUNK,
         'data_files_size_in_mb': 100, 'video_files_size_in_mb': 200, 'fps': recipe.rate,
         'splits': {'train': f'0:{count}'}, 'data_path': DATA, 'video_path': None,
-        'features': _features(recipe, folder / DATA.format(chunk_index=0, file_index=0))}
+        'features': _features(folder / DATA.format(chunk_index=0, file_index=0))}
     return {'meta/info.json': _json(info), 'meta/stats.json': _json(stats),
             'meta/tasks.parquet': _tasks(recipe.name)}
 
@@ -119,8 +116,9 @@ def _each(bones: tuple[str, ...], parts: tuple[str, ...]) -> list[str]:
 def _sample_names(recipe: Recipe) -> tuple[str, ...]:
     """Names of a sensor's numbers in a frame, numbered if it has several samples."""
     if recipe.samples_per_frame == 1:
-        return NAMES
-    return tuple(f'{name}_{sample}' for sample in range(recipe.samples_per_frame) for name in NAMES)
+        return SAMPLE_NAMES
+    return tuple(f'{name}_{sample}' for sample in range(recipe.samples_per_frame)
+                 for name in SAMPLE_NAMES)
 
 
 def _array(column: Column) -> pa.Array:
@@ -190,7 +188,7 @@ def _whole_stats(paths: list[Path], keys: list[str]) -> dict:
     return whole
 
 
-def _features(recipe: Recipe, path: Path) -> dict:
+def _features(path: Path) -> dict:
     """LeRobot's description of each column."""
     schema = parquet.read_schema(path)
     names = json.loads(schema.metadata[b'names'])

@@ -1,6 +1,4 @@
 """Registry of the formats."""
-from __future__ import annotations
-
 import importlib
 from pathlib import Path
 from typing import Protocol
@@ -27,7 +25,7 @@ class Format(Protocol):
         """Files of a shard by their paths in the data set's folder."""
 
     def last_files(self, recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
-        """Files of the whole data set, after all shards of its ``count`` falls are written."""
+        """Files of the data set, after all shards of its ``count`` falls are written; optional."""
 
 
 def resolve_format(name: str) -> Format:

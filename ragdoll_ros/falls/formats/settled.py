@@ -3,8 +3,6 @@
 Of nearly equal states only the first is kept. They are compared by joint angles and by the
 direction of gravity in the root's axes, so position and heading do not matter.
 """
-from __future__ import annotations
-
 import io
 from pathlib import Path
 

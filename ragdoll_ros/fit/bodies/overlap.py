@@ -1,6 +1,4 @@
 """Overlap of bodies with each other and coverage of the skin, in the bind pose."""
-from __future__ import annotations
-
 import numpy as np
 
 from ...model.ragdoll import Bone, Ragdoll

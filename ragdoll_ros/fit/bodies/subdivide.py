@@ -3,8 +3,6 @@
 A leg may have vertices at the hip and the hoof only. The influences of a new vertex are the mean
 of those at both ends of its edge.
 """
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

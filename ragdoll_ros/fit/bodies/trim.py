@@ -1,10 +1,10 @@
-"""Trim shallow overlaps between bodies that no joint connects.
+"""Bodies extended to the anchors of their joints, and trimmed where others overlap them.
+
+An anchor is the child bone's root where both bodies reach it, else where the skins meet.
 
 Two thighs touch at the crotch; as bodies they would push each other apart at the start. Deep
 overlaps stay and are excluded from collision (see colliding_overlaps).
 """
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -12,8 +12,7 @@ import numpy as np
 from ...model import rotation
 from ...model.ragdoll import Bone
 from ...model.shapes import Box, Shape, Sphere
-from ..shapes.fitting import FittedShape
-from ..skeleton.anchors import ANCHOR_TOLERANCE, relative_distance
+from ..shapes.fitting import FittedShape, extend_to
 from ..skeleton.groups import BodyGroup
 from .overlap import MIN_OVERLAP
 
@@ -27,6 +26,47 @@ _AROUND = np.pi * (3 - np.sqrt(5)) * np.arange(201)
 DIRECTIONS = np.stack([np.sqrt(1 - _HEIGHTS ** 2) * np.cos(_AROUND),
                        np.sqrt(1 - _HEIGHTS ** 2) * np.sin(_AROUND), _HEIGHTS], axis=1)
 """Unit directions (201, 3), evenly spread over the sphere: a golden-angle spiral."""
+
+ANCHOR_TOLERANCE = 0.06
+"""Largest distance of an anchor from its body, as a fraction of the body's longest extent."""
+
+MAX_EXTENSION = 0.4
+"""Largest extension of a body towards its anchor, as a fraction of the body's extent."""
+
+
+def place_anchors(groups: list[BodyGroup], fits: list[FittedShape],
+                  frames: list[np.ndarray]) -> list[FittedShape]:
+    """Choose each group's anchor, and extend the shapes to reach their anchors.
+
+    The anchor is the first candidate within ANCHOR_TOLERANCE of both bodies, else the nearest.
+    The ``fits`` are centred in the doll's frame; ``frames`` (3, 3) have their axes as columns.
+    """
+    jointed = [(index, group) for index, group in enumerate(groups)
+               if group.parent >= 0 and not group.fixed]
+    for index, group in jointed:
+        distances = [max(_anchor_distance(fits[k], frames[k], point) for k in (index, group.parent))
+               for point in group.anchors]
+        reached = [number for number, value in enumerate(distances) if value <= ANCHOR_TOLERANCE]
+        group.anchor = group.anchors[reached[0] if reached else int(np.argmin(distances))]
+    extended = list(fits)
+    for index, group in jointed:
+        for k in (index, group.parent):
+            if _anchor_distance(fits[k], frames[k], group.anchor) <= MAX_EXTENSION:
+                old, frame = extended[k], frames[k]
+                new = extend_to(old.shape, (group.anchor - old.centre) @ frame)
+                extended[k] = dataclasses.replace(
+                    new, centre=old.centre + frame @ new.centre, coverage=old.coverage)
+    return extended
+
+
+def _anchor_distance(fit: FittedShape, frame: np.ndarray, point: np.ndarray) -> float:
+    """Distance of a point outside a body, as a fraction of the body's longest extent."""
+    return max(0.0, float(relative_distance(fit.shape, ((point - fit.centre) @ frame)[None])[0]))
+
+
+def relative_distance(shape: Shape, points: np.ndarray) -> np.ndarray:
+    """Signed distance (k,) of points (k, 3) in a shape's frame over its longest extent."""
+    return shape.signed_distance(points) / (2 * max(shape.half_extents))
 
 
 def trim_overlaps(groups: list[BodyGroup], fits: list[FittedShape],
@@ -48,18 +88,13 @@ def trim_overlaps(groups: list[BodyGroup], fits: list[FittedShape],
         cuts = [cut for pair in pairs for cut in _cuts(bones, pair, most[pair])]
         for index, direction, depth in cuts:
             cut = _cut(bones[index], direction, depth)
-            if _reaches_joints(cut, anchors[index]):
+            distances = relative_distance(cut.shape, cut.pose.apply_inverse(anchors[index]))
+            if (distances <= ANCHOR_TOLERANCE).all():
                 bones[index] = cut
         if not cuts:
             break
     return [dataclasses.replace(fit, shape=bone.shape, centre=np.array(bone.position))
             for fit, bone in zip(fits, bones, strict=True)]
-
-
-def _reaches_joints(bone: Bone, anchors: np.ndarray) -> bool:
-    """Whether a body still reaches the anchors (k, 3) of its joints."""
-    distances = relative_distance(bone.shape, bone.pose.apply_inverse(anchors))
-    return bool((distances <= ANCHOR_TOLERANCE).all())
 
 
 def _cuts(bones: list[Bone], pair: tuple[int, int],

@@ -8,8 +8,6 @@ arm bound straight out and one bound half down differ in the zero of the first a
 has no twist: the forearm twists, which has no such joint here. An ankle's second angle is about
 the foot's long axis.
 """
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

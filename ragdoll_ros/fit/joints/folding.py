@@ -3,8 +3,6 @@
 A knee folds backwards and the hock below it forwards; an elbow forwards and the wrist below it
 backwards. So for a straight leg the pair (hind or front) and the order within the leg decide.
 """
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -84,8 +82,7 @@ def note_guesses(character: Character, groups: list[BodyGroup],
     folds, balls = [], []
     for index, (group, along) in enumerate(zip(groups, directions, strict=True)):
         above, leg = parent_direction(character, groups, index), _leg(groups, index)
-        if group.role or above is None or len(leg) < 2 or not _is_paired(
-                character, groups, leg[0]):
+        if group.role or above is None or len(leg) < 2 or not _is_paired(character, groups, leg[0]):
             continue
         fold = leg_fold(character, groups, index, along)
         if fold is not None and fold.guessed:
@@ -129,16 +126,14 @@ def _is_front(character: Character, groups: list[BodyGroup], first: int) -> bool
     inner = {group.parent for group in groups}
     # Limbs of several bodies that point down from the trunk.
     starts = [_leg(groups, index)[0] for index, group in enumerate(groups)
-              if index not in inner and group.parent >= 0
-              and _goes_down(character, groups, index)]
-    places = [groups[start].anchor[0] for start in starts
-              if _is_paired(character, groups, start)]
+              if index not in inner and group.parent >= 0 and _goes_down(groups, index)]
+    places = [groups[start].anchor[0] for start in starts if _is_paired(character, groups, start)]
     if not places or max(places) - min(places) < MIN_PAIR_DISTANCE * character.extent:
         return None
     return bool(groups[first].anchor[0] > (max(places) + min(places)) / 2)
 
 
-def _goes_down(character: Character, groups: list[BodyGroup], end: int) -> bool:
+def _goes_down(groups: list[BodyGroup], end: int) -> bool:
     """Whether a limb of several bodies points down within MIN_STEEPNESS."""
     leg = _leg(groups, end)
     step = groups[end].anchor - groups[leg[0]].anchor

@@ -1,6 +1,4 @@
 """Joint kinds and limits by the role of the bone, else by the topology of the skeleton."""
-from __future__ import annotations
-
 import dataclasses
 import math
 

@@ -3,8 +3,6 @@
 In the anatomical pose arms and legs hang down and the feet are level. Shoulders and hips refer to
 the trunk, which is upright in every bind pose; a wrist, ankle or head to the bone before it.
 """
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

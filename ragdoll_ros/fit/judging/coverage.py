@@ -1,6 +1,4 @@
 """Coverage of the skin by the bodies, their volume, and the density of the doll."""
-from __future__ import annotations
-
 from ...model.ragdoll import Ragdoll
 from ..bodies.overlap import covered, penetration_depth
 from ..reading.character import Character

@@ -1,6 +1,4 @@
 """Drop test: a short fall of the doll alone onto level ground."""
-from __future__ import annotations
-
 import math
 
 from ...model import errors

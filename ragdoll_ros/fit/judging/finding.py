@@ -1,6 +1,4 @@
 """Result of a check of a doll."""
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -1,6 +1,4 @@
 """Plausibility of a well-formed doll: size, densities, bend directions, masses of a person."""
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 
@@ -23,7 +21,6 @@ BEND_DIRECTIONS = {'shin': (-1, 'a knee that bends forwards'),
                    'forearm': (1, 'an elbow that bends backwards'),
                    'thigh': (1, 'a hip that lifts the knee backwards')}
 """By role: sign of the child's motion along x about the first axis, and the fault if it differs."""
-
 
 MIN_BIND_BEND, MAX_OVEREXTENSION = math.radians(35), math.radians(20)
 """Bend in the bind pose that shows the fold direction (paws are bound hyperextended); rotation

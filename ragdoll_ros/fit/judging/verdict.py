@@ -1,6 +1,4 @@
 """Verdict on a doll: good, doubtful or wrong, with the findings of all checks."""
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,12 +7,11 @@ from ...model.ragdoll import Ragdoll
 from ..pipeline import Fit
 from ..roles.names import doll_roles
 from ..roles.person import is_person
-from .connectivity import find_detached_joints, find_wrong_root
 from .coverage import find_uncovered
 from .drop_test import run_drop_test
 from .finding import Finding
 from .plausibility import extent, find_implausible, find_implausible_masses
-from .symmetry import find_asymmetries
+from .structure import find_asymmetries, find_detached_joints, find_wrong_root
 
 
 @dataclass(frozen=True)

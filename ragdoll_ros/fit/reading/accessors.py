@@ -2,8 +2,6 @@
 
 Sections 3.6.2 and 3.11 of the glTF 2.0 specification.
 """
-from __future__ import annotations
-
 import numpy as np
 
 from ...model import errors

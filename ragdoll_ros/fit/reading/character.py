@@ -1,6 +1,4 @@
 """A rigged, skinned character in REP 103 axes: x forward, y left, z up; metres."""
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,7 +7,7 @@ import numpy as np
 
 from ...model import errors, rotation
 from ...model.ragdoll import WORLD
-from ...model.skin import Appearance
+from ...model.skeleton import Appearance
 from ..roles.names import plain_name, side_of
 from .draco import decompress
 from .gltf_file import GltfFile
@@ -22,7 +20,6 @@ from .spring_bones import SpringBone, drop_short_segments, read_springs, with_po
 
 TO_ROS = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
 """glTF has +Y up, +Z forward and +X left: its (z, x, y) is (x, y, z) here."""
-
 
 MAX_BONES = 1500
 """A detailed face has about 900."""

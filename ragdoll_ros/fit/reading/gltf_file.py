@@ -4,8 +4,6 @@ Reads the JSON and the requested bytes only, and trusts nothing: lengths are che
 file's size, and JSON values where they are read. Section 4.4 of the glTF 2.0 specification has
 the chunks.
 """
-from __future__ import annotations
-
 import base64
 import binascii
 import json
@@ -73,7 +71,9 @@ class GltfFile:
         if not binary and self.path.suffix.lower() == '.glb':
             raise errors.Unreadable('byte 0', head.decode('ascii', 'backslashreplace'),
                                     'glTF, as a .glb begins')
-        text, self._chunk = self._read_chunks() if binary else (self._read_text(), None)
+        if not binary and self.size > MAX_JSON_BYTES:
+            raise errors.Unreadable('', f'{self.size} bytes', f'at most {MAX_JSON_BYTES} of JSON')
+        text, self._chunk = self._read_chunks() if binary else (self.path.read_bytes(), None)
         self.json = _parse(text)
         self._buffers: dict[int, Buffer] = {}
 
@@ -98,7 +98,11 @@ class GltfFile:
         if offset < 0 or offset + size > length:
             raise errors.OutOfRange(where, f'bytes {offset} to {offset + size}',
                                     f'within the {length} bytes of {place}')
-        buffer = self._buffer(view.get('buffer'), place)
+        number = view.get('buffer')
+        entry = self.entry('buffers', number, place)
+        if number not in self._buffers:
+            self._buffers[number] = self._open_buffer(entry, f'buffers[{number}]')
+        buffer = self._buffers[number]
         if start + length > buffer.size:
             raise errors.OutOfRange(place, f'bytes {start} to {start + length}',
                                     f'within the {buffer.size} bytes of the buffer')
@@ -111,12 +115,6 @@ class GltfFile:
         buffers.append({'byteLength': len(data)})
         views.append({'buffer': len(buffers) - 1, 'byteLength': len(data)})
         return len(views) - 1
-
-    def _buffer(self, index: object, where: str) -> Buffer:
-        entry = self.entry('buffers', index, where)
-        if index not in self._buffers:
-            self._buffers[index] = self._open_buffer(entry, f'buffers[{index}]')
-        return self._buffers[index]
 
     def _open_buffer(self, entry: dict, where: str) -> Buffer:
         length, uri = get_count(entry, 'byteLength', where), entry.get('uri')
@@ -132,14 +130,8 @@ class GltfFile:
             path = resolve_uri(self.path.parent, uri, where)
             buffer = Buffer(path.stat().st_size, path)
         if length > buffer.size:
-            raise errors.OutOfRange(f'{where}.byteLength', length,
-                                    f'at most {buffer.size} bytes')
+            raise errors.OutOfRange(f'{where}.byteLength', length, f'at most {buffer.size} bytes')
         return buffer
-
-    def _read_text(self) -> bytes:
-        if self.size > MAX_JSON_BYTES:
-            raise errors.Unreadable('', f'{self.size} bytes', f'at most {MAX_JSON_BYTES} of JSON')
-        return self.path.read_bytes()
 
     def _read_chunks(self) -> tuple[bytes, Buffer | None]:
         """Bytes of the JSON chunk, and the binary chunk if there is one."""

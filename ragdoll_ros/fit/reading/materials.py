@@ -3,12 +3,10 @@
 Section 5.19 of glTF 2.0, KHR_materials_unlit and KHR_texture_transform, with the first set of
 texture coordinates. Invalid parts are ignored: no character is refused for its appearance.
 """
-from __future__ import annotations
-
 import math
 
 from ...model import errors
-from ...model.skin import Texture
+from ...model.skeleton import Texture
 from .gltf_file import GltfFile, decode_data_uri, get_count, resolve_uri
 
 MAX_IMAGE_BYTES = 64_000_000

@@ -1,6 +1,4 @@
 """Nodes of a glTF file as a forest with global transforms."""
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

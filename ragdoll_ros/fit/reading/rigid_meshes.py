@@ -3,8 +3,6 @@
 Each becomes skin of one bone with weight 1. In a file without skins each node with a mesh becomes
 a bone, or its parent if that is the pivot of this mesh only.
 """
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

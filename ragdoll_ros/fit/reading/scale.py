@@ -3,8 +3,6 @@
 glTF's unit is the metre (2.0, section 3.4), but many files keep the unit of their editor. The
 estimate uses a person's height, else that no animal is longer than MAX_EXTENT.
 """
-from __future__ import annotations
-
 import numpy as np
 
 from ...model import errors

@@ -5,8 +5,6 @@ transform B from the mesh to the world, the same for all bones of a skin. The no
 be in another pose, such as a step of a walk; B is then an estimate (see ``_mesh_to_world``).
 Without inverse bind matrices the pose of the nodes is the bind pose.
 """
-from __future__ import annotations
-
 import contextlib
 import itertools
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ VRMC_springBone 1.0 and the secondaryAnimation of VRM 0.x. A spring is a chain o
 governs the segment to the next node. Colliders, hit radii, centers and the horizontal part of
 gravity are ignored.
 """
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -15,8 +15,6 @@ the swing has one share, the mean over the chain.
 Differences: VRM's drag is relative to the world (or the spring's ``center``), a swing's damping to
 the body; the restoring torque at large angles is proportional to the angle, not to its sine.
 """
-from __future__ import annotations
-
 import cmath
 import math
 

@@ -4,8 +4,6 @@ The inertia is that of the link and of the links merged into it. It is omitted w
 of a uniform solid of the shapes to 1e-6; a missing or unphysical inertia is replaced by that of the
 solid.
 """
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,8 +16,7 @@ from ...model.compound import Compound, principal_axes
 from ...model.pose import Pose
 from ...model.ragdoll import Bone
 from ...model.shapes import Box, Capsule, Part, Shape
-from .mesh_file import read_mesh
-from .mesh_path import find_mesh
+from .mesh_file import find_mesh, read_mesh
 from .mesh_shapes import fit_mesh
 
 PlacedShape = tuple[Shape, Pose]

@@ -3,8 +3,6 @@
 Parts of robots are solid and modelled along their axes, so those are tried beside the principal
 axes. Hollow parts, such as trays and mugs, are filled.
 """
-from __future__ import annotations
-
 import numpy as np
 
 from ...model import rotation

@@ -5,8 +5,6 @@ ball joint where links without a shape are between (as to_urdf writes them). A l
 is merged into its parent with its mass and inertia, one without a mass with its shapes. Every
 link's frame becomes a frame of the doll, so that it can be published.
 """
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path

@@ -2,8 +2,6 @@
 
 The vocabulary is config/bone_names.yaml.
 """
-from __future__ import annotations
-
 import functools
 import re
 import unicodedata

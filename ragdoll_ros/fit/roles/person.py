@@ -2,8 +2,6 @@
 
 The shares are those of a man in model/anthropometry.py; the head includes the neck.
 """
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 

@@ -1,6 +1,4 @@
 """Vocabulary of bone names: config/bone_names.yaml and the user's own file."""
-from __future__ import annotations
-
 import functools
 import os
 from dataclasses import dataclass

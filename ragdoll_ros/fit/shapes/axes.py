@@ -1,6 +1,4 @@
 """Axes of a body from its vertices: along the principal axis, or along the bone."""
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,6 +1,4 @@
 """Smallest sphere, box, cylinder or capsule around most points of a cluster."""
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 

@@ -1,6 +1,4 @@
 """Bones that the user names as bodies of their own (``--keep``)."""
-from __future__ import annotations
-
 import difflib
 from collections.abc import Sequence
 from fnmatch import fnmatchcase

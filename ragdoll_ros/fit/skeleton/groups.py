@@ -3,8 +3,6 @@
 Parents are those of the skin tree (see skin_tree.py). The cluster of a bone is the set of vertices
 that it moves; a group is the bones of one body with their clusters.
 """
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass, field
 

@@ -1,6 +1,4 @@
 """Adjacency of bones by their skin: area that two bones move together, and distances."""
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,8 +76,7 @@ def cluster_distances(character: Character, clusters: list[np.ndarray]) -> np.nd
     distances = np.full((count, count), np.inf)
     for bone, part in zip(held, chosen, strict=True):
         own = character.vertices[part]
-        squares = ((own ** 2).sum(axis=1)[:, None] + (points ** 2).sum(axis=1)
-                   - 2 * own @ points.T)
+        squares = ((own ** 2).sum(axis=1)[:, None] + (points ** 2).sum(axis=1) - 2 * own @ points.T)
         nearest = np.sqrt(np.maximum(squares.min(axis=0), 0))
         distances[bone, held] = np.minimum.reduceat(nearest, starts)
     return np.minimum(distances, distances.T)

@@ -3,8 +3,6 @@
 First the edges of the file that the skin confirms, then the pairs that share most skin, then the
 nearest.
 """
-from __future__ import annotations
-
 import numpy as np
 
 from ..reading.character import Character

@@ -3,8 +3,6 @@
 Animation rigs parent feet and hands to the root or to nothing, have controls without skin, and may
 start at any bone. The edges are those of skin_forest.py; the root is the bone that balances them.
 """
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

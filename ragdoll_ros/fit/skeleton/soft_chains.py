@@ -3,8 +3,6 @@
 Chains with such names become spring bones, and so do the thinnest branches of a character with
 more bodies than run in real time. They have VRM's default settings and do not collide.
 """
-from __future__ import annotations
-
 import numpy as np
 
 from ..reading.character import Character
@@ -44,8 +42,7 @@ def soft_chains(character: Character, tree: SkinTree, roles: tuple[str | None, .
         # A single bone, such as an ear or a jaw, is part of its parent's body.
         if len(chain) > 1 and carrier not in taken:
             springs.append(_spring(character, chain, carrier,
-                                   [tree.anchors[each][0] for each in chain],
-                                   clusters[chain[-1]]))
+                                   [tree.anchors[each][0] for each in chain], clusters[chain[-1]]))
             taken |= set(chain)
     return springs
 

@@ -1,6 +1,4 @@
-"""Several characters in one file: which bones belong to which, and the frame of each."""
-from __future__ import annotations
-
+"""Several characters in one file: which bones belong to which, the frame of each, subsets."""
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +6,6 @@ import numpy as np
 from ...model import rotation
 from ...model.pose import Pose
 from ..reading.character import Character, yaw_to_front
-from ..reading.subset import subset_character, to_frame
 from .groups import vertices_by_bone
 from .skin_adjacency import cluster_distances, find_adjacency
 
@@ -24,7 +21,7 @@ def split_characters(character: Character) -> list[tuple[Character, Pose]]:
 
     Bones of one tree of the file, and bones that move skin together, belong to one character. A
     single character keeps the file's frame. Several are named after the file and numbered; the
-    frame of each is at its centre, on the file's ground, and faces as the character does.
+    frame of each is at the median of its bones, on the file's ground, and faces as it does.
     """
     islands = _connected_components(character)
     if not islands.any() or not character.weights.any():
@@ -36,16 +33,11 @@ def split_characters(character: Character) -> list[tuple[Character, Pose]]:
     found = []
     for number, owner in enumerate(order, 1):
         part = subset_character(character, owners == owner)
-        frame = _character_frame(part)
+        yaw = np.radians(yaw_to_front(part.bone_names, part.positions))
+        frame = Pose(np.median(part.positions, axis=0) * (1, 1, 0),
+                     rotation.from_axis_angle((0, 0, 1), -yaw))
         found.append((replace(to_frame(part, frame), name=f'{character.name}_{number}'), frame))
     return found
-
-
-def _character_frame(character: Character) -> Pose:
-    """Frame at the median of a character's bones, at height 0, that faces as the character does."""
-    median = np.median(character.positions, axis=0) * (1, 1, 0)
-    yaw = np.radians(yaw_to_front(character.bone_names, character.positions))
-    return Pose(median, rotation.from_axis_angle((0, 0, 1), -yaw))
 
 
 def _assign_characters(character: Character, islands: np.ndarray) -> np.ndarray:
@@ -82,3 +74,48 @@ def _connected_components(character: Character) -> np.ndarray:
         if found[a] != found[b]:
             found[found == max(found[a], found[b])] = min(found[a], found[b])
     return found
+
+
+def subset_character(character: Character, own: np.ndarray) -> Character:
+    """The character of those bones that the mask ``own`` (n,) selects.
+
+    It has all vertices that any of them moves, and the spring bones attached to them; unweighted
+    vertices belong to the first bone of the file.
+    """
+    if own.all():
+        return character
+    place = np.cumsum(own) - 1
+    theirs = own[character.bones] & (character.weights > 0)
+    moved = character.weights.any(axis=1)
+    used = np.where(moved, theirs.any(axis=1), own[0])
+    triangles = used[character.triangles].all(axis=1)
+    look = character.appearance
+    appearance = look and replace(look, normals=look.normals[used], uvs=look.uvs[used],
+                                  material_indices=look.material_indices[triangles])
+    chosen = np.flatnonzero(own)
+    springs = tuple(replace(spring, carrier=int(place[spring.carrier]),
+                            bones=tuple(int(place[bone]) for bone in spring.bones if own[bone]))
+                    for spring in character.springs if own[spring.carrier])
+    return replace(
+        character, bone_names=tuple(character.bone_names[bone] for bone in chosen),
+        parents=tuple(int(place[up]) if up >= 0 and own[up] else -1
+                      for up in np.array(character.parents)[chosen]),
+        positions=character.positions[own], orientations=character.orientations[own],
+        vertices=character.vertices[used],
+        triangles=(np.cumsum(used) - 1)[character.triangles[triangles]],
+        bones=np.where(theirs, place[character.bones], 0)[used],
+        weights=np.where(theirs, character.weights, 0.0)[used], springs=springs,
+        appearance=appearance)
+
+
+def to_frame(character: Character, frame: Pose) -> Character:
+    """The character in another frame, whose pose in the current one is ``frame``; z stays up."""
+    back = rotation.inverse(frame.orientation)
+    appearance = character.appearance and replace(
+        character.appearance, normals=rotation.rotate(back, character.appearance.normals))
+    return replace(
+        character, positions=frame.apply_inverse(character.positions),
+        orientations=rotation.multiply(back, character.orientations),
+        vertices=frame.apply_inverse(character.vertices), appearance=appearance,
+        springs=tuple(replace(spring, points=frame.apply_inverse(spring.points))
+                      for spring in character.springs))

@@ -4,8 +4,6 @@ A hand moves to each target at constant velocity, which smooths pointer events o
 between hand and point has stiffness k = M w^2 and damping c = 2 M w, M the doll's mass: a doll that
 hangs from it is critically damped and sags by g / w^2.
 """
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence

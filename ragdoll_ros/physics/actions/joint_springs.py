@@ -1,6 +1,4 @@
 """Joint springs: springs on joint angles, as of muscles that hold a pose until they go limp."""
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -29,8 +27,11 @@ class JointSprings:
 
     def __init__(self, scene: Scene) -> None:
         self._names = scene.angle_names
-        self._axes = [axis for placement in scene.dolls for joint in placement.doll.joints
-                      for axis in self._joint_axes(scene, placement, joint)]
+        self._axes = [None if joint.is_free_ball else (
+            scene.bone_index(scene.qualified(placement, joint.child)), axis)
+            for placement in scene.dolls for joint in placement.doll.joints
+            for axis in range(joint.dof)]
+        """Child bone and axis index of each angle; None for a ball joint without angles."""
         self._applied: dict[str, AppliedJointSpring] = {}
 
     @property
@@ -67,9 +68,3 @@ class JointSprings:
         if angle not in self._names:
             raise errors.UnknownJoint('angle', angle, errors.one_of(self._names, angle))
         return self._names.index(angle)
-
-    @staticmethod
-    def _joint_axes(scene: Scene, placement: object, joint: object) -> list[tuple[int, int] | None]:
-        """Child bone and axis index of each angle of a joint; None without angles."""
-        bone = scene.bone_index(scene.qualified(placement, joint.child))
-        return [None if joint.is_free_ball else (bone, axis) for axis in range(joint.dof)]

@@ -1,6 +1,4 @@
 """PushQueue: a bounded queue of pushes and drives, and the loads of those that are active."""
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,6 +1,4 @@
 """Engines by name. The library of an engine is imported when the engine is requested."""
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ...model import errors

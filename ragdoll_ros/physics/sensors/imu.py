@@ -7,8 +7,6 @@ of SO(3) (Forster et al. 2017, IEEE T-RO 33:1, on preintegration). So the integr
 the motion. A sample with an impact contains its whole change of velocity: the peak depends on the
 sample rate, the sum does not.
 """
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,6 +1,4 @@
 """Benchmark of swings without dolls: CPU time of a tick."""
-from __future__ import annotations
-
 import statistics
 import time
 

@@ -1,6 +1,4 @@
 """Exact solution of the damped oscillator for any stiffness, damping and step."""
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,9 +11,8 @@ _TERMS = 24
 class Flow:
     """Coefficients of the solution of z'' = -w z - c z' + f, f linear in time, over a step h.
 
-    z(h)  = (1 - w n1) z + m z' + n1 f(0) + n3 (f(h) - f(0))
-    z'(h) = -w m z + (1 - w n1 - c m) z' + m f(0) + n1/h (f(h) - f(0))
-    Shapes as the input's. For w = c = 0: m = h, n1 = h^2/2, n3 = h^2/6.
+    z(h)  = (1 - w n1) z + m z' + n1 f(0) + n3 (f(h) - f(0)) z'(h) = -w m z + (1 - w n1 - c m) z' +
+    m f(0) + n1/h (f(h) - f(0)) Shapes as the input's. For w = c = 0: m = h, n1 = h^2/2, n3 = h^2/6.
     """
 
     m: np.ndarray

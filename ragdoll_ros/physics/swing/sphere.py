@@ -1,6 +1,4 @@
 """Logarithm and exponential map of the unit sphere, vectorized; all vectors are (3, n)."""
-from __future__ import annotations
-
 import numpy as np
 
 _SMALLEST = 1e-150

@@ -1,6 +1,4 @@
 """Track: bone states at ticks, interpolated between them."""
-from __future__ import annotations
-
 import bisect
 
 import numpy as np

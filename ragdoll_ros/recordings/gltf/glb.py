@@ -1,6 +1,4 @@
 """Builder of a binary glTF 2.0 file: its JSON and its buffer."""
-from __future__ import annotations
-
 import json
 import struct
 

@@ -1,11 +1,10 @@
 """Recordings as glTF 2.0 animations.
 
-Y up, facing +Z, metres (y_up.py). Each doll is a node, each bone a child node with a mesh at the
-bone's centre of mass, in its axes. The animation has poses, not joint angles, so that errors do not
-add up along a limb.
+Y up, facing +Z, metres. Each doll is a node, each bone a child node with a mesh at the bone's
+centre of mass, in its axes. The animation has poses, not joint angles, so that errors do not add up
+along a limb.
 """
-from __future__ import annotations
-
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -13,12 +12,14 @@ import numpy as np
 from ...model.compound import Compound
 from ...model.ragdoll import DEFAULT_COLOR, Bone
 from ...model.shapes import Shape
-from ...model.skin import Skin
-from ..recording import Recording
-from ..y_up import orientations_y_up, points_y_up
+from ...model.skeleton import Skin
+from ..recording import Recording, orientations_y_up, points_y_up
 from .glb import ATTRIBUTES, Glb
 from .gltf_skin import add_material, add_skin
-from .vertex_normals import crease_normals
+
+CREASE = math.radians(40)
+"""rad, crease angle: above the 18 degrees between faces of a circle of 20 vertices, below a box's
+90."""
 
 
 def gltf_bytes(recording: Recording, skins: Mapping[int, Skin] = {}) -> bytes:
@@ -94,3 +95,26 @@ def _continuous(orientations: np.ndarray) -> np.ndarray:
     steps = np.einsum('kni,kni->kn', orientations[1:], orientations[:-1])
     signs = np.cumprod(np.where(steps < 0, -1.0, 1.0), axis=0)
     return np.concatenate([orientations[:1], orientations[1:] * signs[..., None]])
+
+
+def crease_normals(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (3t, 3) m, three to each of ``triangles`` (t, 3), and their unit normals.
+
+    A normal is the mean, weighted by area, of those of the faces around the vertex within CREASE of
+    its own face's. Degenerate faces are left out.
+    """
+    corners = vertices[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1)
+    full = areas > 1e-9 * areas.max(initial=0.0)
+    corners, triangles, normals = corners[full], triangles[full], normals[full]
+    units = normals / areas[full, None]
+    _, at = np.unique(vertices.round(12), axis=0, return_inverse=True)
+    points = at.reshape(-1)[triangles]
+    smooth = np.empty_like(corners)
+    for point in np.unique(points):
+        faces, slots = np.nonzero(points == point)
+        near = units[faces] @ units[faces].T > math.cos(CREASE)
+        sums = near @ normals[faces]
+        smooth[faces, slots] = sums / np.linalg.norm(sums, axis=1, keepdims=True)
+    return corners.reshape(-1, 3), smooth.reshape(-1, 3)

@@ -1,14 +1,11 @@
 """A doll's skin in a glTF file: surface, materials, images, joints and weights."""
-from __future__ import annotations
-
 import numpy as np
 
 from ...model import rotation
 from ...model.pose import Pose
-from ...model.skin import Appearance, Skin
-from ..y_up import orientations_y_up, points_y_up
+from ...model.skeleton import Appearance, Skin
+from ..recording import orientations_y_up, points_y_up
 from .glb import ATTRIBUTES, INDICES, Glb
-from .vertex_normals import smooth_normals
 
 ROUGHNESS = 0.8
 """glTF's roughnessFactor of surfaces without materials."""
@@ -126,3 +123,13 @@ def _inverse_binds(skin: Skin) -> np.ndarray:
     inverses[:, :3, 3] = bound.apply_inverse(np.zeros(3))
     inverses[:, 3, 3] = 1
     return inverses.transpose(0, 2, 1).reshape(-1, 16)
+
+
+def smooth_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals (v, 3): the triangles' mean around each vertex, weighted by area; else z."""
+    corners = vertices[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sums = np.stack([np.bincount(triangles.ravel(), np.repeat(component, 3), len(vertices))
+                     for component in normals.T], axis=1)
+    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
+    return np.where(lengths > 1e-30, sums / np.maximum(lengths, 1e-30), (0.0, 0.0, 1.0))

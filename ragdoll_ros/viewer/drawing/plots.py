@@ -8,7 +8,7 @@ import numpy as np
 import viser
 from viser import uplot
 
-from ...physics.ground_heights import JointGap
+from ...physics.rigid_body import JointGap
 from ..sources.source import Frame, SourceStatus
 
 PERIOD = 0.25

@@ -7,7 +7,7 @@ import viser
 from ...fit.skin import skin_of
 from ...model import errors
 from ...model.scene import Scene
-from ...model.skin import Skin
+from ...model.skeleton import Skin
 from ...model.state import State
 from ...recordings.gltf.gltf_skin import group_by_material, surface_glb
 from .bodies import WXYZ

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...physics.ground_heights import GroundHeights
+from ...physics.rigid_body import GroundHeights
 from ...recordings.recording import RecordedPose, Recorder, Recording
 from ..sources.source import Frame
 

@@ -3,8 +3,6 @@
 Speeds count relative to each other, so that dolls that fall side by side do not pair. Where the
 ground may deflect one of two dolls, its speed counts relative to the ground.
 """
-from __future__ import annotations
-
 import numpy as np
 
 from ....model.scene import Scene

@@ -1,6 +1,4 @@
 """Clusters: dolls that may touch soon are integrated as one system, every other doll alone."""
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from concurrent.futures import ThreadPoolExecutor
@@ -365,8 +363,7 @@ def _systems(scene: Scene) -> list[System]:
     made: dict[int, System] = {}
     for placement in scene.dolls:
         if id(placement.doll) not in made:
-            made[id(placement.doll)] = build_system(
-                dataclasses.replace(scene, dolls=(placement,)))
+            made[id(placement.doll)] = build_system(dataclasses.replace(scene, dolls=(placement,)))
     return [made[id(placement.doll)] for placement in scene.dolls]
 
 
@@ -381,8 +378,7 @@ def _contact_points(contacts: np.ndarray, bone_of_body: np.ndarray, first: np.nd
     contacts, first, dt = contacts.take(found), first[found], dt[found]
     bones = np.empty((len(contacts), 2), np.int64)
     bones[:, 0] = bone_of_body[first + contacts['body_a']]
-    bones[:, 1] = np.where(contacts['body_b'] < 0, GROUND,
-                           bone_of_body[first + contacts['body_b']])
+    bones[:, 1] = np.where(contacts['body_b'] < 0, GROUND, bone_of_body[first + contacts['body_b']])
     return contacts, bones, np.where(dt > 0, dt, 1.0)
 
 

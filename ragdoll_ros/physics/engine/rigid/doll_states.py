@@ -1,6 +1,4 @@
 """DollStates: the cluster states of all single dolls, in arrays of the whole scene."""
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -2,8 +2,6 @@
 
 The algorithm of a tick is in kernels/advance.py.
 """
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -13,7 +11,7 @@ from ....model.coordinates import DofLayout, GeneralizedState
 from ....model.scene import Scene
 from ....model.state import State
 from ...accuracy import Accuracy
-from ...ground_heights import GroundHeights
+from ...rigid_body import GroundHeights
 from ...kernels.system import JOINT_OUTSIDE_LIMITS, OVERLAPPING
 from ..doll_totals import DollTotals
 from ..protocol import GROUND, Contacts, Drives, Springs, Wrenches, allowed_penetration
@@ -53,39 +51,32 @@ class RigidEngine:
 
     @property
     def state(self) -> State:
-        """Poses and velocities of all bones now."""
         return self._state
 
     @property
     def coordinates(self) -> GeneralizedState:
-        """Generalised coordinates and velocities of all dolls now."""
         q, v = self._clusters.q.copy(), self._clusters.v.copy()
         v[self._spins] = rotation.rotate(q[self.layout.root_orientations], v[self._spins])
         return GeneralizedState(q, v)
 
     @property
     def joint_angles(self) -> np.ndarray:
-        """Joint angles (k,) rad now."""
         return self.layout.joint_angles(self._clusters.q)
 
     @property
     def joint_rates(self) -> np.ndarray:
-        """Joint rates (k,), rad/s."""
         # The roots' spins, which v has along the roots' own axes, are none of the joints'.
         return self.layout.joint_rates(GeneralizedState(self._clusters.q, self._clusters.v))
 
     @property
     def doll_totals(self) -> DollTotals:
-        """Sums over each doll now."""
         return self._doll_totals
 
     @property
     def cluster_of_doll(self) -> np.ndarray:
-        """Cluster index (d,) of each doll: dolls of one cluster fall asleep together."""
         return self._clusters.of_doll
 
     def set_coordinates(self, coordinates: GeneralizedState) -> None:
-        """Set the state of all dolls and restart; see Engine."""
         clusters, q, v = self._clusters, self._clusters.q, self._clusters.v
         q[:], v[:] = coordinates.q, coordinates.v
         orientations = rotation.inverse(q[self.layout.root_orientations])
@@ -103,7 +94,6 @@ class RigidEngine:
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
                 drives: Drives = ()) -> None:
-        """Advance by ``duration`` s; wakes dolls that are acted on or may be touched."""
         clusters, actions = self._clusters, (wrenches, springs, drives)
         self._last_start = clusters.q.copy(), clusters.v.copy(), duration, actions
         of_doll = self.cluster_of_doll
@@ -113,14 +103,12 @@ class RigidEngine:
         self._advance(duration, actions, self.accuracy)
 
     def put_to_sleep(self, dolls: np.ndarray) -> None:
-        """Stop dolls (d,) where they are, until they are woken; their kinetic energy is lost."""
         self._clusters.stop(dolls)
         self.sleeping[dolls] = True
         self._last_start = None
         self._refresh()
 
     def dolls_on_ground(self) -> np.ndarray:
-        """Which dolls (d,) the ground bears: a contact's normal impulse is positive."""
         contacts, bones, _ = self._clusters.contacts()
         found = np.zeros(len(self.scene.dolls), bool)
         on = (bones[:, 1] == GROUND) & (contacts['impulse'][:, 0] > 0)
@@ -128,23 +116,18 @@ class RigidEngine:
         return found
 
     def contacts(self) -> Contacts:
-        """Contacts of the last step, with mean normal forces."""
         found, bones, dt = self._clusters.contacts()
         return Contacts(bones[:, 0], bones[:, 1], found['point'], found['normal'], -found['gap'],
                         found['impulse'][:, 0] / dt)
 
     def bones_on_ground(self) -> np.ndarray:
-        """Which bones (n,) have a contact with the ground, with or without an impulse."""
         return self._clusters.on_ground()
 
     @property
     def energy_excess(self) -> float:
-        """Total energy, J, less that at the start and all work since."""
-        return (float(self._doll_totals.energy.sum()) - self._start_energy
-                - self._clusters.work())
+        return (float(self._doll_totals.energy.sum()) - self._start_energy - self._clusters.work())
 
     def measures(self) -> dict[str, float]:
-        """Error measures and counts of work since the start; names end in their units."""
         stats = self._clusters.totals()
         return {
             'energy_excess_J': self.energy_excess,
@@ -156,11 +139,9 @@ class RigidEngine:
             'impacts': int(stats['impacts']), 'unsolved_total': int(stats['unsolved'])}
 
     def save(self) -> object:
-        """A snapshot that restore() brings back bit-identically."""
         return self._clusters.save(), self.sleeping.copy(), self._age, self._start_energy
 
     def restore(self, snapshot: tuple) -> None:
-        """Restore a snapshot."""
         saved, self.sleeping[:], self._age, self._start_energy = snapshot
         self._clusters.restore(saved)
         self._last_start = None
@@ -170,11 +151,9 @@ class RigidEngine:
         """Nothing to release: the memory goes with the object."""
 
     def checkpoint(self) -> object:
-        """Coordinates, velocities and work; contacts are recomputed: cheaper than save()."""
         return self._clusters.checkpoint(), self.sleeping.copy(), self._start_energy
 
     def restore_checkpoint(self, checkpoint: tuple) -> None:
-        """Continue from a checkpoint; see Engine."""
         saved, self.sleeping[:], self._start_energy = checkpoint
         self._clusters.restore_checkpoint(saved)
         self._age = MAX_AGE
@@ -182,7 +161,6 @@ class RigidEngine:
         self._refresh()
 
     def close(self) -> None:
-        """Stop the threads."""
         self._clusters.close()
 
     def _update_clusters(self, duration: float) -> None:

@@ -1,6 +1,4 @@
 """What acts on a cluster, as records for the kernels: wrenches, springs, drives."""
-from __future__ import annotations
-
 import math
 
 import numpy as np

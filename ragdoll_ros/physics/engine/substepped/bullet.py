@@ -4,8 +4,6 @@ Dolls are Featherstone multibodies read from URDF with explicit inertia. Univers
 hinges with a massless link between. Joint motors, link damping and velocity clamps, which PyBullet
 enables by default, are disabled.
 """
-from __future__ import annotations
-
 import math
 import os
 import tempfile
@@ -106,10 +104,10 @@ class _World:
             path = os.path.join(folder, 'doll.urdf')
             with open(path, 'w', encoding='utf-8') as file:
                 file.write(to_urdf(doll, 'bullet'))
-            body = pybullet.loadURDF(path, _list(position), placement.orientation, flags=flags,
+            body = pybullet.loadURDF(path, position.tolist(), placement.orientation, flags=flags,
                                      physicsClientId=self._client)
         if any(placement.velocity + placement.spin):
-            pybullet.resetBaseVelocity(body, _list(placement.root_velocity()), placement.spin,
+            pybullet.resetBaseVelocity(body, placement.root_velocity().tolist(), placement.spin,
                                        physicsClientId=self._client)
         return self._set_up(doll, body)
 
@@ -363,11 +361,7 @@ class BulletEngine(SubsteppedEngine):
         arm = turn @ load.point
         if load.local:
             force, torque = turn @ force, turn @ torque
-        pybullet.applyExternalForce(body, link, _list(force), _list(position + arm),
+        pybullet.applyExternalForce(body, link, force.tolist(), (position + arm).tolist(),
                                     pybullet.WORLD_FRAME, physicsClientId=self._client)
-        pybullet.applyExternalTorque(body, link, _list(torque), pybullet.WORLD_FRAME,
+        pybullet.applyExternalTorque(body, link, torque.tolist(), pybullet.WORLD_FRAME,
                                      physicsClientId=self._client)
-
-
-def _list(values: np.ndarray) -> list[float]:
-    return [float(value) for value in values]

@@ -3,8 +3,6 @@
 Discrete steps violate all three. The projection compares each doll with its energy account and
 with the impulses of the loads, and corrects velocities by the smallest change that restores them.
 """
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -15,8 +13,7 @@ from ....model.state import State
 from ...rigid_body import cross
 from ..doll_totals import DollSums, DollTotals
 from ..protocol import Wrenches
-from .energy_account import EnergyAccount
-from .work import mean_wrench
+from .energy_account import EnergyAccount, mean_wrench
 
 TOLERANCE = 5e-4
 """Relative energy excess that is not corrected: half of the documented bound of 0.1 %."""
@@ -34,8 +31,7 @@ class ConservationProjection:
         self._own_groups = np.arange(len(scene.dolls))
 
     def with_momentum(self, coordinates: GeneralizedState, states: tuple[State, State],
-                      duration: float, wrenches: Wrenches,
-                      touched: np.ndarray) -> GeneralizedState:
+                      duration: float, wrenches: Wrenches, touched: np.ndarray) -> GeneralizedState:
         """Restore the momenta of dolls without contacts; ``touched`` (d,) bool.
 
         ``states``: before and after ``duration`` s under ``wrenches``. The missing momentum is

@@ -1,6 +1,4 @@
 """SubsteppedEngine: loads, work and energy account of engines with equal substeps."""
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
@@ -11,12 +9,11 @@ from ....model.coordinates import DofLayout, GeneralizedState
 from ....model.scene import Scene
 from ....model.state import State
 from ...accuracy import Accuracy
-from ...ground_heights import GroundHeights
+from ...rigid_body import GroundHeights
 from ..doll_totals import DollSums, DollTotals
 from ..protocol import GROUND, Drives, Springs, Wrenches, allowed_penetration
-from .energy_account import EnergyAccount
+from .energy_account import EnergyAccount, steady_time, work
 from .explicit_springs import CONSTANT_FORCE_TIME, SpringWrench, drive_wrenches, spring_wrenches
-from .work import steady_time, work
 
 SPAN = 0.01
 """s: Accuracy.substeps counts substeps in this time. Also the longest interval under loads, and the

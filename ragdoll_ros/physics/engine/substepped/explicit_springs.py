@@ -1,6 +1,4 @@
 """Springs of hands and drives as constant loads over an interval, for engines without them."""
-from __future__ import annotations
-
 import numpy as np
 
 from ....model.state import State

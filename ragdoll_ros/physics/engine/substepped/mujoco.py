@@ -2,8 +2,6 @@
 
 MuJoCo is optional: `pip install ragdoll_ros[report]`.
 """
-from __future__ import annotations
-
 import contextlib
 
 import numpy as np

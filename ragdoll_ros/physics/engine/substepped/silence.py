@@ -1,6 +1,4 @@
 """Silence what a C library prints to standard output and standard error."""
-from __future__ import annotations
-
 import ctypes
 import os
 import sys

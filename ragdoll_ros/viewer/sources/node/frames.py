@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState
 
 from ....model.scene import SECOND, Scene
 from ....model.state import State
-from ....recordings.rods import Rods
+from ....recordings.recording import Rods
 from ....ros.messages.serialized import deserialize_pose_array
 from ....ros.outputs import LATCHED
 from ..source import Frame, RequestedData
