@@ -19,7 +19,6 @@ from .editor.editor import Editor
 from .editor.handles import ROOT
 from .pointer import Pointer
 from .recording_panel import RecordingPanel
-from .rest_detector import RestDetector
 from .settings_panel import SettingsPanel
 from .sources.source import Frame, RequestedData, Source, SourceStatus
 from .start_when_visible import StartWhenVisible
@@ -83,7 +82,6 @@ class Page:
         with self.tabs.add_tab('Plots'):
             self.plots = Plots(server)
         self.cameras = Cameras(server)
-        self._rest_detector = RestDetector()
         self._pointer = Pointer(source, self._grabbable_frame, self._select)
 
     def run(self, stop: threading.Event) -> None:
@@ -131,7 +129,7 @@ class Page:
             if self.timeline.is_live:
                 self.cameras.show(frame)
         self.cameras.follow(frame, now, self.display.follow.value)
-        self.controls.show_rest(self._rest_detector.is_at_rest(live, status.paused, now))
+        self.controls.show_rest(live, status.paused, now)
         self.settings.show(status, live.scene, now)
 
     def _grabbable_frame(self) -> Frame | None:

@@ -8,7 +8,7 @@ import viser
 
 from ..model.scene import Scene
 from ..realtime.arrow_keys import FORCE, TAP, PressedKeys, total_force
-from .browser.client_events import add_listener
+from .browser.scripts import add_listener
 from .sources.source import Source
 
 ARROWS = {'←': 'left', '↑': 'up', '↓': 'down', '→': 'right'}

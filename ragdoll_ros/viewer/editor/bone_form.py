@@ -16,8 +16,8 @@ from ...model.ragdoll import DEFAULT_COLOR, JOINT_KINDS, Joint
 from ...model.scene import Scene
 from ...model.shapes import SHAPES, SIZES, Shape
 from ...model.vectors import unit_vector
-from ..widgets import number_parsing
-from ..widgets.fields import Field, FieldValue, FormValues
+from ..widgets import parsing
+from ..widgets.form import Field, FieldValue, FormValues
 from . import changes
 
 SURFACE = ('friction', 'rolling_friction', 'restitution')
@@ -188,7 +188,7 @@ def _not_perpendicular(new: FormValues, shown: FormValues) -> errors.WrongAxes:
     if new[key] == shown.get(key):
         key, other = other, key
     return errors.WrongAxes(key, new[key], f'perpendicular to {other.replace("_", " ")}, which is '
-                            + number_parsing.format_numbers(new[other]))
+                            + parsing.format_numbers(new[other]))
 
 
 def _pair(key: str, text: str, symmetric: bool) -> tuple[float, float] | None:
@@ -197,7 +197,7 @@ def _pair(key: str, text: str, symmetric: bool) -> tuple[float, float] | None:
         return None
     for count in (2, 1) if symmetric else (2,):
         with suppress(errors.WrongForm):
-            numbers = number_parsing.parse_numbers(text, count, '°')
+            numbers = parsing.parse_numbers(text, count, '°')
             return (numbers[0] if count == 2 else -numbers[0]), numbers[-1]
     raise errors.WrongForm(
         key, text, 'two angles in degrees, lower and upper, such as -90; 45.5, or nothing')
@@ -207,7 +207,7 @@ def _moments(text: str) -> tuple[float, ...] | None:
     if not text.strip():
         return None
     try:
-        return number_parsing.parse_numbers(text, 3)
+        return parsing.parse_numbers(text, 3)
     except errors.WrongForm as error:
         raise error.at('inertia') from None
 
@@ -217,7 +217,7 @@ def _number_or_none(key: str, text: str) -> float | None:
     try:
         if not text.strip():
             return None
-        return number_parsing.parse_number(text, unit, infinite=key == 'friction')
+        return parsing.parse_number(text, unit, infinite=key == 'friction')
     except errors.WrongForm as error:
         raise error.at(key) from None
 

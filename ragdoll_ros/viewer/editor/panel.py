@@ -9,8 +9,7 @@ from ...model import errors
 from ...model.scene import Scene
 from ..browser.scripts import style
 from ..widgets.error_text import error_text
-from ..widgets.fields import FormValues
-from ..widgets.form import RED, CallbackGuard, Form, colored
+from ..widgets.form import RED, CallbackGuard, Form, FormValues, colored
 from .bone_form import BODY, JOINT
 from .undo_history import UndoHistory
 

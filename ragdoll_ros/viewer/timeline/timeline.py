@@ -7,7 +7,7 @@ import time
 
 import viser
 
-from ..browser.client_events import add_listener
+from ..browser.scripts import add_listener
 from ..sources.source import Frame, Source
 from .export_zip import export_zip
 from .frame_buffer import Clip, FrameBuffer, clip_of
