@@ -12,9 +12,8 @@ from .browser.scripts import script, style
 from .controls import Controls
 from .drawing.camera import Cameras
 from .drawing.display_options import DisplayOptions, configure_theme
-from .drawing.ground import configure_lights
 from .drawing.plots import Plots
-from .drawing.stage import Stage
+from .drawing.stage import Stage, configure_lights
 from .editor.editor import Editor
 from .editor.handles import ROOT
 from .pointer import Pointer

@@ -16,8 +16,7 @@ from ..physics.simulation import Simulation
 from ..recordings.recording import Recorder, Recording
 from .browser.scripts import source
 from .drawing.camera import FIELD_OF_VIEW, INITIAL_CAMERA
-from .drawing.ground import configure_lights
-from .drawing.stage import Stage
+from .drawing.stage import Stage, configure_lights
 from .sources.playback import PlaybackSource
 
 RATE = 60.0

@@ -59,8 +59,7 @@ JOINT = (
 def read_bone(scene: Scene, name: str) -> FormValues:
     """Values of a bone and its joint; UnknownBone. Compound shapes have no shape values."""
     _, bone = changes.find(scene, name)
-    shape = {} if bone.shape.kind not in SHAPES else {
-        'shape': bone.shape.kind, **vars(bone.shape)}
+    shape = {'shape': bone.shape.kind, **vars(bone.shape)} if bone.shape.kind in SHAPES else {}
     values: FormValues = {**shape, 'mass': bone.mass,
                           'inertia': ', '.join(f'{moment:.9g}' for moment in bone.moments or ()),
                           'position': bone.position, 'rotation': _degrees(bone.orientation),
@@ -118,7 +117,8 @@ def _body_steps(name: str, limb: bool) -> list[Step]:
 
     return [bone('shape', 'size', 'radius', 'length', shape=_shape),
             bone('mass', mass=lambda new: new['mass']),
-            bone('inertia', moments=lambda new: _moments(new['inertia'])),
+            bone('inertia', moments=lambda new: (
+                parsing.parse_numbers(new['inertia'], 3) if new['inertia'].strip() else None)),
             (('position',), position), (('rotation',), orientation),
             (('color',), color),
             *(bone(key, **{key: lambda new, key=key: _number_or_none(key, new[key])})
@@ -126,14 +126,10 @@ def _body_steps(name: str, limb: bool) -> list[Step]:
 
 
 def _joint_steps(name: str, shown: FormValues) -> list[Step]:
-    def anchor(scene: Scene, new: FormValues) -> Scene:
-        return changes.change_joint(scene, name, anchor=new['anchor'])
-
     return [(('kind', 'axis_1', 'axis_2', 'limits_1', 'limits_2', 'limits_3'),
              lambda scene, new: _set_axes_and_limits(scene, name, new, shown)),
-            (('anchor',), anchor),
-            (('damping',), lambda scene, new: changes.change_joint(
-                scene, name, damping=new['damping']))]
+            *(((key,), lambda scene, new, key=key: changes.change_joint(
+                scene, name, **{key: new[key]})) for key in ('anchor', 'damping'))]
 
 
 def _read_joint(joint: Joint) -> FormValues:
@@ -203,23 +199,11 @@ def _pair(key: str, text: str, symmetric: bool) -> tuple[float, float] | None:
         key, text, 'two angles in degrees, lower and upper, such as -90; 45.5, or nothing')
 
 
-def _moments(text: str) -> tuple[float, ...] | None:
+def _number_or_none(key: str, text: str) -> float | None:
     if not text.strip():
         return None
-    try:
-        return parsing.parse_numbers(text, 3)
-    except errors.WrongForm as error:
-        raise error.at('inertia') from None
-
-
-def _number_or_none(key: str, text: str) -> float | None:
     unit = 'm' if key == 'rolling_friction' else ''
-    try:
-        if not text.strip():
-            return None
-        return parsing.parse_number(text, unit, infinite=key == 'friction')
-    except errors.WrongForm as error:
-        raise error.at(key) from None
+    return parsing.parse_number(text, unit, infinite=key == 'friction')
 
 
 def _shape(new: FormValues) -> Shape:

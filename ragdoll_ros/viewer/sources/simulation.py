@@ -1,6 +1,7 @@
 """A simulation in this process as a source, in a thread of its own that alone uses it."""
 from __future__ import annotations
 
+import dataclasses
 import math
 import queue
 import threading
@@ -11,7 +12,7 @@ from concurrent.futures import Future
 import numpy as np
 
 from ...files.scene import load_scene
-from ...model import errors, rotation
+from ...model import errors
 from ...model.push import Push
 from ...model.scene import SECOND, Scene
 from ...model.vectors import Vector
@@ -156,7 +157,7 @@ class SimulationSource(Source):
             self._restart_clock()
 
     def _update_status(self, **changes: object) -> None:
-        self._status = SourceStatus(**{**vars(self._status), **changes})
+        self._status = dataclasses.replace(self._status, **changes)
         self._restart_clock()
 
     def _restart_clock(self) -> None:
@@ -219,10 +220,9 @@ class SimulationSource(Source):
             forces=None if contacts is None else contacts.normals * contacts.forces[:, None])
         if time.monotonic() >= self._next_status:
             self._next_status = time.monotonic() + STATUS_PERIOD
-            self._status = SourceStatus(**{
-                **vars(self._status), 'measures': self._measures(),
-                'measured_real_time_factor': self._statistics.real_time_factor,
-                'tick_cost': self._statistics.mean_cost})
+            self._status = dataclasses.replace(
+                self._status, measures=self._measures(), tick_cost=self._statistics.mean_cost,
+                measured_real_time_factor=self._statistics.real_time_factor)
 
     def _measures(self) -> dict[str, float]:
         """Current measures, or older ones where computing them takes long."""
@@ -236,9 +236,8 @@ class SimulationSource(Source):
     def _grabs(self) -> Iterator[GrabbedPoint]:
         state = self._simulation.state
         for grab in self._simulation.grabs:
-            bone = self._simulation.scene.bone_index(grab.bone)
-            point = rotation.rotate(state.orientations[bone], np.array(grab.point))
-            yield GrabbedPoint(grab.bone, state.positions[bone] + point, np.array(grab.target))
+            pose = state.poses(self._simulation.scene.bone_index(grab.bone))
+            yield GrabbedPoint(grab.bone, pose.apply(np.array(grab.point)), np.array(grab.target))
 
 
 def _real_time_factor(scene: Scene) -> float:

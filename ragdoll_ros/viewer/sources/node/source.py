@@ -30,10 +30,9 @@ from ....ros.diagnostics import status_name
 from ....ros.inputs.subscriptions import PushSubscriptions
 from ....ros.outputs import LATCHED
 from ..source import Frame, RequestedData, Source, SourceStatus
-from .force_publisher import ForcePublisher
 from .frames import NodeFrames
 from .hands import NodeHands
-from .observed_pushes import NoInputCounts, ObservedPushes
+from .pushes import ForcePublisher, NoInputCounts, ObservedPushes
 from .scene import NodeScene
 from .services import NodeServices, Refused
 
