@@ -148,8 +148,7 @@ class DuplicateNodes:
         """Count the nodes in the graph; to be called by a timer."""
         node = self._node
         own = node.get_name(), node.get_namespace()
-        before, self.count = self.count, max(
-            0, node.get_node_names_and_namespaces().count(own) - 1)
+        before, self.count = self.count, max(0, node.get_node_names_and_namespaces().count(own) - 1)
         if self.count > before:
             node.get_logger().warning(
                 f'{self.count + 1} nodes are called {node.get_fully_qualified_name()}: their '

@@ -40,10 +40,7 @@ DISCONNECTED = ('The viewer that served this page has ended, or cannot be reache
 
 
 class Page:
-    """What viser serves. One thread calls `update` repeatedly, and it alone draws.
-
-    The editor is created with the first scene and keeps its files in ``folder``.
-    """
+    """What viser serves; one thread calls `update` and alone draws. ``folder``: of the files."""
 
     def __init__(self, server: viser.ViserServer, source: Source, folder: str | Path = '.') -> None:
         self.server = server

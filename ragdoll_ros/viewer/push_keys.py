@@ -31,10 +31,7 @@ REPEAT_DURATION = 0.1
 
 
 class PushKeys:
-    """Buttons, keys and a slider that push, in the GUI container that is current.
-
-    They are hidden for a recording, which cannot be pushed.
-    """
+    """Buttons, keys and a slider in the current GUI container; hidden for a recording."""
 
     def __init__(self, server: viser.ViserServer, source: Source) -> None:
         self._source = source

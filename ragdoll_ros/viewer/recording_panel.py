@@ -53,10 +53,7 @@ class RecordingPanel:
         return self.recorder is not None and not self._ended
 
     def add(self, frame: Frame) -> None:
-        """Record a frame if recording is on.
-
-        Another scene or MAX_NUMBERS ends the recording, which is then ready for download.
-        """
+        """Record a frame if recording is on; another scene or MAX_NUMBERS ends the recording."""
         with self._lock:
             self._frame = frame
             self._record(frame)

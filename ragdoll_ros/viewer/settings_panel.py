@@ -56,8 +56,7 @@ class SettingsPanel:
         self._warns = False
         gui = server.gui
         self.health = gui.add_html('')
-        with gui.add_folder('Settings', expand_by_default=False,
-                            visible=source.recording is None):
+        with gui.add_folder('Settings', expand_by_default=False, visible=source.recording is None):
             self.accuracy = gui.add_dropdown('Accuracy', tuple(ACCURACIES), visible=False,
                                              hint='step size; the simulation continues')
             self.cost = gui.add_html('')

@@ -68,10 +68,7 @@ class Embedded:
 
 
 def save_static(recording: Recording, folder: str | Path) -> Path:
-    """Write static_html into a folder, which is created if missing, and return the file's path.
-
-    Raises Unreadable if the file cannot be written.
-    """
+    """Write static_html to ``folder``/index.html, and return that path; Unreadable if it cannot."""
     path = Path(folder) / INDEX
     content = static_html(recording)
     try:

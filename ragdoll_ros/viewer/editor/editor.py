@@ -53,8 +53,7 @@ class Editor:
         self.panel = EditorPanel(server.gui, self.select, self.suggest)
         self._connect(server.gui)
         with server.gui.add_folder('Files'):
-            self.files = FilesPanel(server, lambda: self.scene, self.set_scene,
-                                    SceneFolder(folder))
+            self.files = FilesPanel(server, lambda: self.scene, self.set_scene, SceneFolder(folder))
         self._refresh()
 
     @property

@@ -107,8 +107,7 @@ class EditorPanel:
         self.edit.icon = 'player-play' if editing else 'pencil'
 
 
-def _set_options(dropdown: viser.GuiDropdownHandle, options: tuple[str, ...],
-                 value: str) -> None:
+def _set_options(dropdown: viser.GuiDropdownHandle, options: tuple[str, ...], value: str) -> None:
     if dropdown.options != options:
         dropdown.options = options
     dropdown.value = value

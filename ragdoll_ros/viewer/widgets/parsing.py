@@ -86,8 +86,7 @@ def split_numbers(text: str, count: int, unit: str = '') -> list[tuple[str, int]
             plain = _UNIT_SPACES[unit].sub('', plain)
         plain, power = _split_unit(plain, unit)
         found = [part for part in re.split(r'\s*,\s*|\s+', plain) if part or ',' in plain]
-        found = [own[0] if (own := _split_unit(part, unit))[1] == power else part
-                 for part in found]
+        found = [own[0] if (own := _split_unit(part, unit))[1] == power else part for part in found]
     if len(found) != count or not plain:
         raise _wrong_count(text, count)
     return [(part, power) for part in found]

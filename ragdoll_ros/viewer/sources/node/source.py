@@ -130,15 +130,12 @@ class NodeSource(Source):
         self._services.set_parameter('real_time_factor', float(factor))
 
     def load(self, name: str) -> None:
-        """Set the parameter `scene`; Refused."""
         self._services.set_parameter_and_wait('scene', name)
 
     def set_engine(self, name: str) -> None:
-        """Set the parameter `engine`; Refused."""
         self._services.set_parameter_and_wait('engine', name)
 
     def set_accuracy(self, name: str) -> None:
-        """Set the parameter `accuracy`; Refused."""
         self._services.set_parameter_and_wait('accuracy', name)
 
     def set_scene(self, scene: Scene) -> None:
