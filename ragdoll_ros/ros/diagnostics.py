@@ -43,9 +43,7 @@ class Diagnostics:
         node.create_timer(PERIOD, self._on_timer, clock=steady)
 
     def record_tick(self, cost: int, lag: float, simulated: int) -> None:
-        """Record a tick, all in ns: wall time spent, lag of its start behind its due time, and
-        simulated time.
-        """
+        """Record a tick, ns: wall time spent, lag of the start behind its due time, simulated."""
         self._ticks += 1
         self._cost += cost
         self._max_cost = max(self._max_cost, cost)

@@ -114,10 +114,7 @@ class StateDump:
         self._ticks.append((self._simulation.time, self._simulation.state, *self._inputs))
 
     def write(self, path: Path, bad: BadState) -> None:
-        """Write the buffer and the ``bad`` state as an .npz, readable without pickle.
-
-        Raises OSError if that fails, and removes the file.
-        """
+        """Write the states, ``bad`` last, as .npz without pickle; on an OSError remove the file."""
         ticks = [*self._ticks, (bad.time, bad.state, *self._inputs)][-DUMP_LENGTH:]
         times, states, pushes, grabs = zip(*ticks, strict=True)
         simulation = self._simulation

@@ -78,7 +78,7 @@ def main(arguments: list[str] | None = None) -> int:
             raise CannotServe(NO_VISER)
         check_options(options, for_ros)
         if options.static is not None:
-            write_static(options, for_ros)
+            write_static(options)
         else:
             serve(options, for_ros, stop)
     except errors.RagdollError as error:
@@ -204,7 +204,7 @@ def folder_for_files(requested: str | None) -> Path:
     return folder
 
 
-def write_static(options: argparse.Namespace, for_ros: list[str]) -> None:
+def write_static(options: argparse.Namespace) -> None:
     """Write the page that needs no server; RagdollError."""
     scene = None if options.scene is None else load_scene(options.scene)
     page_class()

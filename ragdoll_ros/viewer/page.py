@@ -78,7 +78,8 @@ class Page:
         with self.tabs.add_tab('Plots'):
             self.plots = Plots(server)
         self.cameras = Cameras(server)
-        self._pointer = Pointer(source, self._grabbable_frame, self._select)
+        self._pointer = Pointer(source, self._grabbable_frame, lambda bone: (
+            self.editor and self.editor.select(bone)))
 
     def run(self, stop: threading.Event) -> None:
         """Draw until ``stop`` is set."""
@@ -155,10 +156,6 @@ class Page:
             self.editor = Editor(self.server, scene, self.source.set_scene, self.source.pause,
                                  self._folder)
         self.controls.before_step = self.editor.leave
-
-    def _select(self, bone: str) -> None:
-        if self.editor is not None:
-            self.editor.select(bone)
 
     def _show_messages(self, problem: str, note: str) -> None:
         notes = [note, *(self.stage.skins.notes if self.stage is not None else ())]

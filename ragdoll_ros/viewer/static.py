@@ -68,7 +68,7 @@ class Embedded:
 
 
 def save_static(recording: Recording, folder: str | Path) -> Path:
-    """Write static_html to ``folder``/index.html, and return that path; Unreadable if it cannot."""
+    """Write static_html to ``folder``/index.html and return that path; Unreadable if that fails."""
     path = Path(folder) / INDEX
     content = static_html(recording)
     try:

@@ -33,10 +33,7 @@ class StatusLine:
         return float(self._values.get('real_time_factor', 1.0))
 
     def text(self, push: str = '') -> str:
-        """Real-time factor, simulated time, push, tick cost, position and speed of the root.
-
-        Without a push it fits 80 columns.
-        """
+        """Real-time factor, time, push, tick cost and root; without a push it fits 80 columns."""
         if self._state is None or not self._values:
             return 'waiting for the node'
         values = self._values

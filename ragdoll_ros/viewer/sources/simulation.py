@@ -129,7 +129,8 @@ class SimulationSource(Source):
     def _run(self) -> None:
         while True:
             try:
-                command = self._commands.get(timeout=self._time_to_tick())
+                wait = self._pacer.wait(time.monotonic_ns()) / SECOND if self._is_running else None
+                command = self._commands.get(timeout=wait)
             except queue.Empty:
                 if self._pacer.due(time.monotonic_ns()):
                     self._tick()
@@ -146,10 +147,6 @@ class SimulationSource(Source):
     @property
     def _is_running(self) -> bool:
         return self._requested.frames and not self._status.paused
-
-    def _time_to_tick(self) -> float | None:
-        """Time until the next tick, s; None while not running."""
-        return self._pacer.wait(time.monotonic_ns()) / SECOND if self._is_running else None
 
     def _set_requested(self, requested: RequestedData) -> None:
         was_running, self._requested = self._is_running, requested

@@ -83,10 +83,7 @@ class Form:
         return self._widgets[key]
 
     def fill(self, values: FormValues) -> None:
-        """Show the fields in ``values``, hide the others, and clear all errors.
-
-        Typed text that has the same value stays as it is.
-        """
+        """Show these fields only, without errors; typed text that has the same value stays."""
         self.show_errors(())
         self._color_errors.clear()
         with self._filling:
