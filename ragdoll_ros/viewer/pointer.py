@@ -152,16 +152,13 @@ async def _wait_until_disconnected(client: viser.ClientHandle) -> None:
     """
     open_connections = connections(client)
     while (connection := open_connections.get(client.client_id)) is not None:
-        response = asyncio.ensure_future(_ping(connection))
         try:
-            await asyncio.wait([response], timeout=PING_TIMEOUT)
-        finally:
-            response.cancel()
-        if not response.done() or response.exception() is not None:
+            await asyncio.wait_for(_ping(connection), PING_TIMEOUT)
+        except Exception:  # no response in time, or websockets' ConnectionClosed
             return
         await asyncio.sleep(PING_PERIOD)
 
 
 async def _ping(connection: object) -> None:
-    """Ping and wait for the pong; websockets' ConnectionClosed."""
+    """Ping and wait for the pong."""
     await (await connection.ping())

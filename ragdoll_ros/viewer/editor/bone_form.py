@@ -99,12 +99,6 @@ Step = tuple[tuple[str, ...], Callable[[Scene, FormValues], Scene]]
 
 
 def _body_steps(name: str, limb: bool) -> list[Step]:
-    def position(scene: Scene, new: FormValues) -> Scene:
-        return changes.set_pose(scene, name, new['position'], limb=limb)
-
-    def orientation(scene: Scene, new: FormValues) -> Scene:
-        return changes.set_pose(scene, name, orientation=_quaternion(new['rotation']), limb=limb)
-
     def color(scene: Scene, new: FormValues) -> Scene:
         _, old = changes.find(scene, name)
         opacity = (old.color or DEFAULT_COLOR)[3:]
@@ -119,7 +113,10 @@ def _body_steps(name: str, limb: bool) -> list[Step]:
             bone('mass', mass=lambda new: new['mass']),
             bone('inertia', moments=lambda new: (
                 parsing.parse_numbers(new['inertia'], 3) if new['inertia'].strip() else None)),
-            (('position',), position), (('rotation',), orientation),
+            (('position',), lambda scene, new: changes.set_pose(
+                scene, name, new['position'], limb=limb)),
+            (('rotation',), lambda scene, new: changes.set_pose(
+                scene, name, orientation=_quaternion(new['rotation']), limb=limb)),
             (('color',), color),
             *(bone(key, **{key: lambda new, key=key: _number_or_none(key, new[key])})
               for key in SURFACE)]

@@ -17,10 +17,9 @@ NONE = '(no bone)'
 
 
 class EditorPanel:
-    """Widgets in the GUI container that is current.
+    """Widgets in the GUI container that is current; the editor connects the buttons.
 
-    ``select`` takes the name of a selected bone, or None; ``suggest`` is a Form's ``on_kind``. The
-    editor connects the buttons.
+    ``select`` takes the name of a selected bone, or None; ``suggest`` is a Form's ``on_kind``.
     """
 
     def __init__(self, gui: viser.GuiApi, select: Callable[[str | None], None],

@@ -6,6 +6,7 @@ import math
 import queue
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 
@@ -20,7 +21,9 @@ from ...physics.actions.grab import DRAG_TIME
 from ...physics.simulation import Simulation
 from ...realtime.pacer import Pacer
 from .source import REAL_TIME_FACTORS, Frame, GrabbedPoint, RequestedData, Source, SourceStatus
-from .tick_statistics import TickStatistics
+
+WINDOW = 1.0
+"""s of wall time over which the rate and cost of ticks are measured."""
 
 STATUS_PERIOD = 0.1
 """s of wall time between two updates of the status."""
@@ -235,6 +238,38 @@ class SimulationSource(Source):
         for grab in self._simulation.grabs:
             pose = state.poses(self._simulation.scene.bone_index(grab.bone))
             yield GrabbedPoint(grab.bone, pose.apply(np.array(grab.point)), np.array(grab.target))
+
+
+class TickStatistics:
+    """Rate and cost of ticks over the last WINDOW of wall time. Not thread-safe."""
+
+    def __init__(self) -> None:
+        self._ticks: deque[tuple[float, float, float]] = deque()
+
+    def add(self, begin: float, end: float, simulated: float) -> None:
+        """Record a tick of ``simulated`` s, computed between two instants of wall time, s."""
+        self._ticks.append((begin, end, simulated))
+        while self._ticks[0][0] < begin - WINDOW:
+            self._ticks.popleft()
+
+    def clear(self) -> None:
+        """Forget all ticks."""
+        self._ticks.clear()
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated time per wall time; NaN before half a window has passed."""
+        if not self._ticks or self._ticks[-1][0] - self._ticks[0][0] < WINDOW / 2:
+            return math.nan
+        simulated = sum(tick[2] for tick in self._ticks) - self._ticks[0][2]
+        return simulated / (self._ticks[-1][0] - self._ticks[0][0])
+
+    @property
+    def mean_cost(self) -> float:
+        """Mean wall time of computing a tick, s; NaN before the first."""
+        if not self._ticks:
+            return math.nan
+        return sum(end - begin for begin, end, _ in self._ticks) / len(self._ticks)
 
 
 def _real_time_factor(scene: Scene) -> float:

@@ -202,11 +202,7 @@ class Timeline:
         self._resend = False
 
     def _move_slider(self, value: float, playhead: Playhead | None, resend: bool) -> None:
-        """Set the slider, s, unless the user has moved it meanwhile.
-
-        In viser's thread: set from another one, it could overwrite a value that a page sent before
-        that is read.
-        """
+        """Set the slider, s, unless a user has moved it; in viser's thread, as the Scene list."""
         # While a user drags the slider, the playhead is where the slider is, to within its step.
         if playhead is not self._playhead or (abs(self.slider.value - value) <= STEP
                                               and not resend):

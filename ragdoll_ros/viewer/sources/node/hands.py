@@ -22,8 +22,6 @@ class _Hand:
     bone: str
     local: np.ndarray
     """(3,) m: the grabbed point in the bone's frame."""
-    start: np.ndarray
-    """(3,) m, world: the grabbed point when it was grabbed."""
     pose: Pose
     """Of the bone when it was grabbed."""
     target: np.ndarray
@@ -47,8 +45,7 @@ class NodeHands:
         """Grab a bone of the shown frame at a point of the bone's frame."""
         self.let_go(hand)
         pose = frame.state.poses(frame.scene.bone_index(bone))
-        point = pose.apply(local)
-        self._hands[hand] = grab = _Hand(bone, local, point, pose, point)
+        self._hands[hand] = grab = _Hand(bone, local, pose, pose.apply(local))
         self._send(hand, grab, InteractiveMarkerFeedback.MOUSE_DOWN)
         self.drag(hand, target)
 
@@ -84,7 +81,7 @@ class NodeHands:
 
     def _send(self, hand: str, grab: _Hand, event: int) -> None:
         self.moves += 1
-        position = grab.pose.position + grab.target - grab.start
+        position = grab.pose.position + grab.target - grab.pose.apply(grab.local)
         self._publisher.publish(InteractiveMarkerFeedback(
             header=Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self.frame_id),
             client_id=f'{self._client} {hand}', marker_name=grab.bone, control_name=grab.bone,
