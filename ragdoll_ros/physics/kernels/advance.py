@@ -30,12 +30,11 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from .cluster_state import CLUSTER_STATE, ClusterState
 from .compiling.bundle import bundle_at
-from .compiling.decorators import REAL, compiled, entry
+from .compiling.decorators import ADDRESS, REAL, compiled, entry
 from .contact.gaps import enable_separated_pairs, update_kinematics_and_gaps
 from .dynamics.kinematics import (Kinematics, forward_kinematics, inertial_frame, put_quat,
                                   root_position, velocity_at)
@@ -55,11 +54,6 @@ LONGEST_FLIGHT = 0.05
 MAX_IMPACTS = 200
 """Impacts of one doll in one tick, over the cube of the number of dolls in the cluster: from then
 on no time of impact is sought, so that many dolls do not cost their square."""
-
-JOB = np.dtype([('system', np.int64), ('workspace', np.int64), ('cluster', np.int64)])
-"""Addresses of the bundles of a cluster: its system, a workspace, and its state."""
-
-JOBS = numba.from_dtype(JOB)[::1]
 
 system_at, workspace_at, cluster_state_at = (bundle_at(SYSTEM), bundle_at(WORKSPACE),
                                              bundle_at(CLUSTER_STATE))
@@ -148,14 +142,14 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
     sum_dolls(s, ws, ws.step.end, q, cluster.doll_sums)
 
 
-@entry(JOBS, REAL, REAL, REAL)
+@entry(ADDRESS[:, ::1], REAL, REAL, REAL)
 def advance(jobs: np.ndarray, duration: float, step: float, tolerance: float) -> None:
     """Advance clusters by ``duration`` s, each by itself, and enter their bone states and sums.
 
-    ``jobs`` (k,): JOB of each. ``step``: length of a contact step, s; ``tolerance``: error of a
-    step of flight, m or rad.
+    ``jobs`` (k, 3): addresses of the bundles of system, workspace and state of each. ``step``:
+    length of a contact step, s; ``tolerance``: error of a step of flight, m or rad.
     """
     for k in range(len(jobs)):
-        job = jobs[k]
-        advance_cluster(system_at(job.system), workspace_at(job.workspace),
-                        cluster_state_at(job.cluster), duration, step, tolerance)
+        system, workspace, cluster = vec(jobs[k])
+        advance_cluster(system_at(system), workspace_at(workspace), cluster_state_at(cluster),
+                        duration, step, tolerance)

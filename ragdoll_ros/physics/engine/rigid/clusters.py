@@ -54,7 +54,7 @@ class Cluster:
     """Rows that bind system, state, and a workspace for each thread; see compiling/bundle.py."""
 
     def job(self, worker: int) -> tuple[int, int, int]:
-        """JOB of the kernels on one of the threads."""
+        """Addresses of system, workspace and state for the kernels on one of the threads."""
         system, state, *workspaces = (rows[0].ctypes.data for rows in self.bundles)
         return system, workspaces[worker % len(workspaces)], state
 
@@ -280,8 +280,8 @@ class Clusters:
         """(k, 2) of dolls that may touch, of all clusters."""
         self._pair_numbers = self._numbers(self.pairs)
         self._jobs = np.array([[cluster.job(worker) for cluster in clusters]
-                               for worker in range(self._workers)], kernels.JOB)
-        """(workers, k)"""
+                               for worker in range(self._workers)], np.int64)
+        """(workers, k, 3)"""
 
     def _advance_parallel(self, jobs: np.ndarray, duration: float, accuracy: Accuracy,
                           sleeping: np.ndarray) -> None:

@@ -33,7 +33,7 @@ PATIENCE = 1.0
 KERNELS, SOURCES = __package__.rpartition('.')[0], Path(__file__).parent.parent
 """The package of all kernels, and its folder."""
 
-OURS = re.compile(r'[\w.]+-[0-9a-f]{16}-[0-9a-f]{8}\.nbc(\.\d+)?'  # written by a process, as path.pid
+OURS = re.compile(r'[\w.]+-[0-9a-f]{16}-[0-9a-f]{8}\.nbc(\.\d+)?'  # path.pid while written
                   r'|[\w.]+-\d+\.py\d+\w*(\.\d+)?\.nb[ic]')  # as numba itself names them
 
 

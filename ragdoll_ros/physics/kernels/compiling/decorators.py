@@ -19,7 +19,7 @@ compiled = numba.njit(error_model='numpy', no_cpython_wrapper=True, no_cfunc_wra
 inlined = numba.njit(inline='always', error_model='numpy')
 """The same as a part of what calls it: twice as fast for what is called with many arrays."""
 
-REAL = numba.float64
+REAL, ADDRESS = numba.float64, numba.int64
 
 
 def entry(*types: numba.types.Type) -> Callable[[Callable], Callable]:
