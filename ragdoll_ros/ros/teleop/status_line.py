@@ -48,9 +48,8 @@ class StatusLine:
         return since / SECOND * float(values['stamp_pace'])
 
     def _root(self) -> str:
-        name, position, velocity = (self._state.joint_names[0],
-                                    self._state.transforms[0].translation,
-                                    self._state.twist[0].linear)
+        name, velocity = self._state.joint_names[0], self._state.twist[0].linear
+        position = self._state.transforms[0].translation
         speed = math.hypot(velocity.x, velocity.y, velocity.z)
         return f'{name} {position.x:.2f} {position.y:.2f} {position.z:.2f} m {speed:.1f} m/s'
 
