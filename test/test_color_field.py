@@ -4,7 +4,7 @@ from __future__ import annotations
 import pytest
 
 from ragdoll_ros.model import errors
-from ragdoll_ros.viewer.widgets.color_field import parse_color
+from ragdoll_ros.viewer.widgets.parsing import parse_color
 
 DODGER_BLUE = (30, 144, 255)
 

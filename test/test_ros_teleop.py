@@ -13,7 +13,7 @@ from screen import Screen
 from sensor_msgs.msg import MultiDOFJointState
 
 from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.ros.teleop.find_node import NodeFinder
+from ragdoll_ros.ros.teleop.teleop import NodeFinder
 
 pytestmark = pytest.mark.usefixtures('nothing_runs_on')
 MASSES = np.array([bone.mass for bone in load_scene('flight').bones])

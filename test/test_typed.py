@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip('viser')
 
 from ragdoll_ros.model import errors
-from ragdoll_ros.viewer.widgets.number_parsing import format_number, parse_number, parse_numbers
+from ragdoll_ros.viewer.widgets.parsing import format_number, parse_number, parse_numbers
 
 
 @pytest.mark.parametrize(('text', 'value'), [

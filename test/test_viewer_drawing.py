@@ -28,11 +28,11 @@ from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.recording import Rods
 from ragdoll_ros.viewer.drawing import framing
 from ragdoll_ros.viewer.drawing.bodies import Bodies
-from ragdoll_ros.viewer.drawing.ground import CELL, FADE, grid_size
 from ragdoll_ros.viewer.drawing.joint_limits import ARC_SEGMENTS, RIM, SPOKES, JointLimits
 from ragdoll_ros.viewer.drawing.meshes import COARSE, MESHES, SEGMENTS
 from ragdoll_ros.viewer.drawing.overlays import arrow_to_surface
 from ragdoll_ros.viewer.drawing.skin_meshes import SkinMeshes
+from ragdoll_ros.viewer.drawing.stage import CELL, FADE, grid_size
 from ragdoll_ros.viewer.pointer import nearest_bone, target_at_distance, to_bone_frame
 
 CORNERS = SEGMENTS / 2 * np.sin(2 * np.pi / SEGMENTS)

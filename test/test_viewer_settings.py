@@ -14,9 +14,8 @@ from page_client import served, wait
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.physics.accuracy import ACCURACIES
 from ragdoll_ros.viewer.settings_panel import ERRORS_MM, health_line
-from ragdoll_ros.viewer.sources.simulation import SimulationSource
+from ragdoll_ros.viewer.sources.simulation import SimulationSource, TickStatistics
 from ragdoll_ros.viewer.sources.source import RequestedData, SourceStatus
-from ragdoll_ros.viewer.sources.tick_statistics import TickStatistics
 
 DROP = load_scene('drop')
 WEIGHT = 9.8 * sum(bone.mass for bone in DROP.bones)

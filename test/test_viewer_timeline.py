@@ -24,7 +24,6 @@ from ragdoll_ros.viewer.sources.playback import PlaybackSource
 from ragdoll_ros.viewer.sources.simulation import SimulationSource
 from ragdoll_ros.viewer.sources.source import Frame
 from ragdoll_ros.viewer.timeline import timeline
-from ragdoll_ros.viewer.timeline.export_zip import export_zip
 from ragdoll_ros.viewer.timeline.frame_buffer import MAX_NUMBERS, SPAN, FrameBuffer
 from ragdoll_ros.viewer.timeline.playhead import Playhead
 from ragdoll_ros.viewer.timeline.strip import WIDTH, strip
@@ -324,7 +323,7 @@ def test_save_this_has_the_run_in_every_format(states):
         client.update(page.timeline.slider, 0.2)
         wait(lambda: not page.timeline.is_live)
         clip = page.timeline.clip
-        content = export_zip(clip.recording(), 'run', lambda _: True)
+        content = timeline.export_zip(clip.recording())
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         assert archive.namelist() == [f'run{suffix}' for suffix in FORMATS]
         table = np.genfromtxt(io.BytesIO(archive.read('run.csv')), delimiter=',', skip_header=1)

@@ -24,8 +24,7 @@ DIRECTIONS: dict[str, Vector] = {
 def total_force(arrows: Iterable[str], force: float = FORCE) -> Vector:
     """Sum of the pushes of these keys, N, world frame; each pushes with ``force`` N."""
     parts = [DIRECTIONS[arrow] for arrow in arrows]
-    return tuple(force * part for part in map(sum, zip(*parts, strict=True))) if parts else (
-        0.0, 0.0, 0.0)
+    return tuple(force * sum(part[axis] for part in parts) for axis in range(3))
 
 
 TAP = 0.025

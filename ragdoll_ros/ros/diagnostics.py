@@ -43,9 +43,7 @@ class Diagnostics:
         node.create_timer(PERIOD, self._on_timer, clock=steady)
 
     def record_tick(self, cost: int, lag: float, simulated: int) -> None:
-        """Record a tick, all in ns: wall time spent, lag of its start behind its due time, and
-        simulated time.
-        """
+        """Record a tick, ns: wall time spent, lag of the start behind its due time, simulated."""
         self._ticks += 1
         self._cost += cost
         self._max_cost = max(self._max_cost, cost)
@@ -148,8 +146,7 @@ class DuplicateNodes:
         """Count the nodes in the graph; to be called by a timer."""
         node = self._node
         own = node.get_name(), node.get_namespace()
-        before, self.count = self.count, max(
-            0, node.get_node_names_and_namespaces().count(own) - 1)
+        before, self.count = self.count, max(0, node.get_node_names_and_namespaces().count(own) - 1)
         if self.count > before:
             node.get_logger().warning(
                 f'{self.count + 1} nodes are called {node.get_fully_qualified_name()}: their '

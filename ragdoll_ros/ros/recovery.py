@@ -4,7 +4,7 @@ from __future__ import annotations
 import os
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -114,10 +114,7 @@ class StateDump:
         self._ticks.append((self._simulation.time, self._simulation.state, *self._inputs))
 
     def write(self, path: Path, bad: BadState) -> None:
-        """Write the buffer and the ``bad`` state as an .npz, readable without pickle.
-
-        Raises OSError if that fails, and removes the file.
-        """
+        """Write the states, ``bad`` last, as .npz without pickle; on an OSError remove the file."""
         ticks = [*self._ticks, (bad.time, bad.state, *self._inputs)][-DUMP_LENGTH:]
         times, states, pushes, grabs = zip(*ticks, strict=True)
         simulation = self._simulation
@@ -127,25 +124,18 @@ class StateDump:
                     file, reason=bad.reason, scene=simulation.scene.name,
                     engine=simulation.engine_name, bone_names=simulation.scene.bone_names,
                     times=np.array(times), states=np.array([state.rows for state in states]),
-                    **_table('push', pushes, _push_row, 10, lambda push: push.bone),
-                    **_table('grab', grabs, _grab_row, 6, lambda grab: grab.bone))
+                    **_table('push', pushes, 10, lambda push: [*push.force, *push.torque,
+                                                               *push.point, push.local]),
+                    **_table('grab', grabs, 6, lambda grab: [*grab.point, *grab.target]))
         except OSError:
             path.unlink(missing_ok=True)
             raise
 
 
-def _table(name: str, inputs: Sequence[Sequence], row: object, width: int,
-           bone: object) -> dict[str, np.ndarray]:
+def _table(name: str, inputs: Sequence[Sequence[Push | Grab]], width: int,
+           row: Callable[[Push | Grab], list[float]]) -> dict[str, np.ndarray]:
     """The inputs of all ticks: index of the tick (k,), bone (k,) and numbers (k, width)."""
     flat = [(tick, one) for tick, those in enumerate(inputs) for one in those]
     return {f'{name}_ticks': np.array([tick for tick, _ in flat], np.int64),
-            f'{name}_bones': np.array([bone(one) for _, one in flat], str),
+            f'{name}_bones': np.array([one.bone for _, one in flat], str),
             f'{name}_numbers': np.array([row(one) for _, one in flat], float).reshape(-1, width)}
-
-
-def _push_row(push: Push) -> list[float]:
-    return [*push.force, *push.torque, *push.point, push.local]
-
-
-def _grab_row(grab: Grab) -> list[float]:
-    return [*grab.point, *grab.target]

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 from ..files.scene import load_scene
 from ..model import errors
 from ..physics.engine.registry import ENGINES
+from ..recordings.mcap_file import load_recording
 from .sources.source import Source
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ def main(arguments: list[str] | None = None) -> int:
             raise CannotServe(NO_VISER)
         check_options(options, for_ros)
         if options.static is not None:
-            write_static(options, for_ros)
+            write_static(options)
         else:
             serve(options, for_ros, stop)
     except errors.RagdollError as error:
@@ -204,16 +205,13 @@ def folder_for_files(requested: str | None) -> Path:
     return folder
 
 
-def write_static(options: argparse.Namespace, for_ros: list[str]) -> None:
+def write_static(options: argparse.Namespace) -> None:
     """Write the page that needs no server; RagdollError."""
     scene = None if options.scene is None else load_scene(options.scene)
     page_class()
     from .static import fall, save_static
-    if scene is not None:
-        recording = fall(scene, options.engine or 'auto')
-    else:
-        from ..recordings.mcap_file import load_recording
-        recording = load_recording(options.play)
+    recording = (load_recording(options.play) if scene is None
+                 else fall(scene, options.engine or 'auto'))
     path = save_static(recording, options.static)
     print(f'{path}: {recording.duration:.1f} s, {path.stat().st_size / 1e6:.1f} MB')
 
@@ -231,7 +229,6 @@ def page_class() -> type:
 def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
     """The source that the options select; RagdollError."""
     if options.play is not None:
-        from ..recordings.mcap_file import load_recording
         from .sources.playback import PlaybackSource
         return PlaybackSource(load_recording(options.play), Path(options.play).name)
     if options.scene is not None:

@@ -4,19 +4,26 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
+import numpy as np
 import viser
 
 from ..files.config import scene_names
 from ..model.errors import RagdollError
 from ..physics.engine.registry import ENGINES
 from .push_keys import PushKeys
-from .sources.source import Source, SourceStatus
+from .sources.source import Frame, Source, SourceStatus
 
 REAL_TIME_FACTORS = (0.05, 2.0)
 """Smallest and largest of the slider."""
 
 OTHER = '(other)'
 """Stands for a scene that is not in config/."""
+
+REST_TOLERANCE = 0.002
+"""m that a bone at rest may drift; one that is about to fall moves farther within REST_PERIOD."""
+
+REST_PERIOD = 1.0
+"""s without motion after which a fall is over."""
 
 
 class Controls:
@@ -28,6 +35,8 @@ class Controls:
         """Called before a single tick is requested."""
         self._shown = SourceStatus()
         self._shown_scene = OTHER
+        self._rest_positions: np.ndarray | None = None
+        self._rest_since = 0.0
         self._loop = server.get_event_loop()
         gui, is_simulated = server.gui, source.recording is None
         self.pushes = PushKeys(server, source)
@@ -77,8 +86,13 @@ class Controls:
             self.real_time_factor.value = min(max(status.real_time_factor, lowest), highest)
         self._shown = status
 
-    def show_rest(self, is_at_rest: bool) -> None:
-        """Label the reset button 'Again' once a fall is over."""
+    def show_rest(self, frame: Frame, paused: bool, now: float) -> None:
+        """Label the reset button 'Again' once a fall is over; ``now``: s of a steady clock."""
+        positions, last = frame.state.positions, self._rest_positions
+        if (paused or last is None or positions.shape != last.shape
+                or not np.abs(positions - last).max() <= REST_TOLERANCE):
+            self._rest_since, self._rest_positions = now, positions
+        is_at_rest = now - self._rest_since >= REST_PERIOD
         label = 'Again' if is_at_rest else 'Reset'
         if label != self.reset.label:
             self.reset.label, self.reset.color = label, 'green' if is_at_rest else None
@@ -95,33 +109,30 @@ class Controls:
     async def _on_scene(self, event: viser.GuiEvent) -> None:
         """Load the chosen scene, whose name is read before the page can overwrite it."""
         name = event.target.value
-        if event.client is not None and name != OTHER:
-            asyncio.get_running_loop().run_in_executor(None, self._load, name, event.client)
+        if name != OTHER:
+            self._try(event.client, lambda: self.source.load(name),
+                      lambda: self.show_scene(self._shown_scene))
 
     async def _on_engine(self, event: viser.GuiEvent) -> None:
         """Set the chosen engine; see _on_scene."""
-        if event.client is not None:
-            asyncio.get_running_loop().run_in_executor(
-                None, self._set_engine, event.target.value, event.client)
-
-    def _set_engine(self, name: str, client: viser.ClientHandle) -> None:
-        self._try(client, lambda: self.source.set_engine(name),
+        name = event.target.value
+        self._try(event.client, lambda: self.source.set_engine(name),
                   lambda: self._show_engine(self.source.status.engine))
 
     def _show_engine(self, name: str) -> None:
         shown = name if name in ENGINES else ENGINES[0]
         self._loop.call_soon_threadsafe(setattr, self.engine, 'value', shown)
 
-    def _load(self, name: str, client: viser.ClientHandle) -> None:
-        self._try(client, lambda: self.source.load(name),
-                  lambda: self.show_scene(self._shown_scene))
-
     @staticmethod
-    def _try(client: viser.ClientHandle, change: Callable[[], None],
+    def _try(client: viser.ClientHandle | None, change: Callable[[], None],
              revert: Callable[[], None]) -> None:
-        """Make a change; if it is refused, revert what the page shows and notify the user."""
-        try:
-            change()
-        except RagdollError as error:
-            revert()
-            client.add_notification('Refused', str(error), color='red')
+        """Make a user's change in another thread; if it is refused, revert the page and notify."""
+        def run() -> None:
+            try:
+                change()
+            except RagdollError as error:
+                revert()
+                client.add_notification('Refused', str(error), color='red')
+
+        if client is not None:
+            asyncio.get_running_loop().run_in_executor(None, run)

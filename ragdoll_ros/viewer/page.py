@@ -12,14 +12,12 @@ from .browser.scripts import script, style
 from .controls import Controls
 from .drawing.camera import Cameras
 from .drawing.display_options import DisplayOptions, configure_theme
-from .drawing.ground import configure_lights
 from .drawing.plots import Plots
-from .drawing.stage import Stage
+from .drawing.stage import Stage, configure_lights
 from .editor.editor import Editor
 from .editor.handles import ROOT
 from .pointer import Pointer
 from .recording_panel import RecordingPanel
-from .rest_detector import RestDetector
 from .settings_panel import SettingsPanel
 from .sources.source import Frame, RequestedData, Source, SourceStatus
 from .start_when_visible import StartWhenVisible
@@ -42,10 +40,7 @@ DISCONNECTED = ('The viewer that served this page has ended, or cannot be reache
 
 
 class Page:
-    """What viser serves. One thread calls `update` repeatedly, and it alone draws.
-
-    The editor is created with the first scene and keeps its files in ``folder``.
-    """
+    """What viser serves; one thread calls `update` and alone draws. ``folder``: of the files."""
 
     def __init__(self, server: viser.ViserServer, source: Source, folder: str | Path = '.') -> None:
         self.server = server
@@ -83,8 +78,8 @@ class Page:
         with self.tabs.add_tab('Plots'):
             self.plots = Plots(server)
         self.cameras = Cameras(server)
-        self._rest_detector = RestDetector()
-        self._pointer = Pointer(source, self._grabbable_frame, self._select)
+        self._pointer = Pointer(source, self._grabbable_frame, lambda bone: (
+            self.editor and self.editor.select(bone)))
 
     def run(self, stop: threading.Event) -> None:
         """Draw until ``stop`` is set."""
@@ -131,7 +126,7 @@ class Page:
             if self.timeline.is_live:
                 self.cameras.show(frame)
         self.cameras.follow(frame, now, self.display.follow.value)
-        self.controls.show_rest(self._rest_detector.is_at_rest(live, status.paused, now))
+        self.controls.show_rest(live, status.paused, now)
         self.settings.show(status, live.scene, now)
 
     def _grabbable_frame(self) -> Frame | None:
@@ -161,10 +156,6 @@ class Page:
             self.editor = Editor(self.server, scene, self.source.set_scene, self.source.pause,
                                  self._folder)
         self.controls.before_step = self.editor.leave
-
-    def _select(self, bone: str) -> None:
-        if self.editor is not None:
-            self.editor.select(bone)
 
     def _show_messages(self, problem: str, note: str) -> None:
         notes = [note, *(self.stage.skins.notes if self.stage is not None else ())]

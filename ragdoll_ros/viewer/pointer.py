@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
-from ..model import rotation
+from ..model.pose import Pose
 from ..model.scene import Scene
 from ..model.state import State
 from .drawing.bodies import Bodies
@@ -53,8 +53,11 @@ class Pointer:
             if event.phase == 'start':
                 point = np.array(event.start_position)
                 self._grab(event, bone_of(event.instance_index, point), point)
+            elif event.client_id in self._distances and event.phase == 'end':
+                self._unwatch(event)
+                self._let_go(event)
             elif event.client_id in self._distances:
-                self._drag(event)
+                self._source.drag(_hand(event), self._target(event))
 
         async def on_click(event: viser.SceneNodePointerEvent) -> None:
             frame = self._frame()
@@ -97,13 +100,6 @@ class Pointer:
         if self._distances.pop(event.client_id, None) is not None:
             self._source.let_go(_hand(event))
 
-    def _drag(self, event: viser.SceneNodeDragEvent) -> None:
-        if event.phase == 'end':
-            self._unwatch(event)
-            self._let_go(event)
-        else:
-            self._source.drag(_hand(event), self._target(event))
-
     def _target(self, event: viser.SceneNodeDragEvent) -> tuple[float, ...]:
         target = target_at_distance(event.client.camera.position, np.array(event.end_position),
                                     self._distances[event.client_id])
@@ -132,15 +128,14 @@ def to_bone_frame(scene: Scene, state: State, bone: int, point: np.ndarray) -> n
 
     A page shows a past state, so the bone may have moved away from the point.
     """
-    local = rotation.rotate(rotation.inverse(state.orientations[bone]),
-                            point - state.positions[bone])
+    local = state.poses(bone).apply_inverse(point)
     half = np.array(scene.bones[bone].shape.half_extents)
     return np.clip(local, -half, half)
 
 
 def nearest_bone(scene: Scene, state: State, point: np.ndarray) -> int:
     """Index of the bone whose bounding box is nearest to a point (3,) m."""
-    local = rotation.rotate(rotation.inverse(state.orientations), point - state.positions)
+    local = Pose(state.positions, state.orientations).apply_inverse(point)
     half = np.array([bone.shape.half_extents for bone in scene.bones])
     return int(np.argmin(np.linalg.norm(np.maximum(np.abs(local) - half, 0), axis=1)))
 
@@ -157,16 +152,13 @@ async def _wait_until_disconnected(client: viser.ClientHandle) -> None:
     """
     open_connections = connections(client)
     while (connection := open_connections.get(client.client_id)) is not None:
-        response = asyncio.ensure_future(_ping(connection))
         try:
-            await asyncio.wait([response], timeout=PING_TIMEOUT)
-        finally:
-            response.cancel()
-        if not response.done() or response.exception() is not None:
+            await asyncio.wait_for(_ping(connection), PING_TIMEOUT)
+        except Exception:  # no response in time, or websockets' ConnectionClosed
             return
         await asyncio.sleep(PING_PERIOD)
 
 
 async def _ping(connection: object) -> None:
-    """Ping and wait for the pong; websockets' ConnectionClosed."""
+    """Ping and wait for the pong."""
     await (await connection.ping())

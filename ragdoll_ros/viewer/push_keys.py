@@ -8,7 +8,7 @@ import viser
 
 from ..model.scene import Scene
 from ..realtime.arrow_keys import FORCE, TAP, PressedKeys, total_force
-from .browser.client_events import add_listener
+from .browser.scripts import add_listener
 from .sources.source import Source
 
 ARROWS = {'←': 'left', '↑': 'up', '↓': 'down', '→': 'right'}
@@ -31,10 +31,7 @@ REPEAT_DURATION = 0.1
 
 
 class PushKeys:
-    """Buttons, keys and a slider that push, in the GUI container that is current.
-
-    They are hidden for a recording, which cannot be pushed.
-    """
+    """Buttons, keys and a slider in the current GUI container; hidden for a recording."""
 
     def __init__(self, server: viser.ViserServer, source: Source) -> None:
         self._source = source

@@ -35,7 +35,7 @@ class RecordingPanel:
         self.recorder: Recorder | None = None
         """Frames recorded so far; None if there is no recording."""
         self._ended = False
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         with server.gui.add_folder('Recording', expand_by_default=False):
             self.button = server.gui.add_button(
                 RECORD, icon=viser.Icon.PLAYER_RECORD, disabled=not CAN_WRITE,
@@ -53,26 +53,19 @@ class RecordingPanel:
         return self.recorder is not None and not self._ended
 
     def add(self, frame: Frame) -> None:
-        """Record a frame if recording is on.
-
-        Another scene or MAX_NUMBERS ends the recording, which is then ready for download.
-        """
+        """Record a frame if recording is on; another scene or MAX_NUMBERS ends the recording."""
         with self._lock:
-            self._frame = frame
-            self._record(frame)
-
-    def _record(self, frame: Frame) -> None:
-        recorder = self.recorder
-        if not self.recording:
-            return
-        if recorder.scene is not frame.scene:
-            self._end(SCENE_CHANGED)
-            return
-        pose = RecordedPose(frame.state.positions, frame.state.orientations, frame.rods)
-        numbers = pose.positions.size + pose.orientations.size + np.size(pose.rods)
-        recorder.add(frame.time, pose)
-        if (len(recorder) + 1) * numbers > MAX_NUMBERS:
-            self._end(FULL)
+            self._frame, recorder = frame, self.recorder
+            if not self.recording:
+                return
+            if recorder.scene is not frame.scene:
+                self._end(SCENE_CHANGED)
+                return
+            pose = RecordedPose(frame.state.positions, frame.state.orientations, frame.rods)
+            numbers = pose.positions.size + pose.orientations.size + np.size(pose.rods)
+            recorder.add(frame.time, pose)
+            if (len(recorder) + 1) * numbers > MAX_NUMBERS:
+                self._end(FULL)
 
     def _end(self, label: str) -> None:
         """End the recording, with the reason as label of the button."""
@@ -87,7 +80,7 @@ class RecordingPanel:
             if recorder is None and self._frame is not None:
                 self.recorder = Recorder(self._frame.scene)
                 self.button.label = STOP
-                self._record(self._frame)
+                self.add(self._frame)
             else:
                 self.button.label = RECORD
         if recorder is not None and client is not None:

@@ -13,10 +13,9 @@ from ..model import errors
 from ..model.scene import Ground, Scene
 from ..physics.accuracy import ACCURACIES
 from .sources.source import Source, SourceStatus
-from .widgets import number_parsing
+from .widgets import parsing
 from .widgets.error_text import error_text
-from .widgets.fields import Field
-from .widgets.form import GREEN, RED, Form, colored
+from .widgets.form import GREEN, RED, Field, Form, colored
 
 AMBER = '#e67700'
 
@@ -57,8 +56,7 @@ class SettingsPanel:
         self._warns = False
         gui = server.gui
         self.health = gui.add_html('')
-        with gui.add_folder('Settings', expand_by_default=False,
-                            visible=source.recording is None):
+        with gui.add_folder('Settings', expand_by_default=False, visible=source.recording is None):
             self.accuracy = gui.add_dropdown('Accuracy', tuple(ACCURACIES), visible=False,
                                              hint='step size; the simulation continues')
             self.cost = gui.add_html('')
@@ -75,7 +73,7 @@ class SettingsPanel:
         if scene is not self._scene:
             self._scene = scene
             self.form.fill({'gravity': scene.gravity, 'restitution': scene.material.restitution,
-                            'friction': number_parsing.format_number(scene.material.friction)})
+                            'friction': parsing.format_number(scene.material.friction)})
             self.ground.value = scene.ground is not None
         line, warns = health_line(status, scene)
         if now >= self._next_update or warns != self._warns:
@@ -108,7 +106,7 @@ class SettingsPanel:
         if scene is None:
             return
         try:
-            values['friction'] = number_parsing.parse_number(values['friction'], infinite=True)
+            values['friction'] = parsing.parse_number(values['friction'], infinite=True)
         except errors.ModelError as error:
             del values['friction']
             found.append(error.at('friction'))

@@ -16,8 +16,7 @@ from ..physics.simulation import Simulation
 from ..recordings.recording import Recorder, Recording
 from .browser.scripts import source
 from .drawing.camera import FIELD_OF_VIEW, INITIAL_CAMERA
-from .drawing.ground import configure_lights
-from .drawing.stage import Stage
+from .drawing.stage import Stage, configure_lights
 from .sources.playback import PlaybackSource
 
 RATE = 60.0
@@ -69,10 +68,7 @@ class Embedded:
 
 
 def save_static(recording: Recording, folder: str | Path) -> Path:
-    """Write static_html into a folder, which is created if missing, and return the file's path.
-
-    Raises Unreadable if the file cannot be written.
-    """
+    """Write static_html to ``folder``/index.html and return that path; Unreadable if that fails."""
     path = Path(folder) / INDEX
     content = static_html(recording)
     try:

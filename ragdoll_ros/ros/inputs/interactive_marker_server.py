@@ -61,10 +61,7 @@ class _Drag:
 
 
 class InteractiveMarkerServer:
-    """Publishes the markers, and moves the simulation's hands by the feedback.
-
-    ``now`` returns the time of a steady clock, ns.
-    """
+    """Publishes the markers; moves hands by the feedback. ``now``: time of a steady clock, ns."""
 
     def __init__(self, node: Node, counts: InputCounts, now: Callable[[], int]) -> None:
         self._counts, self._now = counts, now

@@ -97,8 +97,7 @@ class PushSubscriptions:
         limit = self.settings.max_force
         try:
             force = self._limited(source, 'force', wrench.force, limit, 'max_force')
-            torque = self._limited(source, 'torque', wrench.torque, limit * TORQUE_ARM,
-                                   'max_force')
+            torque = self._limited(source, 'torque', wrench.torque, limit * TORQUE_ARM, 'max_force')
             if any(force) or any(torque):
                 self.simulation.push(Push(bone, force, torque, local=local,
                                           duration=self.settings.push_timeout), channel)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion, Transform, Twist, Vector3
+from geometry_msgs.msg import Point, Pose, PoseArray, Transform, Twist, Vector3
 from sensor_msgs.msg import Imu, JointState, MultiDOFJointState
 from std_msgs.msg import Header
 
@@ -69,12 +69,6 @@ def to_vector(values: np.ndarray) -> Vector3:
     """Vector3 from (3,)."""
     x, y, z = map(float, values)
     return Vector3(x=x, y=y, z=z)
-
-
-def to_quaternion(values: np.ndarray) -> Quaternion:
-    """Quaternion from (4,) xyzw."""
-    x, y, z, w = map(float, values)
-    return Quaternion(x=x, y=y, z=z, w=w)
 
 
 def to_pose(row: Sequence[float]) -> Pose:

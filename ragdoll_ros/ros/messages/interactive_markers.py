@@ -57,7 +57,8 @@ class InteractiveMarkers:
 
     def serialize_update(self, sequence: int, state: State) -> bytes:
         """Serialized update of all poses, with this sequence number."""
-        return self._template.serialize(0, _as_float(sequence), poses_of(state))
+        number = np.array([sequence], np.uint64).view(float)
+        return self._template.serialize(0, number, poses_of(state))
 
     def make_update(self, sequence: int, **content: list) -> InteractiveMarkerUpdate:
         """An update message with this sequence number."""
@@ -74,11 +75,6 @@ class InteractiveMarkers:
         return self.make_update(int(sequence.view(np.uint64)[0]), poses=[
             InteractiveMarkerPose(header=self._header, name=name, pose=to_pose(row))
             for name, row in zip(self._scene.bone_names, poses.tolist(), strict=True)])
-
-
-def _as_float(number: int) -> np.ndarray:
-    """A uint64 viewed as float64 (1,)."""
-    return np.array([number], np.uint64).view(float)
 
 
 def _marker(bone: Bone, header: Header) -> InteractiveMarker:

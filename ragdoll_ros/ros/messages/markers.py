@@ -62,10 +62,7 @@ class SceneMarkers:
         return self._make_template()
 
     def _make_template(self, first: bool = False) -> SerializedTemplate:
-        """Template of the bones' parts, poses (p, 7), and of the rods, end points (2 m, 3) m.
-
-        The ``first`` message begins with DELETEALL.
-        """
+        """Template of the bones' parts, poses (p, 7), and of the rods, end points (2 m, 3) m."""
         header, scene = to_header(STAMP_SENTINEL, self._frame), self._scene
         array = MarkerArrayBuilder()
         if first:

@@ -49,7 +49,6 @@ class TfPublisher:
     def __init__(self, node: Node) -> None:
         self._node = node
         self._publisher: Publisher | None = None
-        self._has_logged_missing = False
 
     def set_scene(self, scene: Scene, frame: str, publish_tf: str) -> None:
         """Prepare for a scene; ``frame`` names the world frame, ``publish_tf``: see PUBLISH_TF."""
@@ -60,7 +59,8 @@ class TfPublisher:
             self._node.destroy_publisher(self._publisher)
             self._publisher = None
         elif publish_tf != 'none' and TFMessage is None:
-            self._log_missing()
+            self._node.get_logger().info(
+                f'/tf is not published, as tf2_msgs is not installed: {MISSING}', once=True)
         elif publish_tf != 'none' and self._publisher is None:
             self._publisher = self._node.create_publisher(TFMessage, '/tf', DEPTH)
 
@@ -84,12 +84,6 @@ class TfPublisher:
 
     def _count_subscribers(self) -> int:
         return self._publisher.get_subscription_count() if self._publisher else 0
-
-    def _log_missing(self) -> None:
-        if not self._has_logged_missing:
-            self._has_logged_missing = True
-            self._node.get_logger().info(f'/tf is not published, as tf2_msgs is not installed: '
-                                         f'{MISSING}')
 
 
 def to_tf(edges: list[tuple[str, str]], stamp: int, poses: np.ndarray) -> TFMessage:

@@ -88,8 +88,7 @@ class NodeSettings:
     imu_range: tuple[float, ...] = _parameter(
         (0.0, 0.0), 'Limits at which samples saturate: m/s^2 and rad/s; 0: unlimited',
         constraints='2 numbers, zero or above')
-    imu_seed: int = _parameter(
-        0, "Seed of the sensors' noise", (0, 2 ** 31 - 1))
+    imu_seed: int = _parameter(0, "Seed of the sensors' noise", (0, 2 ** 31 - 1))
 
     @property
     def step(self) -> float:

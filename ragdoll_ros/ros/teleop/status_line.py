@@ -33,10 +33,7 @@ class StatusLine:
         return float(self._values.get('real_time_factor', 1.0))
 
     def text(self, push: str = '') -> str:
-        """Real-time factor, simulated time, push, tick cost, position and speed of the root.
-
-        Without a push it fits 80 columns.
-        """
+        """Real-time factor, time, push, tick cost and root; without a push it fits 80 columns."""
         if self._state is None or not self._values:
             return 'waiting for the node'
         values = self._values
@@ -51,9 +48,8 @@ class StatusLine:
         return since / SECOND * float(values['stamp_pace'])
 
     def _root(self) -> str:
-        name, position, velocity = (self._state.joint_names[0],
-                                    self._state.transforms[0].translation,
-                                    self._state.twist[0].linear)
+        name, velocity = self._state.joint_names[0], self._state.twist[0].linear
+        position = self._state.transforms[0].translation
         speed = math.hypot(velocity.x, velocity.y, velocity.z)
         return f'{name} {position.x:.2f} {position.y:.2f} {position.z:.2f} m {speed:.1f} m/s'
 

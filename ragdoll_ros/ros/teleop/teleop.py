@@ -18,11 +18,11 @@ from rclpy.exceptions import InvalidTopicNameException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
+from rclpy.validate_topic_name import validate_topic_name
 from std_srvs.srv import SetBool, Trigger
 
 from ...realtime.arrow_keys import DIRECTIONS, TAP, HeldKeys, total_force
 from ..process.rclpy_context import rclpy_context
-from .find_node import NodeFinder
 from .status_line import StatusLine
 from .terminal_keys import Keyboard
 
@@ -38,6 +38,9 @@ LINE_PERIOD = 0.1
 GRAPH_PERIOD = 0.5
 """s between two checks of the ROS graph."""
 
+TOPIC_TYPES = {'/poses': 'geometry_msgs/msg/PoseArray', '/force': 'geometry_msgs/msg/Wrench'}
+"""Topics by which a ragdoll node is recognized, relative to its name."""
+
 HELP = 'arrows push: tap or hold | space pauses | r resets | q quits'
 
 EXAMPLE = """examples:
@@ -45,6 +48,47 @@ EXAMPLE = """examples:
   ragdoll_teleop /stage/doll
   ragdoll_teleop --ros-args -r __ns:=/stage
 """
+
+
+class NodeFinder:
+    """The fully qualified ``name`` of a ragdoll node.
+
+    ``requested``: the name the user gave; '': ``ragdoll``, or another ragdoll node if that is not
+    there. Raises rclpy's InvalidTopicNameException for an invalid name.
+    """
+
+    def __init__(self, node: Node, requested: str) -> None:
+        self._node, self._fixed = node, bool(requested)
+        validate_topic_name(requested or 'ragdoll')
+        self.name = node.resolve_topic_name(requested or 'ragdoll')
+        self.problem = ''
+        """Why no node can be chosen."""
+        self._found: list[str] = []
+
+    def update(self) -> bool:
+        """Check the ROS graph; to be called periodically. Returns whether ``name`` has changed."""
+        self.problem = ''
+        if self._fixed or self._exists(self.name):
+            return False
+        # Discovery takes time: a result counts when the next check confirms it.
+        before, self._found = self._found, self._ragdoll_nodes()
+        found = self._found
+        if len(found) > 1:
+            self.problem = (f'several nodes: {", ".join(found)}; choose one: '
+                            f'ragdoll_teleop {found[0]}')
+        if len(found) != 1 or found != before:
+            return False
+        self.name = found[0]
+        return True
+
+    def _ragdoll_nodes(self) -> list[str]:
+        types = dict(self._node.get_topic_names_and_types())
+        names = (topic[:-len('/poses')] for topic in sorted(types) if topic.endswith('/poses'))
+        return [name for name in names if self._exists(name)
+                and all(kind in types.get(name + end, ()) for end, kind in TOPIC_TYPES.items())]
+
+    def _exists(self, name: str) -> bool:
+        return self._node.count_publishers(f'{name}/poses') > 0
 
 
 class Teleop(Node):

@@ -1,4 +1,4 @@
-"""Loads the scripts and style sheets of this folder, as HTML for the panel or as text.
+"""Loads the scripts and style sheets of this folder, and receives the events that scripts send.
 
 Viser has no call for either, and <script> elements in the panel's HTML do not run; the error
 handler of an image that cannot be loaded does, whenever the panel is shown.
@@ -7,7 +7,12 @@ from __future__ import annotations
 
 import html
 import json
+from collections.abc import Callable
 from pathlib import Path
+
+import viser
+
+from ..viser_internals import handle_id
 
 FOLDER = Path(__file__).parent
 
@@ -32,3 +37,22 @@ def style(name: str, **properties: str) -> str:
     """HTML of a style sheet; ``properties``: texts of its custom properties --ragdoll-<name>."""
     custom = ''.join(f'--ragdoll-{key}: {json.dumps(value)};' for key, value in properties.items())
     return f'<style>:root {{{custom}}}\n{source(name)}</style>'
+
+
+def add_listener(gui: viser.GuiApi, name: str, file: str, on_event: Callable[[int, str], None],
+                 widget: viser.GuiInputHandle | None = None) -> viser.GuiInputHandle[str]:
+    """Run the ``listen(send, isTyped)`` of a script ``file`` on all pages; see client_events.js.
+
+    ``on_event`` gets a page's client_id and what it sends, in viser's thread, so in order with all
+    else that pages send. In the script, `isTyped(input)` tells whether an input belongs to
+    ``widget``, which has a label. Returns the hidden text field whose values carry the events.
+    """
+    field = gui.add_text(name, '', visible=False)
+
+    @field.on_update
+    async def _(event: viser.GuiEvent) -> None:
+        on_event(event.client_id, event.target.value.partition(' ')[2])
+
+    gui.add_html(script(file, 'client_events.js', NAME=name, FIELD=handle_id(field),
+                        WIDGET=handle_id(widget) if widget is not None else ''))
+    return field

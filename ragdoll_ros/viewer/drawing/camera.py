@@ -114,8 +114,6 @@ class Cameras:
 
     def _ensure_visible(self, client: viser.ClientHandle) -> None:
         """Show the home view where a camera does not see all or is too far away."""
-        if self._frame is None:
-            return
         camera, spheres = client.camera, bounding_spheres(self._frame.scene, self._frame.state)
         look_at = box_center(*spheres)
         home = home_position(*spheres, look_at, camera.fov, _aspect(camera))

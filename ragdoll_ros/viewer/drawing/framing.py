@@ -79,5 +79,4 @@ def sees_all(position: np.ndarray, look_at: np.ndarray, fov: float, aspect: floa
 def _edges(forward: np.ndarray, right: np.ndarray, fov: float,
            aspect: float) -> tuple[tuple[np.ndarray, float], ...]:
     """Up and right direction of the view, each with the half angle of the frustum, rad."""
-    return ((np.cross(right, forward), fov / 2),
-            (right, math.atan(math.tan(fov / 2) * aspect)))
+    return ((np.cross(right, forward), fov / 2), (right, math.atan(math.tan(fov / 2) * aspect)))

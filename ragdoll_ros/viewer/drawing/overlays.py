@@ -54,12 +54,10 @@ class Overlays:
             self._pushes, self._last_push = pushes, now
         arrows = [arrow_to_surface(scene.bones[bone], push, state.positions[bone],
                                    state.orientations[bone])
-                  for push in self._pushes
-                  for bone in (scene.bone_index(push.bone),)]
-        lines = [np.stack([grab.point, grab.target]) for grab in frame.grabs]
+                  for push in self._pushes for bone in (scene.bone_index(push.bone),)]
         self._set('rods', frame.rods)
         self._set('pushes', arrows)
-        self._set('hands', lines)
+        self._set('hands', [(grab.point, grab.target) for grab in frame.grabs])
         self._set('pointers', [grab.target for grab in frame.grabs])
         self._set('contacts', frame.contacts)
         self._set('forces', force_lines(frame))

@@ -19,8 +19,7 @@ MAX_SKINS = 30
 class SkinMeshes:
     """Skins of the first MAX_SKINS dolls of a scene that have one.
 
-    ``notes``: texts on skins that failed or are too many; ``skinned``: indices of all bones of
-    dolls with a skin mesh.
+    ``notes``: on skins that failed or are too many; ``skinned``: bones of dolls with a skin mesh.
     """
 
     def __init__(self, server: viser.ViserServer, scene: Scene) -> None:

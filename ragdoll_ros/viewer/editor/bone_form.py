@@ -16,8 +16,8 @@ from ...model.ragdoll import DEFAULT_COLOR, JOINT_KINDS, Joint
 from ...model.scene import Scene
 from ...model.shapes import SHAPES, SIZES, Shape
 from ...model.vectors import unit_vector
-from ..widgets import number_parsing
-from ..widgets.fields import Field, FieldValue, FormValues
+from ..widgets import parsing
+from ..widgets.form import Field, FieldValue, FormValues
 from . import changes
 
 SURFACE = ('friction', 'rolling_friction', 'restitution')
@@ -59,8 +59,7 @@ JOINT = (
 def read_bone(scene: Scene, name: str) -> FormValues:
     """Values of a bone and its joint; UnknownBone. Compound shapes have no shape values."""
     _, bone = changes.find(scene, name)
-    shape = {} if bone.shape.kind not in SHAPES else {
-        'shape': bone.shape.kind, **vars(bone.shape)}
+    shape = {'shape': bone.shape.kind, **vars(bone.shape)} if bone.shape.kind in SHAPES else {}
     values: FormValues = {**shape, 'mass': bone.mass,
                           'inertia': ', '.join(f'{moment:.9g}' for moment in bone.moments or ()),
                           'position': bone.position, 'rotation': _degrees(bone.orientation),
@@ -100,12 +99,6 @@ Step = tuple[tuple[str, ...], Callable[[Scene, FormValues], Scene]]
 
 
 def _body_steps(name: str, limb: bool) -> list[Step]:
-    def position(scene: Scene, new: FormValues) -> Scene:
-        return changes.set_pose(scene, name, new['position'], limb=limb)
-
-    def orientation(scene: Scene, new: FormValues) -> Scene:
-        return changes.set_pose(scene, name, orientation=_quaternion(new['rotation']), limb=limb)
-
     def color(scene: Scene, new: FormValues) -> Scene:
         _, old = changes.find(scene, name)
         opacity = (old.color or DEFAULT_COLOR)[3:]
@@ -118,22 +111,22 @@ def _body_steps(name: str, limb: bool) -> list[Step]:
 
     return [bone('shape', 'size', 'radius', 'length', shape=_shape),
             bone('mass', mass=lambda new: new['mass']),
-            bone('inertia', moments=lambda new: _moments(new['inertia'])),
-            (('position',), position), (('rotation',), orientation),
+            bone('inertia', moments=lambda new: (
+                parsing.parse_numbers(new['inertia'], 3) if new['inertia'].strip() else None)),
+            (('position',), lambda scene, new: changes.set_pose(
+                scene, name, new['position'], limb=limb)),
+            (('rotation',), lambda scene, new: changes.set_pose(
+                scene, name, orientation=_quaternion(new['rotation']), limb=limb)),
             (('color',), color),
             *(bone(key, **{key: lambda new, key=key: _number_or_none(key, new[key])})
               for key in SURFACE)]
 
 
 def _joint_steps(name: str, shown: FormValues) -> list[Step]:
-    def anchor(scene: Scene, new: FormValues) -> Scene:
-        return changes.change_joint(scene, name, anchor=new['anchor'])
-
     return [(('kind', 'axis_1', 'axis_2', 'limits_1', 'limits_2', 'limits_3'),
              lambda scene, new: _set_axes_and_limits(scene, name, new, shown)),
-            (('anchor',), anchor),
-            (('damping',), lambda scene, new: changes.change_joint(
-                scene, name, damping=new['damping']))]
+            *(((key,), lambda scene, new, key=key: changes.change_joint(
+                scene, name, **{key: new[key]})) for key in ('anchor', 'damping'))]
 
 
 def _read_joint(joint: Joint) -> FormValues:
@@ -188,7 +181,7 @@ def _not_perpendicular(new: FormValues, shown: FormValues) -> errors.WrongAxes:
     if new[key] == shown.get(key):
         key, other = other, key
     return errors.WrongAxes(key, new[key], f'perpendicular to {other.replace("_", " ")}, which is '
-                            + number_parsing.format_numbers(new[other]))
+                            + parsing.format_numbers(new[other]))
 
 
 def _pair(key: str, text: str, symmetric: bool) -> tuple[float, float] | None:
@@ -197,29 +190,17 @@ def _pair(key: str, text: str, symmetric: bool) -> tuple[float, float] | None:
         return None
     for count in (2, 1) if symmetric else (2,):
         with suppress(errors.WrongForm):
-            numbers = number_parsing.parse_numbers(text, count, '°')
+            numbers = parsing.parse_numbers(text, count, '°')
             return (numbers[0] if count == 2 else -numbers[0]), numbers[-1]
     raise errors.WrongForm(
         key, text, 'two angles in degrees, lower and upper, such as -90; 45.5, or nothing')
 
 
-def _moments(text: str) -> tuple[float, ...] | None:
+def _number_or_none(key: str, text: str) -> float | None:
     if not text.strip():
         return None
-    try:
-        return number_parsing.parse_numbers(text, 3)
-    except errors.WrongForm as error:
-        raise error.at('inertia') from None
-
-
-def _number_or_none(key: str, text: str) -> float | None:
     unit = 'm' if key == 'rolling_friction' else ''
-    try:
-        if not text.strip():
-            return None
-        return number_parsing.parse_number(text, unit, infinite=key == 'friction')
-    except errors.WrongForm as error:
-        raise error.at(key) from None
+    return parsing.parse_number(text, unit, infinite=key == 'friction')
 
 
 def _shape(new: FormValues) -> Shape:

@@ -53,8 +53,7 @@ class Editor:
         self.panel = EditorPanel(server.gui, self.select, self.suggest)
         self._connect(server.gui)
         with server.gui.add_folder('Files'):
-            self.files = FilesPanel(server, lambda: self.scene, self.set_scene,
-                                    SceneFolder(folder))
+            self.files = FilesPanel(server, lambda: self.scene, self.set_scene, SceneFolder(folder))
         self._refresh()
 
     @property
@@ -103,11 +102,11 @@ class Editor:
 
     def update(self) -> None:
         """Apply the values of the form, or show errors below them and change nothing."""
-        with self._reporting_errors():
-            name, limb = self._selected(), self.panel.limb.value
+        def change(name: str) -> Scene:
             values, found = self.panel.values()
-            self._change(lambda: bone_form.apply_values(self.scene, name, values, limb, found),
-                         f'numbers of {name}')
+            return bone_form.apply_values(self.scene, name, values, self.panel.limb.value, found)
+
+        self._change(change, 'numbers of')
 
     def undo(self) -> None:
         """Go one step back."""
@@ -170,27 +169,24 @@ class Editor:
                 trigger(lambda _, action=action: action())
 
     def _on_pose(self, position: np.ndarray, orientation: np.ndarray) -> None:
-        with self._reporting_errors():
-            name, limb = self._selected(), self.panel.limb.value
-            self._change(lambda: changes.set_pose(self.scene, name, position, orientation, limb),
-                         f'move {name}')
+        self._change(lambda name: changes.set_pose(
+            self.scene, name, position, orientation, self.panel.limb.value), 'move')
 
     def _on_size(self, half_extents: np.ndarray) -> None:
+        self._change(lambda name: changes.set_size(self.scene, name, half_extents), 'size of')
+
+    def _change(self, change: Callable[[str], Scene], action: str) -> None:
+        """Change the selected bone, on both sides if so chosen; if refused, reset the handles."""
         with self._reporting_errors():
             name = self._selected()
-            self._change(lambda: changes.set_size(self.scene, name, half_extents),
-                         f'size of {name}')
-
-    def _change(self, change: Callable[[], Scene], name: str) -> None:
-        """Make a change, on both sides if selected; reset the handles if it is refused."""
-        try:
-            scene = change()
-            if self.panel.both.value:
-                scene = mirror.mirrored(scene, self._selected(), self.panel.limb.value)
-            self.set_scene(scene, name)
-        except errors.RagdollError:
-            self.show_handles()
-            raise
+            try:
+                scene = change(name)
+                if self.panel.both.value:
+                    scene = mirror.mirrored(scene, name, self.panel.limb.value)
+                self.set_scene(scene, f'{action} {name}')
+            except errors.RagdollError:
+                self.show_handles()
+                raise
 
     def _push(self, scene: Scene, name: str) -> None:
         """Add a scene to the history; one with another name starts a new history."""

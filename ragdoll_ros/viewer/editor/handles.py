@@ -89,9 +89,7 @@ class Handles:
         self._server.scene.add_icosphere(f'{self.root}/pivot', radius=0.08 * length, color=BLUE,
                                          position=joint.anchor, cast_shadow=False)
         if joint.axes:
-            ends = np.array([[np.subtract(joint.anchor, np.multiply(axis, length)),
-                              np.add(joint.anchor, np.multiply(axis, length))]
-                             for axis in joint.axes])
+            ends = joint.anchor + length * np.array(joint.axes)[:, None] * [[-1], [1]]
             colors = np.array([[color, color] for color in (BLUE, RED)[:len(ends)]], np.uint8)
             self._server.scene.add_line_segments(f'{self.root}/axes', ends, colors,
                                                  thickness=0.03 * length)

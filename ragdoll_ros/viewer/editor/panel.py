@@ -9,8 +9,7 @@ from ...model import errors
 from ...model.scene import Scene
 from ..browser.scripts import style
 from ..widgets.error_text import error_text
-from ..widgets.fields import FormValues
-from ..widgets.form import RED, CallbackGuard, Form, colored
+from ..widgets.form import RED, CallbackGuard, Form, FormValues, colored
 from .bone_form import BODY, JOINT
 from .undo_history import UndoHistory
 
@@ -18,10 +17,9 @@ NONE = '(no bone)'
 
 
 class EditorPanel:
-    """Widgets in the GUI container that is current.
+    """Widgets in the GUI container that is current; the editor connects the buttons.
 
-    ``select`` takes the name of a selected bone, or None; ``suggest`` is a Form's ``on_kind``. The
-    editor connects the buttons.
+    ``select`` takes the name of a selected bone, or None; ``suggest`` is a Form's ``on_kind``.
     """
 
     def __init__(self, gui: viser.GuiApi, select: Callable[[str | None], None],
@@ -108,8 +106,7 @@ class EditorPanel:
         self.edit.icon = 'player-play' if editing else 'pencil'
 
 
-def _set_options(dropdown: viser.GuiDropdownHandle, options: tuple[str, ...],
-                 value: str) -> None:
+def _set_options(dropdown: viser.GuiDropdownHandle, options: tuple[str, ...], value: str) -> None:
     if dropdown.options != options:
         dropdown.options = options
     dropdown.value = value

@@ -18,10 +18,7 @@ class ReadOnly(errors.RagdollError):
 
 
 class PlaybackSource(Source):
-    """Plays a recording in wall time while a page is open; pauses at its end.
-
-    Pushes and hands do nothing.
-    """
+    """Plays a recording in wall time while a page is open; pauses at its end."""
 
     def __init__(self, recording: Recording, name: str = 'recording') -> None:
         self._recording = recording
@@ -82,7 +79,6 @@ class PlaybackSource(Source):
             self._continue_from(0.0)
 
     def set_real_time_factor(self, factor: float) -> None:
-        """Set the playback speed; OutOfRange."""
         errors.check_range('real_time_factor', factor, *REAL_TIME_FACTORS)
         with self._lock:
             self._continue_from(self._now())

@@ -1,17 +1,19 @@
 """A simulation in this process as a source, in a thread of its own that alone uses it."""
 from __future__ import annotations
 
+import dataclasses
 import math
 import queue
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 
 import numpy as np
 
 from ...files.scene import load_scene
-from ...model import errors, rotation
+from ...model import errors
 from ...model.push import Push
 from ...model.scene import SECOND, Scene
 from ...model.vectors import Vector
@@ -19,7 +21,9 @@ from ...physics.actions.grab import DRAG_TIME
 from ...physics.simulation import Simulation
 from ...realtime.pacer import Pacer
 from .source import REAL_TIME_FACTORS, Frame, GrabbedPoint, RequestedData, Source, SourceStatus
-from .tick_statistics import TickStatistics
+
+WINDOW = 1.0
+"""s of wall time over which the rate and cost of ticks are measured."""
 
 STATUS_PERIOD = 0.1
 """s of wall time between two updates of the status."""
@@ -128,7 +132,8 @@ class SimulationSource(Source):
     def _run(self) -> None:
         while True:
             try:
-                command = self._commands.get(timeout=self._time_to_tick())
+                wait = self._pacer.wait(time.monotonic_ns()) / SECOND if self._is_running else None
+                command = self._commands.get(timeout=wait)
             except queue.Empty:
                 if self._pacer.due(time.monotonic_ns()):
                     self._tick()
@@ -146,17 +151,13 @@ class SimulationSource(Source):
     def _is_running(self) -> bool:
         return self._requested.frames and not self._status.paused
 
-    def _time_to_tick(self) -> float | None:
-        """Time until the next tick, s; None while not running."""
-        return self._pacer.wait(time.monotonic_ns()) / SECOND if self._is_running else None
-
     def _set_requested(self, requested: RequestedData) -> None:
         was_running, self._requested = self._is_running, requested
         if not was_running:
             self._restart_clock()
 
     def _update_status(self, **changes: object) -> None:
-        self._status = SourceStatus(**{**vars(self._status), **changes})
+        self._status = dataclasses.replace(self._status, **changes)
         self._restart_clock()
 
     def _restart_clock(self) -> None:
@@ -219,10 +220,9 @@ class SimulationSource(Source):
             forces=None if contacts is None else contacts.normals * contacts.forces[:, None])
         if time.monotonic() >= self._next_status:
             self._next_status = time.monotonic() + STATUS_PERIOD
-            self._status = SourceStatus(**{
-                **vars(self._status), 'measures': self._measures(),
-                'measured_real_time_factor': self._statistics.real_time_factor,
-                'tick_cost': self._statistics.mean_cost})
+            self._status = dataclasses.replace(
+                self._status, measures=self._measures(), tick_cost=self._statistics.mean_cost,
+                measured_real_time_factor=self._statistics.real_time_factor)
 
     def _measures(self) -> dict[str, float]:
         """Current measures, or older ones where computing them takes long."""
@@ -236,9 +236,40 @@ class SimulationSource(Source):
     def _grabs(self) -> Iterator[GrabbedPoint]:
         state = self._simulation.state
         for grab in self._simulation.grabs:
-            bone = self._simulation.scene.bone_index(grab.bone)
-            point = rotation.rotate(state.orientations[bone], np.array(grab.point))
-            yield GrabbedPoint(grab.bone, state.positions[bone] + point, np.array(grab.target))
+            pose = state.poses(self._simulation.scene.bone_index(grab.bone))
+            yield GrabbedPoint(grab.bone, pose.apply(np.array(grab.point)), np.array(grab.target))
+
+
+class TickStatistics:
+    """Rate and cost of ticks over the last WINDOW of wall time. Not thread-safe."""
+
+    def __init__(self) -> None:
+        self._ticks: deque[tuple[float, float, float]] = deque()
+
+    def add(self, begin: float, end: float, simulated: float) -> None:
+        """Record a tick of ``simulated`` s, computed between two instants of wall time, s."""
+        self._ticks.append((begin, end, simulated))
+        while self._ticks[0][0] < begin - WINDOW:
+            self._ticks.popleft()
+
+    def clear(self) -> None:
+        """Forget all ticks."""
+        self._ticks.clear()
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated time per wall time; NaN before half a window has passed."""
+        if not self._ticks or self._ticks[-1][0] - self._ticks[0][0] < WINDOW / 2:
+            return math.nan
+        simulated = sum(tick[2] for tick in self._ticks) - self._ticks[0][2]
+        return simulated / (self._ticks[-1][0] - self._ticks[0][0])
+
+    @property
+    def mean_cost(self) -> float:
+        """Mean wall time of computing a tick, s; NaN before the first."""
+        if not self._ticks:
+            return math.nan
+        return sum(end - begin for begin, end, _ in self._ticks) / len(self._ticks)
 
 
 def _real_time_factor(scene: Scene) -> float:

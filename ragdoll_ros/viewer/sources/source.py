@@ -88,10 +88,7 @@ class RequestedData:
 
 
 class Source(Protocol):
-    """Provides frames and takes commands. A command that a source does not support does nothing.
-
-    All methods may be called from any thread.
-    """
+    """Provides frames and takes commands, from any thread; ignores commands it does not support."""
 
     @property
     def frame(self) -> Frame | None:
@@ -113,10 +110,7 @@ class Source(Protocol):
         """Set which data the page needs from now on."""
 
     def push(self, force: Vector, duration: float) -> None:
-        """Push the pushed bone with a force, N, world axes, for ``duration`` s of simulated time.
-
-        The next push replaces it.
-        """
+        """Push the pushed bone by N, world axes, for ``duration`` s simulated or until the next."""
 
     def pause(self, paused: bool) -> bool:
         """Pause or resume; False if that is not possible yet, because no node is running."""
@@ -143,10 +137,7 @@ class Source(Protocol):
         """Restart with a scene; waits; RagdollError with the reason if refused."""
 
     def grab(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
-        """Let a hand hold a bone at ``point``, m from its centre of mass in its axes.
-
-        The point is pulled to ``target``, m, world frame.
-        """
+        """Hold a bone at ``point``, m, bone frame, and pull that to ``target``, m, world frame."""
 
     def drag(self, hand: str, target: Vector) -> None:
         """Move the target of a hand, m, world frame."""

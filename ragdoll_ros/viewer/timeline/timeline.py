@@ -2,14 +2,19 @@
 from __future__ import annotations
 
 import importlib.util
+import io
 import threading
 import time
+import zipfile
+from pathlib import Path
 
 import viser
 
-from ..browser.client_events import add_listener
+from ...fit.skin import skins_of
+from ...recordings.recording import Recording
+from ...recordings.save import FORMATS, encoded_files
+from ..browser.scripts import add_listener
 from ..sources.source import Frame, Source
-from .export_zip import export_zip
 from .frame_buffer import Clip, FrameBuffer, clip_of
 from .playhead import Playhead
 from .strip import strip
@@ -197,11 +202,7 @@ class Timeline:
         self._resend = False
 
     def _move_slider(self, value: float, playhead: Playhead | None, resend: bool) -> None:
-        """Set the slider, s, unless the user has moved it meanwhile.
-
-        In viser's thread: set from another one, it could overwrite a value that a page sent before
-        that is read.
-        """
+        """Set the slider, s, unless a user has moved it; in viser's thread, as the Scene list."""
         # While a user drags the slider, the playhead is where the slider is, to within its step.
         if playhead is not self._playhead or (abs(self.slider.value - value) <= STEP
                                               and not resend):
@@ -214,8 +215,21 @@ class Timeline:
     def _send_export(self, event: viser.GuiEvent) -> None:
         """Send the whole timeline to the page that asked for it."""
         clip = self.clip
-        if clip is None or event.client is None:
-            return
-        content = export_zip(clip.recording(), 'run',
-                             lambda suffix: CAN_WRITE_MCAP or suffix != '.mcap')
-        event.client.send_file_download('run.zip', content, save_immediately=True)
+        if clip is not None and event.client is not None:
+            event.client.send_file_download('run.zip', export_zip(clip.recording()),
+                                            save_immediately=True)
+
+
+def export_zip(recording: Recording) -> bytes:
+    """A ZIP file of a run in all formats that can be written here.
+
+    A doll whose skin cannot be loaded is exported with its bones; the page shows the reason.
+    """
+    skins = skins_of(recording.scene, lambda _: None)
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, 'w', zipfile.ZIP_DEFLATED) as archive:
+        for suffix in FORMATS:
+            if suffix != '.mcap' or CAN_WRITE_MCAP:
+                for path, content in encoded_files(recording, Path('run' + suffix), skins).items():
+                    archive.writestr(str(path), content)
+    return stream.getvalue()

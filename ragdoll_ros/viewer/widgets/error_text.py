@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 from ...model import errors
-from .number_parsing import format_number, format_numbers
+from .parsing import format_number, format_numbers
 
 
 def field_error(error: errors.ModelError, name: str, unit: str = '') -> str:

@@ -5,6 +5,7 @@ import html
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any
 
 import viser
@@ -12,16 +13,29 @@ import viser
 from ...model import errors
 from ...model.ragdoll import JOINT_KINDS
 from ...model.shapes import SHAPES
-from ..browser.client_events import add_listener
-from . import number_parsing
-from .color_field import parse_color
+from ..browser.scripts import add_listener
+from . import parsing
 from .error_text import field_error
-from .fields import Field, FieldValue, FormValues
 
 NUMBERS = ('number', 'vector')
 """Widgets of one number and of three; both are text fields."""
 
 RED, GREEN, GREY = '#c92a2a', '#2b8a3e', '#495057'
+
+
+FieldValue = str | float | tuple[float, ...]
+FormValues = dict[str, FieldValue]
+"""Values by the keys of their fields."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """One line of a form: key, label with unit, kind of widget, and hint."""
+
+    key: str
+    label: str
+    widget: str
+    hint: str
 
 
 class CallbackGuard(threading.local):
@@ -69,10 +83,7 @@ class Form:
         return self._widgets[key]
 
     def fill(self, values: FormValues) -> None:
-        """Show the fields in ``values``, hide the others, and clear all errors.
-
-        Typed text that has the same value stays as it is.
-        """
+        """Show these fields only, without errors; typed text that has the same value stays."""
         self.show_errors(())
         self._color_errors.clear()
         with self._filling:
@@ -110,7 +121,7 @@ class Form:
         """Handle colours that are typed and picked."""
         def on_typed(page: int, event: str) -> None:
             try:
-                self._colors[key] = parse_color(event)
+                self._colors[key] = parsing.parse_color(event)
                 self._color_errors.pop(key, None)
             except errors.ModelError as error:
                 self._color_errors[key] = error
@@ -139,7 +150,7 @@ class Form:
             if self._read(key, widget.value) == value:
                 self._filled[key] = widget.value, value
                 return
-        text = number_parsing.format_numbers(value if isinstance(value, tuple) else (value,))
+        text = parsing.format_numbers(value if isinstance(value, tuple) else (value,))
         self._filled[key] = text, value
         widget.value = text
 
@@ -155,11 +166,11 @@ class Form:
             return value
         unit = _name_and_unit(field)[1]
         if field.widget == 'number':
-            return number_parsing.parse_number(given, unit)
-        new = number_parsing.parse_numbers(given, 3, unit)
+            return parsing.parse_number(given, unit)
+        new = parsing.parse_numbers(given, 3, unit)
         with suppress(errors.ModelError):
-            parts = zip(number_parsing.split_numbers(text, 3, unit),
-                        number_parsing.split_numbers(given, 3, unit), value, new, strict=True)
+            parts = zip(parsing.split_numbers(text, 3, unit),
+                        parsing.split_numbers(given, 3, unit), value, new, strict=True)
             return tuple(exact if was == now else number for was, now, exact, number in parts)
         return new
 

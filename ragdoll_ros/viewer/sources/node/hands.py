@@ -6,15 +6,14 @@ import socket
 from dataclasses import dataclass
 
 import numpy as np
-from geometry_msgs.msg import Pose
 from rclpy.node import Node
 from std_msgs.msg import Header
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
-from ....model import rotation
+from ....model.pose import Pose
 from ....model.scene import Scene
 from ....model.state import State
-from ....ros.messages.convert import to_point, to_quaternion
+from ....ros.messages.convert import to_point, to_pose
 from ..source import Frame, GrabbedPoint
 
 
@@ -23,10 +22,8 @@ class _Hand:
     bone: str
     local: np.ndarray
     """(3,) m: the grabbed point in the bone's frame."""
-    start: np.ndarray
-    """(3,) m, world: the grabbed point when it was grabbed."""
-    pose: np.ndarray
-    """(7,) of the bone when it was grabbed."""
+    pose: Pose
+    """Of the bone when it was grabbed."""
     target: np.ndarray
 
 
@@ -47,11 +44,8 @@ class NodeHands:
              frame: Frame) -> None:
         """Grab a bone of the shown frame at a point of the bone's frame."""
         self.let_go(hand)
-        index = frame.scene.bone_index(bone)
-        position, orientation = frame.state.positions[index], frame.state.orientations[index]
-        point = position + rotation.rotate(orientation, local)
-        pose = np.concatenate([position, orientation])
-        self._hands[hand] = grab = _Hand(bone, local, point, pose, point)
+        pose = frame.state.poses(frame.scene.bone_index(bone))
+        self._hands[hand] = grab = _Hand(bone, local, pose, pose.apply(local))
         self._send(hand, grab, InteractiveMarkerFeedback.MOUSE_DOWN)
         self.drag(hand, target)
 
@@ -82,17 +76,14 @@ class NodeHands:
         """The points that are held now."""
         names = scene.bone_names
         return tuple(GrabbedPoint(
-            hand.bone, state.positions[bone] + rotation.rotate(
-                state.orientations[bone], hand.local), hand.target)
-            for hand in list(self._hands.values()) if hand.bone in names
-            for bone in (names.index(hand.bone),))
+            hand.bone, state.poses(names.index(hand.bone)).apply(hand.local), hand.target)
+            for hand in list(self._hands.values()) if hand.bone in names)
 
     def _send(self, hand: str, grab: _Hand, event: int) -> None:
         self.moves += 1
-        position = grab.pose[:3] + grab.target - grab.start
-        orientation = to_quaternion(grab.pose[3:])
+        position = grab.pose.position + grab.target - grab.pose.apply(grab.local)
         self._publisher.publish(InteractiveMarkerFeedback(
             header=Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self.frame_id),
             client_id=f'{self._client} {hand}', marker_name=grab.bone, control_name=grab.bone,
-            event_type=event, pose=Pose(position=to_point(position), orientation=orientation),
+            event_type=event, pose=to_pose((*position, *grab.pose.orientation)),
             mouse_point=to_point(grab.target), mouse_point_valid=True))

@@ -30,10 +30,9 @@ from ....ros.diagnostics import status_name
 from ....ros.inputs.subscriptions import PushSubscriptions
 from ....ros.outputs import LATCHED
 from ..source import Frame, RequestedData, Source, SourceStatus
-from .force_publisher import ForcePublisher
 from .frames import NodeFrames
 from .hands import NodeHands
-from .observed_pushes import NoInputCounts, ObservedPushes
+from .pushes import ForcePublisher, NoInputCounts, ObservedPushes
 from .scene import NodeScene
 from .services import NodeServices, Refused
 
@@ -131,15 +130,12 @@ class NodeSource(Source):
         self._services.set_parameter('real_time_factor', float(factor))
 
     def load(self, name: str) -> None:
-        """Set the parameter `scene`; Refused."""
         self._services.set_parameter_and_wait('scene', name)
 
     def set_engine(self, name: str) -> None:
-        """Set the parameter `engine`; Refused."""
         self._services.set_parameter_and_wait('engine', name)
 
     def set_accuracy(self, name: str) -> None:
-        """Set the parameter `accuracy`; Refused."""
         self._services.set_parameter_and_wait('accuracy', name)
 
     def set_scene(self, scene: Scene) -> None:

@@ -1,9 +1,37 @@
-"""Pushes that any publisher sends to a node, read from the same topics as the node does."""
+"""Pushes of a node: sent by the page, and observed from the topics that the node reads."""
 from __future__ import annotations
+
+import threading
+
+from geometry_msgs.msg import Wrench
+from rclpy.node import Node
 
 from ....model.drive import Drive
 from ....model.push import Push
 from ....model.scene import Scene
+from ....model.vectors import Vector
+from ....ros.messages.convert import to_vector
+
+
+class ForcePublisher:
+    """Publishes ``~/force`` of the node ``name``, which ends a push after its push_timeout."""
+
+    def __init__(self, node: Node, name: str) -> None:
+        self._publisher = node.create_publisher(Wrench, f'{name}/force', 10)
+        self._timer: threading.Timer | None = None
+
+    def send(self, force: Vector, duration: float) -> None:
+        """Push with ``force`` (3,) N, world axes, for ``duration`` s of wall time."""
+        self.close()
+        self._publisher.publish(Wrench(force=to_vector(force)))
+        self._timer = threading.Timer(duration, self._publisher.publish, (Wrench(),))
+        self._timer.daemon = True
+        self._timer.start()
+
+    def close(self) -> None:
+        """Cancel the zero force that would end the last push."""
+        if self._timer is not None:
+            self._timer.cancel()
 
 
 class NoInputCounts:

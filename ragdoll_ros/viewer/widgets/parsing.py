@@ -1,14 +1,15 @@
-"""Parses numbers as people type them, without rounding, or refuses them with a reason.
+"""Parses numbers and colours as people type them, or refuses them with a reason.
 
-Accepted: 70, 70.5, .5, 1e-3, 3,5 (a comma in a single number), 1 000 and 1'000, 1,234.5 and
-1.234,5, digits of any script, any minus sign, and a unit. Refused: ambiguous numbers (1,000),
-other text, and what a double cannot represent.
+Numbers are not rounded. Accepted: 70, 70.5, .5, 1e-3, 3,5 (a comma in a single number), 1 000 and
+1'000, 1,234.5 and 1.234,5, digits of any script, any minus sign, and a unit. Refused: ambiguous
+numbers (1,000), other text, and what a double cannot represent.
 """
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 
 from ...model import errors
 
@@ -30,6 +31,11 @@ _UNIT_SPACES = {
     unit: re.compile(rf'(?<=[\d.])\s+(?=({"|".join(map(re.escape, powers))})(?![a-zA-Z]))')
     for unit, powers in UNITS.items()}
 """Matches spaces between a number and its unit."""
+
+EXPECTED_COLOR = 'a known colour, such as red, #1e90ff or 30 144 255'
+
+_THREE = re.compile(r'\s*rgb\s*\(([^()]*)\)\s*|([^a-z#]*)', re.IGNORECASE)
+_HEX = re.compile(r'\s*#?([0-9a-f]{6})\s*', re.IGNORECASE)
 
 
 class NotANumber(errors.WrongForm):
@@ -80,11 +86,33 @@ def split_numbers(text: str, count: int, unit: str = '') -> list[tuple[str, int]
             plain = _UNIT_SPACES[unit].sub('', plain)
         plain, power = _split_unit(plain, unit)
         found = [part for part in re.split(r'\s*,\s*|\s+', plain) if part or ',' in plain]
-        found = [own[0] if (own := _split_unit(part, unit))[1] == power else part
-                 for part in found]
+        found = [own[0] if (own := _split_unit(part, unit))[1] == power else part for part in found]
     if len(found) != count or not plain:
         raise _wrong_count(text, count)
     return [(part, power) for part in found]
+
+
+def parse_color(event: str) -> tuple[int, int, int]:
+    """Red, green, blue, 0 to 255, of an event of color_text.js; WrongForm, without a path.
+
+    Viser takes #1e90ff and rgb(30, 144, 255) only, and drops other text silently.
+    """
+    known, _, text = event.partition(' ')
+    if not text.strip():
+        raise errors.WrongForm('', text, f'{EXPECTED_COLOR}, and the field is empty')
+    three = _THREE.fullmatch(text)
+    numbers = ()
+    with suppress(errors.WrongForm):
+        numbers = parse_numbers((three[1] or three[2]) if three else '', 3)
+    if not all(0 <= number <= 255 and number == round(number) for number in numbers):
+        # A browser would clamp 300 to 255.
+        raise errors.WrongForm('', text, 'three whole numbers from 0 to 255')
+    if numbers:
+        return tuple(round(number) for number in numbers)
+    match = _HEX.fullmatch(text) or _HEX.fullmatch(known)
+    if match is None:
+        raise errors.WrongForm('', text, EXPECTED_COLOR)
+    return tuple(bytes.fromhex(match[1]))
 
 
 def format_number(value: float) -> str:
