@@ -48,7 +48,7 @@ def row(node: Node, scene: Scene, accuracy: str, ticks_before: int) -> dict[str,
     message = to_pose_array('world', 0, poses_of(simulation.state))
     publisher = node.create_publisher(PoseArray, '~/baseline', 10)
     baseline = BulletEngine(scene, BASELINE)
-    baseline.place(simulation.coordinates)
+    baseline.set_coordinates(simulation.coordinates)
 
     def step_baseline() -> None:
         baseline.advance(scene.step)
