@@ -13,7 +13,8 @@ FILES_THAT_NEED = {'rclpy': ['test_ros_*.py'],
                    'mcap': ['test_replay*.py', 'test_ros_replay.py', 'test_viewer_recording.py',
                             'test_recordings_formats.py'],
                    'rosbags': ['test_replay*.py', 'test_ros_replay.py', 'test_viewer_recording.py'],
-                   'viser': ['test_viewer*.py', 'test_editor*.py', 'test_ros_browser.py']}
+                   'viser': ['test_viewer*.py', 'test_editor*.py', 'test_ros_browser.py'],
+                   'trimesh': ['test_viewer_paint.py'], 'rtree': ['test_viewer_paint.py']}
 
 collect_ignore_glob = [file for package, files in FILES_THAT_NEED.items()
                        if importlib.util.find_spec(package) is None for file in files]
