@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import signal
 from pathlib import Path
 
 import pytest
@@ -29,8 +30,14 @@ LONGEST = ('test_ros_viewer.py', 'test_ros_programs.py', 'test_viewer_command.py
 
 
 def pytest_configure(config):
-    """By itself pytest-xdist begins with the files of the most tests, which are not the longest."""
+    """By itself pytest-xdist begins with the files of the most tests, which are not the longest.
+
+    A shell starts what runs in the background, as CI may, with SIGINT ignored, and so would all
+    programs that tests start: those that Ctrl-C should end would run on.
+    """
     config.option.loadscopereorder = False
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(items):
