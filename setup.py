@@ -70,7 +70,7 @@ setup(
     maintainer_email='maintainers@users.noreply.github.com',
     python_requires='>=3.10',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['py.typed']},
+    package_data={NAME: ['py.typed'], f'{NAME}.viewer.browser': ['*.js', '*.css']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
@@ -86,7 +86,8 @@ setup(
         'report': ['scipy', 'matplotlib', 'mujoco'],
         'fit': ['matplotlib', 'trimesh', 'pycollada', 'DracoPy'],
         # The page: 3D, panels and plots in a browser, served from Python, with no build of its own.
-        'viewer': ['viser', 'imageio', 'mcap'],
+        # Its range is that of viewer/viser_internals.py, which uses private names of viser.
+        'viewer': ['viser>=1.1.1,<1.2', 'imageio', 'mcap'],
         'replay': ['mcap'],
         'falls': ['pyarrow', 'mcap-ros2-support', 'matplotlib'],
         'ray': ['ray'],

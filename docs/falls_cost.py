@@ -47,7 +47,7 @@ def watch(clock: Clock) -> None:
     clusters.kernels = SimpleNamespace(
         advance=clock.timed('machine code', clusters.kernels.advance))
     falls.Guard.advance = clock.timed('ticks', falls.Guard.advance)
-    falls._Frames.add = clock.timed('frames', falls._Frames.add)
+    falls._Recorder.add = clock.timed('frames', falls._Recorder.add)
 
 
 def parts_of(recipe: Recipe, count: int, clock: Clock) -> list[float]:

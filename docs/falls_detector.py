@@ -14,7 +14,7 @@ import numpy as np
 from sklearn.ensemble import RandomForestClassifier
 
 from ragdoll_ros.falls import Fall, Phases, Recipe, generate, load_recipe
-from ragdoll_ros.falls.imu_samples import worn_samples
+from ragdoll_ros.falls.imu_samples import fall_samples
 from ragdoll_ros.falls.recipe import recipe_of
 from ragdoll_ros.falls.simulate import begin
 from ragdoll_ros.falls.start import start_of
@@ -68,7 +68,7 @@ def let_down(recipe: Recipe, number: int) -> Fall:
 
 def windows(fall: Fall) -> tuple[np.ndarray, np.ndarray]:
     """Features (w, 12) of all windows, and the frames (w,) after their last ones."""
-    samples = worn_samples(fall, 0)
+    samples = fall_samples(fall, 0)
     sizes = np.stack([np.linalg.norm(samples[:, :3], axis=1),
                       np.linalg.norm(samples[:, 3:], axis=1), samples[:, 2]], axis=1)
     ends = np.arange(WINDOW, len(sizes) + 1, STRIDE)
@@ -105,7 +105,7 @@ def says(forest: RandomForestClassifier, fall: Fall) -> bool:
 
 def jolts(fall: Fall, limit: float = 3 * 9.8) -> bool:
     """The plain rule: more than 3 g."""
-    return bool((np.linalg.norm(worn_samples(fall, 0)[:, :3], axis=1) > limit).any())
+    return bool((np.linalg.norm(fall_samples(fall, 0)[:, :3], axis=1) > limit).any())
 
 
 def main() -> None:

@@ -51,7 +51,7 @@ def page(context: browser.BrowserContext, scene: str) -> Iterator[browser.View]:
         # The first fall begins once the page has drawn its start.
         view.button('Pause').wait_for()
         view.key(' ')
-        view.button('Go on').wait_for()
+        view.button('Resume').wait_for()
         view.key('r')
         shot(view)
         yield view
@@ -97,7 +97,7 @@ def grab(context: browser.BrowserContext, folder: Path) -> None:
         view.key(' ')
         view.page.wait_for_timeout(3000)
         view.key(' ')
-        view.button('Go on').wait_for()
+        view.button('Resume').wait_for()
         mouse.move(*view.pixels([np.add(at, (0, -1.0, 0.5))])[0], steps=5)
         shot(view)
         step(view, 9)
@@ -111,7 +111,7 @@ def edit(context: browser.BrowserContext, folder: Path) -> None:
         look(view, 2.2, 1.3, 0.85, azimuth=0.5)
         view.tab('Edit')
         view.press('Edit')
-        view.button('Drop it').wait_for()
+        view.button('Run').wait_for()
         thigh = next(bone for bone in load_scene('drop').bones if bone.name == 'left_thigh')
         view.page.mouse.click(*view.pixels([thigh.position])[0])
         view.see('Joint to torso')

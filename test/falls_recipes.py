@@ -29,7 +29,7 @@ def recipe(base=None, **changes):
     return made
 
 
-def contents(folder):
+def file_bytes(folder):
     """Bytes of every file of a folder by its path."""
     return {str(path.relative_to(folder)): path.read_bytes()
             for path in sorted(folder.rglob('*')) if path.is_file()}

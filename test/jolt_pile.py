@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ragdoll_ros.accuracy.crowds.depth import BoneDepth
-from ragdoll_ros.accuracy.crowds.pile import DURATION, HEAD, LOOKS, Outcome, enter_depths
+from ragdoll_ros.accuracy.crowds.pile import DEPTH_INTERVAL, DURATION, HEAD, Outcome, record_depths
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.ragdoll import joint_axes
@@ -65,7 +65,8 @@ def told(scene: Scene, steps: int) -> str:
     return json.dumps({
         'gravity': scene.gravity, 'friction': scene.material.friction, 'step': scene.step,
         'restitution': scene.material.restitution, 'ticks': round(DURATION / scene.step),
-        'looks': LOOKS, 'collision_steps': steps, 'parts': len(names), 'bones': bones(scene),
+        'looks': DEPTH_INTERVAL, 'collision_steps': steps, 'parts': len(names),
+        'bones': bones(scene),
         'joints': joints(scene),
         'apart': [[names.index(joint.parent), names.index(joint.child)] for joint in doll.joints]})
 
@@ -77,7 +78,7 @@ def main() -> None:
     given = parser.parse_args()
     scene = load_scene('pile')
     scale, heights = BoneDepth(scene), GroundHeights(scene)
-    outcome = Outcome(past=np.nan, cpu=np.nan)
+    outcome = Outcome(overshoot=np.nan, cpu=np.nan)
     done = subprocess.run(['node', SCRIPT, given.module.resolve()], input=told(scene, given.steps),
                           capture_output=True, text=True, check=True)
     for tick, line in enumerate(done.stdout.splitlines()):
@@ -88,8 +89,8 @@ def main() -> None:
         if 'poses' in one:
             poses = np.array(one['poses'])
             still = np.zeros((len(poses), 3))
-            enter_depths(outcome, heights, scale,
-                         State(poses[:, :3], poses[:, 3:], still, still))
+            record_depths(outcome, heights, scale,
+                          State(poses[:, :3], poses[:, 3:], still, still))
     print(f'{HEAD}\n{f"Jolt, steps {given.steps}":30}{outcome.row()}')
 
 

@@ -34,7 +34,7 @@ from ragdoll_ros.files.scene import load_scene  # noqa: E402
 from ragdoll_ros.model import rotation  # noqa: E402
 from ragdoll_ros.model.scene import Scene  # noqa: E402
 from ragdoll_ros.recordings.recording import Recording  # noqa: E402
-from ragdoll_ros.viewer.sources.playback import Playback  # noqa: E402
+from ragdoll_ros.viewer.sources.playback import PlaybackSource  # noqa: E402
 
 SECONDS = 5.0
 """That a measurement lasts."""
@@ -113,7 +113,7 @@ def serve(dolls: int) -> None:
     """Serve the page until SIGTERM."""
     stop = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: stop.set())
-    with served(Playback(turning(field(dolls)))) as page:
+    with served(PlaybackSource(turning(field(dolls)))) as page:
         print(page.server.get_port(), flush=True)
         stop.wait()
 

@@ -71,7 +71,7 @@ def test_sixty_dolls_have_the_same_bits_for_any_workers_after_a_reset_and_alone(
     assert again == (crowd, lone)
     assert {run for workers in (2, 3) for run in crowd_digests.of_workers(workers, ticks)} == {
         (crowd, lone)}
-    assert crowd_digests.of_the_lone(ticks) == lone
+    assert crowd_digests.of_first_alone(ticks) == lone
     assert seen['joined'] and seen['slept'] and seen['woke']
 
 

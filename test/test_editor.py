@@ -24,11 +24,11 @@ from ragdoll_ros.model import errors, rotation  # noqa: E402
 from ragdoll_ros.model.scene import above_ground  # noqa: E402
 from ragdoll_ros.physics.simulation import Simulation  # noqa: E402
 from ragdoll_ros.recordings.recording import Recording  # noqa: E402
-from ragdoll_ros.viewer.editor import changes, folder  # noqa: E402
+from ragdoll_ros.viewer.editor import changes, scene_folder  # noqa: E402
 from ragdoll_ros.viewer.editor.editor import Editor  # noqa: E402
-from ragdoll_ros.viewer.sources.playback import Playback  # noqa: E402
-from ragdoll_ros.viewer.sources.simulated import Simulated  # noqa: E402
-from ragdoll_ros.viewer.sources.source import Wanted  # noqa: E402
+from ragdoll_ros.viewer.sources.playback import PlaybackSource  # noqa: E402
+from ragdoll_ros.viewer.sources.simulation import SimulationSource  # noqa: E402
+from ragdoll_ros.viewer.sources.source import RequestedData  # noqa: E402
 
 DROP = load_scene('drop')
 
@@ -61,7 +61,7 @@ class Desk:
         return changes.find(self.editor.scene, name)[1]
 
     def said(self):
-        return html.unescape(self.files.said.content)
+        return html.unescape(self.files.message.content)
 
 
 def errors_in(panel):
@@ -127,7 +127,7 @@ def test_a_faulty_value_is_refused_where_it_stands_and_stays(desk):
 
 
 @pytest.mark.parametrize(('key', 'text', 'words'), [
-    ('turn', '0 0 x', 'turn must be 3 numbers, such as 0.1, 0.2, 0.3, not 0 0 x'),
+    ('rotation', '0 0 x', 'rotation must be 3 numbers, such as 0.1, 0.2, 0.3, not 0 0 x'),
     ('axis_1', '1 1 0', 'axis 1 must be perpendicular to axis 2, which is 1, 0, 0, not 1, 1, 0'),
     ('axis_2', '1 1 0', 'axis 2 must be perpendicular to axis 1, which is 0, 1, 0, not 1, 1, 0')])
 def test_what_is_refused_is_told_in_words_at_the_field_that_was_changed(desk, key, text, words):
@@ -144,7 +144,7 @@ def test_a_bone_without_a_partner_is_told_as_such(desk):
     desk.panel.both.value = True
     desk.panel.body['mass'].value = 4.0
     desk.editor.update()
-    assert re.sub('<.*?>', '', desk.panel.said.content) == (
+    assert re.sub('<.*?>', '', desk.panel.message.content) == (
         'both sides: expected a bone with a partner on the other side, not head')
 
 
@@ -178,7 +178,7 @@ def test_what_the_page_cannot_run_is_refused(desk):
     desk.reason = 'no node to take it'
     desk.panel.body['mass'].value = 2.0
     desk.editor.update()
-    assert 'no node to take it' in desk.panel.said.content
+    assert 'no node to take it' in desk.panel.message.content
     desk.editor.toggle()
     assert desk.editor.scene == DROP and not desk.editor.editing
     desk.reason = ''
@@ -199,7 +199,7 @@ def test_both_sides(desk):
     desk.editor.select('head')
     desk.panel.body['mass'].value = 2.0
     desk.editor.update()
-    assert 'partner on the other side' in desk.panel.said.content
+    assert 'partner on the other side' in desk.panel.message.content
     assert desk.bone('head').mass == 5
 
 
@@ -227,7 +227,7 @@ def test_the_root_has_no_joint_fields(desk):
     desk.editor.select('nobody')
     assert desk.editor.bone is None
     desk.editor.update()
-    assert 'a bone of the list' in desk.panel.said.content
+    assert 'a bone of the list' in desk.panel.message.content
 
 
 def test_the_dropdown_chooses(desk):
@@ -276,30 +276,31 @@ def test_editing_holds_the_bind_pose_and_dropping_lets_go(desk):
 @pytest.mark.parametrize('stood', [True, False])
 def test_what_refuses_to_be_edited_is_as_it_was(desk, stood):
     """A recording, say: one that stood stands on, one that went goes on."""
-    desk.editor.take_note(paused=stood)
+    desk.editor.update_paused(paused=stood)
     desk.reason = 'a recording has one scene'
     desk.editor.toggle()
     assert desk.asked == ([True] if stood else [True, False])
-    assert not desk.editor.editing and 'one scene' in desk.panel.said.content
+    assert not desk.editor.editing and 'one scene' in desk.panel.message.content
 
 
 def test_a_recording_at_its_end_is_not_started(server, tmp_path):
     """Nor held: started anew, it goes."""
     turns = np.tile((0, 0, 0, 1.0), (2, len(DROP.bones), 1))
-    source = Playback(Recording(DROP, np.arange(2.0), np.zeros((2, len(DROP.bones), 3)), turns))
-    source.set_pace(100)
-    source.want(Wanted(frames=True))
-    wait(lambda: source.report.paused)
+    source = PlaybackSource(
+        Recording(DROP, np.arange(2.0), np.zeros((2, len(DROP.bones), 3)), turns))
+    source.set_real_time_factor(100)
+    source.request(RequestedData(frames=True))
+    wait(lambda: source.status.paused)
     # From here on it would take a quarter of an hour.
-    source.set_pace(0.001)
+    source.set_real_time_factor(0.001)
     server.gui.reset()
-    editor = Editor(server, DROP, source.use, source.pause, tmp_path)
-    editor.take_note(source.report.paused)
+    editor = Editor(server, DROP, source.set_scene, source.pause, tmp_path)
+    editor.update_paused(source.status.paused)
     editor.toggle()
-    assert 'a recording has one scene' in editor.panel.said.content
-    assert source.report.paused
+    assert 'a recording has one scene' in editor.panel.message.content
+    assert source.status.paused
     source.reset()
-    assert not source.report.paused
+    assert not source.status.paused
 
 
 def test_leaving_takes_the_handles_and_lets_the_time_stand(desk):
@@ -322,13 +323,13 @@ def test_handles_move_turn_and_resize(desk):
     turn = rotation.from_axis_angle((0, 0, 1), 0.5)
     drag(desk.editor.handles.body, turn=turn)
     assert desk.bone('left_forearm').position == bone.position
-    assert desk.panel.body['turn'].value == '0, 0, 28.64789'
+    assert desk.panel.body['rotation'].value == '0, 0, 28.64789'
     # From the middle to a corner.
     drag(desk.editor.handles.size, (0.02, 0.15, 0.03))
     assert desk.bone('left_forearm').shape.size == pytest.approx((0.04, 0.3, 0.06))
     scene = desk.editor.scene
     drag(desk.editor.handles.size, (-0.02, 0.15, 0.03))
-    assert 'above zero' in desk.panel.said.content and desk.editor.scene == scene
+    assert 'above zero' in desk.panel.message.content and desk.editor.scene == scene
     assert tuple(desk.editor.handles.size.position) == pytest.approx((0.02, 0.15, 0.03))
     for _ in range(3):
         desk.editor.undo()
@@ -343,7 +344,7 @@ def test_a_body_of_several_shapes_is_shown_moved_and_saved(server, desk):
     desk.editor.toggle()
     assert desk.editor.handles.size is None
     assert not desk.panel.body['shape'].visible and not desk.panel.body['size'].visible
-    ghosts = [server.scene.get_handle_by_name(f'{desk.editor.handles.room}/own/ghost_{number}')
+    ghosts = [server.scene.get_handle_by_name(f'{desk.editor.handles.root}/frame/outline_{number}')
               for number in range(len(HAMMER.primitives))]
     for ghost, part in zip(ghosts, HAMMER.primitives, strict=True):
         assert tuple(ghost.position) == pytest.approx(part.position, abs=1e-12)
@@ -393,7 +394,7 @@ def test_handles_stand_where_the_doll_is_shown(server, tmp_path):
     desk.editor.show(scene)
     desk.editor.select('left_shin')
     desk.editor.toggle()
-    room = server.scene.get_handle_by_name(desk.editor.handles.room)
+    room = server.scene.get_handle_by_name(desk.editor.handles.root)
     turn = np.array(room.wxyz)[[1, 2, 3, 0]]
     at = room.position + rotation.rotate(turn, desk.editor.handles.body.position)
     with Simulation(scene) as simulation:
@@ -406,7 +407,7 @@ def test_bones_come_and_go(desk):
     desk.editor.add_bone(' hat ')
     assert desk.editor.bone == 'hat' and 'hat' in desk.editor.scene.bone_names
     desk.editor.add_bone('hat')
-    assert 'a unique name' in desk.panel.said.content
+    assert 'a unique name' in desk.panel.message.content
     desk.editor.remove_limb()
     assert desk.editor.scene == DROP and desk.editor.bone is None
     desk.editor.undo()
@@ -454,7 +455,7 @@ def test_many_at_once_leave_one_consistent_history(desk):
     def work(number):
         for k in range(20):
             mass = 1.0 + number + k / 100
-            desk.editor.take(changes.change_bone(DROP, 'head', mass=mass), 'm')
+            desk.editor.set_scene(changes.change_bone(DROP, 'head', mass=mass), 'm')
             desk.editor.select('torso' if k % 2 else 'head')
 
     threads = [threading.Thread(target=work, args=(number,)) for number in range(4)]
@@ -511,7 +512,7 @@ def test_another_file_is_written_over_at_the_second_asking(desk):
     os.utime(path, (0, datetime(2025, 3, 4, 5, 6).timestamp()))
     desk.files.name.value = 'mine'
     desk.files.save()
-    assert 'mine.yaml of 2025-03-04 05:06 is there already' in desk.said()
+    assert 'mine.yaml of 2025-03-04 05:06 exists' in desk.said()
     assert path.read_text() == "somebody else's"
     desk.files.save()
     assert load_scene(str(path)) == DROP
@@ -532,7 +533,7 @@ def test_a_file_is_not_written_over_with_another_scene_unasked(desk, other):
         desk.files.fit('bird.glb', fit_rigs.document(fit_rigs.RIGS['bird']).glb())
     assert desk.editor.scene != DROP
     desk.files.save()
-    assert 'is there already' in desk.said()
+    assert 'exists' in desk.said()
     assert load_scene(str(desk.path / 'mine.yaml')) == DROP
     desk.files.load()
     desk.files.save()
@@ -549,7 +550,7 @@ def test_files_are_listed_with_their_dates_and_loaded_from_there(desk):
     first, newest, new, old = desk.files.saved.options
     assert newest.startswith('newest.yaml · 20') and first == desk.files.saved.value
     assert (new, old) == ('new.yaml · 2025-01-02 12:00', 'old.yaml · 2025-01-01 12:00')
-    desk.files._choose(old)
+    desk.files._load_listed(old)
     assert desk.editor.scene == load_scene('crowd') and desk.files.name.value == 'old.yaml'
     assert str(desk.path) in desk.files.place.content
 
@@ -644,15 +645,15 @@ RUBBISH = {'empty.yaml': b'', 'zeros.yaml': bytes(1000), 'binary.yaml': bytes(ra
 def test_uploaded_rubbish_is_refused_in_words(desk, name):
     start = time.process_time()
     desk.files.upload(name, RUBBISH[name])
-    assert folder.plain(name) in desk.said() and 'expected' in desk.said()
-    assert '<img' not in desk.files.said.content
+    assert scene_folder.safe_name(name) in desk.said() and 'expected' in desk.said()
+    assert '<img' not in desk.files.message.content
     assert desk.editor.scene == DROP and desk.asked == []
     # None of it takes long: what takes longest is 0.1 s of parsing.
     assert time.process_time() - start < 5
 
 
 def test_uploads_have_a_size(desk, monkeypatch):
-    monkeypatch.setattr(folder, 'LARGEST_UPLOAD', 1000)
+    monkeypatch.setattr(scene_folder, 'LARGEST_UPLOAD', 1000)
     for take in (desk.files.upload, desk.files.fit):
         take('large.glb', bytes(1001))
         assert 'at most 1000' in desk.said()
@@ -712,7 +713,7 @@ def test_a_broken_character_is_refused_in_one_sentence(desk, name):
     if name == 'doll.yaml' or name.startswith('uri_link'):
         pytest.skip('lies on the disk in that test')
     desk.files.fit(name, BROKEN.get(name, b'\x89PNG'))
-    assert folder.plain(name) in desk.said() and 'expected' in desk.said()
+    assert scene_folder.safe_name(name) in desk.said() and 'expected' in desk.said()
     assert desk.said().count(': 1 error') == 1
     assert '/tmp' not in desk.said() and not desk.files.progress.visible
     assert desk.editor.scene == DROP and desk.asked == [] and list(desk.path.iterdir()) == []
@@ -747,16 +748,16 @@ def test_an_upload_is_let_go_of(desk):
 
 def test_on_a_running_simulation(server, tmp_path):
     """Edit: the bind pose stands. Drop: it falls. Update while it falls: it starts anew."""
-    source = Simulated(DROP)
-    source.want(Wanted(frames=True))
+    source = SimulationSource(DROP)
+    source.request(RequestedData(frames=True))
     server.gui.reset()
     server.scene.reset()
     try:
-        editor = Editor(server, DROP, source.use, source.pause, tmp_path)
+        editor = Editor(server, DROP, source.set_scene, source.pause, tmp_path)
         wait(lambda: source.frame.time > 0.1)
         editor.select('head')
         editor.toggle()
-        assert source.report.paused and source.frame.time == 0
+        assert source.status.paused and source.frame.time == 0
         drag(editor.handles.body, (0.0, 0.0, 1.5))
         head = DROP.bone_index('head')
         assert source.frame.time == 0 and source.frame.scene is editor.scene
@@ -765,7 +766,7 @@ def test_on_a_running_simulation(server, tmp_path):
         wait(lambda: source.frame.state.positions[head][2] < 1.4)
         editor.panel.body['mass'].value = 2.0
         editor.update()
-        assert source.frame.scene.bones[head].mass == 2 and not source.report.paused
+        assert source.frame.scene.bones[head].mass == 2 and not source.status.paused
         assert source.frame.state.positions[head][2] > 1.4
         wait(lambda: source.frame.state.positions[head][2] < 1.4)
     finally:

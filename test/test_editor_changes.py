@@ -16,8 +16,8 @@ from ragdoll_ros.model.shapes import SHAPES, Box, Capsule, Part
 from ragdoll_ros.model.skeleton import Riders
 from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.viewer.editor import changes, growth, mirror, sheet
-from ragdoll_ros.viewer.editor.history import History
+from ragdoll_ros.viewer.editor import bone_form, changes, mirror
+from ragdoll_ros.viewer.editor.undo_history import UndoHistory
 
 DROP = load_scene('drop')
 TURN = rotation.from_axis_angle((1, 2, -1), 0.7)
@@ -80,9 +80,9 @@ def test_only_what_is_asked_for_changes():
     (lambda: changes.change_joint(DROP, 'left_thigh', axes=((1, 0, 0), (1, 1, 0))),
      'left_thigh.joint.axes', errors.WrongAxes),
     (lambda: changes.change_joint(DROP, 'torso', damping=1), 'torso.joint', errors.Detached),
-    (lambda: growth.add_bone(DROP, 'head', 'torso'), 'name', errors.DuplicateName),
-    (lambda: growth.add_bone(DROP, 'head', 'a/b'), 'name', errors.WrongForm),
-    (lambda: growth.remove_limb(DROP, 'torso'), 'torso', errors.Detached),
+    (lambda: changes.add_bone(DROP, 'head', 'torso'), 'name', errors.DuplicateName),
+    (lambda: changes.add_bone(DROP, 'head', 'a/b'), 'name', errors.WrongForm),
+    (lambda: changes.remove_limb(DROP, 'torso'), 'torso', errors.Detached),
     (lambda: mirror.mirrored(DROP, 'head'), 'both sides', errors.UnknownBone)])
 def test_what_is_wrong_is_refused_with_its_place(change, path, kind):
     with pytest.raises(kind) as caught:
@@ -92,7 +92,7 @@ def test_what_is_wrong_is_refused_with_its_place(change, path, kind):
 
 def test_reversed_limits_are_told_in_degrees():
     with pytest.raises(errors.ModelErrors, match=r'\(30.0, 10.0\); expected lower <= upper'):
-        sheet.apply(DROP, 'left_shin', {'limits_1': '30, 10'})
+        bone_form.apply_values(DROP, 'left_shin', {'limits_1': '30, 10'})
 
 
 def test_a_body_that_moves_leaves_pivots_neighbours_and_skin(fitted):
@@ -221,46 +221,46 @@ def test_partners_are_found_by_name_or_place(rig, name, other):
 
 def test_a_bone_that_is_added_and_taken_off_leaves_nothing(fitted):
     name = fitted.bone_names[-1]
-    grown = growth.add_bone(fitted, name, 'tail')
+    grown = changes.add_bone(fitted, name, 'tail')
     with Simulation(grown) as simulation:
         assert np.abs(simulation.joint_angles).max() < 1e-9
         simulation.advance()
-    assert growth.remove_limb(grown, 'tail') == fitted
+    assert changes.remove_limb(grown, 'tail') == fitted
 
 
 def test_a_limb_that_is_taken_off_leaves_its_skin_to_the_parent(fitted):
     name = 'mixamorig:LeftArm'
-    scene = growth.remove_limb(fitted, name)
+    scene = changes.remove_limb(fitted, name)
     gone = set(fitted.bone_names) - set(scene.bone_names)
     assert name in gone and 'mixamorig:LeftForeArm' in gone
     assert farthest(rider_poses(scene), rider_poses(fitted)) < 1e-9
 
 
 def test_undo_and_redo_give_equal_scenes():
-    history = History(DROP)
+    history = UndoHistory(DROP)
     scenes = [DROP]
     for mass in (1, 2, 3):
         scenes.append(changes.change_bone(scenes[-1], 'head', mass=mass))
         history.push(scenes[-1], f'mass {mass}')
     for scene in scenes[-2::-1]:
         assert history.undo() == scene
-    assert history.undo() == DROP and history.undoes == '' and history.redoes == 'mass 1'
+    assert history.undo() == DROP and history.undo_name == '' and history.redo_name == 'mass 1'
     for scene in scenes[1:]:
         assert history.redo() == scene
-    assert history.redo() == scenes[-1] and history.redoes == ''
+    assert history.redo() == scenes[-1] and history.redo_name == ''
     history.undo()
     history.push(DROP, 'something else')
-    assert history.redoes == '' and history.undo() == scenes[2]
+    assert history.redo_name == '' and history.undo() == scenes[2]
 
 
 def test_the_same_scene_again_is_no_step():
-    history = History(DROP)
+    history = UndoHistory(DROP)
     history.push(load_scene('drop'), 'nothing')
-    assert history.undoes == ''
+    assert history.undo_name == ''
 
 
 def test_the_history_ends_somewhere():
-    history = History(DROP, most=2)
+    history = UndoHistory(DROP, max_steps=2)
     for mass in (1, 2, 3):
         history.push(changes.change_bone(DROP, 'head', mass=mass), str(mass))
     for _ in range(5):
@@ -272,15 +272,16 @@ def test_the_history_ends_somewhere():
 def test_a_sheet_that_nobody_touched_changes_nothing(name):
     scene = load_scene(name)
     for bone in scene.bone_names[:25]:
-        assert sheet.apply(scene, bone, sheet.read(scene, bone)) is scene
+        assert bone_form.apply_values(scene, bone, bone_form.read_bone(scene, bone)) is scene
 
 
 def test_a_colour_is_changed_and_its_opacity_kept():
     clear = changes.change_bone(DROP, 'head', color=(0.2, 0.4, 0.6, 0.5))
-    fields = sheet.read(clear, 'head')
+    fields = bone_form.read_bone(clear, 'head')
     assert fields['color'] == (51, 102, 153)
     fields['color'] = (255, 102, 153)
-    assert bone_of(sheet.apply(clear, 'head', fields), 'head').color == (1, 0.4, 0.6, 0.5)
+    changed = bone_form.apply_values(clear, 'head', fields)
+    assert bone_of(changed, 'head').color == (1, 0.4, 0.6, 0.5)
 
 
 def lop_sided():
@@ -293,16 +294,17 @@ def lop_sided():
 def test_several_shapes_are_moved_weighed_and_left_as_they_are():
     """Their fields are not in the sheet; what it has of the body is."""
     scene = lop_sided()
-    fields = sheet.read(scene, 'left_shin')
+    fields = bone_form.read_bone(scene, 'left_shin')
     assert not {'shape', 'size', 'radius', 'length', 'parts'} & set(fields)
     assert fields['inertia'] == '0.1, 0.15, 0.2'
-    moved = sheet.apply(scene, 'left_shin', {'position': (0, 0, 3.0), 'inertia': '1 2 2.5'})
+    moved = bone_form.apply_values(
+        scene, 'left_shin', {'position': (0, 0, 3.0), 'inertia': '1 2 2.5'})
     before, after = bone_of(scene, 'left_shin'), bone_of(moved, 'left_shin')
     assert after == dataclasses.replace(before, position=(0, 0, 3.0), moments=(1, 2, 2.5))
     with pytest.raises(errors.WrongForm, match='compound'):
         changes.set_size(scene, 'left_shin', (0.1, 0.1, 0.1))
     with pytest.raises(errors.ModelErrors, match='OffCentre') as caught:
-        sheet.apply(scene, 'left_shin', {'inertia': ''})
+        bone_form.apply_values(scene, 'left_shin', {'inertia': ''})
     assert [error.path for error in caught.value.errors] == ['inertia']
 
 
@@ -331,20 +333,20 @@ def test_an_inertia_turns_with_the_axes_of_another_shape():
     ('-1, 1, 1', 'above zero')])
 def test_a_faulty_inertia_is_told_at_its_field(typed, words):
     with pytest.raises(errors.ModelErrors, match=words) as caught:
-        sheet.apply(DROP, 'head', {'inertia': typed})
+        bone_form.apply_values(DROP, 'head', {'inertia': typed})
     assert [error.path for error in caught.value.errors] == ['inertia']
-    own = sheet.apply(DROP, 'head', {'inertia': '1, 2, 2.5'})
+    own = bone_form.apply_values(DROP, 'head', {'inertia': '1, 2, 2.5'})
     assert bone_of(own, 'head').inertia == (1, 2, 2.5)
-    assert sheet.apply(own, 'head', {'inertia': ' '}) == DROP
+    assert bone_form.apply_values(own, 'head', {'inertia': ' '}) == DROP
 
 
 def test_a_sheet_tells_all_its_errors_at_their_fields():
     wrong = {'mass': -1.0, 'size': (0.1, 0.0, 0.1), 'position': (0.0, math.nan, 0.0),
-             'turn': (0.0, math.inf, 0.0), 'friction': 'much', 'restitution': '1.5',
+             'rotation': (0.0, math.inf, 0.0), 'friction': 'much', 'restitution': '1.5',
              'rolling_friction': '-1', 'anchor': (math.inf, 0.0, 0.0), 'limits_1': '30, 10',
              'damping': -2.0}
     with pytest.raises(errors.ModelErrors) as caught:
-        sheet.apply(DROP, 'left_shin', wrong)
+        bone_form.apply_values(DROP, 'left_shin', wrong)
     assert {error.path for error in caught.value.errors} == set(wrong)
 
 
@@ -356,21 +358,21 @@ def test_a_sheet_tells_all_its_errors_at_their_fields():
     ({'axis_2': (0.0, 1.0, 0.5)}, 'axis_2', 'perpendicular')])
 def test_a_faulty_joint_is_told_at_its_field(wrong, field, words):
     with pytest.raises(errors.ModelErrors, match=words) as caught:
-        sheet.apply(DROP, 'left_thigh', wrong)
+        bone_form.apply_values(DROP, 'left_thigh', wrong)
     assert [error.path for error in caught.value.errors] == [field]
 
 
 @pytest.mark.parametrize('text', ['-90, 4.5', '-90 4.5', '-90,4.5', '-90; 4,5', '-90;4.5',
                                   '-90° 4.5°', '-90; 4,5°', '-90, 4.5 deg', '(-90, 4.5)'])
 def test_a_pair_of_limits_is_typed_as_any_numbers_are(text):
-    scene = sheet.apply(DROP, 'left_shin', {'limits_1': text})
+    scene = bone_form.apply_values(DROP, 'left_shin', {'limits_1': text})
     assert changes.joint_of(scene, 'left_shin').limits == (
         (math.radians(-90), math.radians(4.5)),)
 
 
 def test_a_balls_limits_may_be_typed_as_one_number():
     scene = changes.set_joint_kind(DROP, 'left_thigh', 'ball')
-    scene = sheet.apply(scene, 'left_thigh', {'limits_1': '40', 'limits_2': '-20 20'})
+    scene = bone_form.apply_values(scene, 'left_thigh', {'limits_1': '40', 'limits_2': '-20 20'})
     assert np.degrees(changes.joint_of(scene, 'left_thigh').limits) == pytest.approx(
         np.array([[-40, 40], [-20, 20]]))
 
@@ -381,7 +383,7 @@ def test_whatever_is_typed_is_taken_or_refused(seed):
     name = DROP.bone_names[seed % len(DROP.bone_names)]
     numbers = (0.0, -1.0, 1e-320, 1e308, -1e308, math.nan, math.inf, 0.3)
     texts = ('', 'x', '1e999', '-', '1, 2, 3', 'nan', '0 0', '\0', '1e308', '-90, 90')
-    fields = sheet.read(DROP, name)
+    fields = bone_form.read_bone(DROP, name)
     for key in random.choice(list(fields), 3):
         if isinstance(fields[key], tuple):
             fields[key] = tuple(float(x) for x in random.choice(numbers, len(fields[key])))
@@ -389,7 +391,7 @@ def test_whatever_is_typed_is_taken_or_refused(seed):
             fields[key] = random.choice(texts) if isinstance(fields[key], str) else float(
                 random.choice(numbers))
     try:
-        sheet.apply(DROP, name, fields)
+        bone_form.apply_values(DROP, name, fields)
     except errors.ModelErrors as error:
         assert all(error.path in fields for error in error.errors)
 
@@ -405,7 +407,7 @@ def test_a_shoulder_of_three_ranges_is_mirrored_and_typed(fitted):
     limits = [pair if flip > 0 else (-pair[1], -pair[0])
               for flip, pair in zip(flips, after.angle_limits, strict=True)]
     assert np.allclose(limits, before.angle_limits, atol=1e-5)
-    scene = sheet.apply(fitted, names[0], {'limits_3': '-10, 30'})
+    scene = bone_form.apply_values(fitted, names[0], {'limits_3': '-10, 30'})
     assert np.degrees(changes.joint_of(scene, names[0]).limits[2]) == pytest.approx((-10, 30))
     # The form shows nine digits.
     assert np.allclose(changes.joint_of(scene, names[0]).limits[:2],

@@ -11,7 +11,7 @@ from viser import _messages  # noqa: E402
 
 from ragdoll_ros.files.scene import load_scene  # noqa: E402
 from ragdoll_ros.viewer.editor import changes  # noqa: E402
-from ragdoll_ros.viewer.sources.simulated import Simulated  # noqa: E402
+from ragdoll_ros.viewer.sources.simulation import SimulationSource  # noqa: E402
 
 DROP = load_scene('drop')
 
@@ -49,7 +49,7 @@ class Browser(PageClient):
 
 @pytest.fixture
 def page(tmp_path):
-    with served(Simulated(DROP), tmp_path) as page:
+    with served(SimulationSource(DROP), tmp_path) as page:
         yield page
 
 
@@ -77,7 +77,7 @@ def test_a_bone_is_clicked_dragged_typed_and_undone(page, browser):
     wait(lambda: editor.bone == 'left_shin')
     browser.press_button(editor.panel.edit)
     wait(lambda: editor.handles.body is not None)
-    assert page.source.report.paused and page.source.frame.time == 0
+    assert page.source.status.paused and page.source.frame.time == 0
     browser.drag_handle(editor.handles.body, (0.02, 0.1, 0.45))
     wait(lambda: editor.panel.body['position'].value == '0.02, 0.1, 0.45')
     settled(editor)
@@ -96,7 +96,7 @@ def test_a_bone_is_clicked_dragged_typed_and_undone(page, browser):
     wait(lambda: editor.scene == moved and not errors_in(editor.panel))
     browser.press(page, 'Undo')
     wait(lambda: editor.scene == DROP and page.source.frame.scene is editor.scene)
-    browser.press(page, 'Edit, or drop it')
+    browser.press(page, 'Edit or run')
     wait(lambda: page.source.frame.time > 0.05 and editor.handles.body is None)
 
 
@@ -104,7 +104,7 @@ def test_editing_ends_where_the_page_goes_on(page, browser):
     page.editor.select('head')
     browser.press_button(page.editor.panel.edit)
     wait(lambda: page.editor.handles.body is not None
-         and page.controls.pause.label == 'Go on')
+         and page.controls.pause.label == 'Resume')
     browser.press_button(page.controls.pause)
     wait(lambda: page.editor.handles.body is None)
     assert not page.editor.editing
@@ -118,7 +118,7 @@ def test_a_step_ends_editing(page, browser):
     browser.press(page, 'Step')
     wait(lambda: page.frame.time > 0)
     assert page.editor.handles.body is None and not page.editor.editing
-    assert page.source.report.paused and page.frame.time == pytest.approx(0.01)
+    assert page.source.status.paused and page.frame.time == pytest.approx(0.01)
 
 
 def test_undo_stays_in_a_scene_from_elsewhere(page, browser):
@@ -147,8 +147,8 @@ def test_rubbish_leaves_the_page_as_it_was(page, browser):
         button = (files.fit_button, files.upload_button)[number % 2]
         before = page.source.frame.time
         browser.upload(button, f'{number}_{name}', content)
-        wait(lambda number=number: f'{number}_' in files.said.content
-             and 'expected' in files.said.content)
+        wait(lambda number=number: f'{number}_' in files.message.content
+             and 'expected' in files.message.content)
         wait(lambda before=before: page.source.frame.time > before)
     # Values that no field can have, buttons that are none.
     for handle, value in ((page.editor.panel.body['mass'], 'x'), (page.editor.panel.bone, 'nobody'),
@@ -156,7 +156,7 @@ def test_rubbish_leaves_the_page_as_it_was(page, browser):
                           (page.editor.panel.body['shape'], 'cone')):
         browser.update(handle, value)
     browser.press_button(page.editor.panel.update)
-    browser.send(_messages.TransformControlsDragEndMessage(page.editor.handles.room + '/body'))
+    browser.send(_messages.TransformControlsDragEndMessage(page.editor.handles.root + '/body'))
     before = page.source.frame.time
     wait(lambda: page.source.frame.time > before + 0.05)
     assert page.editor.scene == DROP

@@ -8,8 +8,7 @@ from falls_recipes import BALL, DROP, SHOVE, recipe
 
 from ragdoll_ros import Bone, Ground, Joint, Placement, Ragdoll, Scene, Simulation, Sphere, State
 from ragdoll_ros.falls import generate, load_recipe
-from ragdoll_ros.falls.distribution import drawn
-from ragdoll_ros.falls.phases import find_phases
+from ragdoll_ros.falls.distribution import quantile
 from ragdoll_ros.falls.recipe import build_recipe
 from ragdoll_ros.falls.simulate import begin
 from ragdoll_ros.falls.start import start_of
@@ -17,6 +16,7 @@ from ragdoll_ros.files.doll import build_doll
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.coordinates import DofLayout
 from ragdoll_ros.model.errors import ModelErrors, OutOfRange
+from ragdoll_ros.people.fall_phases import bone_impacts, find_phases, part_impact
 from ragdoll_ros.physics.ground_heights import GroundHeights
 
 pytest.importorskip('scipy')
@@ -42,14 +42,14 @@ def test_a_draw_is_the_inverse_of_the_distribution(distribution, same):
     from scipy import stats
     name, *parameters = same
     shares = np.linspace(0, 1, 101)[1:-1]
-    values = [drawn(distribution, share) for share in shares]
+    values = [quantile(distribution, share) for share in shares]
     reference = getattr(stats, name)(*parameters)
     np.testing.assert_allclose(values, reference.ppf(shares), rtol=1e-9, atol=1e-9)
 
 
 def test_choices_are_made_by_their_weights():
     choice = {'choice': ['a', 'b', 'c'], 'weights': [1, 0, 3]}
-    made = [drawn(choice, share) for share in np.arange(0, 1, 0.01)]
+    made = [quantile(choice, share) for share in np.arange(0, 1, 0.01)]
     assert made == ['a'] * 25 + ['c'] * 75
 
 
@@ -190,6 +190,29 @@ def test_phases_are_as_defined():
     assert (never.onset, never.impact, never.rest) == (None, None, None)
 
 
+def test_descent_and_impact_speeds_of_a_fall_made_by_hand():
+    """Onset at frame 3, first contact of a knee at 6, of a hand at 8, of the pelvis at 11."""
+    names = ['foot', 'knee', 'pelvis', 'left_hand', 'right_hand', 'head']
+    ball, _ = build_doll(BALL)
+    scene = Scene('bones', tuple(Placement(ball, name) for name in names), Ground())
+    states, touching = np.zeros((14, 6, 13)), np.zeros((14, 6), bool)
+    down = np.array([0, 0.2, 0.05, 0.2, 0.4, 0.6, 0.8, 1, 1.2, 1.4, 1.6, 0.1, 0, 0])
+    states[:, :, 9] = -down[:, None] * [1, 1, 1, 2, 3, 1]
+    # The pelvis touches again after a bounce; the right hand touches later than the left one.
+    for bone, frames in enumerate([range(14), (6, 7), (11, 13), (8, 9), (9, 10), ()]):
+        touching[list(frames), bone] = True
+    bones = [f'{name}/ball' for name in names]
+    phases = find_phases(scene, states, touching, bones[:1], 2)
+    frames, velocities = bone_impacts(states, touching)
+    assert (phases.onset, phases.impact) == (3, 6)
+    np.testing.assert_array_equal(frames, [math.nan, 6, 11, 8, 9, math.nan])
+    pelvis, hand, head = (part_impact(part, names, frames, -velocities[:, 2])
+                          for part in ('pelvis', 'hand', 'head'))
+    # Speeds are those of the frame before: 1.6 at 10, twice 1.0 at 7.
+    assert pelvis == (11, 1.6) and hand == (8, 2.0) and np.isnan(head).all()
+    assert pelvis[0] - phases.onset == 8
+
+
 def test_a_fall_that_sleeps_is_as_if_it_had_been_watched():
     """Frames after a doll has come to rest are those of a simulation that goes on."""
     made = recipe(SHOVE)
@@ -210,6 +233,7 @@ def test_what_cannot_begin_is_kept_with_its_reason(monkeypatch):
     fall = next(generate(made, [0]))
     assert fall.failure and fall.valid < 30
     assert np.isnan(fall.states[fall.valid:]).all() and fall.phases.rest is None
+    assert np.isnan(fall.impact_velocities).all() and np.isnan(fall.impact_frames).all()
 
 
 def test_five_errors_are_all_named():

@@ -8,11 +8,11 @@ from falls_recipes import SHOVE, recipe
 
 from ragdoll_ros.falls import describe, generate
 from ragdoll_ros.falls.command import main
-from ragdoll_ros.falls.dataset import read
-from ragdoll_ros.falls.generate import run
-from ragdoll_ros.falls.parts import bones_of
+from ragdoll_ros.falls.dataset_builder import build_dataset
+from ragdoll_ros.falls.dataset_summary import summarize
 from ragdoll_ros.falls.pictures import hull
-from ragdoll_ros.falls.shard import Order, make_shard
+from ragdoll_ros.falls.shard import DatasetJob, make_shard
+from ragdoll_ros.people.real_falls import bones_of
 
 pytest.importorskip('pyarrow')
 pytest.importorskip('matplotlib')
@@ -26,10 +26,14 @@ def thrown():
     return recipe({**SHOVE, 'start': start, 'pushes': [], 'duration': 1.0})
 
 
+def here(job, shards):
+    return (make_shard(job, shard) for shard in shards)
+
+
 @pytest.fixture(scope='module')
 def folder(thrown, tmp_path_factory):
     folder = tmp_path_factory.mktemp('thrown')
-    run(Order(thrown, COUNT), folder, lambda order, shards: (make_shard(order, k) for k in shards))
+    build_dataset(DatasetJob(thrown, COUNT), folder, here)
     return folder
 
 
@@ -38,6 +42,11 @@ def test_page_says_what_the_falls_say(thrown, folder, capsys):
     page = (folder / 'README.md').read_text()
     falls = list(generate(thrown, range(COUNT)))
     assert f'{COUNT} falls of 1 s at 100 Hz' in page and '| fall forwards | 100.0% |' in page
+    torso = falls[0].scene.bone_index('torso')
+    descents = np.array([fall.touching[:, torso].argmax() - fall.phases.onset for fall in falls
+                         if fall.touching[:, torso].any()]) / 100
+    assert len(descents)
+    assert f'| {descents.mean():.2f} ± {descents.std():.2f} | 0.58 ± 0.26 |' in page
     for name in ('head', 'torso', 'left_thigh'):
         speeds = np.array([-fall.impact_velocities[fall.scene.bone_index(name), 2]
                            for fall in falls])
@@ -82,14 +91,13 @@ def test_bones_that_stand_for_parts():
 def test_what_cannot_be_described_is_refused(tmp_path, thrown, capsys):
     assert main(['describe', str(tmp_path)]) == 2
     assert 'manifest' in capsys.readouterr().err
-    run(Order(thrown, 1, 'amass'), tmp_path, lambda order, shards: (
-        make_shard(order, k) for k in shards))
+    build_dataset(DatasetJob(thrown, 1, 'amass'), tmp_path, here)
     assert main(['describe', str(tmp_path)]) == 2
     assert 'lerobot' in capsys.readouterr().err
 
 
 def test_a_data_set_without_a_known_part_is_described(tmp_path):
-    run(Order(recipe(), 3), tmp_path, lambda order, shards: (make_shard(order, k) for k in shards))
-    contents = read(tmp_path)
-    assert '| ball | 100% |' in describe.text(contents, [])
+    build_dataset(DatasetJob(recipe(), 3), tmp_path, here)
+    summary = summarize(tmp_path)
+    assert '| ball | 100% |' in describe.page_text(summary, [])
     assert describe.main([str(tmp_path)]) == 0

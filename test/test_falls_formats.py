@@ -12,11 +12,11 @@ from falls_recipes import DROP, SHOVE, recipe
 from ragdoll_ros import load_doll
 from ragdoll_ros.falls import generate, load_recipe
 from ragdoll_ros.falls.command import main
+from ragdoll_ros.falls.dataset_builder import build_dataset
 from ragdoll_ros.falls.formats.registry import FORMATS
 from ragdoll_ros.falls.formats.settled import ALIKE, different
-from ragdoll_ros.falls.generate import run
-from ragdoll_ros.falls.imu_samples import by_frames, worn_samples
-from ragdoll_ros.falls.shard import Order, make_shard
+from ragdoll_ros.falls.imu_samples import fall_samples, samples_by_frame
+from ragdoll_ros.falls.shard import DatasetJob, make_shard
 from ragdoll_ros.files.urdf import to_urdf
 from ragdoll_ros.fit.command import main as fit
 from ragdoll_ros.model import rotation
@@ -26,6 +26,10 @@ from ragdoll_ros.physics.sensors.imu import ImuMount, imu_samples
 parquet = pytest.importorskip('pyarrow.parquet')
 COUNT = 3
 IMU = {'name': 'low_back', 'bone': 'torso', 'position': [-0.05, 0, -0.15]}
+
+
+def here(job, shards):
+    return (make_shard(job, shard) for shard in shards)
 
 
 @pytest.fixture(scope='module')
@@ -46,8 +50,7 @@ def shoved():
 def written(shoved, tmp_path):
     """Write those falls in a format; the folder."""
     def write(name):
-        run(Order(shoved[0], COUNT, name), tmp_path,
-            lambda order, shards: (make_shard(order, shard) for shard in shards))
+        build_dataset(DatasetJob(shoved[0], COUNT, name), tmp_path, here)
         return tmp_path
     return write
 
@@ -73,7 +76,7 @@ def test_lerobot_by_pandas(pandas, shoved, written):
         for name, values in (('poses', fall.states[:, :, :7]),
                              ('velocities', fall.states[:, :, 7:]),
                              ('angles', fall.angles), ('rates', fall.rates),
-                             ('imu.low_back', worn_samples(fall, 0))):
+                             ('imu.low_back', fall_samples(fall, 0))):
             np.testing.assert_allclose(frames_of(rows, name), values.reshape(120, -1), **close)
         np.testing.assert_array_equal(frames_of(rows, 'touching'), fall.touching)
         assert rows['observation.valid'].all()
@@ -94,6 +97,9 @@ def test_lerobots_episodes_tasks_and_statistics(shoved, written):
         assert (row['onset'], row['impact'], row['rest']) == (
             fall.phases.onset, fall.phases.impact, fall.phases.rest)
         assert json.loads(row['drawn']) == fall.drawn and row['tasks'] == ['shove']
+        assert row['impact_frames'] == [
+            next((k for k in range(1, 120) if fall.touching[:k + 1, bone].tolist()
+                  == [False] * k + [True]), None) for bone in range(10)]
     tasks = pandas.read_parquet(folder / 'meta/tasks.parquet')
     assert tasks.loc['shove', 'task_index'] == 0
     stats = json.loads((folder / 'meta/stats.json').read_text())
@@ -124,7 +130,7 @@ def test_kfall_by_pandas(pandas, shoved, written):
                                        'GyrX', 'GyrY', 'GyrZ', 'EulerX', 'EulerY', 'EulerZ']
         # Six digits behind the point.
         close = {'rtol': 0, 'atol': 0.6e-6}
-        samples = worn_samples(fall, 0)
+        samples = fall_samples(fall, 0)
         np.testing.assert_allclose(table['TimeStamp(s)'], fall.times, **close)
         np.testing.assert_allclose(table.iloc[:, 2:5], samples[:, :3] / 9.80665, **close)
         np.testing.assert_allclose(table.iloc[:, 5:8], np.degrees(samples[:, 3:]), **close)
@@ -135,9 +141,9 @@ def test_kfall_by_pandas(pandas, shoved, written):
 
 def test_kfall_wants_a_sensor():
     with pytest.raises(WrongForm, match=r'record\.imus'):
-        Order(recipe(), 1, 'kfall')
+        DatasetJob(recipe(), 1, 'kfall')
     with pytest.raises(OutOfRange, match='lerobot'):
-        Order(recipe(), 1, 'xml')
+        DatasetJob(recipe(), 1, 'xml')
 
 
 def test_mcap_by_mcap_ros2_support(shoved, written):
@@ -162,7 +168,7 @@ def test_mcap_by_mcap_ros2_support(shoved, written):
         imus = [message.ros_msg for message in messages['/ragdoll/imu/low_back/data_raw']]
         force = [(m.linear_acceleration.x, m.linear_acceleration.y, m.linear_acceleration.z)
                  for m in imus]
-        np.testing.assert_array_equal(force, worn_samples(fall, 0)[:, :3])
+        np.testing.assert_array_equal(force, fall_samples(fall, 0)[:, :3])
         assert imus[0].orientation_covariance[0] == -1
         description, = messages['/ragdoll/robot_description']
         assert '<robot name="doll">' in description.ros_msg.data
@@ -214,8 +220,7 @@ def test_amass_by_numpy(shoved, written):
 
 def test_settled_states_are_those_that_rest(tmp_path):
     made = recipe({**SHOVE, 'start': {'lean_deg': {'uniform': [0, 5]}}})
-    run(Order(made, 5, 'settled'), tmp_path,
-        lambda order, shards: (make_shard(order, shard) for shard in shards))
+    build_dataset(DatasetJob(made, 5, 'settled'), tmp_path, here)
     falls = [fall for fall in generate(made, range(5)) if fall.phases.rest is not None]
     with np.load(tmp_path / 'settled.npz') as file:
         numbers = file['fall'].tolist()
@@ -266,7 +271,7 @@ def test_a_sensor_in_free_fall_reads_nothing_and_at_rest_gravity():
                                                  'orientation': [math.sqrt(0.5), 0, 0,
                                                                  math.sqrt(0.5)]}]})
     fall = next(generate(made, [0]))
-    samples = worn_samples(fall, 0)
+    samples = fall_samples(fall, 0)
     # The ball falls for 0.247 s; velocities of up to 3 m/s in float64 over 0.01 s.
     np.testing.assert_allclose(samples[:24], 0, atol=1e-11)
     # Turned by 90 degrees about x: the world's up is the sensor's y.
@@ -281,7 +286,7 @@ def test_a_turning_arm_feels_its_centripetal_acceleration():
                   record={'rate': 1000, 'imus': [{'name': 'a', 'bone': 'ball',
                                                   'position': [0.08, 0, 0]}]})
     fall = next(generate(made, [0]))
-    samples = worn_samples(fall, 0)
+    samples = fall_samples(fall, 0)
     # The mean over an angle a of 0.004 rad is sin(a / 2) / (a / 2) of it: 7e-7 less.
     np.testing.assert_allclose(samples, [[-4 ** 2 * 0.08, 0, 0, 0, 0, 4]] * 200, atol=2e-6)
 
@@ -297,8 +302,8 @@ def test_a_sensors_flaws_are_added_to_what_it_should_read():
             'rate': 100, 'imu_rate': 1000, 'imus': [
                 {'name': f'a{k}', 'bone': 'ball', **own} for k, own in enumerate(sensors)]}),
             [number]))
-        read = [worn_samples(fall, k)[1:] for k in range(len(sensors))]
-        true = imu_samples(fall.worn[:, 0], ImuMount('ball'), 0.001, fall.scene.gravity)
+        read = [fall_samples(fall, k)[1:] for k in range(len(sensors))]
+        true = imu_samples(fall.imu_states[:, 0], ImuMount('ball'), 0.001, fall.scene.gravity)
         return [samples - true for samples in read]
 
     many = np.concatenate([noise_of(k, [flawed])[0] for k in range(25)]) - flawed['bias']
@@ -316,14 +321,13 @@ def test_a_sensors_flaws_are_added_to_what_it_should_read():
     assert not clean.any()
     clipped = recipe({**DROP, 'duration': 0.6}, record={
         'imus': [{'name': 'a', 'bone': 'ball', 'range': [5, 0]}]})
-    assert worn_samples(next(generate(clipped, [0])), 0)[-1].tolist() == [0, 0, 5, 0, 0, 0]
+    assert fall_samples(next(generate(clipped, [0])), 0)[-1].tolist() == [0, 0, 5, 0, 0, 0]
 
 
 def test_mcap_tells_a_sensors_noise(tmp_path):
     reader = pytest.importorskip('mcap_ros2.reader')
     made = recipe(DROP, record={'imus': [{'name': 'a', 'bone': 'ball', 'noise_rate': 0.03}]})
-    run(Order(made, 1, 'mcap'), tmp_path,
-        lambda order, shards: (make_shard(order, shard) for shard in shards))
+    build_dataset(DatasetJob(made, 1, 'mcap'), tmp_path, here)
     message = next(iter(reader.read_ros2_messages(
         tmp_path / 'mcap/fall_0000000.mcap', topics=['/ragdoll/imu/a/data_raw']))).ros_msg
     assert list(message.angular_velocity_covariance) == pytest.approx(
@@ -336,21 +340,21 @@ def test_a_fast_sensor_has_several_samples_a_frame(pandas, tmp_path):
     made = recipe({**DROP, 'duration': 0.6, 'start': {'clearance': 0.3}}, record={
         'rate': 100, 'imu_rate': 1000, 'imus': [{'name': 'a', 'bone': 'ball'}]})
     fall = next(generate(made, [0]))
-    samples = worn_samples(fall, 0)
-    assert samples.shape == (591, 6) and by_frames(fall, 0).shape == (60, 10, 6)
-    np.testing.assert_array_equal(by_frames(fall, 0)[1:].reshape(-1, 6), samples[1:])
+    samples = fall_samples(fall, 0)
+    assert samples.shape == (591, 6) and samples_by_frame(fall, 0).shape == (60, 10, 6)
+    np.testing.assert_array_equal(samples_by_frame(fall, 0)[1:].reshape(-1, 6), samples[1:])
     # Velocities of up to 3 m/s in float64 over 0.001 s.
     np.testing.assert_allclose(samples[:247], 0, atol=1e-10)
     # The bounce is within one sample, and takes what the frame's velocity changes by.
     assert np.flatnonzero(samples[:, 2] > 100).tolist() == [248]
     velocity = np.cumsum(samples[1:, 2] - 9.8) / 1000
     np.testing.assert_allclose(velocity[9::10], fall.states[1:, 0, 9], atol=1e-9)
-    files = make_shard(Order(made, 1, 'kfall'), 0).files
+    files = make_shard(DatasetJob(made, 1, 'kfall'), 0).files
     table = pandas.read_csv(io.BytesIO(files['sensor_data/SA000000/S000000T01R01.csv']))
     labels = pandas.read_csv(io.BytesIO(files['label_data/SA000000_label.csv']))
     assert len(table) == 591 and table['TimeStamp(s)'].iloc[-1] == 0.59
     assert labels['Fall_impact_frame'][0] == 10 * fall.phases.impact == 250
-    run(Order(made, 1), tmp_path, lambda order, shards: (make_shard(order, k) for k in shards))
+    build_dataset(DatasetJob(made, 1), tmp_path, here)
     info = json.loads((tmp_path / 'meta/info.json').read_text())
     assert info['features']['observation.imu.a']['shape'] == [60]
 

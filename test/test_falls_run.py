@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 import yaml
 from conftest import ROOT
-from falls_recipes import DROP, contents, recipe
+from falls_recipes import DROP, file_bytes, recipe
 
-from ragdoll_ros.falls.generate import run
+from ragdoll_ros.falls.dataset_builder import build_dataset
 from ragdoll_ros.falls.manifest import FILE, Manifest
 from ragdoll_ros.falls.pool import make_shards
-from ragdoll_ros.falls.shard import SIZE, Order, make_shard
+from ragdoll_ros.falls.shard import FALLS_PER_SHARD, DatasetJob, make_shard
 from ragdoll_ros.model.errors import Unreadable
 
 pytest.importorskip('pyarrow')
@@ -27,21 +27,21 @@ PATIENCE = 60.0
 
 SHORT = {**DROP, 'duration': 0.2}
 
-COUNT = 3 * SIZE - 10
+COUNT = 3 * FALLS_PER_SHARD - 10
 """Three shards, the last of them shorter."""
 
 
 @pytest.fixture(scope='module')
-def order():
-    return Order(recipe(SHORT), COUNT)
+def job():
+    return DatasetJob(recipe(SHORT), COUNT)
 
 
 @pytest.fixture(scope='module')
-def whole(order, tmp_path_factory):
+def whole(job, tmp_path_factory):
     """The data set as this process makes it, shard by shard."""
     folder = tmp_path_factory.mktemp('whole') / 'falls'
-    run(order, folder, here)
-    return contents(folder)
+    build_dataset(job, folder, here)
+    return file_bytes(folder)
 
 
 @pytest.fixture
@@ -64,14 +64,14 @@ def command(tmp_path):
             process.communicate()
 
 
-def here(order, shards):
+def here(job, shards):
     """Make shards in this process."""
-    return (make_shard(order, shard) for shard in shards)
+    return (make_shard(job, shard) for shard in shards)
 
 
-def backwards(order, shards):
+def backwards(job, shards):
     """Make them in this process, the last one first."""
-    return here(order, list(shards)[::-1])
+    return here(job, list(shards)[::-1])
 
 
 def wait_for_shards(folder, count, process):
@@ -93,20 +93,20 @@ def told(errors):
             if 'falls, ' not in line and 'the dynamics' not in line]
 
 
-def test_the_same_bytes_in_reverse(order, whole, tmp_path):
-    run(order, tmp_path, backwards)
-    assert contents(tmp_path) == whole
+def test_the_same_bytes_in_reverse(job, whole, tmp_path):
+    build_dataset(job, tmp_path, backwards)
+    assert file_bytes(tmp_path) == whole
 
 
-def test_the_same_bytes_by_two_processes(order, whole, tmp_path):
-    run(order, tmp_path, partial(make_shards, workers=2))
-    assert contents(tmp_path) == whole
+def test_the_same_bytes_by_two_processes(job, whole, tmp_path):
+    build_dataset(job, tmp_path, partial(make_shards, workers=2))
+    assert file_bytes(tmp_path) == whole
 
 
 @pytest.mark.parametrize('times', [1, pytest.param(3, marks=pytest.mark.slow)])
 def test_a_run_that_is_killed_ends_with_the_same_bytes(command, tmp_path, times):
     folder, shards = tmp_path / 'falls', 2 * times + 1
-    many = ('--count', shards * SIZE, '--resume')
+    many = ('--count', shards * FALLS_PER_SHARD, '--resume')
     for done in range(times):
         process = command('-o', folder, *many)
         wait_for_shards(folder, 2 + done, process)
@@ -120,8 +120,8 @@ def test_a_run_that_is_killed_ends_with_the_same_bytes(command, tmp_path, times)
     process = command('-o', folder, *many)
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, errors
-    run(Order(recipe(SHORT), shards * SIZE), tmp_path / 'whole', here)
-    assert contents(folder) == contents(tmp_path / 'whole')
+    build_dataset(DatasetJob(recipe(SHORT), shards * FALLS_PER_SHARD), tmp_path / 'whole', here)
+    assert file_bytes(folder) == file_bytes(tmp_path / 'whole')
 
 
 def _wait_until_no_process_of(leader):
@@ -138,66 +138,66 @@ def _wait_until_no_process_of(leader):
 
 def test_ctrl_c_ends_the_run_in_one_line(command, tmp_path):
     folder = tmp_path / 'falls'
-    process = command('-o', folder, '--count', 1000 * SIZE)
+    process = command('-o', folder, '--count', 1000 * FALLS_PER_SHARD)
     wait_for_shards(folder, 2, process)
     # As a terminal does it: to all processes of the run.
     os.killpg(process.pid, signal.SIGINT)
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     line, = told(errors)
-    assert '--resume goes on' in line and Manifest.read(folder).done >= SIZE
+    assert '--resume continues' in line and Manifest.read(folder).done >= FALLS_PER_SHARD
     _wait_until_no_process_of(process)
 
 
-def test_what_is_torn_is_made_again(order, whole, tmp_path):
-    run(order, tmp_path, here)
+def test_what_is_torn_is_made_again(job, whole, tmp_path):
+    build_dataset(job, tmp_path, here)
     made = []
     (tmp_path / 'data/chunk-000/file-001.parquet').write_bytes(b'PAR1')
     (tmp_path / 'meta/episodes/chunk-000/file-002.parquet').unlink()
 
-    def watched(order, shards):
+    def watched(job, shards):
         made.extend(shards)
-        return here(order, made)
-    run(order, tmp_path, watched, resume=True)
-    assert made == [1, 2] and contents(tmp_path) == whole
+        return here(job, made)
+    build_dataset(job, tmp_path, watched, resume=True)
+    assert made == [1, 2] and file_bytes(tmp_path) == whole
 
 
-def test_more_falls_keep_those_that_are_there(order, tmp_path):
-    run(Order(recipe(SHORT), SIZE + 1), tmp_path, here)
+def test_more_falls_keep_those_that_are_there(job, tmp_path):
+    build_dataset(DatasetJob(recipe(SHORT), FALLS_PER_SHARD + 1), tmp_path, here)
     made = []
 
-    def watched(order, shards):
+    def watched(job, shards):
         made.extend(shards)
-        return here(order, made)
-    run(order, tmp_path, watched, resume=True)
+        return here(job, made)
+    build_dataset(job, tmp_path, watched, resume=True)
     # The second shard had one fall only.
     assert made == [1, 2]
 
 
-def test_other_falls_are_not_mixed(order, tmp_path):
-    run(Order(recipe(), 1), tmp_path, here)
-    before = contents(tmp_path)
+def test_other_falls_are_not_mixed(job, tmp_path):
+    build_dataset(DatasetJob(recipe(), 1), tmp_path, here)
+    before = file_bytes(tmp_path)
     with pytest.raises(Unreadable, match='resume'):
-        run(Order(recipe(), 1), tmp_path, here)
+        build_dataset(DatasetJob(recipe(), 1), tmp_path, here)
     with pytest.raises(Unreadable, match='recipe'):
-        run(Order(recipe(seed=1), 1), tmp_path, here, resume=True)
-    assert contents(tmp_path) == before
-    run(Order(recipe(), 2), tmp_path, here, resume=True)
+        build_dataset(DatasetJob(recipe(seed=1), 1), tmp_path, here, resume=True)
+    assert file_bytes(tmp_path) == before
+    build_dataset(DatasetJob(recipe(), 2), tmp_path, here, resume=True)
     with pytest.raises(Unreadable, match='2 or more'):
-        run(Order(recipe(), 1), tmp_path, here, resume=True)
+        build_dataset(DatasetJob(recipe(), 1), tmp_path, here, resume=True)
 
 
-def test_a_worker_that_is_killed_costs_its_shards_time(order, whole, tmp_path):
+def test_a_worker_that_is_killed_costs_its_shards_time(job, whole, tmp_path):
     killed = []
 
-    def killing(order, shards):
-        for shard in make_shards(order, shards, workers=2):
+    def killing(job, shards):
+        for shard in make_shards(job, shards, workers=2):
             if not killed:
                 killed.append(_workers()[0])
                 os.kill(killed[0], signal.SIGKILL)
             yield shard
-    manifest = run(order, tmp_path, killing)
-    assert killed and manifest.done == COUNT and contents(tmp_path) == whole
+    manifest = build_dataset(job, tmp_path, killing)
+    assert killed and manifest.done == COUNT and file_bytes(tmp_path) == whole
 
 
 def _workers():
@@ -213,10 +213,10 @@ def _workers():
 
 def test_a_failed_fall_is_kept_with_its_reason(tmp_path):
     import pyarrow.parquet as parquet
-    order = Order(recipe(), 3)
+    job = DatasetJob(recipe(), 3)
     # A speed that no recipe may have: the fall ends as it begins.
-    order.recipe.data['start']['velocity'] = [1e12, 0.0, 0.0]
-    manifest = run(order, tmp_path, here)
+    job.recipe.data['start']['velocity'] = [1e12, 0.0, 0.0]
+    manifest = build_dataset(job, tmp_path, here)
     assert set(manifest.failures) == {0, 1, 2} and manifest.done == 3
     episodes = parquet.read_table(tmp_path / 'meta/episodes/chunk-000/file-000.parquet')
     assert episodes.column('failure').to_pylist() == list(manifest.failures.values())
@@ -245,8 +245,8 @@ def test_a_full_disk_ends_the_run_in_one_line_and_it_goes_on_when_there_is_room(
         pytest.skip('no file system can be mounted here')
     assert process.returncode == 0, errors
     line, = told(errors)
-    assert 'No space left on device' in line and '--resume goes on' in line
-    assert contents(tmp_path / 'small.kept/falls') == whole
+    assert 'No space left on device' in line and '--resume continues' in line
+    assert file_bytes(tmp_path / 'small.kept/falls') == whole
 
 
 def test_the_command_says_what_it_made(command, tmp_path):

@@ -19,7 +19,7 @@ from ragdoll_ros.model.ragdoll import SkeletonFrame
 from ragdoll_ros.model.scene import all_above_ground, height
 from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.viewer.editor.folder import Folder
+from ragdoll_ros.viewer.editor.scene_folder import SceneFolder
 
 SMALL = 0.8
 """Size of the second person, of the first."""
@@ -155,7 +155,8 @@ def test_each_wears_its_own_skin_and_no_other(tmp_path, skins):
 def test_the_page_takes_both_and_judges_each(tmp_path):
     glb = write_two(tmp_path, person(), person('', SMALL, x=2), 1)
     (tmp_path / 'kept').mkdir()
-    scene, verdicts = Folder(tmp_path / 'kept').fit('two.glb', glb.read_bytes(), lambda *_: None)
+    scene, verdicts = SceneFolder(tmp_path / 'kept').fit(
+        'two.glb', glb.read_bytes(), lambda *_: None)
     assert [placement.name for placement in scene.dolls] == ['two_1', 'two_2']
     assert [verdict.word for verdict in verdicts] == ['good', 'good']
     assert sorted(skins_of(scene, pytest.fail)) == [0, 1]

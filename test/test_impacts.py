@@ -125,12 +125,12 @@ def test_friction_under_a_disc_is_the_mean_over_its_face(ratio):
     size = np.hypot(along, across)
     force = (along / size).mean()
     torque = ((rho * np.cos(theta) * across - rho * np.sin(theta) * along) / size).mean()
-    assert sliding_disc.shares(ratio) == pytest.approx((force, torque), abs=2e-3)
+    assert sliding_disc.friction_factors(ratio) == pytest.approx((force, torque), abs=2e-3)
 
 
 def test_a_disc_stops_sliding_and_spinning_at_once():
     """At the ratio to which all discs tend both fall in proportion; and friction's work fits."""
-    force, torque = sliding_disc.shares(0.653)
+    force, torque = sliding_disc.friction_factors(0.653)
     assert force / (2 * torque) == pytest.approx(0.653, abs=1e-3)
     times = np.linspace(0, 1, 100001)
     for speed, rate in ((1.0, 10.0), (0.2, 10.0)):
@@ -138,7 +138,8 @@ def test_a_disc_stops_sliding_and_spinning_at_once():
         moving = np.flatnonzero(np.diff(slid) > 1e-8)[-10]
         assert np.diff(angle)[moving + 20:].max() < 1e-7 * rate
         v, w = np.gradient(slid, times), np.gradient(angle, times)
-        power = [0.3 * G * sum(np.array(sliding_disc.shares(a / (0.2 * b))) * (a, 0.2 * b))
+        power = [0.3 * G * sum(
+            np.array(sliding_disc.friction_factors(a / (0.2 * b))) * (a, 0.2 * b))
                  for a, b in zip(v[1:moving:50], w[1:moving:50], strict=True)]
         energy = speed ** 2 / 2 + 0.2 ** 2 * rate ** 2 / 4
         # a sum of rectangles 0.5 ms wide

@@ -50,7 +50,7 @@ def test_what_is_no_pair_of_two_bones_is_told(tmp_path):
 
 
 def test_renamed_and_cut_off_bones_take_it_along():
-    from ragdoll_ros.viewer.editor.growth import remove_limb
+    from ragdoll_ros.viewer.editor.changes import remove_limb
     doll = two_rods(('left', 'right'))
     assert doll.renamed(str.upper).no_collision == (('LEFT', 'RIGHT'),)
     scene = remove_limb(Scene('rods', (Placement(doll),), Ground()), 'left')

@@ -282,9 +282,15 @@ def test_wheel_holds_config_twice_and_nothing_foreign(wheel):
     for part in ('ragdoll_ros/config/', '.data/data/share/ragdoll_ros/config/'):
         assert {Path(name).name for name in names if part in f'/{name}'} >= shipped, part
     assert 'ragdoll_ros/py.typed' in names
+    page = {path.name for path in (ROOT / 'ragdoll_ros/viewer/browser').iterdir()
+            if path.suffix in ('.js', '.css')}
+    assert page and {Path(name).name for name in names
+                     if name.startswith('ragdoll_ros/viewer/browser/')} >= page
     # Beside the package, its metadata and its data, a wheel's top level must hold nothing.
     assert {name.split('/')[0].split('-')[0] for name in names} == {'ragdoll_ros'}
-    assert not any('test' in name for name in names)
+    tests = {path.name for path in (ROOT / 'test').iterdir()}
+    assert not tests & {Path(name).name for name in names}
+    assert not any('test' in Path(name).parts for name in names)
 
 
 def test_pip_install_has_the_layout_of_a_ros_prefix(prefix):

@@ -137,7 +137,7 @@ def test_contacts_with_friction_keep_every_law(seed):
 @pytest.mark.parametrize(('friction', 'restitution'), [(0.0, 0.5), (0.3, 0.0), (0.8, 0.5)])
 def test_a_doll_keeps_its_energy_between_touches_and_never_gains(friction, restitution):
     """Rises are rounding; without friction nothing pushes it along the ground."""
-    figure, start = planar_doll.figure(friction, restitution), planar_doll.beginning()
+    figure, start = planar_doll.figure(friction, restitution), planar_doll.initial_rows()
     rows = event_driven.rows(figure, start, np.linspace(0, 0.3, 301))
     energy = figure.energy(rows)
     assert np.diff(energy).max() < 1e-9 * energy[0]
@@ -168,8 +168,8 @@ def test_pybullet_without_restitution_comes_to_the_same(name, bound):
 
     Bounces are left out: PyBullet's do not converge.
     """
-    from ragdoll_ros.accuracy.measure import compare
     from ragdoll_ros.accuracy.methods import bullet, run
+    from ragdoll_ros.accuracy.metrics import compare
     motion = next(motion for motion in planar_doll.planar_motions() if motion.name == name)
     truth = motion.truth(motion.trial.times())
     coarse, fine = (compare(run(bullet(count), motion.trial).trajectory, truth)['position_worst_m']

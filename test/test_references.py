@@ -11,9 +11,8 @@ from scipy.special import ellipk
 from ragdoll_ros.accuracy.motions import flight
 from ragdoll_ros.accuracy.motions.motion import without_damping
 from ragdoll_ros.accuracy.references import closed_forms
-from ragdoll_ros.accuracy.references.articulated import Articulated
+from ragdoll_ros.accuracy.references.articulated import Articulated, torque_free_rotation
 from ragdoll_ros.accuracy.references.planar_chain import PlanarChain
-from ragdoll_ros.accuracy.references.rigid_body import torque_free_rotation
 from ragdoll_ros.files.doll import load_doll
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.ragdoll import Bone, Joint, Ragdoll

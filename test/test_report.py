@@ -17,17 +17,17 @@ from ragdoll_ros.accuracy import methods
 from ragdoll_ros.accuracy.cases import starts
 from ragdoll_ros.accuracy.cases.hard_cases import hard_cases
 from ragdoll_ros.accuracy.cases.trial import Trial
-from ragdoll_ros.accuracy.measure import Measure
 from ragdoll_ros.accuracy.methods import bullet, by_name, median_run, ours, quickstart, run
+from ragdoll_ros.accuracy.metrics import Metrics
 from ragdoll_ros.accuracy.motions.flight import free_fall, gentle_flight, tumbling_box
 from ragdoll_ros.accuracy.motions.mechanisms import OMEGA, swing
-from ragdoll_ros.accuracy.parts import classes, orders
+from ragdoll_ros.accuracy.parts import orders, start_classes
 from ragdoll_ros.accuracy.parts.hard import violations
-from ragdoll_ros.accuracy.references.articulated import Articulated
-from ragdoll_ros.accuracy.references.rigid_body import torque_free_rotation
+from ragdoll_ros.accuracy.references.articulated import Articulated, torque_free_rotation
 from ragdoll_ros.accuracy.report import command, hard, many_starts, plots
 from ragdoll_ros.accuracy.report.sections import markdown
-from ragdoll_ros.accuracy.results import figures, goals, tables
+from ragdoll_ros.accuracy.results import criteria, figures
+from ragdoll_ros.accuracy.results import markdown as tables
 from ragdoll_ros.accuracy.results.runner import Job, attempt
 from ragdoll_ros.accuracy.trajectory import Trajectory
 from ragdoll_ros.model import rotation
@@ -99,11 +99,11 @@ def test_the_quickstart_owes_nothing_to_what_ran_before():
     code = ('from ragdoll_ros.accuracy.methods import quickstart, run\n'
             'from ragdoll_ros.accuracy.cases.starts import trial\n'
             'print(run(quickstart(), trial("drop .4 m", 0)).trajectory.positions.tobytes().hex())')
-    alone = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+    airborne_scene = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
                            cwd=ROOT, check=True).stdout.split()[-1]
     trial = starts.trial('drop .4 m', 0)
     run(ours('normal'), trial)
-    assert run(quickstart(), trial).trajectory.positions.tobytes().hex() == alone
+    assert run(quickstart(), trial).trajectory.positions.tobytes().hex() == airborne_scene
 
 
 def test_costs_are_medians_over_runs(monkeypatch):
@@ -112,7 +112,7 @@ def test_costs_are_medians_over_runs(monkeypatch):
     monkeypatch.setattr(methods, 'process_time', lambda: next(readings))
     result = median_run(bullet(1), free_fall().trial, 3)
     assert result.costs.tolist() == [3e-3] * 100
-    assert result.rate == pytest.approx(.3)
+    assert result.cpu_s_per_s == pytest.approx(.3)
 
 
 TUMBLING = tumbling_box()
@@ -150,7 +150,7 @@ def test_the_gentle_flight_touches_no_limit():
     """The reference knows no limits, so it must not need them."""
     motion = gentle_flight()
     truth = motion.truth(motion.trial.times())
-    assert Measure(motion.trial.scene).overshoot(truth) == 0
+    assert Metrics(motion.trial.scene).overshoot(truth) == 0
 
 
 @pytest.mark.parametrize('name', list(starts.CLASSES))
@@ -170,7 +170,7 @@ def test_starts_are_what_their_class_says(name):
     height = {'limit slam': .4, 'start outside': .4}.get(
         name, 2.0 if 'spin' in name else float(name.split()[1]) if 'drop' in name else None)
     assert lowest == pytest.approx(height, abs=1e-9)
-    outside = Measure(scene).overshoot(moved)
+    outside = Metrics(scene).overshoot(moved)
     assert (outside > math.radians(5)) if name == 'start outside' else outside == 0
     if 'spin' in name:
         assert np.linalg.norm(first.start.v[3:6]) == pytest.approx(float(name.split()[1]))
@@ -184,21 +184,22 @@ def row(**changes):
 
 
 def test_many_starts_become_one_row_with_the_worst_of_each():
-    one = classes.gathered('drop', 'ours', [row(), row(number=1, excess=2e-3)])
-    two = classes.gathered('drop', 'ours', [row(number=2, excess=math.inf, settled_s=math.inf)])
-    merged, = classes.merged([one, two])
+    one = start_classes.gathered('drop', 'ours', [row(), row(number=1, excess=2e-3)])
+    two = start_classes.gathered('drop', 'ours', [
+        row(number=2, excess=math.inf, settled_s=math.inf)])
+    merged, = start_classes.merged([one, two])
     assert (merged['starts'], merged['bad'], merged['worst_start']) == (3, 2, 2)
     assert merged['worst_excess'] == math.inf
     assert merged['settled'] == 2
     assert merged['cpu_s'] == pytest.approx(1.5)
 
 
-def test_a_promise_broken_is_shown_as_broken():
-    rows = [{**classes.gathered('spin', f'ours-{name}', [row(excess=excess)])}
+def test_a_criterion_that_is_not_met_is_shown_as_such():
+    rows = [{**start_classes.gathered('spin', f'ours-{name}', [row(excess=excess)])}
             for name, excess in (('draft', 1e-6), ('normal', 2e-5))]
-    held = {entry['goal']: entry['held'] for entry in goals.goals({'classes': rows})}
-    assert held['energy excess in every start, draft'] is True
-    assert held['energy excess in every start, normal'] is False
+    met = {entry['criterion']: entry['met'] for entry in criteria.criteria({'classes': rows})}
+    assert met['energy excess in every start, draft'] is True
+    assert met['energy excess in every start, normal'] is False
 
 
 def test_a_method_beaten_in_speed_and_error_is_not_on_the_front():
@@ -207,9 +208,9 @@ def test_a_method_beaten_in_speed_and_error_is_not_on_the_front():
                 'cpu_s_per_s': cpu, 'yardstick': 'position_worst_m', 'position_worst_m': error}
     rows = [point('ours-draft', 'ours', 1.0, 1e-3), point('ours-exact', 'ours', 2.0, 1e-6),
             point('other', 'PyBullet', .5, 1e-4)]
-    held = {entry['goal'].split()[-1]: entry['held']
-            for entry in goals.goals({'precision': rows}) if 'front' in entry['goal']}
-    assert held == {'ours-draft': False, 'ours-exact': True}
+    met = {entry['criterion'].split()[-1]: entry['met']
+           for entry in criteria.criteria({'precision': rows}) if 'front' in entry['criterion']}
+    assert met == {'ours-draft': False, 'ours-exact': True}
 
 
 def test_json_has_neither_nan_nor_infinity_and_a_line_for_each_row(tmp_path):
@@ -252,18 +253,18 @@ def test_a_failed_job_is_told_beside_the_rows_of_the_others():
     page = markdown({'about': figures.about('', 1.0, True, 2), 'figures': {
         'hard': [case, failed], 'costs': [failed, {'scene': 'empty', 'tick_s': 1e-6}]}}, {})
     assert page.count('| j | **failed**: E: x (f.py:1) |') == 2
-    assert '| fall | **no** | gap |' in page and '- **fall** fails: no reason' in page
+    assert '| fall | **no** | gap |' in page and '- **fall** fails: cause unknown' in page
     assert '| empty | 1 |' in page
 
 
 @pytest.mark.slow
 def test_page_and_pictures_come_from_the_json_alone(tmp_path):
     pytest.importorskip('matplotlib')
-    from ragdoll_ros.accuracy.parts import drop, precision
-    rows = precision.measure_all('free_fall', ['ours-normal', 'bullet-1', 'mujoco-rk4-1'], 1)
+    from ragdoll_ros.accuracy.parts import energy, work_precision
+    rows = work_precision.measure_all('free_fall', ['ours-normal', 'bullet-1', 'mujoco-rk4-1'], 1)
     about = figures.about('ragdoll_report', 1.0, True, 2)
-    figures.save({'about': about, 'figures': {'precision': rows, 'energy': drop.energies('drop')}},
-                 tmp_path)
+    figures.save({'about': about, 'figures': {
+        'precision': rows, 'energy': energy.energies('drop')}}, tmp_path)
     assert command.main(['--from-json', '--out', str(tmp_path)]) == 0
     page = (tmp_path / 'accuracy.md').read_text()
     assert '| free fall and throw, normal |' in page and '### Free fall' in page
@@ -302,7 +303,7 @@ def test_an_unknown_hard_case_or_method_is_named(capsys):
         by_name('leapfrog')
 
 
-def test_a_hard_case_is_held_against_its_rule():
+def test_a_hard_case_is_checked_against_its_requirements():
     """A limit passed by 7 degrees, at rest, whole: one error."""
     case = hard_cases()[0]
     good = {'excess': 0.0, 'gap_m': 0.0, 'overshoot_rad': 0.0, 'sinking_m': 0.0,
@@ -324,7 +325,7 @@ def test_starts_that_once_sank_do_not(name, number):
     """A shin dragged at 38 m/s that friction drove 36 mm into the ground, and jammed legs."""
     trial = starts.trial(name, number)
     moved = run(ours('normal'), trial).trajectory
-    assert Measure(trial.scene).sinking(moved) < 0.005
+    assert Metrics(trial.scene).penetration(moved) < 0.005
 
 
 @pytest.mark.slow

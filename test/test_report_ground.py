@@ -10,13 +10,13 @@ pytest.importorskip('mujoco')
 
 from ragdoll_ros.accuracy.cases.contact_cases import two_dolls
 from ragdoll_ros.accuracy.cases.fuzzed import fuzzed
-from ragdoll_ros.accuracy.measure import Measure
 from ragdoll_ros.accuracy.methods import bullet, by_name, core, reference, run
-from ragdoll_ros.accuracy.parts import convergence, drops, estimate, restitution
+from ragdoll_ros.accuracy.metrics import Metrics
+from ragdoll_ros.accuracy.parts import convergence, drop_statistics, error_estimate, restitution
 from ragdoll_ros.accuracy.references.closed_forms import bounce_times
-from ragdoll_ros.accuracy.report.ground_plots import STYLES, draw_convergence, draw_drops
-from ragdoll_ros.accuracy.report.ground_sections import CONVERGENCE, DROPS, PIECES, RESTITUTION
-from ragdoll_ros.accuracy.results import goals
+from ragdoll_ros.accuracy.report.contact_plots import STYLES, draw_convergence, draw_drops
+from ragdoll_ros.accuracy.report.contact_sections import CONVERGENCE, DROPS, RESTITUTION, SEGMENTS
+from ragdoll_ros.accuracy.results import criteria
 from ragdoll_ros.accuracy.trajectory import Trajectory
 from ragdoll_ros.model.ragdoll import JOINT_KINDS
 from ragdoll_ros.model.shapes import SHAPES
@@ -25,13 +25,13 @@ from ragdoll_ros.model.shapes import SHAPES
 def cloud(method, values, population='random'):
     """A chunk of drops whose every quantity takes these values."""
     return {'population': population, 'method': method, 'label': method, 'drops': len(values),
-            'values': {key: list(values) for key in drops.QUANTITIES}}
+            'values': {key: list(values) for key in drop_statistics.QUANTITIES}}
 
 
 def test_clouds_are_told_apart_by_their_distribution_not_their_order():
     """The same numbers in other chunks: p = 1; moved by three standard deviations: p near 0."""
     draws = np.random.default_rng(1).normal(size=60)
-    rows = drops.merged([cloud('truth', draws[:40]), cloud('same', draws[30:]),
+    rows = drop_statistics.merged([cloud('truth', draws[:40]), cloud('same', draws[30:]),
                          cloud('truth', draws[40:]), cloud('same', draws[:30]),
                          cloud('other', draws + 3)])
     truth, same, other = rows
@@ -45,14 +45,14 @@ def test_clouds_are_told_apart_by_their_distribution_not_their_order():
 
 
 def test_what_has_not_settled_counts_as_settling_at_the_end():
-    never, = drops.merged([cloud('truth', [math.inf, 1.0])])
-    assert never['settled_s_mean'] == pytest.approx((drops.DURATION + 1) / 2)
+    never, = drop_statistics.merged([cloud('truth', [math.inf, 1.0])])
+    assert never['settled_s_mean'] == pytest.approx((drop_statistics.DURATION + 1) / 2)
 
 
 @pytest.mark.parametrize('wrong', [0.0, 0.01])
 def test_apexes_come_from_height_and_speed_in_the_middle_of_a_flight(wrong):
     """Parabolas of e = 0.5 in ticks of 2 ms; those of a restitution 1 % too large show it."""
-    shape, flights = restitution.BODIES['ball'], restitution.counted(0.5)
+    shape, flights = restitution.BODIES['ball'], restitution.impact_times(0.5)
     found = 0.5 * (1 + wrong)
     impacts = bounce_times(1.0, found, 9.8, len(flights))
     times = np.arange(0, flights[-1], restitution.FINE_TICK)
@@ -73,8 +73,8 @@ def test_apexes_come_from_height_and_speed_in_the_middle_of_a_flight(wrong):
 
 def test_flights_count_down_to_the_slowest_approach():
     """v0 = 4.43 m/s: 0.5^6 of it is above 0.05 m/s, 0.5^7 below."""
-    assert len(restitution.counted(0.5)) == 8
-    assert len(restitution.counted(1.0)) == restitution.MOST + 1
+    assert len(restitution.impact_times(0.5)) == 8
+    assert len(restitution.impact_times(1.0)) == restitution.MAX_FLIGHTS + 1
 
 
 def test_semi_implicit_euler_shows_its_order_on_a_slope():
@@ -87,51 +87,53 @@ def test_semi_implicit_euler_shows_its_order_on_a_slope():
     assert 'h/32' in page and 'PyBullet' in page
 
 
-def promised(figures):
-    return {row['goal']: row['held'] for row in goals.goals(figures)}
+def criteria_met(figures):
+    return {row['criterion']: row['met'] for row in criteria.criteria(figures)}
 
 
-def test_promises_about_pieces_hold_for_error_and_price():
-    def piece(method, family, cpu, error, own):
+def test_criteria_of_segments_are_met_or_not():
+    def segment(method, family, cpu, error, own):
         return {'method': method, 'label': method, 'family': family, 'cpu_s_per_s': cpu,
                 'position_median_m': error, 'position_p90_m': 5 * error, 'own_median_m': own,
                 'reference': 'fine'}
-    rows = [piece('ours-normal', 'ours', 9.0, 0.3e-3, 0.3e-3),
-            piece('ours-exact', 'ours', 35.0, 0.3e-3, 0.3e-3),
-            piece('bullet-10', 'PyBullet', 10.0, 6e-3, 0.2e-3)]
-    held = promised({'pieces': rows})
-    assert held['pieces through contacts, normal'] is True
-    assert held['pieces through contacts, exact'] is False
-    assert held['CPU of pieces over PyBullet N = 10, normal'] is True
-    assert held['CPU of pieces over PyBullet N = 10, exact'] is False
-    assert held['no engine is cheaper and nearer its own limit, normal'] is True
-    assert held['no engine is cheaper and nearer its own limit, exact'] is False
-    assert '| 0.90 |' in PIECES.tables(rows)[1]
+    rows = [segment('ours-normal', 'ours', 9.0, 0.3e-3, 0.3e-3),
+            segment('ours-exact', 'ours', 35.0, 0.3e-3, 0.3e-3),
+            segment('bullet-10', 'PyBullet', 10.0, 6e-3, 0.2e-3)]
+    met = criteria_met({'pieces': rows})
+    assert met['short segments through contacts, normal'] is True
+    assert met['short segments through contacts, exact'] is False
+    assert met['CPU of segments over PyBullet N = 10, normal'] is True
+    assert met['CPU of segments over PyBullet N = 10, exact'] is False
+    assert met['no engine is faster and closer to its own limit, normal'] is True
+    assert met['no engine is faster and closer to its own limit, exact'] is False
+    assert '| 0.90 |' in SEGMENTS.tables(rows)[1]
 
 
-def test_promises_about_restitution_and_energy_hold_or_not():
+def test_criteria_of_restitution_and_energy_are_met_or_not():
     def body(accuracy, worst):
         return {'method': f'ours-{accuracy}', 'label': accuracy, 'body': 'ball', 'restitution': 0.5,
                 'flights': 7, 'seen': 7, 'worst': worst, 'found': 0.5}
     rows = [body('normal', 1e-9), body('exact', math.nan)]
-    held = promised({'restitution': rows})
-    assert held['apexes of single bodies, e = 0.5 to 0.5, normal'] is True
-    assert held['apexes of single bodies, e = 0.5 to 0.5, exact'] is False
+    met = criteria_met({'restitution': rows})
+    assert met['apexes of single bodies, e = 0.5 to 0.5, normal'] is True
+    assert met['apexes of single bodies, e = 0.5 to 0.5, exact'] is False
     assert '| normal | ball | 0.5000 |' in RESTITUTION.tables(rows)[0]
-    clouds = drops.merged([cloud('truth', (0.5, 0.6, 0.7), 'default, tilted'),
-                           cloud('ours-draft', (0.51, 0.6, 0.7), 'default, tilted'),
-                           cloud('ours-normal', (0.91, 0.92, 0.93), 'default, tilted')])
-    held = promised({'drops': clouds})
-    assert held['energies of 3 default drops, draft'] is True
-    assert held['energies of 3 default drops, normal'] is False
+    clouds = drop_statistics.merged([
+        cloud('truth', (0.5, 0.6, 0.7), 'default, tilted'),
+        cloud('ours-draft', (0.51, 0.6, 0.7), 'default, tilted'),
+        cloud('ours-normal', (0.91, 0.92, 0.93), 'default, tilted')])
+    met = criteria_met({'drops': clouds})
+    assert met['energies of 3 default drops, draft'] is True
+    assert met['energies of 3 default drops, normal'] is False
 
 
 def test_ticks_at_rounding_level_do_not_count_as_estimated(monkeypatch):
     """A flight whose errors are all rounding is no proof of the estimate."""
-    monkeypatch.setattr(estimate, 'NOISE', 1.0)
-    row, = estimate.measure('draft', ('flight_gentle',))
+    monkeypatch.setattr(error_estimate, 'NOISE', 1.0)
+    row, = error_estimate.measure('draft', ('flight_gentle',))
     assert row['ticks'] == 0 and row['rounding'] + row['distrusted'] == 28
-    assert not [entry for entry in goals.goals({'estimate': [row]}) if 'estimate' in entry['goal']]
+    assert not [entry for entry in criteria.criteria({'estimate': [row]})
+                if 'estimate' in entry['criterion']]
 
 
 def test_methods_are_found_by_their_names():
@@ -158,7 +160,7 @@ def test_dolls_that_collide_meet_and_one_alone_keeps_its_momentum():
     """The measure itself: the pair's flight before they meet loses nothing."""
     trial = two_dolls(6.0)
     early = dataclasses.replace(trial, duration=0.1)
-    assert Measure(trial.scene).momentum_drift(early, run(bullet(4), early).trajectory) < 1e-9
+    assert Metrics(trial.scene).momentum_drift(early, run(bullet(4), early).trajectory) < 1e-9
     moved = run(bullet(4), trial).trajectory
     assert np.abs(moved.angular_velocities[-1]).max() > 0.5
 
@@ -171,7 +173,7 @@ def test_pictures_show_a_line_for_each_engine_and_each_cloud():
              'steps_s': [1e-2, 5e-3], 'errors': [1e-3, 0.0]} for label in STYLES]
     figure = draw_convergence({'convergence': rows}, plt)
     assert len(figure.axes[0].lines) == len(STYLES) + 1
-    clouds = drops.merged([cloud('truth', [0.1, 0.2]), cloud('other', [0.3, math.inf])])
+    clouds = drop_statistics.merged([cloud('truth', [0.1, 0.2]), cloud('other', [0.3, math.inf])])
     figure = draw_drops({'drops': clouds}, plt)
     # of two drops one has no value: its line ends at a half
     assert [line.get_ydata()[-1] for line in figure.axes[0].lines] == [1.0, 0.5]

@@ -30,10 +30,10 @@ from ragdoll_ros.ros.messages.convert import to_pose_array
 from ragdoll_ros.ros.messages.serialized import deserialize_pose_array
 from ragdoll_ros.viewer.sources.node import source as remote_source
 from ragdoll_ros.viewer.sources.node.scene import scene_of_node
-from ragdoll_ros.viewer.sources.node.source import Remote
-from ragdoll_ros.viewer.sources.source import Wanted
+from ragdoll_ros.viewer.sources.node.source import NodeSource
+from ragdoll_ros.viewer.sources.source import RequestedData
 
-OPEN = Wanted(frames=True)
+OPEN = RequestedData(frames=True)
 
 
 @pytest.fixture(scope='module')
@@ -56,7 +56,7 @@ def nothing_runs_on(nodes):
 
 @pytest.fixture
 def remote(ros):
-    remote = Remote([])
+    remote = NodeSource([])
     yield remote
     remote.close()
 
@@ -122,28 +122,28 @@ def test_the_viewer_leaves_at_a_signal(no_node):
 
 
 def test_no_node_is_said_and_heals_by_itself(no_node, nodes, remote):
-    remote.want(OPEN)
-    wait(lambda: 'no node' in remote.report.problem and 'ragdoll_node' in remote.report.problem)
+    remote.request(OPEN)
+    wait(lambda: 'no node' in remote.status.problem and 'ragdoll_node' in remote.status.problem)
     with pytest.raises(ValueError, match='no node'):
         remote.load('drop')
     nodes.append(start('node'))
     seen(remote)
-    assert not remote.report.problem
+    assert not remote.status.problem
 
 
 def test_two_nodes_of_one_name_are_told_with_what_to_do(node, remote):
-    remote.want(OPEN)
+    remote.request(OPEN)
     twin = start('node')
-    wait(lambda: 'namespace of its own' in remote.report.note)
+    wait(lambda: 'namespace of its own' in remote.status.note)
     end(twin, signal.SIGINT)
-    wait(lambda: not remote.report.note)
+    wait(lambda: not remote.status.note)
 
 
 def test_shows_what_the_node_publishes(node, remote, peer):
     """The poses are those of ~/poses, with their scene and their time since the start."""
-    remote.want(OPEN)
+    remote.request(OPEN)
     frame = seen(remote)
-    assert frame.scene == load_scene('drop') and not remote.report.note
+    assert frame.scene == load_scene('drop') and not remote.status.note
     got = peer.collect(PoseArray, 'ragdoll/poses')
     peer.wait(lambda: len(got) > 5)
     wait(lambda: remote.frame.time > frame.time)
@@ -151,13 +151,13 @@ def test_shows_what_the_node_publishes(node, remote, peer):
     peer.wait(lambda: any(np.array_equal(
         [[p.position.x, p.position.y, p.position.z] for p in message.poses],
         shown.state.positions) for _, message in got))
-    wait(lambda: remote.report.measures)
+    wait(lambda: remote.status.measures)
     before = remote.frame.time
     assert 0 < before < 60
 
 
 def test_listens_to_what_is_shown_alone(node, remote, peer):
-    remote.want(Wanted())
+    remote.request(RequestedData())
     topics = ('ragdoll/poses', 'ragdoll/contacts', 'joint_states', 'ragdoll/swings',
               'robot_description')
 
@@ -166,11 +166,11 @@ def test_listens_to_what_is_shown_alone(node, remote, peer):
 
     peer.wait(lambda: peer.count_publishers('ragdoll/poses'))
     peer.wait(lambda: listened() == [])
-    remote.want(OPEN)
+    remote.request(OPEN)
     seen(remote)
     peer.wait(lambda: listened() == ['ragdoll/poses', 'robot_description'])
     assert remote.frame.contacts is None and remote.frame.angles is None
-    remote.want(Wanted(frames=True, contacts=True, angles=True))
+    remote.request(RequestedData(frames=True, contacts=True, angles=True))
     wait(lambda: remote.frame.contacts is not None and remote.frame.angles is not None)
     assert len(remote.frame.angles) == 14
     remote.load('ponytail')
@@ -178,20 +178,20 @@ def test_listens_to_what_is_shown_alone(node, remote, peer):
     wait(lambda: remote.frame.rods is not None)
     assert remote.frame.rods.shape == (8, 2, 3)
     peer.wait(lambda: listened() == list(topics))
-    remote.want(Wanted())
+    remote.request(RequestedData())
     peer.wait(lambda: listened() == [])
 
 
 def test_a_node_that_is_paused_is_seen_as_it_stands(node, remote, peer):
     """It publishes nothing: the last poses are kept for who comes late."""
-    remote.want(OPEN)
+    remote.request(OPEN)
     seen(remote)
     remote.pause(True)
-    wait(lambda: remote.report.paused)
-    late = Remote([])
-    late.want(OPEN)
+    wait(lambda: remote.status.paused)
+    late = NodeSource([])
+    late.request(OPEN)
     frame = seen(late)
-    wait(lambda: late.report.paused)
+    wait(lambda: late.status.paused)
     wait(lambda: np.array_equal(late.frame.state.positions, remote.frame.state.positions))
     before = frame.time
     late.step()
@@ -200,16 +200,16 @@ def test_a_node_that_is_paused_is_seen_as_it_stands(node, remote, peer):
 
 
 def test_steers_the_node(node, remote):
-    remote.want(OPEN)
+    remote.request(OPEN)
     seen(remote)
-    remote.set_pace(0.5)
-    wait(lambda: remote.report.pace == 0.5)
+    remote.set_real_time_factor(0.5)
+    wait(lambda: remote.status.real_time_factor == 0.5)
     seen(remote)
     remote.push((0.0, 2000.0, 1.0), 0.1)
     wait(lambda: remote.frame.pushes)
     assert remote.frame.pushes[0].force == pytest.approx((0, 2000, 1))
     wait(lambda: not remote.frame.pushes)
-    wait(lambda: remote.report.measures['work_of_pushes_J'] > 100)
+    wait(lambda: remote.status.measures['work_of_pushes_J'] > 100)
     late = remote.frame.time
     remote.reset()
     wait(lambda: remote.frame.time < late)
@@ -217,24 +217,24 @@ def test_steers_the_node(node, remote):
 
 def test_another_accuracy_and_what_its_ticks_cost(node, remote):
     """Once a second the node tells its pace and the cost of a tick; a page shows both."""
-    remote.want(OPEN)
-    wait(lambda: remote.report.accuracy == 'normal' and remote.report.tick_cost > 0)
-    wait(lambda: remote.report.reached == pytest.approx(1, abs=0.5))
+    remote.request(OPEN)
+    wait(lambda: remote.status.accuracy == 'normal' and remote.status.tick_cost > 0)
+    wait(lambda: remote.status.measured_real_time_factor == pytest.approx(1, abs=0.5))
     try:
-        remote.take_accuracy('draft')
-        wait(lambda: remote.report.accuracy == 'draft')
+        remote.set_accuracy('draft')
+        wait(lambda: remote.status.accuracy == 'draft')
         with pytest.raises(RagdollError, match='accuracy'):
-            remote.take_accuracy('perfect')
+            remote.set_accuracy('perfect')
     finally:
-        remote.take_accuracy('normal')
+        remote.set_accuracy('normal')
 
 
 def test_pushes_of_others_are_shown(node, remote, peer):
     """2000 N on ~/force for 0.1 s of simulated time, at two fifths of real time."""
-    remote.want(OPEN)
+    remote.request(OPEN)
     seen(remote)
-    remote.set_pace(0.4)
-    wait(lambda: remote.report.pace == 0.4)
+    remote.set_real_time_factor(0.4)
+    wait(lambda: remote.status.real_time_factor == 0.4)
     sender = peer.sender(Wrench, 'ragdoll/force')
     peer.wait(lambda: sender.get_subscription_count() == 2)
 
@@ -249,26 +249,26 @@ def test_pushes_of_others_are_shown(node, remote, peer):
 
 def test_a_grab_lifts_the_bone_and_rests_longer_than_the_nodes_patience(node, remote):
     """A pointer that rests sends nothing: the hand is kept for it beyond 3 s."""
-    remote.want(OPEN)
+    remote.request(OPEN)
     frame = seen(remote)
     bone = frame.scene.bone_index('head')
     target = np.array([0.3, 0.2, 2.2])
     remote.grab('page 1', 'head', (0.0, 0.0, 0.1), tuple(target))
     wait(lambda: np.linalg.norm(remote.frame.state.positions[bone] - target) < 0.2)
-    assert remote.frame.held[0].bone == 'head'
+    assert remote.frame.grabs[0].bone == 'head'
     since = remote.frame.time
     wait(lambda: remote.frame.time > since + 3.5)
     assert np.linalg.norm(remote.frame.state.positions[bone] - target) < 0.2
     remote.let_go('page 1')
-    wait(lambda: not remote.frame.held)
+    wait(lambda: not remote.frame.grabs)
     wait(lambda: remote.frame.state.positions[bone][2] < 1.0)
 
 
 def test_a_hand_rests_also_where_ros_time_stands(node, peer):
     """A page that is to go by a /clock which nobody tells still says that it holds the bone."""
-    remote = Remote(['--ros-args', '-p', 'use_sim_time:=true'])
+    remote = NodeSource(['--ros-args', '-p', 'use_sim_time:=true'])
     try:
-        remote.want(OPEN)
+        remote.request(OPEN)
         seen(remote)
         feedback = peer.collect(InteractiveMarkerFeedback, 'ragdoll/interactive/feedback')
         remote.grab('page 1', 'head', (0.0, 0.0, 0.1), (0.3, 0.2, 2.2))
@@ -290,14 +290,14 @@ def test_a_pause_opens_no_hand(node, remote, peer):
 
     Its pace is so slow that a second on the wall would be seen.
     """
-    remote.want(OPEN)
+    remote.request(OPEN)
     seen(remote)
-    remote.set_pace(0.01)
-    wait(lambda: remote.report.measures and remote.report.pace == 0.01)
+    remote.set_real_time_factor(0.01)
+    wait(lambda: remote.status.measures and remote.status.real_time_factor == 0.01)
     remote.grab('page 1', 'head', (0.0, 0.0, 0.1), (0.3, 0.2, 2.2))
-    wait(lambda: remote.frame.held)
+    wait(lambda: remote.frame.grabs)
     remote.pause(True)
-    wait(lambda: remote.report.paused)
+    wait(lambda: remote.status.paused)
     reports = peer.collect(DiagnosticArray, '/diagnostics')
     peer.wait(lambda: reports)
     before, stamp = remote.frame.time, zero_of(reports)
@@ -305,31 +305,31 @@ def test_a_pause_opens_no_hand(node, remote, peer):
     peer.wait(lambda: zero_of(reports) > stamp)
     # The picture at hand may be one that came before the stamps were set.
     wait(lambda: before < remote.frame.time < before + 0.1)
-    assert remote.frame.held
+    assert remote.frame.grabs
     remote.let_go('page 1')
 
 
 def test_a_reset_lets_go_here_too(node, remote):
     """The node opens its hands; none is shown that pulls nothing."""
-    remote.want(OPEN)
+    remote.request(OPEN)
     seen(remote)
-    wait(lambda: remote.report.measures and remote.frame.time > 0.5)
+    wait(lambda: remote.status.measures and remote.frame.time > 0.5)
     remote.grab('page 1', 'head', (0.0, 0.0, 0.1), (0.3, 0.2, 2.2))
-    wait(lambda: remote.frame.held and remote.report.measures['work_of_grabs_J'] > 1)
+    wait(lambda: remote.frame.grabs and remote.status.measures['work_of_grabs_J'] > 1)
     remote.reset()
-    wait(lambda: not remote.frame.held)
+    wait(lambda: not remote.frame.grabs)
 
 
 def test_uses_an_edited_scene_or_says_why_not(node, remote, tmp_path):
-    remote.want(OPEN)
+    remote.request(OPEN)
     seen(remote)
     heavier = load_scene('drop')
     doll = heavier.dolls[0].doll.replace_bone('head', mass=7.5)
     heavier = dataclasses.replace(heavier, name='heavier', dolls=(
         dataclasses.replace(heavier.dolls[0], doll=doll),))
-    remote.use(heavier)
+    remote.set_scene(heavier)
     assert seen(remote, 'heavier').scene.bones[1].mass == 7.5
-    assert not remote.report.note
+    assert not remote.status.note
     with pytest.raises(ValueError, match='nowhere'):
         remote.load('nowhere')
     assert remote.frame.scene.name == 'heavier'
@@ -341,9 +341,9 @@ def test_a_scene_that_is_not_here_is_shown_by_its_urdf(node, remote, peer, tmp_p
     save_scene(scene, path)
     assert set_parameters(peer, scene=str(path))
     save_scene(load_scene('drop'), path)
-    remote.want(OPEN)
+    remote.request(OPEN)
     wait(lambda: remote.frame is not None)
-    assert 'robot_description' in remote.report.note
+    assert 'robot_description' in remote.status.note
     assert remote.frame.scene.bone_names == scene.bone_names
     assert np.allclose([bone.shape.half_extents for bone in remote.frame.scene.bones],
                        [bone.shape.half_extents for bone in scene.bones])
@@ -366,7 +366,7 @@ def test_shapes_and_axes_from_a_urdf_are_the_scenes(name):
 @pytest.fixture
 def page(ros):
     """The whole way: DDS, page, websocket, one page that is open."""
-    with served(Remote([])) as page:
+    with served(NodeSource([])) as page:
         page.open()
         yield page
 
@@ -388,7 +388,7 @@ def test_the_page_draws_the_node(node, page):
     before = page.frame.time
     wait(lambda: page.frame.time > before + 0.1)
     page.source.pause(True)
-    wait(lambda: page.source.report.paused and page.frame is page.source.frame)
+    wait(lambda: page.source.status.paused and page.frame is page.source.frame)
     assert drawn(page, load_scene('drop'))
 
 
@@ -418,7 +418,7 @@ def test_an_open_page_follows_the_scene_that_others_set(node, page, peer, broken
     before = page.frame.time
     wait(lambda: page.frame.time > before + 0.1)
     page.source.pause(True)
-    wait(lambda: page.source.report.paused)
+    wait(lambda: page.source.status.paused)
     wait(lambda: drawn(page, load_scene('ponytail')))
 
 
@@ -432,16 +432,16 @@ def test_an_open_page_follows_a_node_that_comes_back_with_another_scene(
     monkeypatch.setattr(remote_source, 'SILENCE', 1.5)
     wait(lambda: page.frame is not None)
     page.source.grab('page 0', 'head', (0.0, 0.0, 0.0), (0.0, 0.0, 2.0))
-    wait(lambda: page.frame.held)
+    wait(lambda: page.frame.grabs)
     kill(node)
     wait(lambda: 'silent' in page.problem.content and 'start it again' in page.problem.content)
     start('node', '--ros-args', '-p', 'scene:=crowd')
     wait(lambda: page.stage.scene == load_scene('crowd'))
     wait(lambda: not page.problem.content)
     page.source.pause(True)
-    wait(lambda: page.source.report.paused)
+    wait(lambda: page.source.status.paused)
     wait(lambda: drawn(page, load_scene('crowd')))
-    assert not page.frame.held
+    assert not page.frame.grabs
     reports = peer.collect(DiagnosticArray, '/diagnostics')
     peer.wait(lambda: len(reports) > 1)
     assert {pair.key: pair.value for pair in reports[-1][1].status[0].values}['refused'] == '0'

@@ -11,7 +11,7 @@ pytest.importorskip('viser')
 from page_client import served, wait
 from page_cost import bench, many_dolls, middle, one_doll, row
 
-from ragdoll_ros.viewer.sources.node.source import Remote
+from ragdoll_ros.viewer.sources.node.source import NodeSource
 
 pytestmark = pytest.mark.slow
 
@@ -64,9 +64,9 @@ def test_a_minute_of_scrubbing_costs_the_node_nothing(ros):
     """Twenty instants a second, as a hand drags: the node keeps its rate, and needs what it needs
     for a page that looks at it live. The viewer is in this process, with the page's other half.
     """
-    with bench(1, twin=True) as node, served(Remote([])) as page:
+    with bench(1, twin=True) as node, served(NodeSource([])) as page:
         client = page.open()
-        wait(lambda: page.timeline.cut is not None and page.timeline.cut.duration > 5)
+        wait(lambda: page.timeline.clip is not None and page.timeline.clip.duration > 5)
         live = [node.measure() for _ in range(3)]
         stop = threading.Event()
 

@@ -26,7 +26,8 @@ WRITERS = {
     'physics/kernels/compiling/cache.py': 'machine code, NUMBA_CACHE_DIR',
     'recordings/save.py': '--save, save_recording(path)', 'viewer/static.py': '--static',
     'ros/tools/crowd_bench.py': 'a temporary file', 'ros/recovery.py': 'dump_directory',
-    'viewer/command.py': '~/ragdolls', 'viewer/editor/folder.py': '--folder, ~/ragdolls'}
+    'viewer/command.py': '~/ragdolls',
+    'viewer/editor/scene_folder.py': '--folder, ~/ragdolls'}
 """Files that write files, and what says where."""
 
 

@@ -75,13 +75,14 @@ def test_its_primitives_reach_as_far_as_it_does(shape):
 def test_the_editor_makes_each_kind_of_each_other(shape):
     """And what the sheet shows of it, applied as it is, changes nothing."""
     pytest.importorskip('viser')
-    from ragdoll_ros.viewer.editor import changes, sheet
+    from ragdoll_ros.viewer.editor import bone_form, changes
     scene = alone(shape)
     for kind in SHAPES:
         changed = changes.set_shape(scene, 'bone', kind)
         assert changed.bones[0].shape.kind == kind
-        assert sheet.apply(changed, 'bone', sheet.read(changed, 'bone')) == changed
-    assert sheet.apply(scene, 'bone', sheet.read(scene, 'bone')) == scene
+        values = bone_form.read_bone(changed, 'bone')
+        assert bone_form.apply_values(changed, 'bone', values) == changed
+    assert bone_form.apply_values(scene, 'bone', bone_form.read_bone(scene, 'bone')) == scene
 
 
 @pytest.mark.parametrize('number', [np.float64(0.1), np.float32(0.5), 1])

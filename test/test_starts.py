@@ -116,7 +116,7 @@ def test_a_fall_that_begins_beyond_limits_ends_as_others_do(number, accuracy):
     """
     pytest.importorskip('mujoco')
     from ragdoll_ros.accuracy.methods import by_name, run
-    from ragdoll_ros.accuracy.parts.classes import worst
+    from ragdoll_ros.accuracy.parts.start_classes import worst
     fall = trial('start outside', number)
     found = worst(fall, run(by_name(f'ours-{accuracy}'), fall).trajectory)
     assert found['excess'] < 1e-6

@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip('viser')
 
 from ragdoll_ros.model import errors
-from ragdoll_ros.viewer.widgets.number_parsing import number, numbers, shown
+from ragdoll_ros.viewer.widgets.number_parsing import format_number, parse_number, parse_numbers
 
 
 @pytest.mark.parametrize(('text', 'value'), [
@@ -25,7 +25,7 @@ from ragdoll_ros.viewer.widgets.number_parsing import number, numbers, shown
     ('70 kg', 70.0), ('70kg', 70.0), ('500 g', 0.5), ('7e1 kg', 70.0), ('1 000 g', 1.0),
     ('0.3 t', 300.0)])
 def test_what_is_typed_is_read_to_the_digit(text, value):
-    assert number(text, 'kg') == value
+    assert parse_number(text, 'kg') == value
 
 
 @pytest.mark.parametrize('text', [
@@ -34,19 +34,20 @@ def test_what_is_typed_is_read_to_the_digit(text, value):
     '1e-400', '1e9999999', '1..2', '1.2.3', '70 m', '70 lb', 'kg', '<b>1</b>', '1\x00', '1;2'])
 def test_what_may_be_another_number_or_none_is_refused_in_words(text):
     with pytest.raises(errors.WrongForm) as caught:
-        number(text, 'kg')
+        parse_number(text, 'kg')
     assert caught.value.value == text and len(caught.value.expected.split()) > 1
 
 
 def test_a_comma_that_may_be_two_things_is_told_with_both():
     with pytest.raises(errors.WrongForm, match=r'write 1000, or 1\.000'):
-        number('1,000')
+        parse_number('1,000')
 
 
 def test_infinity_is_a_number_where_it_means_something():
-    assert number(' inf', infinite=True) == math.inf and number('∞', infinite=True) == math.inf
+    assert parse_number(' inf', infinite=True) == math.inf
+    assert parse_number('∞', infinite=True) == math.inf
     with pytest.raises(errors.WrongForm):
-        number('nan', infinite=True)
+        parse_number('nan', infinite=True)
 
 
 @pytest.mark.parametrize(('text', 'values'), [
@@ -57,7 +58,7 @@ def test_infinity_is_a_number_where_it_means_something():
     ('1 m 2 m -.3 m', (1, 2, -0.3)),
     ('1,5 m； 2 m； 3 m', (1.5, 2, 3)), ('1m, 2, 3m', (1, 2, 3)), ('７ ８ ９', (7, 8, 9))])
 def test_three_numbers(text, values):
-    assert numbers(text, 3, 'm') == values
+    assert parse_numbers(text, 3, 'm') == values
 
 
 @pytest.mark.parametrize('text', ['', '1', '1 2', '1 2 3 4', '1,5 2,5 3,5', '1,,2', '1, 2, x',
@@ -66,13 +67,13 @@ def test_three_numbers(text, values):
 def test_what_is_not_three_numbers_is_refused(text):
     """As such, or as what may be two numbers."""
     with pytest.raises(errors.WrongForm) as caught:
-        numbers(text, 3, 'm')
-    assert ('3 numbers' if '1,000' not in text else 'clear') in caught.value.expected
+        parse_numbers(text, 3, 'm')
+    assert ('3 numbers' if '1,000' not in text else 'unambiguous') in caught.value.expected
 
 
 def test_an_acceleration_has_its_unit():
-    assert numbers('0 0 -9.8 m/s²', 3, 'm/s²') == (0, 0, -9.8)
-    assert numbers('0 m/s2, 0 m/s^2, -9.8m/s²', 3, 'm/s²') == (0, 0, -9.8)
+    assert parse_numbers('0 0 -9.8 m/s²', 3, 'm/s²') == (0, 0, -9.8)
+    assert parse_numbers('0 m/s2, 0 m/s^2, -9.8m/s²', 3, 'm/s²') == (0, 0, -9.8)
 
 
 def test_what_is_shown_is_read_as_what_is_shown():
@@ -80,6 +81,6 @@ def test_what_is_shown_is_read_as_what_is_shown():
     random = np.random.default_rng(5)
     for value in [0.0, 1.0, -0.25, 1e9, 1e-9, *random.normal(size=200) * 10.0 **
                   random.integers(-12, 12, 200)]:
-        assert number(shown(value)) == pytest.approx(value, rel=6e-7, abs=0)
-    assert [shown(value) for value in (70.0, 1e9, 1e-9, 0.1, -0.0)] == [
+        assert parse_number(format_number(value)) == pytest.approx(value, rel=6e-7, abs=0)
+    assert [format_number(value) for value in (70.0, 1e9, 1e-9, 0.1, -0.0)] == [
         '70', '1e9', '1e-9', '0.1', '0']

@@ -18,18 +18,18 @@ from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.model.shapes import Capsule, Sphere
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.recording import Recording
-from ragdoll_ros.viewer.drawing.framing import bounds, place
-from ragdoll_ros.viewer.drawing.marks import WEIGHT_LENGTH
-from ragdoll_ros.viewer.sources.playback import Playback
-from ragdoll_ros.viewer.sources.simulated import Simulated
-from ragdoll_ros.viewer.sources.source import Wanted
+from ragdoll_ros.viewer.drawing.framing import bounding_spheres, home_position
+from ragdoll_ros.viewer.drawing.overlays import WEIGHT_LENGTH
+from ragdoll_ros.viewer.sources.playback import PlaybackSource
+from ragdoll_ros.viewer.sources.simulation import SimulationSource
+from ragdoll_ros.viewer.sources.source import RequestedData
 
 DROP = load_scene('drop')
 
 
 @pytest.fixture
 def page():
-    with served(Simulated(DROP)) as page:
+    with served(SimulationSource(DROP)) as page:
         yield page
 
 
@@ -43,7 +43,7 @@ def drawn(page):
 def paused(page):
     """Hold the time; give the frame that is drawn then."""
     page.source.pause(True)
-    wait(lambda: page.source.report.paused and page.frame is page.source.frame)
+    wait(lambda: page.source.status.paused and page.frame is page.source.frame)
     return page.frame
 
 
@@ -68,7 +68,7 @@ def test_a_capsule_is_a_cylinder_between_two_balls():
     turn = rotation.from_axis_angle((1, 2, 3), 0.7)
     bone = Bone('b', Capsule(0.1, 0.6), 1, (0, 0, 1), turn, color=(1, 0.5, 0, 1))
     scene = Scene('s', (Placement(Ragdoll('d', (bone,))),), gravity=(0, 0, 0))
-    with served(Simulated(scene)) as page:
+    with served(SimulationSource(scene)) as page:
         page.open()
         wait(lambda: page.stage)
         batches = {batch.kind: batch.handle
@@ -104,7 +104,7 @@ def test_time_stands_while_no_page_is_open(page):
 def test_nothing_is_sent_while_nothing_moves():
     """A scene at rest in free space: the page gets its plots' points alone, four a second."""
     still = load_scene('flight')
-    with served(Simulated(still)) as page:
+    with served(SimulationSource(still)) as page:
         client = page.open()
         wait(lambda: page.frame and page.frame.time > 0.3)
         before, since = client.windows, page.frame.time
@@ -119,15 +119,15 @@ def test_arrow_keys_push(page, label, axis, sign):
     """A tap of 2000 N: 50 N s of 55 kg. The arrow is there while the push is, and gone after."""
     client = page.open()
     wait(lambda: page.frame)
-    client.press(page, 'Pause, or go on')
-    wait(lambda: page.source.report.paused)
+    client.press(page, 'Pause or resume')
+    wait(lambda: page.source.status.paused)
     client.press(page, 'Reset')
     client.press(page, label)
     wait(lambda: page.frame.pushes and page.frame.time == 0)
     assert page.frame.pushes[0].force[axis] == 2000 * sign
     arrow = wait_for(page, '/scene/pushes')
     assert arrow.visible and np.sign(np.diff(arrow.points[0], axis=0)[0, axis]) == sign
-    client.press(page, 'Pause, or go on')
+    client.press(page, 'Pause or resume')
     wait(lambda: not page.frame.pushes)
     frame = page.frame
     masses = np.array([bone.mass for bone in frame.scene.bones])
@@ -144,37 +144,42 @@ def test_a_key_that_comes_again_and_again_is_held(page):
     counts = itertools.count()
 
     def fast():
-        client.update(page.controls.pushes.told, f'{next(counts)} up')
+        client.update(page.controls.pushes.key_events, f'{next(counts)} up')
         return page.frame.state.linear_velocities[0, 0] < -5
     wait(fast)
-    client.update(page.controls.pushes.told, f'{next(counts)}')
+    client.update(page.controls.pushes.key_events, f'{next(counts)}')
     wait(lambda: not any(any(push.force) for push in page.frame.pushes))
 
 
 def test_the_strength_is_that_of_the_slider(page):
     client = page.open()
     wait(lambda: page.frame)
-    client.press(page, 'Pause, or go on')
-    wait(lambda: page.source.report.paused)
+    client.press(page, 'Pause or resume')
+    wait(lambda: page.source.status.paused)
     client.update(page.controls.pushes.strength, 350.0)
-    client.update(page.controls.pushes.told, '0 right')
+    client.update(page.controls.pushes.key_events, '0 right')
     wait(lambda: page.frame.pushes and page.frame.pushes[0].force[:2] == (0, 350))
 
 
 def test_arrows_pressed_together_add_up(page):
     client = page.open()
     wait(lambda: page.frame)
-    client.press(page, 'Pause, or go on')
-    wait(lambda: page.source.report.paused)
-    client.update(page.controls.pushes.told, '0 up left')
+    client.press(page, 'Pause or resume')
+    wait(lambda: page.source.status.paused)
+    client.update(page.controls.pushes.key_events, '0 up left')
     wait(lambda: page.frame.pushes and page.frame.pushes[0].force == (-2000, -2000, 2))
 
 
 def buttons_and_keys(page):
-    """Labels of all that can be used on a page, and all commands by which it can be."""
+    """Labels of all that can be used on a page, and all commands by which it can be.
+
+    Of copies, made at once: viser's threads change what they copy.
+    """
     gui = page.server.gui
-    shown = {handle.label for handle in gui._gui_input_handle_from_uuid.values() if handle.visible}
-    return shown, {handle.label for handle in gui._command_handle_from_uuid.values()}
+    handles = list(gui._gui_input_handle_from_uuid.values())
+    commands = list(gui._command_handle_from_uuid.values())
+    return ({handle.label for handle in handles if handle.visible},
+            {command.label for command in commands})
 
 
 def test_a_recording_offers_nothing_that_it_cannot_do():
@@ -183,30 +188,30 @@ def test_a_recording_offers_nothing_that_it_cannot_do():
                     np.tile((0, 0, 0, 1.0), (2, 10, 1)))
     changes = {'Push', 'Strength, N', 'Scene', 'Engine'}
     pushes = {'Push up', 'Push down', 'Push left', 'Push right'}
-    with served(Simulated(DROP)) as page:
+    with served(SimulationSource(DROP)) as page:
         shown, keys = buttons_and_keys(page)
         assert changes < shown and pushes < keys and 'Reset' in shown
-    with served(Playback(run)) as page:
+    with served(PlaybackSource(run)) as page:
         page.open()
-        wait(lambda: page.stage)
+        wait(lambda: page.editor)  # the last part of a page that is made
         shown, keys = buttons_and_keys(page)
         assert not changes & shown and not pushes & keys and {'Pause', 'Reset', 'Time'} < shown
 
 
-def test_pause_step_reset_and_pace(page):
+def test_pause_step_reset_and_real_time_factor(page):
     client = page.open()
     wait(lambda: page.frame and page.frame.time > 0.2)
-    client.press(page, 'Pause, or go on')
-    wait(lambda: page.source.report.paused)
+    client.press(page, 'Pause or resume')
+    wait(lambda: page.source.status.paused)
     held = paused(page).time
     client.press(page, 'Step')
     wait(lambda: page.frame.time > held)
     assert page.frame.time == pytest.approx(held + 0.01)
     client.press(page, 'Reset')
     wait(lambda: page.frame.time == 0)
-    client.update(page.controls.pace, 0.5)
-    wait(lambda: page.source.report.pace == 0.5)
-    client.press(page, 'Pause, or go on')
+    client.update(page.controls.real_time_factor, 0.5)
+    wait(lambda: page.source.status.real_time_factor == 0.5)
+    client.press(page, 'Pause or resume')
     wait(lambda: page.frame.time > 0)
 
 
@@ -230,17 +235,18 @@ def test_another_engine_by_the_dropdown(page):
     wait(lambda: page.stage and page.frame and page.frame.time > 0.2)
     scene = page.frame.scene
     client.update(page.controls.engine, 'bullet')
-    wait(lambda: page.source.report.engine == 'bullet' and page.frame.time < 0.2)
+    wait(lambda: page.source.status.engine == 'bullet' and page.frame.time < 0.2)
     assert page.frame.scene is scene
     client.update(page.controls.scene, 'flight')
     wait(lambda: page.stage.scene.name == 'flight')
-    assert page.source.report.engine == page.controls.engine.value == 'bullet'
+    assert page.source.status.engine == page.controls.engine.value == 'bullet'
 
 
 def test_a_scene_that_is_refused_is_not_chosen():
     """The list goes on naming the scene that is shown, and the page that chose is told why."""
     unturned = np.tile((0, 0, 0, 1.0), (1, 10, 1))
-    with served(Playback(Recording(DROP, np.zeros(1), np.zeros((1, 10, 3)), unturned))) as page:
+    run = Recording(DROP, np.zeros(1), np.zeros((1, 10, 3)), unturned)
+    with served(PlaybackSource(run)) as page:
         client, handle, seen = page.open(), page.controls.scene, []
         wait(lambda: handle.value == 'drop')
 
@@ -262,7 +268,7 @@ def test_what_was_sent_is_text_on_the_page(page):
     doll = dataclasses.replace(placement.doll, riders=(SkeletonFrame('r', 'torso', (0, 0, 0)),),
                                model='nothing.glb')
     page.open()
-    page.source.use(dataclasses.replace(DROP, dolls=(
+    page.source.set_scene(dataclasses.replace(DROP, dolls=(
         dataclasses.replace(placement, doll=doll, name='<iframe srcdoc=x>'),)))
     wait(lambda: 'no skin for &lt;iframe srcdoc=x&gt;' in page.problem.content)
     assert '<iframe' not in page.problem.content
@@ -295,20 +301,20 @@ def test_a_dragged_bone_follows_at_the_distance_it_had(page):
     wait(lambda: np.array_equal(camera.position, eye))
     node, number, place = batch_of(page, 'left_forearm')
     client.drag(node, 'start', place, place, number)
-    wait(lambda: page.source.frame.held)
+    wait(lambda: page.source.frame.grabs)
     pointer = np.add(place, (0.0, 0.4, 0.5))
     client.drag(node, 'update', place, pointer, number)
     distance = np.linalg.norm(place - eye)
     target = eye + (pointer - eye) / np.linalg.norm(pointer - eye) * distance
     page.source.pause(False)
-    wait(lambda: page.frame.held and np.allclose(page.frame.held[0].target, target))
-    assert page.frame.held[0].bone == 'left_forearm'
+    wait(lambda: page.frame.grabs and np.allclose(page.frame.grabs[0].target, target))
+    assert page.frame.grabs[0].bone == 'left_forearm'
     bone = frame.scene.bone_index('left_forearm')
     wait(lambda: np.linalg.norm(page.frame.state.positions[bone] - target) < 0.05)
     # Drawn as a line while it is held.
     assert wait_for(page, '/scene/hands').visible
     client.drag(node, 'end', place, pointer, number)
-    wait(lambda: not page.frame.held)
+    wait(lambda: not page.frame.grabs)
 
 
 def test_a_point_that_has_moved_on_is_taken_at_the_edge(page):
@@ -318,11 +324,11 @@ def test_a_point_that_has_moved_on_is_taken_at_the_edge(page):
     frame = paused(page)
     node, number, place = batch_of(page, 'head')
     client.drag(node, 'start', np.add(place, (0.5, 0, 0)), place, number)
-    wait(lambda: page.source.frame.held)
+    wait(lambda: page.source.frame.grabs)
     turn = rotation.matrix(frame.state.orientations[DROP.bone_index('head')])
     edge = np.clip(turn.T @ (0.5, 0, 0), -0.1, 0.1)  # half of its edges are 0.1 m
     # A page gets numbers of 32 bits.
-    assert turn.T @ (page.source.frame.held[0].point - place) == pytest.approx(edge, abs=1e-5)
+    assert turn.T @ (page.source.frame.grabs[0].point - place) == pytest.approx(edge, abs=1e-5)
 
 
 def test_a_page_that_vanishes_lets_go(page):
@@ -331,10 +337,10 @@ def test_a_page_that_vanishes_lets_go(page):
     wait(lambda: page.frame and len(page.server.get_clients()) == 2)
     node, number, place = batch_of(page, 'head')
     goes.drag(node, 'start', place, place, number)
-    wait(lambda: page.frame.held)
+    wait(lambda: page.frame.grabs)
     goes.drop()
     page.clients.remove(goes)
-    wait(lambda: not page.frame.held and len(page.server.get_clients()) == 1)
+    wait(lambda: not page.frame.grabs and len(page.server.get_clients()) == 1)
     before = stays.windows
     wait(lambda: stays.windows > before)
 
@@ -345,7 +351,7 @@ def test_two_pages_have_a_hand_each(page):
     for client, bone in zip(clients, ('left_forearm', 'right_forearm'), strict=True):
         node, number, place = batch_of(page, bone)
         client.drag(node, 'start', place, place, number)
-    wait(lambda: len(page.frame.held) == 2)
+    wait(lambda: len(page.frame.grabs) == 2)
 
 
 @pytest.mark.filterwarnings('ignore')
@@ -366,11 +372,11 @@ def test_a_pointer_that_points_nowhere_moves_nothing(page, phase, number):
     node, bone, place = batch_of(page, 'head')
     if phase == 'update':
         client.drag(node, 'start', place, place, bone)
-        wait(lambda: page.frame.held)
+        wait(lambda: page.frame.grabs)
     client.drag(node, phase, place if phase == 'update' else (number,) * 3, (number,) * 3, bone)
     client.drag(node, 'end', place, place, bone)
     since = page.frame.time
-    wait(lambda: not page.frame.held and page.frame.time > since + 0.1)
+    wait(lambda: not page.frame.grabs and page.frame.time > since + 0.1)
     assert np.isfinite(page.frame.state.positions).all()
     assert np.abs(page.frame.state.positions).max() < 10
 
@@ -391,9 +397,9 @@ def test_a_dark_page_has_a_dark_ground(page):
     wait(lambda: page.frame)
     ground = page.server.scene.get_handle_by_name('/scene/ground')
     assert min(ground.plane_color) > 200
-    client.update(page.view.dark, True)
+    client.update(page.display.dark, True)
     wait(lambda: max(page.server.scene.get_handle_by_name('/scene/ground').plane_color) < 60)
-    client.update(page.view.dark, False)
+    client.update(page.display.dark, False)
     wait(lambda: min(page.server.scene.get_handle_by_name('/scene/ground').plane_color) > 200)
 
 
@@ -402,7 +408,7 @@ def test_contacts_on_demand(page):
     client = page.open()
     wait(lambda: page.frame)
     assert page.server.scene.get_handle_by_name('/scene/contacts') is None
-    client.update(page.view.contacts, True)
+    client.update(page.display.contacts, True)
     wait(lambda: page.frame.contacts is not None and len(page.frame.contacts) > 3)
     points = wait_for(page, '/scene/contacts').points
     # Bones of the doll touch each other as well, above the ground.
@@ -414,7 +420,7 @@ def test_contacts_on_demand(page):
     below = lines[:, 0, 2] < 0.01
     rises = (lines[below, 1, 2] - lines[below, 0, 2]).sum()
     assert rises == pytest.approx(WEIGHT_LENGTH, rel=0.01)
-    client.update(page.view.contacts, False)
+    client.update(page.display.contacts, False)
     wait(lambda: page.frame.contacts is None)
     wait(lambda: not page.server.scene.get_handle_by_name('/scene/contacts').visible)
 
@@ -437,18 +443,18 @@ def test_the_camera_is_told_on_demand_what_to_follow(page):
     paused(page)
     begin = centre()
     assert followed() is None
-    client.update(page.view.follow, True)
+    client.update(page.display.follow, True)
     wait(lambda: followed() and is_at(begin))
     node, number, place = batch_of(page, 'head')
     client.drag(node, 'start', place, place, number)
     client.drag(node, 'update', place, np.add(place, (0, 0, 1)), number)
-    wait(lambda: page.frame.held)
+    wait(lambda: page.frame.grabs)
     page.source.pause(False)
     wait(lambda: centre()[2] - begin[2] > 0.5)
     assert is_at(begin)
     client.drag(node, 'end', place, place, number)
-    wait(lambda: not page.frame.held and is_at(centre()))
-    client.update(page.view.follow, False)
+    wait(lambda: not page.frame.grabs and is_at(centre()))
+    client.update(page.display.follow, False)
     wait(lambda: followed() is None)
 
 
@@ -456,7 +462,7 @@ def test_another_scene_is_framed_while_the_camera_follows(page):
     """By where its own first doll is, not by where that of the scene before was, 3 m aside."""
     client = page.open()
     wait(lambda: page.frame)
-    client.update(page.view.follow, True)
+    client.update(page.display.follow, True)
     # The page's wish and the scenes below come by different ways: it follows before they do.
     wait(lambda: page.server.scene.get_handle_by_name('/followed'))
     camera, = (each.camera for each in page.server.get_clients().values())
@@ -469,25 +475,25 @@ def test_another_scene_is_framed_while_the_camera_follows(page):
         # It may fall meanwhile: straight down.
         wait(lambda centre=centre: np.abs((camera.look_at - centre)[:2]).max() < 0.1)
     # In free space nothing falls.
-    home = place(*bounds(scene, page.frame.state), centre, camera.fov,
+    home = home_position(*bounding_spheres(scene, page.frame.state), centre, camera.fov,
                  camera.image_width / camera.image_height)
     assert np.linalg.norm(camera.position - home) < 0.01 * np.linalg.norm(home - centre)
 
 
-def test_plots_tell_energy_gap_and_pace(page):
+def test_plots_tell_energy_gap_and_real_time_factor(page):
     client = page.open()
     wait(lambda: page.frame)
     client.press(page, 'Push up')
     wait(lambda: min(len(plot.handle.data[0]) for plot in (
-        page.plots.pace, page.plots.energy)) > 3)
+        page.plots.real_time_factor, page.plots.energy)) > 3)
     wait(lambda: page.plots.energy.handle.data[2].max() > 10)
     _, energy, put_in = page.plots.energy.handle.data
     # The doll never has more than was put in: a thousandth for rounding.
     assert (energy <= put_in * 1.001 + 1e-6).all()
     _, gap = page.plots.gap.handle.data
     assert 0 <= gap.max() < 50
-    _, pace, wanted = page.plots.pace.handle.data
-    assert wanted.tolist() == [1.0] * len(wanted) and 0 < np.median(pace) < 2
+    _, factor, requested = page.plots.real_time_factor.handle.data
+    assert requested.tolist() == [1.0] * len(requested) and 0 < np.median(factor) < 2
 
 
 # What they are when they have run away is told as well, and cannot be computed.
@@ -498,11 +504,11 @@ def test_numbers_that_run_away_are_never_drawn():
     doll = Ragdoll('d', bones, (Joint('a', 'b', 'ball', (0, 0, 0.15), ((0, 0, 1),)),))
     wild = Scene('wild', (Placement(doll, spin=(1e155, 0, 0)),), gravity=(0, 0, 0))
     try:
-        source = Simulated(wild)
+        source = SimulationSource(wild)
     except (ValueError, ArithmeticError):
         pytest.skip('the simulation refuses it at once')
-    source.want(Wanted(frames=True))
-    wait(lambda: source.report.problem)
+    source.request(RequestedData(frames=True))
+    wait(lambda: source.status.problem)
     assert all(np.isfinite(part).all() for part in vars(source.frame.state).values()) or \
         source.frame.time == 0
     source.close()

@@ -8,7 +8,7 @@ pytest.importorskip('viser')
 from browser import View, chromium, serving
 
 from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.viewer.browser.disconnected_banner import WORDS
+from ragdoll_ros.viewer.page import DISCONNECTED
 
 SCENE = load_scene('drop')
 START = np.array([SCENE.dolls[0].bone_pose(bone)[0] for bone in SCENE.bones])
@@ -43,7 +43,7 @@ def test_software_rendering_a_grab_and_a_lost_viewer():
             assert 'check that hardware acceleration is enabled' in note.text_content()
             check_grab(view)
             assert not view.page.evaluate(SAID)
-        view.wait(lambda: view.page.evaluate(SAID) == WORDS)
+        view.wait(lambda: view.page.evaluate(SAID) == DISCONNECTED)
         with serving('--port', url.rpartition(':')[2], '--scene', 'drop'):
             view.wait(lambda: not view.page.evaluate(SAID))
             view.button('Pause').wait_for()

@@ -17,7 +17,7 @@ pytest.importorskip('viser')
 from conftest import ROOT, light
 from page_client import PATIENCE, PageClient
 
-from ragdoll_ros.viewer.command import folder_for_files, is_open, main, stopped_by_signals
+from ragdoll_ros.viewer.command import folder_for_files, is_public, main, stop_on_signals
 
 COMMAND = [sys.executable, '-m', 'ragdoll_ros.viewer.command']
 
@@ -135,7 +135,7 @@ def test_files_go_to_a_folder_of_their_own(tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize(('host', 'others'), [
     ('127.0.0.1', False), ('localhost', False), ('::1', False), ('0.0.0.0', True), ('::', True)])
 def test_a_page_that_others_reach_says_so(host, others):
-    assert is_open(host) == others
+    assert is_public(host) == others
 
 
 def test_an_open_host_is_told_with_what_to_do():
@@ -150,7 +150,7 @@ def test_a_signal_is_heard_within_a_wait_for_it():
     """The main thread holds the event's lock then, in one of 40 ends on a busy machine."""
     before = {sign: signal.getsignal(sign) for sign in (signal.SIGINT, signal.SIGTERM)}
     try:
-        stop = stopped_by_signals()
+        stop = stop_on_signals()
         with stop._cond:
             signal.raise_signal(signal.SIGTERM)
             signal.raise_signal(signal.SIGTERM)

@@ -18,10 +18,10 @@ from ragdoll_ros.model.scene import Placement, Scene
 from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.recording import Recording
-from ragdoll_ros.viewer.drawing import joint_limits, skin
-from ragdoll_ros.viewer.drawing.joint_limits import PIECES, Limits
+from ragdoll_ros.viewer.drawing import joint_limits, skin_meshes
+from ragdoll_ros.viewer.drawing.joint_limits import ARC_SEGMENTS, JointLimits
 from ragdoll_ros.viewer.drawing.stage import Stage
-from ragdoll_ros.viewer.sources.playback import Playback
+from ragdoll_ros.viewer.sources.playback import PlaybackSource
 from ragdoll_ros.viewer.sources.source import Frame
 
 FIELD = load_scene('field')
@@ -50,7 +50,7 @@ def recording():
 @pytest.fixture
 def page(recording):
     """The recording, held at its start."""
-    source = Playback(recording)
+    source = PlaybackSource(recording)
     source.pause(True)
     with served(source) as page:
         page.open(look_at=(20.0, 20.0, 0.8))
@@ -113,7 +113,7 @@ def test_joint_limits_are_those_of_the_dolls_that_are_looked_at(page):
 
     A page is brought home as it opens, so it may have to look there more than once.
     """
-    limits, state = Limits(page.server, FIELD), page.frame.state
+    limits, state = JointLimits(page.server, FIELD), page.frame.state
 
     def shown():
         page.clients[0].look((20.0, 16.0, 3.0), (20.0, 20.0, 0.8))
@@ -123,13 +123,13 @@ def test_joint_limits_are_those_of_the_dolls_that_are_looked_at(page):
     wait(lambda: np.linalg.norm(shown()[..., :2] - (20, 20), axis=-1).max() < 9)
     dials = sum(pair is not None for joint in FIELD.dolls[0].doll.joints
                 for pair in joint.angle_limits)
-    assert len(shown()) == joint_limits.MOST * dials * (PIECES + 1)
+    assert len(shown()) == joint_limits.MAX_DOLLS * dials * (ARC_SEGMENTS + 1)
 
 
 def test_dolls_without_a_skin_show_their_bones_beside_those_with_one(tmp_path, monkeypatch):
     """Skins beyond the most that are shown: the page tells, and their dolls have bones."""
     import viser
-    monkeypatch.setattr(skin, 'MOST', 1)
+    monkeypatch.setattr(skin_meshes, 'MAX_SKINS', 1)
     model = str(fit_rigs.write(RIGS['bird'], tmp_path))
     doll = dataclasses.replace(fit_rigs.fitted('bird').doll, model=model)
     scene = Scene('s', (Placement(doll, 'a'), Placement(doll, 'b', (2, 0, 0))))
@@ -139,7 +139,7 @@ def test_dolls_without_a_skin_show_their_bones_beside_those_with_one(tmp_path, m
     server = viser.ViserServer('127.0.0.1', 0, verbose=False)
     stage = Stage(server, Frame(scene, 0.0, state))
     for bones, skins, seen in ((False, True, 1), (True, True, 2), (False, False, 2)):
-        stage.be_visible(bones=bones, skins=skins)
+        stage.set_visible(bones=bones, skins=skins)
         shown = {int(scene.doll_of_bone[bone]) for batch in stage.bodies.batches
                  if batch.handle.visible for bone in batch.bones}
         assert shown == set(range(2 - seen, 2))

@@ -28,15 +28,15 @@ from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.rods import Rods
 from ragdoll_ros.viewer.drawing import framing
 from ragdoll_ros.viewer.drawing.bodies import Bodies
-from ragdoll_ros.viewer.drawing.ground import CELL, FADE, grid
-from ragdoll_ros.viewer.drawing.joint_limits import PIECES, RIM, SPOKES, Limits
-from ragdoll_ros.viewer.drawing.marks import arrow_before
-from ragdoll_ros.viewer.drawing.meshes import COARSE, MESHES, ROUND
-from ragdoll_ros.viewer.drawing.skin import Skins
-from ragdoll_ros.viewer.pointer import kept_distance, nearest, on_bone
+from ragdoll_ros.viewer.drawing.ground import CELL, FADE, grid_size
+from ragdoll_ros.viewer.drawing.joint_limits import ARC_SEGMENTS, RIM, SPOKES, JointLimits
+from ragdoll_ros.viewer.drawing.meshes import COARSE, MESHES, SEGMENTS
+from ragdoll_ros.viewer.drawing.overlays import arrow_to_surface
+from ragdoll_ros.viewer.drawing.skin_meshes import SkinMeshes
+from ragdoll_ros.viewer.pointer import nearest_bone, target_at_distance, to_bone_frame
 
-CORNERS = ROUND / 2 * np.sin(2 * np.pi / ROUND)
-"""Area of the polygon of ROUND corners in a circle of radius 1, which stands for pi."""
+CORNERS = SEGMENTS / 2 * np.sin(2 * np.pi / SEGMENTS)
+"""Area of the polygon of SEGMENTS corners in a circle of radius 1, which stands for pi."""
 
 
 @pytest.mark.parametrize(('meshes', 'kind', 'volume', 'tolerance'), [
@@ -109,7 +109,7 @@ def test_the_last_needle_of_each_joint_moves_with_the_child():
     doll = all_kinds()
     scene = Scene('s', (Placement(doll, spin=(3, -2, 4)),), gravity=(0, 0, 0))
     server = viser.ViserServer('127.0.0.1', 0, verbose=False)
-    limits = Limits(server, scene)
+    limits = JointLimits(server, scene)
     with Simulation(scene) as simulation:
         begin = simulation.state
         limits.show(begin, simulation.joint_angles)
@@ -119,7 +119,7 @@ def test_the_last_needle_of_each_joint_moves_with_the_child():
         assert np.abs(simulation.joint_angles).max() > 0.2
         limits.show(state, simulation.joint_angles)
     needles, before = drawn(server).points[-6:], first[-6:]
-    assert len(drawn(server).points) == RIM + SPOKES + 6 * (PIECES + 1)
+    assert len(drawn(server).points) == RIM + SPOKES + 6 * (ARC_SEGMENTS + 1)
     for child, row in (('b', 0), ('c', 2), ('d', 5)):
         index = scene.bone_index(child)
         local = rotation.rotate(rotation.inverse(begin.orientations[index]),
@@ -141,7 +141,7 @@ def test_a_limb_at_both_ends_of_its_swing_points_at_the_corner_of_its_cone(corne
     (joint,), child = doll.joints, doll.bone('d')
     scene = Scene('s', (Placement(doll, orientation=(0.5, 0.1, 0.3, 0.8)),), gravity=(0, 0, 0))
     server = viser.ViserServer('127.0.0.1', 0, verbose=False)
-    limits = Limits(server, scene)
+    limits = JointLimits(server, scene)
     with Simulation(scene) as simulation:
         q, v = simulation.coordinates.q.copy(), simulation.coordinates.v
         q[7:10] = 1.4 * x, 1.4 * y, 0.6
@@ -165,7 +165,7 @@ def test_needles_are_red_at_their_limit():
     from ragdoll_ros.viewer.drawing.joint_limits import GREEN, RED
     scene = load_scene('drop')
     server = viser.ViserServer('127.0.0.1', 0, verbose=False)
-    limits = Limits(server, scene)
+    limits = JointLimits(server, scene)
     with Simulation(scene) as simulation:
         angles = simulation.joint_angles
         state = simulation.state
@@ -261,9 +261,9 @@ def test_rods_from_masses_alone_are_the_simulations():
 def test_the_pointer_keeps_its_distance():
     """Target = C + D |A - C|, D of length one toward the pointer."""
     eye, point = np.array([4.0, 0, 1]), np.array([0.0, 0, 1])
-    assert kept_distance(eye, np.array([0.0, 3, 1]), 4.0) == pytest.approx([0.8, 2.4, 1])
-    assert kept_distance(eye, point, 4.0) == pytest.approx(point)
-    assert kept_distance(eye, eye, 4.0) == pytest.approx(eye)
+    assert target_at_distance(eye, np.array([0.0, 3, 1]), 4.0) == pytest.approx([0.8, 2.4, 1])
+    assert target_at_distance(eye, point, 4.0) == pytest.approx(point)
+    assert target_at_distance(eye, eye, 4.0) == pytest.approx(eye)
 
 
 def test_the_nearest_body_and_its_point():
@@ -273,9 +273,9 @@ def test_the_nearest_body_and_its_point():
     with Simulation(scene) as simulation:
         state = simulation.state
     # Nearer to a's centre than to b's, but b reaches far out.
-    assert nearest(scene, state, np.array([0.95, 0.9, 0])) == 1
-    assert nearest(scene, state, np.array([0.3, 0.3, 0])) == 0
-    assert on_bone(scene, state, 1, np.array([5.0, 1.05, 0])) == pytest.approx([1, 0.05, 0])
+    assert nearest_bone(scene, state, np.array([0.95, 0.9, 0])) == 1
+    assert nearest_bone(scene, state, np.array([0.3, 0.3, 0])) == 0
+    assert to_bone_frame(scene, state, 1, np.array([5.0, 1.05, 0])) == pytest.approx([1, 0.05, 0])
 
 
 @pytest.mark.parametrize(('push', 'tip'), [
@@ -287,7 +287,7 @@ def test_the_arrow_of_a_push_ends_before_the_body(push, tip):
     """Of a box of 6 x 4 x 2 m; the arrow is as long and runs as the push says."""
     box, place = Bone('box', Box((6, 4, 2)), 1, (0, 0, 0)), np.array((1.0, 2.0, 3.0))
     turn = rotation.from_rpy(0, 0, np.pi / 2)
-    arrow = arrow_before(box, push, place, turn)
+    arrow = arrow_to_surface(box, push, place, turn)
     assert arrow[1] == pytest.approx(tip)
     assert np.diff(arrow, axis=0) == pytest.approx(np.diff(push.arrow(place, turn), axis=0))
 
@@ -300,7 +300,7 @@ def test_a_character_that_cannot_be_opened_is_told_and_the_doll_shown_without():
     dolls = tuple(Placement(dataclasses.replace(ball, model=model), name=name)
                   for name, model in (('long', 'm' * 300), ('through', f'{__file__}/x.glb')))
     server = viser.ViserServer('127.0.0.1', 0, verbose=False)
-    skins = Skins(server, Scene('s', dolls))
+    skins = SkinMeshes(server, Scene('s', dolls))
     server.stop()
     assert [note.split(':')[0] for note in skins.notes] == ['no skin for long',
                                                             'no skin for through']
@@ -315,10 +315,10 @@ def test_the_ground_is_below_all_dolls_seen_from_home(name):
     """
     scene = load_scene(name)
     with Simulation(scene) as simulation:
-        balls = framing.bounds(scene, simulation.state)
-    look_at = framing.middle(*balls)
-    eye = framing.place(*balls, look_at, fov=0.8, aspect=1.2)
-    cell, reach = grid(scene)
+        balls = framing.bounding_spheres(scene, simulation.state)
+    look_at = framing.box_center(*balls)
+    eye = framing.home_position(*balls, look_at, fov=0.8, aspect=1.2)
+    cell, reach = grid_size(scene)
     assert np.linalg.norm(balls[0] - eye, axis=1).max() < 0.9 * reach
     apart = 300 / np.tan(0.4) * eye[2] * cell / (reach / 2) ** 2
     assert apart > 1.5

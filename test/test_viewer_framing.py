@@ -10,7 +10,13 @@ pytest.importorskip('viser')
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.physics.simulation import Simulation
-from ragdoll_ros.viewer.drawing.framing import MARGIN, bounds, middle, place, sees
+from ragdoll_ros.viewer.drawing.framing import (
+    MARGIN,
+    bounding_spheres,
+    box_center,
+    home_position,
+    sees_all,
+)
 
 FOV = 0.8
 
@@ -43,26 +49,26 @@ def test_all_is_seen_and_large(aspect, spread):
     random = np.random.default_rng(7)
     centres = random.normal(size=(20, 3)) * spread + (1e3, -2e3, 5.0)
     radii = random.uniform(0.05, 0.3, 20)
-    look_at = middle(centres, radii)
-    position = place(centres, radii, look_at, FOV, aspect)
+    look_at = box_center(centres, radii)
+    position = home_position(centres, radii, look_at, FOV, aspect)
     drawn = abs(projected(position, look_at, aspect, outsides(centres, radii)))
     assert drawn.max() < 1
-    assert sees(position, look_at, FOV, aspect, centres, radii)
+    assert sees_all(position, look_at, FOV, aspect, centres, radii)
     # The least distance is a MARGIN of this one: there, some ball is at an edge.
     near = look_at + (position - look_at) / (1.1 * MARGIN)
     if spread > 1:
         assert abs(projected(near, look_at, aspect, outsides(centres, radii))).max() > 1
-        assert not sees(near, look_at, FOV, aspect, centres, radii)
+        assert not sees_all(near, look_at, FOV, aspect, centres, radii)
 
 
 def test_what_is_behind_is_not_seen():
     centre, radius = np.zeros((1, 3)), np.array([0.1])
-    assert not sees(np.array((3.0, 0, 0)), np.array((4.0, 0, 0)), FOV, 1.0, centre, radius)
-    assert not sees(np.zeros(3), np.zeros(3), FOV, 1.0, centre, radius)
+    assert not sees_all(np.array((3.0, 0, 0)), np.array((4.0, 0, 0)), FOV, 1.0, centre, radius)
+    assert not sees_all(np.zeros(3), np.zeros(3), FOV, 1.0, centre, radius)
 
 
 def test_a_doll_that_hangs_is_framed_with_the_ground_it_will_fall_on():
     with Simulation(load_scene('drop')) as simulation:
-        centres, radii = bounds(simulation.scene, simulation.state)
+        centres, radii = bounding_spheres(simulation.scene, simulation.state)
     lowest = (centres[:, 2] - radii).min()
     assert len(centres) == 20 and lowest == pytest.approx(0.0, abs=1e-9)

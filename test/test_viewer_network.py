@@ -8,8 +8,8 @@ from network import Network
 from page_client import PageClient, batch_of, served, wait
 
 from ragdoll_ros.files.scene import load_scene
-from ragdoll_ros.viewer.drawing import line
-from ragdoll_ros.viewer.sources.simulated import Simulated
+from ragdoll_ros.viewer import pointer
+from ragdoll_ros.viewer.sources.simulation import SimulationSource
 
 PERIOD, PATIENCE = 0.1, 0.9
 """s between two questions, and for an answer, in place of half a second and 2.5 s."""
@@ -17,9 +17,9 @@ PERIOD, PATIENCE = 0.1, 0.9
 
 @pytest.fixture
 def page(monkeypatch):
-    monkeypatch.setattr(line, 'PERIOD', PERIOD)
-    monkeypatch.setattr(line, 'PATIENCE', PATIENCE)
-    with served(Simulated(load_scene('drop'))) as page:
+    monkeypatch.setattr(pointer, 'PING_PERIOD', PERIOD)
+    monkeypatch.setattr(pointer, 'PING_TIMEOUT', PATIENCE)
+    with served(SimulationSource(load_scene('drop'))) as page:
         yield page
 
 
@@ -37,7 +37,7 @@ def holding(page, network):
     wait(lambda: page.frame and page.server.get_clients())
     node, number, place = batch_of(page, 'head')
     client.drag(node, 'start', place, place, number)
-    wait(lambda: page.frame.held)
+    wait(lambda: page.frame.grabs)
     return client
 
 
@@ -50,9 +50,9 @@ def test_a_pointer_that_rests_holds_on_and_a_line_that_goes_silent_lets_go(page,
     holding(page, network)
     since = page.frame.time
     wait(lambda: page.frame.time > since + PERIOD + PATIENCE + 0.5)
-    assert page.frame.held
+    assert page.frame.grabs
     network.go_silent()
-    wait(lambda: not page.frame.held, timeout=PERIOD + PATIENCE + 10)
+    wait(lambda: not page.frame.grabs, timeout=PERIOD + PATIENCE + 10)
     before, since = stays.windows, page.frame.time
     wait(lambda: stays.windows > before and page.frame.time > since)
 
@@ -60,7 +60,7 @@ def test_a_pointer_that_rests_holds_on_and_a_line_that_goes_silent_lets_go(page,
 def test_a_line_that_is_cut_lets_go_and_the_page_may_come_back(page, network):
     client = holding(page, network)
     network.cut()
-    wait(lambda: not page.source.frame.held and not page.server.get_clients())
+    wait(lambda: not page.source.frame.grabs and not page.server.get_clients())
     client.close()
     network.come_back()
     holding(page, network)

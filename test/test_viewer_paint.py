@@ -21,7 +21,7 @@ from ragdoll_ros.model.scene import above_ground
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.gltf.gltf_file import gltf_bytes
 from ragdoll_ros.recordings.recording import Recorder
-from ragdoll_ros.viewer.sources.playback import Playback
+from ragdoll_ros.viewer.sources.playback import PlaybackSource
 from ragdoll_ros.viewer.static import save_static
 
 LIMBS = {'L_.*(Arm|Hand)': (200, 40, 40), 'R_.*(Arm|Hand)': (40, 160, 60),
@@ -38,7 +38,7 @@ EYE = """() => {
 PAINTED = """() => {
   let is = false;
   window.__viserMutable.scene.traverse(each => {
-    is = is || Boolean(each.isSkinnedMesh && each.ragdollPaint && each.material[1]?.map?.image);
+    is = is || Boolean(each.isSkinnedMesh && each.ragdollMaterials && each.material[1]?.map?.image);
   });
   return is;
 }"""
@@ -138,10 +138,10 @@ def test_limbs_have_their_colours_on_the_page(run):
     recording, skin = run
     pose = recording.pose(40)
     content = gltf_bytes(recording, {0: skin})
-    with served(Playback(recording)) as page, chromium() as browser:
+    with served(PlaybackSource(recording)) as page, chromium() as browser:
         view = View(browser, f'http://127.0.0.1:{page.server.get_port()}')
         view.page.set_viewport_size({'width': 1280, 'height': 800})
-        view.wait(lambda: page.timeline.cut is not None)
+        view.wait(lambda: page.timeline.clip is not None)
         page.timeline.go_to(0.4)
         view.wait(lambda: page.frame is not None and page.frame.time == 0.4)
         view.wait(lambda: view.page.evaluate(PAINTED))

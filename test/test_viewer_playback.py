@@ -7,8 +7,8 @@ import pytest
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.model import errors
 from ragdoll_ros.recordings.recording import Recording
-from ragdoll_ros.viewer.sources.playback import Playback
-from ragdoll_ros.viewer.sources.source import Wanted
+from ragdoll_ros.viewer.sources.playback import PlaybackSource
+from ragdoll_ros.viewer.sources.source import RequestedData
 
 TURNS = np.tile((0, 0, 0, 1.0), (10, 1))
 
@@ -24,9 +24,9 @@ def climb(duration, poses=11):
 @pytest.fixture
 def playing():
     """An hour's recording that is shown, and an instant before which it did not go."""
-    playback = Playback(climb(3600.0))
+    playback = PlaybackSource(climb(3600.0))
     begin = time.monotonic()
-    playback.want(Wanted(frames=True))
+    playback.request(RequestedData(frames=True))
     return playback, begin
 
 
@@ -55,9 +55,9 @@ def test_another_instant_is_another_frame(playing):
 
 def test_stands_while_no_page_is_open(playing):
     playback, _ = playing
-    playback.want(Wanted())
+    playback.request(RequestedData())
     assert playback.frame is playback.frame
-    assert not playback.report.paused
+    assert not playback.status.paused
 
 
 def test_pause_step_and_restart(playing):
@@ -65,7 +65,7 @@ def test_pause_step_and_restart(playing):
     playback.step()
     assert playback.frame.time < 360
     playback.pause(True)
-    assert playback.report.paused
+    assert playback.status.paused
     for following in (360, 720):
         playback.step()
         assert playback.frame.time == height(playback.frame) == following
@@ -75,29 +75,29 @@ def test_pause_step_and_restart(playing):
     assert playback.frame is not playback.frame
 
 
-def test_pace_changes_from_here_on(playing):
+def test_real_time_factor_changes_from_here_on(playing):
     playback, _ = playing
     playback.pause(True)
     playback.step()
-    playback.set_pace(50.0)
-    assert (playback.frame.time, playback.report.pace) == (360, 50)
+    playback.set_real_time_factor(50.0)
+    assert (playback.frame.time, playback.status.real_time_factor) == (360, 50)
     before = time.monotonic()
     playback.pause(False)
     while time.monotonic() < before + 0.01:
         pass
     assert 360 + 50 * 0.01 <= playback.frame.time + 1e-9 <= 360 + 50 * (time.monotonic() - before)
-    with pytest.raises(errors.OutOfRange, match='pace'):
-        playback.set_pace(0.0)
+    with pytest.raises(errors.OutOfRange, match='real_time_factor'):
+        playback.set_real_time_factor(0.0)
 
 
 def test_stands_at_its_end_and_goes_on_from_the_start():
-    playback = Playback(climb(0.01))
-    playback.want(Wanted(frames=True))
-    while not playback.report.paused:
+    playback = PlaybackSource(climb(0.01))
+    playback.request(RequestedData(frames=True))
+    while not playback.status.paused:
         pass
     assert playback.frame.time == height(playback.frame) == 0.01
-    assert playback.report.note == 'recording: 0.0 of 0.0 s'
-    playback.set_pace(0.001)
+    assert playback.status.note == 'recording: 0.0 of 0.0 s'
+    playback.set_real_time_factor(0.001)
     playback.pause(False)
     assert playback.frame.time < 0.01
 
@@ -106,7 +106,7 @@ def test_says_where_it_is(playing):
     playback, _ = playing
     playback.pause(True)
     playback.step()
-    assert playback.report.note == 'recording: 360.0 of 3600.0 s'
+    assert playback.status.note == 'recording: 360.0 of 3600.0 s'
 
 
 def test_what_cannot_be_is_refused_with_what_can(playing):
@@ -114,4 +114,4 @@ def test_what_cannot_be_is_refused_with_what_can(playing):
     with pytest.raises(errors.RagdollError, match='ragdoll_viewer --scene crowd'):
         playback.load('crowd')
     with pytest.raises(errors.RagdollError, match='ragdoll_viewer --scene'):
-        playback.use(load_scene('crowd'))
+        playback.set_scene(load_scene('crowd'))

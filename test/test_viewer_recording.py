@@ -235,14 +235,14 @@ def frame(scene, time):
 def test_the_button_tells_that_another_scene_has_ended_a_recording(panel):
     panel, button, click = panel
     scenes = load_scene('drop'), load_scene('drop')
-    panel.take(frame(scenes[0], 0.0))
+    panel.add(frame(scenes[0], 0.0))
     click()
-    panel.take(frame(scenes[0], 0.1))
+    panel.add(frame(scenes[0], 0.1))
     assert panel.recording and button.label == 'Stop and download'
-    panel.take(frame(scenes[1], 0.0))
+    panel.add(frame(scenes[1], 0.0))
     assert not panel.recording and button.label == 'Download (scene has changed)'
     # Ended is ended, even where the first scene comes back.
-    panel.take(frame(scenes[0], 0.2))
+    panel.add(frame(scenes[0], 0.2))
     assert len(panel.recorder) == 2
     click()
     assert button.label == 'Record'
@@ -253,11 +253,11 @@ def test_the_button_tells_that_another_scene_has_ended_a_recording(panel):
 def test_the_button_tells_that_a_recording_is_full(panel, monkeypatch):
     """Ten bones are 70 numbers an instant: three of them are within 279, a fourth is not."""
     from ragdoll_ros.viewer import recording_panel
-    monkeypatch.setattr(recording_panel, 'MOST_NUMBERS', 279)
+    monkeypatch.setattr(recording_panel, 'MAX_NUMBERS', 279)
     panel, button, click = panel
     scene = load_scene('drop')
-    panel.take(frame(scene, 0.0))
+    panel.add(frame(scene, 0.0))
     click()
     for tick in range(1, 5):
-        panel.take(frame(scene, tick / 100))
+        panel.add(frame(scene, tick / 100))
     assert len(panel.recorder) == 3 and button.label == 'Download (recording is full)'

@@ -13,11 +13,10 @@ from page_client import served, wait
 
 from ragdoll_ros.files.scene import load_scene
 from ragdoll_ros.physics.accuracy import ACCURACIES
-from ragdoll_ros.viewer.health import health
-from ragdoll_ros.viewer.settings import ERRORS_MM
-from ragdoll_ros.viewer.sources.simulated import Simulated
-from ragdoll_ros.viewer.sources.source import Report, Wanted
-from ragdoll_ros.viewer.sources.tempo import Tempo
+from ragdoll_ros.viewer.settings_panel import ERRORS_MM, health_line
+from ragdoll_ros.viewer.sources.simulation import SimulationSource
+from ragdoll_ros.viewer.sources.source import RequestedData, SourceStatus
+from ragdoll_ros.viewer.sources.tick_statistics import TickStatistics
 
 DROP = load_scene('drop')
 WEIGHT = 9.8 * sum(bone.mass for bone in DROP.bones)
@@ -25,7 +24,7 @@ WEIGHT = 9.8 * sum(bone.mass for bone in DROP.bones)
 
 @pytest.fixture
 def page():
-    with served(Simulated(DROP)) as page:
+    with served(SimulationSource(DROP)) as page:
         page.client = page.open()
         wait(lambda: page.stage and page.frame and page.frame.time > 0.1)
         yield page
@@ -33,30 +32,32 @@ def page():
 
 def test_the_tempo_of_ticks():
     """Ticks of 10 ms every 20 ms that take 5 ms each: half the pace; what is older is forgotten."""
-    tempo = Tempo()
-    assert math.isnan(tempo.pace) and math.isnan(tempo.cost)
+    statistics = TickStatistics()
+    assert math.isnan(statistics.real_time_factor) and math.isnan(statistics.mean_cost)
     for k in range(200):
-        tempo.tick(0.02 * k, 0.02 * k + (0.5 if k < 100 else 0.005), 0.01)
-    assert tempo.pace == pytest.approx(0.5) and tempo.cost == pytest.approx(0.005)
+        statistics.add(0.02 * k, 0.02 * k + (0.5 if k < 100 else 0.005), 0.01)
+    assert statistics.real_time_factor == pytest.approx(0.5)
+    assert statistics.mean_cost == pytest.approx(0.005)
 
 
 @pytest.mark.parametrize(('changes', 'reason'), [
     ({}, ''),
-    ({'paused': True, 'reached': 0.1}, ''),
-    ({'reached': 0.6, 'tick_cost': 0.016}, 'take draft'),
-    ({'reached': 0.6}, 'busy elsewhere'),
-    ({'measures': {'energy_excess_J': 0.0011 * WEIGHT}}, 'from nothing: take exact'),
+    ({'paused': True, 'measured_real_time_factor': 0.1}, ''),
+    ({'measured_real_time_factor': 0.6, 'tick_cost': 0.016}, 'use accuracy draft'),
+    ({'measured_real_time_factor': 0.6}, 'the machine is busy'),
+    ({'measures': {'energy_excess_J': 0.0011 * WEIGHT}}, 'energy error: use accuracy exact'),
     ({'measures': {'energy_excess_J': 0.0011 * WEIGHT, 'work_of_pushes_J': WEIGHT}}, ''),
     ({'measures': {'energy_excess_J': -300.0}}, '')])
 def test_health_warns_with_a_reason(changes, reason):
-    report = dataclasses.replace(Report(reached=0.99, tick_cost=2e-4), **changes)
-    line, warns = health(report, DROP)
+    status = dataclasses.replace(
+        SourceStatus(measured_real_time_factor=0.99, tick_cost=2e-4), **changes)
+    line, warns = health_line(status, DROP)
     assert warns == bool(reason) and reason in line
-    assert ('pace' in line) != report.paused
+    assert ('real-time factor' in line) != status.paused
 
 
 def test_nothing_is_said_of_a_source_that_does_not_compute():
-    assert health(Report(), DROP) == ('', False)
+    assert health_line(SourceStatus(), DROP) == ('', False)
 
 
 def test_errors_are_those_of_the_report():
@@ -72,32 +73,33 @@ def test_errors_are_those_of_the_report():
 
 def test_what_is_said_of_a_scene_is_not_of_the_one_before():
     """160 dolls are measured for so long that it is done each few seconds only."""
-    source = Simulated(load_scene('pile'))
+    source = SimulationSource(load_scene('pile'))
     try:
-        source.want(Wanted(frames=True))
-        wait(lambda: source.report.tick_cost > 0 and source.report.measures['flights'] >= 160)
-        cost = source.report.tick_cost
+        source.request(RequestedData(frames=True))
+        wait(lambda: source.status.tick_cost > 0 and source.status.measures['flights'] >= 160)
+        cost = source.status.tick_cost
         source.load('flight')
-        report = source.report
+        status = source.status
         # One doll has begun: at most a few ticks, of which each is a flight.
-        assert not report.tick_cost > cost / 2 and report.measures['flights'] < 80
+        assert not status.tick_cost > cost / 2 and status.measures['flights'] < 80
     finally:
         source.close()
 
 
 def test_the_accuracy_by_the_dropdown_and_its_price(page):
-    wait(lambda: 'ms a tick here' in page.settings.price.content)
-    assert '0.2 mm' in page.settings.price.content
-    page.source.take_engine('bullet')
-    wait(lambda: '13 mm' in page.settings.price.content)
-    page.source.take_engine('auto')
-    assert 'pace' in page.settings.health.content or 'tick' in page.settings.health.content
+    wait(lambda: 'ms per tick' in page.settings.cost.content)
+    assert '0.2 mm' in page.settings.cost.content
+    page.source.set_engine('bullet')
+    wait(lambda: '13 mm' in page.settings.cost.content)
+    page.source.set_engine('auto')
+    health = page.settings.health.content
+    assert 'real-time factor' in health or 'tick' in health
     page.client.update(page.settings.accuracy, 'exact')
-    wait(lambda: page.source.report.accuracy == 'exact')
-    wait(lambda: '0.02 mm' in page.settings.price.content)
+    wait(lambda: page.source.status.accuracy == 'exact')
+    wait(lambda: '0.02 mm' in page.settings.cost.content)
     assert page.frame.scene is DROP, 'it goes on'
     page.source.load('flight')
-    assert page.source.report.accuracy == 'exact'
+    assert page.source.status.accuracy == 'exact'
 
 
 def test_gravity_and_ground_as_typed(page):
@@ -106,7 +108,7 @@ def test_gravity_and_ground_as_typed(page):
     page.client.update(form['friction'], '0.5')
     page.client.update(page.settings.ground, False)
     wait(lambda: form['gravity'].value == '0; 0; -1,62' and not page.settings.ground.value)
-    page.client.update(page.settings.use, True)
+    page.client.update(page.settings.apply, True)
     wait(lambda: page.frame.scene is not DROP)
     scene = page.frame.scene
     assert scene.gravity == (0.0, 0.0, -1.62) and scene.material.friction == 0.5
@@ -116,12 +118,12 @@ def test_gravity_and_ground_as_typed(page):
 @pytest.mark.parametrize(('key', 'text', 'word'), [
     ('gravity', 'abc', '3 numbers'), ('friction', 'x', 'a number'),
     ('restitution', '', 'a number'), ('friction', '-1', 'scene friction must be 0 to inf, not -1'),
-    ('restitution', '1.5', 'bounce must be 0 to 1, not 1.5')])
+    ('restitution', '1.5', 'restitution must be 0 to 1, not 1.5')])
 def test_what_cannot_be_read_is_said_beside_the_field(page, key, text, word):
     form = page.settings.form
     page.client.update(form[key], text)
     wait(lambda: form[key].value == text)
-    page.client.update(page.settings.use, True)
+    page.client.update(page.settings.apply, True)
     wait(lambda: word in form.errors[key].content)
     assert page.source.frame.scene is DROP
 
@@ -131,6 +133,6 @@ def test_all_that_cannot_be_is_said_at_once(page):
     for key, text in (('gravity', '0 0 x'), ('friction', '-1'), ('restitution', '2')):
         page.client.update(form[key], text)
     wait(lambda: form['restitution'].value == '2')
-    page.client.update(page.settings.use, True)
+    page.client.update(page.settings.apply, True)
     wait(lambda: all(form.errors[key].visible for key in ('gravity', 'friction', 'restitution')))
     assert page.source.frame.scene is DROP

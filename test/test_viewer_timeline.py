@@ -20,13 +20,13 @@ from ragdoll_ros.model.state import State
 from ragdoll_ros.physics.simulation import Simulation
 from ragdoll_ros.recordings.recording import Recorder
 from ragdoll_ros.recordings.save import FORMATS
-from ragdoll_ros.viewer.sources.playback import Playback
-from ragdoll_ros.viewer.sources.simulated import Simulated
+from ragdoll_ros.viewer.sources.playback import PlaybackSource
+from ragdoll_ros.viewer.sources.simulation import SimulationSource
 from ragdoll_ros.viewer.sources.source import Frame
 from ragdoll_ros.viewer.timeline import timeline
-from ragdoll_ros.viewer.timeline.export_zip import zipped
-from ragdoll_ros.viewer.timeline.frame_buffer import MOST_NUMBERS, SPAN, History
-from ragdoll_ros.viewer.timeline.playhead import Look
+from ragdoll_ros.viewer.timeline.export_zip import export_zip
+from ragdoll_ros.viewer.timeline.frame_buffer import MAX_NUMBERS, SPAN, FrameBuffer
+from ragdoll_ros.viewer.timeline.playhead import Playhead
 from ragdoll_ros.viewer.timeline.strip import WIDTH, strip
 
 DROP = load_scene('drop')
@@ -42,24 +42,24 @@ def frame(time, height=5.0, scene=DROP, **changes):
 
 
 @pytest.fixture
-def history():
+def buffer():
     """1.0 s, a push in 0.2 to 0.3 s, the ground from 0.5 s on."""
-    history = History()
+    buffer = FrameBuffer()
     push = Push('torso', (10, 0, 0))
     for tick in range(101):
-        history.take(frame(tick / 100, height=0.0 if tick >= 50 else 5.0,
+        buffer.add(frame(tick / 100, height=0.0 if tick >= 50 else 5.0,
                            pushes=(push,) if 20 <= tick < 30 else ()))
-    return history
+    return buffer
 
 
 def test_a_minute_is_kept_and_no_more():
     """Of 90 s in frames at even times those of the last 60 s, the newest being the last."""
-    history = History()
+    buffer = FrameBuffer()
     for tick in range(901):
-        history.take(frame(tick / 10))
-    cut = history.cut()
-    assert len(history) == 601 and cut.duration == pytest.approx(SPAN)
-    assert cut.frame(600).time == 90.0 and cut.frame(0).time == 30.0
+        buffer.add(frame(tick / 10))
+    clip = buffer.clip()
+    assert len(buffer) == 601 and clip.duration == pytest.approx(SPAN)
+    assert clip.frame(600).time == 90.0 and clip.frame(0).time == 30.0
 
 
 @pytest.mark.parametrize('minutes', [3, pytest.param(30, marks=pytest.mark.slow)])
@@ -69,9 +69,9 @@ def test_memory_is_bounded_whatever_comes(minutes):
     A frame of ten bones is 1040 bytes of numbers and half as much of objects.
     """
     tracemalloc.start()
-    history, sizes = History(), []
+    buffer, sizes = FrameBuffer(), []
     for tick in range(minutes * 3600):
-        history.take(frame(tick / 60))
+        buffer.add(frame(tick / 60))
         if tick in (3700, minutes * 3600 - 1):
             sizes.append(tracemalloc.get_traced_memory()[0])
     tracemalloc.stop()
@@ -81,61 +81,61 @@ def test_memory_is_bounded_whatever_comes(minutes):
 
 def test_a_crowd_is_kept_for_less_than_a_minute():
     """By the numbers that its frames hold."""
-    history, crowd = History(), load_scene('crowd')
+    buffer, crowd = FrameBuffer(), load_scene('crowd')
     numbers = 13 * len(crowd.bones)
-    for tick in range(2 * MOST_NUMBERS // numbers):
-        history.take(frame(tick / 100, scene=crowd))
+    for tick in range(2 * MAX_NUMBERS // numbers):
+        buffer.add(frame(tick / 100, scene=crowd))
         if tick > 5000:
             break
-    assert len(history) * numbers <= MOST_NUMBERS and len(history) > 100
+    assert len(buffer) * numbers <= MAX_NUMBERS and len(buffer) > 100
 
 
-def test_the_timeline_goes_on_over_a_reset(history):
+def test_the_timeline_goes_on_over_a_reset(buffer):
     """Time that goes back is a reset: a tick later; the same frame again is not kept."""
-    assert history.take(frame(1.0)) is None
-    moment = history.take(frame(0.0))
-    assert moment.begins and moment.time == pytest.approx(1.01)
-    history.take(frame(0.01))
-    cut = history.cut()
-    assert np.flatnonzero(cut.begins).tolist() == [101]
-    np.testing.assert_allclose(np.diff(cut.times), 0.01, atol=1e-12)
+    assert buffer.add(frame(1.0)) is None
+    entry = buffer.add(frame(0.0))
+    assert entry.resets and entry.time == pytest.approx(1.01)
+    buffer.add(frame(0.01))
+    clip = buffer.clip()
+    assert np.flatnonzero(clip.resets).tolist() == [101]
+    np.testing.assert_allclose(np.diff(clip.times), 0.01, atol=1e-12)
 
 
-def test_another_scene_begins_anew(history):
-    history.take(frame(3.0, scene=load_scene('drop')))
-    assert len(history) == 1 and history.end == 0
+def test_another_scene_begins_anew(buffer):
+    buffer.add(frame(3.0, scene=load_scene('drop')))
+    assert len(buffer) == 1 and buffer.end == 0
 
 
-def test_pushes_and_contacts_are_marked(history):
+def test_pushes_and_contacts_are_marked(buffer):
     """When a push acted, and from when the doll lay; to the 0.05 s between two looks."""
-    cut = history.cut()
-    assert np.flatnonzero(cut.pushed).tolist() == list(range(20, 30))
-    touched = np.flatnonzero(cut.touching)
+    clip = buffer.clip()
+    assert np.flatnonzero(clip.pushed).tolist() == list(range(20, 30))
+    touched = np.flatnonzero(clip.touching)
     assert 50 <= touched[0] <= 55 and touched[-1] == 100 and len(touched) == 101 - touched[0]
-    picture = strip(cut)
+    picture = strip(clip)
     assert f'x="{WIDTH * 20 // 100}"' in picture and '#e63219' in picture and '#f5be00' in picture
-    quiet = History()
-    quiet.take(frame(0.0))
-    assert '#e63219' not in strip(quiet.cut())
+    quiet = FrameBuffer()
+    quiet.add(frame(0.0))
+    assert '#e63219' not in strip(quiet.clip())
 
 
-def test_a_look_stands_plays_and_steps(history):
-    look = Look(history.cut(), 0.5)
-    assert look.frame(100.0).time == look.frame(200.0).time == 0.5
-    look.toggle(200.0)
-    assert look.frame(200.25).time == 0.75
-    look.set_speed(0.1, 200.25)
-    assert look.frame(201.25).time == 0.85
-    look.step(-1, 201.25)
-    assert look.frame(300.0).time == 0.84 and not look.plays
-    look.step(2, 300.0)
-    assert look.frame(300.0).time == 0.86
-    look.go_to(7.0, 300.0)
-    look.step(1, 300.0)
-    assert look.frame(300.0).time == 1.0
-    look.toggle(300.0)
-    assert look.frame(300.0).time == 0.0, 'from the beginning'
-    assert look.frame(999.0).time == 1.0 and not look.plays
+def test_a_playhead_pauses_plays_and_steps(buffer):
+    playhead = Playhead(buffer.clip(), 0.5)
+    assert playhead.frame(100.0).time == playhead.frame(200.0).time == 0.5
+    playhead.toggle(200.0)
+    assert playhead.frame(200.25).time == 0.75
+    playhead.set_speed(0.1, 200.25)
+    assert playhead.frame(201.25).time == 0.85
+    playhead.step(-1, 201.25)
+    assert playhead.frame(300.0).time == 0.84 and not playhead.is_playing
+    playhead.step(2, 300.0)
+    assert playhead.frame(300.0).time == 0.86
+    playhead.go_to(7.0, 300.0)
+    playhead.step(1, 300.0)
+    assert playhead.frame(300.0).time == 1.0
+    playhead.toggle(300.0)
+    assert playhead.frame(300.0).time == 0.0, 'from the beginning'
+    assert playhead.frame(999.0).time == 1.0 and not playhead.is_playing
 
 
 def drawn(page):
@@ -158,26 +158,26 @@ def states():
 
 def test_what_was_is_drawn_while_the_doll_goes_on(states):
     """The slider shows the instant that it names; J and L go by frames; Live is what goes on."""
-    with served(Simulated(DROP)) as page:
+    with served(SimulationSource(DROP)) as page:
         client = page.open()
         wait(lambda: page.frame and page.frame.time > 1.0)
         client.update(page.timeline.slider, 0.5)
         wait(lambda: not page.timeline.is_live)
-        cut = page.timeline.cut
-        index = cut.index(0.5)
-        seen, following = cut.frame(index), cut.frame(index + 1)
-        assert seen.time - cut.frame(0).time <= 0.5 < following.time - cut.frame(0).time
+        clip = page.timeline.clip
+        index = clip.index(0.5)
+        seen, following = clip.frame(index), clip.frame(index + 1)
+        assert seen.time - clip.frame(0).time <= 0.5 < following.time - clip.frame(0).time
         wait(lambda: page.frame is seen)
         wait(lambda: shows(page, states[round(seen.time * 100)]))
         before = page.source.frame.time
         wait(lambda: page.source.frame.time > before + 0.3)
-        assert page.frame is seen and page.timeline.cut is cut
-        assert cut.duration < page.source.frame.time
-        client.press(page, 'A frame on')
+        assert page.frame is seen and page.timeline.clip is clip
+        assert clip.duration < page.source.frame.time
+        client.press(page, 'Next frame')
         wait(lambda: page.frame is following)
-        client.press(page, 'A frame back')
+        client.press(page, 'Previous frame')
         wait(lambda: page.frame is seen)
-        client.press(page, 'Play, or stand')
+        client.press(page, 'Play or pause')
         wait(lambda: page.frame.time > seen.time + 0.2)
         assert not page.timeline.is_live
         client.update(page.timeline.buttons, 'Live')
@@ -188,7 +188,7 @@ def test_what_a_slider_is_put_to_is_looked_at():
     """Though viser's threads are busy meanwhile, and the page moves the slider along; and it is
     sent back, as the page may show where it was moved to.
     """
-    with served(Simulated(DROP)) as page:
+    with served(SimulationSource(DROP)) as page:
         client, slider = page.open(), page.timeline.slider
         wait(lambda: slider.value > 0.8)
         free = threading.Event()
@@ -202,62 +202,62 @@ def test_what_a_slider_is_put_to_is_looked_at():
         finally:
             free.set()
         wait(lambda: not page.timeline.is_live)
-        assert page.timeline.looked_at(time.monotonic()) == slider.value == 0.3
+        assert page.timeline.shown_instant(time.monotonic()) == slider.value == 0.3
 
 
 def test_time_stands_while_one_types_it():
     """From the click into the field on; and goes on if nothing was typed."""
-    with served(Simulated(DROP)) as page:
+    with served(SimulationSource(DROP)) as page:
         client, slider = page.open(), page.timeline.slider
         wait(lambda: slider.value > 0.8)
-        told = page.timeline.typing
-        client.update(told, '0 typing')
+        told = page.timeline.focus_events
+        client.update(told, '0 focus')
         wait(lambda: not page.timeline.is_live)
         shown, before = slider.value, page.source.frame.time
         wait(lambda: page.source.frame.time > before + 2 * timeline.PERIOD)
-        assert slider.value == shown == page.timeline.looked_at(time.monotonic())
-        client.update(told, '1 no more')
+        assert slider.value == shown == page.timeline.shown_instant(time.monotonic())
+        client.update(told, '1 blur')
         wait(lambda: page.timeline.is_live and slider.value > shown)
-        client.update(told, '2 typing')
+        client.update(told, '2 focus')
         wait(lambda: not page.timeline.is_live)
         client.update(slider, 0.5)
-        client.update(told, '3 no more')
+        client.update(told, '3 blur')
         before = page.source.frame.time
         wait(lambda: page.source.frame.time > before + 2 * timeline.PERIOD)
-        assert page.timeline.looked_at(time.monotonic()) == 0.5
+        assert page.timeline.shown_instant(time.monotonic()) == 0.5
 
 
 def test_time_goes_on_when_the_page_that_types_it_closes():
     """And not when another one leaves its field."""
-    with served(Simulated(DROP)) as page:
+    with served(SimulationSource(DROP)) as page:
         one, other = page.open(), page.open()
         wait(lambda: page.timeline.slider.value > 0)
-        one.update(page.timeline.typing, '0 typing')
+        one.update(page.timeline.focus_events, '0 focus')
         wait(lambda: not page.timeline.is_live)
-        other.update(page.timeline.typing, '0 no more')
+        other.update(page.timeline.focus_events, '0 blur')
         # Comes after that by the same way.
-        other.update(page.controls.pace, 0.5)
-        wait(lambda: page.source.report.pace == 0.5)
+        other.update(page.controls.real_time_factor, 0.5)
+        wait(lambda: page.source.status.real_time_factor == 0.5)
         assert not page.timeline.is_live
         one.close()
         wait(lambda: page.timeline.is_live)
 
 
 def test_nothing_is_taken_hold_of_in_the_past_and_a_reset_leads_back():
-    with served(Simulated(DROP)) as page:
+    with served(SimulationSource(DROP)) as page:
         client = page.open()
         wait(lambda: page.frame and page.frame.time > 0.3)
-        assert page._at_hand() is not None
+        assert page._grabbable_frame() is not None
         client.update(page.timeline.slider, 0.1)
         wait(lambda: not page.timeline.is_live)
-        assert page._at_hand() is None
+        assert page._grabbable_frame() is None
         client.press(page, 'Reset')
         wait(lambda: page.timeline.is_live)
 
 
 def test_plots_follow_the_timeline():
     """They end where one looks, and begin anew with a reset."""
-    with served(Simulated(DROP)) as page:
+    with served(SimulationSource(DROP)) as page:
         client = page.open()
         ends = lambda: page.plots.gap.handle.data[0][-1]  # noqa: E731
         wait(lambda: len(page.plots.gap.handle.data[0]) > 6)
@@ -271,9 +271,10 @@ def test_plots_follow_the_timeline():
 
 def test_plots_begin_anew_with_another_scene():
     """A run that is younger than the one before is plotted from its first moment, and alone."""
-    with served(Simulated(DROP)) as page:
+    with served(SimulationSource(DROP)) as page:
         client = page.open()
-        handles = [plot.handle for plot in (page.plots.energy, page.plots.gap, page.plots.pace)]
+        plots = page.plots
+        handles = [plot.handle for plot in (plots.energy, plots.gap, plots.real_time_factor)]
         wait(lambda: min(handle.data[0][-1:].sum() for handle in handles) > 2)
         client.update(page.controls.scene, 'flight')
         wait(lambda: page.frame.scene.name == 'flight' and page.frame.time > 1)
@@ -286,7 +287,7 @@ def test_plots_begin_anew_with_another_scene():
 
 def test_plots_begin_anew_with_a_recording(states):
     """Played a second time, it is plotted as the first."""
-    with served(Playback(recording(states))) as page:
+    with served(PlaybackSource(recording(states))) as page:
         client, gap = page.open(), page.plots.gap.handle
         wait(lambda: gap.data[0][-1:].sum() > 0.9)
         client.press(page, 'Reset')
@@ -304,28 +305,28 @@ def recording(states):
 
 def test_a_file_has_the_same_timeline(states):
     """All of it from the start on, with the ground that it touches."""
-    with served(Playback(recording(states))) as page:
+    with served(PlaybackSource(recording(states))) as page:
         client = page.open()
         wait(lambda: page.frame)
-        cut = page.timeline.cut
-        assert cut.duration == pytest.approx(1.19) and 0 < cut.touching.sum() < 120
+        clip = page.timeline.clip
+        assert clip.duration == pytest.approx(1.19) and 0 < clip.touching.sum() < 120
         touched = next(k for k, state in enumerate(states) if state.positions[:, 2].min() < 0.11)
-        assert abs(np.flatnonzero(cut.touching)[0] - touched) < 10
+        assert abs(np.flatnonzero(clip.touching)[0] - touched) < 10
         client.update(page.timeline.slider, 1.0)
         wait(lambda: page.frame.time == 1.0 and shows(page, states[100]))
 
 
 def test_save_this_has_the_run_in_every_format(states):
     """What a page is sent: each file, and in the table the poses that were shown."""
-    with served(Simulated(DROP)) as page:
+    with served(SimulationSource(DROP)) as page:
         client = page.open()
         wait(lambda: page.frame and page.frame.time > 0.5)
         client.update(page.timeline.slider, 0.2)
         wait(lambda: not page.timeline.is_live)
-        cut = page.timeline.cut
-        content = zipped(cut.recording(), 'run', lambda _: True)
-    with zipfile.ZipFile(io.BytesIO(content)) as package:
-        assert package.namelist() == [f'run{suffix}' for suffix in FORMATS]
-        table = np.genfromtxt(io.BytesIO(package.read('run.csv')), delimiter=',', skip_header=1)
-    ticks = [round(cut.frame(k).time * SECOND / 1e7) for k in range(len(cut.times))]
+        clip = page.timeline.clip
+        content = export_zip(clip.recording(), 'run', lambda _: True)
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        assert archive.namelist() == [f'run{suffix}' for suffix in FORMATS]
+        table = np.genfromtxt(io.BytesIO(archive.read('run.csv')), delimiter=',', skip_header=1)
+    ticks = [round(clip.frame(k).time * SECOND / 1e7) for k in range(len(clip.times))]
     np.testing.assert_array_equal(table[:, 1:4], [states[k].positions[0] for k in ticks])

@@ -34,12 +34,12 @@ FIELDS = {
     'restitution': lambda bone, joint: bone.restitution,
     'damping': lambda bone, joint: joint.damping,
     'size, m': lambda bone, joint: bone.shape.size,
-    'place, m': lambda bone, joint: bone.position,
-    'pivot, m': lambda bone, joint: joint.anchor,
+    'position, m': lambda bone, joint: bone.position,
+    'anchor, m': lambda bone, joint: joint.anchor,
     'inertia, kg m²': lambda bone, joint: bone.moments,
     'limits 1, °': lambda bone, joint: joint.limits[0]}
 
-OF_THREE = ('size, m', 'place, m', 'pivot, m', 'inertia, kg m²')
+OF_THREE = ('size, m', 'position, m', 'anchor, m', 'inertia, kg m²')
 """Fields of three numbers; each is typed with a semicolon between them."""
 
 OPTIONAL = ('friction', 'rolling, m', 'restitution', 'inertia, kg m²')
@@ -50,7 +50,7 @@ COUNT = itertools.count()
 
 HANDLE = """() => {
   const nodes = window.__viserMutable.nodeRefFromName;
-  const names = Object.keys(nodes).filter(name => /^.editor.*.own$/.test(name) && nodes[name]);
+  const names = Object.keys(nodes).filter(name => /^.editor.*.frame$/.test(name) && nodes[name]);
   if (names.length !== 1) return null;
   nodes[names[0]].updateWorldMatrix(true, false);
   const root = nodes[''].matrixWorld.clone().invert();
@@ -147,7 +147,7 @@ def test_handles_stay_on_the_body_that_is_edited(view, edits):
     if view.button('Edit').count():
         view.press('Edit')
     choices = {'size, m': ['19 19 19', '.3 .3 .3', '0.08 0.08 0.2'],
-               'place, m': ['0 0 0', '0 0.1 0.5', '0 3 9'], 'turn, °': ['0 0 0', '10 20 30']}
+               'position, m': ['0 0 0', '0 0.1 0.5', '0 3 9'], 'rotation, °': ['0 0 0', '10 20 30']}
     labels = ['size, m', 'size, m', *random.choice(list(choices), edits)][:edits]
     for count, label in enumerate(labels):
         text = choices[label][count] if count < 2 else random.choice(choices[label])

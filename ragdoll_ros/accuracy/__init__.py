@@ -1,1 +1,1 @@
-"""How wrong and how fast: cases with independent references, methods, metrics, a report."""
+"""The accuracy report: trials with independent references, methods, metrics, plots and pages."""

@@ -1,4 +1,4 @@
-"""The ways to simulate a trial that stand side by side in the report."""
+"""Methods that the report compares: engines with their settings."""
 from __future__ import annotations
 
 import dataclasses
@@ -18,64 +18,64 @@ from ..physics.engine.protocol import Engine
 from ..physics.engine.substepped.bullet import BulletEngine
 from ..physics.engine.substepped.mujoco import MujocoEngine
 from ..physics.simulation import Simulation
-from . import fineness
+from . import step_sizes
 from .cases.trial import Trial
 from .quickstart import STEP as QUICKSTART_STEP
 from .quickstart import Quickstart
 from .trajectory import Trajectory
 
 
-class Run(Protocol):
-    """A trial under way; a Simulation is one."""
+class MethodRun(Protocol):
+    """A running trial; implemented by Simulation."""
 
     @property
     def state(self) -> State:
-        """Poses and velocities of all bones now."""
+        """Current poses and velocities of all bones."""
 
     def advance(self) -> State:
-        """Go on by one tick."""
+        """Advance by one tick."""
 
     def close(self) -> None:
-        """Give everything back."""
+        """Free all resources."""
 
 
 @dataclass(frozen=True)
 class Method:
-    """A way to simulate. ``family`` groups points of one line; ``substeps`` a tick, 0 by need."""
+    """An engine with settings; ``family`` is its line in plots, ``substeps`` 0 if adaptive."""
 
     name: str
     label: str
     family: str
-    begin: Callable[[Trial], Run]
+    start: Callable[[Trial], MethodRun]
     substeps: int = 0
     tick: float | None = None
-    """Its own tick in s; None: the trial's."""
+    """Tick, s; None: the trial's."""
     order: int | None = None
-    """What theory says of the order in flight."""
+    """Theoretical order of convergence in flight."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What a method made of a trial, and the CPU seconds of each tick (t - 1,)."""
+    """Trajectory of a trial by a method, and CPU time of each tick, (t - 1,) s."""
 
     trajectory: Trajectory
     costs: np.ndarray
-    told: dict[str, float] = field(default_factory=dict)
-    """Simulation.measures() at the end; empty for others."""
+    measures: dict[str, float] = field(default_factory=dict)
+    """Simulation.measures() at the end; empty for other engines."""
 
     @property
-    def rate(self) -> float:
+    def cpu_s_per_s(self) -> float:
         """CPU seconds per simulated second."""
         return float(self.costs.sum() / self.trajectory.times[-1])
 
 
 class _FixedSteps:
-    """An engine driven with the same number of substeps in each tick."""
+    """An engine with a fixed number of substeps per tick."""
 
     def __init__(self, trial: Trial, substeps: int, make: Callable[..., Engine]) -> None:
         self._trial = trial
         self._tick, self._count = trial.scene.step, 0
-        self._engine = make(trial.scene, fineness.of_step(self._tick / substeps))
+        self._engine = make(trial.scene, step_sizes.fixed_steps(self._tick / substeps))
         if trial.start is not None:
             self._engine.set_coordinates(trial.start)
 
@@ -94,8 +94,8 @@ class _FixedSteps:
         self._engine.close()
 
 
-def simulated(trial: Trial, accuracy: str | Accuracy, engine: str = 'auto') -> Simulation:
-    """A trial's simulation, as the node runs it."""
+def start_simulation(trial: Trial, accuracy: str | Accuracy, engine: str = 'auto') -> Simulation:
+    """Start a trial in a Simulation, as the node runs it."""
     simulation = Simulation(trial.scene, accuracy=accuracy, engine=engine)
     if trial.start is not None:
         simulation.place(trial.start)
@@ -105,66 +105,67 @@ def simulated(trial: Trial, accuracy: str | Accuracy, engine: str = 'auto') -> S
 
 
 def run(method: Method, trial: Trial) -> Result:
-    """Simulate a trial once, from the start to its end."""
+    """Simulate a trial."""
     tick = method.tick or trial.scene.step
     times = trial.times(tick)
-    motion = method.begin(trial)
+    running = method.start(trial)
     try:
-        states, costs = [motion.state], np.empty(len(times) - 1)
+        states, costs = [running.state], np.empty(len(times) - 1)
         for index in range(len(costs)):
             before = process_time()
-            state = motion.advance()
+            state = running.advance()
             costs[index] = process_time() - before
             states.append(state)
-        told = motion.measures() if isinstance(motion, Simulation) else {}
+        measures = running.measures() if isinstance(running, Simulation) else {}
     finally:
-        motion.close()
-    return Result(Trajectory.of(times, states), costs, told)
+        running.close()
+    return Result(Trajectory.of(times, states), costs, measures)
 
 
 def median_run(method: Method, trial: Trial, repeats: int) -> Result:
-    """Simulate a trial several times; each tick's cost is its median."""
+    """Simulate a trial several times; the cost of each tick is its median."""
     results = [run(method, trial) for _ in range(repeats)]
     costs = np.median([result.costs for result in results], axis=0)
     return dataclasses.replace(results[0], costs=costs)
 
 
 def ours(accuracy: str | Accuracy, name: str | None = None, engine: str = 'auto') -> Method:
-    """Our simulation at one of its settings, or with settings of one's own."""
+    """Our simulation at a named accuracy, or with a given one."""
     name = name or f'ours-{accuracy}'
     order = kernels.ORDER if engine == 'auto' and kernels.ready() else 1
     return Method(name, name.replace('-', ' '), 'ours', functools.partial(
-        simulated, accuracy=accuracy, engine=engine), order=order)
+        start_simulation, accuracy=accuracy, engine=engine), order=order)
 
 
 def core(step: float) -> Method:
-    """The engine that solves impacts where they happen, with steps of ``step`` s."""
+    """The rigid engine with fixed steps of ``step`` s."""
     return Method(f'core-{step:g}', f'core, steps of {step * 1e6:g} µs', 'core', functools.partial(
-        simulated, accuracy=fineness.of_step(step), engine=fineness.CORE))
+        start_simulation, accuracy=step_sizes.fixed_steps(step), engine=step_sizes.RIGID))
 
 
-def reference(parts: int) -> Method:
-    """What stands for the truth where there is no formula: the core, its step in ``parts``.
+def reference(refinement: int) -> Method:
+    """Numerical reference: the rigid engine with its step divided by ``refinement``.
 
-    PyBullet at 128 substeps until there is a core; the label says which one it was.
+    PyBullet at 128 substeps where the rigid engine is not available; the label names it.
     """
-    return core(fineness.core_step() / parts) if fineness.has_core() else bullet(128)
+    return (core(step_sizes.contact_step() / refinement) if step_sizes.has_rigid_engine()
+            else bullet(128))
 
 
 def quickstart() -> Method:
-    """PyBullet by its quickstart."""
+    """PyBullet as in its quickstart guide."""
     return Method('quickstart', 'PyBullet quickstart, 1/240 s', 'quickstart', Quickstart, 1,
                   QUICKSTART_STEP)
 
 
 def bullet(substeps: int) -> Method:
-    """PyBullet, our scene, always as many substeps."""
+    """PyBullet on our scene with fixed substeps."""
     return Method(f'bullet-{substeps}', f'PyBullet N = {substeps}', 'PyBullet', functools.partial(
         _FixedSteps, substeps=substeps, make=BulletEngine), substeps, order=1)
 
 
 def mujoco(integrator: str, substeps: int) -> Method:
-    """MuJoCo, our scene, always as many substeps."""
+    """MuJoCo on our scene with fixed substeps."""
     make = functools.partial(MujocoEngine, integrator=integrator)
     return Method(f'mujoco-{integrator}-{substeps}', f'MuJoCo {integrator} N = {substeps}',
                   f'MuJoCo {integrator}', functools.partial(
@@ -175,8 +176,8 @@ def mujoco(integrator: str, substeps: int) -> Method:
 SUBSTEPS = (1, 2, 4, 8, 16, 32)
 
 
-def every_method(substeps: Iterable[int] = SUBSTEPS) -> list[Method]:
-    """Ours at three settings, the quickstart, PyBullet and MuJoCo at fixed substeps."""
+def all_methods(substeps: Iterable[int] = SUBSTEPS) -> list[Method]:
+    """Ours at three accuracies, the quickstart, PyBullet and MuJoCo with fixed substeps."""
     counts = tuple(substeps)
     return [*map(ours, ACCURACIES), quickstart(), *map(bullet, counts),
             *(mujoco(integrator, count) for integrator in ('euler', 'implicitfast', 'rk4')
@@ -184,7 +185,7 @@ def every_method(substeps: Iterable[int] = SUBSTEPS) -> list[Method]:
 
 
 def by_name(name: str) -> Method:
-    """The method of a name; OutOfRange names the families there are."""
+    """Find a method by its name; OutOfRange lists the valid ones."""
     family, _, rest = name.partition('-')
     try:
         if family == 'ours' and rest in ACCURACIES:

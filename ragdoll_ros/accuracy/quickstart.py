@@ -1,7 +1,7 @@
-"""PyBullet as its quickstart guide shows it: load a URDF, set gravity, step at 1/240 s.
+"""PyBullet as in its quickstart guide: load a URDF, set gravity, step at 1/240 s.
 
-This file, beside engine/bullet.py, imports pybullet, and on purpose does nothing of what that
-file does: inertia, damping, joint motors, contact margins and solver are PyBullet's defaults.
+Inertia, damping, joint motors, contact margins and solver are PyBullet's defaults, on purpose
+unlike in physics/engine/substepped/bullet.py.
 """
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from .cases.trial import Trial
 STEP = 1 / 240
 
 DEFAULT_BREAKING_DISTANCE = 0.02
-"""m: PyBullet keeps one for all clients of a process; here it is what it would be alone."""
+"""m. PyBullet has one value for all clients of a process; this is its default."""
 
 
 class Quickstart:
-    """One motion, the plain way."""
+    """A trial in PyBullet with default settings."""
 
     def __init__(self, trial: Trial) -> None:
         self._trial = trial
@@ -46,7 +46,7 @@ class Quickstart:
         self._place()
 
     def advance(self) -> State:
-        """Go on by one step."""
+        """Advance by one step."""
         for load in self._trial.loads(self._time, self._time + STEP):
             link = self._links[load.bone]
             place = self._pose(link)
@@ -71,7 +71,7 @@ class Quickstart:
         return State.of(np.array(rows))
 
     def close(self) -> None:
-        """Give everything back, to others of this process the breaking distance too."""
+        """Disconnect, and restore the breaking distance for other clients of this process."""
         pybullet.setPhysicsEngineParameter(contactBreakingThreshold=BREAKING_DISTANCE,
                                            physicsClientId=self._client)
         pybullet.disconnect(self._client)
@@ -102,7 +102,7 @@ class Quickstart:
         self._links = [links.get(bone.name, -1) for bone in doll.bones]
 
     def _set_material(self) -> None:
-        """Friction and restitution are part of the task, not of the method."""
+        """Set friction and restitution, which belong to the trial and not to the method."""
         material = self._trial.scene.material
         bodies = [(self._body, link) for link in self._links]
         if self._trial.scene.ground is not None:
@@ -113,7 +113,7 @@ class Quickstart:
                 restitution=material.restitution ** 0.5, physicsClientId=self._client)
 
     def _place(self) -> None:
-        """Take up the trial's start: the coordinates' joints are in the order of the links."""
+        """Set the trial's initial state; its joint coordinates are in the order of the links."""
         start = self._trial.start
         if start is None:
             return

@@ -1,5 +1,6 @@
-"""Falls by the thousand: drawn by a recipe, simulated on all cores, written as a data set."""
-from .fall import Fall, Phases
+"""Data sets of falls: drawn from a recipe, simulated on all cores, written in several formats."""
+from ..people.fall_phases import Phases
+from .fall import Fall
 from .recipe import Recipe, load_recipe
 from .simulate import generate
 

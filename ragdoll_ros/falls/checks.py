@@ -1,4 +1,4 @@
-"""What is wrong with a recipe's values, beyond what its schema tells."""
+"""Validate a recipe's values, beyond its schema."""
 from __future__ import annotations
 
 import math
@@ -16,7 +16,7 @@ from .distribution import choices, distribution_errors, support
 from .imu_samples import flaws_of
 
 RATE = 100
-"""Frames in each s where a recipe does not say."""
+"""Default frames per second."""
 
 TURN = (-3600.0, 3600.0)
 RANGES = {
@@ -29,11 +29,11 @@ RANGES = {
     'ground.friction': (0, math.inf), 'ground.restitution': (0, 1), 'ground.slope_deg': (0, 45),
     'ground.downhill_deg': TURN, 'duration': (0.1, 600), 'record.rate': (5, 5000),
     'phases.onset_speed': (0, 10), 'phases.rest_speed': (0, 10)}
-"""Smallest and largest of what each value may be, in the units of the schema."""
+"""Smallest and largest admissible value by key, in the units of the schema."""
 
 
 def value_errors(data: dict, dolls: list[Ragdoll], found: list[ModelError]) -> list[ModelError]:
-    """What is wrong with data beside what was ``found`` so far; ``dolls`` are those it names."""
+    """Errors of the data beside those ``found`` so far; ``dolls`` are those it names."""
     more = [error for key, part in data.items() if not has_error_under(found, key)
             for error in distribution_errors(part, key)]
     more += list(_out_of_range(data, [*found, *more]))
@@ -47,8 +47,8 @@ def value_errors(data: dict, dolls: list[Ragdoll], found: list[ModelError]) -> l
     return more
 
 
-def mounted(mount: dict) -> dict:
-    """Where an IMU is on its bone: position m, and a unit quaternion; NotFinite, NotUnit."""
+def checked_mount(mount: dict) -> dict:
+    """Position m and unit quaternion of an IMU on its bone; NotFinite, NotUnit."""
     return {'position': list(finite_floats('position', mount.get('position', (0, 0, 0)))),
             'orientation': list(unit_vector('orientation', mount.get('orientation', IDENTITY),
                                             count=4))}
@@ -64,7 +64,7 @@ def _angle_names(doll: Ragdoll) -> list[str]:
 
 
 def _out_of_range(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
-    """Values of which some would be out of their ranges."""
+    """Values or distributions that leave their RANGES."""
     for key, bounds in RANGES.items():
         for path, value in _values(data, key):
             if has_error_under(found, path) or isinstance(value, (str, bool)):
@@ -75,7 +75,7 @@ def _out_of_range(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
 
 
 def _values(data: object, key: str, path: str = '') -> Iterator[tuple[str, object]]:
-    """Where a key like ``pushes.force`` stands in the data, and what stands there."""
+    """Paths in the data that match a key like ``pushes.force``, and their values."""
     if isinstance(data, list):
         for index, part in enumerate(data):
             yield from _values(part, key, f'{path}[{index}]')
@@ -88,7 +88,7 @@ def _values(data: object, key: str, path: str = '') -> Iterator[tuple[str, objec
 
 
 def _wrong_people(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
-    """Groups of which some would weigh more or less than a person can."""
+    """Groups of people whose masses would leave MASSES."""
     for path, group in _values(data, 'who.people'):
         if not has_error_under(found, path) and isinstance(group, dict):
             ends = [support(group['bmi'])[end] * support(group['height'])[end] ** 2
@@ -99,14 +99,14 @@ def _wrong_people(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
 
 
 def _wrong_limp(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
-    """Joints that are to go limp of dolls that nothing holds."""
+    """`limp` of dolls: only people can be held upright."""
     who = data.get('who')
     if data.get('limp') and isinstance(who, dict) and 'people' not in who:
-        yield errors.WrongForm('limp', 'dolls', 'people: of others nobody knows how to stand')
+        yield errors.WrongForm('limp', 'dolls', 'people: only they can be held upright')
 
 
 def _wrong_rate(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
-    """A rate of sensors that is no multiple of that of frames."""
+    """A sensor rate that is no multiple of the frame rate."""
     record = data.get('record')
     if not has_error_under(found, 'record') and isinstance(record, dict) and 'imu_rate' in record:
         rate, fast = record.get('rate', RATE), record['imu_rate']
@@ -116,14 +116,14 @@ def _wrong_rate(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
 
 
 def _wrong_imus(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
-    """IMUs of one name, or whose place, orientation or flaws are none."""
+    """IMUs with equal names, or with an invalid position, orientation or flaw."""
     if has_error_under(found, 'record'):
         return
     names = []
     for index, mount in enumerate(data.get('record', {}).get('imus', ())):
         where = f'record.imus[{index}]'
         try:
-            mounted(mount)
+            checked_mount(mount)
             flaws_of(mount)
         except ModelError as error:
             yield error.at(where)
@@ -133,7 +133,7 @@ def _wrong_imus(data: dict, found: list[ModelError]) -> Iterator[ModelError]:
 
 
 def _unknown_names(data: dict, dolls: list[Ragdoll]) -> Iterator[ModelError]:
-    """Bones and joint angles that the dolls do not have, and angles beyond their limits."""
+    """Unknown bones and joint angles, and angles beyond the joint limits."""
     bones, _ = names_of(dolls[0])
     named = [(f'feet[{index}]', name) for index, name in enumerate(data.get('feet', ()))]
     named += [(f'pushes[{index}].bone', name) for index, push in enumerate(data.get('pushes', ()))
@@ -150,7 +150,8 @@ def _unknown_names(data: dict, dolls: list[Ragdoll]) -> Iterator[ModelError]:
                 yield errors.UnknownJoint(f'limp[{index}].angles[{place}]', name,
                                           errors.one_of(known, name))
     for name, value in data.get('start', {}).get('angles_deg', {}).items():
-        path, ranges = f'start.angles_deg.{name}', [ranges_of(doll).get(name) for doll in dolls]
+        path = f'start.angles_deg.{name}'
+        ranges = [angle_limits_deg(doll).get(name) for doll in dolls]
         if name not in known:
             yield errors.UnknownJoint(path, name, errors.one_of(known, name))
             continue
@@ -161,7 +162,7 @@ def _unknown_names(data: dict, dolls: list[Ragdoll]) -> Iterator[ModelError]:
             yield errors.OutOfRange(path, value, f'{low:g} to {high:g}, the limits of the joint')
 
 
-def ranges_of(doll: Ragdoll) -> dict[str, tuple[float, float]]:
-    """Limits of each limited joint angle, degrees."""
+def angle_limits_deg(doll: Ragdoll) -> dict[str, tuple[float, float]]:
+    """Limits of each limited joint angle, degrees, by name."""
     return {name: tuple(round(math.degrees(angle), 9) for angle in pair) for joint in doll.joints
             for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True) if pair}

@@ -1,36 +1,36 @@
-"""Shards made by a Ray cluster, or by a Ray on this machine alone."""
+"""Make shards on a Ray cluster, or with a local Ray instance."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
 from ..model.errors import Unreadable
-from .pool import AHEAD, TRIES, WorkersDied
-from .shard import Order, Shard, make_shard
+from .pool import MAX_ATTEMPTS, QUEUED_PER_WORKER, WorkersDied
+from .shard import DatasetJob, Shard, make_shard
 
-HERE = 'local'
-"""Address of a Ray that is begun for this run on this machine."""
+LOCAL = 'local'
+"""Address of a Ray instance started on this machine for this run."""
 
 
-def make_shards(order: Order, shards: Iterable[int], address: str = HERE,
+def make_shards(job: DatasetJob, shards: Iterable[int], address: str = LOCAL,
                 workers: int | None = None) -> Iterator[Shard]:
-    """Shards by their numbers, each as soon as it is done, by tasks of one core each.
+    """Yield shards, each as soon as it is done, made by tasks of one core each.
 
-    Ray does again what a process or a machine that dies takes with it, TRIES times in all. Files
-    are written here: no folder need be shared. ``workers`` bounds a local Ray.
+    Ray repeats the tasks of a process or machine that dies, MAX_ATTEMPTS in all. Files are written
+    by this process: no shared folder is needed. ``workers`` limits a local Ray.
     """
     try:
         import ray
     except ImportError:
         raise Unreadable('', '--ray', "Ray: pip install 'ragdoll_ros[ray]'") from None
     try:
-        ray.init(address=address, num_cpus=workers if address == HERE else None,
-                 include_dashboard=False if address == HERE else None, log_to_driver=False)
+        ray.init(address=address, num_cpus=workers if address == LOCAL else None,
+                 include_dashboard=False if address == LOCAL else None, log_to_driver=False)
     except (ConnectionError, ValueError) as error:
         raise Unreadable('', f'--ray {address}', f'a Ray cluster there: {error}') from None
     try:
-        make = ray.remote(num_cpus=1, max_retries=TRIES - 1)(make_shard)
-        shared, left, making = ray.put(order), iter(shards), []
-        most = AHEAD * int(ray.cluster_resources().get('CPU', 1))
+        make = ray.remote(num_cpus=1, max_retries=MAX_ATTEMPTS - 1)(make_shard)
+        shared, left, making = ray.put(job), iter(shards), []
+        most = QUEUED_PER_WORKER * int(ray.cluster_resources().get('CPU', 1))
         while True:
             while len(making) < most and (shard := next(left, None)) is not None:
                 making.append(make.remote(shared, shard))

@@ -1,4 +1,4 @@
-"""What is in a data set: a page and pictures, beside what is known of real falls."""
+"""Describe a data set: a page and pictures, compared with published figures of real falls."""
 from __future__ import annotations
 
 import argparse
@@ -6,26 +6,25 @@ from pathlib import Path
 
 import numpy as np
 
-from ..people.real_falls import DESCENT, IMPACT_SPEEDS, SHARE_THAT_HITS
+from ..people.real_falls import DESCENT, IMPACT_SPEEDS, SHARE_THAT_HITS, Known, bones_of
 from . import pictures
-from .dataset import DIRECTIONS, Contents, read
-from .parts import bones_of
+from .dataset_summary import DIRECTIONS, DatasetSummary, summarize
 from .simulate import generate
 
 PAGE = 'README.md'
 SHEET = 24
-"""Falls of the contact sheet."""
+"""Number of falls on the contact sheet."""
 
 
 def main(arguments: list[str]) -> int:
     """Run `ragdoll_falls describe`; 0."""
     options = parser().parse_args(arguments)
-    contents = read(options.folder)
-    numbers = np.unique(np.linspace(0, len(contents.hits) - 1, SHEET).round().astype(int))
-    falls = list(generate(contents.recipe, numbers.tolist()))
-    drawn = pictures.draw_all(contents, falls, options.folder)
+    summary = summarize(options.folder)
+    numbers = np.unique(np.linspace(0, len(summary.hits) - 1, SHEET).round().astype(int))
+    falls = list(generate(summary.recipe, numbers.tolist()))
+    drawn = pictures.draw_all(summary, falls, options.folder)
     page = options.folder / PAGE
-    page.write_text(text(contents, drawn), encoding='utf-8')
+    page.write_text(page_text(summary, drawn), encoding='utf-8')
     print(f'{page} and {len(drawn)} pictures')
     return 0
 
@@ -39,53 +38,57 @@ def parser() -> argparse.ArgumentParser:
     return parser
 
 
-def text(contents: Contents, drawn: list[str]) -> str:
-    """The page, in Markdown."""
-    hits, rests = contents.hits, np.isfinite(contents.durations)
-    count, failed = len(hits), len(contents.failures)
+def page_text(summary: DatasetSummary, drawn: list[str]) -> str:
+    """The page, in Markdown; ``drawn`` are the paths of its pictures."""
+    hits = summary.hits
+    count, failed = len(hits), len(summary.failures)
     lines = [
-        f'# {contents.recipe.name}', '',
-        f'{count} falls of {contents.recipe.data["duration"]:g} s at {contents.recipe.rate} Hz, '
-        f'simulated at {contents.recipe.data["accuracy"]}; {failed} failed.', '',
+        f'# {summary.recipe.name}', '',
+        f'{count} falls of {summary.recipe.data["duration"]:g} s at {summary.recipe.rate} Hz, '
+        f'simulated at {summary.recipe.data["accuracy"]}; {failed} failed.', '',
         '| | falls |', '| --- | --- |', f'| hit the ground | {hits.mean():.1%} |',
-        f'| come to rest | {rests.mean():.1%} |',
+        f'| come to rest | {len(summary.durations) / count:.1%} |',
         *(f'| fall {name} | {share:.1%} |' for name, share in
-          zip(DIRECTIONS, contents.share_towards(), strict=True)), '',
-        'Directions are of the centre of mass from the start to the impact, as seen from where the '
-        'doll faces at the start; shares are of the falls that hit.', '',
-        '## Beside real falls', '', *_beside(contents), '', '## Bones that hit', '',
-        '| bone | falls in which it hits | downwards then, m/s |', '| --- | --- | --- |',
-        *_bones(contents), '', *(f'![{Path(name).stem}]({name})\n' for name in drawn)]
-    if contents.failures:
+          zip(DIRECTIONS, summary.share_towards(), strict=True)), '',
+        'A fall hits the ground when a bone other than the feet touches it. Directions are those '
+        'of the centre of mass from the start to that instant, relative to the heading at the '
+        'start; their shares are of the falls that hit.', '',
+        '## Compared with real falls', '', *_comparison(summary), '',
+        'The descent lasts from the onset to the impact of the pelvis. Speeds are vertical, of the '
+        "bone's centre of mass in the last frame before its first contact; of two hands, the one "
+        'that touches first counts.', '', '## Bones that hit', '',
+        '| bone | falls in which it hits | speed downwards, m/s |', '| --- | --- | --- |',
+        *_bones(summary), '', *(f'![{Path(name).stem}]({name})\n' for name in drawn)]
+    if summary.failures:
         lines += ['', '## Failed', '', *(f'- fall {number}: {reason}' for number, reason
-                                         in contents.failures.items())]
+                                         in summary.failures.items())]
     return '\n'.join(lines) + '\n'
 
 
-def _beside(contents: Contents) -> list[str]:
-    """Rows of the table beside real falls."""
-    rows = ['| | here | real falls | source |', '| --- | --- | --- | --- |',
-            f'| onset to impact, s | {_spread(contents.descents[contents.hits])} | '
-            f'{DESCENT.mean:.2f} ± {DESCENT.deviation:.2f} | {DESCENT.source} |']
+def _comparison(summary: DatasetSummary) -> list[str]:
+    """Rows of the table of simulated and real falls; none for body parts that the doll lacks."""
+    def row(what: str, part: str, own: np.ndarray, known: Known) -> list[str]:
+        names = [summary.bones[index] for index in bones_of(part, summary.bones)]
+        return [f'| {what} ({", ".join(names)}) | {_spread(own)} | {known.mean:.2f} ± '
+                f'{known.deviation:.2f} | {known.source} |'] if names else []
+
+    rows = ['| | simulated | real falls | source |', '| --- | --- | --- | --- |',
+            *row('descent, s', 'pelvis', summary.descents, DESCENT)]
     for part, known in IMPACT_SPEEDS.items():
-        names = [contents.bones[index] for index in bones_of(part, contents.bones)]
-        if names:
-            rows.append(f'| {part} hits with, m/s ({", ".join(names)}) | '
-                        f'{_spread(contents.speeds_of(part))} | {known.mean:.2f} ± '
-                        f'{known.deviation:.2f} | {known.source} |')
+        rows += row(f'impact speed of the {part}, m/s', part, summary.speeds_of(part), known)
     for part, (share, source) in SHARE_THAT_HITS.items():
-        if bones_of(part, contents.bones):
-            rows.append(f'| {part} hits in | {contents.share_that_hits(part):.0%} | {share:.0%} | '
+        if bones_of(part, summary.bones):
+            rows.append(f'| {part} hits in | {summary.share_that_hits(part):.0%} | {share:.0%} | '
                         f'{source} |')
     return rows
 
 
-def _bones(contents: Contents) -> list[str]:
-    known = np.isfinite(contents.impact_speeds)
+def _bones(summary: DatasetSummary) -> list[str]:
+    known = np.isfinite(summary.impact_speeds)
     return [f'| {name} | {known[:, bone].mean():.0%} | '
-            f'{_spread(contents.impact_speeds[known[:, bone], bone])} |'
-            for bone, name in enumerate(contents.bones)
-            if name not in contents.recipe.data['feet']]
+            f'{_spread(summary.impact_speeds[known[:, bone], bone])} |'
+            for bone, name in enumerate(summary.bones)
+            if name not in summary.recipe.data['feet']]
 
 
 def _spread(values: np.ndarray) -> str:

@@ -1,7 +1,6 @@
-"""Values of a recipe that are drawn anew for each fall: even, normal, or one of several.
+"""Distributions of a recipe's values: uniform, truncated normal, or a weighted choice.
 
-Each takes one number of the generator, whatever it is of, so that draws have an order and nothing
-else: by the inverse of its cumulative distribution.
+Each is sampled by inverse transform and takes exactly one number of the generator.
 """
 from __future__ import annotations
 
@@ -17,17 +16,17 @@ KINDS = ('uniform', 'normal', 'choice')
 
 
 def is_distribution(value: object) -> bool:
-    """Whether a part of a recipe's data is drawn."""
+    """Whether a part of a recipe's data is a distribution."""
     return isinstance(value, dict) and len(set(KINDS) & set(value)) == 1
 
 
 def draw(data: object, generator: np.random.Generator) -> object:
-    """The same data with every distribution in it replaced by what is drawn from it.
+    """The same data with every distribution replaced by a sample.
 
-    Mappings are gone through in the order of their keys, so that a file may list them as it likes.
+    Mappings are traversed in the order of their sorted keys: their order in the file is irrelevant.
     """
     if is_distribution(data):
-        return drawn(data, generator.random())
+        return quantile(data, generator.random())
     if isinstance(data, dict):
         return {key: draw(data[key], generator) for key in sorted(data)}
     if isinstance(data, list):
@@ -35,8 +34,8 @@ def draw(data: object, generator: np.random.Generator) -> object:
     return data
 
 
-def drawn(distribution: dict, share: float) -> object:
-    """The value below which ``share`` of all draws are, share in [0, 1)."""
+def quantile(distribution: dict, share: float) -> object:
+    """Inverse of the cumulative distribution at ``share`` in [0, 1)."""
     if 'uniform' in distribution:
         low, high = distribution['uniform']
         return low + (high - low) * share
@@ -52,7 +51,7 @@ def drawn(distribution: dict, share: float) -> object:
 
 
 def support(value: object) -> tuple[float, float]:
-    """Smallest and largest number that a value can be."""
+    """Smallest and largest possible number of a value."""
     if not isinstance(value, dict):
         return value, value
     if 'choice' in value:
@@ -61,12 +60,12 @@ def support(value: object) -> tuple[float, float]:
 
 
 def choices(value: object) -> list:
-    """All that a value which is no number can be."""
+    """All possible values of one that is no number."""
     return value['choice'] if is_distribution(value) else [value]
 
 
 def distribution_errors(data: object, path: str = '') -> Iterator[errors.ModelError]:
-    """What is wrong with distributions in data that the schema has nothing against."""
+    """Errors of distributions in data, beyond the schema."""
     if isinstance(data, list):
         for index, part in enumerate(data):
             yield from distribution_errors(part, f'{path}[{index}]')
@@ -93,9 +92,10 @@ def _wrong(data: dict, path: str) -> Iterator[errors.ModelError]:
             yield errors.WrongForm(f'{path}.within', None, 'the bounds of a normal distribution')
         elif NormalDist(mean, deviation).cdf(data['within'][1]) <= NormalDist(
                 mean, deviation).cdf(data['within'][0]):
-            yield errors.OutOfRange(f'{path}.within', data['within'], 'bounds that it can reach')
+            yield errors.OutOfRange(f'{path}.within', data['within'],
+                                    'bounds with nonzero probability')
     elif 'within' in data:
-        yield errors.WrongForm(f'{path}.within', data['within'], 'nothing but with normal')
+        yield errors.WrongForm(f'{path}.within', data['within'], 'only with normal')
     weights = data.get('weights')
     if weights is not None and (len(weights) != len(data.get('choice', ()))
                                 or min(weights) < 0 or not 0 < sum(weights) < math.inf):

@@ -1,4 +1,4 @@
-"""What inertial sensors that are worn on bones read in a fall, as `physics.imu` tells."""
+"""Samples of the inertial sensors of a fall, as defined in physics/sensors/imu.py."""
 from __future__ import annotations
 
 from dataclasses import fields
@@ -11,40 +11,42 @@ from .fall import Fall
 NAMES = ('ax', 'ay', 'az', 'wx', 'wy', 'wz')
 
 
-def worn_samples(fall: Fall, imu: int) -> np.ndarray:
-    """Samples (s, 6) of the recipe's sensor ``imu``, m/s^2 and rad/s in its own axes, with its
-    flaws: each is of the time up to its instant. The first, before which nothing was, is the
-    second's.
+def fall_samples(fall: Fall, imu: int) -> np.ndarray:
+    """Samples (s, 6) of the recipe's sensor ``imu``, m/s^2 and rad/s in its own axes, with noise,
+    bias and range.
+
+    Sample k is the mean over the interval that ends at its stamp; the first repeats the second.
     """
-    true = imu_samples(fall.worn[:, imu], mounted(fall, imu), fall.times[1] / fall.parts,
-                       fall.scene.gravity)
-    # Recipe.draw's counter begins with 0 where a sensor's does with 1 + imu, 2^128 numbers apart.
+    true = imu_samples(fall.imu_states[:, imu], mount_of(fall, imu),
+                       fall.times[1] / fall.samples_per_frame, fall.scene.gravity)
+    # Recipe.draw's counter begins with 0, a sensor's with 1 + imu: they are 2^128 draws apart.
     random = np.random.Generator(np.random.Philox(
         key=fall.noise_key, counter=[0, 0, 1 + imu, fall.number]))
     samples = flaws_of(fall.imus[imu])(true, random)
     return np.concatenate([samples[:1], samples])
 
 
-def by_frames(fall: Fall, imu: int) -> np.ndarray:
-    """The same samples, those of each frame (t, parts, 6) up to its instant; the first frame's are
-    all the same.
+def samples_by_frame(fall: Fall, imu: int) -> np.ndarray:
+    """The same samples by frame, (t, samples_per_frame, 6): those up to the frame's instant.
+
+    All samples of the first frame are equal.
     """
-    samples = worn_samples(fall, imu)
-    first = np.repeat(samples[:1], fall.parts - 1, axis=0)
-    return np.concatenate([first, samples]).reshape(-1, fall.parts, 6)
+    samples = fall_samples(fall, imu)
+    first = np.repeat(samples[:1], fall.samples_per_frame - 1, axis=0)
+    return np.concatenate([first, samples]).reshape(-1, fall.samples_per_frame, 6)
 
 
-def worn_orientations(fall: Fall, imu: int) -> np.ndarray:
-    """Orientations (s, 4) of the sensor in the world at the same instants."""
-    return sensor_motion(fall.worn[:, imu], mounted(fall, imu))[1]
+def sensor_orientations(fall: Fall, imu: int) -> np.ndarray:
+    """Orientations (s, 4) of the sensor in the world at the sample times."""
+    return sensor_motion(fall.imu_states[:, imu], mount_of(fall, imu))[1]
 
 
 def flaws_of(sensor: dict) -> ImuErrors:
-    """What a recipe's sensor adds to what it should read; NotFinite, OutOfRange."""
+    """Noise, bias and range of a recipe's sensor; NotFinite, OutOfRange."""
     return ImuErrors(**{field.name: sensor[field.name] for field in fields(ImuErrors)
-                    if field.name in sensor})
+                        if field.name in sensor})
 
 
-def mounted(fall: Fall, imu: int) -> ImuMount:
-    """Where the sensor is worn."""
+def mount_of(fall: Fall, imu: int) -> ImuMount:
+    """Bone, position and orientation of the sensor."""
     return ImuMount(**{key: fall.imus[imu][key] for key in ('bone', 'position', 'orientation')})

@@ -1,7 +1,7 @@
-"""The manifest of a data set: what it is of, and each shard that is whole, with its files' hashes.
+"""The manifest of a data set: recipe, versions, and its complete shards with their files' hashes.
 
-Text, JSON in lines: the first says what all is made from, each other one what a shard is. A line
-is added when a shard's files are there; a torn last line is as if it were not.
+JSON lines: a header, then one line per shard, appended once the shard's files are written. An
+incomplete last line is ignored.
 """
 from __future__ import annotations
 
@@ -12,61 +12,61 @@ from pathlib import Path
 
 from ..files.run_scene import versions
 from ..model.errors import Unreadable
-from .shard import SIZE, Order, Shard
+from .shard import FALLS_PER_SHARD, DatasetJob, Shard
 
 FILE = 'manifest.jsonl'
 PART = '.part'
-"""End of the name of a file that is being written."""
+"""Suffix of a file that is being written."""
 
 
 class Manifest:
-    """That of a data set's folder, which shards are added to."""
+    """Manifest of a data set's folder."""
 
     def __init__(self, folder: Path, header: dict, shards: dict[int, dict]) -> None:
         self.folder, self.header, self.shards = folder, header, shards
 
     @classmethod
-    def begin(cls, folder: Path, order: Order) -> Manifest:
-        """A new one, of a folder that holds none yet; OSError where it cannot be written."""
+    def begin(cls, folder: Path, job: DatasetJob) -> Manifest:
+        """Create the manifest in a folder that has none; OSError if it cannot be written."""
         folder.mkdir(parents=True, exist_ok=True)
-        made = cls(folder, _header(order), {})
+        made = cls(folder, _header(job), {})
         made.write_sorted()
         return made
 
     @classmethod
-    def resume(cls, folder: Path, order: Order) -> Manifest:
-        """That of a folder, with the shards that are whole; Unreadable where it is of other falls.
+    def resume(cls, folder: Path, job: DatasetJob) -> Manifest:
+        """Read a folder's manifest and keep its complete shards; Unreadable if of another job.
 
-        A shard is whole if it has all falls that it is to have, and its files have their hashes.
+        A shard is complete if it has all its falls and its files have their hashes.
         """
         header, entries, end = _read(folder / FILE)
-        wanted = _header(order)
+        wanted = _header(job)
         for key, value in wanted.items():
             if key != 'count' and header.get(key) != value:
-                raise Unreadable(key, header.get(key), f'{value!r}, as of what is asked for now')
-        if header['count'] > order.count:
-            raise Unreadable('count', order.count, f'{header["count"]} or more, which are there')
+                raise Unreadable(key, header.get(key), f'{value!r}, as requested now')
+        if header['count'] > job.count:
+            raise Unreadable('count', job.count, f'{header["count"]} or more, as in the folder')
         os.truncate(folder / FILE, end)
         for left in folder.rglob('*' + PART):
             left.unlink()
         shards = {entry['shard']: entry for entry in entries
-                  if entry['shard'] < order.shards and _is_whole(folder, entry, order)}
+                  if entry['shard'] < job.shards and _is_complete(folder, entry, job)}
         return cls(folder, wanted, shards)
 
     @classmethod
     def read(cls, folder: Path) -> Manifest:
-        """That of a folder, as it stands; Unreadable where there is none."""
+        """Read a folder's manifest; Unreadable if there is none."""
         header, entries, _ = _read(folder / FILE)
         return cls(folder, header, {entry['shard']: entry for entry in entries})
 
     @property
     def done(self) -> int:
-        """Falls in whole shards."""
+        """Number of falls in complete shards."""
         return sum(entry['falls'][1] - entry['falls'][0] for entry in self.shards.values())
 
     @property
     def failures(self) -> dict[int, str]:
-        """Why falls failed, by their numbers."""
+        """Reasons of falls that failed, by their numbers."""
         return {int(number): reason for _, entry in sorted(self.shards.items())
                 for number, reason in entry['failures'].items()}
 
@@ -80,14 +80,14 @@ class Manifest:
         self.shards[shard.number] = entry
 
     def write_sorted(self) -> None:
-        """Write the whole file anew, the shards in their order, however they came."""
+        """Rewrite the file with the shards in order of their numbers."""
         lines = [self.header, *(entry for _, entry in sorted(self.shards.items()))]
         text = ''.join(_line(line) for line in lines)
         write_files(self.folder, {FILE: text.encode()})
 
 
 def write_files(folder: Path, files: dict[str, bytes]) -> dict[str, str]:
-    """Write files by their paths in a folder, each whole or not at all; SHA-256 of each."""
+    """Write files by their paths in a folder, each atomically; returns the SHA-256 of each."""
     for name, content in files.items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -105,14 +105,14 @@ def _line(data: dict) -> str:
     return json.dumps(data, sort_keys=True) + '\n'
 
 
-def _header(order: Order) -> dict:
-    """What all shards are made from."""
-    return {'recipe': order.recipe.data, 'digest': order.recipe.digest, 'count': order.count,
-            'format': order.format, 'falls_per_shard': SIZE, 'versions': versions()}
+def _header(job: DatasetJob) -> dict:
+    """All that the shards depend on."""
+    return {'recipe': job.recipe.data, 'digest': job.recipe.digest, 'count': job.count,
+            'format': job.format, 'falls_per_shard': FALLS_PER_SHARD, 'versions': versions()}
 
 
 def _read(path: Path) -> tuple[dict, list[dict], int]:
-    """Header and entries of a manifest, and where its last whole line ends."""
+    """Header and entries of a manifest, and the end of its last complete line in bytes."""
     try:
         content = path.read_bytes()
         whole = content[:content.rfind(b'\n') + 1]
@@ -122,8 +122,8 @@ def _read(path: Path) -> tuple[dict, list[dict], int]:
     return header, entries, len(whole)
 
 
-def _is_whole(folder: Path, entry: dict, order: Order) -> bool:
-    falls = order.numbers(entry['shard'])
+def _is_complete(folder: Path, entry: dict, job: DatasetJob) -> bool:
+    falls = job.falls_of(entry['shard'])
     return entry['falls'] == [falls.start, falls.stop] and all(
         _has_hash(folder / name, digest) for name, digest in entry['files'].items())
 

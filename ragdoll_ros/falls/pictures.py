@@ -1,4 +1,4 @@
-"""Pictures of a data set: what hits how fast, where falls go, and 24 of them."""
+"""Pictures of a data set: impact speeds, timing, directions, and a contact sheet of falls."""
 from __future__ import annotations
 
 from pathlib import Path
@@ -7,18 +7,17 @@ import numpy as np
 
 from ..model import errors
 from ..model.state import State
-from ..people.real_falls import DESCENT, IMPACT_SPEEDS
-from .dataset import Contents
+from ..people.real_falls import DESCENT, IMPACT_SPEEDS, Known, bones_of
+from .dataset_summary import DatasetSummary
 from .fall import Fall
-from .parts import bones_of
 
 BLUE, GREY = '#1f5fa8', '0.75'
-MOMENTS = 4
-"""Poses of each fall that the contact sheet shows before the last."""
+EARLIER_POSES = 4
+"""Poses of each fall on the contact sheet before the last one."""
 
 
-def draw_all(contents: Contents, falls: list[Fall], folder: Path) -> list[str]:
-    """Write all pictures into a folder; their names in it. Unreadable without matplotlib."""
+def draw_all(summary: DatasetSummary, falls: list[Fall], folder: Path) -> list[str]:
+    """Write all pictures; returns their paths in the folder. Unreadable without matplotlib."""
     try:
         import matplotlib
         matplotlib.use('Agg')
@@ -28,9 +27,9 @@ def draw_all(contents: Contents, falls: list[Fall], folder: Path) -> list[str]:
             '', 'no matplotlib', "pip install 'ragdoll_ros[falls]' for pictures") from None
     (folder / 'pictures').mkdir(exist_ok=True)
     names = []
-    for name, draw in (('speeds', _speeds), ('courses', _courses)):
+    for name, draw in (('speeds', _speeds), ('courses', _timing_and_directions)):
         names.append(f'pictures/{name}.png')
-        figure = draw(pyplot, contents)
+        figure = draw(pyplot, summary)
         figure.savefig(folder / names[-1], dpi=100, bbox_inches='tight')
         pyplot.close(figure)
     names.append('pictures/sheet.png')
@@ -40,29 +39,29 @@ def draw_all(contents: Contents, falls: list[Fall], folder: Path) -> list[str]:
     return names
 
 
-def _speeds(pyplot: object, contents: Contents) -> object:
-    """Of pelvis, head and hand, the speeds at which they hit, beside real falls."""
-    parts = [part for part in IMPACT_SPEEDS if bones_of(part, contents.bones)]
+def _speeds(pyplot: object, summary: DatasetSummary) -> object:
+    """Histograms of the impact speeds of pelvis, head and hand, with those of real falls."""
+    parts = [part for part in IMPACT_SPEEDS if bones_of(part, summary.bones)]
     figure, axes = pyplot.subplots(1, max(len(parts), 1), figsize=(4 * max(len(parts), 1), 3),
                                    squeeze=False)
     for ax, part in zip(axes[0], parts, strict=False):
-        _histogram(ax, contents.speeds_of(part), IMPACT_SPEEDS[part])
-        ax.set_xlabel(f'{part} hits with, m/s downwards')
+        _histogram(ax, summary.speeds_of(part), IMPACT_SPEEDS[part])
+        ax.set_xlabel(f'impact speed of the {part}, m/s')
     axes[0, 0].set_ylabel('share of falls')
     return figure
 
 
-def _courses(pyplot: object, contents: Contents) -> object:
-    """How long falls take, and where they go."""
+def _timing_and_directions(pyplot: object, summary: DatasetSummary) -> object:
+    """Histograms of descent time and time to rest, and of the direction of the fall."""
     figure = pyplot.figure(figsize=(12, 3))
     times = figure.add_subplot(1, 3, 1)
-    _histogram(times, contents.descents[contents.hits], DESCENT)
-    times.set(xlabel='onset to impact, s', ylabel='share of falls')
+    _histogram(times, summary.descents, DESCENT)
+    times.set(xlabel='descent: onset to impact of the pelvis, s', ylabel='share of falls')
     rests = figure.add_subplot(1, 3, 2)
-    _histogram(rests, contents.durations[np.isfinite(contents.durations)], None)
+    _histogram(rests, summary.durations, None)
     rests.set_xlabel('onset to rest, s')
     rose = figure.add_subplot(1, 3, 3, projection='polar')
-    angles = np.radians(contents.directions[contents.hits])
+    angles = np.radians(summary.directions[summary.hits])
     counts, edges = np.histogram(angles % (2 * np.pi), 24, (0, 2 * np.pi))
     rose.bar(edges[:-1], counts, width=np.diff(edges), align='edge', color=BLUE)
     rose.set_theta_zero_location('N')
@@ -71,8 +70,8 @@ def _courses(pyplot: object, contents: Contents) -> object:
     return figure
 
 
-def _histogram(axes: object, values: np.ndarray, known: object) -> None:
-    """Shares of values, and over them mean and deviation of what is known of real falls."""
+def _histogram(axes: object, values: np.ndarray, known: Known | None) -> None:
+    """Histogram of values in shares, with mean and standard deviation of real falls."""
     if len(values):
         axes.hist(values, 40, weights=np.full(len(values), 1 / len(values)), color=BLUE)
     if known is not None:
@@ -83,7 +82,7 @@ def _histogram(axes: object, values: np.ndarray, known: object) -> None:
 
 
 def _sheet(pyplot: object, falls: list[Fall]) -> object:
-    """Each fall seen across the way it goes, from light to dark, to scale."""
+    """Each fall seen from the side, poses from light to dark, to scale."""
     rows = -(-len(falls) // 6)
     figure, axes = pyplot.subplots(rows, 6, figsize=(15, 2.6 * rows), squeeze=False)
     for ax in axes.ravel():
@@ -100,12 +99,12 @@ def _draw_fall(axes: object, fall: Fall) -> None:
     if fall.valid:
         last = fall.valid - 1
         until = min(last, fall.phases.rest or last)
-        moments = np.linspace(0, until, MOMENTS + 1).round().astype(int)
-        across = _way(fall)
-        for place, frame in enumerate(moments):
-            for outline in _outlines(fall, frame, across):
+        frames = np.linspace(0, until, EARLIER_POSES + 1).round().astype(int)
+        along = _fall_direction(fall)
+        for place, frame in enumerate(frames):
+            for outline in _outlines(fall, frame, along):
                 axes.add_patch(Polygon(outline, closed=True, fc=BLUE, ec='white', lw=0.3,
-                                       alpha=0.15 + 0.75 * (place / MOMENTS) ** 2))
+                                       alpha=0.15 + 0.75 * (place / EARLIER_POSES) ** 2))
         axes.set_aspect('equal')
         axes.autoscale_view()
         title += ': failed' if fall.failure else f': {_direction(fall)}'
@@ -116,16 +115,16 @@ def _direction(fall: Fall) -> str:
     return 'no impact' if fall.phases.impact is None else f'{fall.direction:.0f}°'
 
 
-def _way(fall: Fall) -> np.ndarray:
-    """Direction (3,) along the ground in which the centre of mass goes, world frame."""
+def _fall_direction(fall: Fall) -> np.ndarray:
+    """Unit vector (3,) along which the centre of mass moves horizontally, world frame."""
     centres = np.einsum('tnk,n->tk', fall.states[:fall.valid, :, :3], fall.masses)
-    way = (centres[-1] - centres[0]) * (1, 1, 0)
-    length = np.linalg.norm(way)
-    return way / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
+    moved = (centres[-1] - centres[0]) * (1, 1, 0)
+    length = np.linalg.norm(moved)
+    return moved / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
 
 
 def _outlines(fall: Fall, frame: int, along: np.ndarray) -> list[np.ndarray]:
-    """Outlines (c, 2) m of all bones as seen across ``along``, farthest first."""
+    """Outlines (c, 2) m of all bones projected on the plane of ``along`` and z, farthest first."""
     state = State.of(fall.states[frame])
     across = np.cross(along, (0, 0, 1))
     order = np.argsort(-(state.positions @ across))

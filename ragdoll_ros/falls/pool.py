@@ -1,4 +1,4 @@
-"""Shards made by processes on this machine."""
+"""Make shards in a pool of processes on this machine."""
 from __future__ import annotations
 
 import multiprocessing
@@ -12,35 +12,34 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.connection import Connection
 
 from ..model.errors import RagdollError
-from .shard import Order, Shard, make_shard
+from .shard import DatasetJob, Shard, make_shard
 
-AHEAD = 2
-"""Shards that wait or are made for each worker: no more, so that memory stays as it is."""
+QUEUED_PER_WORKER = 2
+"""Shards queued or in work per worker, which bounds the memory."""
 
-TRIES = 4
-"""Times that a shard is begun whose worker dies."""
+MAX_ATTEMPTS = 4
+"""Attempts at a shard whose worker dies."""
 
 
 class WorkersDied(RagdollError):
-    """A shard that ends every process which makes it."""
+    """A shard ended every process that tried to make it."""
 
 
-def make_shards(order: Order, shards: Iterable[int], workers: int) -> Iterator[Shard]:
-    """Shards by their numbers, made by ``workers`` processes, each as soon as it is done.
+def make_shards(job: DatasetJob, shards: Iterable[int], workers: int) -> Iterator[Shard]:
+    """Yield shards, made by ``workers`` processes, each as soon as it is done.
 
-    A process that dies takes what it made with it, which others make again: WorkersDied after
-    TRIES of the same.
+    Shards of a process that dies are made again; WorkersDied after MAX_ATTEMPTS at one of them.
     """
-    left, tries = list(shards)[::-1], Counter()
+    left, attempts = list(shards)[::-1], Counter()
     while left:
-        watched, held = multiprocessing.Pipe(duplex=False)
-        # Not by fork: what threads hold at that instant is held for ever in the child.
+        child_end, parent_end = multiprocessing.Pipe(duplex=False)
+        # Not by fork: locks that other threads hold would stay locked in the child.
         pool = ProcessPoolExecutor(workers, multiprocessing.get_context('spawn'), _start,
-                                   (order, watched))
+                                   (job, child_end))
         making: dict[Future, int] = {}
         try:
             while left or making:
-                while left and len(making) < AHEAD * workers:
+                while left and len(making) < QUEUED_PER_WORKER * workers:
                     making[pool.submit(_make, left[-1])] = left[-1]
                     left.pop()
                 for done in wait(making, return_when=FIRST_COMPLETED).done:
@@ -48,34 +47,32 @@ def make_shards(order: Order, shards: Iterable[int], workers: int) -> Iterator[S
                     del making[done]
                     yield shard
         except BrokenProcessPool:
-            _count(tries, making.values())
+            _count_attempts(attempts, making.values())
             left += sorted(making.values(), reverse=True)
         finally:
-            held.close()
+            parent_end.close()
             pool.shutdown(cancel_futures=True)
 
 
-def _count(tries: Counter, shards: Iterable[int]) -> None:
-    tries.update(shards)
-    shard, most = tries.most_common(1)[0]
-    if most >= TRIES:
-        raise WorkersDied(f'shard {shard}: {most} processes died that were to make it')
+def _count_attempts(attempts: Counter, shards: Iterable[int]) -> None:
+    attempts.update(shards)
+    shard, most = attempts.most_common(1)[0]
+    if most >= MAX_ATTEMPTS:
+        raise WorkersDied(f'shard {shard}: {most} processes died while making it')
 
 
-def _start(order: Order, watched: Connection) -> None:
-    """Begin as a worker: leave Ctrl-C to who started it, and end when that closes its end of a
-    pipe, or dies, whatever is being made.
-    """
-    global _order
-    _order = order
+def _start(job: DatasetJob, child_end: Connection) -> None:
+    """Initialise a worker: ignore Ctrl-C, and exit when the parent closes the pipe or dies."""
+    global _job
+    _job = job
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with, args=(watched,), daemon=True).start()
+    threading.Thread(target=_exit_with, args=(child_end,), daemon=True).start()
 
 
-def _end_with(watched: Connection) -> None:
-    watched.poll(None)
+def _exit_with(child_end: Connection) -> None:
+    child_end.poll(None)
     os._exit(1)
 
 
 def _make(shard: int) -> Shard:
-    return make_shard(_order, shard)
+    return make_shard(_job, shard)

@@ -1,6 +1,6 @@
-"""A recipe: how falls are drawn, simulated and recorded; read and checked with all errors at once.
+"""A recipe: how falls are drawn, simulated and recorded. All errors are reported at once.
 
-The form is that of config/recipe.schema.json.
+Its schema is config/recipe.schema.json.
 """
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ from ..model import errors
 from ..model.errors import ModelError
 from ..model.ragdoll import Ragdoll
 from ..people import person, standard
-from .checks import RATE, mounted, names_of, ranges_of, value_errors
+from ..people.fall_phases import ONSET_SPEED, REST_SPEED
+from .checks import RATE, angle_limits_deg, checked_mount, names_of, value_errors
 from .distribution import draw
 
 DEFAULTS = {
@@ -33,18 +34,18 @@ START = {
 PUSH = {'towards_deg': 0.0, 'upwards_deg': 0.0, 'at': 0.0, 'duration': 0.1}
 GROUND = {'friction': 0.7, 'restitution': 0.0, 'slope_deg': 0.0, 'downhill_deg': 0.0}
 RECORD = {'rate': RATE, 'what': ['poses', 'velocities', 'angles', 'touching'], 'imus': []}
-PHASES = {'onset_speed': 0.1, 'rest_speed': 0.05}
+PHASES = {'onset_speed': ONSET_SPEED, 'rest_speed': REST_SPEED}
 
 DRAWN = ('seed', 'who', 'start', 'pushes', 'limp', 'ground')
-"""What falls are drawn from. Recipes that differ in nothing of it have the same falls, however
-finely they are simulated and whatever of them is recorded."""
+"""Keys that determine the draws: recipes that agree in these have the same falls."""
+
 
 @dataclass(frozen=True)
 class Recipe:
-    """What a file says, with its defaults filled in and its ``dolls`` read; of people, one of
-    middle size, of whose bones and joints they all are.
+    """A recipe's ``data`` with defaults filled in, and its ``dolls``; of people, one of average
+    size, whose bones and joints all of them have.
 
-    ``data`` is plain, and names nothing outside itself.
+    ``data`` is plain JSON data and refers to no other file.
     """
 
     name: str
@@ -53,58 +54,55 @@ class Recipe:
 
     @property
     def frames(self) -> int:
-        """Of each fall, the start's among them."""
+        """Number of frames of each fall, including the start."""
         return round(self.data['duration'] * self.rate)
 
     @property
     def rate(self) -> int:
-        """Frames in each s."""
+        """Frames per second."""
         return self.data['record']['rate']
 
     @property
-    def what(self) -> list[str]:
-        """What of each frame is recorded."""
+    def recorded(self) -> list[str]:
+        """Quantities recorded in each frame."""
         return self.data['record']['what']
 
     @property
-    def parts(self) -> int:
-        """Samples of a sensor in each frame."""
+    def samples_per_frame(self) -> int:
+        """Sensor samples in each frame."""
         return self.data['record'].get('imu_rate', self.rate) // self.rate
 
     @property
     def imus(self) -> list[dict]:
-        """Sensors that are worn: name, bone, position m and orientation along the bone's axes, and
-        of ImuErrors what is given.
-        """
+        """Inertial sensors: name, bone, position m and orientation on the bone, of ImuErrors."""
         return self.data['record']['imus']
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 of all that the recipe says, in hexadecimal digits."""
+        """SHA-256 of the recipe's data, in hexadecimal digits."""
         return _digest(self.data)
 
     @cached_property
-    def key(self) -> int:
-        """What all draws depend on beside a fall's number: 128 bits of what is drawn from."""
+    def philox_key(self) -> int:
+        """Key of the random generator, 128 bits: a hash of the DRAWN keys."""
         return int(_digest({key: self.data[key] for key in DRAWN})[:32], 16)
 
     def doll(self, who: dict | int) -> Ragdoll:
-        """Who falls, as draw() tells."""
+        """The doll that falls; ``who`` is as returned by draw()."""
         if isinstance(who, int):
             return self.dolls[who]
         return person(who['height'], who['bmi'] * who['height'] ** 2, who['sex'])
 
     def draw(self, number: int) -> dict:
-        """All that is drawn for fall ``number``: the recipe's ``start``, ``pushes``, ``limp`` and
-        ``ground`` with a value in the place of each distribution, and ``who`` falls: the number of
+        """Draw the values of fall ``number``: the recipe's ``start``, ``pushes``, ``limp`` and
+        ``ground`` with a value in the place of each distribution, and ``who`` falls: the index of
         a doll, or a person's sex, height m and bmi kg/m^2.
 
-        By Philox (Salmon et al., Parallel Random Numbers: As Easy as 1, 2, 3, 2011), whose key is
-        the recipe's and whose counter begins at the fall's number times 2^192: no fall needs
-        another's.
+        The generator is Philox (Salmon et al., Parallel Random Numbers: As Easy as 1, 2, 3, 2011);
+        its counter begins at the fall's number times 2^192, so falls are drawn independently.
         """
         errors.check_range('fall', number, 0, 2 ** 63)
-        philox = np.random.Philox(key=self.key, counter=[0, 0, 0, number])
+        philox = np.random.Philox(key=self.philox_key, counter=[0, 0, 0, number])
         generator = np.random.Generator(philox)
         values = draw({key: self.data[key] for key in ('start', 'pushes', 'limp', 'ground')},
                       generator)
@@ -117,20 +115,20 @@ class Recipe:
 
 
 def load_recipe(name: str | Path) -> Recipe:
-    """Read a recipe by its path or its name in config/; ModelErrors with all that is wrong."""
+    """Read a recipe by its path or its name in config/; ModelErrors lists every error."""
     data, path = read_by_name(str(name))
     return value_or_raise(path, *build_recipe(data, path))
 
 
 def recipe_of(data: dict) -> Recipe:
-    """The recipe whose ``data`` this is."""
+    """The recipe with this complete ``data``."""
     dolls = [value_or_raise(Path('recipe'), *build_doll(doll))
              for doll in data['who'].get('dolls', ())] or [person(*standard('female'), 'female')]
     return Recipe(data['name'], data, tuple(dolls))
 
 
 def build_recipe(data: object, path: Path) -> tuple[Recipe | None, list[ModelError]]:
-    """Make a recipe from what the YAML file at ``path`` holds: it, or None and every error."""
+    """Make a recipe from the data of the YAML file at ``path``: it, or None and every error."""
     found = schema_errors('recipe', data)
     if not isinstance(data, dict):
         return None, found
@@ -146,7 +144,8 @@ def build_recipe(data: object, path: Path) -> tuple[Recipe | None, list[ModelErr
                           ('phases', PHASES)):
         whole[key] = {**defaults, **whole[key]}
     whole['pushes'] = [{**PUSH, **push} for push in whole['pushes']]
-    whole['record']['imus'] = [{**mount, **mounted(mount)} for mount in whole['record']['imus']]
+    whole['record']['imus'] = [
+        {**mount, **checked_mount(mount)} for mount in whole['record']['imus']]
     whole['start'] = _with_all_angles(whole['start'], dolls[0])
     name = whole.setdefault('name', path.stem)
     return Recipe(name, whole, tuple(dolls)), []
@@ -157,7 +156,7 @@ def _digest(data: object) -> str:
 
 
 def _dolls(data: dict, path: Path) -> tuple[list[Ragdoll], list[ModelError]]:
-    """The dolls that a recipe names, and what is wrong with them."""
+    """The dolls that a recipe names, and their errors."""
     dolls, found = [], []
     who = data.get('who')
     if isinstance(who, dict) and set(who) == {'people'}:
@@ -183,9 +182,9 @@ def _dolls(data: dict, path: Path) -> tuple[list[Ragdoll], list[ModelError]]:
 
 
 def _with_all_angles(start: dict, doll: Ragdoll) -> dict:
-    """The start with a share of its range for each limited angle that is not given itself."""
+    """The start with ``angle_shares``: a share of its range for each limited angle not given."""
     start = dict(start)
     share = start.pop('other_angles', None)
-    others = sorted(set(ranges_of(doll)) - set(start['angles_deg']))
+    others = sorted(set(angle_limits_deg(doll)) - set(start['angles_deg']))
     start['angle_shares'] = {} if share is None else dict.fromkeys(others, share)
     return start

@@ -1,5 +1,7 @@
-"""A shard: some falls, one after the other, as the bytes of files. It is made from the recipe and
-its number alone, by whoever: the same on every worker, in every order.
+"""A shard: consecutive falls of a data set, as the bytes of its files.
+
+It depends on the recipe and the shard's number alone, so it is the same on every worker and in
+every order.
 """
 from __future__ import annotations
 
@@ -10,50 +12,50 @@ from .formats.registry import resolve_format
 from .recipe import Recipe
 from .simulate import generate
 
-SIZE = 50
-"""Falls in each shard but the last. What a worker loses that dies: a few s of work."""
+FALLS_PER_SHARD = 50
+"""Of each shard but the last: a worker that dies loses a few seconds of work."""
 
-MOST_FALLS = 10 ** 9
+MAX_FALLS = 10 ** 9
 
 
 @dataclass(frozen=True)
-class Order:
-    """Falls 0 to ``count`` of a recipe, in a format; what is asked for as a whole."""
+class DatasetJob:
+    """A data set to be generated: falls 0 to ``count`` - 1 of a recipe, in a format."""
 
     recipe: Recipe
     count: int
     format: str = 'lerobot'
 
     def __post_init__(self) -> None:
-        if not 1 <= self.count <= MOST_FALLS:
-            raise OutOfRange('count', self.count, f'1 to {MOST_FALLS}')
+        if not 1 <= self.count <= MAX_FALLS:
+            raise OutOfRange('count', self.count, f'1 to {MAX_FALLS}')
         getattr(resolve_format(self.format), 'check', lambda recipe: None)(self.recipe)
 
     @property
     def shards(self) -> int:
-        """How many there are in all."""
-        return -(-self.count // SIZE)
+        """Number of shards."""
+        return -(-self.count // FALLS_PER_SHARD)
 
-    def numbers(self, shard: int) -> range:
-        """The falls of a shard."""
-        return range(shard * SIZE, min((shard + 1) * SIZE, self.count))
+    def falls_of(self, shard: int) -> range:
+        """Numbers of the falls of a shard."""
+        return range(shard * FALLS_PER_SHARD, min((shard + 1) * FALLS_PER_SHARD, self.count))
 
 
 @dataclass(frozen=True)
 class Shard:
-    """What became of one."""
+    """A finished shard."""
 
     number: int
     falls: range
     files: dict[str, bytes]
     """By their paths in the data set's folder."""
     failures: dict[int, str]
-    """Why falls failed, by their numbers."""
+    """Reasons of falls that failed, by their numbers."""
 
 
-def make_shard(order: Order, shard: int) -> Shard:
-    """Simulate the falls of a shard and write them as files."""
-    falls = list(generate(order.recipe, order.numbers(shard)))
-    files = resolve_format(order.format).shard_files(order.recipe, falls, shard)
+def make_shard(job: DatasetJob, shard: int) -> Shard:
+    """Simulate the falls of a shard and encode them as files."""
+    falls = list(generate(job.recipe, job.falls_of(shard)))
+    files = resolve_format(job.format).shard_files(job.recipe, falls, shard)
     failures = {fall.number: fall.failure for fall in falls if fall.failure}
-    return Shard(shard, order.numbers(shard), files, failures)
+    return Shard(shard, job.falls_of(shard), files, failures)

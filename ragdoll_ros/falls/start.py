@@ -1,4 +1,4 @@
-"""From what was drawn for a fall to how it begins: scene, coordinates, pushes."""
+"""Initial conditions of a fall from its drawn values: scene, coordinates, pushes."""
 from __future__ import annotations
 
 import math
@@ -18,8 +18,8 @@ GRAVITY = (0.0, 0.0, -9.8)
 
 
 @dataclass(frozen=True)
-class Limp:
-    """Joint ``angles`` that are let go ``at`` ns, None: all that are still held."""
+class JointRelease:
+    """Joint ``angles`` released ``at`` ns; None: all that are still held."""
 
     at: int
     angles: list[str] | None
@@ -27,27 +27,27 @@ class Limp:
 
 @dataclass(frozen=True)
 class Start:
-    """How fall ``number`` of a recipe begins; ``drawn`` is Recipe.draw's."""
+    """Initial conditions of fall ``number`` of a recipe; ``drawn`` is from Recipe.draw."""
 
     number: int
     drawn: dict
     scene: Scene
     clearance: float
-    """m that the lowest point is to be above the ground."""
+    """Height of the lowest point above the ground, m."""
     angles: dict[str, float]
-    """Joint angles, rad, by name, that are not zero."""
+    """Nonzero joint angles, rad, by name."""
     pushes: tuple[Push, ...]
-    limp: tuple[Limp, ...]
-    """In the order of their instants; without any, nothing is held."""
+    limp: tuple[JointRelease, ...]
+    """In order of time; without any, no joint is held."""
 
     @property
-    def last_act(self) -> int:
-        """When the last push ends or the last joint goes limp, ns; 0 without any."""
+    def last_event(self) -> int:
+        """Time of the end of the last push or of the last joint release, ns; 0 without any."""
         ends = [round((push.start + push.duration) * SECOND) for push in self.pushes]
         return max([0, *ends, *(limp.at for limp in self.limp)])
 
     def coordinates(self, bound: GeneralizedState) -> GeneralizedState:
-        """Of the start at the height at which ``bound``, the scene's own, is."""
+        """Coordinates of the start, at the position of ``bound``, the scene's own."""
         layout = DofLayout([placement.doll for placement in self.scene.dolls])
         angles = layout.joint_angles(bound.q)
         for name, angle in self.angles.items():
@@ -56,11 +56,11 @@ class Start:
 
 
 def start_of(recipe: Recipe, number: int) -> Start:
-    """How fall ``number`` of a recipe begins, from the recipe and the number alone."""
+    """Initial conditions of fall ``number``; they depend on recipe and number alone."""
     drawn = recipe.draw(number)
     doll, start = recipe.doll(drawn['who']), drawn['start']
     heading = rotation.from_axis_angle((0, 0, 1), math.radians(start['heading_deg']))
-    orientation = (_any_orientation(*start['shares']) if start['tumbled']
+    orientation = (_uniform_orientation(*start['shares']) if start['tumbled']
                    else rotation.multiply(heading, _lean(start)))
     faced = orientation if start['tumbled'] else heading
     placement = Placement(doll, orientation=tuple(orientation),
@@ -72,19 +72,19 @@ def start_of(recipe: Recipe, number: int) -> Start:
                   step=1 / recipe.rate)
     return Start(number, drawn, scene, start['clearance'], _angles(doll, start),
                  tuple(_push(push, heading) for push in drawn['pushes']),
-                 tuple(sorted((Limp(round(each['at'] * SECOND), each.get('angles'))
+                 tuple(sorted((JointRelease(round(each['at'] * SECOND), each.get('angles'))
                                for each in drawn['limp']), key=lambda limp: limp.at)))
 
 
 def _lean(start: dict) -> np.ndarray:
-    """Turn (4,) that tilts what is upright towards a direction of the horizontal."""
+    """Rotation (4,) that tilts the upright doll towards a horizontal direction."""
     sine, cosine = sine_and_cosine(math.radians(start['lean_towards_deg']))
     return rotation.from_axis_angle((-sine, cosine, 0.0), math.radians(start['lean_deg']))
 
 
-def _any_orientation(first: float, second: float, third: float) -> np.ndarray:
-    """One of all orientations (4,), none likelier than another, from three shares (Shoemake,
-    Uniform Random Rotations, Graphics Gems III, 1992).
+def _uniform_orientation(first: float, second: float, third: float) -> np.ndarray:
+    """Uniformly distributed orientation (4,) from three numbers in [0, 1) (Shoemake, Uniform Random
+    Rotations, Graphics Gems III, 1992).
     """
     (s1, c1), (s2, c2) = (sine_and_cosine(2 * math.pi * share) for share in (second, third))
     low, high = math.sqrt(1 - first), math.sqrt(first)
@@ -92,14 +92,14 @@ def _any_orientation(first: float, second: float, third: float) -> np.ndarray:
 
 
 def _ground(drawn: dict) -> Ground:
-    """A plane whose normal leans downhill."""
+    """A plane whose normal is tilted downhill."""
     sine, cosine = sine_and_cosine(math.radians(drawn['slope_deg']))
     y, x = sine_and_cosine(math.radians(drawn['downhill_deg']))
     return Ground((sine * x, sine * y, cosine))
 
 
 def _angles(doll: Ragdoll, start: dict) -> dict[str, float]:
-    """Joint angles, rad, by name, that a start gives."""
+    """Initial joint angles, rad, by name."""
     limits = {name: pair for joint in doll.joints
               for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
     angles = {name: limits[name][0] + share * (limits[name][1] - limits[name][0])

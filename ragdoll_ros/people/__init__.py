@@ -1,4 +1,4 @@
-"""People as dolls: bodies of a height, mass and sex, and what holds them upright."""
+"""People as dolls: bodies of a given height, mass and sex; standing; phases of their falls."""
 from .person import person, standard
 from .standing import standing
 

@@ -18,7 +18,7 @@ examples:
   ros2 run ragdoll_ros ragdoll_node --ros-args -p scene:=person.yaml
 
 Masses, centres and inertias are de Leva's of 1996 (J Biomech 29:1223); the percentiles ANSUR II's.
-Exit code 0: done; 2: an option is wrong, or the file can not be written."""
+Exit code 0: done; 2: an option is wrong, or the file cannot be written."""
 
 HEAD = """\
 A person as a doll: {sex}, {height:g} m, {mass:g} kg; soles on z = 0.
@@ -27,12 +27,12 @@ Masses, centres of mass and inertias: de Leva 1996. Shapes: lengths, and girths 
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command; exit code 0, 2 where an option is wrong or the file can not be written."""
+    """Run the command; exit code 2 if an option is wrong or the file cannot be written."""
     options = _parser().parse_args(arguments)
     try:
-        usual = standard(options.sex, options.percentile)
-        height = usual[0] if options.height is None else options.height
-        mass = usual[1] if options.mass is None else options.mass
+        average = standard(options.sex, options.percentile)
+        height = average[0] if options.height is None else options.height
+        mass = average[1] if options.mass is None else options.mass
         doll = person(height, mass, options.sex, Path(options.output).stem)
         save_doll(doll, options.output, HEAD.format(sex=options.sex, height=height, mass=mass))
     except errors.RagdollError as error:
@@ -51,21 +51,21 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         'ragdoll_person', description=__doc__, epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--sex', choices=SEXES, required=True, help='whose table is taken')
+    parser.add_argument('--sex', choices=SEXES, required=True, help='selects the table')
     parser.add_argument('--height', type=float, metavar='M',
                         help="standing height, m, 1.0 to 2.1 (default: the percentile's)")
     parser.add_argument('--mass', type=float, metavar='KG',
                         help="kg, 15 to 160 (default: the percentile's)")
     parser.add_argument('--percentile', type=int, choices=PERCENTILES['male'], default=50,
-                        help='of US soldiers: what is taken of height and mass if not given '
+                        help='percentile of US soldiers for height and mass if not given '
                              '(default 50)')
     parser.add_argument('-o', '--output', metavar='DOLL.yaml', default='person.yaml',
-                        help='where the doll goes (default person.yaml)')
+                        help='output file (default person.yaml)')
     return parser
 
 
 def _table(doll: Ragdoll) -> str:
-    """Mass and inertia of each bone; of limbs the left one."""
+    """Mass, centre and inertia of each bone; of limbs the left ones."""
     lines = [f'{"bone":16} {"kg":>7} {"centre x, z, m":>16} {"Ixx, Iyy, Izz, kg m^2":>30}']
     for bone in doll.bones:
         if not bone.name.startswith('right_'):

@@ -1,15 +1,14 @@
-"""A person's joints: their axes, ranges, damping, and names after REP 155.
+"""Joints of a person: axes, ranges, damping, and names after REP 155.
 
-Angles are the child's relative to its parent, right-handed: pitch about y (to the left), roll about
-x (forwards), yaw about z (up) of trunk and head, of limbs about their length, down. So a thigh that
-is lifted forwards has a negative pitch, a bent knee a positive one, a bent elbow a negative one, a
-nod a positive one.
+Angles are those of the child relative to its parent, right-handed: pitch about y (left), roll about
+x (forwards), yaw about z (up) for trunk and head, about the length (down) for limbs. Flexion is
+negative at hips and elbows, positive at knees and neck.
 
 Ranges are the norms of the American Academy of Orthopaedic Surgeons (Joint Motion: Method of
-Measuring and Recording, 1965); of the trunk half at the waist, half at the chest. A swing to the
-side ends at 85 degrees, as ball joints do here: an arm goes higher by its pitch. Between their ends
-joints are damped alone: torques of tissue grow there (exponentially, by Anderson 1999 as used by
-Falisse 2019), and the limit stands for that.
+Measuring and Recording, 1965), of the trunk half at the waist, half at the chest. Abduction of an
+arm ends at 85 degrees, the limit of ball joints here; it goes higher by its pitch. Within the range
+there is only damping: passive torques that grow exponentially near its ends (Anderson 1999 as used
+by Falisse 2019) are replaced by the limits.
 """
 from __future__ import annotations
 
@@ -21,17 +20,17 @@ from .places import SIDES, Places
 
 DAMPING = 0.1
 """N m s/rad on each axis of a man of the table: Falisse et al. 2019 (J R Soc Interface
-16:20190402). Others' goes with mass times height squared, as the torques that move them do."""
+16:20190402). It scales with mass times height squared, as the torques do."""
 
-MAN = 73.0
-"""kg, the table's."""
+MEAN_MASS = 73.0
+"""kg, of the man of that table."""
 
 FORWARDS, LEFT, UP, DOWN = (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, -1)
 
 
 def joints(at: Places, height: float, mass: float) -> tuple[Joint, ...]:
-    """All 15 joints of a person whose joints are ``at`` these places."""
-    damping = DAMPING * (mass / MAN) * (height / MEN.height) ** 2
+    """All 15 joints of a person with the landmarks ``at``."""
+    damping = DAMPING * (mass / MEAN_MASS) * (height / MEN.height) ** 2
 
     def spine(parent: str, child: str, z: float, names: tuple[str, str, str],
               roll: float, pitch: Limits, yaw: float) -> Joint:
@@ -58,8 +57,7 @@ def _arm(side: str, left: float, at: Places, damping: float) -> list[Joint]:
               ((-180, 60), _mirrored(-20, 85, left), _mirrored(-70, 90, left))),
         Joint(upper, fore, 'hinge', at.proximal(fore), (LEFT,), _radians(((-150, 0),)), damping,
               (f'{s}_elbow',)),
-        _limb(fore, hand, at, 'wrist', damping,
-              ((-80, 70), _mirrored(-30, 20, left), (-80, 80)))]
+        _limb(fore, hand, at, 'wrist', damping, ((-80, 70), _mirrored(-30, 20, left), (-80, 80)))]
 
 
 def _leg(side: str, left: float, at: Places, damping: float) -> list[Joint]:
@@ -77,14 +75,14 @@ def _leg(side: str, left: float, at: Places, damping: float) -> list[Joint]:
 
 def _limb(parent: str, child: str, at: Places, joint: str, damping: float,
           ranges: tuple[Limits, Limits, Limits]) -> Joint:
-    """A ball joint of what hangs: pitch first, so that it may go beyond 85 degrees."""
+    """A ball joint of a hanging limb: pitch first, so that it may go beyond 85 degrees."""
     names = tuple(f'{child[0]}_{axis}_{joint}' for axis in 'pry')
     return Joint(parent, child, 'ball', at.proximal(child), (DOWN, LEFT), _radians(ranges), damping,
                  names)
 
 
 def _mirrored(lower: float, upper: float, left: float) -> Limits:
-    """A range of the left as it is on a side: what is outwards stays outwards."""
+    """The range of the left side, mirrored for the right side."""
     return (lower, upper) if left > 0 else (-upper, -lower)
 
 

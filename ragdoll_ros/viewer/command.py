@@ -1,4 +1,4 @@
-"""Shows the doll on a page in the browser: a scene of its own, or that of a node `ragdoll`."""
+"""Serves a page that shows dolls in a browser: of a node `ragdoll`, a scene, or a recording."""
 from __future__ import annotations
 
 import argparse
@@ -25,26 +25,26 @@ from ..physics.engine.registry import ENGINES
 from .sources.source import Source
 
 if TYPE_CHECKING:
-    from .start_when_visible import Opening
+    from .start_when_visible import StartWhenVisible
 
 PORT = 8080
 LAST_PORT = 65535
 HOST = '127.0.0.1'
 
-OPEN_TO_ALL = ('Whoever reaches this machine at port {} may steer the dolls and write into {}; '
-               '--host 127.0.0.1 serves this machine alone')
+PUBLIC_WARNING = ('Whoever reaches this machine at port {} may steer the dolls and write into {}; '
+                  '--host 127.0.0.1 serves this machine alone')
 
-OWN_FOLDER = 'ragdolls'
-"""Of the user's home: where the page keeps files unless --folder names another."""
+DEFAULT_FOLDER = 'ragdolls'
+"""In the user's home: where the page keeps files without --folder."""
 
 REMEDIES = {
-    errno.EADDRINUSE: f'without --port, the next free one from {PORT} on is taken',
-    errno.EACCES: 'ports below 1024 are for root alone, unless the system says otherwise: expected '
+    errno.EADDRINUSE: f'without --port, the next free one from {PORT} on is used',
+    errno.EACCES: 'ports below 1024 need root rights, unless the system allows them: expected '
                   f'one from 1024 to {LAST_PORT}'}
-"""What to do about a port that cannot be had."""
+"""What to do about a port that cannot be used."""
 
-ENDING = 0.5
-"""s that viser may take to say goodbye to its pages."""
+STOP_TIMEOUT = 0.5
+"""s that viser may take to close its connections."""
 
 EXAMPLE = """examples:
   ragdoll_viewer                          show the node `ragdoll`
@@ -52,31 +52,31 @@ EXAMPLE = """examples:
   ragdoll_viewer --scene doll.yaml        simulate a doll or scene here
   ragdoll_viewer --scene crowd --port 9000 --engine bullet
   ragdoll_viewer --play run.mcap          show a recording
-  ragdoll_viewer --static out/ --scene drop     write a page that needs no server
+  ragdoll_viewer --static out/ --scene drop     write a page that works without a server
 """
 
 NO_VISER = ("ragdoll_viewer needs viser: pip install 'ragdoll_ros[viewer]', or, for the Python of "
             "Ubuntu's ROS, PIP_BREAK_SYSTEM_PACKAGES=1 pip install viser")
 
-NO_ROS = ("without --scene, ragdoll_viewer listens to a node over ROS 2: source ROS, or "
+NO_ROS = ("without --scene, ragdoll_viewer shows a node over ROS 2: source ROS, or "
           "pip install 'ragdoll_ros[ros]', or name a scene: ragdoll_viewer --scene drop")
 
 
 class CannotServe(errors.RagdollError):
-    """No page can be served as asked: with what would be right."""
+    """No page can be served with these options."""
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Serve the page until SIGINT or SIGTERM; 2 if it cannot be as asked."""
+    """Serve the page until SIGINT or SIGTERM; exit code 2 if the options do not allow it."""
     arguments = sys.argv[1:] if arguments is None else arguments
     at = arguments.index('--ros-args') if '--ros-args' in arguments else len(arguments)
     options, for_ros = parser().parse_args(arguments[:at]), arguments[at:]
-    stop = stopped_by_signals()
+    stop = stop_on_signals()
     try:
         if importlib.util.find_spec('viser') is None:
-            # Said before machine code is made, which takes half a minute.
+            # Checked before the kernels are compiled, which takes half a minute.
             raise CannotServe(NO_VISER)
-        check(options, for_ros)
+        check_options(options, for_ros)
         if options.static is not None:
             write_static(options, for_ros)
         else:
@@ -87,11 +87,11 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def stopped_by_signals() -> threading.Event:
-    """What SIGINT and SIGTERM set.
+def stop_on_signals() -> threading.Event:
+    """An event that SIGINT and SIGTERM set.
 
-    A handler runs within whatever the main thread does, a wait for the event too, which holds its
-    lock: it hands on to a thread, through a queue that may be put into within itself.
+    A handler may interrupt the main thread while that holds the event's lock. So it only puts into
+    a queue, which is reentrant, and a thread sets the event.
     """
     stop, signals = threading.Event(), queue.SimpleQueue()
 
@@ -106,35 +106,34 @@ def stopped_by_signals() -> threading.Event:
 
 
 def parser() -> argparse.ArgumentParser:
-    """Options of the command."""
+    """Parser of the command line."""
     parser = argparse.ArgumentParser(
         'ragdoll_viewer', description=__doc__, epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter)
     shown = parser.add_mutually_exclusive_group()
-    shown.add_argument('--play', metavar='RUN.mcap', help='show what the page, or '
-                       '`ros2 bag record`, has recorded')
-    shown.add_argument('--scene', help='a name in config/ or a path: simulate it here, without '
-                        'ROS (else: listen to the node `ragdoll`)')
-    parser.add_argument('--static', metavar='FOLDER', help='serve nothing: write the fall of the '
-                        '--scene, or the run to --play, as FOLDER/index.html, which any web server '
-                        'shows, or a browser without one')
-    parser.add_argument('--engine', choices=ENGINES, help='with --scene: what simulates (auto); a '
+    shown.add_argument('--play', metavar='RUN.mcap', help='show a recording of the page or of '
+                       '`ros2 bag record`')
+    shown.add_argument('--scene', help='simulate a scene here, without ROS: a name in config/ or '
+                       'a path (default: show the node `ragdoll`)')
+    parser.add_argument('--static', metavar='FOLDER', help='do not serve: write the fall of '
+                        '--scene, or the run of --play, as FOLDER/index.html, which a browser '
+                        'shows from any web server or from disk')
+    parser.add_argument('--engine', choices=ENGINES, help='physics engine of --scene (auto); a '
                         'node has a parameter for it')
     parser.add_argument('--host', default=HOST, help='address to serve at (%(default)s: this '
                         'machine alone; 0.0.0.0: whoever reaches this machine may steer)')
-    parser.add_argument('--port', type=port, help=f'port to serve at; it must be free ({PORT}, or '
-                        'the next free one)')
-    parser.add_argument('--start-after', type=patience, metavar='S', help='the node waits, started '
-                        'with start_paused: let it go once a page shows it, or after so many s '
-                        'without one')
-    parser.add_argument('--folder', help='where the page saves and loads scenes, and keeps the '
-                        f'characters it is sent (~/{OWN_FOLDER}, made if missing); pages can write '
+    parser.add_argument('--port', type=port, help=f'port ({PORT}, or the next free one)')
+    parser.add_argument('--start-after', type=seconds, metavar='S', help='resume a node that was '
+                        'started with start_paused once a page shows it, or after S seconds '
+                        'without a page')
+    parser.add_argument('--folder', help='where the page saves and loads scenes and uploaded '
+                        f'characters (~/{DEFAULT_FOLDER}, created if missing); pages can write '
                         'nowhere else')
     return parser
 
 
 def port(text: str) -> int:
-    """Read a port's number; 0 stands for any free one."""
+    """Parse a port number; 0 stands for any free port."""
     number = int(text) if text.isdecimal() else -1
     if not 0 <= number <= LAST_PORT:
         raise argparse.ArgumentTypeError(
@@ -142,34 +141,35 @@ def port(text: str) -> int:
     return number
 
 
-def patience(text: str) -> float:
-    """Read for how long to wait for a page, s; inf: until there is one."""
+def seconds(text: str) -> float:
+    """Parse a duration, s, 0 or more; may be inf."""
     try:
-        seconds = float(text)
+        duration = float(text)
     except ValueError:
-        seconds = math.nan
-    if not seconds >= 0:
+        duration = math.nan
+    if not duration >= 0:
         raise argparse.ArgumentTypeError(f'{text}: expected seconds, 0 or more')
-    return seconds
+    return duration
 
 
-def check(options: argparse.Namespace, for_ros: list[str]) -> None:
-    """Refuse, with CannotServe, options that do not go together."""
-    alone = next((f'--{key}' for key in ('scene', 'play') if getattr(options, key) is not None), '')
-    if options.static is not None and (not alone or for_ros):
-        raise CannotServe('--static: expected --scene or --play with it, and nothing of ROS; a '
-                          "node's run is recorded first: ros2 bag record")
-    if alone and for_ros:
-        raise CannotServe(f'{" ".join(for_ros)}: not with {alone}, which does without ROS')
+def check_options(options: argparse.Namespace, for_ros: list[str]) -> None:
+    """Raise CannotServe for options that exclude each other."""
+    chosen = next((f'--{key}' for key in ('scene', 'play')
+                   if getattr(options, key) is not None), '')
+    if options.static is not None and (not chosen or for_ros):
+        raise CannotServe('--static: expected --scene or --play with it, and no ROS arguments; '
+                          "record a node's run first: ros2 bag record")
+    if chosen and for_ros:
+        raise CannotServe(f'{" ".join(for_ros)}: not with {chosen}, which does not use ROS')
     if options.engine is not None and options.scene is None:
         raise CannotServe(f'--engine {options.engine}: only with --scene')
-    if options.start_after is not None and alone:
-        raise CannotServe(f'--start-after {options.start_after:g}: not with {alone}, which waits '
-                          'for a page as long as it takes')
+    if options.start_after is not None and chosen:
+        raise CannotServe(f'--start-after {options.start_after:g}: not with {chosen}, which always '
+                          'waits for a page')
 
 
 def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event) -> None:
-    """Serve the page until told to stop; RagdollError if it cannot be."""
+    """Serve the page until ``stop`` is set; RagdollError."""
     folder = folder_for_files(options.folder)
     number = free_port(options.host, options.port)
     source = make_source(options, for_ros)
@@ -177,34 +177,35 @@ def serve(options: argparse.Namespace, for_ros: list[str], stop: threading.Event
         Page = page_class()
         with server_at(options.host, number) as server:
             page = Page(server, source, folder)
-            page.opening = opening(options, source)
-            print(f'The page is at http://{shown(options.host)}:{server.get_port()}', flush=True)
-            if is_open(options.host):
-                print(OPEN_TO_ALL.format(server.get_port(), folder), file=sys.stderr, flush=True)
+            page.start_when_visible = start_when_visible(options, source)
+            print(f'The page is at http://{url_host(options.host)}:{server.get_port()}', flush=True)
+            if is_public(options.host):
+                print(PUBLIC_WARNING.format(server.get_port(), folder), file=sys.stderr, flush=True)
             page.run(stop)
     finally:
         source.close()
 
 
-def folder_for_files(wanted: str | None) -> Path:
-    """Where the page keeps files: the ``wanted`` folder, or OWN_FOLDER, made if it is missing, or,
-    where that cannot be, one for this run alone; CannotServe if the wanted one cannot be written.
+def folder_for_files(requested: str | None) -> Path:
+    """Where the page keeps files: the ``requested`` folder; CannotServe if it is not writable.
+
+    By default DEFAULT_FOLDER, created if missing, or a temporary one where that is impossible.
     """
-    folder = Path(wanted) if wanted is not None else Path.home() / OWN_FOLDER
-    if wanted is None:
+    folder = Path(requested) if requested is not None else Path.home() / DEFAULT_FOLDER
+    if requested is None:
         try:
             folder.mkdir(exist_ok=True)
         except OSError as error:
             folder = Path(tempfile.mkdtemp(prefix='ragdolls_'))
-            print(f'{error.filename}: {error.strerror}; what the page saves goes to {folder}, '
-                  'unless --folder names another', file=sys.stderr)
+            print(f'{error.filename}: {error.strerror}; the page keeps its files in {folder}; '
+                  '--folder selects another', file=sys.stderr)
     if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
         raise CannotServe(f'--folder {folder}: expected a folder that can be written to')
     return folder
 
 
 def write_static(options: argparse.Namespace, for_ros: list[str]) -> None:
-    """Write the page that needs no server; RagdollError if it cannot be as asked."""
+    """Write the page that needs no server; RagdollError."""
     scene = None if options.scene is None else load_scene(options.scene)
     page_class()
     from .static import fall, save_static
@@ -218,7 +219,7 @@ def write_static(options: argparse.Namespace, for_ros: list[str]) -> None:
 
 
 def page_class() -> type:
-    """Import what takes longest, only once all else is as it should be; CannotServe if it fails."""
+    """Import the page, which takes longest, after all checks; CannotServe without viser."""
     try:
         import viser  # noqa: F401
     except ImportError as error:
@@ -228,34 +229,34 @@ def page_class() -> type:
 
 
 def make_source(options: argparse.Namespace, for_ros: list[str]) -> Source:
-    """Simulate a scene here, play a run, or listen to a node; RagdollError if that cannot be."""
+    """The source that the options select; RagdollError."""
     if options.play is not None:
         from ..recordings.mcap_file import load_recording
-        from .sources.playback import Playback
-        return Playback(load_recording(options.play), Path(options.play).name)
+        from .sources.playback import PlaybackSource
+        return PlaybackSource(load_recording(options.play), Path(options.play).name)
     if options.scene is not None:
         scene = load_scene(options.scene)
-        from .sources.simulated import Simulated
-        return Simulated(scene, options.engine or 'auto')
+        from .sources.simulation import SimulationSource
+        return SimulationSource(scene, options.engine or 'auto')
     try:
-        from .sources.node.source import Remote
+        from .sources.node.source import NodeSource
     except ImportError as error:
         raise CannotServe(f'{error}: {NO_ROS}') from None
-    return Remote(for_ros)
+    return NodeSource(for_ros)
 
 
-def opening(options: argparse.Namespace, source: Source) -> Opening | None:
-    """What lets a scene of its own, or a node that waits, go once it is seen; else None."""
-    from .start_when_visible import Opening
+def start_when_visible(options: argparse.Namespace, source: Source) -> StartWhenVisible | None:
+    """What resumes a scene simulated here, or a paused node, once a page shows it."""
+    from .start_when_visible import StartWhenVisible
     if options.scene is not None:
         source.pause(True)
-        return Opening(source, None)
-    return None if options.start_after is None else Opening(source, options.start_after)
+        return StartWhenVisible(source, None)
+    return None if options.start_after is None else StartWhenVisible(source, options.start_after)
 
 
-def free_port(host: str, wanted: int | None) -> int:
-    """The wanted port, or the first free one from PORT on; CannotServe if there is none."""
-    for port in (wanted,) if wanted is not None else range(PORT, PORT + 100):
+def free_port(host: str, requested: int | None) -> int:
+    """The requested port, or the first free one from PORT on; CannotServe if there is none."""
+    for port in (requested,) if requested is not None else range(PORT, PORT + 100):
         try:
             family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
             with socket.socket(family, socket.SOCK_STREAM) as probe:
@@ -267,15 +268,15 @@ def free_port(host: str, wanted: int | None) -> int:
     remedy = REMEDIES.get(getattr(refused, 'errno', None),
                           f'expected an address of this machine, as {HOST}')
     reason = getattr(refused, 'strerror', None) or refused
-    raise CannotServe(f'--host {host} --port {wanted or PORT}: {reason}; {remedy}')
+    raise CannotServe(f'--host {host} --port {requested or PORT}: {reason}; {remedy}')
 
 
 @contextlib.contextmanager
 def server_at(host: str, port: int) -> Iterator[object]:
-    """Viser's server, without its own words on standard output.
+    """Viser's server, without its output.
 
-    At the end it would wait 6 s for each connection on which nothing was asked yet, such as a
-    browser keeps in reserve: it is left to itself then.
+    It would take 6 s to close each connection without a request, such as a browser keeps in
+    reserve, so it is not waited for longer than STOP_TIMEOUT.
     """
     import viser
     with contextlib.redirect_stdout(io.StringIO()):
@@ -286,17 +287,17 @@ def server_at(host: str, port: int) -> Iterator[object]:
         with contextlib.redirect_stdout(io.StringIO()):
             ending = threading.Thread(target=server.stop, daemon=True)
             ending.start()
-            ending.join(ENDING)
+            ending.join(STOP_TIMEOUT)
 
 
-def is_open(host: str) -> bool:
-    """Whether other machines reach what is served at a host."""
+def is_public(host: str) -> bool:
+    """Whether other machines can reach an address."""
     address = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)[0][4][0]
     return not ipaddress.ip_address(address.partition('%')[0]).is_loopback
 
 
-def shown(host: str) -> str:
-    """Name by which this machine's browser reaches a host."""
+def url_host(host: str) -> str:
+    """Host part of a URL by which a browser on this machine reaches an address."""
     return {'0.0.0.0': '127.0.0.1', '::': '[::1]'}.get(host, f'[{host}]' if ':' in host else host)
 
 

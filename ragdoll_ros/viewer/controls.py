@@ -1,4 +1,4 @@
-"""Buttons and keys: pushes, time, scene."""
+"""Controls of the first tab: pushes, time, scene and engine."""
 from __future__ import annotations
 
 import asyncio
@@ -10,23 +10,24 @@ from ..files.config import scene_names
 from ..model.errors import RagdollError
 from ..physics.engine.registry import ENGINES
 from .push_keys import PushKeys
-from .sources.source import Report, Source
+from .sources.source import Source, SourceStatus
 
-PACES = (0.05, 2.0)
-"""Slowest and fastest of the slider."""
+REAL_TIME_FACTORS = (0.05, 2.0)
+"""Smallest and largest of the slider."""
 
 OTHER = '(other)'
-"""Stands for a scene that has no name in config/."""
+"""Stands for a scene that is not in config/."""
+
 
 class Controls:
-    """The panel's first tab."""
+    """Widgets in the GUI container that is current."""
 
     def __init__(self, server: viser.ViserServer, source: Source) -> None:
         self.source = source
         self.before_step: Callable[[], None] = lambda: None
-        """Called before a single tick is asked for."""
-        self._shown = Report()
-        self._scene_shown = OTHER
+        """Called before a single tick is requested."""
+        self._shown = SourceStatus()
+        self._shown_scene = OTHER
         self._loop = server.get_event_loop()
         gui, is_simulated = server.gui, source.recording is None
         self.pushes = PushKeys(server, source)
@@ -34,18 +35,20 @@ class Controls:
         self.step_button = gui.add_button('Step', icon='player-track-next', disabled=True,
                                           hint='N; while paused; ends editing')
         self.reset = gui.add_button('Reset', icon='player-skip-back', hint='R')
-        self.pace = gui.add_slider('Pace', *PACES, step=0.05, initial_value=1.0,
-                                   hint='simulated seconds for each second on the wall')
+        self.real_time_factor = gui.add_slider(
+            'Real-time factor', *REAL_TIME_FACTORS, step=0.05, initial_value=1.0,
+            hint='simulated time per wall time')
         self.scene = gui.add_dropdown('Scene', (OTHER, *scene_names()), initial_value=OTHER,
                                       visible=is_simulated)
         self.engine = gui.add_dropdown('Engine', ENGINES, initial_value=ENGINES[0],
                                        visible=is_simulated,
-                                       hint='what simulates; another one starts anew')
-        self.pace.on_update(lambda event: event.client and self.source.set_pace(self.pace.value))
-        self.scene.on_update(self._choose)
-        self.engine.on_update(self._choose_engine)
+                                       hint='physics engine; another one restarts the scene')
+        self.real_time_factor.on_update(lambda event: event.client and (
+            self.source.set_real_time_factor(self.real_time_factor.value)))
+        self.scene.on_update(self._on_scene)
+        self.engine.on_update(self._on_engine)
         for button, label, key, action in (
-                (self.pause, 'Pause, or go on', 'space', self.toggle_pause),
+                (self.pause, 'Pause or resume', 'space', self.toggle_pause),
                 (self.step_button, 'Step', 'N', self.step),
                 (self.reset, 'Reset', 'R', source.reset)):
             command = gui.add_command(label, hotkey=key)
@@ -53,71 +56,72 @@ class Controls:
                 trigger(lambda _, action=action: action())
 
     def toggle_pause(self) -> None:
-        """Hold the time, or let it go on."""
-        self.source.pause(not self.source.report.paused)
+        """Pause or resume."""
+        self.source.pause(not self.source.status.paused)
 
     def step(self) -> None:
-        """Make one tick while the time stands."""
+        """Advance by one tick while paused."""
         self.before_step()
         self.source.step()
 
-    def show(self, report: Report) -> None:
-        """Show how the source does."""
-        if report.paused != self._shown.paused:
-            self.pause.label = 'Go on' if report.paused else 'Pause'
-            self.pause.icon = 'player-play' if report.paused else 'player-pause'
-            self.step_button.disabled = not report.paused
-        if report.engine != self._shown.engine:
-            self._show_engine(report.engine)
-        if report.pace != self._shown.pace:
-            self.pace.value = min(max(report.pace, PACES[0]), PACES[1])
-        self._shown = report
+    def show(self, status: SourceStatus) -> None:
+        """Show the status of the source."""
+        if status.paused != self._shown.paused:
+            self.pause.label = 'Resume' if status.paused else 'Pause'
+            self.pause.icon = 'player-play' if status.paused else 'player-pause'
+            self.step_button.disabled = not status.paused
+        if status.engine != self._shown.engine:
+            self._show_engine(status.engine)
+        if status.real_time_factor != self._shown.real_time_factor:
+            lowest, highest = REAL_TIME_FACTORS
+            self.real_time_factor.value = min(max(status.real_time_factor, lowest), highest)
+        self._shown = status
 
-    def show_rest(self, lies: bool) -> None:
-        """Invite to another fall once one is over."""
-        label = 'Again' if lies else 'Reset'
+    def show_rest(self, is_at_rest: bool) -> None:
+        """Label the reset button 'Again' once a fall is over."""
+        label = 'Again' if is_at_rest else 'Reset'
         if label != self.reset.label:
-            self.reset.label, self.reset.color = label, 'green' if lies else None
+            self.reset.label, self.reset.color = label, 'green' if is_at_rest else None
 
     def show_scene(self, name: str) -> None:
-        """Show which scene it is.
+        """Show the name of the scene.
 
-        It is written where `_choose` reads it, in viser's thread: written from another one, it
-        could come between a choice that arrives at this moment and its reading, and win.
+        It is set in viser's thread, where `_on_scene` reads it: set from another one, it could
+        overwrite a choice that arrives at this moment before that is read.
         """
-        self._scene_shown = shown = name if name in self.scene.options else OTHER
+        self._shown_scene = shown = name if name in self.scene.options else OTHER
         self._loop.call_soon_threadsafe(setattr, self.scene, 'value', shown)
 
-    async def _choose(self, event: viser.GuiEvent) -> None:
-        """Load the chosen scene; at once, before the page tells of the one that is shown."""
+    async def _on_scene(self, event: viser.GuiEvent) -> None:
+        """Load the chosen scene, whose name is read before the page can overwrite it."""
         name = event.target.value
         if event.client is not None and name != OTHER:
             asyncio.get_running_loop().run_in_executor(None, self._load, name, event.client)
 
-    async def _choose_engine(self, event: viser.GuiEvent) -> None:
-        """Take the chosen engine; see _choose."""
+    async def _on_engine(self, event: viser.GuiEvent) -> None:
+        """Set the chosen engine; see _on_scene."""
         if event.client is not None:
             asyncio.get_running_loop().run_in_executor(
-                None, self._take_engine, event.target.value, event.client)
+                None, self._set_engine, event.target.value, event.client)
 
-    def _take_engine(self, name: str, client: viser.ClientHandle) -> None:
-        self._ask(client, lambda: self.source.take_engine(name),
-                  lambda: self._show_engine(self.source.report.engine))
+    def _set_engine(self, name: str, client: viser.ClientHandle) -> None:
+        self._try(client, lambda: self.source.set_engine(name),
+                  lambda: self._show_engine(self.source.status.engine))
 
     def _show_engine(self, name: str) -> None:
         shown = name if name in ENGINES else ENGINES[0]
         self._loop.call_soon_threadsafe(setattr, self.engine, 'value', shown)
 
     def _load(self, name: str, client: viser.ClientHandle) -> None:
-        self._ask(client, lambda: self.source.load(name),
-                  lambda: self.show_scene(self._scene_shown))
+        self._try(client, lambda: self.source.load(name),
+                  lambda: self.show_scene(self._shown_scene))
 
     @staticmethod
-    def _ask(client: viser.ClientHandle, change: Callable[[], None],
-             take_back: Callable[[], None]) -> None:
-        """Ask for a change; where it is refused, take back what the page shows, and say why."""
+    def _try(client: viser.ClientHandle, change: Callable[[], None],
+             revert: Callable[[], None]) -> None:
+        """Make a change; if it is refused, revert what the page shows and notify the user."""
         try:
             change()
         except RagdollError as error:
-            take_back()
+            revert()
             client.add_notification('Refused', str(error), color='red')

@@ -1,4 +1,4 @@
-"""The page: takes a source's newest frame and shows it to all who have it open."""
+"""The page: draws a source's newest frame for all who have it open."""
 from __future__ import annotations
 
 import threading
@@ -8,41 +8,43 @@ from pathlib import Path
 import viser
 
 from ..model.scene import Scene
-from .browser.disconnected_banner import LOST
-from .browser.hide_drag_arrow import NO_ARROW
-from .browser.hint import OF_DOLL, OF_RECORDING, hint
-from .browser.materials import PAINT
-from .browser.panel_layout import FREE
-from .browser.upload_notices import OWN_UPLOADS
+from .browser.scripts import script, style
 from .controls import Controls
 from .drawing.camera import Cameras
-from .drawing.ground import light
+from .drawing.display_options import DisplayOptions, configure_theme
+from .drawing.ground import configure_lights
 from .drawing.plots import Plots
-from .drawing.skin import KEEP_PAGE
 from .drawing.stage import Stage
-from .drawing.view import View, theme
 from .editor.editor import Editor
-from .editor.on_top import ON_TOP
+from .editor.handles import ROOT
 from .pointer import Pointer
 from .recording_panel import RecordingPanel
-from .rest_detector import Rest
-from .settings import Settings
-from .sources.source import Frame, Report, Source, Wanted
-from .start_when_visible import Opening
+from .rest_detector import RestDetector
+from .settings_panel import SettingsPanel
+from .sources.source import Frame, RequestedData, Source, SourceStatus
+from .start_when_visible import StartWhenVisible
 from .timeline.timeline import Timeline
 from .widgets.form import GREY, RED, colored
 
 PERIOD = 1 / 60
-"""s between two drawings at the least."""
+"""s between two frames at least."""
 
-IDLE = 0.1
-"""s between two looks for a page that is open."""
+IDLE_PERIOD = 0.1
+"""s between two checks for an open page."""
+
+SIMULATION_HINT = ('Drag a bone. Arrow keys push: tap or hold. Space pauses, R resets, E edits, '
+                   'H shows the home view.')
+RECORDING_HINT = ('A recorded run. Space pauses, R restarts, drag Time or press J, K, L to look '
+                  'back, H shows the home view.')
+
+DISCONNECTED = ('The viewer that served this page has ended, or cannot be reached: start it again '
+                'at the same port, and the page will reconnect by itself.')
 
 
 class Page:
-    """What viser serves. `update` is called again and again by one thread, which alone draws.
+    """What viser serves. One thread calls `update` repeatedly, and it alone draws.
 
-    The editor, which comes with the first scene, keeps its files in ``folder``.
+    The editor is created with the first scene and keeps its files in ``folder``.
     """
 
     def __init__(self, server: viser.ViserServer, source: Source, folder: str | Path = '.') -> None:
@@ -50,109 +52,113 @@ class Page:
         self.source = source
         self.editor: Editor | None = None
         self.frame: Frame | None = None
-        """What is shown; None before the first."""
+        """The frame that is shown; None before the first."""
         self.stage: Stage | None = None
-        """All that is drawn of the scene that is shown; None before the first frame."""
-        self.opening: Opening | None = None
-        """Lets a source go that waits to be seen; None where none does."""
+        """The scene that is shown; None before the first frame."""
+        self.start_when_visible: StartWhenVisible | None = None
         self._live: Frame | None = None
         self._folder = folder
-        light(server)
-        theme(server, dark=False)
+        configure_lights(server)
+        configure_theme(server, dark=False)
         server.gui.main_panel.dock_right()
-        said = (hint(OF_DOLL, 'ragdollHint') if source.recording is None
-                else hint(OF_RECORDING, 'ragdollRecordingHint'))
-        for html in (FREE, said, LOST, KEEP_PAGE, PAINT, NO_ARROW, ON_TOP, OWN_UPLOADS):
+        is_simulated = source.recording is None
+        for html in (style('panel.css'), script('panel_layout.js'),
+                     hint(SIMULATION_HINT, 'ragdollHint') if is_simulated
+                     else hint(RECORDING_HINT, 'ragdollRecordingHint'),
+                     style('disconnected_banner.css', message=DISCONNECTED),
+                     script('null_node_guard.js'), script('materials.js'),
+                     script('hide_drag_arrow.js'), script('handle_picking.js', ROOT=ROOT),
+                     script('upload_notices.js')):
             server.gui.add_html(html)
         self.problem = server.gui.add_html('')
         self.tabs = server.gui.add_tab_group()
         with self.tabs.add_tab('Play'):
             self.controls = Controls(server, source)
-            self.view = View(server)
-            self.settings = Settings(server, source)
-            self.view.on_home(lambda client: self.cameras.go_home(client))
+            self.display = DisplayOptions(server)
+            self.settings = SettingsPanel(server, source)
+            self.display.on_home(lambda client: self.cameras.go_home(client))
             self.timeline = Timeline(server, source)
             self._recording = RecordingPanel(server)
         self._edit_tab = self.tabs.add_tab('Edit')
         with self.tabs.add_tab('Plots'):
             self.plots = Plots(server)
         self.cameras = Cameras(server)
-        self._rest = Rest()
-        self._pointer = Pointer(source, self._at_hand, self._select)
+        self._rest_detector = RestDetector()
+        self._pointer = Pointer(source, self._grabbable_frame, self._select)
 
     def run(self, stop: threading.Event) -> None:
-        """Draw until told to stop."""
+        """Draw until ``stop`` is set."""
         next_time = time.monotonic()
         while not stop.is_set():
             is_open = self.update()
-            next_time = max(next_time + (PERIOD if is_open else IDLE), time.monotonic())
+            next_time = max(next_time + (PERIOD if is_open else IDLE_PERIOD), time.monotonic())
             stop.wait(next_time - time.monotonic())
-        self.source.want(Wanted())
+        self.source.request(RequestedData())
 
     def update(self) -> bool:
         """Draw what has changed; returns whether any page is open."""
         clients = list(self.server.get_clients().values())
         is_open = bool(clients)
-        self.source.want(self.view.wanted if is_open else Wanted())
-        self.controls.pushes.keep(time.monotonic())
+        self.source.request(self.display.requested if is_open else RequestedData())
+        self.controls.pushes.update(time.monotonic())
         if is_open:
-            frame, report = self.source.frame, self.source.report
+            frame, status = self.source.frame, self.source.status
             if frame is not None:
-                self._show(frame, report, time.monotonic())
+                self._show(frame, status, time.monotonic())
             if self.stage is not None:
-                self.stage.be_visible(bones=self.view.bones.value, skins=self.view.skin.value)
-                self.stage.be_dark(self.view.dark.value)
+                self.stage.set_visible(bones=self.display.bones.value,
+                                       skins=self.display.skin.value)
+                self.stage.set_dark(self.display.dark.value)
             if self.editor is not None:
-                self.editor.take_note(report.paused)
-            self._tell(report.problem, report.note)
-            self.controls.show(report)
-        if self.opening is not None:
-            self.opening.look(clients, self.frame is not None, time.monotonic())
+                self.editor.update_paused(status.paused)
+            self._show_messages(status.problem, status.note)
+            self.controls.show(status)
+        if self.start_when_visible is not None:
+            self.start_when_visible.update(clients, self.frame is not None, time.monotonic())
         return is_open
 
-    def _show(self, live: Frame, report: Report, now: float) -> None:
-        """Draw the source's newest frame, or the one on the timeline that is looked at."""
+    def _show(self, live: Frame, status: SourceStatus, now: float) -> None:
+        """Draw the source's newest frame, or the one that the timeline selects."""
         if live is not self._live:
             self._live = live
-            self._recording.take(live)
-            self.timeline.take(live)
-        self.plots.take(live, self.timeline.instant(live), report, now)
-        self.plots.show(self.timeline.looked_at(now))
-        frame = self.timeline.shown(live, now)
+            self._recording.add(live)
+            self.timeline.add(live)
+        self.plots.add(live, self.timeline.live_instant(live), status, now)
+        self.plots.show(self.timeline.shown_instant(now))
+        frame = self.timeline.frame_to_show(live, now)
         if frame is not self.frame:
             self._draw(frame)
             if self.timeline.is_live:
                 self.cameras.show(frame)
-        self.cameras.follow(frame, now, self.view.follow.value)
-        self.controls.show_rest(self._rest.lies(live, report.paused, now))
-        self.settings.show(report, live.scene, now)
+        self.cameras.follow(frame, now, self.display.follow.value)
+        self.controls.show_rest(self._rest_detector.is_at_rest(live, status.paused, now))
+        self.settings.show(status, live.scene, now)
 
-    def _at_hand(self) -> Frame | None:
-        """What a pointer may take hold of: nothing of what is over."""
+    def _grabbable_frame(self) -> Frame | None:
+        """The shown frame; None if it is in the past, where nothing can be grabbed."""
         return self.frame if self.timeline.is_live else None
 
     def _draw(self, frame: Frame) -> None:
-        new = self.stage is None or frame.scene is not self.stage.scene
-        if new:
+        if self.stage is None or frame.scene is not self.stage.scene:
             self.stage = Stage(self.server, frame)
             self._pointer.attach(self.stage.bodies, self.stage.skins)
             self.controls.show_scene(frame.scene.name)
             self.controls.pushes.show_scene(frame.scene)
-            self.view.show_scene(has_skin=bool(self.stage.skins.handles))
+            self.display.show_scene(has_skin=bool(self.stage.skins.handles))
             self._edit(frame.scene)
         self.frame = frame
         with self.server.atomic():
             self.stage.show(frame)
-        # Else viser waits for more to send along, up to its own 60th of a second.
+        # Without it viser collects messages for up to 1/60 s.
         self.server.flush()
 
     def _edit(self, scene: Scene) -> None:
-        """Hand the scene to the editor, which the first one makes."""
+        """Pass the scene to the editor, which is created for the first one."""
         if self.editor is not None:
             self.editor.show(scene)
             return
         with self._edit_tab:
-            self.editor = Editor(self.server, scene, self.source.use, self.source.pause,
+            self.editor = Editor(self.server, scene, self.source.set_scene, self.source.pause,
                                  self._folder)
         self.controls.before_step = self.editor.leave
 
@@ -160,7 +166,13 @@ class Page:
         if self.editor is not None:
             self.editor.select(bone)
 
-    def _tell(self, problem: str, note: str) -> None:
+    def _show_messages(self, problem: str, note: str) -> None:
         notes = [note, *(self.stage.skins.notes if self.stage is not None else ())]
         self.problem.content = colored(problem, RED) + ''.join(colored(each, GREY)
                                                                 for each in notes)
+
+
+def hint(text: str, key: str) -> str:
+    """HTML of a hint above the panel; once closed, a browser remembers that under ``key``."""
+    return (f'<div class="ragdoll-hint"><span>{text}</span><button aria-label="Close the hint">'
+            '&times;</button></div>' + script('hint.js', KEY=key))

@@ -1,7 +1,7 @@
-"""The pointer takes bodies and drags them at the distance they had from the eye.
+"""Drags bodies with the pointer, at constant distance from the camera.
 
 Viser finds the nearest body under the pointer. The grabbed point A keeps its distance from the
-camera C while the pointer goes on, D being the direction to it: target = C + D |A - C|.
+camera C: with D the direction from C to the pointer, target = C + D |A - C|.
 """
 from __future__ import annotations
 
@@ -16,41 +16,48 @@ from ..model import rotation
 from ..model.scene import Scene
 from ..model.state import State
 from .drawing.bodies import Bodies
-from .drawing.line import is_dead
-from .drawing.skin import Skins
+from .drawing.skin_meshes import SkinMeshes
 from .sources.source import Frame, Source
+from .viser_internals import connections
+
+PING_PERIOD = 0.5
+"""s from a response to the next ping."""
+
+PING_TIMEOUT = 2.5
+"""s: with PING_PERIOD, as long as a node waits for a client that drags."""
 
 
 class Pointer:
-    """What all pages' pointers hold: each page has a hand of its own.
+    """Drags and clicks of all pages; each page has a hand of its own.
 
-    Viser's callbacks are coroutines here: they run in order, and nothing in them waits.
+    Viser's callbacks are coroutines here, so that they run in order; they must not block.
     """
 
-    def __init__(self, source: Source, shown: Callable[[], Frame | None],
+    def __init__(self, source: Source, grabbable_frame: Callable[[], Frame | None],
                  select: Callable[[str], None]) -> None:
-        self._source, self._shown, self._select = source, shown, select
+        self._source, self._frame, self._select = source, grabbable_frame, select
         self._distances: dict[int, float] = {}
+        """Distance from the camera, m, of the point that each client holds."""
         self._watches: dict[int, asyncio.Task] = {}
 
-    def attach(self, bodies: Bodies, skins: Skins) -> None:
+    def attach(self, bodies: Bodies, skins: SkinMeshes) -> None:
         """Listen to drags and clicks on the bodies and skins of a new scene."""
         for batch in bodies.batches:
             self._listen(batch.handle, lambda index, _, bones=batch.bones: int(bones[index or 0]))
         for skin in skins.handles:
-            self._listen(skin, lambda _, point: self._nearest(point))
+            self._listen(skin, lambda _, point: self._nearest_bone(point))
 
     def _listen(self, handle: viser.BatchedMeshHandle | viser.MeshSkinnedHandle,
                 bone_of: Callable[[int | None, np.ndarray], int]) -> None:
-        async def dragged(event: viser.SceneNodeDragEvent) -> None:
+        async def on_drag(event: viser.SceneNodeDragEvent) -> None:
             if event.phase == 'start':
                 point = np.array(event.start_position)
-                self._take(event, bone_of(event.instance_index, point), point)
+                self._grab(event, bone_of(event.instance_index, point), point)
             elif event.client_id in self._distances:
                 self._drag(event)
 
-        async def clicked(event: viser.SceneNodePointerEvent) -> None:
-            frame = self._shown()
+        async def on_click(event: viser.SceneNodePointerEvent) -> None:
+            frame = self._frame()
             if frame is None:
                 return
             eye, direction = np.array(event.ray_origin), np.array(event.ray_direction)
@@ -58,24 +65,24 @@ class Pointer:
             bone = bone_of(event.instance_index, point)
             self._select(frame.scene.bone_names[bone])
 
-        handle.on_drag('left')(dragged)
-        handle.on_click(clicked)
+        handle.on_drag('left')(on_drag)
+        handle.on_click(on_click)
 
-    def _take(self, event: viser.SceneNodeDragEvent, bone: int, point: np.ndarray) -> None:
-        frame = self._shown()
+    def _grab(self, event: viser.SceneNodeDragEvent, bone: int, point: np.ndarray) -> None:
+        frame = self._frame()
         if frame is None:
             return
         eye = event.client.camera.position
         self._distances[event.client_id] = float(np.linalg.norm(point - eye))
-        local = on_bone(frame.scene, frame.state, bone, point)
+        local = to_bone_frame(frame.scene, frame.state, bone, point)
         self._source.grab(_hand(event), frame.scene.bone_names[bone], tuple(local.tolist()),
-                            self._target(event))
+                          self._target(event))
         self._watch(event)
 
     def _watch(self, event: viser.SceneNodeDragEvent) -> None:
-        """Open the hand if the page's line dies before it says so."""
+        """Let go if the page's connection is lost."""
         async def watch() -> None:
-            await is_dead(event.client)
+            await _wait_until_disconnected(event.client)
             self._let_go(event)
 
         self._unwatch(event)
@@ -98,32 +105,32 @@ class Pointer:
             self._source.drag(_hand(event), self._target(event))
 
     def _target(self, event: viser.SceneNodeDragEvent) -> tuple[float, ...]:
-        target = kept_distance(event.client.camera.position, np.array(event.end_position),
-                               self._distances[event.client_id])
+        target = target_at_distance(event.client.camera.position, np.array(event.end_position),
+                                    self._distances[event.client_id])
         return tuple(target.tolist())
 
-    def _nearest(self, point: np.ndarray) -> int:
-        frame = self._shown()
-        return nearest(frame.scene, frame.state, point)
+    def _nearest_bone(self, point: np.ndarray) -> int:
+        frame = self._frame()
+        return nearest_bone(frame.scene, frame.state, point)
 
     def _depth(self, eye: np.ndarray, direction: np.ndarray) -> float:
-        """Distance, m, at which a ray comes nearest to a bone's centre, the nearest such bone."""
-        offsets = self._shown().state.positions - eye
+        """Distance, m, along a ray to the point nearest to the centre of any bone."""
+        offsets = self._frame().state.positions - eye
         along = offsets @ direction
         aside = np.linalg.norm(offsets - along[:, None] * direction, axis=1)
         return float(along[np.argmin(aside)])
 
 
-def kept_distance(eye: np.ndarray, pointer: np.ndarray, distance: float) -> np.ndarray:
-    """Target (3,) m in the direction of ``pointer`` (3,) m as far from the eye as ``distance``."""
+def target_at_distance(eye: np.ndarray, pointer: np.ndarray, distance: float) -> np.ndarray:
+    """Point (3,) m from ``eye`` in the direction of ``pointer`` (3,) m, at ``distance`` m."""
     length = math.dist(eye, pointer)
     return eye + (pointer - eye) * (distance / length) if 0 < length < math.inf else pointer
 
 
-def on_bone(scene: Scene, state: State, bone: int, point: np.ndarray) -> np.ndarray:
-    """Point (3,) m of the world along a bone's axes, from its centre, in its bounding box.
+def to_bone_frame(scene: Scene, state: State, bone: int, point: np.ndarray) -> np.ndarray:
+    """World point (3,) m in a bone's frame, clamped to its bounding box.
 
-    A page shows where the bone was a moment ago: what has moved on is taken at its edge.
+    A page shows a past state, so the bone may have moved away from the point.
     """
     local = rotation.rotate(rotation.inverse(state.orientations[bone]),
                             point - state.positions[bone])
@@ -131,7 +138,7 @@ def on_bone(scene: Scene, state: State, bone: int, point: np.ndarray) -> np.ndar
     return np.clip(local, -half, half)
 
 
-def nearest(scene: Scene, state: State, point: np.ndarray) -> int:
+def nearest_bone(scene: Scene, state: State, point: np.ndarray) -> int:
     """Index of the bone whose bounding box is nearest to a point (3,) m."""
     local = rotation.rotate(rotation.inverse(state.orientations), point - state.positions)
     half = np.array([bone.shape.half_extents for bone in scene.bones])
@@ -140,3 +147,26 @@ def nearest(scene: Scene, state: State, point: np.ndarray) -> int:
 
 def _hand(event: viser.SceneNodeDragEvent) -> str:
     return f'page {event.client_id}'
+
+
+async def _wait_until_disconnected(client: viser.ClientHandle) -> None:
+    """Return once a page does not respond to a ping, or has closed its connection.
+
+    A browser responds by itself, however busy the page is. Viser pings too, but closes a
+    connection only after 20 to 40 s.
+    """
+    open_connections = connections(client)
+    while (connection := open_connections.get(client.client_id)) is not None:
+        response = asyncio.ensure_future(_ping(connection))
+        try:
+            await asyncio.wait([response], timeout=PING_TIMEOUT)
+        finally:
+            response.cancel()
+        if not response.done() or response.exception() is not None:
+            return
+        await asyncio.sleep(PING_PERIOD)
+
+
+async def _ping(connection: object) -> None:
+    """Ping and wait for the pong; websockets' ConnectionClosed."""
+    await (await connection.ping())

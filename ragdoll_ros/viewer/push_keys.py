@@ -1,4 +1,4 @@
-"""Pushes by arrow keys: which are down each page tells, and how hard they push a slider says."""
+"""Pushes by arrow keys and buttons; a slider sets their force."""
 from __future__ import annotations
 
 import threading
@@ -8,62 +8,32 @@ import viser
 
 from ..model.scene import Scene
 from ..realtime.arrow_keys import FORCE, TAP, PressedKeys, total_force
-from .browser.client_events import tell
+from .browser.client_events import add_listener
 from .sources.source import Source
 
 ARROWS = {'←': 'left', '↑': 'up', '↓': 'down', '→': 'right'}
-"""Label of each push: short, so that all stand in one row."""
+"""By the labels of their buttons, short enough for one row."""
 
 STRENGTHS = (100.0, 5000.0)
-"""N: weakest and strongest of the slider."""
+"""N: smallest and largest of the slider."""
 
 STEP = 50.0
-"""N between two values of the slider."""
+"""N: of the slider."""
 
-SHOVE = 0.1
-"""s for which the page says what a push does."""
+EFFECT_DURATION = 0.1
+"""s of the push whose effect the page shows."""
 
-REFRESH = 0.04
-"""s between two pushes of a held key, well within the node's push_timeout."""
+REPEAT_PERIOD = 0.04
+"""s between two pushes of a held key, well below the node's push_timeout."""
 
-LASTS = 0.1
-"""s of simulated time that each of them pushes, unless the next one comes first."""
-
-KEYS = """
-    const down = new Set();
-    const tellAll = () => tell([...down].join(' '));
-    const letGo = () => { if (down.size) { down.clear(); tellAll(); } };
-    const root = document.documentElement;
-    root.addEventListener('keydown', (event) => {
-      const key = event.key.replace('Arrow', '').toLowerCase();
-      const arrow = event.key.startsWith('Arrow');
-      if (arrow || key === 'e') event.stopPropagation();
-      if (!arrow || event.target.matches('input, textarea, select')
-          || event.ctrlKey || event.altKey || event.metaKey || down.has(key)) return;
-      down.add(key);
-      tellAll();
-    });
-    root.addEventListener('keyup', (event) => {
-      if (down.delete(event.key.replace('Arrow', '').toLowerCase())) tellAll();
-    });
-    window.addEventListener('blur', letGo);
-    document.addEventListener('visibilitychange', letGo);
-    setInterval(() => { if (down.size) tellAll(); }, 100);
-    document.addEventListener('click', (event) => {
-      const at = document.activeElement;
-      const typed = at?.matches('input:not([type=checkbox]), textarea');
-      if (event.detail && (!typed || event.target.closest('[role=option]'))) at?.blur();
-    });"""
-"""For told.py: tells which arrows are down; again and again while any is, as a page may go without
-a word. Arrows and E are kept from viser's camera, which would turn or rise with them; commands
-still get E: they listen where this does, the camera further out. What was clicked gives the keys
-back, or Space would press it again, a checkbox keep all keys; not so a field in which one types."""
+REPEAT_DURATION = 0.1
+"""s of simulated time that each of them lasts, unless the next one replaces it."""
 
 
 class PushKeys:
     """Buttons, keys and a slider that push, in the GUI container that is current.
 
-    Of a recording, which nothing pushes, there are none to be seen.
+    They are hidden for a recording, which cannot be pushed.
     """
 
     def __init__(self, server: viser.ViserServer, source: Source) -> None:
@@ -71,19 +41,18 @@ class PushKeys:
         self._lock = threading.Lock()
         self._pressed: dict[int, PressedKeys] = {}
         self._mass = 0.0
-        self._next = 0.0
-        self._pushing = False
+        self._next_repeat = 0.0
+        self._is_pushing = False
         gui, can_push = server.gui, source.recording is None
-        self.told = tell(gui, 'keys', KEYS, lambda page, down: self.take(
+        self.key_events = add_listener(gui, 'keys', 'arrow_keys.js', lambda page, down: self.take(
             page, down.split(), time.monotonic()))
         buttons = gui.add_button_group(
-            'Push', tuple(ARROWS), visible=can_push, hint='as seen from in front of the doll: '
-            'left, away, toward you, right; arrow keys do the same, and push on while they are '
-            'held')
+            'Push', tuple(ARROWS), visible=can_push, hint='as seen from the front: left, away from '
+            'you, towards you, right; arrow keys do the same, and repeat while held')
         self.strength = gui.add_slider('Strength, N', *STRENGTHS, step=STEP,
                                        initial_value=FORCE, visible=can_push, hint='of a push')
         self._effect = gui.add_html('', visible=can_push)
-        self.strength.on_update(lambda _: self._tell_effect())
+        self.strength.on_update(lambda _: self._show_effect())
         buttons.on_click(lambda event: self.tap(ARROWS[event.target.value]))
         for arrow in ARROWS.values() if can_push else ():
             command = gui.add_command(f'Push {arrow}')
@@ -95,38 +64,40 @@ class PushKeys:
                 self._pressed.pop(client.client_id, None)
 
     def tap(self, arrow: str) -> None:
-        """Push for a tap."""
+        """Push for the duration of a tap."""
         self._source.push(total_force([arrow], self.strength.value), TAP)
 
     def take(self, page: int, down: list[str], now: float) -> None:
-        """Enter which arrows are down on a page; what goes down pushes for a tap at least."""
+        """Set which arrow keys are down on a page; a new one pushes for at least a tap."""
         with self._lock:
             pressed = self._pressed.setdefault(page, PressedKeys())
             if pressed.report(down, now):
-                self._source.push(total_force(self._at(now), self.strength.value), TAP)
+                self._source.push(total_force(self._arrows_at(now), self.strength.value), TAP)
 
-    def keep(self, now: float) -> None:
-        """Push on with what is held, and end the push of what no longer is; called at each turn."""
+    def update(self, now: float) -> None:
+        """Repeat the pushes of held keys, and end them on release; call repeatedly."""
         with self._lock:
             held = any(each.held(now) for each in self._pressed.values())
-            if held and now >= self._next:
-                self._next = now + REFRESH
-                self._source.push(total_force(self._at(now), self.strength.value), LASTS)
-            elif self._pushing and not held:
+            if held and now >= self._next_repeat:
+                self._next_repeat = now + REPEAT_PERIOD
+                self._source.push(total_force(self._arrows_at(now), self.strength.value),
+                                  REPEAT_DURATION)
+            elif self._is_pushing and not held:
                 self._source.push((0.0, 0.0, 0.0), TAP)
-            self._pushing = held
+            self._is_pushing = held
 
     def show_scene(self, scene: Scene) -> None:
-        """Say from now on what a push does to the first doll of a scene."""
+        """Show the effect of a push on the first doll of a scene."""
         self._mass = sum(bone.mass for bone in scene.bones[scene.bone_slices[0]])
-        self._tell_effect()
+        self._show_effect()
 
-    def _at(self, now: float) -> list[str]:
+    def _arrows_at(self, now: float) -> list[str]:
         return [arrow for each in self._pressed.values() for arrow in each.active(now)]
 
-    def _tell_effect(self) -> None:
+    def _show_effect(self) -> None:
         force = self.strength.value
         self._effect.content = '' if not self._mass else (
             '<div style="font-size: 0.85em; padding: 0 1em 0.4em">'
-            f'{force:g} N for {SHOVE:g} s give {self._mass:.3g} kg '
-            f'{force * SHOVE / self._mass:.2g} m/s, a tap {force * TAP / self._mass:.2g} m/s</div>')
+            f'{force:g} N for {EFFECT_DURATION:g} s give {self._mass:.3g} kg '
+            f'{force * EFFECT_DURATION / self._mass:.2g} m/s, a tap '
+            f'{force * TAP / self._mass:.2g} m/s</div>')

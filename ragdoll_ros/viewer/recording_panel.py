@@ -1,4 +1,4 @@
-"""Buttons that take what the page shows with them: the run as MCAP, the view as PNG."""
+"""Buttons that record the run as MCAP and save the view as PNG."""
 from __future__ import annotations
 
 import importlib.util
@@ -12,51 +12,50 @@ from ..recordings.mcap_file import recording_bytes
 from ..recordings.recording import RecordedPose, Recorder
 from .sources.source import Frame
 
-MOST_NUMBERS = 5_000_000
+MAX_NUMBERS = 5_000_000
 """In one recording: 40 MB as MCAP; 20 minutes of ten bones at 60 Hz, half a minute of 500."""
 
 CAN_WRITE = importlib.util.find_spec('mcap') is not None
 
 RENDER_TIMEOUT = 20.0
-"""s that a page may take for its picture."""
+"""s that a page may take to render an image."""
 
 RECORD, STOP = 'Record', 'Stop and download'
-ELSEWHERE, FULL = 'Download (scene has changed)', 'Download (recording is full)'
-"""Labels of the button; the last two once a recording has ended by itself."""
+SCENE_CHANGED, FULL = 'Download (scene has changed)', 'Download (recording is full)'
+"""Labels of the button; the last two after a recording has ended by itself."""
 
 
 class RecordingPanel:
-    """Two buttons in the page's panel; take() is told what is shown, from any thread.
+    """Two buttons in the panel; `add` takes the frames and may be called from any thread.
 
-    All pages share one recording: whoever stops it gets it.
+    All pages share one recording; the page that stops it gets the file.
     """
 
     def __init__(self, server: viser.ViserServer) -> None:
         self.recorder: Recorder | None = None
-        """What has been taken; None before a recording begins."""
+        """Frames recorded so far; None if there is no recording."""
         self._ended = False
         self._lock = threading.Lock()
         with server.gui.add_folder('Recording', expand_by_default=False):
             self.button = server.gui.add_button(
                 RECORD, icon=viser.Icon.PLAYER_RECORD, disabled=not CAN_WRITE,
-                hint='Poses of all bones as run.mcap; ragdoll_viewer --play run.mcap shows them'
-                if CAN_WRITE else 'It needs mcap: pip install mcap')
-            picture = server.gui.add_button('Picture', icon=viser.Icon.CAMERA,
-                                            hint='This view as ragdoll.png')
+                hint='Poses of all bones as run.mcap; play it by ragdoll_viewer --play run.mcap'
+                if CAN_WRITE else 'Requires mcap: pip install mcap')
+            screenshot = server.gui.add_button('Screenshot', icon=viser.Icon.CAMERA,
+                                               hint='this view as ragdoll.png')
         self._frame: Frame | None = None
         self.button.on_click(lambda event: self.toggle(event.client))
-        picture.on_click(_send_picture)
+        screenshot.on_click(_send_screenshot)
 
     @property
     def recording(self) -> bool:
-        """Whether poses are being taken."""
+        """Whether frames are being recorded."""
         return self.recorder is not None and not self._ended
 
-    def take(self, frame: Frame) -> None:
-        """Take note of what is shown.
+    def add(self, frame: Frame) -> None:
+        """Record a frame if recording is on.
 
-        Another scene, or as much as one recording may hold, ends what is being taken; it waits
-        for its download.
+        Another scene or MAX_NUMBERS ends the recording, which is then ready for download.
         """
         with self._lock:
             self._frame = frame
@@ -67,21 +66,21 @@ class RecordingPanel:
         if not self.recording:
             return
         if recorder.scene is not frame.scene:
-            self._end(ELSEWHERE)
+            self._end(SCENE_CHANGED)
             return
         pose = RecordedPose(frame.state.positions, frame.state.orientations, frame.rods)
         numbers = pose.positions.size + pose.orientations.size + np.size(pose.rods)
         recorder.add(frame.time, pose)
-        if (len(recorder) + 1) * numbers > MOST_NUMBERS:
+        if (len(recorder) + 1) * numbers > MAX_NUMBERS:
             self._end(FULL)
 
     def _end(self, label: str) -> None:
-        """Take no more; the button says why."""
+        """End the recording, with the reason as label of the button."""
         self._ended = True
         self.button.label = label
 
     def toggle(self, client: viser.ClientHandle | None) -> None:
-        """Begin to record; else end the recording and send it to the page that asked."""
+        """Start recording; or end the recording and send it to the page that asked."""
         with self._lock:
             recorder, self.recorder = self.recorder, None
             self._ended = False
@@ -96,21 +95,21 @@ class RecordingPanel:
             client.send_file_download('run.mcap', content, save_immediately=True)
 
 
-def _send_picture(event: viser.GuiEvent) -> None:
+def _send_screenshot(event: viser.GuiEvent) -> None:
     client = event.client
     if client is None:
         return
     size = client.camera.image_height, client.camera.image_width
     try:
-        picture = client.get_render(*size, transport_format='png', timeout=RENDER_TIMEOUT)
+        image = client.get_render(*size, transport_format='png', timeout=RENDER_TIMEOUT)
     except TimeoutError:
-        client.add_notification('No picture', f'The page drew none within {RENDER_TIMEOUT:g} s.')
+        client.add_notification('No screenshot', f'No image within {RENDER_TIMEOUT:g} s.')
         return
-    content = iio.imwrite('<bytes>', _on_white(picture), extension='.png')
+    content = iio.imwrite('<bytes>', _on_white(image), extension='.png')
     client.send_file_download('ragdoll.png', content, save_immediately=True)
 
 
-def _on_white(picture: np.ndarray) -> np.ndarray:
-    """Lay a picture (h, w, 4) uint8 with transparent parts on white: (h, w, 3) uint8."""
-    share = picture[..., 3:] / 255
-    return np.rint(picture[..., :3] * share + 255 * (1 - share)).astype(np.uint8)
+def _on_white(image: np.ndarray) -> np.ndarray:
+    """Blend an RGBA image (h, w, 4) uint8 with white: (h, w, 3) uint8."""
+    alpha = image[..., 3:] / 255
+    return np.rint(image[..., :3] * alpha + 255 * (1 - alpha)).astype(np.uint8)

@@ -1,4 +1,4 @@
-"""The first fall waits until somebody sees it."""
+"""Starts the first fall once a page shows it."""
 from __future__ import annotations
 
 import threading
@@ -7,41 +7,43 @@ import viser
 
 from .sources.source import Source
 
-PATIENCE = 5.0
-"""s that a page may take for one picture, before it is asked anew."""
+RENDER_TIMEOUT = 5.0
+"""s that a page may take to render an image before it is asked again."""
 
 
-class Opening:
-    """Lets a source that stands at its start go once a page has drawn it.
+class StartWhenVisible:
+    """Resumes a paused source once a page has drawn it.
 
-    Without a page it goes after ``longest`` s, or not at all where that is None. `look` is called
-    again and again, by one thread, with the pages that are open and the time, s of a steady clock.
+    Without a page it resumes after ``timeout`` s, or never if that is None. `update` is called
+    repeatedly by one thread, with the open pages and the time, s of a steady clock.
     """
 
-    def __init__(self, source: Source, longest: float | None) -> None:
-        self._source, self._longest = source, longest
+    def __init__(self, source: Source, timeout: float | None) -> None:
+        self._source, self._timeout = source, timeout
         self._begin: float | None = None
-        self._asking: threading.Thread | None = None
-        self._drawn = False
-        self.is_over = False
+        self._rendering: threading.Thread | None = None
+        self._is_drawn = False
+        self.is_done = False
 
-    def look(self, clients: list[viser.ClientHandle], shown: bool, now: float) -> None:
-        """Ask a page for a picture once it was sent one to draw, or let the source go."""
-        if self.is_over:
+    def update(self, clients: list[viser.ClientHandle], has_frame: bool, now: float) -> None:
+        """Request an image from a page that has a frame to draw, or resume the source."""
+        if self.is_done:
             return
         self._begin = now if self._begin is None else self._begin
-        alone = not clients and self._longest is not None and now - self._begin >= self._longest
-        if self._drawn or alone:
-            self.is_over = self._source.pause(False)
-        elif clients and shown and (self._asking is None or not self._asking.is_alive()):
-            self._asking = threading.Thread(target=self._ask, args=(clients[-1],), daemon=True)
-            self._asking.start()
+        timed_out = (not clients and self._timeout is not None
+                     and now - self._begin >= self._timeout)
+        if self._is_drawn or timed_out:
+            self.is_done = self._source.pause(False)
+        elif clients and has_frame and not (self._rendering and self._rendering.is_alive()):
+            self._rendering = threading.Thread(target=self._render, args=(clients[-1],),
+                                               daemon=True)
+            self._rendering.start()
 
-    def _ask(self, client: viser.ClientHandle) -> None:
-        """Learn that a page draws: it sends pictures only after all that it was sent before."""
+    def _render(self, client: viser.ClientHandle) -> None:
+        """Wait for an image: a page renders it after it has drawn what it was sent before."""
         try:
-            client.get_render(16, 16, timeout=PATIENCE)
+            client.get_render(16, 16, timeout=RENDER_TIMEOUT)
         except (TimeoutError, RuntimeError):
-            # It has gone, or is in a tab behind others.
+            # The page was closed, or is in a background tab.
             return
-        self._drawn = True
+        self._is_drawn = True

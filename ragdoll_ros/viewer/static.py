@@ -1,4 +1,4 @@
-"""A page without a server: a run that can be turned, scrubbed and stopped, in one HTML file."""
+"""A run as one HTML file without a server, which can be viewed, paused and scrubbed."""
 from __future__ import annotations
 
 import contextlib
@@ -14,53 +14,50 @@ from ..model import errors
 from ..model.scene import Scene
 from ..physics.simulation import Simulation
 from ..recordings.recording import Recorder, Recording
-from .browser.materials import DRESS
-from .drawing.camera import CAMERA, FIELD
-from .drawing.ground import light
+from .browser.scripts import source
+from .drawing.camera import FIELD_OF_VIEW, INITIAL_CAMERA
+from .drawing.ground import configure_lights
 from .drawing.stage import Stage
-from .sources.playback import Playback
+from .sources.playback import PlaybackSource
 
 RATE = 60.0
-"""Pictures in each s of the run."""
+"""Hz: frames of the file."""
 
-LONGEST = 10.0
-"""s of a fall that comes to no rest."""
+MAX_DURATION = 10.0
+"""s of a fall that does not come to rest."""
 
 INDEX = 'index.html'
 
 
 def static_html(recording: Recording) -> str:
-    """A page of viser's that plays a recording: no server, no network, one file.
+    """HTML of viser's page that plays a recording without server or network.
 
-    Space stops it; a slider scrubs. A recording of one instant is a scene that stands.
+    Space pauses, a slider scrubs. A recording of one instant is a still scene.
     """
-    source = Playback(recording)
+    playback = PlaybackSource(recording)
     with contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer('127.0.0.1', 0, verbose=False)
     try:
-        server.initial_camera.position, server.initial_camera.look_at = CAMERA
-        server.initial_camera.fov = FIELD
-        light(server)
-        frame = source.frame_at(0.0)
+        server.initial_camera.position, server.initial_camera.look_at = INITIAL_CAMERA
+        server.initial_camera.fov = FIELD_OF_VIEW
+        configure_lights(server)
+        frame = playback.frame_at(0.0)
         stage = Stage(server, frame)
         stage.show(frame)
-        stage.be_visible(bones=False, skins=True)
+        stage.set_visible(bones=False, skins=True)
         serializer = server.get_scene_serializer()
         for time in np.arange(1, int(recording.duration * RATE) + 1) / RATE:
             serializer.insert_sleep(1 / RATE)
-            stage.show(source.frame_at(float(time)))
+            stage.show(playback.frame_at(float(time)))
         head, end, tail = serializer.as_html().rpartition('</body>')
-        return f'{head}<script>{DRESS}</script>{end}{tail}'
+        return f'{head}<script>{source("materials.js")}</script>{end}{tail}'
     finally:
         with contextlib.redirect_stdout(io.StringIO()):
             server.stop()
 
 
 class Embedded:
-    """A recording as a notebook shows it, below the cell whose last line it is.
-
-    It is ``height`` pixels high; see static_html.
-    """
+    """A recording for display in a notebook, ``height`` pixels high; see static_html."""
 
     def __init__(self, recording: Recording, height: int = 400) -> None:
         page = html.escape(static_html(recording))
@@ -72,9 +69,9 @@ class Embedded:
 
 
 def save_static(recording: Recording, folder: str | Path) -> Path:
-    """Write static_html into a folder, which is made if need be; the path of the page.
+    """Write static_html into a folder, which is created if missing, and return the file's path.
 
-    Unreadable where the disk refuses.
+    Raises Unreadable if the file cannot be written.
     """
     path = Path(folder) / INDEX
     content = static_html(recording)
@@ -88,11 +85,11 @@ def save_static(recording: Recording, folder: str | Path) -> Path:
 
 
 def fall(scene: Scene, engine: str = 'auto') -> Recording:
-    """A scene from its start until all rests, LONGEST at most; tells how far it is."""
+    """Simulate a scene until it rests, at most MAX_DURATION, with progress on standard error."""
     recorder = Recorder(scene)
     with Simulation(scene, engine=engine, workers='auto') as simulation:
         recorder.take(simulation)
-        while not simulation.asleep and recorder.duration < LONGEST:
+        while not simulation.asleep and recorder.duration < MAX_DURATION:
             simulation.advance()
             recorder.take(simulation)
             if simulation.time % 10 ** 9 < simulation.tick:

@@ -1,1 +1,1 @@
-"""What is tried: trials, hard cases, starts."""
+"""Trials: random starts, hard cases, random scenes."""

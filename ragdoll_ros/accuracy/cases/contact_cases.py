@@ -1,4 +1,4 @@
-"""Hard cases of contact: mass ratios, stacks, piles, dolls that collide, any friction."""
+"""Hard contact cases: mass ratios, stacks, piles, collisions of dolls, extreme friction."""
 from __future__ import annotations
 
 import dataclasses
@@ -12,23 +12,24 @@ from ...model.ragdoll import Bone, Ragdoll
 from ...model.scene import Ground, Material, Placement, Scene
 from ...model.shapes import Box, Sphere
 from . import starts
-from .hard_case import HardCase, Rule, drop
+from .hard_case import HardCase, Requirements, drop
 from .trial import Trial, posed
 
 COLLISIONS = (2.0, 6.0, 20.0, 60.0)
-"""m/s at which two dolls approach each other in the air."""
+"""Approach speeds, m/s, of two dolls in the air."""
 
-KEPT = 1e-9
-"""Share of momentum that a collision in the air may lose."""
+MOMENTUM_TOLERANCE = 1e-9
+"""Largest relative drift of momentum in a collision in the air."""
 
 FRICTIONS = (0.0, 0.1, 1.0, 10.0, math.inf)
 
 
 def contact_cases() -> list[HardCase]:
-    """All of them."""
-    in_air = Rule(rest=False, momentum=KEPT)
+    """All hard contact cases."""
+    in_air = Requirements(rest=False, max_momentum_drift=MOMENTUM_TOLERANCE)
+    stays = Requirements(max_displacement_m=1e-3)
     return [
-        # What hangs from a head that nothing moves swings until its joints' damping ends it: 9 s.
+        # What hangs from the heavy head swings for 9 s, until the joint damping ends it.
         HardCase('mass ratio 1:100', lambda: _weighted(100, 'head')),
         HardCase('mass ratio 1:1000', lambda: _weighted(1000, 'head')),
         HardCase('torso 1000 times as heavy', lambda: _weighted(1000, 'torso')),
@@ -38,12 +39,12 @@ def contact_cases() -> list[HardCase]:
         *(HardCase(f'two dolls at {speed:g} m/s in the air',
                    lambda speed=speed: two_dolls(speed), in_air) for speed in COLLISIONS),
         HardCase('ball of 1 g against the doll', _light_ball),
-        HardCase('stack of five boxes', lambda: _stack((1.0,) * 5), Rule(stays_m=1e-3)),
-        HardCase('100 kg on 1 kg', lambda: _stack((1.0, 100.0)), Rule(stays_m=1e-3)),
+        HardCase('stack of five boxes', lambda: _stack((1.0,) * 5), stays),
+        HardCase('100 kg on 1 kg', lambda: _stack((1.0, 100.0)), stays),
         HardCase('pile of ten dolls, 60 s', lambda: pile(60.0)),
         HardCase('jammed limbs', _jammed),
         *(HardCase(f'friction {friction:g}', lambda friction=friction: _on_friction(friction),
-                   Rule(rest=friction > 0)) for friction in FRICTIONS)]
+                   Requirements(rest=friction > 0)) for friction in FRICTIONS)]
 
 
 def _weighted(ratio: float, *names: str) -> Trial:
@@ -54,7 +55,7 @@ def _weighted(ratio: float, *names: str) -> Trial:
 
 
 def two_dolls(speed: float) -> Trial:
-    """Two dolls that fly side to side at each other, without gravity; they meet after 0.1 s."""
+    """Two dolls that fly sideways at each other, without gravity; they collide after 0.1 s."""
     doll = load_doll('doll')
     apart = 1.2 + 0.1 * speed
     left = Placement(doll, 'left', (0.0, apart / 2, 0.0), velocity=(0.0, -0.45 * speed, 0.0))
@@ -73,7 +74,7 @@ def _light_ball() -> Trial:
 
 
 def _stack(masses: tuple[float, ...]) -> Trial:
-    """Boxes of 20 cm on each other, the lowest first, each a little aside; they stay."""
+    """A stack of 20 cm boxes, the lowest first, each slightly offset; it must not move."""
     edge = 0.2
     dolls = tuple(Placement(Ragdoll(f'box_{k}', (Bone('box', Box((edge,) * 3), mass, (0, 0, 0)),)),
                             position=(0.01 * (-1) ** k, 0.0, (k + 0.5) * edge))
@@ -82,7 +83,7 @@ def _stack(masses: tuple[float, ...]) -> Trial:
 
 
 def pile(duration: float) -> Trial:
-    """Ten dolls that fall onto each other."""
+    """Ten dolls dropped onto each other."""
     scene = load_scene('drop')
     doll = scene.dolls[0].doll
     placements = tuple(Placement(doll, f'doll_{i}', (0.02 * i, 0.03 * (-1) ** i, 2.0 * i),
@@ -91,7 +92,7 @@ def pile(duration: float) -> Trial:
 
 
 def _jammed() -> Trial:
-    """Limbs folded against the body, joints that give by 1 degree, and 1000 N on the torso."""
+    """Limbs folded against the body, joint ranges of 1 degree, and 1000 N on the torso."""
     scene = load_scene('drop')
     angles = {'left_upper_arm_2': math.radians(-60), 'right_upper_arm_2': math.radians(60),
               'left_forearm': math.radians(-110), 'right_forearm': math.radians(110)}
@@ -103,8 +104,7 @@ def _jammed() -> Trial:
     placement = dataclasses.replace(scene.dolls[0], doll=dataclasses.replace(doll, joints=joints))
     scene = dataclasses.replace(scene, dolls=(placement,))
     start = starts.lifted(scene, posed(placement, angles), 0.2)
-    return Trial(scene, 12.0, start, (Push('torso', (0.0, 0.0, -1000.0), start=1.0,
-                                           duration=2.0),))
+    return Trial(scene, 12.0, start, (Push('torso', (0.0, 0.0, -1000.0), start=1.0, duration=2.0),))
 
 
 def _on_friction(friction: float) -> Trial:

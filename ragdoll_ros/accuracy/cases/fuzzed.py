@@ -1,4 +1,4 @@
-"""Random scenes, the same for ever: any shapes, joints, masses, materials, motions."""
+"""Random scenes, reproducible: any shapes, joints, masses, materials, motions."""
 from __future__ import annotations
 
 import math
@@ -42,19 +42,19 @@ def _placed(rng: np.random.Generator, name: str, index: int) -> Placement:
 
 
 def _doll(rng: np.random.Generator, name: str) -> Ragdoll:
-    """A tree that grows outwards, each bone beyond its parent; masses over three decades."""
+    """A tree of bones, each placed outwards of its parent; masses over three decades."""
     bones, joints = [], []
     for index in range(rng.integers(1, 9)):
         shape, mass = _shape(rng), float(10 ** rng.uniform(-1.5, 1.5))
-        turn = tuple(rotation.normalized(rng.normal(size=4)))
+        orientation = tuple(rotation.normalized(rng.normal(size=4)))
         if not bones:
-            bones.append(Bone('bone_0', shape, mass, (0.0, 0.0, 0.0), turn))
+            bones.append(Bone('bone_0', shape, mass, (0.0, 0.0, 0.0), orientation))
             continue
         parent = bones[rng.integers(len(bones))]
-        way = rotation.normalized(rng.normal(size=3))
-        anchor = np.array(parent.position) + way * max(parent.shape.half_extents)
+        direction = rotation.normalized(rng.normal(size=3))
+        anchor = np.array(parent.position) + direction * max(parent.shape.half_extents)
         bones.append(Bone(f'bone_{index}', shape, mass,
-                          tuple(anchor + way * max(shape.half_extents)), turn))
+                          tuple(anchor + direction * max(shape.half_extents)), orientation))
         joints.append(_joint(rng, parent.name, f'bone_{index}', tuple(anchor)))
     return Ragdoll(name, tuple(bones), tuple(joints))
 
@@ -65,8 +65,7 @@ def _shape(rng: np.random.Generator) -> Shape:
             Capsule(sizes[0], 2 * sizes[1]))[rng.integers(4)]
 
 
-def _joint(rng: np.random.Generator, parent: str, child: str,
-           anchor: tuple[float, ...]) -> Joint:
+def _joint(rng: np.random.Generator, parent: str, child: str, anchor: tuple[float, ...]) -> Joint:
     kind = JOINT_KINDS[str(rng.choice(list(JOINT_KINDS)))]
     axes = [tuple(axis) for axis in np.linalg.qr(rng.normal(size=(3, 3)))[0][:kind.axes]]
     reach = [float(angle) for angle in rng.uniform(0.1, 1.4, kind.limits)]

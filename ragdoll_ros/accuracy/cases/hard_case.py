@@ -1,4 +1,4 @@
-"""A trial that breaks simulations, and what must hold all the same."""
+"""A hard trial and its requirements."""
 from __future__ import annotations
 
 import dataclasses
@@ -13,48 +13,48 @@ from .trial import Trial, posed
 
 OVERSHOOT = math.radians(0.2)
 SINKING = 1e-3
-"""rad and m: what the setting normal promises, of the ground and of bones in bones."""
+"""Bounds at the accuracy `normal`: overshoot, rad; penetration of ground and of bones, m."""
 
 
 @dataclass(frozen=True)
-class Rule:
-    """What must hold, on top of: no NaN, no energy from nothing, no gaps, no stop.
+class Requirements:
+    """Bounds besides those for all cases: no NaN, no energy gain, no joint gaps, no stop.
 
-    None: no bound. Bounds in m scale with the doll where it is larger than the default one.
+    None: no bound. Bounds in m scale with dolls larger than the default one.
     """
 
     sinking_m: float | None = SINKING
     depth_m: float | None = SINKING
-    """Of a bone in another; pairs that start in each other count from when they are apart."""
+    """Penetration of bones; pairs that overlap at the start count once they have separated."""
     overshoot_rad: float | None = OVERSHOOT
     rest: bool = True
-    """Whether all bones must be slower than 0.05 m/s (times the root of the scale) at the end."""
+    """Whether all bones must end slower than 0.05 m/s, times the square root of the scale."""
     lift_m: float = 0.0
-    """How far the ground may lift the doll out of itself: that energy is the start's own."""
-    exit_m_s: float | None = None
-    """Fastest any bone may ever be."""
-    momentum: float | None = None
-    """Share of the momentum and of the angular momentum that may be lost in the air."""
-    stays_m: float | None = None
-    """How far any bone may be from its start at the end."""
+    """Height by which the ground may push the doll out: energy that the start stores."""
+    max_speed_m_s: float | None = None
+    """Largest speed of any bone at any time."""
+    max_momentum_drift: float | None = None
+    """Largest relative drift of momentum and angular momentum in the air."""
+    max_displacement_m: float | None = None
+    """Largest displacement of any bone at the end."""
 
 
 @dataclass(frozen=True)
 class HardCase:
-    """A trial and its rule."""
+    """A trial and its requirements."""
 
     name: str
     make: Callable[[], Trial]
-    rule: Rule = Rule()
+    requirements: Requirements = Requirements()
     scale: float = 1.0
-    """Size of the doll over that of the default one."""
+    """Size relative to the default doll."""
     reason: str = ''
-    """Why it may fail and what was tried: shown only where it does fail."""
+    """Known cause of a failure, shown if the case fails."""
 
 
 def drop(doll: Ragdoll, fall: float = 0.4, duration: float = 8.0, tick: float = 0.01,
          at: tuple[float, float] = (0.0, 0.0), **placed: object) -> Trial:
-    """A fall from rest, slightly tilted so that nothing stands by symmetry."""
+    """A drop from rest by ``fall`` m, slightly tilted so that nothing stands by symmetry."""
     scene = above_ground(doll, fall)
     _, _, up = scene.dolls[0].position
     turn = tuple(rotation.from_rpy(0.03, 0.05, 0.0))

@@ -1,4 +1,4 @@
-"""Scenes that break simulations, each with what must hold all the same."""
+"""Hard cases: scenes that break simulations, each with its requirements."""
 from __future__ import annotations
 
 import dataclasses
@@ -12,16 +12,16 @@ from ...model.ragdoll import Bone, Joint, Ragdoll
 from ...model.shapes import Box, Capsule, Cylinder, Sphere
 from . import starts
 from .contact_cases import contact_cases
-from .hard_case import HardCase, Rule, drop
+from .hard_case import HardCase, Requirements, drop
 from .trial import Trial, posed
 
 
 def hard_cases() -> list[HardCase]:
-    """All cases that are one trial and one rule; others are in parts/hard.py."""
+    """All cases of one trial with requirements; others are in parts/hard.py."""
     return [
         HardCase('flat and tiny bodies, inertia 1e-9', lambda: drop(_flat_and_tiny(), 0.3)),
         HardCase('start 0.2 m inside the floor', _inside_floor,
-                 Rule(sinking_m=None, lift_m=0.2, exit_m_s=6.0)),
+                 Requirements(sinking_m=None, lift_m=0.2, max_speed_m_s=6.0)),
         HardCase('start in a self-overlap', _self_overlap),
         HardCase('start outside the limits', lambda: _longer(starts.trial('start outside', 0), 16)),
         HardCase('limits of 2°', lambda: drop(_narrow(math.radians(2)))),
@@ -31,9 +31,9 @@ def hard_cases() -> list[HardCase]:
         HardCase('hits the ground at 100 m/s', lambda: drop(
             load_doll('doll'), 1.0, 20.0, velocity=(20.0, 0.0, -100.0))),
         HardCase('2 kN for 3 s', lambda: _pulled(2e3)),
-        HardCase('20 kN for 3 s', lambda: _pulled(2e4), Rule(rest=False),
-                 reason='the torso comes near 1000 m/s; bones that are driven into each other '
-                        'there are given back half of their depth in each step.'),
+        HardCase('20 kN for 3 s', lambda: _pulled(2e4), Requirements(rest=False),
+                 reason='the torso comes near 1000 m/s; position correction removes half of the '
+                        'penetration of bones in each step.'),
         HardCase('wrung by 300 N m for 3 s', _wrung),
         HardCase('ticks of 1/30 s', lambda: drop(load_doll('doll'), tick=1 / 30)),
         HardCase('ticks of 1/500 s', lambda: drop(load_doll('doll'), tick=1 / 500)),
@@ -58,7 +58,7 @@ def _narrow(angle: float) -> Ragdoll:
 
 
 def _flat_and_tiny() -> Ragdoll:
-    """A sheet of 0.1 mm with two grains of 1 g hinged to its edges."""
+    """A sheet of 0.1 mm with two spheres of 1 g hinged to its edges."""
     grain = Sphere(0.0016)
     bones = (Bone('sheet', Box((0.2, 0.2, 1e-4)), 0.01, (0.0, 0.0, 0.0)),
              Bone('left', grain, 0.001, (0.0, 0.11, 0.0)),
@@ -75,7 +75,7 @@ def _inside_floor() -> Trial:
 
 
 def _self_overlap() -> Trial:
-    """Both forearms folded into the torso's sides, thighs crossed."""
+    """Both forearms folded into the sides of the torso, thighs crossed."""
     scene = load_scene('drop')
     angles = {'left_upper_arm_2': math.radians(-80), 'right_upper_arm_2': math.radians(80),
               'left_forearm': math.radians(-120), 'right_forearm': math.radians(120),
@@ -84,11 +84,11 @@ def _self_overlap() -> Trial:
 
 
 def _heavy_chain() -> Trial:
-    """30 rods of 0.1 kg with 100 kg at the end, let fall from 2 m."""
+    """A chain of 29 rods of 0.1 kg with 100 kg at the end, dropped from 2 m."""
     length = 0.1
     rods = [Bone(f'rod_{i}', Box((length, 0.04, 0.04)), 0.1, (i * length, 0.0, 0.0))
             for i in range(29)]
-    # A ball without rolling friction rolls for ever.
+    # Without rolling friction the ball would roll forever.
     tip = Bone('tip', Sphere(0.1), 100.0, (29 * length + 0.05, 0.0, 0.0), rolling_friction=0.01)
     names = [bone.name for bone in (*rods, tip)]
     joints = tuple(Joint(a, b, 'universal', ((i + 0.5) * length, 0.0, 0.0),
@@ -110,7 +110,7 @@ def _wrung() -> Trial:
 
 
 def _scaled(scale: float) -> Trial:
-    """The default drop of a doll ``scale`` times as large, as dense, as far seen."""
+    """The default drop of a doll ``scale`` times as large, of the same density."""
     def point(values: tuple[float, ...]) -> tuple[float, ...]:
         return tuple(scale * value for value in values)
 
@@ -122,7 +122,7 @@ def _scaled(scale: float) -> Trial:
         bones.append(dataclasses.replace(bone, shape=type(bone.shape)(**sizes),
                                          mass=bone.mass * scale ** 3,
                                          position=point(bone.position)))
-    # damping times length^4.5 keeps the course the same in units of the doll's own
+    # Damping times length^4.5 keeps the motion the same in dimensionless units.
     joints = tuple(dataclasses.replace(joint, anchor=point(joint.anchor),
                                        damping=joint.damping * scale ** 4.5)
                    for joint in doll.joints)

@@ -1,7 +1,7 @@
-"""Nine classes of random starts of the default doll over the ground, the same for ever.
+"""Nine classes of random starts of the default doll above the ground, reproducible.
 
-A start is known by its class and its number alone. Poses are drawn from the inner part of all
-joint ranges, so that no bone starts inside another; lowest points are placed exactly.
+A start is determined by its class and number. Joint angles are drawn from the inner part of their
+ranges, so that no bones overlap; the height of the lowest point is exact.
 """
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from ...model.coordinates import GeneralizedState
 from ...model.push import Push
 from ...model.scene import Placement, Scene, height
 from ..references.articulated import Articulated
-from .trial import Trial, angle_limits, angle_places, inner_angles, posed
+from .trial import Trial, angle_indices, angle_limits, inner_angles, posed
 
 SETTLING = 2.0
-"""s simulated after the first touch."""
+"""s simulated after the first contact."""
 
 
 @functools.cache
 def drop() -> Scene:
-    """The default scene, read once."""
+    """The default scene, cached."""
     return load_scene('drop')
 
 
@@ -37,7 +37,7 @@ def trial(class_name: str, number: int) -> Trial:
 
 
 def _push(rng: np.random.Generator) -> Trial:
-    """2000 N along the ground on the torso, as the arrow keys do, for 0.1 to 3 s."""
+    """A horizontal push of 2000 N on the torso, as by the arrow keys, for 0.1 to 3 s."""
     scene = drop()
     heading = rng.uniform(0, 2 * math.pi)
     force = (2000 * math.cos(heading), 2000 * math.sin(heading), 1.0)
@@ -47,25 +47,26 @@ def _push(rng: np.random.Generator) -> Trial:
 
 
 def _spin(speed: float) -> Callable[[np.random.Generator], Trial]:
-    """A rigid spin about any axis, 2 m above the ground."""
+    """A rigid rotation about a random axis, 2 m above the ground."""
     def make(rng: np.random.Generator) -> Trial:
         axis = rotation.normalized(rng.normal(size=3))
-        return _let_go(rng, 2.0, inner_angles(drop().dolls[0].doll, rng), spin=tuple(speed * axis))
+        angles = inner_angles(drop().dolls[0].doll, rng)
+        return _released(rng, 2.0, angles, spin=tuple(speed * axis))
     return make
 
 
 def _drop(fall: float) -> Callable[[np.random.Generator], Trial]:
-    """A fall from rest, at any orientation."""
+    """A drop from rest at a random orientation."""
     def make(rng: np.random.Generator) -> Trial:
-        return _let_go(rng, fall, inner_angles(drop().dolls[0].doll, rng))
+        return _released(rng, fall, inner_angles(drop().dolls[0].doll, rng))
     return make
 
 
 def _slam(rng: np.random.Generator) -> Trial:
-    """Every joint flung toward one of its limits at 10 to 20 rad/s."""
+    """Every joint moves towards one of its limits at 10 to 20 rad/s."""
     doll = drop().dolls[0].doll
-    rates = {name: rng.choice((-1, 1)) * rng.uniform(10, 20) for name in angle_places(doll)}
-    return _let_go(rng, 0.4, inner_angles(doll, rng), rates)
+    rates = {name: rng.choice((-1, 1)) * rng.uniform(10, 20) for name in angle_indices(doll)}
+    return _released(rng, 0.4, inner_angles(doll, rng), rates)
 
 
 def _outside(rng: np.random.Generator) -> Trial:
@@ -76,7 +77,7 @@ def _outside(rng: np.random.Generator) -> Trial:
         if rng.random() < 0.5:
             past = math.radians(rng.uniform(5, 30))
             angles[name] = upper + past if rng.random() < 0.5 else lower - past
-    return _let_go(rng, 0.4, angles)
+    return _released(rng, 0.4, angles)
 
 
 CLASSES: dict[str, Callable[[np.random.Generator], Trial]] = {
@@ -85,9 +86,9 @@ CLASSES: dict[str, Callable[[np.random.Generator], Trial]] = {
     'drop 50 m': _drop(50.0), 'limit slam': _slam, 'start outside': _outside}
 
 
-def _let_go(rng: np.random.Generator, fall: float, angles: dict[str, float],
-            rates: dict[str, float] | None = None, **moving: object) -> Trial:
-    """The doll at any orientation, with its lowest point ``fall`` m above the ground."""
+def _released(rng: np.random.Generator, fall: float, angles: dict[str, float],
+              rates: dict[str, float] | None = None, **moving: object) -> Trial:
+    """The doll at a random orientation, its lowest point ``fall`` m above the ground."""
     scene = drop()
     orientation = tuple(rotation.normalized(rng.normal(size=4)))
     placement = Placement(scene.dolls[0].doll, orientation=orientation, **moving)

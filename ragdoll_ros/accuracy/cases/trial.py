@@ -1,4 +1,4 @@
-"""One motion that every method is to simulate: a scene, how it starts, what pushes it, how long."""
+"""A trial: scene, initial state, pushes and duration, to be simulated by every method."""
 from __future__ import annotations
 
 import dataclasses
@@ -16,9 +16,9 @@ from ..references.articulated import Articulated
 
 @dataclass(frozen=True)
 class Trial:
-    """``duration`` s of a scene, from ``start`` or from where the scene itself begins.
+    """``duration`` s of a scene, from ``start`` or from the scene's own initial state.
 
-    Pushes begin and end with a tick, have a start, act on centres of mass, along the world's axes.
+    Pushes have a start, begin and end with a tick, and act along the world's axes.
     """
 
     scene: Scene
@@ -27,16 +27,16 @@ class Trial:
     pushes: tuple[Push, ...] = ()
 
     def times(self, tick: float | None = None) -> np.ndarray:
-        """Instants 0, tick, 2 tick ... (t,) s; the scene's own tick if None."""
+        """Instants 0, tick, 2 tick ... (t,) s; the scene's tick if None."""
         tick = tick or self.scene.step
         return np.arange(round(self.duration / tick) + 1) * tick
 
     def with_tick(self, tick: float) -> Trial:
-        """The same motion in ticks of another length, s."""
+        """The same trial with another tick, s."""
         return dataclasses.replace(self, scene=dataclasses.replace(self.scene, step=tick))
 
     def loads(self, begin: float, end: float) -> list[AppliedWrench]:
-        """Wrenches of all pushes that act in the middle of a tick, from ``begin`` to ``end`` s."""
+        """Wrenches of the pushes that act in the middle of a tick from ``begin`` to ``end`` s."""
         middle = (begin + end) / 2
         return [AppliedWrench(self.scene.bone_index(push.bone), np.array(push.force),
                               np.array(push.torque), np.array(push.point))
@@ -45,15 +45,15 @@ class Trial:
 
 def posed(placement: Placement, angles: dict[str, float] | None = None,
           rates: dict[str, float] | None = None) -> GeneralizedState:
-    """Coordinates of one placed doll with some joint angles (rad) and rates (rad/s) set.
+    """Coordinates of a placed doll with some joint angles (rad) and rates (rad/s) set by name.
 
-    The names are those of Joint.angle_names; the root moves as ``placement`` says.
+    Names are those of Joint.angle_names; the root has the placement's velocity.
     """
     doll = placement.doll
     tree = Articulated(doll)
     q, v = tree.bind(placement.position, placement.orientation), np.zeros(tree.nv)
     v[:3], v[3:6] = placement.root_velocity(), placement.spin
-    where = angle_places(doll)
+    where = angle_indices(doll)
     for name, angle in (angles or {}).items():
         q[7 + where[name]] = angle
     for name, rate in (rates or {}).items():
@@ -61,14 +61,14 @@ def posed(placement: Placement, angles: dict[str, float] | None = None,
     return GeneralizedState(q, v)
 
 
-def angle_places(doll: Ragdoll) -> dict[str, int]:
-    """Place of each joint angle behind the root's coordinates, for dolls without free balls."""
+def angle_indices(doll: Ragdoll) -> dict[str, int]:
+    """Index of each joint angle after the root's coordinates, for dolls without free balls."""
     names = [name for joint in doll.joints_depth_first() for name in joint.angle_names]
     return {name: place for place, name in enumerate(names)}
 
 
 def angle_limits(doll: Ragdoll) -> dict[str, tuple[float, float]]:
-    """Range of each joint angle, rad, for dolls whose joints all have limits."""
+    """Limits of each joint angle, rad, for dolls whose joints all have limits."""
     return {name: pair for joint in doll.joints
             for name, pair in zip(joint.angle_names, joint.angle_limits, strict=True)}
 

@@ -1,1 +1,1 @@
-"""Many dolls at once: cost, depth, equal bits."""
+"""Many dolls at once: cost, penetration, reproducibility."""

@@ -1,7 +1,7 @@
-"""`python -m ragdoll_ros.accuracy.crowds`: what dolls cost that fall, lie, sleep and pile up.
+"""`python -m ragdoll_ros.accuracy.crowds`: cost of dolls that fall, lie, sleep and pile up.
 
-But for those of the pile and the digests, dolls are 2.5 m apart and do not touch. Take the ratios;
-the microseconds are this machine's.
+Except in the pile and the digests, dolls are 2.5 m apart and do not touch. Compare ratios: absolute
+times depend on the machine.
 """
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from ...physics.accuracy import ACCURACIES
 from ...physics.simulation import Simulation
 from . import crowd_digests, pile
 
-NUMBERS = (1, 10, 100, 1000)
-APART = 2.5
-SAME = 100
-"""Dolls of which all smaller crowds are made, as no two fall alike."""
+CROWD_SIZES = (1, 10, 100, 1000)
+SPACING = 2.5
+SAMPLED = 100
+"""Smaller crowds are averaged over the same 100 dolls, as no two falls cost the same."""
 
 FALL = 2.0
-"""s from the start, in which dolls fall 0.4 m and lie down."""
+"""s in which dolls fall by 0.4 m and come to lie."""
 
 
 def grid(count: int, **placed: object) -> Scene:
-    """The default scene with so many of its dolls, APART m apart; ``placed`` as of a Placement."""
+    """``count`` default dolls, SPACING m apart; ``placed`` are fields of their Placement."""
     drop = load_scene('drop')
     first = Placement(drop.dolls[0].doll, **placed)
     return dataclasses.replace(drop, name='grid', dolls=tuple(
-        repeated_placements(first, {'count': count, 'grid': (APART, APART, 0.0)})))
+        repeated_placements(first, {'count': count, 'grid': (SPACING, SPACING, 0.0)})))
 
 
 def turning(count: int, first: int = 0) -> Scene:
-    """So many dolls, each of which turns a little otherwise as it falls, from one on."""
+    """``count`` dolls, each with another small spin; ``first`` numbers the first one."""
     level = grid(count)
     return dataclasses.replace(level, dolls=tuple(
         dataclasses.replace(doll, spin=(0.1 * math.sin(first + k), 0.1 * math.cos(first + k), 0.0))
@@ -47,12 +47,12 @@ def turning(count: int, first: int = 0) -> Scene:
 
 
 def lying(count: int) -> Scene:
-    """So many dolls on their faces, soon asleep."""
+    """``count`` dolls on their faces, soon asleep."""
     return grid(count, position=(0.0, 0.0, 0.12), orientation=(0.0, 1.0, 0.0, 1.0))
 
 
 def falling(scene: Scene, accuracy: str, workers: int = 1) -> tuple[float, float]:
-    """CPU and wall in us a doll and tick while they fall and lie down."""
+    """CPU and wall time per doll and tick, us, while the dolls fall and come to lie."""
     count = len(scene.dolls)
     with Simulation(scene, accuracy=dataclasses.replace(
             ACCURACIES[accuracy], sleep=False), workers=workers) as simulation:
@@ -65,14 +65,14 @@ def falling(scene: Scene, accuracy: str, workers: int = 1) -> tuple[float, float
 
 
 def falls() -> None:
-    """Print what a doll of a crowd costs; the smaller crowds are parts of the hundred."""
-    print(f'us a doll and tick of 10 ms over {FALL:g} s of a fall; "real time": dolls whose ticks '
-          'take 10 ms')
-    print(f'{"":22}{"CPU":>10}{"of alone":>10}{"2 workers":>12}{"wall ratio":>12}{"real time":>12}')
+    """Print the cost per doll of crowds; smaller crowds are parts of the SAMPLED dolls."""
+    print(f'us per doll and tick of 10 ms over {FALL:g} s of a fall; "real time": number of dolls '
+          'whose tick takes 10 ms')
+    print(f'{"":22}{"CPU":>10}{"over one":>10}{"2 workers":>12}{"wall ratio":>12}{"real time":>12}')
     for accuracy in ACCURACIES:
         alone = 0.0
-        for count in NUMBERS:
-            crowds = [turning(count, first) for first in range(0, max(SAME, count), count)]
+        for count in CROWD_SIZES:
+            crowds = [turning(count, first) for first in range(0, max(SAMPLED, count), count)]
             cpu, wall, shared = np.mean([(*falling(crowd, accuracy), falling(crowd, accuracy, 2)[1])
                                          for crowd in crowds], axis=0)
             alone = alone or cpu
@@ -81,12 +81,12 @@ def falls() -> None:
 
 
 def sleepers() -> None:
-    """Print what those cost that lie still, and what waking one wakes."""
-    print('\nasleep: us a tick of all; set-up in s; memory of the process at the most, MB')
-    for count in NUMBERS:
+    """Print the cost of sleeping dolls, and which dolls a push wakes."""
+    print('\nasleep: us per tick of all dolls; set-up, s; peak memory of the process, MB')
+    for count in CROWD_SIZES:
         begin = time.perf_counter()
         with Simulation(lying(count)) as simulation:
-            made = time.perf_counter() - begin
+            set_up = time.perf_counter() - begin
             while not simulation.asleep and simulation.time < 30e9:
                 simulation.advance()
             begin = time.process_time()
@@ -99,7 +99,7 @@ def sleepers() -> None:
                 simulation.advance()
             moved = (simulation.state.rows != before).any(axis=1)
             print(f'{count:6} dolls:{tick:8.1f} us,'
-                  f' set up in {made:.2f} s, a push moves '
+                  f' set up in {set_up:.2f} s, a push moves '
                   f'{len(set(simulation.scene.doll_of_bone[moved].tolist()))} doll(s); '
                   f'{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB', flush=True)
 
@@ -108,13 +108,13 @@ PARTS = {'falls': falls, 'sleepers': sleepers, 'pile': pile.pile, 'digests': cro
 
 
 def main() -> None:
-    """Print the parts that are asked for."""
+    """Print the selected parts."""
     parser = argparse.ArgumentParser(
-        prog='python -m ragdoll_ros.accuracy.crowds', description='Print what crowds cost.',
+        prog='python -m ragdoll_ros.accuracy.crowds', description='Measure the cost of crowds.',
         epilog='example: python -m ragdoll_ros.accuracy.crowds --part pile --part digests')
     parser.add_argument('--part', action='append', choices=PARTS,
-                        help='a part alone, more than once for several: falls (5 min), sleepers '
-                             '(1 min), pile (at most 14 min), digests (1 min); all by default')
+                        help='only this part; repeatable: falls (5 min), sleepers (1 min), '
+                             'pile (at most 14 min), digests (1 min); default: all')
     for name in parser.parse_args().part or PARTS:
         PARTS[name]()
 

@@ -1,7 +1,6 @@
-"""Whether a crowd's states depend on threads, resets and processes: SHA-256 over all ticks.
+"""Reproducibility of a crowd over threads, resets and processes: SHA-256 of all states.
 
-Sixty dolls of which some collide, some are pushed and some sleep and are woken, and one that is far
-from all others.
+Sixty dolls: some collide, some are pushed, some sleep and are woken, one is far from all others.
 """
 from __future__ import annotations
 
@@ -20,13 +19,11 @@ from ...physics.simulation import Simulation
 TICKS = 1000
 PUSHES = {1: Push('doll_12/torso', (300.0, 200.0, 300.0), duration=0.2),
           8: Push('doll_30/torso', (0.0, 0.0, 900.0), duration=0.1)}
-"""After so many tenths of the ticks: one that still moves, and one that sleeps by then."""
+"""By tenths of the run: a push on a moving doll, and one on a sleeping doll."""
 
 
 def sixty() -> Scene:
-    """Dolls on their faces, most of them asleep soon; above every sixth one that falls onto it; and
-    a lone one, which is the first.
-    """
+    """A lone doll, 50 dolls on their faces, most of them soon asleep, and 9 that fall onto them."""
     drop = load_scene('drop')
     doll = drop.dolls[0].doll
     lying = repeated_placements(
@@ -40,7 +37,7 @@ def sixty() -> Scene:
 
 
 def run(simulation: Simulation, ticks: int, seen: Counter | None = None) -> tuple[str, str]:
-    """Digests of all states of the scene and of those of its first doll, from its start on."""
+    """Digests of all states of the scene and of its first doll, from the start."""
     scene, crowd, first = simulation.scene, hashlib.sha256(), hashlib.sha256()
     engine, pushes = simulation._engine, PUSHES if len(scene.dolls) > 1 else {}
     for tick in range(ticks):
@@ -60,7 +57,7 @@ def run(simulation: Simulation, ticks: int, seen: Counter | None = None) -> tupl
 
 def of_workers(workers: int, ticks: int = TICKS, rounds: int = 1,
                seen: Counter | None = None) -> list[tuple[str, str]]:
-    """What run() gives, again after each reset."""
+    """Results of run() with some workers, again after each reset."""
     found = []
     with Simulation(sixty(), engine='rigid', workers=workers) as simulation:
         for _ in range(rounds):
@@ -69,8 +66,8 @@ def of_workers(workers: int, ticks: int = TICKS, rounds: int = 1,
     return found
 
 
-def of_the_lone(ticks: int = TICKS) -> str:
-    """The digest of the first doll in a scene of its own."""
+def of_first_alone(ticks: int = TICKS) -> str:
+    """Digest of the first doll simulated alone."""
     scene = sixty()
     with Simulation(dataclasses.replace(scene, dolls=scene.dolls[:1]),
                     engine='rigid') as simulation:
@@ -78,18 +75,18 @@ def of_the_lone(ticks: int = TICKS) -> str:
 
 
 def digests() -> None:
-    """Print digests by one, two and three workers, after a reset, in another process, alone."""
+    """Print digests with one, two and three workers, after a reset, of another process, alone."""
     seen = Counter()
     (crowd, first), again = of_workers(1, rounds=2, seen=seen)
     print(f'\nSHA-256 of {TICKS} ticks of {len(sixty().dolls)} dolls; at most '
-          f'{seen["joined"]} on others, {seen["slept"]} times one slept, {seen["woke"]} one woke')
+          f'{seen["joined"]} in clusters, {seen["slept"]} fell asleep, {seen["woke"]} woke')
     other = subprocess.run([sys.executable, '-m', __name__], capture_output=True, text=True,
                            check=True).stdout.strip()
     print(f'{"1 worker":24}{crowd}\n{"first doll in the crowd":24}{first}')
     for name, found, wanted in (
             ('1 worker, after a reset', again[0], crowd), ('2 workers', of_workers(2)[0][0], crowd),
             ('3 workers', of_workers(3)[0][0], crowd), ('another process', other, crowd),
-            ('first doll, alone', of_the_lone(), first)):
+            ('first doll, alone', of_first_alone(), first)):
         print(f'{name:24}{found} {"equal" if found == wanted else "UNEQUAL"}', flush=True)
 
 

@@ -1,4 +1,4 @@
-"""How deep bones are in each other, by a judge that moves none of them: MuJoCo's distances."""
+"""Penetration depths of bones by MuJoCo's distance functions, independent of all engines."""
 from __future__ import annotations
 
 import itertools
@@ -10,18 +10,15 @@ from ...model import rotation
 from ...model.scene import Scene
 from ..trajectory import Trajectory
 
-APART = 1e-3
-"""m: a pair that starts deeper in each other counts from when it is no deeper than this."""
+SEPARATED = 1e-3
+"""m: a pair that overlaps at the start counts once its depth falls to this."""
 
-SEARCHED = 0.01
-"""m of distance from which a pair is apart, however far."""
+SEARCH_DISTANCE = 0.01
+"""m: larger distances are not computed."""
 
 
 class BoneDepth:
-    """Depths of all pairs of a scene's bones that may collide: those without a joint between.
-
-    None may where the scene has no self-collision.
-    """
+    """Penetration depths of all pairs of a scene's bones that may collide."""
 
     def __init__(self, scene: Scene) -> None:
         import mujoco
@@ -42,7 +39,7 @@ class BoneDepth:
                                int).reshape(-1, 2)
 
     def depths(self, positions: np.ndarray, orientations: np.ndarray) -> np.ndarray:
-        """Of each pair, m, at poses (n, 3) and (n, 4); 0 where they are apart."""
+        """Depth of each pair, (pairs,) m, at poses (n, 3) and (n, 4); 0 without penetration."""
         a, b = self._pairs.T
         far = np.linalg.norm(positions[a] - positions[b], axis=1) > self._radii[a] + self._radii[b]
         found = np.zeros(len(self._pairs))
@@ -55,24 +52,22 @@ class BoneDepth:
         return found
 
     def deepest(self, trajectory: Trajectory) -> float:
-        """Largest depth of any pair, m, each from when it first was apart."""
-        return _deepest(self._course(trajectory))
+        """Largest depth of any pair, m, after its first separation."""
+        return _deepest(self._over_time(trajectory))
 
-    def since_apart(self, trajectory: Trajectory) -> tuple[Trajectory, float]:
-        """What comes after all pairs that begin in each other, and come apart, have done so; and
-        the deepest() of that.
-        """
-        found = self._course(trajectory)
-        begin = int((found <= APART).argmax(axis=0).max(initial=0))
+    def after_separation(self, trajectory: Trajectory) -> tuple[Trajectory, float]:
+        """The part after all pairs that overlap at the start have separated, and its deepest()."""
+        found = self._over_time(trajectory)
+        begin = int((found <= SEPARATED).argmax(axis=0).max(initial=0))
         return trajectory.part(slice(begin, None)), _deepest(found[begin:])
 
-    def _course(self, trajectory: Trajectory) -> np.ndarray:
+    def _over_time(self, trajectory: Trajectory) -> np.ndarray:
         """Depths (t, pairs), m."""
         return np.array([self.depths(positions, orientations) for positions, orientations
                          in zip(trajectory.positions, trajectory.orientations, strict=True)])
 
     def _pose(self, positions: np.ndarray, orientations: np.ndarray) -> None:
-        """Put every geom where its bone is; MuJoCo's quaternions are w, x, y, z."""
+        """Set the poses of all geoms; MuJoCo's quaternions are w, x, y, z."""
         turns = orientations[self._bones]
         self._data.geom_xpos[self._own] = positions[self._bones] + rotation.rotate(
             turns, self._places)
@@ -80,10 +75,11 @@ class BoneDepth:
             rotation.multiply(turns, self._turns)).reshape(-1, 9)
 
     def _distance(self, one: int, other: int) -> float:
-        return self._mujoco.mj_geomDistance(self._model, self._data, one, other, SEARCHED, None)
+        return self._mujoco.mj_geomDistance(self._model, self._data, one, other,
+                                            SEARCH_DISTANCE, None)
 
 
 def _deepest(found: np.ndarray) -> float:
-    """Largest of depths (t, pairs), m, each pair's from when it first was apart."""
-    counts = np.maximum.accumulate(found <= APART, axis=0)
+    """Largest of depths (t, pairs), m, of each pair after its first separation."""
+    counts = np.maximum.accumulate(found <= SEPARATED, axis=0)
     return float(found[counts].max(initial=0.0))

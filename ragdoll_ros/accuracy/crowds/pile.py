@@ -1,7 +1,7 @@
-"""The scene `pile` by several engines: what a tick costs, how deep bones sink, when all lie still.
+"""The scene `pile` by several engines: tick cost, penetration, time until all dolls sleep.
 
-Depths are told of all engines by one scale that moves none of them: MuJoCo's distances, and the
-shapes' own heights over the ground.
+Penetration is measured independently of the engines: by MuJoCo's distance functions, and by the
+shapes' heights above the ground.
 """
 from __future__ import annotations
 
@@ -29,65 +29,66 @@ DURATION = 10.0
 HALF_SECOND = 50
 """Ticks."""
 
-LOOKS = 10
-"""Ticks from one look at the depths to the next; limits are looked at each tick."""
+DEPTH_INTERVAL = 10
+"""Ticks between measurements of depths; joint limits are checked every tick."""
 
-PATIENCE = 120.0
-"""s on the wall, after which a run is ended where it is."""
+MAX_WALL_TIME = 120.0
+"""s, after which a run is aborted."""
 
-RUNAWAY = 100.0
-"""m/s: what falls from 6 m has a tenth of it; a run with a faster bone has exploded."""
+MAX_SPEED = 100.0
+"""m/s: a run with a faster bone has diverged; a fall from 6 m reaches a tenth of it."""
 
 
 class RungeKutta(MujocoEngine):
-    """MuJoCo by its integrator of order 4, which lets fewer limbs spin up than the others."""
+    """MuJoCo with its integrator of order 4, by which fewer limbs spin up."""
 
     def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
         super().__init__(scene, accuracy, 'rk4', workers=workers)
 
 
-class Ended(Exception):
-    """A run is not worth going on with."""
+class RunAborted(Exception):
+    """A run has diverged or takes too long."""
 
 
 @dataclass
 class Outcome:
-    """What one engine made of the pile."""
+    """Results of one engine."""
 
     costs: list[float] = field(default_factory=list)
-    """Of each tick, s on the wall."""
+    """Wall time of each tick, s."""
     cpu: float = 0.0
-    """Of all ticks together, s of processors."""
-    between: float = 0.0
-    """Deepest of bones in each other, m."""
-    sunk: float = 0.0
-    """Deepest below the ground, m."""
-    past: float = 0.0
-    """Farthest past a joint's limit, rad."""
+    """CPU time of all ticks, s."""
+    bone_depth: float = 0.0
+    """Largest penetration of bones, m."""
+    ground_depth: float = 0.0
+    """Largest penetration of the ground, m."""
+    overshoot: float = 0.0
+    """Largest limit overshoot, rad."""
     asleep: float = math.inf
-    """s after which nothing moved any more."""
+    """Time, s, after which nothing moves."""
     ended: str = ''
-    """Why it ended early."""
+    """Reason of an abort."""
 
     def row(self) -> str:
-        """As HEAD has it."""
+        """Line of the table under HEAD."""
         ms = 1e3 * np.array(self.costs)
         halves = [part.mean() for part in np.split(ms, range(HALF_SECOND, len(ms), HALF_SECOND))]
         still = f'{self.asleep:.1f}' if self.asleep < math.inf else 'no'
         return (f'{1e3 * self.cpu / len(ms):9.1f}{ms.mean():9.1f}{max(halves):9.1f}'
                 f'{np.percentile(ms, 99):9.1f}'
-                f'{1e3 * self.between:10.2f}{1e3 * self.sunk:10.2f}{math.degrees(self.past):9.2f}'
+                f'{1e3 * self.bone_depth:10.2f}{1e3 * self.ground_depth:10.2f}'
+                f'{math.degrees(self.overshoot):9.2f}'
                 f'{still:>8}  {self.ended}')
 
 
 HEAD = (f'{"ms a tick, depths in mm":30}{"CPU":>9}{"mean":>9}{"worst":>9}{"p99":>9}'
         f'{"bones":>10}{"ground":>10}{"past, °":>9}{"asleep":>8}')
-"""Of a tick the CPU; on the wall the mean, the worst half second, the 99th percentile."""
+"""Per tick: CPU time; wall time as mean, worst half second and 99th percentile."""
 
 
-def watched(scene: Scene, scale: BoneDepth, advance: Callable[[], State],
-            past: Callable[[], float]) -> Outcome:
-    """Take a scene on for DURATION; ``advance`` goes a tick, ``past`` tells of limits, rad."""
+def measured(scene: Scene, depths: BoneDepth, advance: Callable[[], State],
+             overshoot: Callable[[], float]) -> Outcome:
+    """Advance a scene for DURATION by ``advance``, a tick each; ``overshoot`` returns rad."""
     outcome, heights = Outcome(), GroundHeights(scene)
     try:
         for tick in range(round(DURATION / scene.step)):
@@ -95,52 +96,53 @@ def watched(scene: Scene, scale: BoneDepth, advance: Callable[[], State],
             state = advance()
             outcome.costs.append(time.perf_counter() - begin)
             outcome.cpu += time.process_time() - used
-            _look(outcome, heights, scale, state, tick, scene.step)
-            outcome.past = max(outcome.past, past())
-            if sum(outcome.costs) > PATIENCE:
-                raise Ended(f'ended after {PATIENCE:g} s')
-    except Ended as reason:
+            _record(outcome, heights, depths, state, tick, scene.step)
+            outcome.overshoot = max(outcome.overshoot, overshoot())
+            if sum(outcome.costs) > MAX_WALL_TIME:
+                raise RunAborted(f'aborted after {MAX_WALL_TIME:g} s')
+    except RunAborted as reason:
         outcome.ended = f'{reason}, at {len(outcome.costs) * scene.step:.2f} s'
     return outcome
 
 
-def _look(outcome: Outcome, heights: GroundHeights, scale: BoneDepth, state: State, tick: int,
-          step: float) -> None:
-    """Enter what the state after a tick of ``step`` s shows."""
+def _record(outcome: Outcome, heights: GroundHeights, depths: BoneDepth, state: State, tick: int,
+            step: float) -> None:
+    """Record the state after a tick of ``step`` s."""
     speeds = np.abs(state.linear_velocities).max()
-    if not speeds < RUNAWAY:
-        raise Ended('exploded')
+    if not speeds < MAX_SPEED:
+        raise RunAborted('diverged')
     if speeds > 0:
         outcome.asleep = math.inf
     elif outcome.asleep == math.inf:
         outcome.asleep = (tick + 1) * step
-    if tick % LOOKS == 0:
-        enter_depths(outcome, heights, scale, state)
+    if tick % DEPTH_INTERVAL == 0:
+        record_depths(outcome, heights, depths, state)
 
 
-def enter_depths(outcome: Outcome, heights: GroundHeights, scale: BoneDepth, state: State) -> None:
-    """Enter how deep bones are in each other and below the ground."""
-    depths = scale.depths(state.positions, state.orientations)
-    outcome.between = max(outcome.between, float(depths.max(initial=0.0)))
-    outcome.sunk = max(outcome.sunk, -float(heights(state).min()))
+def record_depths(outcome: Outcome, heights: GroundHeights, depths: BoneDepth,
+                  state: State) -> None:
+    """Record the largest penetration of bones and of the ground."""
+    found = depths.depths(state.positions, state.orientations)
+    outcome.bone_depth = max(outcome.bone_depth, float(found.max(initial=0.0)))
+    outcome.ground_depth = max(outcome.ground_depth, -float(heights(state).min()))
 
 
-def simulated(scene: Scene, scale: BoneDepth, **how: object) -> Outcome:
-    """The outcome by an engine of the package; ``how`` goes to Simulation."""
-    with Simulation(scene, **how) as simulation:
-        return watched(scene, scale, simulation.advance, lambda: float(
+def run_pile(scene: Scene, depths: BoneDepth, **options: object) -> Outcome:
+    """Simulate a scene; ``options`` are passed to Simulation."""
+    with Simulation(scene, **options) as simulation:
+        return measured(scene, depths, simulation.advance, lambda: float(
             simulation._engine.layout.limit_violations(simulation.coordinates.q).max()))
 
 
 def pile() -> None:
     """Print a row for each engine."""
     scene = load_scene('pile')
-    scale = BoneDepth(scene)
-    print(f'\n{len(scene.dolls)} dolls dropped into a heap, {DURATION:g} s\n{HEAD}')
+    depths = BoneDepth(scene)
+    print(f'\n{len(scene.dolls)} dolls dropped into a pile, {DURATION:g} s\n{HEAD}')
     for accuracy, workers in itertools.product(('draft', 'normal'), (1, 2)):
-        outcome = simulated(scene, scale, engine='rigid', accuracy=accuracy, workers=workers)
+        outcome = run_pile(scene, depths, engine='rigid', accuracy=accuracy, workers=workers)
         print(f'{f"rigid {accuracy}, workers {workers}":30}{outcome.row()}', flush=True)
     for engine, name in ((MujocoEngine, 'MuJoCo'), (RungeKutta, 'MuJoCo by RK4'),
                          (BulletEngine, 'PyBullet')):
-        outcome = simulated(scene, scale, engine=engine, accuracy='draft')
+        outcome = run_pile(scene, depths, engine=engine, accuracy='draft')
         print(f'{name + ", 4 substeps":30}{outcome.row()}', flush=True)

@@ -1,1 +1,1 @@
-"""Motions whose truth is known."""
+"""Reference motions: trials with an exact solution."""

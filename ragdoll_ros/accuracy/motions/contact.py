@@ -1,4 +1,4 @@
-"""Contacts whose motion has a formula: a bouncing ball, a block on a slope, a rolling ball."""
+"""Contacts with a closed form: a bouncing ball, a block on a slope, a rolling ball."""
 from __future__ import annotations
 
 import itertools
@@ -13,14 +13,14 @@ from ...model.shapes import Box, Sphere
 from ..cases.trial import Trial, posed
 from ..references import closed_forms
 from ..trajectory import Trajectory
-from .motion import Motion, orientations_about
+from .motion import ReferenceMotion, orientations_about
 
 GRAVITY = 9.8
 RADIUS = 0.1
 
 
-def contact_motions() -> list[Motion]:
-    """All motions on the ground."""
+def contact_motions() -> list[ReferenceMotion]:
+    """All reference motions with contacts that have a closed form."""
     return [*map(bounce, (0.1, 0.5, 0.9, 1.0)), incline('incline_stick', 'Block that sticks', 0.6),
             incline('incline_slip', 'Block that slips', 0.2),
             incline('tilted_stick', 'Block that sticks under tilted gravity', 0.6, tilted=True),
@@ -36,8 +36,8 @@ def _ball(material: Material, height: float, **placed: object) -> Scene:
     return Scene('ball', (placement,), Ground(), material)
 
 
-def bounce(restitution: float = 0.5, height: float = 1.0, bounces: int = 3) -> Motion:
-    """A ball let fall from 1 m; the heights it comes back to are e^(2 n) of it."""
+def bounce(restitution: float = 0.5, height: float = 1.0, bounces: int = 3) -> ReferenceMotion:
+    """A ball dropped from 1 m; its apexes are e^(2 n) of that."""
     impacts = closed_forms.bounce_times(height, restitution, GRAVITY, bounces + 1)
 
     def truth(times: np.ndarray) -> Trajectory:
@@ -57,13 +57,13 @@ def bounce(restitution: float = 0.5, height: float = 1.0, bounces: int = 3) -> M
     scene = _ball(Material(friction=0.0, restitution=restitution), height)
     duration = round(impacts[bounces] - 0.01, 2)
     name = 'bounce' if restitution == 0.5 else f'bounce_{restitution:g}'
-    return Motion(name, f'Ball that bounces {bounces} times, e = {restitution:g}',
-                  'parabolas, heights e²ⁿ h', Trial(scene, duration), truth, in_air=False,
-                  extra=apexes)
+    return ReferenceMotion(name, f'Ball that bounces {bounces} times, e = {restitution:g}',
+                           'parabolas, heights e²ⁿ h', Trial(scene, duration), truth,
+                           in_flight=False, extra=apexes)
 
 
 def _apex(times: np.ndarray, heights: np.ndarray) -> float:
-    """Highest point of the parabola through the three highest samples, m."""
+    """Apex of the parabola through the three highest samples, m."""
     top = int(np.clip(np.argmax(heights), 1, len(heights) - 2))
     a, b, c = np.polyfit(times[top - 1:top + 2] - times[top], heights[top - 1:top + 2], 2)
     return float(c - b * b / (4 * a)) if a < 0 else float(heights.max())
@@ -79,8 +79,8 @@ def _flight_height(t: float, height: float, restitution: float, impacts: list[fl
 
 
 def incline(name: str, title: str, friction: float, slope: float = math.radians(20),
-            tilted: bool = False) -> Motion:
-    """A flat block laid on a slope of 20 degrees; or on level ground, gravity ``tilted``."""
+            tilted: bool = False) -> ReferenceMotion:
+    """A flat block on a slope of 20 degrees, or on level ground with ``tilted`` gravity."""
     lean = 0.0 if tilted else slope
     normal = (math.sin(lean), 0.0, math.cos(lean))
     downhill = np.array((math.cos(lean), 0.0, -math.sin(lean)))
@@ -96,14 +96,14 @@ def incline(name: str, title: str, friction: float, slope: float = math.radians(
         return Trajectory.of_poses(times, (start + slid[:, None] * downhill)[:, None],
                                    np.tile(orientation, (len(times), 1, 1)))
     where = 'of 20°' if tilted else 'on a slope of 20°'
-    return Motion(name, f'{title} {where}, µ = {friction:g}, 1 s', "Coulomb's law",
-                  Trial(scene, 1.0), truth, in_air=False)
+    return ReferenceMotion(name, f'{title} {where}, µ = {friction:g}, 1 s', "Coulomb's law",
+                           Trial(scene, 1.0), truth, in_flight=False)
 
 
 def rolling_ball(name: str = 'rolling_ball', title: str = 'Ball that slides, then rolls',
                  reference: str = 'v falls to 5/7, then stays', speed: float = 2.0,
-                 rim: float = 0.0, friction: float = 0.3) -> Motion:
-    """A ball thrown flat, its rim spinning at ``rim`` m/s, forwards if positive."""
+                 rim: float = 0.0, friction: float = 0.3) -> ReferenceMotion:
+    """A ball that starts sliding on the ground; ``rim`` is radius times spin, m/s, forwards > 0."""
     scene = _ball(Material(friction=friction, restitution=0.0), 0.0, velocity=(speed, 0.0, 0.0),
                   spin=(0.0, rim / RADIUS, 0.0))
 
@@ -116,5 +116,5 @@ def rolling_ball(name: str = 'rolling_ball', title: str = 'Ball that slides, the
         return Trajectory.of_poses(
             times, positions, orientations_about((0.0, 1.0, 0.0), angles[:, None]))
     start = posed(scene.dolls[0])
-    return Motion(name, f'{title}, µ = {friction:g}, 1.5 s', reference, Trial(scene, 1.5, start),
-                  truth, in_air=False)
+    return ReferenceMotion(name, f'{title}, µ = {friction:g}, 1.5 s', reference,
+                           Trial(scene, 1.5, start), truth, in_flight=False)

@@ -1,4 +1,4 @@
-"""Motions in the air: falls, throws, a tumbling box, chains, the doll itself."""
+"""Reference motions in flight: falls, throws, a tumbling box, chains, the doll."""
 from __future__ import annotations
 
 import dataclasses
@@ -14,36 +14,35 @@ from ...model.push import Push
 from ...model.ragdoll import Bone, Joint, Ragdoll
 from ...model.scene import Placement, Scene
 from ...model.shapes import Box
-from ..cases.trial import Trial, angle_places, inner_angles, posed
-from ..references.articulated import Articulated
+from ..cases.trial import Trial, angle_indices, inner_angles, posed
+from ..references.articulated import Articulated, torque_free_rotation
 from ..references.closed_forms import fall
 from ..references.planar_chain import PlanarChain
-from ..references.rigid_body import torque_free_rotation
 from ..trajectory import Trajectory
-from .motion import Motion, alone, orientations_about, without_limits
+from .motion import ReferenceMotion, airborne_scene, orientations_about, without_limits
 
 EQUATIONS = 'equations of motion of the tree, DOP853 at 1e-12'
 GENTLE = {'velocity': (1.0, 0.5, 2.0), 'spin': (0.5, -0.5, 1.0)}
 
 
-def flight_motions() -> list[Motion]:
-    """All motions in the air."""
+def flight_motions() -> list[ReferenceMotion]:
+    """All reference motions in flight."""
     return [free_fall(), projectile(), first_touch(), tumbling_box(),
             *map(chain, (2, 5, 10)), gentle_flight(), long_flight(), fast_flight(), pushed_flight()]
 
 
-def free_fall() -> Motion:
-    """The doll let fall without a ground: as a whole, no joint moves."""
+def free_fall() -> ReferenceMotion:
+    """The doll in free fall from rest: no joint moves."""
     return _rigid_fall('free_fall', 'Free fall, 1 s', _thrown((0.0, 0.0, 0.0)))
 
 
-def projectile() -> Motion:
-    """The doll thrown, not rotating."""
+def projectile() -> ReferenceMotion:
+    """The doll thrown without rotation."""
     return _rigid_fall('projectile', 'Throw without spin, 1 s', _thrown((3.0, 1.0, 4.0)))
 
 
-def first_touch() -> Motion:
-    """The default scene, its doll not turning, up to just before the feet touch, at 0.2857 s."""
+def first_touch() -> ReferenceMotion:
+    """The default drop without spin, up to just before the first contact at 0.2857 s."""
     scene = load_scene('drop')
     even = dataclasses.replace(scene.dolls[0], spin=(0.0, 0.0, 0.0))
     return _rigid_fall('drop_to_touch', 'The default drop, even, up to the first touch, 0.28 s',
@@ -55,7 +54,7 @@ def _thrown(velocity: tuple[float, float, float]) -> Scene:
 
 
 def _rigid_fall(name: str, title: str, scene: Scene, duration: float = 1.0,
-                formula: str = 'x0 + v0 t + g t²/2') -> Motion:
+                formula: str = 'x0 + v0 t + g t²/2') -> ReferenceMotion:
     placement, = scene.dolls
     start = np.array([placement.bone_pose(bone)[0] for bone in scene.bones])
 
@@ -63,25 +62,25 @@ def _rigid_fall(name: str, title: str, scene: Scene, duration: float = 1.0,
         displacement = fall(np.zeros(3), np.array(placement.velocity), np.array(scene.gravity),
                             times)
         return Trajectory.of_poses(times, start + displacement[:, None])
-    return Motion(name, title, formula, Trial(scene, duration), truth)
+    return ReferenceMotion(name, title, formula, Trial(scene, duration), truth)
 
 
-def tumbling_box() -> Motion:
-    """A box with moments 1 : 2 : 3 rotating about its middle axis, which is unstable."""
+def tumbling_box() -> ReferenceMotion:
+    """A box with moments 1 : 2 : 3 rotating about its intermediate axis, which is unstable."""
     bone = Bone('box', Box((0.2 * math.sqrt(2), 0.2, 0.002)), 1.0, (0.0, 0.0, 0.0))
     omega = (0.05, 8.0, 0.05)
-    scene = alone(Ragdoll('box', (bone,)), (0.0, 0.0, 0.0), spin=omega)
+    scene = airborne_scene(Ragdoll('box', (bone,)), (0.0, 0.0, 0.0), spin=omega)
 
     def truth(times: np.ndarray) -> Trajectory:
         orientations, _ = torque_free_rotation(bone.inertia, omega, times)
         return Trajectory.of_poses(times, np.zeros((len(times), 1, 3)), orientations[:, None])
-    return Motion('tumbling_box', 'Tumbling box, moments 1 : 2 : 3, 8 rad/s, 5 s',
-                  "Euler's equations, DOP853 at 1e-12", Trial(scene, 5.0), truth,
-                  'angle_worst_rad')
+    return ReferenceMotion('tumbling_box', 'Tumbling box, moments 1 : 2 : 3, 8 rad/s, 5 s',
+                           "Euler's equations, DOP853 at 1e-12", Trial(scene, 5.0), truth,
+                           'angle_worst_rad')
 
 
-def chain(links: int, length: float = 0.2, mass: float = 1.0) -> Motion:
-    """A chain of rods thrown in a plane, coiling up; nothing holds it."""
+def chain(links: int, length: float = 0.2, mass: float = 1.0) -> ReferenceMotion:
+    """A free chain of rods that moves in a plane and coils up."""
     rods = tuple(Bone(f'rod_{i}', Box((length, 0.04, 0.03)), mass, (i * length, 0.0, 0.0))
                  for i in range(links))
     joints = tuple(Joint(f'rod_{i - 1}', f'rod_{i}', 'hinge', ((i - 0.5) * length, 0.0, 0.0),
@@ -99,61 +98,61 @@ def chain(links: int, length: float = 0.2, mass: float = 1.0) -> Motion:
         centres, phi = planar.motion(angles, rates, times)
         flat = np.concatenate([centres, np.zeros((*centres.shape[:2], 1))], axis=2)
         return Trajectory.of_poses(times, flat, orientations_about((0.0, 0.0, 1.0), phi))
-    return Motion(f'chain_{links}', f'Thrown chain of {links} rods, 1 s',
-                  "Lagrange's equations in the plane, DOP853 at 1e-12",
-                  Trial(alone(doll, (0.0, 0.0, 0.0)), 1.0, start), truth)
+    return ReferenceMotion(f'chain_{links}', f'Thrown chain of {links} rods, 1 s',
+                           "Lagrange's equations in the plane, DOP853 at 1e-12",
+                           Trial(airborne_scene(doll, (0.0, 0.0, 0.0)), 1.0, start), truth)
 
 
-def gentle_flight() -> Motion:
-    """The default doll, limbs moving a little, for as long as the default drop flies."""
+def gentle_flight() -> ReferenceMotion:
+    """The default doll with slowly moving limbs, for the flight time of the default drop."""
     doll = load_doll('doll')
     placement = Placement(doll, **GENTLE)
     trial = Trial(Scene('gentle', (placement,)), 0.28,
                   posed(placement, *_inside_limits(doll, speed=1.0, seed=1)))
-    return Motion('flight_gentle', 'The doll in gentle flight, 0.28 s', EQUATIONS, trial,
-                  _articulated(trial))
+    return ReferenceMotion('flight_gentle', 'The doll in gentle flight, 0.28 s', EQUATIONS, trial,
+                           _articulated(trial))
 
 
-def long_flight() -> Motion:
-    """The same for 2 s, limits off."""
+def long_flight() -> ReferenceMotion:
+    """The same for 2 s without limits."""
     return _without_limits('flight_long', 'The doll in gentle flight, 2 s, limits off', 2.0,
                            speed=1.0, seed=1, **GENTLE)
 
 
-def fast_flight() -> Motion:
-    """Spun at 20 rad/s, limbs at some 5 rad/s, limits off."""
+def fast_flight() -> ReferenceMotion:
+    """The doll spinning at 20 rad/s, limbs at up to 5 rad/s, without limits."""
     return _without_limits('flight_fast', 'The doll spun at 20 rad/s, 0.28 s, limits off', 0.28,
                            speed=5.0, seed=2,
                            spin=tuple(20 * rotation.normalized(np.array((1.0, 2.0, 2.0)))))
 
 
 def _without_limits(name: str, title: str, duration: float, speed: float, seed: int,
-                    **placed: object) -> Motion:
+                    **placed: object) -> ReferenceMotion:
     limited = load_doll('doll')
     doll = without_limits(limited)
-    trial = Trial(alone(doll, **placed), duration,
+    trial = Trial(airborne_scene(doll, **placed), duration,
                   posed(Placement(doll, **placed), *_inside_limits(limited, speed, seed)))
-    return Motion(name, title, EQUATIONS, trial, _articulated(trial))
+    return ReferenceMotion(name, title, EQUATIONS, trial, _articulated(trial))
 
 
-def pushed_flight() -> Motion:
-    """2000 N on the torso for 0.1 s in the air, limits off."""
+def pushed_flight() -> ReferenceMotion:
+    """2000 N on the torso for 0.1 s in flight, without limits."""
     doll = without_limits(load_doll('doll'))
     push = Push('torso', (-2000.0, 0.0, 1.0), start=0.05, duration=0.1)
-    trial = Trial(alone(doll), 0.3, posed(Placement(doll)), (push,))
-    return Motion('flight_pushed', '2000 N on the torso for 0.1 s in flight, limits off',
-                  EQUATIONS, trial, _articulated(trial))
+    trial = Trial(airborne_scene(doll), 0.3, posed(Placement(doll)), (push,))
+    return ReferenceMotion('flight_pushed', '2000 N on the torso for 0.1 s in flight, limits off',
+                           EQUATIONS, trial, _articulated(trial))
 
 
 def _inside_limits(doll: Ragdoll, speed: float, seed: int) -> tuple[dict, dict]:
-    """Angles (rad) in the inner two fifths of their ranges, and rates of up to ``speed`` rad/s."""
+    """Random joint angles, rad, inside their ranges, and rates of up to ``speed`` rad/s."""
     rng = np.random.default_rng(seed)
     return inner_angles(doll, rng), {name: rng.uniform(-speed, speed)
-                                     for name in angle_places(doll)}
+                                     for name in angle_indices(doll)}
 
 
 def _articulated(trial: Trial) -> object:
-    """Truth from the equations of motion, with the trial's pushes."""
+    """Solution of the equations of motion with the trial's pushes."""
     start: GeneralizedState = trial.start
     tree = Articulated(trial.scene.dolls[0].doll, trial.scene.gravity)
     breaks = sorted({time for push in trial.pushes

@@ -1,4 +1,4 @@
-"""Impacts and edges whose motion is known: struck, rocking, tipping over, spinning on its face."""
+"""Reference motions with impacts, and on edges and faces: rocking, tipping, spinning."""
 from __future__ import annotations
 
 import functools
@@ -14,16 +14,16 @@ from ...model.shapes import Box, Cylinder, Shape, Sphere
 from ..cases.trial import Trial
 from ..references import impacts, sliding_disc
 from ..trajectory import Trajectory
-from .motion import Motion, orientations_about
+from .motion import ReferenceMotion, orientations_about
 
 GRAVITY = 9.8
 PITCH = (0.0, 1.0, 0.0)
 ROD = (0.02, 0.2, 1.0)
-"""m, edges of the rods: thin across the plane that they move in."""
+"""Size of the rods, m: thin across their plane of motion."""
 
 
-def impact_motions() -> list[Motion]:
-    """All motions in which something is struck, or stands on an edge or a face."""
+def impact_motions() -> list[ReferenceMotion]:
+    """All reference motions with impacts, or on an edge or a face."""
     return [rocking_block(), falling_rod(), *(dropped_rod(*rod) for rod in (
         ('rod_frictionless', 'without friction', 0.5, 0.0), ('rod_sticks', 'that sticks', 0.5, 2.0),
         ('rod_slides', 'that slides', 0.5, 0.1))), spinning_disc(), thin_disc(),
@@ -39,8 +39,8 @@ def _body(shape: Shape, material: Material, position: tuple[float, float, float]
 
 
 def _on_edge(name: str, title: str, reference: str, size: tuple[float, float, float], start: float,
-             duration: float, rocks: bool) -> Motion:
-    """A box let go on one lower edge, leaning by ``start`` rad; friction without limit."""
+             duration: float, rocks: bool) -> ReferenceMotion:
+    """A box released on a lower edge, tilted by ``start`` rad; infinite friction."""
     half_width, half_height = size[0] / 2, size[2] / 2
 
     def truth(times: np.ndarray) -> Trajectory:
@@ -52,12 +52,12 @@ def _on_edge(name: str, title: str, reference: str, size: tuple[float, float, fl
     scene = _body(Box(size), Material(restitution=0.0), tuple(centre),
                   rotation.from_axis_angle(PITCH, start))
     extra = functools.partial(_peaks, truth) if rocks else lambda _: {}
-    return Motion(name, title, reference, Trial(scene, duration), truth, 'angle_worst_rad',
-                  in_air=False, extra=extra)
+    return ReferenceMotion(name, title, reference, Trial(scene, duration), truth, 'angle_worst_rad',
+                           in_flight=False, extra=extra)
 
 
 def _peaks(truth: Callable[[np.ndarray], Trajectory], found: Trajectory) -> dict[str, float]:
-    """Relative error of the ninth peak of a block that rocks."""
+    """Relative error of the ninth peak of a rocking block."""
     exact, peaks = impacts.peaks(pitches(truth(found.times))), impacts.peaks(pitches(found))
     error = abs(peaks[8] / exact[8] - 1) if len(peaks) > 8 else math.inf
     return {'peak_9_error': float(error)}
@@ -69,20 +69,20 @@ def pitches(trajectory: Trajectory) -> np.ndarray:
     return 2 * np.arctan2(y, w)
 
 
-def rocking_block() -> Motion:
-    """A slender block that rocks from edge to edge, from 5 degrees."""
+def rocking_block() -> ReferenceMotion:
+    """A slender block that rocks from edge to edge, released at 5 degrees."""
     return _on_edge('rocking_block', 'Block that rocks from 5°, 3 s', 'Housner 1963',
                     (0.2, 0.4, 0.8), math.radians(5), 3.0, True)
 
 
-def falling_rod() -> Motion:
-    """A rod that stands on its edge and falls over, up to 60 degrees."""
+def falling_rod() -> ReferenceMotion:
+    """A rod that tips over its edge, up to 60 degrees."""
     return _on_edge('falling_rod', 'Rod that falls over, from 5° to 60°', 'a pendulum, upside down',
                     ROD, math.radians(5), 0.98, False)
 
 
-def dropped_rod(name: str, title: str, restitution: float, friction: float) -> Motion:
-    """A rod dropped by 0.2 m at 30 degrees, thrown forwards: its lower edge strikes once."""
+def dropped_rod(name: str, title: str, restitution: float, friction: float) -> ReferenceMotion:
+    """A rod dropped by 0.2 m at 30 degrees, moving forwards: its lower edge strikes once."""
     lean, drop, speed = math.radians(30), 0.2, 0.5
     arm = rotation.rotate(rotation.from_axis_angle(PITCH, lean),
                           np.array((ROD[0] / 2, 0.0, -ROD[2] / 2)))
@@ -105,11 +105,11 @@ def dropped_rod(name: str, title: str, restitution: float, friction: float) -> M
     scene = _body(Box(ROD), Material(friction=friction, restitution=restitution),
                   (0.0, 0.0, height), rotation.from_axis_angle(PITCH, lean),
                   velocity=(speed, 0.0, 0.0))
-    return Motion(name, f'Dropped rod {title}, e = {restitution:g}, µ = {friction:g}',
-                  "Newton's and Coulomb's laws", Trial(scene, 0.3), truth, in_air=False)
+    return ReferenceMotion(name, f'Dropped rod {title}, e = {restitution:g}, µ = {friction:g}',
+                           "Newton's and Coulomb's laws", Trial(scene, 0.3), truth, in_flight=False)
 
 
-def spinning_disc() -> Motion:
+def spinning_disc() -> ReferenceMotion:
     """A disc that spins on its face until friction stops it."""
     radius, thick, rate, friction = 0.2, 0.05, 10.0, 0.3
 
@@ -119,12 +119,13 @@ def spinning_disc() -> Motion:
                                    orientations_about((0.0, 0.0, 1.0), angles[:, None]))
     scene = _body(Cylinder(radius, thick), Material(friction=friction, restitution=0.0),
                   (0.0, 0.0, thick / 2), spin=(0.0, 0.0, rate))
-    return Motion('spinning_disc', 'Disc that spins on its face, µ = 0.3, 0.7 s',
-                  'torque 2/3 µ m g r', Trial(scene, 0.7), truth, 'angle_worst_rad', in_air=False)
+    return ReferenceMotion('spinning_disc', 'Disc that spins on its face, µ = 0.3, 0.7 s',
+                           'torque 2/3 µ m g r', Trial(scene, 0.7), truth, 'angle_worst_rad',
+                           in_flight=False)
 
 
-def thin_disc() -> Motion:
-    """A disc of 2 mm that slides and spins on its face; so thin that it is evenly pressed."""
+def thin_disc() -> ReferenceMotion:
+    """A disc that slides and spins on its face; at 2 mm the pressure is uniform."""
     radius, thick, speed, rate, friction = 0.2, 0.002, 1.0, 10.0, 0.3
 
     def truth(times: np.ndarray) -> Trajectory:
@@ -134,13 +135,13 @@ def thin_disc() -> Motion:
                                    orientations_about((0.0, 0.0, 1.0), angles[:, None]))
     scene = _body(Cylinder(radius, thick), Material(friction=friction, restitution=0.0),
                   (0.0, 0.0, thick / 2), velocity=(speed, 0.0, 0.0), spin=(0.0, 0.0, rate))
-    return Motion('thin_disc', 'Disc that slides and spins on its face, µ = 0.3, 0.7 s',
-                  'Coulomb over an even pressure, Farkas 2003', Trial(scene, 0.7), truth,
-                  in_air=False)
+    return ReferenceMotion('thin_disc', 'Disc that slides and spins on its face, µ = 0.3, 0.7 s',
+                           'Coulomb over an even pressure, Farkas 2003', Trial(scene, 0.7), truth,
+                           in_flight=False)
 
 
-def balls(name: str, title: str, masses: tuple[float, ...], restitution: float) -> Motion:
-    """Balls in a row in the air, without gravity; the first comes at 2 m/s and strikes."""
+def balls(name: str, title: str, masses: tuple[float, ...], restitution: float) -> ReferenceMotion:
+    """Balls in a row without gravity; the first one strikes at 2 m/s."""
     radius, gap, speed = 0.1, 0.05, 2.0
     starts = [index * (2 * radius + gap) for index in range(len(masses))]
     speeds = [speed, *[0.0] * (len(masses) - 1)]
@@ -156,4 +157,5 @@ def balls(name: str, title: str, masses: tuple[float, ...], restitution: float) 
         for index, (mass, start, velocity) in enumerate(zip(masses, starts, speeds, strict=True)))
     scene = Scene(name, placements, None, Material(friction=0.0, restitution=restitution),
                   gravity=(0.0, 0.0, 0.0))
-    return Motion(name, title, "Newton's law, momentum", Trial(scene, 0.5), truth, in_air=False)
+    return ReferenceMotion(name, title, "Newton's law, momentum", Trial(scene, 0.5), truth,
+                           in_flight=False)

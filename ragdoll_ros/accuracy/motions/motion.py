@@ -1,4 +1,4 @@
-"""A trial together with the truth about it."""
+"""A trial with its exact solution."""
 from __future__ import annotations
 
 import dataclasses
@@ -15,22 +15,22 @@ from ..trajectory import Trajectory
 
 
 @dataclass(frozen=True)
-class Motion:
-    """A trial whose exact course is known."""
+class ReferenceMotion:
+    """A trial with an exact solution."""
 
     name: str
     title: str
     reference: str
-    """Where the truth comes from, for the report."""
+    """Source of the truth, for the report."""
     trial: Trial
     truth: Callable[[np.ndarray], Trajectory]
-    """The exact course at given instants (t,) s."""
-    yardstick: str = 'position_worst_m'
-    """The error that is plotted."""
-    in_air: bool = True
-    """Whether nothing ever touches, so that momentum is kept."""
+    """The exact solution at instants (t,) s."""
+    error_key: str = 'position_worst_m'
+    """The error that is plotted, a key of metrics.compare."""
+    in_flight: bool = True
+    """Whether there are no contacts, so that momentum is conserved."""
     extra: Callable[[Trajectory], dict[str, float]] = lambda _: {}
-    """Further figures of this motion alone."""
+    """Returns additional figures of this motion."""
 
 
 def orientations_about(axis: tuple[float, float, float], angles: np.ndarray) -> np.ndarray:
@@ -39,18 +39,18 @@ def orientations_about(axis: tuple[float, float, float], angles: np.ndarray) -> 
 
 
 def without_limits(doll: Ragdoll) -> Ragdoll:
-    """The same doll with all joints free: the reference knows no limits."""
+    """The same doll without joint limits, which the reference does not model."""
     return dataclasses.replace(doll, joints=tuple(
         dataclasses.replace(joint, limits=()) for joint in doll.joints))
 
 
 def without_damping(doll: Ragdoll) -> Ragdoll:
-    """The same doll with joints that lose nothing: its energy is a constant of flight."""
+    """The same doll without joint damping: its energy is conserved in flight."""
     return dataclasses.replace(doll, joints=tuple(
         dataclasses.replace(joint, damping=0.0) for joint in doll.joints))
 
 
-def alone(doll: Ragdoll, gravity: tuple[float, float, float] = (0.0, 0.0, -9.8),
-          **placed: object) -> Scene:
-    """A scene of one doll in the air, whose bones pass through each other."""
+def airborne_scene(doll: Ragdoll, gravity: tuple[float, float, float] = (0.0, 0.0, -9.8),
+                   **placed: object) -> Scene:
+    """A scene of one doll without ground and self-collision."""
     return Scene(doll.name, (Placement(doll, **placed),), gravity=gravity, self_collision=False)

@@ -1,1 +1,1 @@
-"""Parts of the report: each names its jobs; what they find goes into the JSON as rows."""
+"""Parts of the report: each defines jobs, whose rows go into the JSON under its NAME."""

@@ -1,4 +1,4 @@
-"""Two dolls that collide in the air: their momentum together, and how deep bones get in bones."""
+"""Two dolls that collide in the air: conservation of momentum, and penetration of bones."""
 from __future__ import annotations
 
 import functools
@@ -7,15 +7,15 @@ import math
 from ...physics.accuracy import ACCURACIES
 from ..cases.contact_cases import COLLISIONS, two_dolls
 from ..crowds.depth import BoneDepth
-from ..measure import Measure
 from ..methods import by_name, run
-from ..results.runner import Job, Options, Row
+from ..metrics import Metrics
+from ..results.runner import Job, Row, RunOptions
 
 NAME = 'collisions'
 OTHERS = ('bullet-4', 'bullet-10', 'mujoco-implicitfast-4', 'mujoco-implicitfast-10')
 
 
-def jobs(options: Options) -> list[Job]:
+def jobs(options: RunOptions) -> list[Job]:
     """One job for each method."""
     names = [*(f'ours-{accuracy}' for accuracy in ACCURACIES),
              *(OTHERS[1:2] if options.quick else OTHERS)]
@@ -24,17 +24,17 @@ def jobs(options: Options) -> list[Job]:
 
 
 def measure(name: str) -> list[Row]:
-    """One row for each speed of approach."""
+    """One row for each approach speed."""
     method, rows = by_name(name), []
     for speed in COLLISIONS:
         trial = two_dolls(speed)
-        moved, scales = run(method, trial).trajectory, Measure(trial.scene)
+        moved, metrics = run(method, trial).trajectory, Metrics(trial.scene)
         row: Row = {'method': name, 'label': method.label, 'speed_m_s': speed}
         rows.append(row | (dict.fromkeys(FIGURES, math.inf) if not moved.finite else {
-            'momentum_drift': scales.momentum_drift(trial, moved),
-            'angular_momentum_drift': scales.angular_momentum_drift(moved),
+            'momentum_drift': metrics.momentum_drift(trial, moved),
+            'angular_momentum_drift': metrics.angular_momentum_drift(moved),
             'depth_m': BoneDepth(trial.scene).deepest(moved),
-            'energy_excess': scales.energy_excess(trial, moved)}))
+            'energy_excess': metrics.energy_excess(trial, moved)}))
     return rows
 
 

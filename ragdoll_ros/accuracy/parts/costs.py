@@ -1,4 +1,4 @@
-"""A scene that needs less costs less: ticks of ever simpler scenes."""
+"""CPU time per tick of scenes, from complex to simple."""
 from __future__ import annotations
 
 import dataclasses
@@ -12,21 +12,21 @@ from ...files.scene import load_scene
 from ...model.ragdoll import Ragdoll
 from ...model.scene import Placement, Scene
 from ...physics.simulation import Simulation
-from ..results.runner import Job, Options, Row
+from ..results.runner import Job, Row, RunOptions
 
 NAME = 'costs'
 TICKS = 100
 
 
-def jobs(options: Options) -> list[Job]:
-    """One timed job: the scenes are compared with each other."""
+def jobs(options: RunOptions) -> list[Job]:
+    """One timed job, since the scenes are compared with each other."""
     repeats = 2 if options.quick else 7
     return [Job(NAME, 'what a scene costs', functools.partial(
         measure_all, repeats), repeats, timed=True)]
 
 
 def measure_all(repeats: int) -> list[Row]:
-    """Cost of the median tick of each scene, each tick with the least of its runs, at normal."""
+    """Median tick of each scene at `normal`; each tick counts with its least cost of all runs."""
     rounds = [[make() for _, make in SCENES] for _ in range(repeats)]
     rows = []
     for (text, _), costs in zip(SCENES, zip(*rounds, strict=True), strict=True):
@@ -37,7 +37,7 @@ def measure_all(repeats: int) -> list[Row]:
 
 
 def _ticks(simulation: Simulation, skipped: int = 0) -> np.ndarray:
-    """Costs of TICKS ticks, s, after some that are not counted."""
+    """CPU time of TICKS ticks, s, after ``skipped`` ones."""
     for _ in range(skipped):
         simulation.advance()
     costs = np.empty(TICKS)
@@ -59,12 +59,12 @@ def _high(scene: Scene) -> Scene:
 
 
 def _impact() -> np.ndarray:
-    """From the first touch on."""
+    """From the first contact on."""
     return _ticks(Simulation(_scene()), skipped=29)
 
 
 def _lying() -> np.ndarray:
-    """At rest on the ground, sleep switched off."""
+    """At rest on the ground, with sleep disabled."""
     normal = Simulation(_scene())
     awake = dataclasses.replace(normal.accuracy, sleep=False)
     normal.close()
@@ -101,8 +101,6 @@ def _asleep() -> np.ndarray:
 SCENES: tuple[tuple[str, Callable[[], np.ndarray]], ...] = (
     ('falling onto the ground, the second after the first touch', _impact),
     ('lying on the ground, on all bones, kept awake', _lying),
-    ('in flight, 100 m over the ground', _flight_over_ground),
-    ('in flight, no ground', _flight),
+    ('in flight, 100 m over the ground', _flight_over_ground), ('in flight, no ground', _flight),
     ('in flight, no ground, no self-collision', _flight_without_self_collision),
-    ('one bone in flight, no ground', _one_bone),
-    ('asleep on the ground', _asleep))
+    ('one bone in flight, no ground', _one_bone), ('asleep on the ground', _asleep))

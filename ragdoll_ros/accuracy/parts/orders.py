@@ -1,4 +1,4 @@
-"""The order of each method: how fast its error goes to zero with the tick."""
+"""Order of convergence of each method: slope of the error over the tick."""
 from __future__ import annotations
 
 import dataclasses
@@ -10,39 +10,38 @@ import numpy as np
 
 from ...physics import kernels
 from ...physics.accuracy import ACCURACIES
-from ..measure import compare
 from ..methods import Method, bullet, mujoco, ours, run
-from ..results.runner import Job, Options, Row
-from .precision import motions
+from ..metrics import compare
+from ..results.runner import Job, Row, RunOptions
+from .work_precision import motions
 
 NAME = 'orders'
 TICKS = (0.02, 0.01, 0.005, 0.0025, 0.00125)
 FEW_TICKS = {'pendulum_large': (10, 16, 20), 'flight_gentle': (2, 4, 5, 7),
              'flight_long': (16, 20, 25, 32, 40, 50, 64)}
-"""Ticks to a whole motion for order 8, at which its errors are small but not yet rounding: each a
-whole number of nanoseconds long."""
+"""Ticks per motion for order 8: errors above rounding, whole numbers of ns per tick."""
 
 MOTIONS = ('pendulum_large', 'flight_gentle', 'flight_long')
 FLOOR = 1e-11
-"""Errors below are the reference's or rounding's (a pendulum's root gives way by 2e-11 m)."""
+"""Smaller errors are those of the reference or rounding (a pendulum's root moves by 2e-11 m)."""
 
 LOW_FLOOR = 2e-14
-"""The same for what lies above the reference's and the root's share at few ticks."""
+"""The same for order 8 at few ticks."""
 
 CEILING = 0.3
-"""Errors above it are no longer small: theory says nothing about them."""
+"""Larger errors are not in the asymptotic range."""
 
 
 def methods() -> list[Method]:
-    """One method of each family, a single step to a tick where we have the choice."""
+    """One method of each family, with one step per tick where this can be set."""
     mine = [ours(dataclasses.replace(setting, flight_error=math.inf), f'ours-{name}')
             for name, setting in ACCURACIES.items()]
-    # compiled, the settings differ in the steps alone
+    # Compiled, the accuracies differ in the step size alone.
     return [*(mine[-1:] if kernels.ready() else mine), bullet(1),
             *(mujoco(name, 1) for name in ('euler', 'implicitfast', 'rk4'))]
 
 
-def jobs(options: Options) -> list[Job]:
+def jobs(options: RunOptions) -> list[Job]:
     """One job for each motion."""
     names = MOTIONS[:2] if options.quick else MOTIONS
     return [Job(NAME, f'orders, {name}', functools.partial(measure_all, name), weight=3.0)
@@ -54,7 +53,7 @@ def measure_all(motion_name: str) -> list[Row]:
     motion, rows = motions()[motion_name], []
     few = tuple(motion.trial.duration / count for count in FEW_TICKS[motion_name])
     truths = {tick: motion.truth(motion.trial.with_tick(tick).times()) for tick in TICKS + few}
-    # what cannot touch itself is not looked at between ticks
+    # Without self-collision a flight is one step per tick.
     scene = dataclasses.replace(motion.trial.scene, self_collision=False)
     trial = dataclasses.replace(motion.trial, scene=scene)
     for method in methods():
@@ -62,19 +61,18 @@ def measure_all(motion_name: str) -> list[Row]:
         ticks, floor = (few, LOW_FLOOR) if high else (TICKS, FLOOR)
         for tick in ticks:
             result = run(method, trial.with_tick(tick))
-            errors.append(compare(result.trajectory, truths[tick])[motion.yardstick])
+            errors.append(compare(result.trajectory, truths[tick])[motion.error_key])
         rows.append({'motion': motion_name, 'title': motion.title, 'method': method.name,
                      'label': method.label.removesuffix(', N = 1'), 'theory': method.order,
-                     'ticks_s': list(ticks), 'errors': errors,
-                     **slope(ticks, errors, floor)})
+                     'ticks_s': list(ticks), 'errors': errors, **slope(ticks, errors, floor)})
     return rows
 
 
 def slope(ticks: tuple[float, ...], errors: list[float], floor: float) -> dict[str, object]:
-    """Order by least squares on the logarithms of all errors that tell of the method.
+    """Order by least squares on the logarithms of the errors in the asymptotic range.
 
-    Runs from the coarsest tick down to the first error at the floor; needs three points. Beside
-    it, the steepness between the two finest ticks.
+    From the coarsest tick down to the first error at the floor; needs three points. Also the slope
+    between the two finest ticks.
     """
     usable = [(tick, error) for tick, error in zip(ticks, errors, strict=True)
               if math.isfinite(error) and error < CEILING]

@@ -1,4 +1,4 @@
-"""Single bodies that bounce: whether they come back as high as their restitution says."""
+"""Single bodies that bounce: their apexes against the restitution."""
 from __future__ import annotations
 
 import functools
@@ -14,7 +14,7 @@ from ...physics.accuracy import ACCURACIES
 from ..cases.trial import Trial
 from ..methods import by_name, run
 from ..references.closed_forms import bounce_times
-from ..results.runner import Job, Options, Row
+from ..results.runner import Job, Row, RunOptions
 from ..trajectory import Trajectory
 
 NAME = 'restitution'
@@ -23,19 +23,19 @@ BODIES: dict[str, Shape] = {'ball': Sphere(0.1), 'box on its face': Box((0.2, 0.
                             'upright capsule': Capsule(0.05, 0.2)}
 HEIGHT, GRAVITY = 1.0, 9.8
 SLOWEST = 0.05
-"""m/s of approach, down to which each flight counts."""
+"""Smallest approach speed, m/s, of flights that count."""
 
-MOST = 12
-"""Flights of a body that never comes to rest."""
+MAX_FLIGHTS = 12
+"""Flights of a body with restitution 1."""
 
 TICK, FINE_TICK = 0.01, 0.002
-"""s. Ours in fine ticks, so that few flights fall between two; the others in those whose substeps
-their names count."""
+"""s. Fine ticks for ours, so that few flights are shorter than a tick; the others have the tick
+that their substeps refer to."""
 
 OTHERS = ('bullet-4', 'bullet-10', 'bullet-100', 'mujoco-implicitfast-10')
 
 
-def jobs(options: Options) -> list[Job]:
+def jobs(options: RunOptions) -> list[Job]:
     """One job for each method."""
     names = [*(f'ours-{accuracy}' for accuracy in ACCURACIES),
              *(OTHERS[1:2] if options.quick else OTHERS)]
@@ -47,32 +47,31 @@ def jobs(options: Options) -> list[Job]:
 
 
 def measure(name: str, bodies: tuple[str, ...], restitutions: tuple[float, ...]) -> list[Row]:
-    """Worst error of the heights of all flights, and e by the first, for each body and e."""
+    """Largest error of the apex heights, and measured restitution, for each body."""
     method, rows = by_name(name), []
     for body, restitution in itertools.product(bodies, restitutions):
-        flights = counted(restitution)
+        flights = impact_times(restitution)
         trial = dropped(BODIES[body], restitution, flights,
                         FINE_TICK if method.family in ('ours', 'core') else TICK)
         shares = apex_shares(run(method, trial).trajectory, BODIES[body], flights, restitution)
         rows.append({'method': name, 'label': method.label, 'body': body,
-                     'restitution': restitution, 'flights': len(flights) - 1,
-                     'seen': len(shares),
+                     'restitution': restitution, 'flights': len(flights) - 1, 'seen': len(shares),
                      'worst': max((abs(share - 1) for share in shares), default=math.nan),
                      'found': restitution * math.sqrt(max(0.0, shares[0])) if shares else math.nan})
     return rows
 
 
-def counted(restitution: float) -> list[float]:
-    """Instants, s, of the impacts that count, and of the one after them."""
+def impact_times(restitution: float) -> list[float]:
+    """Times, s, of the impacts that count and of the next one."""
     fall = math.sqrt(2 * GRAVITY * HEIGHT)
-    count = MOST
+    count = MAX_FLIGHTS
     if restitution < 1:
         count = 1 + math.floor(math.log(SLOWEST / fall) / math.log(restitution))
     return bounce_times(HEIGHT, restitution, GRAVITY, min(count, 60) + 1)
 
 
 def dropped(shape: Shape, restitution: float, flights: list[float], tick: float) -> Trial:
-    """A body let go level, 1 m above the ground."""
+    """A body released level, 1 m above the ground."""
     doll = Ragdoll('body', (Bone('body', shape, 1.0, (0.0, 0.0, 0.0)),))
     up = float(shape.support(np.array((0.0, 0.0, -1.0))))
     scene = Scene('bounce', (Placement(doll, position=(0.0, 0.0, up + HEIGHT)),), Ground(),
@@ -82,9 +81,9 @@ def dropped(shape: Shape, restitution: float, flights: list[float], tick: float)
 
 def apex_shares(trajectory: Trajectory, shape: Shape, flights: list[float],
                 restitution: float) -> list[float]:
-    """Height of each flight over e^(2 n) h, by z + v^2 / 2 g in the middle of the flight.
+    """Apex height of each flight, z + v^2 / 2 g at mid-flight, over e^(2 n) h.
 
-    Flights between two ticks are not seen.
+    Flights without a tick near the middle are skipped.
     """
     up = float(shape.support(np.array((0.0, 0.0, -1.0))))
     height = (trajectory.positions[:, 0, 2] - up

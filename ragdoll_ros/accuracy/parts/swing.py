@@ -1,7 +1,7 @@
-"""Swinging things: a spring, a pendulum and a fall, at several frame rates, against formulas.
+"""Swings at several frame rates against closed forms: a spring, a pendulum and a throw.
 
-Beside them the usual recipe for hair, VRM's spring bones (VRMC_springBone-1.0: a Verlet step with
-drag, stiffness and gravity each times the frame's length), whose period depends on the frame rate.
+For comparison VRM spring bones (VRMC_springBone-1.0: a Verlet step with drag, stiffness and gravity
+each times the frame's length), whose period depends on the frame rate.
 """
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ...model.swing import Link, Swing
 from ...physics.swing.mount import SwingMount
 from ...physics.swing.swings import Swings
 from ..references.closed_forms import pendulum_angle
-from ..results.runner import Job, Options, Row
+from ..results.runner import Job, Row, RunOptions
 
 NAME = 'swing'
 RATES = (15, 30, 60, 120, 240)
@@ -31,13 +31,13 @@ START = math.radians(60)
 STILL = State(np.zeros((1, 3)), np.array([rotation.IDENTITY]), *np.zeros((2, 1, 3)))
 
 
-def jobs(options: Options) -> list[Job]:
+def jobs(options: RunOptions) -> list[Job]:
     """One job."""
     return [Job(NAME, 'swings', functools.partial(measure), 2.0)]
 
 
 def measure() -> list[Row]:
-    """Worst error over 3 s of each kind, and the recipe's period, at each frame rate."""
+    """Largest error over 3 s of each kind, and the period of VRM's spring, at each frame rate."""
     rows = []
     for rate in RATES:
         times = np.arange(1, round(DURATION * rate) + 1) / rate
@@ -46,7 +46,7 @@ def measure() -> list[Row]:
             before = process_time()
             row[f'{name}_error'] = angle(times)
             row[f'{name}_frame_s'] = (process_time() - before) / len(times)
-        row['recipe_period_s'] = recipe_period(rate)
+        row['recipe_period_s'] = vrm_period(rate)
         rows.append(row)
     return rows
 
@@ -58,7 +58,7 @@ def _swings(link: Link, mode: str, gravity: float, **fields: object) -> Swings:
 
 
 def _spring(times: np.ndarray) -> float:
-    """Angle error in rad of a damped spring let go at 60 degrees, no gravity."""
+    """Largest angle error, rad, of a damped spring released at 60 degrees, no gravity."""
     swings = _swings(Link(LENGTH, MASS, STIFFNESS, DAMPING), 'spring', 0.0)
     swings.begin(0.0, [[math.cos(START), math.sin(START), 0.0]], [[0.0, 0.0, 0.0]])
     omega = math.sqrt(STIFFNESS / MASS) / LENGTH
@@ -69,7 +69,7 @@ def _spring(times: np.ndarray) -> float:
 
 
 def _pendulum(times: np.ndarray) -> float:
-    """Angle error in rad of a pendulum let go level."""
+    """Largest angle error, rad, of a pendulum released horizontally."""
     swings = _swings(Link(LENGTH, MASS), 'pendulum', GRAVITY)
     swings.begin(0.0)
     truth = pendulum_angle(math.pi / 2, math.sqrt(GRAVITY / LENGTH), times)
@@ -77,7 +77,7 @@ def _pendulum(times: np.ndarray) -> float:
 
 
 def _fall(times: np.ndarray) -> float:
-    """Height error in m of a mass thrown up at 2 m/s under 2 m/s^2."""
+    """Largest height error, m, of a mass thrown up at 2 m/s under 2 m/s^2."""
     swings = _swings(Link(LENGTH, MASS), 'free', 2.0, velocity=(0.0, 0.0, 2.0))
     swings.begin(0.0)
     return _worst(swings, times, 2 * times - times ** 2, lambda x: x[2])
@@ -89,8 +89,8 @@ def _worst(swings: Swings, times: np.ndarray, truth: np.ndarray,
     return float(np.abs(np.array(found) - truth).max())
 
 
-def recipe_period(rate: float, stiffness: float = 1.0, drag: float = 0.02) -> float:
-    """Period in s of VRM's spring bone without gravity, let go at 60 degrees, from its zeros."""
+def vrm_period(rate: float, stiffness: float = 1.0, drag: float = 0.02) -> float:
+    """Period, s, of a VRM spring bone released at 60 degrees without gravity, from its zeros."""
     dt, rest = 1 / rate, np.array([1.0, 0.0])
     now = before = LENGTH * np.array([math.cos(START), math.sin(START)])
     angles = [START]

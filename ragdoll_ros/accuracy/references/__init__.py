@@ -1,1 +1,1 @@
-"""Truth that owes nothing to any engine: closed forms and high-order integration."""
+"""References independent of all engines: closed forms and high-order integration."""

@@ -1,15 +1,14 @@
-"""The motion of a doll in flight, from the equations of motion, independent of any engine.
+"""Motion of a doll or a rigid body in flight from the equations of motion.
 
-The coordinates are those of the tree, so a joint cannot open. With J the Jacobians of all centres
-of mass, Jw of all angular velocities, and a0, alpha0 the accelerations that are left when dv/dt
-vanishes (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 3):
+In generalised coordinates of the kinematic tree, so that joints have no gaps. With J the Jacobians
+of all centres of mass, Jw of all angular velocities, and a0, alpha0 the bias accelerations at
+dv/dt = 0 (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 3):
 
     sum_i [m J'J + Jw' I Jw] dv/dt
         = sum_i [J' (m g + f - m a0) + Jw' (tau - I alpha0 - w x I w)] - c v
 
-integrated by DOP853 (Hairer, Norsett, Wanner) at 1e-12. Limits and contacts are not in it.
-
-They are laid out as in coordinates.py, the joints depth first.
+integrated by DOP853 (Hairer, Norsett, Wanner) at 1e-12, without limits and contacts. The
+layout of coordinates is that of model/coordinates.py, joints depth first.
 """
 from __future__ import annotations
 
@@ -98,7 +97,7 @@ class Articulated:
 
     def trajectory(self, q: np.ndarray, v: np.ndarray, times: Sequence[float],
                    wrenches: Wrenches | None = None, breaks: Sequence[float] = ()) -> Trajectory:
-        """Motion from times[0]; ``breaks`` are the instants at which the wrenches jump, s."""
+        """Motion from times[0]; ``breaks``, s, are the discontinuities of the wrenches."""
         times = np.asarray(times, float)
         edges = [times[0], *sorted(t for t in breaks if times[0] < t < times[-1]), times[-1]]
         y = np.concatenate([q, v])
@@ -115,7 +114,7 @@ class Articulated:
 
     def _derivative(self, t: float, y: np.ndarray, middle: float,
                     wrenches: Wrenches | None) -> np.ndarray:
-        """Wrenches are taken from the middle of the piece: they do not jump within it."""
+        """Time derivative of (q, v); wrenches, constant between breaks, are those at ``middle``."""
         q, v = y[:self.nq], y[self.nq:]
         loads = wrenches(middle, self.state(q, v)) if wrenches else ()
         rates = np.empty_like(q)
@@ -197,6 +196,25 @@ def _skew(a: np.ndarray) -> np.ndarray:
 
 
 def _quaternion_rate(q: np.ndarray, omega: np.ndarray, outer: bool) -> np.ndarray:
-    """dq/dt of a body that turns with omega, given in the outer frame or in the body's."""
+    """dq/dt of a body with angular velocity omega, in the outer frame or in the body's."""
     pure = np.append(omega, 0.0)
     return (rotation.multiply(pure, q) if outer else rotation.multiply(q, pure)) / 2
+
+
+def torque_free_rotation(inertia: Sequence[float], omega: Sequence[float],
+                         times: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Orientations (t, 4) and angular velocities (t, 3) rad/s in body axes, by Euler's equations.
+
+    ``inertia`` are the principal moments, ``omega`` is the initial angular velocity in the
+    principal axes, which are the world's at the start.
+    """
+    moments = np.array(inertia, float)
+
+    def derivative(t: float, y: np.ndarray) -> np.ndarray:
+        q, w = y[:4], y[4:]
+        turn = rotation.multiply(q, np.append(w, 0.0)) / 2
+        return np.concatenate([turn, np.cross(moments * w, w) / moments])
+
+    start = np.concatenate([rotation.IDENTITY, omega])
+    rows = integrate(derivative, start, times)
+    return rotation.normalized(rows[:, :4]), rows[:, 4:]

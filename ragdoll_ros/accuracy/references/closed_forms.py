@@ -1,4 +1,4 @@
-"""Motions that have a formula."""
+"""Motions in closed form."""
 from __future__ import annotations
 
 import math
@@ -13,7 +13,7 @@ def fall(start: np.ndarray, velocity: np.ndarray, gravity: np.ndarray, t: np.nda
 
 
 def pendulum_angle(amplitude: float, omega: float, t: np.ndarray) -> np.ndarray:
-    """Angle in rad of a pendulum let go at ``amplitude``; omega^2 = m g L / I.
+    """Angle, rad, of a pendulum released at ``amplitude``; omega^2 = m g L / I.
 
     sin(phi/2) = k cd(omega t | k^2) with k = sin(amplitude/2) (Abramowitz, Stegun 16.1).
     """
@@ -24,12 +24,12 @@ def pendulum_angle(amplitude: float, omega: float, t: np.ndarray) -> np.ndarray:
 
 
 def bounce_apex(height: float, restitution: float, bounces: int) -> float:
-    """Height in m a ball comes back to: each bounce leaves e^2 of the energy."""
+    """Apex height, m, after some bounces: each leaves e^2 of the energy."""
     return height * restitution ** (2 * bounces)
 
 
 def bounce_times(height: float, restitution: float, gravity: float, bounces: int) -> list[float]:
-    """Instants in s of the first impacts of a ball let go at ``height``."""
+    """Times, s, of the first impacts of a ball released at ``height``."""
     times = [math.sqrt(2 * height / gravity)]
     for n in range(1, bounces):
         apex = bounce_apex(height, restitution, n)
@@ -38,16 +38,16 @@ def bounce_times(height: float, restitution: float, gravity: float, bounces: int
 
 
 def incline_slide(slope: float, friction: float, gravity: float, t: np.ndarray) -> np.ndarray:
-    """Distance in m that a block at rest has slid down: Coulomb's law, 0 while it sticks."""
+    """Distance, m, that a block slides down from rest by Coulomb's law; 0 if it sticks."""
     pull = gravity * (math.sin(slope) - friction * math.cos(slope))
     return max(0.0, pull) * np.asarray(t, float) ** 2 / 2
 
 
 def ball_slide_then_roll(speed: float, friction: float, gravity: float, t: np.ndarray,
                          rim: float = 0.0) -> np.ndarray:
-    """Distance in m of a solid ball thrown flat, its rim spinning at ``rim`` m/s: r w, rolling > 0.
+    """Distance, m, of a solid ball on the ground with initial speed and ``rim`` = r w, m/s.
 
-    It slides with -mu g until 2 (v0 - r w0) / (7 mu g), then rolls on as fast as it is.
+    It slides with -mu g until 2 (v0 - r w0) / (7 mu g), then rolls at constant speed.
     """
     t = np.asarray(t, float)
     grip = 2 * (speed - rim) / (7 * friction * gravity)
@@ -59,7 +59,7 @@ def ball_slide_then_roll(speed: float, friction: float, gravity: float, t: np.nd
 
 def ball_slide_then_roll_angle(speed: float, friction: float, gravity: float, radius: float,
                                t: np.ndarray, rim: float = 0.0) -> np.ndarray:
-    """Angle in rad by which the same ball has rotated: 5/2 mu g / r until it rolls, then v / r."""
+    """Rotation, rad, of the same ball: accelerated by 5/2 mu g / r until it rolls, then v / r."""
     t = np.asarray(t, float)
     grip = 2 * (speed - rim) / (7 * friction * gravity)
     slid, rolled = np.minimum(t, grip), np.maximum(t - grip, 0.0)

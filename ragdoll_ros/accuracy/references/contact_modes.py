@@ -1,13 +1,13 @@
-"""Unilateral contacts with Coulomb friction in a plane: every combination of modes is tried.
+"""Unilateral contacts with Coulomb friction in a plane, solved by enumeration of contact modes.
 
 Contact i gives a normal and a tangential force, or impulse, (n_i, t_i), and has a normal and a
 tangential response
 
     w = G (n, t) + b,
 
-G the Delassus matrix, w accelerations or velocities after a blow. A contact is open (no force,
+G the Delassus matrix, w accelerations or velocities after an impact. A contact is open (no force,
 w_n >= 0) or closed (w_n = 0, n >= 0), and closed it sticks (w_t = 0, |t| <= mu n) or slides towards
-s (t = -s mu n, s w_t >= 0). Moreau's law: what slides is judged by how it moves afterwards.
+s (t = -s mu n, s w_t >= 0). Moreau's law: sliding is determined by the velocity afterwards.
 """
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ OPEN, STICK, FORWARD, BACKWARD = 'open', 'stick', 'forward', 'backward'
 SIGNS = {FORWARD: 1.0, BACKWARD: -1.0}
 MODES = (OPEN, STICK, FORWARD, BACKWARD)
 
-ALLOWED = 1e-9
-"""By which an inequality may be missed, as a share of the largest term of b: rounding."""
+TOLERANCE = 1e-9
+"""Tolerance of inequalities relative to the largest term of b: rounding."""
 
 
 def rows_and_forces(jacobian: np.ndarray, modes: Sequence[str],
                     friction: float) -> tuple[np.ndarray, np.ndarray]:
-    """What the modes hold at zero (r, nv), and along what the forces act that do it (r, nv).
+    """Constraint rows (r, nv) of the modes, and the directions (r, nv) of their forces.
 
     ``jacobian`` (k, 2, nv) has each contact's normal and tangential row.
     """
@@ -43,9 +43,9 @@ def rows_and_forces(jacobian: np.ndarray, modes: Sequence[str],
     return np.reshape(rows, shape), np.reshape(forces, shape)
 
 
-def parted(strengths: np.ndarray, modes: Sequence[str], friction: float) -> np.ndarray:
-    """Normal and tangential forces (k, 2) of all contacts, from those of rows_and_forces (r,)."""
-    found, left = np.zeros((len(modes), 2)), iter(strengths)
+def contact_forces(multipliers: np.ndarray, modes: Sequence[str], friction: float) -> np.ndarray:
+    """Normal and tangential forces (k, 2) of all contacts from the multipliers (r,)."""
+    found, left = np.zeros((len(modes), 2)), iter(multipliers)
     for force, mode in zip(found, modes, strict=True):
         if mode != OPEN:
             force[0] = next(left)
@@ -54,18 +54,18 @@ def parted(strengths: np.ndarray, modes: Sequence[str], friction: float) -> np.n
 
 
 def choices(friction: float) -> tuple[str, ...]:
-    """Modes that a contact may take which does not slide yet; without friction, sliding is one."""
+    """Possible modes of a contact that does not slide yet; without friction one sliding mode."""
     return MODES if friction > 0 else (OPEN, FORWARD)
 
 
 def solve(mass: np.ndarray, jacobian: np.ndarray, free: np.ndarray, friction: float,
           options: Sequence[Sequence[str]], slides: np.ndarray | None = None,
           ) -> tuple[tuple[str, ...], np.ndarray]:
-    """Modes (k,) and forces (k, 2) that keep all laws, the contacts' ``options`` tried in turn.
+    """Modes (k,) and forces (k, 2) that satisfy all laws, by trying the contacts' ``options``.
 
     ``mass`` (nv, nv), ``jacobian`` (k, 2, nv), ``free`` (k, 2): b, each contact's w without forces;
-    ``slides`` (k,): which ones slide already, whichever way they are accelerated.
-    Where forces are not unique, as of a rod that sticks at both ends, the least ones are taken.
+    ``slides`` (k,): contacts that slide already, whatever their acceleration. Indeterminate forces,
+    as of a rod that sticks at both ends, are those of least norm.
     """
     slides = np.zeros(len(free), bool) if slides is None else slides
     mobile = np.linalg.solve(mass, jacobian.reshape(-1, len(mass)).T)
@@ -73,12 +73,12 @@ def solve(mass: np.ndarray, jacobian: np.ndarray, free: np.ndarray, friction: fl
     for modes in itertools.product(*options):
         rows, forces = rows_and_forces(jacobian, modes, friction)
         held = rows_and_forces(free[..., None], modes, friction)[0][:, 0]
-        strengths = np.linalg.lstsq(rows @ np.linalg.solve(mass, forces.T), -held, rcond=1e-12)[0]
-        found = parted(strengths, modes, friction)
+        multipliers = np.linalg.lstsq(rows @ np.linalg.solve(mass, forces.T), -held, rcond=1e-12)[0]
+        found = contact_forces(multipliers, modes, friction)
         response = free + (jacobian.reshape(-1, len(mass)) @ (mobile @ found.ravel())).reshape(
             free.shape)
         wrong = violation(modes, found, response, friction, slides)
-        if wrong <= ALLOWED * max(1.0, float(np.abs(free).max())):
+        if wrong <= TOLERANCE * max(1.0, float(np.abs(free).max())):
             return modes, found
         missed[modes] = wrong
     raise ArithmeticError(f'no mode of {len(free)} contacts fits: {min(missed.values()):.1e}')
@@ -86,7 +86,7 @@ def solve(mass: np.ndarray, jacobian: np.ndarray, free: np.ndarray, friction: fl
 
 def violation(modes: Sequence[str], forces: np.ndarray, response: np.ndarray,
               friction: float, slides: np.ndarray) -> float:
-    """By how much the worst law is broken; 0 where all hold."""
+    """Largest violation of a law; 0 if all hold."""
     worst = 0.0
     for mode, (normal, tangent), (away, along), slid in zip(modes, forces, response, slides,
                                                             strict=True):

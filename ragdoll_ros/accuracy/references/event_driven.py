@@ -1,8 +1,8 @@
-"""A figure with feet goes from touch to touch: each located, each impact solved.
+"""Event-driven integration of planar rods with feet: contact events located, impacts solved.
 
-Between events DOP853 at 1e-12 with the feet's modes held (contact_modes.py); an event is a touch,
-a foot that lets go, begins or ends to slide. At a touch all closed feet take Newton's law, w_n = -e
-w_n before, and Moreau's cone.
+Between events DOP853 at 1e-12 with fixed contact modes (contact_modes.py). Events are a touch-down,
+a lift-off, the begin and the end of sliding. At a touch-down all closed feet obey Newton's law,
+w_n = -e w_n before, and Moreau's friction law.
 """
 from __future__ import annotations
 
@@ -15,27 +15,26 @@ from .contact_modes import BACKWARD, FORWARD, OPEN, SIGNS, STICK
 from .integration import TOLERANCE
 from .planar_rods import PlanarRods
 
-LONGEST = 1e-3
-"""s. An end that dips and comes back within a step is not seen; 1 ms hides 12 um at 100 m/s^2."""
+MAX_STEP = 1e-3
+"""Maximum step, s: a penetration within a step is missed, up to 12 um at 100 m/s^2."""
 
 TOUCH = 1e-14
-"""m below which a point must come to touch: after a touch it is put back to 0, above that."""
+"""m: depth at which a touch-down is detected; afterwards the gap is projected to 0."""
 
 STILL = 1e-6
-"""m/s below which what a closed foot does is put to 0. Two feet that strike in turn come to rest
-by ever smaller blows: this ends them at the velocity to which those blows lead."""
+"""m/s: slower feet in contact are stopped, which ends infinite sequences of alternate impacts."""
 
 CLOSED = 1e-9
-"""m and m/s within which a contact is closed, and does not slide."""
+"""m and m/s: tolerance of a closed contact, and of one that does not slide."""
 
-HIDDEN = 1e-6
-"""m that an end may dip into the ground unseen; more is an error."""
+MAX_PENETRATION = 1e-6
+"""m: undetected penetration that is an error."""
 
-MOST = 2000
-"""Events; more is an error."""
+MAX_EVENTS = 2000
+"""More are an error."""
 
 Hint = dict[int, tuple[str, ...]]
-"""Modes left to the foot that an event met."""
+"""Possible modes of the foot after its event."""
 
 Event = Callable[[float, np.ndarray], float]
 
@@ -43,9 +42,9 @@ Event = Callable[[float, np.ndarray], float]
 def rows(figure: PlanarRods, y: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Coordinates and velocities (t, 2 (n + 2)) at ``times`` s, from ``y`` at the first."""
     rows, now, hint = np.empty((len(times), len(y))), float(times[0]), {}
-    for _ in range(MOST):
+    for _ in range(MAX_EVENTS):
         closed = np.abs(figure.gaps(y)) <= CLOSED
-        y = _settled(figure, _blow(figure, _raised(figure, y, closed), closed), closed)
+        y = _at_rest(figure, _after_impact(figure, _projected(figure, y, closed), closed), closed)
         resting = closed & (np.abs(figure.contact(y)[0] @ figure.speeds(y))[:, 0] <= CLOSED)
         modes = _modes(figure, y, resting, hint)
         solved, hint = _until_event(figure, now, float(times[-1]), y, modes)
@@ -55,11 +54,11 @@ def rows(figure: PlanarRods, y: np.ndarray, times: np.ndarray) -> np.ndarray:
         now, y = float(solved.t[-1]), solved.y[:, -1]
         if now >= times[-1]:
             return rows
-    raise ArithmeticError(f'more than {MOST} events up to {now} s')
+    raise ArithmeticError(f'more than {MAX_EVENTS} events up to {now} s')
 
 
-def _raised(figure: PlanarRods, y: np.ndarray, closed: np.ndarray) -> np.ndarray:
-    """The same with closed feet at 0 m, by the least motion in the metric of the mass."""
+def _projected(figure: PlanarRods, y: np.ndarray, closed: np.ndarray) -> np.ndarray:
+    """Project the gaps of closed feet to 0 m, in the metric of the mass matrix."""
     if not closed.any():
         return y
     mass, _ = figure.dynamics(y)
@@ -69,8 +68,8 @@ def _raised(figure: PlanarRods, y: np.ndarray, closed: np.ndarray) -> np.ndarray
     return np.concatenate([y[:len(lift)] + lift, y[len(lift):]])
 
 
-def _blow(figure: PlanarRods, y: np.ndarray, closed: np.ndarray) -> np.ndarray:
-    """The same after the impulses that closed feet need; nothing changes where none does."""
+def _after_impact(figure: PlanarRods, y: np.ndarray, closed: np.ndarray) -> np.ndarray:
+    """Apply the impact impulses of closed feet; unchanged if none approaches the ground."""
     jacobian, speeds = figure.contact(y)[0][closed], figure.speeds(y)
     before = jacobian @ speeds
     if not (before[:, 0] < 0).any():
@@ -84,8 +83,8 @@ def _blow(figure: PlanarRods, y: np.ndarray, closed: np.ndarray) -> np.ndarray:
     return np.concatenate([y[:len(change)], speeds + change])
 
 
-def _settled(figure: PlanarRods, y: np.ndarray, closed: np.ndarray) -> np.ndarray:
-    """The same with closed feet that hardly move at rest, by the least change of velocity."""
+def _at_rest(figure: PlanarRods, y: np.ndarray, closed: np.ndarray) -> np.ndarray:
+    """Set velocities of closed feet below STILL to 0, in the metric of the mass matrix."""
     speeds, rows = figure.speeds(y), figure.contact(y)[0][closed]
     rows = (rows if figure.friction > 0 else rows[:, :1]).reshape(-1, len(speeds))
     rows = rows[np.abs(rows @ speeds) < STILL]
@@ -96,7 +95,7 @@ def _settled(figure: PlanarRods, y: np.ndarray, closed: np.ndarray) -> np.ndarra
 
 def _modes(figure: PlanarRods, y: np.ndarray, resting: np.ndarray, hint: Hint,
            ) -> tuple[str, ...]:
-    """Modes of all feet from here on; ``hint`` narrows those of the foot that an event met."""
+    """Modes of all feet after an event; ``hint`` restricts those of the foot of the event."""
     places, modes = np.flatnonzero(resting), [OPEN] * len(figure.feet)
     if not len(places):
         return tuple(modes)
@@ -114,7 +113,7 @@ def _modes(figure: PlanarRods, y: np.ndarray, resting: np.ndarray, hint: Hint,
 
 
 def _options(figure: PlanarRods, along: float) -> tuple[str, ...]:
-    """Modes of a closed foot that moves ``along`` the ground, m/s."""
+    """Possible modes of a closed foot that slides at ``along`` m/s."""
     if abs(along) <= CLOSED or FORWARD not in modes_of.choices(figure.friction):
         return modes_of.choices(figure.friction)
     return (OPEN, FORWARD if along > 0 or figure.friction == 0 else BACKWARD)
@@ -122,7 +121,7 @@ def _options(figure: PlanarRods, along: float) -> tuple[str, ...]:
 
 def _until_event(figure: PlanarRods, begin: float, end: float, y: np.ndarray,
                  modes: tuple[str, ...]) -> tuple[object, Hint]:
-    """Solution up to the next event, and what the foot that it met may do after it."""
+    """Solution up to the next event, and the possible modes of its foot afterwards."""
     from scipy.integrate import solve_ivp
 
     def derivative(_: float, y: np.ndarray) -> np.ndarray:
@@ -135,16 +134,16 @@ def _until_event(figure: PlanarRods, begin: float, end: float, y: np.ndarray,
             events.append(event)
             hints.append({foot: after} if after else {})
     solved = solve_ivp(derivative, (begin, end), y, 'DOP853', dense_output=True, events=events,
-                       rtol=TOLERANCE, atol=TOLERANCE, max_step=LONGEST)
-    if not solved.success or min(figure.gaps(row).min() for row in solved.y.T) < -HIDDEN:
-        raise ArithmeticError(f'a touch was missed between {begin} and {solved.t[-1]} s')
+                       rtol=TOLERANCE, atol=TOLERANCE, max_step=MAX_STEP)
+    if not solved.success or min(figure.gaps(row).min() for row in solved.y.T) < -MAX_PENETRATION:
+        raise ArithmeticError(f'a touch-down was missed between {begin} and {solved.t[-1]} s')
     met = [hint for hint, found in zip(hints, solved.t_events, strict=True) if len(found)]
     return solved, met[0] if met else {}
 
 
 def _events(figure: PlanarRods, foot: int, mode: str, modes: tuple[str, ...],
             ) -> Iterator[tuple[Event, tuple[str, ...]]]:
-    """What ends a foot's mode, each a function that falls through 0, and the modes after it."""
+    """Events that end a foot's mode, functions that fall through 0, and the modes afterwards."""
     def gap(_: float, y: np.ndarray) -> float:
         return figure.gaps(y)[foot] + TOUCH
 

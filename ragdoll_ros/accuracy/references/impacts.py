@@ -1,7 +1,6 @@
-"""Impacts, and motions about an edge that sticks: formulas, or one equation of one variable.
+"""Impacts, and motions about a sticking edge: closed forms, or one equation of one variable.
 
-Nothing here shares code with an engine. Planar motions: x forward, z up, angles about y, so that a
-positive one leans forward.
+Shares no code with the engines. Planar motions: x forward, z up, angles about y, positive forwards.
 """
 from __future__ import annotations
 
@@ -10,20 +9,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .integration import LONGEST, TOLERANCE
+from .integration import MAX_STEP, TOLERANCE
 
 STILL = 1e-9
-"""rad/s below which a rocking block is taken to have come to rest."""
+"""rad/s: a rocking block with a slower impact is at rest."""
 
 
 def edge_angle(half_width: float, half_height: float, start: float, gravity: float,
                times: np.ndarray, rocks: bool = True) -> np.ndarray:
-    """Angles (t,) rad of a box on one lower edge, let go at the angle ``start`` > 0.
+    """Angles (t,) rad of a box on one lower edge, released at the angle ``start`` > 0.
 
-    About the edge I a'' = m g x, with x = h sin a - b cos a how far the centre is beyond the edge,
-    I = 4/3 m (b^2 + h^2), b and h half the width and height, m. Where it ``rocks``, the angular
-    momentum about the edge that strikes is kept as the other one lets go: the rate falls to
-    1 - 2 m b^2 / I of itself (Housner, Bull. Seism. Soc. Am. 53, 1963).
+    About the edge I a'' = m g x, with x = h sin a - b cos a the horizontal offset of the centre,
+    I = 4/3 m (b^2 + h^2), b and h half the width and height, m. If it ``rocks``, the angular
+    momentum about the striking edge is conserved: the rate is multiplied by 1 - 2 m b^2 / I
+    (Housner, Bull. Seism. Soc. Am. 53, 1963).
     """
     about_edge = 4 / 3 * (half_width ** 2 + half_height ** 2)
     kept = 1 - 2 * half_width ** 2 / about_edge
@@ -53,11 +52,11 @@ def _until_flat(half_width: float, half_height: float, pull: float, begin: float
         return y[0]
     flat.terminal, flat.direction = True, -1
     return solve_ivp(derivative, (begin, end), state, 'DOP853', dense_output=True, events=flat,
-                     rtol=TOLERANCE, atol=TOLERANCE, max_step=LONGEST)
+                     rtol=TOLERANCE, atol=TOLERANCE, max_step=MAX_STEP)
 
 
 def edge_centre(half_width: float, half_height: float, angles: np.ndarray) -> np.ndarray:
-    """Centres (t, 3) m of that box, which stands about the origin at angle 0."""
+    """Centres (t, 3) m of the same box, which stands centred at the origin at angle 0."""
     side = np.where(angles < 0, -1.0, 1.0) * half_width
     sin, cos = np.sin(angles), np.cos(angles)
     return np.stack([side - side * cos + half_height * sin, np.zeros(len(angles)),
@@ -65,7 +64,7 @@ def edge_centre(half_width: float, half_height: float, angles: np.ndarray) -> np
 
 
 def peaks(angles: np.ndarray) -> np.ndarray:
-    """Peaks of |angle| between samples at even times, by the parabola through the three highest."""
+    """Peaks of |angle| at uniform samples, by parabolas through the three highest samples."""
     size = np.abs(angles)
     tops = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
     before, here, after = size[tops - 1], size[tops], size[tops + 1]
@@ -78,9 +77,9 @@ def planar_impulse(arm: tuple[float, float], mass: float, inertia: float,
     """Impulse (x, z) N s that the ground gives a body at a point, ``arm`` (x, z) m from its centre.
 
     Newton's law: the normal velocity becomes -e times itself; Coulomb's: the point sticks where
-    the impulse is within the cone, else the impulse is on the cone's edge, against the velocity
-    with which the point slides afterwards (Moreau 1988; a blow may turn it about).
-    ``velocity`` (x, z) m/s is the point's before, ``inertia`` kg m^2 about y.
+    the impulse is within the cone, else the impulse is on the cone's edge, against the sliding
+    velocity after the impact (Moreau 1988), which may be reversed.
+    ``velocity`` (x, z) m/s is the point's before the impact, ``inertia`` kg m^2 about y.
     """
     x, z = arm
     xx, xz, zz = 1 / mass + z * z / inertia, -x * z / inertia, 1 / mass + x * x / inertia
@@ -97,9 +96,9 @@ def planar_impulse(arm: tuple[float, float], mass: float, inertia: float,
 
 def balls_in_a_row(radius: float, masses: Sequence[float], starts: Sequence[float],
                    speeds: Sequence[float], restitution: float, times: np.ndarray) -> np.ndarray:
-    """Places (t, n) m of balls on a line that strike one after the other, from left to right.
+    """Positions (t, n) m of balls on a line with successive impacts, from left to right.
 
-    Two that meet keep their momentum and part with -e times the speed at which they met.
+    An impact conserves momentum and multiplies the relative velocity by -e.
     """
     x, v = np.array(starts, float), np.array(speeds, float)
     places, now = np.empty((len(times), len(x))), 0.0
@@ -120,9 +119,9 @@ def balls_in_a_row(radius: float, masses: Sequence[float], starts: Sequence[floa
 
 def spin_down(radius: float, friction: float, gravity: float, rate: float,
               times: np.ndarray) -> np.ndarray:
-    """Angles (t,) rad of a disc that spins on its face, until friction has stopped it.
+    """Angles (t,) rad of a disc that spins on its face until friction stops it.
 
-    Evenly pressed: the torque is 2/3 mu m g r, the moment m r^2 / 2, so w' = -4/3 mu g / r.
+    With uniform pressure the torque is 2/3 mu m g r, the moment m r^2 / 2, so w' = -4/3 mu g / r.
     """
     slowing = 4 / 3 * friction * gravity / radius
     t = np.minimum(times, rate / slowing)

@@ -6,7 +6,7 @@ Then T = m/2 sum |x_i'|^2 + I/2 sum phi_i'^2 gives
 
     M(phi) [x'', phi''] = Q + [c, s] phi'^2,
 
-integrated by DOP853 at 1e-12. Nothing here knows of quaternions, trees or Jacobians of bodies.
+integrated by DOP853 at 1e-12. Shares no code with the engines.
 """
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class PlanarChain:
         return x[:, None, :] + np.einsum('ik,tkd->tid', arms, rods), phi
 
     def _arms(self) -> np.ndarray:
-        """Lengths a_ik by which rod k carries centre i, measured from the first centre."""
+        """Coefficients a_ik: offset of centre i from the first centre along rod k, in lengths."""
         arms = np.tril(np.ones((self.links, self.links)), -1)
         arms[1:, 0] = 0.5
         return arms + np.diag([0.0] + [0.5] * (self.links - 1))

@@ -1,12 +1,12 @@
-"""Hinged rods over level ground in a plane: Lagrange's equations, and the feet's kinematics.
+"""Hinged rods above level ground in a plane: Lagrange's equations and contact kinematics.
 
 x forward, z up; a rod at angle phi points along u = (sin phi, cos phi), so angles are those about
 y. Every point is the root's centre plus a sum of rods, p = c + sum_k b_k u(phi_k), which gives
 
     M(phi) [c'', phi''] = sum_i m_i J_i' (g + sum_k b_ik u(phi_k) phi_k'^2) + J_c' f.
 
-Rods end in balls that touch the ground at their lowest points. Nothing here knows of quaternions,
-trees of bodies or steps; event_driven.py goes from touch to touch.
+Rods end in balls that touch the ground at their lowest points. Shares no code with the engines;
+event_driven.py integrates from event to event.
 """
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .contact_modes import parted, rows_and_forces
+from .contact_modes import contact_forces, rows_and_forces
 
 
 def directions(phi: np.ndarray) -> np.ndarray:
@@ -43,7 +43,7 @@ class PlanarRods:
     friction: float = 0.0
     restitution: float = 0.0
     restitution_speed: float = 1e-3
-    """m/s: what comes slower does not bounce."""
+    """m/s: slower impacts have no restitution."""
 
     def centres(self, rows: np.ndarray) -> np.ndarray:
         """Centres (t, n, 2) m of all rods, from coordinates and velocities (t, 2 (n + 2))."""
@@ -65,7 +65,7 @@ class PlanarRods:
 
     @cached_property
     def _arms(self) -> np.ndarray:
-        """b_ik (n, n): how far, m, rod k carries the centre of rod i."""
+        """b_ik (n, n), m: offset of the centre of rod i along rod k."""
         n = len(self.lengths)
         arms = np.zeros((n, n))
         for rod in range(1, n):
@@ -84,7 +84,7 @@ class PlanarRods:
         return arms
 
     def _jacobian(self, phi: np.ndarray, arms: np.ndarray) -> np.ndarray:
-        """Of points with such arms (k, n): (k, 2, n + 2)."""
+        """Jacobian (k, 2, n + 2) of points with arms (k, n)."""
         across = np.stack([np.cos(phi), -np.sin(phi)])
         jacobian = np.zeros((len(arms), 2, len(phi) + 2))
         jacobian[:, :, :2] = np.eye(2)
@@ -120,11 +120,11 @@ class PlanarRods:
         return y[len(self.lengths) + 2:]
 
     def forces(self, y: np.ndarray, modes: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
-        """Accelerations (n + 2,) with the modes held, and forces (k, 2) N of all feet."""
+        """Accelerations (n + 2,) with fixed modes, and forces (k, 2) N of all feet."""
         mass, force = self.dynamics(y)
         jacobian, drift = self.contact(y)
         rows, forces = rows_and_forces(jacobian, modes, self.friction)
         held = rows_and_forces(drift[..., None], modes, self.friction)[0][:, 0]
         free, mobile = np.linalg.solve(mass, force), np.linalg.solve(mass, forces.T)
-        strengths = np.linalg.lstsq(rows @ mobile, -held - rows @ free, rcond=1e-12)[0]
-        return free + mobile @ strengths, parted(strengths, modes, self.friction)
+        multipliers = np.linalg.lstsq(rows @ mobile, -held - rows @ free, rcond=1e-12)[0]
+        return free + mobile @ multipliers, contact_forces(multipliers, modes, self.friction)

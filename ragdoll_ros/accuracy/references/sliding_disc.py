@@ -1,4 +1,4 @@
-"""A thin disc that slides on its face while it spins, evenly pressed, under Coulomb's law.
+"""A thin disc that slides and spins on its face under Coulomb's law with uniform pressure.
 
 With a = v / (r w) the mean of |v + w x p| over the face is r w W(a), the mean distance of the
 face's points from one at a radii from its centre:
@@ -6,8 +6,8 @@ face's points from one at a radii from its centre:
     W = 4/(9 pi) [(7 + a^2) E - 4 (1 - a^2) K](a^2),                       a <= 1
     W = 4/(9 pi) [a (7 + a^2) E - (a^2 - 1) (a^2 + 3) / a K](1/a^2),       a >= 1
 
-so friction takes mu m g (f v + t r w) of power, f = dW/da and t = W - a f. Both speeds end at one
-instant, with a near 0.653 (Farkas, Bartels, Unger, Wolf, Phys. Rev. Lett. 90, 2003).
+so friction dissipates the power mu m g (f v + t r w), f = dW/da and t = W - a f. Sliding and spin
+stop at the same time, with a near 0.653 (Farkas, Bartels, Unger, Wolf, Phys. Rev. Lett. 90, 2003).
 """
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ import math
 
 import numpy as np
 
-from .integration import LONGEST, TOLERANCE
+from .integration import MAX_STEP, TOLERANCE
 
 STOPPED = 1e-9
-"""m/s of sliding and rim together, below which the disc rests."""
+"""m/s: sum of sliding speed and r w below which the disc is at rest."""
 
 
-def shares(ratio: float) -> tuple[float, float]:
+def friction_factors(ratio: float) -> tuple[float, float]:
     """Force over mu m g, and torque over mu m g r, at v / (r w) = ``ratio``."""
     from scipy.special import ellipe, ellipk
     a = min(max(ratio, 1e-9), 1e6)
@@ -38,12 +38,12 @@ def shares(ratio: float) -> tuple[float, float]:
 
 def slide_and_spin(radius: float, friction: float, gravity: float, speed: float, rate: float,
                    times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distance (t,) m slid and angle (t,) rad turned, from ``speed`` m/s and ``rate`` rad/s > 0."""
+    """Distance (t,) m and rotation (t,) rad, from ``speed`` m/s and ``rate`` rad/s > 0."""
     from scipy.integrate import solve_ivp
 
     def derivative(_: float, y: np.ndarray) -> tuple[float, ...]:
         rim = radius * y[3]
-        force, torque = shares(y[2] / max(rim, 1e-300))
+        force, torque = friction_factors(y[2] / max(rim, 1e-300))
         return y[2], y[3], -friction * gravity * force, -2 * friction * gravity * torque / radius
 
     def stopped(_: float, y: np.ndarray) -> float:
@@ -51,6 +51,6 @@ def slide_and_spin(radius: float, friction: float, gravity: float, speed: float,
     stopped.terminal = True
     solved = solve_ivp(derivative, (times[0], times[-1]), (0.0, 0.0, speed, rate), 'DOP853',
                        events=stopped, dense_output=True, rtol=TOLERANCE, atol=TOLERANCE,
-                       max_step=LONGEST)
+                       max_step=MAX_STEP)
     slid, angle, *_ = solved.sol(np.minimum(times, solved.t[-1]))
     return slid, angle

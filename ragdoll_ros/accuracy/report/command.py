@@ -1,4 +1,4 @@
-"""`ragdoll_report`: runs every case by every method, writes JSON, Markdown and pictures."""
+"""`ragdoll_report`: run every part by every method, write JSON, Markdown and pictures."""
 from __future__ import annotations
 
 import argparse
@@ -9,38 +9,39 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..parts import (
-    classes,
     collisions,
     convergence,
     costs,
-    drop,
-    drops,
-    estimate,
-    faints,
+    drop_statistics,
+    energy,
+    error_estimate,
+    fainting_falls,
     hard,
     orders,
-    pieces,
-    precision,
     restitution,
+    short_segments,
+    start_classes,
     swing,
+    work_precision,
 )
 from ..results import figures
-from ..results.runner import Job, Options, run_jobs
+from ..results.runner import Job, RunOptions, run_jobs
 from .plots import draw_all
 from .sections import markdown
 
-PARTS = {'precision': precision, 'orders': orders, 'restitution': restitution,
-         'convergence': convergence, 'pieces': pieces, 'drop': drop, 'drops': drops,
-         'classes': classes, 'collisions': collisions, 'hard': hard,
-         'costs': costs, 'estimate': estimate, 'swing': swing, 'faints': faints}
-"""Modules by the names that --case takes: each says by jobs() what it has to run."""
+PARTS = {'precision': work_precision, 'orders': orders, 'restitution': restitution,
+         'convergence': convergence, 'pieces': short_segments, 'drop': energy,
+         'drops': drop_statistics, 'classes': start_classes, 'collisions': collisions,
+         'hard': hard, 'costs': costs, 'estimate': error_estimate, 'swing': swing,
+         'faints': fainting_falls}
+"""Modules by their names for --case; each has a function jobs()."""
 
 NEEDED = ('scipy', 'matplotlib', 'mujoco')
-"""What the extra `report` brings; imported where it is used, never by a node."""
+"""Packages of the extra `report`, imported only where they are used."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Exit code of the command: 2 for a wrong call or a missing package."""
+    """Run the command; exit code 2 for a wrong call or a missing package."""
     options = parser().parse_args(arguments)
     missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
     if missing:
@@ -55,31 +56,31 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 class WrongCall(ValueError):
-    """An option whose value cannot be used."""
+    """An invalid value of an option."""
 
 
 def parser() -> argparse.ArgumentParser:
     """Options of the command."""
     made = argparse.ArgumentParser(
-        prog='ragdoll_report', description='Measure how wrong and how fast the simulation is, '
-        'beside PyBullet and MuJoCo. Writes accuracy.json, accuracy.md and pictures.',
+        prog='ragdoll_report', description='Measure errors and CPU time of the simulation, '
+        'compared with PyBullet and MuJoCo. Writes accuracy.json, accuracy.md and pictures.',
         epilog='example: ragdoll_report --quick --out /tmp/report; '
         'ragdoll_report --case classes --starts 300')
     made.add_argument('--quick', action='store_true',
                       help='fewer motions, methods and starts: at most 90 s (else 40 min)')
     made.add_argument('--case', action='append', metavar='NAME', default=[],
-                      help='only this part or motion; may be given again; "list" names them all')
+                      help='only this part or motion; repeatable; "list" prints all names')
     made.add_argument('--starts', type=int, default=100, metavar='N',
                       help='starts of each of the nine classes (100)')
-    made.add_argument('--out', type=Path, metavar='DIR', help='folder to write into (docs; with '
-                      '--case build/report, so that the published page stays whole)')
+    made.add_argument('--out', type=Path, metavar='DIR', help='output folder (docs; with --case '
+                      'build/report, so that the published page stays complete)')
     made.add_argument('--from-json', action='store_true',
-                      help='measure nothing, write page and pictures anew from DIR/accuracy.json')
+                      help='run nothing, rewrite page and pictures from DIR/accuracy.json')
     return made
 
 
 def report(options: argparse.Namespace) -> int:
-    """Measure, unless the figures are there already, and write; 0."""
+    """Run the jobs unless --from-json is given, then write; 0."""
     if options.case == ['list']:
         sys.stdout.write('\n'.join(labels()) + '\n')
         return 0
@@ -99,14 +100,14 @@ def report(options: argparse.Namespace) -> int:
 
 
 def measured(options: argparse.Namespace) -> dict:
-    """What the JSON holds, from running the jobs."""
+    """Run the jobs; returns the data of the JSON."""
     if options.starts < 1:
         raise WrongCall(f'--starts {options.starts}: expected 1 or more')
     began = time.monotonic()
-    rows = run_jobs(chosen(options.case, Options(options.quick, options.starts)))
-    for part, join in ((classes.NAME, classes.merged), (drops.NAME, drops.merged)):
-        if part in rows:
-            rows[part] = join(rows[part])
+    rows = run_jobs(chosen(options.case, RunOptions(options.quick, options.starts)))
+    for part in (start_classes, drop_statistics):
+        if part.NAME in rows:
+            rows[part.NAME] = part.merged(rows[part.NAME])
     words = ['ragdoll_report', *(['--quick'] if options.quick else []),
              *(f'--case {name}' for name in options.case),
              *([f'--starts {options.starts}'] if options.starts != 100 else [])]
@@ -115,7 +116,7 @@ def measured(options: argparse.Namespace) -> dict:
 
 
 def write(folder: Path) -> None:
-    """Write page and pictures from the JSON in a folder."""
+    """Write the page and pictures from the JSON in a folder."""
     data = figures.load(folder)
     pictures = draw_all(data['figures'], folder)
     page = folder / 'accuracy.md'
@@ -123,8 +124,8 @@ def write(folder: Path) -> None:
     sys.stdout.write(f'{page} and {len(pictures)} pictures\n')
 
 
-def chosen(names: Sequence[str], options: Options) -> list[Job]:
-    """All jobs, or those of the parts and motions named; WrongCall for a name that is none."""
+def chosen(names: Sequence[str], options: RunOptions) -> list[Job]:
+    """All jobs, or those of the named parts and motions; WrongCall for an unknown name."""
     jobs = [(part, job) for part, module in PARTS.items() for job in module.jobs(options)]
     for name in names:
         if any(name in (part, job.part, job.label) for part, job in jobs):
@@ -137,8 +138,8 @@ def chosen(names: Sequence[str], options: Options) -> list[Job]:
 
 
 def labels() -> list[str]:
-    """Names that --case takes."""
-    return [*PARTS, *precision.motions()]
+    """Valid names for --case."""
+    return [*PARTS, *work_precision.motions()]
 
 
 if __name__ == '__main__':

@@ -1,4 +1,4 @@
-"""The report's pictures, drawn from its JSON alone."""
+"""Plots of the report, drawn from its JSON alone."""
 from __future__ import annotations
 
 import math
@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..results.criteria import EXCESS
 from ..results.figures import Figures, Row, number, sound
-from ..results.goals import EXCESS
-from .faint_plots import draw_directions, draw_faints
-from .ground_plots import draw_convergence, draw_drops
+from .contact_plots import draw_convergence, draw_drops
+from .fall_plots import draw_fainting_falls, draw_fall_directions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,17 +25,18 @@ SMALLEST = 1e-16
 """Where errors of zero are drawn."""
 
 LINE = 0.06
-"""Share of an axis' height that a line of text takes."""
+"""Height of a line of text as a share of the axis."""
 
-FASTEST_SLOWEST = (4e-4, 1.5)
-"""Range of CPU s per simulated s in all diagrams."""
+CPU_RANGE = (4e-4, 1.5)
+"""CPU s per simulated s in all plots."""
 
-WORDS = {'position_worst_m': 'worst position error, m', 'angle_worst_rad': 'worst angle error, rad',
-         'position_median_m': 'position error after 0.1 s, median, m'}
+AXIS_LABELS = {'position_worst_m': 'largest position error, m',
+               'angle_worst_rad': 'largest angle error, rad',
+               'position_median_m': 'position error within 0.1 s, median, m'}
 
 
 def draw_all(figures: Figures, folder: Path) -> dict[str, str]:
-    """Every picture there are figures for, drawn into a folder; files by the pictures' names."""
+    """Draw every plot that has figures into a folder; returns files by the plots' names."""
     import matplotlib
     matplotlib.use('Agg')
     import matplotlib.pyplot as plt
@@ -43,10 +44,10 @@ def draw_all(figures: Figures, folder: Path) -> dict[str, str]:
                          'figure.dpi': 110, 'axes.titlesize': 11, 'legend.frameon': False})
     made = {}
     for name, draw in (('energy', draw_energy), ('precision', draw_precision),
-                       ('pieces', draw_pieces), ('drop', draw_drop), ('classes', draw_classes),
+                       ('pieces', draw_segments), ('drop', draw_drop), ('classes', draw_classes),
                        ('orders', draw_orders), ('estimate', draw_estimate),
                        ('convergence', draw_convergence), ('drops', draw_drops),
-                       ('faints', draw_faints), ('faint_directions', draw_directions)):
+                       ('faints', draw_fainting_falls), ('faint_directions', draw_fall_directions)):
         figure = draw(figures, plt)
         if figure is None:
             continue
@@ -57,14 +58,14 @@ def draw_all(figures: Figures, folder: Path) -> dict[str, str]:
 
 
 def draw_energy(figures: Figures, plt: object) -> object:
-    """The README's picture: a spun doll that nothing touches, its energy over time."""
+    """The README's picture: energy over time of a spinning doll without contacts."""
     rows = _by_method(figures.get('energy', ()), scene='spin')
     if len(rows) < 3:
         return None
     figure, axes = plt.subplots(figsize=(7.5, 4.2))
     axes.axhline(1.0, color='black', lw=1, ls=':')
-    lines = (('bullet-1', RED, 'PyBullet, 10 ms steps:\nenergy out of nothing'),
-             ('quickstart', ORANGE, 'PyBullet as in its quickstart:\nbrakes that nobody asked for'),
+    lines = (('bullet-1', RED, 'PyBullet, 10 ms steps:\nenergy gain'),
+             ('quickstart', ORANGE, 'PyBullet as in its quickstart:\ndefault damping'),
              ('ours-normal', BLUE, 'ragdoll_ros'))
     top = 2.2
     for method, colour, text in lines:
@@ -81,7 +82,7 @@ def draw_energy(figures: Figures, plt: object) -> object:
                       va='bottom' if offset > 0 else 'top', fontsize=12, fontweight='bold')
     axes.set(ylim=(0, top), xlim=(0, rows['ours-normal']['time_s'][-1]), xlabel='time, s',
              ylabel='energy / energy at the start')
-    axes.set_title('A loose-limbed doll, spun. Nothing touches it: its energy must stay the same.',
+    axes.set_title('A spinning doll without contacts and damping: its energy must stay constant.',
                    loc='left')
     return figure
 
@@ -97,18 +98,18 @@ def draw_drop(figures: Figures, plt: object) -> object:
         axes.plot(row['time_s'], [number(value) for value in row['energy']], color=colour, lw=2,
                   label=row['label'] + (', 10 ms' if method == 'bullet-1' else ''))
     axes.axvline(0.2857, color=GREY, lw=1, ls=':')
-    axes.annotate('first touch', (0.2857, 0.03), color=GREY, xytext=(4, 0),
+    axes.annotate('first contact', (0.2857, 0.03), color=GREY, xytext=(4, 0),
                   textcoords='offset points')
     axes.set(xlabel='time, s', ylabel='energy / energy at the start', ylim=(0, None),
              xlim=(0, row['time_s'][-1]))
-    axes.set_title('The default drop: before the touch the energy must stay, after it fall',
+    axes.set_title('The default drop: energy is constant before the first contact, then decreases',
                    loc='left')
     axes.legend()
     return figure
 
 
 def draw_precision(figures: Figures, plt: object) -> object:
-    """Error over CPU time for every motion: lower left is better."""
+    """Work-precision plots: error over CPU time for every motion."""
     rows = sound(figures.get('precision', ()))
     names = list(dict.fromkeys(row['motion'] for row in rows))
     if not names:
@@ -128,21 +129,20 @@ def draw_precision(figures: Figures, plt: object) -> object:
     return figure
 
 
-def draw_pieces(figures: Figures, plt: object) -> object:
-    """The same for short pieces through contacts."""
+def draw_segments(figures: Figures, plt: object) -> object:
+    """Work-precision plot of short segments through contacts."""
     rows = [row for row in sound(figures.get('pieces', ())) if 'reference' in row]
     if not rows:
         return None
     figure, axes = plt.subplots(figsize=(7.5, 4.2))
     _work_precision(axes, rows, 'position_median_m')
-    axes.set_title('Pieces of 0.1 s through contacts, against one reference',
-                   loc='left')
+    axes.set_title('Segments of 0.1 s through contacts, against one reference', loc='left')
     axes.legend(fontsize=9)
     return figure
 
 
 def draw_classes(figures: Figures, plt: object) -> object:
-    """The worst energy from nothing in each class of starts."""
+    """Largest energy gain in each class of starts."""
     rows = sound(figures.get('classes', ()))
     classes = list(dict.fromkeys(row['class'] for row in rows))
     shown = (('ours-draft', '#9dbbe8', 'ours draft'), ('ours-normal', BLUE, 'ours normal'),
@@ -162,22 +162,22 @@ def draw_classes(figures: Figures, plt: object) -> object:
         positions = [index + shift for index in range(len(classes))]
         axes.bar(positions, heights, width, color=colour, label=label)
     axes.axhline(EXCESS, color='black', lw=1)
-    axes.annotate(f'{EXCESS:g}: promised', (-0.45, 1.15 * EXCESS), va='bottom', fontsize=9)
+    axes.annotate(f'bound: {EXCESS:g}', (-0.45, 1.15 * EXCESS), va='bottom', fontsize=9)
     axes.set(yscale='log', ylim=(low, high), xlim=(-0.5, len(classes) - 0.5),
-             ylabel='worst energy excess (share)')
+             ylabel='largest relative energy excess')
     axes.set_xticks(range(len(classes)), classes, rotation=20, ha='right')
-    axes.set_title('Energy made from nothing: the worst of all starts of each class '
-                   '(no bar: less than 1e-9)', loc='left')
+    axes.set_title('Energy gain: the largest of all starts of each class '
+                   '(no bar: below 1e-9)', loc='left')
     axes.legend(ncols=3, fontsize=9, loc='upper left')
     return figure
 
 
 ROUND_TICKS = (1, 2, 5, 10, 20, 50, 100, 200)
-"""ms, where the axis of ticks is labelled."""
+"""Labels of the tick axis, ms."""
 
 
 def draw_orders(figures: Figures, plt: object) -> object:
-    """Errors over the tick."""
+    """Error over the tick."""
     rows = sound(figures.get('orders', ()))
     names = list(dict.fromkeys(row['motion'] for row in rows))
     if not names:
@@ -198,7 +198,7 @@ def draw_orders(figures: Figures, plt: object) -> object:
             axes.loglog([1e3 * tick for tick in row['ticks_s']],
                         [number(error) or math.nan for error in row['errors']],
                         marker=mark, color=colour, ms=5, label=text)
-        axes.set(xlabel='tick, ms', ylabel='worst error, m or rad', xlim=(1, 300))
+        axes.set(xlabel='tick, ms', ylabel='largest error, m or rad', xlim=(1, 300))
         axes.set_xticks(ROUND_TICKS, [f'{tick:g}' for tick in ROUND_TICKS])
         axes.minorticks_off()
         axes.set_title(rows[[r['motion'] for r in rows].index(name)]['title'], loc='left',
@@ -208,7 +208,7 @@ def draw_orders(figures: Figures, plt: object) -> object:
 
 
 def draw_estimate(figures: Figures, plt: object) -> object:
-    """The live error estimate over the true error, tick by tick."""
+    """Estimated over true local error, tick by tick."""
     rows = [row for row in figures.get('estimate', ()) if row.get('true')]
     if not rows:
         return None
@@ -219,14 +219,14 @@ def draw_estimate(figures: Figures, plt: object) -> object:
     for factor, style in ((1, '-'), (3, ':'), (1 / 3, ':')):
         axes.plot((low, high), (factor * low, factor * high), color=GREY, lw=1, ls=style)
     axes.set(xlabel='true error of a tick, m', ylabel='estimated, m')
-    axes.set_title('The live estimate in flight; dotted: a factor 3', loc='left')
+    axes.set_title('Local error estimate in flight; dotted: a factor of 3', loc='left')
     axes.legend()
     return figure
 
 
-def _work_precision(axes: Axes, rows: Sequence[Row], yardstick: str) -> None:
-    """One diagram: a line for each family, the front, the real-time line, two slopes."""
-    points = [(row['family'], number(row['cpu_s_per_s']), number(row[yardstick]))
+def _work_precision(axes: Axes, rows: Sequence[Row], error_key: str) -> None:
+    """A work-precision plot: a line for each family, the Pareto front, the real-time line."""
+    points = [(row['family'], number(row['cpu_s_per_s']), number(row[error_key]))
               for row in rows]
     points = [(family, x, max(y, SMALLEST)) for family, x, y in points
               if math.isfinite(y) and y < 1e3]
@@ -239,22 +239,22 @@ def _work_precision(axes: Axes, rows: Sequence[Row], yardstick: str) -> None:
                       zorder=3 if big else 2, label=family)
     front = _front([(x, y) for _, x, y in points])
     axes.step(*zip(*front, strict=True), where='post', color='black', lw=0.7, ls='--', zorder=1,
-              label='front')
-    axes.set(xscale='log', yscale='log', xlim=FASTEST_SLOWEST, xlabel='CPU s per simulated s',
-             ylabel=WORDS[yardstick])
-    _name_settings(axes, [row for row in rows if row['family'] == 'ours'], yardstick)
+              label='Pareto front')
+    axes.set(xscale='log', yscale='log', xlim=CPU_RANGE, xlabel='CPU s per simulated s',
+             ylabel=AXIS_LABELS[error_key])
+    _name_settings(axes, [row for row in rows if row['family'] == 'ours'], error_key)
     axes.grid(True, which='major', lw=0.3)
     axes.axvline(1.0, color=RED, lw=1)
     axes.annotate('real time', (1.0, 0.02), xycoords=('data', 'axes fraction'), color=RED,
                   fontsize=8, ha='right', va='bottom', rotation=90)
 
 
-def _name_settings(axes: Axes, rows: Sequence[Row], yardstick: str) -> None:
-    """The settings' names beside their points; points as high on the axes share one text."""
+def _name_settings(axes: Axes, rows: Sequence[Row], error_key: str) -> None:
+    """Label the accuracies' points; points of equal height share one label."""
     low, high = np.log10(axes.get_ylim())
     groups: list[list[tuple[float, float, str]]] = []
     for row in rows:
-        height = math.log10(max(number(row[yardstick]), SMALLEST))
+        height = math.log10(max(number(row[error_key]), SMALLEST))
         point = (number(row['cpu_s_per_s']), height, row['label'].removeprefix('ours '))
         if groups and abs(groups[-1][0][1] - height) < LINE * (high - low):
             groups[-1].append(point)
@@ -267,7 +267,7 @@ def _name_settings(axes: Axes, rows: Sequence[Row], yardstick: str) -> None:
 
 
 def _front(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The points (x, y) that no other beats in both speed and error."""
+    """Pareto front: the points (x, y) that no other dominates."""
     kept: list[tuple[float, float]] = []
     for x, y in sorted(points):
         if not kept or y < kept[-1][1]:

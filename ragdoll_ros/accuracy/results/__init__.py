@@ -1,1 +1,1 @@
-"""Figures of the report, what they are held to, and how they are run."""
+"""Results of the report: jobs that produce them, JSON, acceptance criteria, Markdown."""

@@ -1,4 +1,4 @@
-"""The report's data: one JSON file that holds every figure, and about what they were taken."""
+"""The report's data: a JSON file with every figure and the conditions of the run."""
 from __future__ import annotations
 
 import datetime
@@ -7,10 +7,11 @@ import json
 import math
 import os
 import platform
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from ...physics import kernels
+from ...physics.accuracy import ACCURACIES
 
 FILE = 'accuracy.json'
 
@@ -18,25 +19,24 @@ Row = dict[str, object]
 """One result: figures by their names, which end in their units."""
 
 Figures = dict[str, list[Row]]
-"""The rows of each part."""
+"""Rows by part."""
 
 
 def about(command: str, seconds: float, quick: bool, starts: int) -> dict[str, object]:
-    """Versions, machine, date: what a reader needs to compare the figures with his own."""
+    """Conditions of the run: versions, machine, date."""
     return {'date': datetime.datetime.now(datetime.timezone.utc).strftime('%Y-%m-%d %H:%M UTC'),
             'command': command, 'quick': quick, 'starts': starts, 'seconds': round(seconds, 1),
             'machine': _processor(), 'cores': os.cpu_count(),
             'system': f'{platform.system()} {platform.machine()}',
-            'python': platform.python_version(),
-            'engine': 'rigid' if kernels.ready() else 'bullet',
+            'python': platform.python_version(), 'engine': 'rigid' if kernels.ready() else 'bullet',
             'versions': {name: _version(name) for name in
                          ('ragdoll_ros', 'pybullet', 'mujoco', 'numpy', 'scipy', 'numba')}}
 
 
 def save(data: dict, folder: Path) -> Path:
-    """Path of the JSON file, written with a line for each row: a change shows in a diff by rows.
+    """Write the JSON file, one line per row for readable diffs; returns its path.
 
-    Infinity becomes the text 'inf', NaN null: JSON has neither.
+    Infinity is written as the text 'inf', NaN as null: JSON has neither.
     """
     parts = (f'{_line(part)}: [\n' + ',\n'.join(map(_line, rows)) + '\n]'
              for part, rows in data['figures'].items())
@@ -47,18 +47,33 @@ def save(data: dict, folder: Path) -> Path:
 
 
 def load(folder: Path) -> dict:
-    """What save() wrote: 'about' and, under 'figures', the rows of each part."""
+    """Read what save() wrote: 'about', and 'figures' with the rows of each part."""
     return json.loads((folder / FILE).read_text(encoding='utf-8'))
 
 
 def number(value: object) -> float:
-    """A figure of the JSON, in which infinity is the text 'inf' and NaN is null."""
+    """A figure of the JSON as a float."""
     return math.nan if value is None else float(value)
 
 
 def sound(rows: Iterable[Row]) -> list[Row]:
-    """The rows of jobs that did not fail."""
+    """Rows of jobs that did not fail."""
     return [row for row in rows if 'failed' not in row]
+
+
+def criterion(name: str, required: str, measured: str, met: bool) -> Row:
+    """Row of an acceptance criterion."""
+    return {'criterion': name, 'required': required, 'measured': measured, 'met': met}
+
+
+def by_setting(figures: Figures, part: str, keep: Callable[[Row], bool] = lambda row: True,
+               ) -> Iterator[tuple[str, list[Row]]]:
+    """Yield each of our accuracies and its rows of a part, if there are any."""
+    for accuracy in ACCURACIES:
+        rows = [row for row in figures.get(part, ())
+                if row.get('method') == f'ours-{accuracy}' and keep(row)]
+        if rows:
+            yield accuracy, rows
 
 
 def _line(value: object) -> str:

@@ -1,25 +1,26 @@
-"""Runs the jobs of all parts: those that are not timed side by side, the timed ones alone."""
+"""Run the jobs of all parts: timed ones alone, the others in parallel."""
 from __future__ import annotations
 
 import concurrent.futures
 import multiprocessing
 import os
+import sys
 import tempfile
+import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ...physics.engine.substepped.mujoco import silence_warnings
 from .figures import Row
-from .progress import Progress
 
 WORKERS = 2
-"""Processes; PyBullet never releases the GIL, so more cores need more of them."""
+"""Processes; threads would not do, as PyBullet never releases the GIL."""
 
 
 @dataclass(frozen=True)
-class Options:
-    """How much to run. ``starts`` of each class at each of our settings; quick: 2."""
+class RunOptions:
+    """Extent of a run. ``starts`` of each class at each of our accuracies; 2 if quick."""
 
     quick: bool = False
     starts: int = 100
@@ -27,22 +28,22 @@ class Options:
 
 @dataclass(frozen=True)
 class Job:
-    """A piece of work that gives rows for a part. ``weight``: about how many seconds it takes."""
+    """Work that returns rows of a part; ``weight`` is its approximate duration, s."""
 
     part: str
     label: str
     work: Callable[[], list[Row]]
     weight: float = 1.0
     timed: bool = False
-    """CPU time is measured: nothing else may run beside it."""
+    """Measures CPU time, so that no other job may run at the same time."""
 
 
 def run_jobs(jobs: Sequence[Job]) -> dict[str, list[Row]]:
-    """Each part's rows in the order of its jobs; a job that fails gives a row that says so."""
-    progress = Progress(sum(job.weight / (1 if job.timed else WORKERS) for job in jobs))
+    """Rows of each part in the order of its jobs; a failed job gives a row with its error."""
+    progress = ProgressBar(sum(job.weight / (1 if job.timed else WORKERS) for job in jobs))
     results: dict[int, list[Row]] = {}
     together = [index for index, job in enumerate(jobs) if not job.timed]
-    # spawn: a forked copy of a process that holds PyBullet clients is in no defined state
+    # Not fork: the copy of a process with PyBullet clients has no defined state.
     context = multiprocessing.get_context('spawn')
     if together:
         with concurrent.futures.ProcessPoolExecutor(WORKERS, context, initializer=prepare) as pool:
@@ -64,7 +65,7 @@ def run_jobs(jobs: Sequence[Job]) -> dict[str, list[Row]]:
 
 
 def attempt(job: Job) -> list[Row]:
-    """The rows of a job; one that fails gives a row that says so, and leaves the others theirs."""
+    """Rows of a job, or one row with its error."""
     try:
         return job.work()
     except Exception as error:
@@ -74,6 +75,49 @@ def attempt(job: Job) -> list[Row]:
 
 
 def prepare() -> None:
-    """Keep MuJoCo's warnings about diverging runs off the terminal: the figures tell of them."""
+    """Silence MuJoCo's warnings about diverging runs, which show in the figures."""
     silence_warnings()
     os.chdir(tempfile.gettempdir())
+
+
+class ProgressBar:
+    """Progress on stderr: a bar on a terminal, else a line every LOG_INTERVAL."""
+
+    WIDTH = 30
+    LOG_INTERVAL = 15.0
+    """s between lines if stderr is no terminal."""
+
+    def __init__(self, total: float) -> None:
+        self._total = max(total, 1e-9)
+        self._done = 0.0
+        self._began = self._printed = time.monotonic()
+        self._terminal = sys.stderr.isatty()
+
+    def advance(self, weight: float, label: str) -> None:
+        """Count a finished job of ``weight``."""
+        self._done += weight
+        now = time.monotonic()
+        if self._terminal:
+            filled = round(self.WIDTH * self._share)
+            bar = '#' * filled + '.' * (self.WIDTH - filled)
+            sys.stderr.write(f'\r[{bar}] {self._text(now)} {label[:40]:40}')
+            sys.stderr.flush()
+        elif now - self._printed > self.LOG_INTERVAL:
+            self._printed = now
+            sys.stderr.write(f'{self._text(now)} {label}\n')
+            sys.stderr.flush()
+
+    def close(self) -> None:
+        """End the line."""
+        if self._terminal:
+            sys.stderr.write('\n')
+
+    @property
+    def _share(self) -> float:
+        return min(1.0, self._done / self._total)
+
+    def _text(self, now: float) -> str:
+        elapsed = now - self._began
+        left = elapsed * (1 / self._share - 1) if self._share > 0.02 else None
+        rest = '' if left is None else f', about {left:.0f} s left'
+        return f'{self._share:4.0%} {elapsed:.0f} s{rest}'

@@ -1,1 +1,1 @@
-"""Files of falls, one format each."""
+"""File formats of data sets, one module each."""

@@ -1,8 +1,9 @@
-"""npz in AMASS's names, one file a fall.
+"""npz with the keys of AMASS, one file per fall.
 
-trans (t, 3) m is where the root's centre of mass is, poses (t, 3 j) are rotation vectors, rad: the
-root's turn from its bind pose in the world, then of each other bone its turn relative to its
-parent, both from their bind poses. joint_names says whose; they are this doll's bones, not SMPL's.
+trans (t, 3) m is the position of the root's centre of mass. poses (t, 3 j) are rotation vectors,
+rad, relative to the bind pose: of the root in the world, of every other bone relative to its
+parent. joint_names are their bones, those of this doll and not of SMPL. onset, impact (first
+contact) and rest are the frames of Phases, -1 if there is none.
 """
 from __future__ import annotations
 
@@ -20,12 +21,12 @@ NAME = 'amass/fall_{number:07d}.npz'
 
 
 def shard_files(recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, bytes]:
-    """A file for each fall."""
+    """One file per fall."""
     return {NAME.format(number=fall.number): _written(recipe, fall) for fall in falls}
 
 
 def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
-    """None: each fall is whole by itself."""
+    """None: each file is complete."""
     return {}
 
 
@@ -41,7 +42,7 @@ def _written(recipe: Recipe, fall: Fall) -> bytes:
 
 
 def _motion(fall: Fall) -> tuple[list[str], np.ndarray, np.ndarray]:
-    """Names (j,), places (t, 3) of the root and rotation vectors (t, 3 j)."""
+    """Names (j,), positions (t, 3) of the root and rotation vectors (t, 3 j)."""
     doll, states = fall.scene.dolls[0].doll, fall.states[:fall.valid]
     index = {bone.name: place for place, bone in enumerate(doll.bones)}
     turns = {bone.name: rotation.multiply(states[:, place, 3:7],

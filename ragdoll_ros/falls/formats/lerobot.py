@@ -1,32 +1,40 @@
 """Parquet in the layout of LeRobot v3: an episode is a fall, a data file is a shard.
 
-Of https://github.com/huggingface/lerobot (Apache-2.0) it has the layout, of its code nothing:
-meta/info.json, meta/stats.json, meta/tasks.parquet, meta/episodes/chunk-000/file-000.parquet and
-data/chunk-000/file-000.parquet. Numbers are float32. All falls have equally many frames, so that a
-shard knows where in the data set it stands.
+The layout, not the code, of https://github.com/huggingface/lerobot (Apache-2.0): meta/info.json,
+meta/stats.json, meta/tasks.parquet, meta/episodes/chunk-000/file-000.parquet and
+data/chunk-000/file-000.parquet. Numbers are float32. All falls have equally many frames, so the
+indices of a shard follow from its number.
+
+Labels in meta/episodes: onset, impact (first contact) and rest are the frames of Phases;
+impact_frames and impact_speeds (m/s downwards) are those of each bone's first contact.
 """
 from __future__ import annotations
 
 import io
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as parquet
 
+from ...model.errors import WrongForm
 from ..fall import Fall
+from ..imu_samples import NAMES, samples_by_frame
 from ..recipe import Recipe
-from .columns import Column, columns
 
 FILES_PER_CHUNK = 1000
 PLACE = 'chunk-{chunk_index:03d}/file-{file_index:03d}.parquet'
 DATA, EPISODES = f'data/{PLACE}', f'meta/episodes/{PLACE}'
 STATISTICS = ('min', 'max', 'mean', 'std', 'count')
+POSE = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
+VELOCITY = ('vx', 'vy', 'vz', 'wx', 'wy', 'wz')
+LABELS = ('onset', 'impact', 'rest', 'direction_deg', 'impact_frames', 'impact_speeds')
 
 
 def shard_files(recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, bytes]:
-    """Data and episodes of a shard."""
+    """Data file and episodes file of a shard."""
     place = dict(zip(('chunk_index', 'file_index'), divmod(shard, FILES_PER_CHUNK), strict=True))
     tables = [_frames(recipe, fall) for fall in falls]
     rows = [_episode(recipe, fall, place) for fall in falls]
@@ -36,7 +44,7 @@ def shard_files(recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, byte
 
 
 def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
-    """What LeRobot wants to know of the whole."""
+    """Metadata of the whole data set."""
     names = sorted(folder.glob('meta/episodes/*/*.parquet'))
     first = parquet.read_table(names[0]).slice(0, 1).to_pylist()[0]
     keys = [key.split('/')[1] for key in first if key.startswith('stats/') and key.endswith('/min')]
@@ -52,18 +60,19 @@ def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
 
 
 def read_labels(folder: Path) -> dict[str, np.ndarray]:
-    """Of a data set's f falls: onset, impact and rest (f,) in frames, direction_deg (f,) and
-    impact_speeds (f, n) m/s; NaN where there is none.
+    """Labels of a data set's f falls: onset, impact and rest (f,) in frames, direction_deg (f,),
+    impact_frames (f, n) and impact_speeds (f, n) m/s; NaN where there is none.
     """
-    keys = ('onset', 'impact', 'rest', 'direction_deg', 'impact_speeds')
-    parts = [parquet.read_table(path, columns=list(keys))
-             for path in sorted(folder.glob('meta/episodes/*/*.parquet'))]
-    table = pa.concat_tables(parts)
-    return {key: np.array(table.column(key).to_pylist(), float) for key in keys}
+    paths = sorted(folder.glob('meta/episodes/*/*.parquet'))
+    if missing := set(LABELS) - set(parquet.read_schema(paths[0]).names):
+        raise WrongForm('labels', str(folder), f'labels with {", ".join(missing)}: generate the '
+                        'data set again')
+    table = pa.concat_tables(parquet.read_table(path, columns=list(LABELS)) for path in paths)
+    return {key: np.array(table.column(key).to_pylist(), float) for key in LABELS}
 
 
 def _frames(recipe: Recipe, fall: Fall) -> pa.Table:
-    """Of one fall."""
+    """Rows of one fall."""
     count = recipe.frames
     made = {f'observation.{column.name}': _array(column) for column in columns(recipe, fall)}
     frames = np.arange(count)
@@ -78,6 +87,42 @@ def _frames(recipe: Recipe, fall: Fall) -> pa.Table:
     return table.replace_schema_metadata({'names': json.dumps(names)})
 
 
+@dataclass(frozen=True)
+class Column:
+    """One quantity in t frames: ``values`` (t, m), float or bool, with ``names`` of m numbers."""
+
+    name: str
+    values: np.ndarray
+    names: tuple[str, ...]
+
+
+def columns(recipe: Recipe, fall: Fall) -> list[Column]:
+    """Columns that the recipe records of a fall, without those that its doll lacks."""
+    bones, angles = fall.scene.bone_names, fall.scene.angle_names
+    frames = len(fall.times)
+    made = {
+        'poses': (fall.states[:, :, :7], _each(bones, POSE)),
+        'velocities': (fall.states[:, :, 7:], _each(bones, VELOCITY)),
+        'angles': (fall.angles, angles), 'rates': (fall.rates, angles),
+        'touching': (fall.touching, bones)}
+    return [Column(name, made[name][0].reshape(frames, -1), tuple(made[name][1]))
+            for name in recipe.recorded if made[name][1]] + [
+                Column(f'imu.{mount["name"]}', samples_by_frame(fall, imu).reshape(frames, -1),
+                       _sample_names(recipe))
+                for imu, mount in enumerate(recipe.imus)]
+
+
+def _each(bones: tuple[str, ...], parts: tuple[str, ...]) -> list[str]:
+    return [f'{bone}.{part}' for bone in bones for part in parts]
+
+
+def _sample_names(recipe: Recipe) -> tuple[str, ...]:
+    """Names of a sensor's numbers in a frame, numbered if it has several samples."""
+    if recipe.samples_per_frame == 1:
+        return NAMES
+    return tuple(f'{name}_{sample}' for sample in range(recipe.samples_per_frame) for name in NAMES)
+
+
 def _array(column: Column) -> pa.Array:
     flags = column.values.dtype == bool
     flat = column.values.ravel() if flags else column.values.ravel().astype(np.float32)
@@ -85,7 +130,7 @@ def _array(column: Column) -> pa.Array:
 
 
 def _episode(recipe: Recipe, fall: Fall, place: dict[str, int]) -> dict:
-    """LeRobot's columns, then this package's labels."""
+    """Row of a fall in meta/episodes: LeRobot's columns, then this package's labels."""
     first = fall.number * recipe.frames
     speeds = -fall.impact_velocities[:, 2]
     row = {
@@ -97,6 +142,8 @@ def _episode(recipe: Recipe, fall: Fall, place: dict[str, int]) -> dict:
         'failure': fall.failure, 'valid_frames': fall.valid,
         'energy_excess_J': fall.energy_excess,
         'direction_deg': fall.direction,
+        'impact_frames': [None if np.isnan(frame) else int(frame) for frame in
+                          fall.impact_frames.tolist()],
         'impact_speeds': [None if np.isnan(speed) else speed for speed in speeds.tolist()],
         'drawn': json.dumps(fall.drawn, sort_keys=True)}
     for column in columns(recipe, fall):
@@ -110,11 +157,11 @@ def _episode(recipe: Recipe, fall: Fall, place: dict[str, int]) -> dict:
 
 
 def _episode_schema(row: dict) -> pa.Schema:
-    """Types of an episode's columns, whatever is missing in a shard."""
+    """Types of an episode's columns, even if a shard has no values of them."""
     kinds = {str: pa.string(), int: pa.int64(), float: pa.float64(), type(None): pa.int64()}
     fields = {key: kinds[type(value)] for key, value in row.items() if not isinstance(value, list)}
     fields.update(tasks=pa.list_(pa.string()), impact_speeds=pa.list_(pa.float64()),
-                  valid_frames=pa.int64())
+                  impact_frames=pa.list_(pa.int64()), valid_frames=pa.int64())
     for key in row:
         if key.startswith('stats/'):
             fields[key] = pa.list_(pa.int64() if key.endswith('/count') else pa.float64())
@@ -122,7 +169,7 @@ def _episode_schema(row: dict) -> pa.Schema:
 
 
 def _whole_stats(paths: list[Path], keys: list[str]) -> dict:
-    """Of all frames, from those of the episodes, weighted by their counts."""
+    """Statistics of all frames, from those of the episodes weighted by their counts."""
     whole = {}
     for key in keys:
         parts = {name: [] for name in STATISTICS}
@@ -144,7 +191,7 @@ def _whole_stats(paths: list[Path], keys: list[str]) -> dict:
 
 
 def _features(recipe: Recipe, path: Path) -> dict:
-    """What LeRobot is told of each column."""
+    """LeRobot's description of each column."""
     schema = parquet.read_schema(path)
     names = json.loads(schema.metadata[b'names'])
     features = {}
@@ -158,7 +205,7 @@ def _features(recipe: Recipe, path: Path) -> dict:
 
 
 def _tasks(name: str) -> bytes:
-    """The one task, which pandas reads as the table's index."""
+    """The table of the one task, which is the index when read by pandas."""
     columns = [{'name': 'task_index', 'field_name': 'task_index', 'pandas_type': 'int64',
                 'numpy_type': 'int64', 'metadata': None},
                {'name': 'task', 'field_name': 'task', 'pandas_type': 'unicode',
@@ -170,7 +217,7 @@ def _tasks(name: str) -> bytes:
 
 
 def _parquet(table: pa.Table, rows_per_group: int) -> bytes:
-    """Bytes that depend on the table and pyarrow's version alone."""
+    """Encode a table; the bytes depend on the table and pyarrow's version alone."""
     stream = io.BytesIO()
     parquet.write_table(table, stream, row_group_size=rows_per_group, compression='zstd')
     return stream.getvalue()

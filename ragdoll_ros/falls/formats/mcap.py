@@ -1,9 +1,9 @@
-"""MCAP of ROS 2 messages, one file a fall, as `ros2 bag play` and Foxglove take them.
+"""MCAP of ROS 2 messages, one file per fall, readable by `ros2 bag play` and Foxglove.
 
 /ragdoll/poses is a geometry_msgs/PoseArray of all bones, /ragdoll/joint_states a
 sensor_msgs/JointState, /ragdoll/imu/<name>/data_raw a sensor_msgs/Imu, /ragdoll/robot_description a
-std_msgs/String with the doll's URDF; labels and what was drawn are the metadata record `fall`.
-Times are those since the fall's start.
+std_msgs/String with the doll's URDF. The metadata record `fall` holds the phases as frame numbers
+and the drawn values. Stamps count from the fall's start.
 """
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mcap_ros2.writer import Writer
 
 from ...files.urdf import to_urdf
 from ..fall import Fall
-from ..imu_samples import flaws_of, worn_samples
+from ..imu_samples import fall_samples, flaws_of
 from ..recipe import Recipe
 from .definitions import DEFINITIONS
 
@@ -24,18 +24,18 @@ NAME = 'mcap/fall_{number:07d}.mcap'
 
 
 def shard_files(recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, bytes]:
-    """A file for each fall."""
+    """One file per fall."""
     return {NAME.format(number=fall.number): _written(recipe, fall) for fall in falls}
 
 
 def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
-    """None: each fall is whole by itself."""
+    """None: each file is complete."""
     return {}
 
 
 def _written(recipe: Recipe, fall: Fall) -> bytes:
     stream = io.BytesIO()
-    samples = [worn_samples(fall, imu).tolist() for imu in range(len(recipe.imus))]
+    samples = [fall_samples(fall, imu).tolist() for imu in range(len(recipe.imus))]
     with Writer(stream) as writer:
         schemas = {kind: writer.register_msgdef(kind, text) for kind, text in DEFINITIONS.items()}
 
@@ -53,9 +53,10 @@ def _written(recipe: Recipe, fall: Fall) -> bytes:
         for frame in range(fall.valid):
             write('poses', 'geometry_msgs/msg/PoseArray', frame, _poses(fall, frame))
             for mount, own in zip(recipe.imus, samples, strict=True):
-                for place in range(max(0, (frame - 1) * fall.parts + 1), frame * fall.parts + 1):
+                many = fall.samples_per_frame
+                for place in range(max(0, (frame - 1) * many + 1), frame * many + 1):
                     write(f'imu/{mount["name"]}/data_raw', 'sensor_msgs/msg/Imu',
-                          place / fall.parts, _imu(fall, place / fall.parts, mount, own[place]))
+                          place / many, _imu(fall, place / many, mount, own[place]))
             write('joint_states', 'sensor_msgs/msg/JointState', frame, _joints(fall, frame))
     return stream.getvalue()
 
@@ -83,7 +84,7 @@ def _joints(fall: Fall, frame: int) -> dict:
 
 
 def _imu(fall: Fall, frame: float, sensor: dict, sample: list[float]) -> dict:
-    """By REP 145: no orientation is measured; without noise a covariance is unknown."""
+    """sensor_msgs/Imu by REP 145: orientation not measured, covariance unknown without noise."""
     flaws, unmeasured = flaws_of(sensor), [-1.0] + [0.0] * 8
     return {'header': _header(fall, frame, sensor['name']),
             'orientation': {'x': 0, 'y': 0, 'z': 0, 'w': 1},

@@ -1,4 +1,4 @@
-"""The formats by their names."""
+"""Registry of the formats."""
 from __future__ import annotations
 
 import importlib
@@ -10,28 +10,28 @@ from ..fall import Fall
 from ..recipe import Recipe
 
 FORMATS = {
-    'lerobot': 'Parquet in the layout of LeRobot v3', 'kfall': 'CSV as of KFall, one a fall',
-    'mcap': 'ROS 2 messages, one MCAP a fall',     'amass': "npz in AMASS's names, one a fall",
+    'lerobot': 'Parquet in the layout of LeRobot v3',
+    'kfall': 'CSV in the layout of KFall, one per fall',
+    'mcap': 'ROS 2 messages, one MCAP per fall',
+    'amass': 'npz with the keys of AMASS, one per fall',
     'settled': 'states at rest, for controllers that get up, one npz'}
 
 
 class Format(Protocol):
-    """What a format's module has; its bytes depend on the falls and the libraries alone."""
+    """Interface of a format's module; its bytes depend on falls and library versions alone."""
 
     def check(self, recipe: Recipe) -> None:
-        """Raise what is wrong with a recipe for this format; optional."""
+        """Raise an error if the format cannot hold a recipe's falls; optional."""
 
     def shard_files(self, recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, bytes]:
         """Files of a shard by their paths in the data set's folder."""
 
     def last_files(self, recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
-        """Files of the whole data set, once all shards of its ``count`` falls are there."""
+        """Files of the whole data set, after all shards of its ``count`` falls are written."""
 
 
 def resolve_format(name: str) -> Format:
-    """The module of a format; OutOfRange for a name that is none, Unreadable where its library is
-    missing.
-    """
+    """Import a format's module; OutOfRange if unknown, Unreadable if its library is missing."""
     if name not in FORMATS:
         raise errors.OutOfRange('format', name, 'one of ' + ', '.join(FORMATS))
     try:

@@ -1,7 +1,7 @@
-"""States at rest, from which controllers learn to get up: one npz of all falls that came to rest.
+"""States at rest, for controllers that learn to get up: one npz of all falls that came to rest.
 
-Of states that are nearly the same only the first is kept: those whose root is turned and whose
-joint angles are alike, wherever they lie and face.
+Of nearly equal states only the first is kept. They are compared by joint angles and by the
+direction of gravity in the root's axes, so position and heading do not matter.
 """
 from __future__ import annotations
 
@@ -16,18 +16,17 @@ from ..recipe import Recipe
 
 PART, WHOLE = 'settled/shard_{shard:06d}.npz', 'settled.npz'
 ALIKE = np.radians(5.0)
-"""Largest difference of any joint angle, and of the direction in which gravity pulls as the root
-sees it, in rad, up to which two states are one."""
+"""Tolerance, rad, of joint angles and of the direction of gravity, of equal states."""
 
 
 def shard_files(recipe: Recipe, falls: list[Fall], shard: int) -> dict[str, bytes]:
-    """Last states of a shard's falls that rest."""
+    """Final states of the shard's falls that come to rest."""
     rested = [fall for fall in falls if not fall.failure and fall.phases.rest is not None]
     return {PART.format(shard=shard): _npz(_states(rested, falls[0]))}
 
 
 def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
-    """All of them, but for those that are alike."""
+    """All states of all shards, without duplicates."""
     parts = []
     for path in sorted(folder.glob('settled/*.npz')):
         with np.load(path) as part:
@@ -39,10 +38,9 @@ def last_files(recipe: Recipe, count: int, folder: Path) -> dict[str, bytes]:
 
 
 def different(rows: np.ndarray) -> list[int]:
-    """Indices of rows (s, m), none within ALIKE of one before it in all m numbers.
+    """Indices of rows (s, m) that differ by more than ALIKE from every earlier kept row.
 
-    Rows are sorted into cells as wide as that by their first numbers, so that each is compared
-    with those of its own and of neighbouring cells alone.
+    A grid of cells of that width over the first columns limits the comparisons to neighbours.
     """
     width = min(3, rows.shape[1])
     cells: dict[tuple, list[int]] = {}
@@ -57,7 +55,7 @@ def different(rows: np.ndarray) -> list[int]:
 
 
 def _states(falls: list[Fall], one: Fall) -> dict[str, np.ndarray]:
-    """What is known of s states; ``one`` fall gives the shapes where there is none."""
+    """Arrays of the s final states of ``falls``; ``one`` gives the shapes if there are none."""
     doll = one.scene.dolls[0].doll
     root = one.scene.bone_names.index(doll.root.name)
     last = np.array([fall.states[-1] for fall in falls]).reshape(len(falls), *one.states.shape[1:])

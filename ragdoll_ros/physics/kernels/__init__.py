@@ -1,16 +1,16 @@
-"""Machine code, made by numba, and nothing else; who needs it asks first whether it can be made."""
+"""Kernels: machine code, compiled by numba at the first import; ready() tells whether it can be."""
 from __future__ import annotations
 
 import functools
 import os
 
 ORDER = 8
-"""Of the method that flies in compiled code."""
+"""Order of the Runge-Kutta method of flight."""
 
 
 @functools.cache
 def problem() -> str:
-    """Why there is no machine code, in words; empty where it can be made."""
+    """Why the kernels cannot be compiled; empty if they can."""
     if os.environ.get('NUMBA_DISABLE_JIT', '0') not in ('', '0'):
         return 'NUMBA_DISABLE_JIT is set'
     try:
@@ -22,5 +22,5 @@ def problem() -> str:
 
 
 def ready() -> bool:
-    """Whether machine code can be made."""
+    """Whether the kernels can be compiled."""
     return not problem()

@@ -24,27 +24,22 @@ One tick of a cluster, and what its stages read and write:
         impact                   q, gaps -> v                     restitution, friction
       write_bone_states, sum_dolls   q, v -> bone_states, doll_sums
 
-The broad phase and sleep are outside, in engine/rigid.
+The broad phase is in engine/rigid/broad_phase.py, sleep in physics/sleeping.py. In all
+kernels s is the System, ws the Workspace, kin a Kinematics, m a number of contacts, n of their
+rows, h the length of a step, s; ``found``: ws.contacts.found, ``dynamics``: ws.step.dynamics.
 """
 from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from .cluster_state import CLUSTER_STATE, ClusterState
 from .compiling.bundle import bundle_at
-from .compiling.decorators import REAL, compiled, entry
+from .compiling.decorators import ADDRESS, REAL, compiled, entry
 from .contact.gaps import enable_separated_pairs, update_kinematics_and_gaps
-from .dynamics.kinematics import (
-    Kinematics,
-    forward_kinematics,
-    inertial_frame,
-    put_quat,
-    root_position,
-    velocity_at,
-)
+from .dynamics.kinematics import (Kinematics, forward_kinematics, inertial_frame, put_quat,
+                                  root_position, velocity_at)
 from .flight.dense_step import begin_dense_step
 from .flight.first_contact import find_first_contact
 from .flight.flight import can_fly, follow_dense_step
@@ -62,18 +57,13 @@ MAX_IMPACTS = 200
 """Impacts of one doll in one tick, over the cube of the number of dolls in the cluster: from then
 on no time of impact is sought, so that many dolls do not cost their square."""
 
-JOB = np.dtype([('system', np.int64), ('workspace', np.int64), ('cluster', np.int64)])
-"""Addresses of the bundles of a cluster: its system, a workspace, and its state."""
-
-JOBS = numba.from_dtype(JOB)[::1]
-
 system_at, workspace_at, cluster_state_at = (bundle_at(SYSTEM), bundle_at(WORKSPACE),
                                              bundle_at(CLUSTER_STATE))
 
 
 @compiled
 def is_finite(values: np.ndarray) -> bool:
-    """Whether all values (k,) are finite, and their sum."""
+    """Whether all values (k,) and their sum are finite."""
     total = 0.0
     for j in range(len(values)):
         total += values[j]
@@ -83,7 +73,8 @@ def is_finite(values: np.ndarray) -> bool:
 @compiled
 def write_bone_states(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray,
                       states: np.ndarray) -> None:
-    """Enter position, orientation, linear and angular velocity (n, 13) of all bones, world frame;
+    """Write to ``states`` (n, 13), by bone, world frame: position of the center of mass,
+    orientation x, y, z, w of the principal axes, velocity of the center of mass, angular velocity.
     ``kin`` becomes that of q and v.
     """
     forward_kinematics(s.tree, q, v, kin)
@@ -98,7 +89,7 @@ def write_bone_states(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray,
 
 @compiled
 def refresh_gaps(s: System, ws: Workspace, cluster: ClusterState) -> None:
-    """Enter the gaps of now."""
+    """Write the gaps at cluster.q to ws.gaps; step.end becomes the kinematics of q and v."""
     update_kinematics_and_gaps(s, ws, ws.step.end, cluster.q, cluster.v, ws.gaps, math.inf,
                                ws.gaps)
     ws.stats[0].gaps_current = 1
@@ -107,7 +98,7 @@ def refresh_gaps(s: System, ws: Workspace, cluster: ClusterState) -> None:
 @compiled
 def try_flight(s: System, ws: Workspace, cluster: ClusterState, left: float, nominal: float,
                tolerance: float) -> None:
-    """Begin a step of flight if everything separates."""
+    """Begin a dense step, with its first contact, if everything separates; ws.gaps are current."""
     longest = min(left, LONGEST_FLIGHT) if len(cluster.loads) else LONGEST_FLIGHT
     if can_fly(s, ws, cluster, nominal) and begin_dense_step(s, ws, cluster, tolerance, longest):
         find_first_contact(s, ws, cluster)
@@ -117,7 +108,7 @@ def try_flight(s: System, ws: Workspace, cluster: ClusterState, left: float, nom
 @compiled
 def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: float,
                     nominal: float, tolerance: float) -> None:
-    """Advance one cluster by ``duration`` s; see advance()."""
+    """Advance one cluster by ``duration`` s; see advance(), whose ``step`` is ``nominal``."""
     q, v, dense, stats = cluster.q, cluster.v, cluster.dense_step[0], ws.stats[0]
     time, impacts = 0.0, 0
     max_impacts = MAX_IMPACTS // len(ws.step.external) ** 3
@@ -154,14 +145,15 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
     sum_dolls(s, ws, ws.step.end, q, cluster.doll_sums)
 
 
-@entry(JOBS, REAL, REAL, REAL)
+@entry(ADDRESS[:, ::1], REAL, REAL, REAL)
 def advance(jobs: np.ndarray, duration: float, step: float, tolerance: float) -> None:
-    """Advance clusters by ``duration`` s, each by itself, and enter their bone states and sums.
+    """Advance clusters independently by ``duration`` s and write their bone states and doll sums.
+    ``duration`` 0: only recompute these and the gaps.
 
-    ``jobs`` (k,): JOB of each. ``step``: length of a contact step, s; ``tolerance``: error of a
-    step of flight, m or rad.
+    ``jobs`` (k, 3): addresses of the bundles of system, workspace and state of each. ``step``:
+    length of a contact step, s; ``tolerance``: error of a step of flight, m or rad.
     """
     for k in range(len(jobs)):
-        job = jobs[k]
-        advance_cluster(system_at(job.system), workspace_at(job.workspace),
-                        cluster_state_at(job.cluster), duration, step, tolerance)
+        system, workspace, cluster = vec(jobs[k])
+        advance_cluster(system_at(system), workspace_at(workspace), cluster_state_at(cluster),
+                        duration, step, tolerance)

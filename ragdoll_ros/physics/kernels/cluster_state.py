@@ -1,4 +1,4 @@
-"""ClusterState: what of a cluster of dolls is carried from tick to tick."""
+"""ClusterState: the state of a cluster of dolls, kept from tick to tick."""
 from __future__ import annotations
 
 import collections
@@ -37,8 +37,8 @@ DENSE_STEP = np.dtype([
     ('valid', np.int64), ('first_rate_known', np.int64), ('elapsed', float), ('length', float),
     ('next_length', float), ('event_time', float), ('error', float)], align=True)
 """A step of flight with dense output: whether there is one; whether the state derivative at its
-start is known; time gone along it, s; its length, s; the next one's, from the error; the time of
-its first contact, or infinity; its estimated error, m or rad."""
+start is known; time advanced along it, s; its length, s; the length of the next one, by its error;
+the time of its first contact, or infinity; its estimated error, m or rad."""
 
 STEP_STATS = np.dtype([
     ('flight_steps', np.int64), ('steps', np.int64), ('impacts', np.int64), ('sweeps', np.int64),
@@ -51,8 +51,8 @@ STEP_STATS = np.dtype([
 unsolved, contacts dropped for want of space, searches for a time of impact that failed, impacts
 whose restitution was reduced to gain no energy, steps that gained some all the same. Of the last
 step: its contacts, whether it ended without an impact, its length and the longest that the next may
-have, s (0: any). Work of pushes, of grabs, and of position correction beyond what the motion paid
-for, J. ``gaps_current``: whether the gaps are those of now."""
+have, s (0: any). Work of pushes, of grabs, and of position correction beyond its share of the
+kinetic energy, J. ``gaps_current``: whether the gaps are those at q."""
 
 ClusterState = collections.namedtuple(
     'ClusterState', 'q v dense_output end_rates dense_step stats excluded contacts gaps '
@@ -67,7 +67,7 @@ Input: ``loads``, ``springs``."""
 
 
 def make_cluster_state(system: System, contacts: int = 0) -> ClusterState:
-    """At the origin, at rest, with room for so many contacts."""
+    """A cluster state at the origin, at rest, with room for so many contacts."""
     nv, nq = len(system.dof_parent), coordinate_count(system)
     return ClusterState(
         q=np.zeros(nq), v=np.zeros(nv), dense_output=np.zeros((8, nq + nv)),

@@ -1,4 +1,4 @@
-"""The kernels. What importing them compiles, one process compiles for all that start together."""
+"""Imports the kernels, which compiles them, in one process at a time; others load them."""
 from .compiling.cache import alone
 
 with alone():

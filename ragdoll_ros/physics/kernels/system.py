@@ -1,4 +1,4 @@
-"""System: what compiled code knows of a scene, or of some of its dolls. It never changes."""
+"""System: the constants of a scene, or of some of its dolls, that compiled code reads."""
 from __future__ import annotations
 
 import collections
@@ -30,6 +30,7 @@ JOINT_LIMIT = np.dtype([('q', np.int64), ('dof', np.int64), ('lower', float), ('
 """A limited joint coordinate: its index in q, its degree of freedom, and its limits, rad."""
 
 MAX_MANIFOLD_POINTS = 8
+"""Contact points that are kept of one pair."""
 
 CONTACT_POINT = np.dtype([('point', float, 3), ('normal', float, 3), ('gap', float),
                           ('feature_id', np.int64)], align=True)
@@ -55,9 +56,10 @@ OVERLAPPING, JOINT_OUTSIDE_LIMITS = 1, 2
 start; a joint between its bodies is outside its limits."""
 
 COMPLIANCE, IMPACT_COMPLIANCE = 1e-8, 1e-10
-"""Compliance of contacts and limits, as a share of the diagonal of W, in steps and at impacts. It
-makes impulses of redundant contacts unique and keeps them small where contacts jam. A body at rest
-on a slope creeps by some 1e-10 m/s for it; an impact misses its velocity by as large a share."""
+"""Compliance of contacts and limits, as a share of the diagonal of W = J H^-1 J^T, in steps and at
+impacts. It makes impulses of redundant contacts unique and keeps them small where contacts jam.
+Bodies at rest on slopes creep by some 1e-10 m/s; impacts miss their velocity by as large a share.
+"""
 
 MAX_DENSE_ROWS = 96
 """Islands of more rows are solved without forming W; see impulses/large_island.py."""
@@ -67,7 +69,7 @@ NO_SLIP = 1e5
 
 
 def gap_count(system: System) -> int:
-    """Gaps of a system: of points from the ground, of joints from both limits, and of pairs."""
+    """Gaps of a system: one of each ground point, two of each limit, one of each pair."""
     return (int(system.geoms['point_count'].sum()) + 2 * len(system.joint_limits)
             + len(system.pairs))
 
@@ -78,7 +80,7 @@ def coordinate_count(system: System) -> int:
 
 
 def tree_depth(system: System) -> int:
-    """Most degrees of freedom that move one body."""
+    """Largest number of degrees of freedom that move one body."""
     most = 0
     for dof in system.body_last_dof:
         size = 0
@@ -89,7 +91,7 @@ def tree_depth(system: System) -> int:
 
 
 def blank_system() -> System:
-    """A system of one body, whose types compiled code is compiled for."""
+    """A system of one body: a sample, from which the type SYSTEM is made."""
     return System(
         tree=np.zeros(1, BODY), gravity=np.zeros(3), dof_parent=np.arange(6) - 1,
         dof_body=np.zeros(6, np.int64), dof_damping=np.zeros(6),

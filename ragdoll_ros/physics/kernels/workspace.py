@@ -9,20 +9,13 @@ from .cluster_state import CONTACT, DOLL_SUMS, ClusterState, make_cluster_state
 from .compiling.bundle import bundle_type
 from .dynamics.forward_dynamics import make_dynamics
 from .dynamics.kinematics import make_kinematics
-from .system import (
-    CONTACT_POINT,
-    MAX_DENSE_ROWS,
-    MAX_MANIFOLD_POINTS,
-    System,
-    blank_system,
-    coordinate_count,
-    tree_depth,
-)
+from .system import (CONTACT_POINT, MAX_DENSE_ROWS, MAX_MANIFOLD_POINTS, System, blank_system,
+                     coordinate_count, tree_depth)
 
 MOTION = np.dtype([('speed', float), ('angular_speed', float), ('correction', float),
                    ('correction_angle', float)], align=True)
 """Bounds on how far points of a body move in a step: speed of the center of mass, m/s, and angular
-speed, rad/s, at its end; what position correction moves, m, and turns, rad, it by."""
+speed, rad/s, at its end; displacement, m, and rotation, rad, by position correction."""
 
 FLIGHT_MOTION = np.dtype([('velocity', float, 3), ('angular_speed', float), ('reach', float)],
                          align=True)
@@ -32,15 +25,15 @@ rad/s, and its largest reach, m."""
 EXTERNAL_IMPULSE = np.dtype([
     ('impulse', float, 3), ('moment', float, 3), ('center', float, 3), ('on_ground', np.int64),
     ('touches_other', np.int64)], align=True)
-"""What a step gives a doll from outside: impulse, N s, and its moment about the world's origin;
-its center of mass before position correction, m; whether the ground holds it; whether another doll
-touches it."""
+"""What acts on a doll from outside in a step: impulse, N s, and its moment about the world's
+origin; its center of mass before position correction, m; whether the ground bears it; whether
+another doll touches it."""
 
 BRACKET = np.dtype([('low', float), ('high', float), ('moved', np.int64), ('halved_width', float),
                     ('chords', np.int64)], align=True)
-"""Bracket of a time of impact, step lengths in s: ``low``, at which nothing has met, and ``high``,
-at which something has; which of them moved last, -1 or 1 (0: neither); its width when it was last
-halved, and the chords since."""
+"""Bracket of a time of impact, step lengths in s: ``low``, at whose end nothing has met, and
+``high``, at whose end something has; which of them moved last, -1 or 1 (0: neither); its width when
+it was last halved, and the chords since."""
 
 STEP_SCALARS = np.dtype([
     ('start_contact_count', np.int64), ('seeks_impacts', np.int64), ('correction_energy', float),
@@ -61,7 +54,7 @@ separates as the step begins."""
 Contacts = collections.namedtuple(
     'Contacts', 'found start gaps_end gaps_active manifold motion joint_outside angles u v')
 """Contacts (c,) that are ``found`` at a pose, and those at the ``start`` of the step. Gaps:
-``gaps_end`` at the end of a step, ``gaps_active``, which tell what may touch in it. ``manifold``:
+``gaps_end`` at the end of a step; ``gaps_active``, by which contacts are found in it. ``manifold``:
 of one pair. ``motion`` (n,); ``joint_outside`` (n,): whether the joint of a body is outside its
 limits. ``angles``, ``u``, ``v`` (c,): the corners of a patch in order, see patch.py."""
 
@@ -99,7 +92,7 @@ Workspace = collections.namedtuple('Workspace', 'contacts island step flight sta
 
 
 def make_workspace(system: System, cluster: ClusterState) -> Workspace:
-    """For a cluster of a system, with room for as many contacts as the cluster has."""
+    """Allocate the scratch for a cluster of a system, with room for as many contacts as it has."""
     bodies, nv, nq = len(system.tree), len(system.dof_parent), coordinate_count(system)
     dolls, contacts, gaps = len(system.doll_masses), len(cluster.contacts), len(cluster.gaps)
     rolls = max(system.geoms['rolling_friction'].max(initial=0.0),
@@ -132,7 +125,7 @@ def make_workspace(system: System, cluster: ClusterState) -> Workspace:
 
 
 def _make_island(system: System, contacts: int, rows: int) -> Island:
-    """With room for so many contacts and rows."""
+    """Allocate an island with room for so many contacts and rows."""
     nv, few = len(system.dof_parent), min(rows, MAX_DENSE_ROWS)
     wide = min(nv, 2 * tree_depth(system)) + 1
 

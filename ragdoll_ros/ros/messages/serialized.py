@@ -83,7 +83,9 @@ def _as_slice(places: np.ndarray) -> slice | np.ndarray:
 
 
 def serialize_pose_array(frame: str, stamp: int, poses: np.ndarray) -> bytes:
-    """Serialized PoseArray of poses (n, 7) for varying n; layout: deserialize_pose_array()."""
+    """Serialized PoseArray of poses (n, 7), for ~/contacts, whose count varies (~/poses:
+    SceneTemplates); layout: deserialize_pose_array().
+    """
     seconds, nanoseconds = divmod(stamp, SECOND)
     name = frame.encode() + b'\0'
     words = struct.pack(f'<iII{len(name)}s{-len(name) % 4}xI', seconds, nanoseconds, len(name),

@@ -1,4 +1,4 @@
-"""The node's parameters: declared with descriptors, validated, and changed at run time."""
+"""The node's parameters: declared, validated, changed at run time; values: node_settings.py."""
 from __future__ import annotations
 
 import dataclasses

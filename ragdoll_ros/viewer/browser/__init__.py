@@ -1,1 +1,1 @@
-"""What runs in the browser, and what it tells."""
+"""What runs in the browser: scripts, style sheets and the events that they send."""

@@ -1,42 +1,28 @@
-"""What pages tell that viser's widgets do not: keys that are down, focus, a text as typed."""
+"""Events of a page that viser's widgets do not report: keys that are down, focus, typed text."""
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import viser
 
-SCRIPT = """<img src="data:," style="display:none" onerror="
-  const all = window.ragdollTold ??= {};
-  const isFirst = !all.NAME;
-  all.NAME = {told: 'TOLD', widget: 'WIDGET'};
-  if (isFirst) {
-    let count = 0;
-    const tell = (what) => window.__viserMutable.sendMessage({
-      type: 'GuiUpdateMessage', uuid: all.NAME.told, updates: {value: `${count++} ${what}`}});
-    const isTyped = (input) => input.matches('input:not([type=hidden])')
-      && document.querySelector(`label[for='${all.NAME.widget}']`)
-        ?.closest('.mantine-Flex-root').contains(input);
-    LISTEN
-  }">"""
-"""A browser runs it whenever it shows the panel anew, viser with other ids after another start."""
+from ..viser_internals import handle_id
+from .scripts import script
 
 
-def tell(gui: viser.GuiApi, name: str, listen: str, take: Callable[[int, str], None],
-         widget: viser.GuiInputHandle | None = None) -> viser.GuiInputHandle[str]:
-    """Have pages run ``listen`` once, a script without double quotes, which may call `tell(text)`.
+def add_listener(gui: viser.GuiApi, name: str, file: str, on_event: Callable[[int, str], None],
+                 widget: viser.GuiInputHandle | None = None) -> viser.GuiInputHandle[str]:
+    """Run the ``listen(send, isTyped)`` of a script ``file`` on all pages; see client_events.js.
 
-    ``take`` gets the page's client_id and the text, in viser's thread, so in the order in which
-    pages sent it and what else they send. In the script, `isTyped(input)` is whether an input is
-    the one in which ``widget``, a labelled one, is typed. The text comes as the value of a field
-    that nobody sees, with a count before it, as what is the same would not be told: it is returned.
+    ``on_event`` gets a page's client_id and what it sends, in viser's thread, so in order with all
+    else that pages send. In the script, `isTyped(input)` tells whether an input belongs to
+    ``widget``, which has a label. Returns the hidden text field whose values carry the events.
     """
-    told = gui.add_text(name, '', visible=False)
+    field = gui.add_text(name, '', visible=False)
 
-    @told.on_update
+    @field.on_update
     async def _(event: viser.GuiEvent) -> None:
-        take(event.client_id, event.target.value.partition(' ')[2])
+        on_event(event.client_id, event.target.value.partition(' ')[2])
 
-    gui.add_html(SCRIPT.replace('NAME', name).replace('TOLD', told._impl.uuid)
-                 .replace('WIDGET', widget._impl.uuid if widget is not None else '')
-                 .replace('LISTEN', listen))
-    return told
+    gui.add_html(script(file, 'client_events.js', NAME=name, FIELD=handle_id(field),
+                        WIDGET=handle_id(widget) if widget is not None else ''))
+    return field

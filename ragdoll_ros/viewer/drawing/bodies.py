@@ -1,7 +1,7 @@
-"""The bones: many parts of one kind are one batch, so that hundreds cost as little as ten.
+"""The bones, as instanced meshes: parts of one shape form batches, so that many cost little.
 
-A batch in which nothing has moved is not sent: one doll that moves among a thousand that lie still
-costs as much as the batches it is in.
+A batch in which nothing has moved is not sent: among a thousand resting dolls one that moves costs
+only the batches that it is in.
 """
 from __future__ import annotations
 
@@ -19,84 +19,84 @@ from ...model.shapes import Part
 from ...model.state import State
 from .meshes import COARSE, MESHES
 
-GLASS = 0.45
-"""Opacity of bones through which their skin is to be seen."""
+OPACITY = 0.45
+"""Of bones below a visible skin."""
 
-MOST = 1000
-"""Parts in a batch: 28 kB when it moves. Each batch costs the page some 0.4 ms by itself."""
+BATCH_SIZE = 1000
+"""Most parts in a batch: 28 kB when it moves. Each batch costs the page some 0.4 ms."""
 
 CROWD = 1000
-"""Parts from which on round ones are drawn coarsely."""
+"""Number of parts above which round ones are drawn with fewer triangles."""
 
 WXYZ = [3, 0, 1, 2]
-"""Viser's order of a quaternion, from ours."""
+"""Indices that turn a quaternion xyzw into viser's wxyz."""
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Parts of one kind: which bone each is of, and its pose (p,) in that one's frame."""
+    """p parts of one shape; ``bones``: index of the bone of each."""
 
     kind: str
-    clad: bool
-    """Whether they are of dolls that show their skin."""
+    skinned: bool
+    """Whether they are parts of dolls with a skin."""
     handle: viser.BatchedMeshHandle
     bones: np.ndarray
-    within: Pose | None
-    """None where all are the bones themselves: most are, and this runs with every frame."""
+    local_pose: Pose | None
+    """Poses (p,) in the frames of the bones; None for identity, the usual and faster case."""
 
 
 class Bodies:
-    """Every bone of a scene in its own shape and colour; those in ``clad`` are under a skin."""
+    """Bones of a scene in their shapes and colours; those in ``skinned`` are below a skin."""
 
     def __init__(self, server: viser.ViserServer, scene: Scene, state: State,
-                 clad: Collection[int] = ()) -> None:
+                 skinned: Collection[int] = ()) -> None:
         self._server = server
         self.batches: list[Batch] = []
         parts = [(index, part) for index, bone in enumerate(scene.bones)
                  for part in bone.shape.primitives]
         self._meshes = MESHES if len(parts) <= CROWD else COARSE
         colors = np.array([(bone.color or DEFAULT_COLOR)[:3] for bone in scene.bones])
-        for kind, under in itertools.product(MESHES, (False, True)):
-            mine = [(index, part) for index, part in parts
-                    if part.kind == kind and (index in clad) == under]
-            for first in range(0, len(mine), MOST):
-                self._add(mine[first:first + MOST], under, colors, state)
+        for kind, below_skin in itertools.product(MESHES, (False, True)):
+            selected = [(index, part) for index, part in parts
+                        if part.kind == kind and (index in skinned) == below_skin]
+            for first in range(0, len(selected), BATCH_SIZE):
+                self._add(selected[first:first + BATCH_SIZE], below_skin, colors, state)
 
-    def _add(self, some: list[tuple[int, Part]], clad: bool, colors: np.ndarray,
+    def _add(self, chunk: list[tuple[int, Part]], skinned: bool, colors: np.ndarray,
              state: State) -> None:
-        """Add parts of one kind, each with the bone that it is of."""
-        bones = np.array([index for index, _ in some])
-        parts = [part for _, part in some]
+        """Add a batch of parts of one shape, each with the index of its bone."""
+        bones = np.array([index for index, _ in chunk])
+        parts = [part for _, part in chunk]
         kind = parts[0].kind
-        within = None if all(part.is_centred for part in parts) else Pose(
+        local_pose = None if all(part.is_centred for part in parts) else Pose(
             np.array([part.position for part in parts]),
             np.array([part.orientation for part in parts]))
-        positions, wxyzs = _placed(state, bones, within)
+        positions, wxyzs = _part_poses(state, bones, local_pose)
         handle = self._server.scene.add_batched_meshes_simple(
             f'/scene/bodies/{kind}_{len(self.batches)}', *self._meshes[kind], wxyzs, positions,
             batched_scales=np.array([part.size for part in parts]),
             batched_colors=np.round(colors[bones] * 255).astype(np.uint8), lod='off')
-        self.batches.append(Batch(kind, clad, handle, bones, within))
+        self.batches.append(Batch(kind, skinned, handle, bones, local_pose))
 
     def show(self, state: State) -> None:
-        """Draw all where they are now."""
+        """Draw a state."""
         for batch in self.batches:
-            positions, wxyzs = _placed(state, batch.bones, batch.within)
+            positions, wxyzs = _part_poses(state, batch.bones, batch.local_pose)
             batch.handle.batched_positions = positions
             batch.handle.batched_wxyzs = wxyzs
 
-    def be_visible(self, wanted: bool, glass: bool) -> None:
-        """Show the bones under skins, as of glass if so wished, or hide them; others stay."""
+    def set_visible(self, visible: bool, translucent: bool) -> None:
+        """Show or hide the bones below skins; others stay visible."""
         for batch in self.batches:
-            if batch.clad:
-                batch.handle.visible = wanted
-                batch.handle.opacity = GLASS if glass else None
+            if batch.skinned:
+                batch.handle.visible = visible
+                batch.handle.opacity = OPACITY if translucent else None
 
 
-def _placed(state: State, bones: np.ndarray,
-            within: Pose | None) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (p, 3) m and orientations (p, 4) w, x, y, z of parts, float32."""
+def _part_poses(state: State, bones: np.ndarray,
+                local_pose: Pose | None) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (p, 3) m and orientations (p, 4) wxyz of parts, float32."""
     pose = state.poses(bones)
-    if within is not None:
-        pose = pose.compose(within)
+    if local_pose is not None:
+        pose = pose.compose(local_pose)
     return pose.position.astype(np.float32), pose.orientation[:, WXYZ].astype(np.float32)

@@ -1,7 +1,7 @@
-"""Meshes of size one, to be scaled: a box, a cylinder along z, a ball.
+"""Unit meshes, to be scaled: a box, a cylinder along z, a sphere.
 
-Vertices (v, 3) m and faces (f, 3), counter-clockwise seen from outside. The page's shading goes
-by vertices, so that what has an edge has its vertices there once for each side.
+Vertices (v, 3) m and faces (f, 3), counter-clockwise seen from outside. Shading uses vertex
+normals, so sharp edges have separate vertices for each face.
 """
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 
 Mesh = tuple[np.ndarray, np.ndarray]
 
-ROUND = 24
-"""Corners of a circle."""
+SEGMENTS = 24
+"""Of a circle."""
 
 
 def box() -> Mesh:
-    """Edges 1 m long."""
+    """A box with edges of 1 m."""
     corners, faces = [], []
     for axis in range(3):
         u, w = np.eye(3)[[(axis + 1) % 3, (axis + 2) % 3]]
@@ -26,8 +26,8 @@ def box() -> Mesh:
     return np.array(corners), np.array(faces)
 
 
-def cylinder(corners: int = ROUND) -> Mesh:
-    """1 m across and 1 m long."""
+def cylinder(corners: int = SEGMENTS) -> Mesh:
+    """A cylinder of 1 m diameter and 1 m length."""
     angle = np.arange(corners) * 2 * np.pi / corners
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(corners)], axis=1) / 2
     up = np.array([0, 0, 0.5])
@@ -40,8 +40,8 @@ def cylinder(corners: int = ROUND) -> Mesh:
     return np.concatenate([low, high, low, high]), np.concatenate(side + caps)
 
 
-def ball(corners: int = ROUND) -> Mesh:
-    """1 m across."""
+def sphere(corners: int = SEGMENTS) -> Mesh:
+    """A sphere of 1 m diameter, as latitude and longitude grid."""
     rows = corners // 2
     tilt = np.arange(rows + 1)[:, None] * np.pi / rows
     angle = np.arange(corners)[None] * 2 * np.pi / corners
@@ -56,8 +56,8 @@ def ball(corners: int = ROUND) -> Mesh:
     return points.reshape(-1, 3), faces
 
 
-MESHES = {'box': box(), 'cylinder': cylinder(), 'sphere': ball()}
-"""By the kinds of the primitives of model.shapes."""
+MESHES = {'box': box(), 'cylinder': cylinder(), 'sphere': sphere()}
+"""By the kinds of primitives in model.shapes."""
 
-COARSE = {**MESHES, 'cylinder': cylinder(ROUND // 2), 'sphere': ball(ROUND // 2)}
-"""For crowds, whose heads are most of what there is to draw: a quarter of their triangles."""
+COARSE = {**MESHES, 'cylinder': cylinder(SEGMENTS // 2), 'sphere': sphere(SEGMENTS // 2)}
+"""For crowds, whose heads are most of the triangles: a quarter of these."""

@@ -5,39 +5,39 @@ import viser
 
 from ..sources.source import Frame
 from .bodies import Bodies
-from .ground import show_ground
-from .joint_limits import Limits
-from .marks import Marks
-from .skin import Skins
+from .ground import draw_ground
+from .joint_limits import JointLimits
+from .overlays import Overlays
+from .skin_meshes import SkinMeshes
 
 
 class Stage:
-    """Takes the place of the stage before it."""
+    """Draws one scene, in place of the stage before."""
 
     def __init__(self, server: viser.ViserServer, frame: Frame) -> None:
         self.scene = frame.scene
         server.scene.remove_by_name('/scene')
         self._server, self._dark = server, False
-        show_ground(server, self.scene, dark=False)
-        self.skins = Skins(server, self.scene)
-        self.bodies = Bodies(server, self.scene, frame.state, self.skins.clad)
-        self._marks = Marks(server)
-        self._limits = Limits(server, self.scene)
+        draw_ground(server, self.scene, dark=False)
+        self.skins = SkinMeshes(server, self.scene)
+        self.bodies = Bodies(server, self.scene, frame.state, self.skins.skinned)
+        self._overlays = Overlays(server)
+        self._limits = JointLimits(server, self.scene)
 
     def show(self, frame: Frame) -> None:
-        """Draw all where it is."""
+        """Draw a frame of the scene."""
         self.bodies.show(frame.state)
         self.skins.show(frame.state)
-        self._marks.show(frame)
+        self._overlays.show(frame)
         self._limits.show(frame.state, frame.angles)
 
-    def be_dark(self, wanted: bool) -> None:
-        """Draw the ground for a dark page, or for a light one."""
-        if wanted != self._dark:
-            self._dark = wanted
-            show_ground(self._server, self.scene, wanted)
+    def set_dark(self, dark: bool) -> None:
+        """Draw the ground for a dark page or a light one."""
+        if dark != self._dark:
+            self._dark = dark
+            draw_ground(self._server, self.scene, dark)
 
-    def be_visible(self, bones: bool, skins: bool) -> None:
-        """Show bones and skins; bones at least where there is no skin."""
-        self.bodies.be_visible(bones or not skins, glass=skins)
-        self.skins.be_visible(skins)
+    def set_visible(self, bones: bool, skins: bool) -> None:
+        """Show or hide bones and skins; bones are shown at least where skins are hidden."""
+        self.bodies.set_visible(bones or not skins, translucent=skins)
+        self.skins.set_visible(skins)

@@ -1,1 +1,1 @@
-"""Edit a scene in the page: pure changes with undo, a panel of numbers, handles, files."""
+"""Editor of a scene in the page: pure changes with undo, a form, handles, files."""

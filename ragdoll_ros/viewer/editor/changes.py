@@ -1,19 +1,17 @@
-"""Changes of one bone or of its joint: each takes a scene and gives another, or a ModelError.
+"""Changes of a bone or its joint: each returns a changed scene, or raises a ModelError.
 
-Bones go by their names in the scene (``Scene.bone_names``). An error's path begins with that name:
-``left shin.mass``, ``left shin.joint.limits_deg[0]``. What the dataclasses check is checked here
-by making them.
+Bones are named as in ``Scene.bone_names``. The path of an error starts with that name:
+``left shin.mass``, ``left shin.joint.limits_deg[0]``. The dataclasses validate the values.
 
-What belongs together stays together. A body that is moved, rotated or given another shape leaves
-all else of the doll where it is in the bind pose: the pivots, its neighbours, and the skeleton of
-the skin, as an editor of a fitted doll moves bodies under a skin that stays. With ``limb`` the
-body takes along all that hangs from it, with its own joint, axes, swings and skin: one rigid
-piece, cut at the pivot to the parent.
+A body that is moved, rotated or given another shape leaves the rest of the doll where it is in the
+bind pose: anchors, other bodies, and the skeleton of the skin. With ``limb``, the subtree of the
+body moves rigidly with it, with joints, axes, swings and skin, and with its own joint.
 """
 from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
@@ -26,24 +24,27 @@ from ...model.shapes import SHAPES, Box, Shape, Sphere
 from ...model.swing import Swing
 from ...model.vectors import floats
 
-USUAL, USUAL_TWIST = math.radians(45), math.radians(30)
-"""Limit of an axis, and twist of a ball, where the joint had none of the kind before."""
+DEFAULT_LIMIT, DEFAULT_TWIST = math.radians(45), math.radians(30)
+"""rad: limit of an axis, and twist of a ball joint, where the joint had none before."""
+
+NAME = re.compile(r'[^\s/][^/\x00-\x1f]{0,99}')
+"""Names that config/doll.schema.json allows."""
 
 
 def find(scene: Scene, name: str) -> tuple[Placement, Bone]:
-    """The doll that holds a bone, and the bone; UnknownBone if there is none."""
+    """The doll of a bone, and the bone; UnknownBone."""
     index = scene.bone_index(name)
     return scene.dolls[scene.doll_of_bone[index]], scene.bones[index]
 
 
 def joint_of(scene: Scene, name: str) -> Joint | None:
-    """Joint between a bone and its parent, None for a root."""
+    """Joint between a bone and its parent; None for a root."""
     placement, bone = find(scene, name)
     return next((joint for joint in placement.doll.joints if joint.child == bone.name), None)
 
 
 def replace_doll(scene: Scene, placement: Placement, **fields: object) -> Scene:
-    """The scene with fields of one doll replaced."""
+    """Replace fields of one doll."""
     doll = dataclasses.replace(placement.doll, **fields)
     return dataclasses.replace(scene, dolls=tuple(
         dataclasses.replace(placement, doll=doll) if each is placement else each
@@ -53,12 +54,12 @@ def replace_doll(scene: Scene, placement: Placement, **fields: object) -> Scene:
 def change_bone(scene: Scene, name: str, **fields: object) -> Scene:
     """Set fields of a bone: mass, friction, color, ...; a new size keeps the mass.
 
-    Inertia follows where a bone is a uniform solid. To move or rotate one, see ``set_pose``.
+    The inertia of a uniform solid is updated. For its pose see ``set_pose``.
     """
     placement, bone = find(scene, name)
     with _errors_at(name):
         changed = dataclasses.replace(bone, **fields)
-    return replace_doll(scene, placement, bones=_swapped(placement.doll.bones, bone, changed))
+    return replace_doll(scene, placement, bones=_replaced(placement.doll.bones, bone, changed))
 
 
 def change_joint(scene: Scene, name: str, **fields: object) -> Scene:
@@ -69,12 +70,12 @@ def change_joint(scene: Scene, name: str, **fields: object) -> Scene:
         raise errors.Detached(f'{name}.joint', name, 'a bone with a parent: the root has no joint')
     with _errors_at(f'{name}.joint'):
         changed = dataclasses.replace(joint, **fields)
-    return replace_doll(scene, placement, joints=_swapped(placement.doll.joints, joint, changed))
+    return replace_doll(scene, placement, joints=_replaced(placement.doll.joints, joint, changed))
 
 
 def set_pose(scene: Scene, name: str, position: Sequence[float] | None = None,
              orientation: Sequence[float] | None = None, limb: bool = False) -> Scene:
-    """Place a body: centre of mass (m) and quaternion, doll's frame, bind pose; None stays."""
+    """Set the pose of a body: centre of mass, m, and quaternion; doll's frame, bind pose."""
     placement, bone = find(scene, name)
     fields = {'position': position, 'orientation': orientation}
     with _errors_at(name):
@@ -82,14 +83,14 @@ def set_pose(scene: Scene, name: str, position: Sequence[float] | None = None,
             bone, **{key: value for key, value in fields.items() if value is not None})
     if limb:
         return _move_limb(scene, placement, bone, moved)
-    riders = tuple(carried(rider, bone, moved) if rider.bone == bone.name else rider
+    riders = tuple(reattached(rider, bone, moved) if rider.bone == bone.name else rider
                    for rider in placement.doll.riders)
     return replace_doll(scene, placement, riders=riders,
-                        bones=_swapped(placement.doll.bones, bone, moved))
+                        bones=_replaced(placement.doll.bones, bone, moved))
 
 
 def set_size(scene: Scene, name: str, half_extents: Sequence[float]) -> Scene:
-    """Make a body as large as a box (3,) m along its own axes, from its centre; mass stays."""
+    """Scale a body to the half extents (3,) m in its frame; the mass stays."""
     _, bone = find(scene, name)
     with _errors_at(name):
         errors.check_positive('size', floats(half_extents))
@@ -100,7 +101,7 @@ def set_size(scene: Scene, name: str, half_extents: Sequence[float]) -> Scene:
 
 
 def set_shape(scene: Scene, name: str, kind: str) -> Scene:
-    """Make a body another kind of shape that fills the same box, its long side along z."""
+    """Change the kind of a body's shape, keeping its box, with the longest side along z."""
     _, bone = find(scene, name)
     if kind not in SHAPES:
         raise errors.WrongForm(f'{name}.shape', kind, 'one of ' + ', '.join(SHAPES))
@@ -109,7 +110,7 @@ def set_shape(scene: Scene, name: str, kind: str) -> Scene:
     half, moments = np.array(bone.shape.half_extents), bone.moments
     longest = int(np.argmax(half))
     if kind in ('cylinder', 'capsule') and half[longest] > half[2] * (1 + 1e-9):
-        # A rotation by 120 degrees that brings the long side onto z keeps the axes right-handed.
+        # Rotate by 120 degrees, which permutes the axes and keeps them right-handed.
         cycle = np.roll(np.eye(3), 2 - longest, axis=1).T
         orientation = rotation.multiply(bone.orientation, rotation.from_matrix(cycle.T))
         scene = set_pose(scene, name, orientation=orientation)
@@ -118,7 +119,7 @@ def set_shape(scene: Scene, name: str, kind: str) -> Scene:
 
 
 def shape_within(kind: str, half_extents: Sequence[float]) -> Shape:
-    """Shape of a kind that fits a box with half edges (3,) m; round ones by the mean."""
+    """Shape of a kind for half extents (3,) m; round ones use geometric means."""
     x, y, z = (float(edge) for edge in half_extents)
     if kind == 'box':
         return Box((2 * x, 2 * y, 2 * z))
@@ -126,40 +127,74 @@ def shape_within(kind: str, half_extents: Sequence[float]) -> Shape:
         return Sphere(float(np.cbrt(x * y * z)))
     radius = math.sqrt(x * y)
     if kind == 'capsule':
-        # Its barrel keeps a tenth of the length, as it has to be longer than nothing.
+        # Its cylinder keeps a tenth of the length, which must not be zero.
         radius = min(radius, 0.9 * z)
         return SHAPES[kind](radius, 2 * (z - radius))
     return SHAPES[kind](radius, 2 * z)
 
 
 def set_joint_kind(scene: Scene, name: str, kind: str) -> Scene:
-    """Make a bone's joint another kind; axes and limits that the two have in common stay."""
+    """Change the kind of a bone's joint; axes and limits that both kinds have stay."""
     joint = joint_of(scene, name)
     if joint is None or kind not in JOINT_KINDS or kind == joint.kind:
         return change_joint(scene, name, kind=kind)
     _, bone = find(scene, name)
     hinge, universal, twist = _axes(joint, bone)
-    pairs = joint.limits or ((-USUAL, USUAL),)
+    pairs = joint.limits or ((-DEFAULT_LIMIT, DEFAULT_LIMIT),)
     widest = max((max(map(abs, pair)) for pair in pairs if pair), default=0.0)
     swing = min(widest, MAX_SWING)
-    second = joint.limits[1] if joint.kind == 'universal' else (-USUAL, USUAL)
-    ball = ((-swing, swing), (-USUAL_TWIST, USUAL_TWIST)) if swing else (None, None)
+    second = joint.limits[1] if joint.kind == 'universal' else (-DEFAULT_LIMIT, DEFAULT_LIMIT)
+    ball = ((-swing, swing), (-DEFAULT_TWIST, DEFAULT_TWIST)) if swing else (None, None)
     axes, limits = {'hinge': ((hinge,), pairs[:1]), 'ball': ((twist,), ball),
                     'universal': ((hinge, universal), (pairs[0], second)),
                     'fixed': ((), ())}[kind]
     return change_joint(scene, name, kind=kind, axes=axes, limits=limits)
 
 
+def add_bone(scene: Scene, parent: str, name: str) -> Scene:
+    """Add a copy of bone ``parent`` at its end, on a ball joint; an error's path is ``name``."""
+    placement, above = find(scene, parent)
+    if not NAME.fullmatch(name):
+        raise errors.WrongForm('name', name, 'text without / and control characters')
+    if any(bone.name == name for bone in placement.doll.bones):
+        raise errors.DuplicateName('name', name, 'a unique name')
+    outward = outward_from(joint_of(scene, parent), above)
+    reach = float(above.shape.support(
+        rotation.rotate(rotation.inverse(above.orientation), outward)))
+    bone = dataclasses.replace(above, name=name, position=above.position + 2 * reach * outward)
+    joint = Joint(above.name, name, 'ball', above.position + reach * outward, (outward,),
+                  ((-DEFAULT_LIMIT, DEFAULT_LIMIT), (-DEFAULT_TWIST, DEFAULT_TWIST)))
+    return replace_doll(scene, placement, bones=(*placement.doll.bones, bone),
+                        joints=(*placement.doll.joints, joint))
+
+
+def remove_limb(scene: Scene, name: str) -> Scene:
+    """Remove a bone's subtree and its swings; its skin is attached to the parent."""
+    placement, bone = find(scene, name)
+    doll, joint = placement.doll, joint_of(scene, name)
+    if joint is None:
+        raise errors.Detached(name, name, 'a bone with a parent: the root carries all others')
+    removed = set(limb(doll, bone.name))
+    return replace_doll(
+        scene, placement,
+        bones=tuple(bone for bone in doll.bones if bone.name not in removed),
+        joints=tuple(joint for joint in doll.joints if joint.child not in removed),
+        swings=tuple(swing for swing in doll.swings if swing.bone not in removed),
+        riders=tuple(reattached(rider, doll.bone(rider.bone), doll.bone(joint.parent))
+                     if rider.bone in removed else rider for rider in doll.riders),
+        no_collision=tuple(pair for pair in doll.no_collision if removed.isdisjoint(pair)))
+
+
 def limb(doll: Ragdoll, root: str) -> tuple[str, ...]:
-    """Names of a bone and of all that hangs from it, parents first."""
+    """Names of the bones of a subtree, parents first."""
     names = [root]
     for name in names:
         names += [joint.child for joint in doll.joints if joint.parent == name]
     return tuple(names)
 
 
-def carried(rider: SkeletonFrame, old: Bone, new: Bone) -> SkeletonFrame:
-    """A rider of ``old`` as ``new`` carries it: in the bind pose it stays where it is."""
+def reattached(rider: SkeletonFrame, old: Bone, new: Bone) -> SkeletonFrame:
+    """A frame of ``old`` attached to ``new``, with the same world pose in the bind pose."""
     back = rotation.inverse(new.orientation)
     rotated = rotation.multiply(back, old.orientation)
     shift = rotation.rotate(back, np.subtract(old.position, new.position))
@@ -169,14 +204,14 @@ def carried(rider: SkeletonFrame, old: Bone, new: Bone) -> SkeletonFrame:
 
 
 def outward_from(joint: Joint | None, bone: Bone) -> np.ndarray:
-    """Unit direction (3,) from where a bone hangs to its middle; up for the root."""
+    """Unit direction (3,) from a bone's joint to its centre; up for the root."""
     outward = np.subtract(bone.position, joint.anchor) if joint else np.zeros(3)
     length = np.linalg.norm(outward)
     return outward / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
 
 
 def _axes(joint: Joint, bone: Bone) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Axes (3,) for a joint of any kind: to rotate about, one across it, and along the bone."""
+    """Axes (3,) for a joint of any kind: hinge axis, one normal to it, and along the bone."""
     along = outward_from(joint, bone)
     if joint.kind in ('hinge', 'universal'):
         first = np.array(joint.axes[0])
@@ -193,7 +228,7 @@ def _axes(joint: Joint, bone: Bone) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def _move_limb(scene: Scene, placement: Placement, bone: Bone, moved: Bone) -> Scene:
-    """The scene with all that hangs from ``bone`` moved rigidly as that moves to ``moved``."""
+    """Move the subtree of ``bone`` rigidly, so that the bone becomes ``moved``."""
     doll = placement.doll
     rotated = rotation.multiply(moved.orientation, rotation.inverse(bone.orientation))
     names = set(limb(doll, bone.name))
@@ -204,7 +239,7 @@ def _move_limb(scene: Scene, placement: Placement, bone: Bone, moved: Bone) -> S
     def direction(v: Sequence[float]) -> np.ndarray:
         return rotation.rotate(rotated, v)
 
-    def swung(swing: Swing) -> Swing:
+    def move_swing(swing: Swing) -> Swing:
         links = tuple(dataclasses.replace(link, direction=direction(link.direction))
                       if link.direction else link for link in swing.links)
         return dataclasses.replace(swing, root=point(swing.root), links=links,
@@ -217,18 +252,18 @@ def _move_limb(scene: Scene, placement: Placement, bone: Bone, moved: Bone) -> S
     joints = tuple(dataclasses.replace(
         joint, anchor=point(joint.anchor), axes=tuple(direction(axis) for axis in joint.axes))
         if joint.child in names else joint for joint in doll.joints)
-    swings = tuple(swung(swing) if swing.bone in names else swing for swing in doll.swings)
-    return replace_doll(scene, placement, bones=_swapped(bones, bones[doll.bones.index(bone)],
+    swings = tuple(move_swing(swing) if swing.bone in names else swing for swing in doll.swings)
+    return replace_doll(scene, placement, bones=_replaced(bones, bones[doll.bones.index(bone)],
                                                          moved), joints=joints, swings=swings)
 
 
-def _swapped(items: tuple, old: object, new: object) -> tuple:
+def _replaced(items: tuple, old: object, new: object) -> tuple:
     return tuple(new if each is old else each for each in items)
 
 
 @contextmanager
 def _errors_at(place: str) -> Iterator[None]:
-    """Errors from within have their place in the scene before their path."""
+    """Prefix the paths of errors with their place in the scene."""
     try:
         yield
     except errors.ModelError as error:

@@ -1,4 +1,4 @@
-"""The editor: keeps the scene and its history, and lets panel, handles and files change it."""
+"""The editor: holds the scene and its history; panel, handles and files change it."""
 from __future__ import annotations
 
 import threading
@@ -12,258 +12,261 @@ import viser
 
 from ...model import errors
 from ...model.scene import Scene
-from ..widgets.error_text import in_words
-from . import changes, growth, mirror, sheet
-from .files import Files
-from .folder import Folder
+from ..widgets.error_text import error_text
+from . import bone_form, changes, mirror
+from .files_panel import FilesPanel
 from .handles import Handles
-from .history import History
-from .panel import Panel
+from .panel import EditorPanel
+from .scene_folder import SceneFolder
+from .undo_history import UndoHistory
 
-UNSEEN = 20
-"""Scenes given to the page that it has not shown yet."""
+MAX_PENDING = 20
+"""Scenes sent to the source that the page has not shown yet."""
 
 
 class Editor:
     """Edits a scene in the GUI container that is current.
 
-    Two states. Editing: the page stands paused in the bind pose, the chosen body has handles, and
-    each change is seen at once. Else the doll lives; an Update starts it anew with the change.
+    While editing, the source is paused in the bind pose, the selected body has handles, and each
+    change is shown at once. Otherwise the simulation runs, and Update restarts it with the change.
 
-    ``use(scene)`` makes the page's source start anew with a scene, or raises RagdollError: then
-    the change is refused and the scene stays. ``pause`` holds the source's time.
+    ``set_scene`` restarts the source with a scene, or raises RagdollError: then the change is
+    refused and the scene stays. ``pause`` pauses or resumes the source.
 
-    Callbacks come from many threads. They act one after another; `show` and `select`, which the
-    page calls, never wait for `use`.
+    Callbacks come from many threads and are serialized. `show` and `select`, which the page calls,
+    never wait for ``set_scene``.
     """
 
-    def __init__(self, server: viser.ViserServer, scene: Scene, use: Callable[[Scene], None],
+    def __init__(self, server: viser.ViserServer, scene: Scene, set_scene: Callable[[Scene], None],
                  pause: Callable[[bool], None], folder: str | Path = '.') -> None:
-        self._use, self._pause = use, pause
-        self._acting = threading.RLock()
-        self._showing = threading.RLock()
-        self._history = History(scene)
-        self._given: deque[Scene] = deque(maxlen=UNSEEN)
-        self._stood = False
+        self._set_source_scene, self._pause = set_scene, pause
+        self._action_lock = threading.RLock()
+        self._display_lock = threading.RLock()
+        self._history = UndoHistory(scene)
+        self._pending: deque[Scene] = deque(maxlen=MAX_PENDING)
+        self._was_paused = False
         self.bone: str | None = None
-        """Name of the chosen bone."""
+        """Name of the selected bone."""
         self.editing = False
-        """Whether the page stands in the bind pose."""
-        self.handles = Handles(server, self._pose_dragged, self._size_dragged)
-        self.panel = Panel(server.gui, self.select, self.suggest)
+        """Whether the source is paused in the bind pose."""
+        self.handles = Handles(server, self._on_pose, self._on_size)
+        self.panel = EditorPanel(server.gui, self.select, self.suggest)
         self._connect(server.gui)
         with server.gui.add_folder('Files'):
-            self.files = Files(server, lambda: self.scene, self.take, Folder(folder))
+            self.files = FilesPanel(server, lambda: self.scene, self.set_scene,
+                                    SceneFolder(folder))
         self._refresh()
 
     @property
     def scene(self) -> Scene:
-        """The scene as it is now."""
+        """The current scene."""
         return self._history.scene
 
     def show(self, scene: Scene) -> None:
-        """Take note that the page shows another scene now."""
-        with self._showing:
-            if scene in self._given:
-                # One of ours; the page draws late, and may have left out some before it.
-                while self._given.popleft() != scene:
+        """Take note that the page shows another scene."""
+        with self._display_lock:
+            if scene in self._pending:
+                # Sent by the editor; the page draws late, and may have skipped some before it.
+                while self._pending.popleft() != scene:
                     pass
             elif scene != self.scene:
-                self._enter(scene, f'scene {scene.name}')
+                self._push(scene, f'scene {scene.name}')
 
     def select(self, bone: str | None) -> None:
-        """Choose a bone by its name in the scene; one that is not there, or None: none."""
-        with self._showing:
+        """Select a bone by its name in the scene; an unknown name or None deselects."""
+        with self._display_lock:
             bone = bone if bone in self.scene.bone_names else None
             if bone != self.bone:
                 self.bone = bone
                 self._refresh()
 
     def toggle(self) -> None:
-        """Go to the bind pose to edit, or drop the doll."""
-        with self._telling():
-            wanted = not self.editing
-            self._run(self.scene, wanted)
-            if not wanted:
+        """Start editing in the bind pose, or end it and run."""
+        with self._reporting_errors():
+            editing = not self.editing
+            self._restart(self.scene, editing)
+            if not editing:
                 self._pause(False)
-            self._set_editing(wanted)
+            self._set_editing(editing)
 
-    def take_note(self, paused: bool) -> None:
-        """Learn from the page whether time stands: where it goes on by itself, editing ends."""
-        if self._stood and not paused and self.editing:
+    def update_paused(self, paused: bool) -> None:
+        """Take note whether the source is paused: if it was resumed elsewhere, editing ends."""
+        if self._was_paused and not paused and self.editing:
             self._set_editing(False)
-        self._stood = paused
+        self._was_paused = paused
 
     def leave(self) -> None:
-        """End editing where the doll is about to leave its bind pose; time stays as it is."""
-        with self._acting:
+        """End editing before the doll leaves its bind pose; the source stays paused."""
+        with self._action_lock:
             if self.editing:
                 self._set_editing(False)
 
     def update(self) -> None:
-        """Apply what stands in the fields; where that is wrong, say so there and change nothing."""
-        with self._telling():
-            name, limb = self._chosen(), self.panel.limb.value
-            values, unread = self.panel.values()
-            self._change(lambda: sheet.apply(self.scene, name, values, limb, unread),
+        """Apply the values of the form, or show errors below them and change nothing."""
+        with self._reporting_errors():
+            name, limb = self._selected(), self.panel.limb.value
+            values, found = self.panel.values()
+            self._change(lambda: bone_form.apply_values(self.scene, name, values, limb, found),
                          f'numbers of {name}')
 
     def undo(self) -> None:
-        """Go back a step."""
-        self._go(self._history.undo, self._history.redo)
+        """Go one step back."""
+        self._step(self._history.undo, self._history.redo)
 
     def redo(self) -> None:
-        """Go a step forward again."""
-        self._go(self._history.redo, self._history.undo)
+        """Go one step forward."""
+        self._step(self._history.redo, self._history.undo)
 
-    def take(self, scene: Scene, what: str) -> None:
-        """Go on with a changed scene, or with another one; RagdollError if it cannot run."""
-        with self._acting:
-            self._run(scene, self.editing)
-            with self._showing:
-                self._enter(scene, what)
+    def set_scene(self, scene: Scene, name: str) -> None:
+        """Make a scene current, as a change called ``name``; RagdollError if it is refused."""
+        with self._action_lock:
+            self._restart(scene, self.editing)
+            with self._display_lock:
+                self._push(scene, name)
 
     def suggest(self, key: str, kind: str) -> None:
-        """Fill in numbers that fit another kind of shape or joint, for the user to go on from."""
-        with self._telling():
-            name = self._chosen()
+        """Fill the form with values for another kind of shape or joint, to be edited further."""
+        with self._reporting_errors():
+            name = self._selected()
             change = changes.set_shape if key == 'shape' else changes.set_joint_kind
             form = self.panel.body if key == 'shape' else self.panel.joint
-            form.fill(sheet.read(change(self.scene, name, kind), name))
+            form.fill(bone_form.read_bone(change(self.scene, name, kind), name))
 
     def show_handles(self) -> None:
-        """Put handles on the chosen bone while editing, else take them away."""
-        with self._showing:
+        """Show handles on the selected bone while editing, otherwise none."""
+        with self._display_lock:
             if self.editing and self.bone is not None:
                 self.handles.show(self.scene, self.bone, self.panel.limb.value)
             else:
                 self.handles.hide()
 
     def add_bone(self, name: str) -> None:
-        """Add a bone at the end of the chosen one, and choose it."""
-        with self._telling():
-            above, name = self._chosen(), name.strip()
-            self.take(growth.add_bone(self.scene, above, name), f'add {name}')
-            placement, _ = changes.find(self.scene, above)
+        """Add a bone at the end of the selected one, and select it."""
+        with self._reporting_errors():
+            parent, name = self._selected(), name.strip()
+            self.set_scene(changes.add_bone(self.scene, parent, name), f'add {name}')
+            placement, _ = changes.find(self.scene, parent)
             self.select(self.scene.qualified(placement, name))
 
     def remove_limb(self) -> None:
-        """Take the chosen bone off, with all that hangs from it."""
-        with self._telling():
-            name = self._chosen()
-            self.take(growth.remove_limb(self.scene, name), f'remove {name}')
+        """Remove the selected bone and its subtree."""
+        with self._reporting_errors():
+            name = self._selected()
+            self.set_scene(changes.remove_limb(self.scene, name), f'remove {name}')
 
     def _connect(self, gui: viser.GuiApi) -> None:
-        """Have the panel's buttons, and keys, do what they say."""
+        """Connect the panel's buttons, and hotkeys."""
         panel = self.panel
         panel.limb.on_update(lambda _: self.show_handles())
         panel.update.on_click(lambda _: self.update())
         panel.add.on_click(lambda _: self.add_bone(panel.name.value))
         panel.remove.on_click(lambda _: self.remove_limb())
         for button, label, key, modifier, action in (
-                (panel.edit, 'Edit, or drop it', 'E', None, self.toggle),
+                (panel.edit, 'Edit or run', 'E', None, self.toggle),
                 (panel.undo, 'Undo', 'Z', 'cmd/ctrl', self.undo),
                 (panel.redo, 'Redo', 'Z', 'cmd/ctrl+shift', self.redo)):
             command = gui.add_command(label, hotkey=key, modifier=modifier)
             for trigger in (button.on_click, command.on_trigger):
                 trigger(lambda _, action=action: action())
 
-    def _pose_dragged(self, position: np.ndarray, orientation: np.ndarray) -> None:
-        with self._telling():
-            name, limb = self._chosen(), self.panel.limb.value
+    def _on_pose(self, position: np.ndarray, orientation: np.ndarray) -> None:
+        with self._reporting_errors():
+            name, limb = self._selected(), self.panel.limb.value
             self._change(lambda: changes.set_pose(self.scene, name, position, orientation, limb),
                          f'move {name}')
 
-    def _size_dragged(self, half_extents: np.ndarray) -> None:
-        with self._telling():
-            name = self._chosen()
+    def _on_size(self, half_extents: np.ndarray) -> None:
+        with self._reporting_errors():
+            name = self._selected()
             self._change(lambda: changes.set_size(self.scene, name, half_extents),
                          f'size of {name}')
 
-    def _change(self, made: Callable[[], Scene], what: str) -> None:
-        """Take a changed scene, on both sides if so wished; put back what is refused."""
+    def _change(self, change: Callable[[], Scene], name: str) -> None:
+        """Make a change, on both sides if selected; reset the handles if it is refused."""
         try:
-            scene = made()
+            scene = change()
             if self.panel.both.value:
-                scene = mirror.mirrored(scene, self._chosen(), self.panel.limb.value)
-            self.take(scene, what)
+                scene = mirror.mirrored(scene, self._selected(), self.panel.limb.value)
+            self.set_scene(scene, name)
         except errors.RagdollError:
             self.show_handles()
             raise
 
-    def _enter(self, scene: Scene, what: str) -> None:
-        """Have a scene from now on: a step, but for one of another name, which has its own past."""
+    def _push(self, scene: Scene, name: str) -> None:
+        """Add a scene to the history; one with another name starts a new history."""
         if scene.name == self.scene.name:
-            self._history.push(scene, what)
+            self._history.push(scene, name)
         else:
-            self._history = History(scene)
+            self._history = UndoHistory(scene)
             self.files.forget()
         self._refresh()
 
-    def _go(self, there: Callable[[], Scene], back: Callable[[], Scene]) -> None:
-        with self._telling():
+    def _step(self, step: Callable[[], Scene], revert: Callable[[], Scene]) -> None:
+        """Go a step in the history; revert it if the source refuses the scene."""
+        with self._reporting_errors():
             before = self.scene
-            scene = there()
+            scene = step()
             if scene is before:
                 return
             try:
-                self._run(scene, self.editing)
+                self._restart(scene, self.editing)
             except errors.RagdollError:
-                back()
+                revert()
                 raise
-            with self._showing:
+            with self._display_lock:
                 self._refresh()
 
-    def _set_editing(self, wanted: bool) -> None:
-        with self._showing:
-            self.editing = wanted
-            self.panel.show_editing(wanted)
+    def _set_editing(self, editing: bool) -> None:
+        with self._display_lock:
+            self.editing = editing
+            self.panel.show_editing(editing)
             self.show_handles()
 
-    def _run(self, scene: Scene, hold: bool) -> None:
-        """Have the page start anew with a scene; one that it refuses was never shown."""
-        with self._showing:
-            self._given.append(scene)
-        stood = self._stood
-        if hold:
-            # First, so that not one tick is made before it stands.
+    def _restart(self, scene: Scene, pause: bool) -> None:
+        """Restart the source with a scene; a refused one is not pending."""
+        with self._display_lock:
+            self._pending.append(scene)
+        was_paused = self._was_paused
+        if pause:
+            # Before the scene is set, so that no tick is made with it.
             self._pause(True)
         try:
-            self._use(scene)
+            self._set_source_scene(scene)
         except errors.RagdollError:
-            with self._showing, suppress(ValueError):
-                self._given.remove(scene)
-            if hold and not (stood or self.editing):
+            with self._display_lock, suppress(ValueError):
+                self._pending.remove(scene)
+            if pause and not (was_paused or self.editing):
                 self._pause(False)
             raise
 
-    def _chosen(self) -> str:
+    def _selected(self) -> str:
         if self.bone is None:
             raise errors.UnknownBone('bone', None, 'a bone of the list, or a click on one')
         return self.bone
 
     def _refresh(self) -> None:
-        """Show the scene and the chosen bone as they are now."""
+        """Show the current scene and the selected bone."""
         scene = self.scene
         if self.bone not in scene.bone_names:
             self.bone = None
         self.panel.show_bones(scene, self.bone)
         self.panel.show_history(self._history)
         joint = None if self.bone is None else changes.joint_of(scene, self.bone)
-        self.panel.show_sheet(None if self.bone is None else sheet.read(scene, self.bone),
-                              joint and joint.parent)
+        self.panel.show_values(
+            None if self.bone is None else bone_form.read_bone(scene, self.bone),
+            joint and joint.parent)
         self.show_handles()
 
     @contextmanager
-    def _telling(self) -> Iterator[None]:
-        """One action at a time; what is wrong is said in the panel."""
-        with self._acting:
-            self.panel.tell(())
+    def _reporting_errors(self) -> Iterator[None]:
+        """Run one action at a time, and show its errors in the panel."""
+        with self._action_lock:
+            self.panel.show_errors(())
             try:
                 yield
             except errors.ModelErrors as error:
-                self.panel.tell(error.errors)
+                self.panel.show_errors(error.errors)
             except errors.ModelError as error:
-                self.panel.tell([error])
+                self.panel.show_errors([error])
             except errors.RagdollError as error:
-                self.panel.say(in_words(error))
+                self.panel.show_message(error_text(error))

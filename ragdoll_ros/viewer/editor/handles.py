@@ -1,4 +1,4 @@
-"""Handles in the scene that move, rotate and resize a body where it stands in the bind pose."""
+"""Transform controls that move, rotate and resize a body in the bind pose."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
@@ -14,26 +14,26 @@ from ..drawing.bodies import WXYZ
 from ..drawing.meshes import MESHES
 from .changes import find, joint_of
 
-ROOM = '/editor'
-"""Where all of it stands in the page's scene tree."""
+ROOT = '/editor'
+"""Node of all handles in viser's scene tree."""
 
 YELLOW, BLUE, RED = (255, 200, 0), (40, 90, 220), (220, 50, 30)
 
-GROWN = 1.03
-"""The ghost is this much larger than the body, so that it is seen around it."""
+OUTLINE_SCALE = 1.03
+"""Of the wireframe around the body."""
 
 XYZW = [1, 2, 3, 0]
-"""Our order of a quaternion, from viser's."""
+"""Indices that turn viser's quaternion wxyz into xyzw."""
 
-STILL = 1e-6
-"""m, and rad: what a drag moves less than this, it has not moved."""
+TOLERANCE = 1e-6
+"""m, and rad: smaller motions of a drag are ignored."""
 
 
 class Handles:
-    """At most one body has handles. What is dragged is told when it is let go.
+    """Handles of one body at a time, with callbacks at the end of a drag.
 
     ``on_pose`` takes the new centre of mass (3,) m and orientation (4,), doll's frame;
-    ``on_size`` the new half extents (3,) m along the body's own axes.
+    ``on_size`` the new half extents (3,) m in the body's frame.
     """
 
     def __init__(self, server: viser.ViserServer,
@@ -43,84 +43,84 @@ class Handles:
         self._on_pose, self._on_size = on_pose, on_size
         self.body: viser.TransformControlsHandle | None = None
         self.size: viser.TransformControlsHandle | None = None
-        self.room = ROOM
-        """Where in the scene tree all is that is shown now. Each time it has a name of its own:
-        viser leaves a node that comes again where it was, if it is to be at zero."""
+        self.root = ROOT
+        """Node of the current handles. The name is new each time: viser keeps the old pose of a
+        node that is added again at the origin."""
         self._count = 0
 
     def hide(self) -> None:
-        """Take all handles away."""
+        """Remove all handles."""
         if self.body is not None:
-            self._server.scene.remove_by_name(self.room)
+            self._server.scene.remove_by_name(self.root)
         self.body = self.size = None
 
     def show(self, scene: Scene, name: str, limb: bool) -> None:
-        """Put handles on a bone; with ``limb`` it rotates about its joint, not its own centre."""
+        """Show handles of a bone; with ``limb`` they rotate it about its joint, not its centre."""
         self.hide()
         self._count += 1
-        self.room = f'{ROOM}/{self._count}'
+        self.root = f'{ROOT}/{self._count}'
         (placement, bone), joint = find(scene, name), joint_of(scene, name)
         at = joint.anchor if limb and joint else bone.position
         with self._server.atomic():
             self._server.scene.add_frame(
-                self.room, position=placement.position + _lift(scene, placement),
+                self.root, position=placement.position + _lift(scene, placement),
                 wxyz=_wxyz(placement.orientation), show_axes=False)
-            self._own = self._server.scene.add_frame(
-                f'{self.room}/own', position=bone.position, wxyz=_wxyz(bone.orientation),
+            self._frame = self._server.scene.add_frame(
+                f'{self.root}/frame', position=bone.position, wxyz=_wxyz(bone.orientation),
                 show_axes=False)
-            self._add_ghost(bone)
+            self._add_outline(bone)
             if joint is not None:
                 self._add_pivot(joint, bone)
             self._add_body(bone, at)
             if bone.shape.kind in SHAPES:
                 self._add_size(bone)
 
-    def _add_ghost(self, bone: Bone) -> None:
+    def _add_outline(self, bone: Bone) -> None:
         for number, part in enumerate(bone.shape.primitives):
             vertices, faces = MESHES[part.kind]
             self._server.scene.add_mesh_simple(
-                f'{self.room}/own/ghost_{number}', vertices * part.size * GROWN, faces,
+                f'{self.root}/frame/outline_{number}', vertices * part.size * OUTLINE_SCALE, faces,
                 color=YELLOW, wireframe=True, cast_shadow=False, receive_shadow=False,
                 position=part.position, wxyz=_wxyz(part.orientation))
 
     def _add_pivot(self, joint: Joint, bone: Bone) -> None:
-        """Draw the joint: a ball where it is, a line along each axis, the first in blue."""
+        """Draw the joint: a sphere at its anchor, a line along each axis, the first in blue."""
         length = 1.5 * max(bone.shape.half_extents)
-        self._server.scene.add_icosphere(f'{self.room}/pivot', radius=0.08 * length, color=BLUE,
+        self._server.scene.add_icosphere(f'{self.root}/pivot', radius=0.08 * length, color=BLUE,
                                          position=joint.anchor, cast_shadow=False)
         if joint.axes:
             ends = np.array([[np.subtract(joint.anchor, np.multiply(axis, length)),
                               np.add(joint.anchor, np.multiply(axis, length))]
                              for axis in joint.axes])
             colors = np.array([[color, color] for color in (BLUE, RED)[:len(ends)]], np.uint8)
-            self._server.scene.add_line_segments(f'{self.room}/axes', ends, colors,
+            self._server.scene.add_line_segments(f'{self.root}/axes', ends, colors,
                                                  thickness=0.03 * length)
 
     def _add_body(self, bone: Bone, at: Sequence[float]) -> None:
         self.body = self._server.scene.add_transform_controls(
-            f'{self.room}/body', scale=2.5 * max(bone.shape.half_extents), depth_test=False,
+            f'{self.root}/body', scale=2.5 * max(bone.shape.half_extents), depth_test=False,
             opacity=0.8, position=at, wxyz=_wxyz(bone.orientation))
-        # The body as the handle sees it: both move as one.
+        # Centre of the body in the handle's frame.
         back = rotation.inverse(bone.orientation)
         arm = rotation.rotate(back, np.subtract(bone.position, at))
-        body, own = self.body, self._own
+        body, frame = self.body, self._frame
 
         @body.on_update
         def _(event: viser.TransformControlsEvent) -> None:
             orientation = rotation.normalized(np.array(body.wxyz)[XYZW])
             position = np.array(body.position) + rotation.rotate(orientation, arm)
-            own.position, own.wxyz = position, _wxyz(orientation)
+            frame.position, frame.wxyz = position, _wxyz(orientation)
             if event.phase == 'end':
-                if rotation.angle_between(orientation, bone.orientation) < STILL:
+                if rotation.angle_between(orientation, bone.orientation) < TOLERANCE:
                     orientation = np.array(bone.orientation)
-                self._on_pose(_unless_still(position, bone.position), orientation)
+                self._on_pose(_unless_unchanged(position, bone.position), orientation)
 
     def _add_size(self, bone: Bone) -> None:
-        # A round shape is as wide along y as along x, a ball along z as well.
+        # Cylinders and capsules have equal x and y, spheres equal x, y and z.
         active = (True, bone.shape.kind == 'box', bone.shape.kind != 'sphere')
         half = np.array(bone.shape.half_extents)
         self.size = size = self._server.scene.add_transform_controls(
-            f'{self.room}/own/size', scale=0.8 * float(half.max()), active_axes=active,
+            f'{self.root}/frame/size', scale=0.8 * float(half.max()), active_axes=active,
             disable_rotations=True, disable_sliders=True, depth_test=False,
             position=np.where(active, half, 0.0))
 
@@ -128,12 +128,12 @@ class Handles:
         def _(event: viser.TransformControlsEvent) -> None:
             if event.phase == 'end':
                 x, y, z = size.position
-                drawn = np.array((x, y if active[1] else x, z if active[2] else x))
-                self._on_size(_unless_still(drawn, half))
+                new = np.array((x, y if active[1] else x, z if active[2] else x))
+                self._on_size(_unless_unchanged(new, half))
 
 
 def _lift(scene: Scene, placement: Placement) -> np.ndarray:
-    """How far (3,) m a doll that begins in the ground is set onto it when it runs."""
+    """Offset (3,) m by which the simulation lifts a doll that starts below the ground."""
     if scene.ground is None:
         return np.zeros(3)
     lowest = min(height(bone, *placement.bone_pose(bone), scene.ground)
@@ -141,8 +141,8 @@ def _lift(scene: Scene, placement: Placement) -> np.ndarray:
     return max(0.0, -lowest) * np.array(scene.ground.normal)
 
 
-def _unless_still(new: np.ndarray, old: Sequence[float]) -> np.ndarray:
-    return np.where(np.abs(new - old) < STILL, old, new)
+def _unless_unchanged(new: np.ndarray, old: Sequence[float]) -> np.ndarray:
+    return np.where(np.abs(new - old) < TOLERANCE, old, new)
 
 
 def _wxyz(quaternion: Sequence[float]) -> np.ndarray:

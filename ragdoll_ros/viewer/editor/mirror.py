@@ -1,4 +1,4 @@
-"""The other side of a body: what is done to the left arm is done to the right one as well."""
+"""Mirrors changes to the other side of a doll: of the left arm to the right one, and back."""
 from __future__ import annotations
 
 import math
@@ -15,17 +15,14 @@ from ...model.vectors import Quaternion, Vector
 from .changes import change_bone, change_joint, find, joint_of, limb, set_pose
 
 OTHER = {'left': 'right', 'right': 'left', 'l': 'r', 'r': 'l', 'lft': 'rgt', 'rgt': 'lft'}
-"""Words for a side in names of bones: the English ones of config/bone_names.yaml."""
+"""Sides in names of bones: the English words of config/bone_names.yaml."""
 
-NEAR = 0.05
-"""How far from the mirrored place a partner without such a name may be, of the doll's size."""
+TOLERANCE = 0.05
+"""Largest distance of a partner found by place from the mirrored place, in sizes of the doll."""
 
 
 def partner(scene: Scene, name: str) -> str:
-    """Name of the bone on the other side; UnknownBone if there is none.
-
-    By its name (left, right, L, R); else the one that stands where this one's mirror image does.
-    """
+    """Name of the bone on the other side, by its name or else by its place; UnknownBone."""
     placement, bone = find(scene, name)
     doll = placement.doll
     swapped = re.sub(r'[A-Z]+(?![a-z])|[A-Z]?[a-z]+', _other_word, bone.name)
@@ -40,44 +37,43 @@ def partner(scene: Scene, name: str) -> str:
 def mirrored(scene: Scene, name: str, whole_limb: bool = False) -> Scene:
     """Make the bone on the other side (and its limb) and its joint the mirror image of this one.
 
-    The mirror is the plane through the middle of the doll's root that faces its left. What the
-    two are named, their colours and what they hang from stay, and to which side a partner's joint
-    axis points; swings are not mirrored.
+    The mirror plane passes through the centre of the root, normal to the doll's y axis. Names,
+    colours, parents, and the signs of a partner's joint axes stay; swings are not mirrored.
     """
     placement, bone = find(scene, name)
     names = limb(placement.doll, bone.name) if whole_limb else (bone.name,)
     middle = placement.doll.root.position[1]
     for each in names:
         here = scene.qualified(placement, each)
-        scene = _copied_over(scene, here, partner(scene, here), middle)
+        scene = _mirror_bone(scene, here, partner(scene, here), middle)
     return scene
 
 
-def _copied_over(scene: Scene, name: str, other: str, middle: float) -> Scene:
+def _mirror_bone(scene: Scene, name: str, other: str, middle: float) -> Scene:
     (_, bone), joint = find(scene, name), joint_of(scene, name)
     scene = set_pose(scene, other, _point(bone.position, middle), _orientation(bone.orientation))
-    kept = {key: getattr(bone, key) for key in (
+    fields = {key: getattr(bone, key) for key in (
         'mass', 'moments', 'friction', 'rolling_friction', 'restitution')}
-    scene = change_bone(scene, other, shape=_shape(bone.shape), **kept)
-    theirs = joint_of(scene, other)
-    if joint is None or theirs is None:
+    scene = change_bone(scene, other, shape=_shape(bone.shape), **fields)
+    other_joint = joint_of(scene, other)
+    if joint is None or other_joint is None:
         return scene
     return change_joint(scene, other, kind=joint.kind, damping=joint.damping,
-                        anchor=_point(joint.anchor, middle), **_axes_and_limits(joint, theirs))
+                        anchor=_point(joint.anchor, middle), **_axes_and_limits(joint, other_joint))
 
 
-def _axes_and_limits(joint: Joint, theirs: Joint) -> dict[str, tuple]:
-    """Mirror axes and limits. The image of a rotation by t about a is one by -t about a's image."""
+def _axes_and_limits(joint: Joint, other_joint: Joint) -> dict[str, tuple]:
+    """Mirror axes and limits: a rotation by t about a becomes one by -t about the image of a."""
     axes, limits = [], list(joint.limits)
     if len(limits) == 3:
-        # The image of y = z times x is -z' times x', so that its angle stays.
+        # y = z x x is an axial vector: its image is -(z' x x'), so its angle stays.
         twist, x = (tuple(np.array(axis) * (1, -1, 1) + 0.0) for axis in joint.axes)
         about_x, turn = (limits[index] and (-limits[index][1], -limits[index][0])
                          for index in (0, 2))
         return {'axes': (twist, x), 'limits': (about_x, limits[1], turn)}
     for index, axis in enumerate(joint.axes):
         image = np.array(axis) * (1, -1, 1)
-        like = theirs.axes[index] if theirs.kind == joint.kind else axis
+        like = other_joint.axes[index] if other_joint.kind == joint.kind else axis
         if image @ np.array(like) < 0:
             image = -image
         elif limits[index] is not None:
@@ -97,7 +93,7 @@ def _orientation(q: Quaternion) -> Quaternion:
 
 
 def _shape(shape: Shape | Compound) -> Shape | Compound:
-    """The mirror image in the body's own axes; each simple shape is its own."""
+    """Mirror image in the body's frame; primitive shapes are symmetric."""
     return shape if shape.kind in SHAPES else Compound(tuple(
         Part(part.shape, _point(part.position, 0.0), _orientation(part.orientation))
         for part in shape.parts))
@@ -112,11 +108,11 @@ def _other_word(match: re.Match) -> str:
 
 
 def _at_mirrored_place(doll: Ragdoll, bone: Bone) -> str | None:
-    """Name of the bone nearest to the mirrored place, None if that is none or too far."""
+    """Name of the bone nearest to the mirrored place; None if too far, or the bone itself."""
     places = np.array([each.position for each in doll.bones])
-    wanted = _point(bone.position, doll.root.position[1])
-    nearest = int(np.argmin(np.linalg.norm(places - wanted, axis=1)))
+    target = _point(bone.position, doll.root.position[1])
+    nearest = int(np.argmin(np.linalg.norm(places - target, axis=1)))
     size = float(np.ptp(places, axis=0).max())
-    if doll.bones[nearest] is bone or math.dist(places[nearest], wanted) > NEAR * size:
+    if doll.bones[nearest] is bone or math.dist(places[nearest], target) > TOLERANCE * size:
         return None
     return doll.bones[nearest].name

@@ -1,1 +1,1 @@
-"""Where the states that the page shows come from."""
+"""Sources of the states that the page shows."""

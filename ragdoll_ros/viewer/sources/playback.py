@@ -1,4 +1,4 @@
-"""A recorded run as a source: it plays, pauses, steps, starts again; nothing can change it."""
+"""A recorded run as a source: it plays, pauses, steps and restarts; nothing can change it."""
 from __future__ import annotations
 
 import threading
@@ -10,28 +10,28 @@ from ...model import errors
 from ...model.scene import Scene
 from ...model.state import State
 from ...recordings.recording import Recording
-from .source import PACES, Frame, Report, Source, Wanted
+from .source import REAL_TIME_FACTORS, Frame, RequestedData, Source, SourceStatus
 
 
-class Fixed(errors.RagdollError):
-    """A wish that a recording cannot grant."""
+class ReadOnly(errors.RagdollError):
+    """A command that would change a recording."""
 
 
-class Playback(Source):
-    """Plays a recording by the clock on the wall while a page is open; at its end it stands.
+class PlaybackSource(Source):
+    """Plays a recording in wall time while a page is open; pauses at its end.
 
-    A push or a hand does nothing, as in any source without: what was recorded is over.
+    Pushes and hands do nothing.
     """
 
     def __init__(self, recording: Recording, name: str = 'recording') -> None:
         self._recording = recording
         self._name = name
         self._lock = threading.Lock()
-        self._wanted = False
+        self._is_open = False
         self._paused = False
-        self._pace = 1.0
+        self._real_time_factor = 1.0
         self._time = 0.0
-        """s of the recording at the instant _since on the wall."""
+        """s of the recording at the wall time _since."""
         self._since = time.monotonic()
         self._frame = self.frame_at(0.0)
 
@@ -48,24 +48,26 @@ class Playback(Source):
             return self._frame
 
     @property
-    def report(self) -> Report:
+    def status(self) -> SourceStatus:
         with self._lock:
             instant = self._now()
             end = self._recording.duration
             note = f'{self._name}: {instant:.1f} of {end:.1f} s'
-            return Report(note=note, paused=self._paused or instant >= end, pace=self._pace)
+            return SourceStatus(note=note, paused=self._paused or instant >= end,
+                                real_time_factor=self._real_time_factor)
 
-    def want(self, wanted: Wanted) -> None:
+    def request(self, requested: RequestedData) -> None:
         with self._lock:
-            self._go_on_from(self._now())
-            self._wanted = wanted.frames
+            self._continue_from(self._now())
+            self._is_open = requested.frames
 
-    def pause(self, wanted: bool) -> bool:
-        """Hold the time, or let it go on; at the end it stands, and goes on from the start."""
+    def pause(self, paused: bool) -> bool:
+        """Pause or resume; at the end it is paused, and resumes from the start."""
         with self._lock:
             instant = self._now()
-            self._paused = wanted and instant < self._recording.duration
-            self._go_on_from(0.0 if instant >= self._recording.duration and not wanted else instant)
+            at_end = instant >= self._recording.duration
+            self._paused = paused and not at_end
+            self._continue_from(0.0 if at_end and not paused else instant)
         return True
 
     def step(self) -> None:
@@ -73,40 +75,40 @@ class Playback(Source):
             if self._paused:
                 times = self._recording.times
                 following = int(np.searchsorted(times, self._now(), 'right'))
-                self._go_on_from(float(times[min(following, len(times) - 1)]))
+                self._continue_from(float(times[min(following, len(times) - 1)]))
 
     def reset(self) -> None:
         with self._lock:
-            self._go_on_from(0.0)
+            self._continue_from(0.0)
 
-    def set_pace(self, pace: float) -> None:
-        """Go faster or slower; OutOfRange."""
-        errors.check_range('pace', pace, *PACES)
+    def set_real_time_factor(self, factor: float) -> None:
+        """Set the playback speed; OutOfRange."""
+        errors.check_range('real_time_factor', factor, *REAL_TIME_FACTORS)
         with self._lock:
-            self._go_on_from(self._now())
-            self._pace = pace
+            self._continue_from(self._now())
+            self._real_time_factor = factor
 
     def load(self, name: str) -> None:
-        raise Fixed(f'a recording has one scene; for another: ragdoll_viewer --scene {name}')
+        raise ReadOnly(f'a recording has one scene; for another: ragdoll_viewer --scene {name}')
 
-    def take_engine(self, name: str) -> None:
-        raise Fixed('a recording was simulated once and for all')
+    def set_engine(self, name: str) -> None:
+        raise ReadOnly('a recording is not simulated again')
 
-    def use(self, scene: Scene) -> None:
-        raise Fixed('a recording has one scene; to change it: ragdoll_viewer --scene')
+    def set_scene(self, scene: Scene) -> None:
+        raise ReadOnly('a recording has one scene; to change it: ragdoll_viewer --scene')
 
     def _now(self) -> float:
         """Instant of the recording, s."""
-        gone = 0.0
-        if self._wanted and not self._paused:
-            gone = (time.monotonic() - self._since) * self._pace
-        return min(self._time + gone, self._recording.duration)
+        elapsed = 0.0
+        if self._is_open and not self._paused:
+            elapsed = (time.monotonic() - self._since) * self._real_time_factor
+        return min(self._time + elapsed, self._recording.duration)
 
-    def _go_on_from(self, instant: float) -> None:
+    def _continue_from(self, instant: float) -> None:
         self._time, self._since = instant, time.monotonic()
 
     def frame_at(self, instant: float) -> Frame:
-        """What is there at an instant, s."""
+        """Frame of the recording at an instant, s."""
         pose = self._recording.at(instant)
         unknown = np.full(pose.positions.shape, np.nan)
         state = State(pose.positions, pose.orientations, unknown, unknown)

@@ -1,7 +1,7 @@
-"""What a page shows and steers: one protocol for a doll in this process, a node's, a recording.
+"""What a page shows and controls: one protocol for a simulation here, a node, and a recording.
 
-A source has its own time and threads. It holds its newest frame ready, and the page takes that
-when it draws; what the page asks for is queued and never blocks, but for `use`.
+A source has its own clock and threads. It keeps its newest frame ready for the page to draw.
+Commands of the page are queued and do not block, unless a method says that it waits.
 """
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from ...model.state import State
 from ...model.vectors import Vector
 from ...recordings.recording import Recording
 
-PACES = (0.001, 100.0)
-"""Slowest and fastest, as the node's real_time_factor."""
+REAL_TIME_FACTORS = (0.001, 100.0)
+"""Lowest and highest, as the node's parameter real_time_factor."""
 
 
 @dataclass(frozen=True)
-class Held:
-    """What a hand holds: the grabbed point and where it is pulled to, (3,) m, world frame."""
+class GrabbedPoint:
+    """A point of a bone that a hand holds, and the target it is pulled to; (3,) m, world frame."""
 
     bone: str
     point: np.ndarray
@@ -32,54 +32,54 @@ class Held:
 
 @dataclass(frozen=True)
 class Frame:
-    """Everything that moves, at one instant. What was not asked for is None."""
+    """All that is drawn, at one instant. What was not requested is None."""
 
     scene: Scene
-    """What it is of. Another scene, another object."""
+    """Compared by identity: another scene is another object."""
     time: float
     """s simulated since the start."""
     state: State
-    """A node tells no velocities with its poses: they are NaN then."""
+    """Velocities are NaN where the source has poses only."""
     pushes: tuple[Push, ...] = ()
-    held: tuple[Held, ...] = ()
+    grabs: tuple[GrabbedPoint, ...] = ()
     rods: np.ndarray | None = None
     """(m, 2, 3) m: both ends of every rod of the swings."""
     contacts: np.ndarray | None = None
-    """(c, 3) m: where something touches."""
+    """(c, 3) m: contact points."""
     angles: np.ndarray | None = None
-    """(k,) rad, in the order of Scene.angle_names."""
+    """(k,) rad: joint angles, in the order of Scene.angle_names."""
     forces: np.ndarray | None = None
-    """(c, 3) N: what presses at each of the contacts, along its normal; a node does not tell it."""
+    """(c, 3) N: normal force at each contact; a node does not publish them."""
 
 
 @dataclass(frozen=True)
-class Report:
-    """How the source does, besides its frames."""
+class SourceStatus:
+    """State of a source besides its frames."""
 
     problem: str = ''
-    """What is wrong, in words for who looks at the page; empty if nothing is."""
+    """What is wrong, as text for the page; empty if nothing is."""
     note: str = ''
-    """What should be known of what is shown."""
+    """Information on what is shown; may be empty."""
     paused: bool = False
-    pace: float = 1.0
-    """s simulated for each s on the wall that are asked for."""
+    real_time_factor: float = 1.0
+    """Requested simulated time per wall time."""
     engine: str = ''
-    """The engine that was asked for, by its name; empty where there is none."""
+    """Name of the requested engine; empty if there is none."""
     engine_name: str = ''
-    """The engine that simulates; empty where that is not known."""
+    """Name of the engine in use; empty if unknown."""
     accuracy: str = ''
-    """The accuracy that it computes with, by its name; empty where there is none."""
-    reached: float = math.nan
-    """s simulated for each s on the wall, over the last second; NaN: not known."""
+    """Name of the accuracy; empty if there is none."""
+    measured_real_time_factor: float = math.nan
+    """Over the last second of wall time; NaN: unknown."""
     tick_cost: float = math.nan
-    """Mean s on the wall that a tick takes to compute, over the last second; NaN: not known."""
+    """Mean wall time of computing a tick over the last second, s; NaN: unknown."""
     measures: dict[str, float] = field(default_factory=dict)
-    """As Simulation.measures() has them, no older than a second, or some more in a crowd."""
+    """Simulation.measures(), at most about a second old; older in a crowd."""
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """What is shown: a source need not work for anything else."""
+class RequestedData:
+    """Data that the page needs; a source need not produce anything else."""
 
     frames: bool = False
     """Whether any page is open."""
@@ -88,71 +88,71 @@ class Wanted:
 
 
 class Source(Protocol):
-    """Where frames come from and commands go to; what a source has not, does nothing.
+    """Provides frames and takes commands. A command that a source does not support does nothing.
 
-    All may be called from any thread.
+    All methods may be called from any thread.
     """
 
     @property
     def frame(self) -> Frame | None:
-        """The newest frame; None before the first. Another instant, another object."""
+        """The newest frame, a new object for each instant; None before the first."""
 
     @property
     def recording(self) -> Recording | None:
-        """All that it will ever show, where that is known from the start."""
+        """The whole run, where it is known from the start."""
         return None
 
     def frame_at(self, instant: float) -> Frame:
-        """What its recording has at an instant, s."""
+        """Frame of the recording at an instant, s."""
 
     @property
-    def report(self) -> Report:
-        """How it does now."""
+    def status(self) -> SourceStatus:
+        """The current status."""
 
-    def want(self, wanted: Wanted) -> None:
-        """Say what is shown from now on."""
+    def request(self, requested: RequestedData) -> None:
+        """Set which data the page needs from now on."""
 
     def push(self, force: Vector, duration: float) -> None:
-        """Push the pushed bone with a force, N, world axes, for so many s of simulated time.
+        """Push the pushed bone with a force, N, world axes, for ``duration`` s of simulated time.
 
-        The next push takes its place.
+        The next push replaces it.
         """
 
-    def pause(self, wanted: bool) -> bool:
-        """Hold the time, or let it go on; False if there is none yet, as no node is there."""
+    def pause(self, paused: bool) -> bool:
+        """Pause or resume; False if that is not possible yet, because no node is running."""
 
     def step(self) -> None:
-        """Make one tick while paused."""
+        """Advance by one tick while paused."""
 
     def reset(self) -> None:
         """Go back to the start."""
 
-    def set_pace(self, pace: float) -> None:
-        """Ask for ``pace`` simulated s for each s on the wall."""
+    def set_real_time_factor(self, factor: float) -> None:
+        """Set the simulated time per wall time."""
 
     def load(self, name: str) -> None:
-        """Take another scene, by its name in config/ or its path; waits; RagdollError if not."""
+        """Load a scene by its name in config/ or its path; waits; RagdollError if refused."""
 
-    def take_engine(self, name: str) -> None:
-        """Start anew with another engine, by its name; waits; RagdollError if not."""
+    def set_engine(self, name: str) -> None:
+        """Restart with another engine; waits; RagdollError if refused."""
 
-    def take_accuracy(self, name: str) -> None:
-        """Go on with another accuracy, by its name; waits; RagdollError if not."""
+    def set_accuracy(self, name: str) -> None:
+        """Continue with another accuracy; waits; RagdollError if refused."""
 
-    def use(self, scene: Scene) -> None:
-        """Start anew with a scene; waits until it is so; RagdollError with the reason if not."""
+    def set_scene(self, scene: Scene) -> None:
+        """Restart with a scene; waits; RagdollError with the reason if refused."""
 
     def grab(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
-        """Let a hand hold a bone at ``point`` (m, from its centre of mass, its axes).
+        """Let a hand hold a bone at ``point``, m from its centre of mass in its axes.
 
-        It is pulled to ``target``, m, world frame.
+        The point is pulled to ``target``, m, world frame.
         """
 
     def drag(self, hand: str, target: Vector) -> None:
-        """Pull what the hand holds to ``target``, m, world frame."""
+        """Move the target of a hand, m, world frame."""
 
     def let_go(self, hand: str) -> None:
-        """Open a hand; one that holds nothing stays as it is."""
+        """Release what a hand holds, if anything."""
 
     def close(self) -> None:
-        """End its threads and give everything back."""
+        """End the threads and release all resources."""

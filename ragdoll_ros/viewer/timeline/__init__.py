@@ -1,1 +1,1 @@
-"""What has been shown: kept, looked at again, saved."""
+"""The timeline: what was shown, to be scrubbed, replayed and exported."""

@@ -1,4 +1,4 @@
-"""A run in all the formats that there are, as one file to be sent to a page."""
+"""Exports a run in all available formats as one ZIP file."""
 from __future__ import annotations
 
 import io
@@ -11,15 +11,15 @@ from ...recordings.recording import Recording
 from ...recordings.save import FORMATS, encoded_files
 
 
-def zipped(recording: Recording, name: str, can_write: Callable[[str], bool]) -> bytes:
-    """A ZIP of ``name`` in each of the FORMATS whose suffix ``can_write``.
+def export_zip(recording: Recording, name: str, can_write: Callable[[str], bool]) -> bytes:
+    """A ZIP file of ``name`` in each of the FORMATS whose suffix satisfies ``can_write``.
 
-    Dolls whose skin fails show their bones, as on the page, which says why.
+    A doll whose skin cannot be loaded is exported with its bones; the page shows the reason.
     """
     skins = skins_of(recording.scene, lambda _: None)
     stream = io.BytesIO()
-    with zipfile.ZipFile(stream, 'w', zipfile.ZIP_DEFLATED) as package:
+    with zipfile.ZipFile(stream, 'w', zipfile.ZIP_DEFLATED) as archive:
         for suffix in filter(can_write, FORMATS):
             for path, content in encoded_files(recording, Path(name + suffix), skins).items():
-                package.writestr(str(path), content)
+                archive.writestr(str(path), content)
     return stream.getvalue()

@@ -1,1 +1,1 @@
-"""Fields of the page's panels, and how they read what is typed."""
+"""Form fields of the panels, and the parsing of typed values."""

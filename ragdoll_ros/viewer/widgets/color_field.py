@@ -1,6 +1,6 @@
-"""The field of a colour: read as people type it; viser takes #1e90ff and rgb(30, 144, 255) alone.
+"""Parses colours in any usual form; viser takes #1e90ff and rgb(30, 144, 255) only.
 
-It drops anything else without a word, so pages tell what was typed.
+It drops other text silently, so pages send what was typed: color_text.js.
 """
 from __future__ import annotations
 
@@ -10,37 +10,24 @@ from contextlib import suppress
 from ...model import errors
 from . import number_parsing
 
-LEFT = """
-    document.addEventListener('focusout', (event) => {
-      if (!isTyped(event.target)) return;
-      const brush = document.createElement('canvas').getContext('2d');
-      brush.fillStyle = 'rgba(0, 0, 0, 0.5)';
-      brush.fillStyle = event.target.value;
-      const isColor = brush.fillStyle.startsWith('#');
-      tell(`${isColor ? brush.fillStyle : '-'} ${event.target.value}`);
-    }, true);"""
-"""For told.py: what stands in the field when it is left, behind it as #rrggbb where the browser
-knows it: a canvas keeps its colour where it does not. First of all who listen, as viser puts its
-own text there."""
-
-EXPECTED = 'one that is known, such as red, #1e90ff or 30 144 255'
+EXPECTED = 'a known colour, such as red, #1e90ff or 30 144 255'
 
 _THREE = re.compile(r'\s*rgb\s*\(([^()]*)\)\s*|([^a-z#]*)', re.IGNORECASE)
 _HEX = re.compile(r'\s*#?([0-9a-f]{6})\s*', re.IGNORECASE)
 
 
-def color(told: str) -> tuple[int, int, int]:
-    """Red, green, blue from 0 to 255 of what a page tells; WrongForm, without a path."""
-    known, _, text = told.partition(' ')
+def parse_color(event: str) -> tuple[int, int, int]:
+    """Red, green, blue, 0 to 255, of an event of color_text.js; WrongForm, without a path."""
+    known, _, text = event.partition(' ')
     if not text.strip():
-        raise errors.WrongForm('', text, f'{EXPECTED}, and nothing stands there')
+        raise errors.WrongForm('', text, f'{EXPECTED}, and the field is empty')
     three = _THREE.fullmatch(text)
     numbers = ()
     with suppress(errors.WrongForm):
-        numbers = number_parsing.numbers((three[1] or three[2]) if three else '', 3)
+        numbers = number_parsing.parse_numbers((three[1] or three[2]) if three else '', 3)
     if not all(0 <= number <= 255 and number == round(number) for number in numbers):
-        # A browser would take 300 for 255.
-        raise errors.WrongForm('', text, 'of three whole numbers from 0 to 255')
+        # A browser would clamp 300 to 255.
+        raise errors.WrongForm('', text, 'three whole numbers from 0 to 255')
     if numbers:
         return tuple(round(number) for number in numbers)
     match = _HEX.fullmatch(text) or _HEX.fullmatch(known)

@@ -1,8 +1,8 @@
-"""Numbers as people type them: read to the digit, or refused in words.
+"""Parses numbers as people type them, without rounding, or refuses them with a reason.
 
-Taken: 70, 70.5, .5, 1e-3, 3,5 (a comma in a single number), 1 000 and 1'000, 1,234.5 and 1.234,5,
-digits of any script, a minus sign of any kind, and a unit behind it. Refused: what may be two
-numbers (1,000), what is none, and what a double cannot hold.
+Accepted: 70, 70.5, .5, 1e-3, 3,5 (a comma in a single number), 1 000 and 1'000, 1,234.5 and
+1.234,5, digits of any script, any minus sign, and a unit. Refused: ambiguous numbers (1,000),
+other text, and what a double cannot represent.
 """
 from __future__ import annotations
 
@@ -15,99 +15,102 @@ from ...model import errors
 UNITS = {'m': {'m': 0, 'cm': -2, 'mm': -3, 'km': 3}, 'kg': {'kg': 0, 'g': -3, 't': 3},
          '°': {'°': 0, 'deg': 0}, 'N': {'N': 0, 'kN': 3}, 's': {'s': 0, 'ms': -3},
          'm/s²': {'m/s²': 0, 'm/s2': 0, 'm/s^2': 0}}
-"""For each unit of a field those in which one may type, with their power of ten."""
+"""For the unit of a field the accepted units, with their powers of ten."""
 
 SIGNS = str.maketrans({'−': '-', '，': ',', '．': '.', '；': ';', '\u00a0': ' ', '\u2009': ' ',  # noqa: RUF001
                        '\u202f': ' ', '\u3000': ' ', '’': "'"})  # noqa: RUF001
-"""What keyboards of other scripts and what is copied from print have for plain signs."""
+"""Typographic and full-width signs, and their ASCII equivalents."""
 
 _PLAIN = re.compile(r'([+-]?)(\d+\.?\d*|\.\d+)(?:e([+-]?\d{1,6}))?', re.IGNORECASE)
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:([ ',.])\d{3})(?:\1\d{3})*(?:[.,]\d*)?")
-_UNSURE = re.compile(r'[+-]?[1-9]\d{0,2},\d{3}')
+_AMBIGUOUS = re.compile(r'[+-]?[1-9]\d{0,2},\d{3}')
 _INFINITE = re.compile(r'([+-]?)(?:inf|infinity|∞)', re.IGNORECASE)
 _UNIT = re.compile(r'[a-zA-Z°][a-zA-Z/^²2]*$')
-_APART = {unit: re.compile(rf'(?<=[\d.])\s+(?=({"|".join(map(re.escape, powers))})(?![a-zA-Z]))')
-          for unit, powers in UNITS.items()}
-"""Blanks between a number and its unit."""
+_UNIT_SPACES = {
+    unit: re.compile(rf'(?<=[\d.])\s+(?=({"|".join(map(re.escape, powers))})(?![a-zA-Z]))')
+    for unit, powers in UNITS.items()}
+"""Matches spaces between a number and its unit."""
 
 
-class NoNumber(errors.WrongForm):
-    """A text that is no number in any usual form."""
+class NotANumber(errors.WrongForm):
+    """Text that is no number in any accepted form."""
 
 
-def number(text: str, unit: str = '', infinite: bool = False) -> float:
-    """The number that a text holds, in ``unit``; ``infinite``: whether inf is one.
+def parse_number(text: str, unit: str = '', infinite: bool = False) -> float:
+    """The number in a text, in ``unit``; ``infinite``: whether inf is accepted.
 
-    Raises WrongForm, without a path, whose `expected` follows on 'must be'.
+    Raises WrongForm without a path, whose `expected` completes a sentence with 'must be'.
     """
-    plain = _plain(text)
+    plain = _normalized(text)
     if not plain:
-        raise errors.WrongForm('', text, 'a number, and nothing stands there')
+        raise errors.WrongForm('', text, 'a number, and the field is empty')
     match = _INFINITE.fullmatch(plain)
     if match and infinite:
         return math.inf if match[1] != '-' else -math.inf
-    digits, power = _without_unit(plain, unit)
-    if _UNSURE.fullmatch(digits):
-        whole = digits.replace(',', '')
-        raise errors.WrongForm('', text, f'clear: write {whole}, or {digits.replace(",", ".")}')
-    return _read(_ungrouped(digits), power, text, unit)
+    digits, power = _split_unit(plain, unit)
+    if _AMBIGUOUS.fullmatch(digits):
+        whole, decimal = digits.replace(',', ''), digits.replace(',', '.')
+        raise errors.WrongForm('', text, f'unambiguous: write {whole}, or {decimal}')
+    return _to_float(_without_grouping(digits), power, text, unit)
 
 
-def numbers(text: str, count: int, unit: str = '') -> tuple[float, ...]:
-    """So many numbers, with commas or spaces between them, or semicolons: 1,5; 2; 0,5.
+def parse_numbers(text: str, count: int, unit: str = '') -> tuple[float, ...]:
+    """``count`` numbers, separated by commas, spaces, or semicolons: 1,5; 2; 0,5.
 
-    The unit stands behind each or behind all; errors are those of ``number``.
+    The unit follows each or all of them; raises the errors of ``parse_number``.
     """
-    found, apart = parts(text, count, unit), ';' in _plain(text)
+    found, by_semicolon = split_numbers(text, count, unit), ';' in _normalized(text)
     try:
-        return tuple(number(part, unit) if apart else _read(part, power, text, unit)
-                     for part, power in found)
-    except NoNumber:
-        raise _not_so_many(text, count) from None
+        return tuple(
+            parse_number(part, unit) if by_semicolon else _to_float(part, power, text, unit)
+            for part, power in found)
+    except NotANumber:
+        raise _wrong_count(text, count) from None
 
 
-def parts(text: str, count: int, unit: str = '') -> list[tuple[str, int]]:
-    """Texts of so many numbers, each with the power of ten of the unit behind them all."""
-    plain = _plain(text)
+def split_numbers(text: str, count: int, unit: str = '') -> list[tuple[str, int]]:
+    """Texts of ``count`` numbers, each with the power of ten of the unit that follows all."""
+    plain = _normalized(text)
     if plain[:1] + plain[-1:] in ('()', '[]'):
         plain = plain[1:-1].strip()
     if ';' in plain:
         found, power = [part.strip() for part in plain.split(';')], 0
     else:
-        plain, power = _without_unit(_APART[unit].sub('', plain) if unit in _APART else plain,
-                                     unit)
+        if unit in _UNIT_SPACES:
+            plain = _UNIT_SPACES[unit].sub('', plain)
+        plain, power = _split_unit(plain, unit)
         found = [part for part in re.split(r'\s*,\s*|\s+', plain) if part or ',' in plain]
-        found = [own[0] if (own := _without_unit(part, unit))[1] == power else part
+        found = [own[0] if (own := _split_unit(part, unit))[1] == power else part
                  for part in found]
     if len(found) != count or not plain:
-        raise _not_so_many(text, count)
+        raise _wrong_count(text, count)
     return [(part, power) for part in found]
 
 
-def shown(value: float) -> str:
-    """A number as a field shows it: seven digits, which are a tenth of a micrometre of a metre."""
+def format_number(value: float) -> str:
+    """A number with seven digits, so a length in m to 0.1 um."""
     text = f'{value + 0.0:.7g}'
     mantissa, e, power = text.partition('e')
     return f'{mantissa}e{int(power)}' if e else text
 
 
-def shown_all(values: Sequence[float]) -> str:
-    """Numbers as one field shows them."""
-    return ', '.join(shown(value) for value in values)
+def format_numbers(values: Sequence[float]) -> str:
+    """Numbers separated by commas."""
+    return ', '.join(format_number(value) for value in values)
 
 
-def _not_so_many(text: str, count: int) -> errors.WrongForm:
+def _wrong_count(text: str, count: int) -> errors.WrongForm:
     example = ', '.join(('0.1', '0.2', '0.3')[:count])
     return errors.WrongForm('', text, f'{count} numbers, such as {example}')
 
 
-def _plain(text: str) -> str:
+def _normalized(text: str) -> str:
     text = text.translate(SIGNS).strip()
     return ''.join(str(int(c)) if c.isdecimal() else c for c in text)
 
 
-def _without_unit(plain: str, unit: str) -> tuple[str, int]:
-    """What stands before a unit, and its power of ten; any other word is left for who reads."""
+def _split_unit(plain: str, unit: str) -> tuple[str, int]:
+    """Text before a unit, and the unit's power of ten; other words are kept."""
     match = _UNIT.search(plain)
     powers = UNITS.get(unit, {unit: 0})
     if match and match[0] in powers and plain[:match.start()].strip():
@@ -115,8 +118,8 @@ def _without_unit(plain: str, unit: str) -> tuple[str, int]:
     return plain, 0
 
 
-def _ungrouped(digits: str) -> str:
-    """A number with a point alone: what groups thousands is left out, a comma is a point."""
+def _without_grouping(digits: str) -> str:
+    """A number without separators of thousands and with a decimal point."""
     match = _GROUPED.fullmatch(digits)
     group = match and match[1]
     if group in (' ', "'") or (group and (digits.count(group) > 1 or (',' in digits
@@ -125,11 +128,11 @@ def _ungrouped(digits: str) -> str:
     return digits.replace(',', '.') if digits.count(',') == 1 else digits
 
 
-def _read(digits: str, power: int, text: str, unit: str) -> float:
+def _to_float(digits: str, power: int, text: str, unit: str) -> float:
     match = _PLAIN.fullmatch(digits)
     if match is None:
         example = f'70{" " * (unit != "°") + unit if unit else ""}'
-        raise NoNumber('', text, f'a number, such as {example}')
+        raise NotANumber('', text, f'a number, such as {example}')
     value = float(f'{match[1]}{match[2]}e{int(match[3] or 0) + power}')
     if math.isinf(value):
         raise errors.WrongForm('', text, 'below 1.8e308')

@@ -1,4 +1,4 @@
-"""The system of a scene: the tables that the kernels read."""
+"""The System of a scene: the tables that the kernels read."""
 from __future__ import annotations
 
 import math
@@ -12,14 +12,7 @@ from ....model.ragdoll import Joint, Ragdoll, joint_axes
 from ....model.scene import Scene
 from ...kernels.collision.shapes import SHAPE_KIND
 from ...kernels.dynamics.body import BODY
-from ...kernels.system import (
-    GEOM,
-    GEOM_PAIR,
-    JOINT_LIMIT,
-    NO_SLIP,
-    System,
-    coordinate_count,
-)
+from ...kernels.system import (GEOM, GEOM_PAIR, JOINT_LIMIT, NO_SLIP, System, coordinate_count)
 from ...rigid_body import damping_rate
 
 MAX_FLIGHT_DAMPING = 1000.0
@@ -27,14 +20,11 @@ MAX_FLIGHT_DAMPING = 1000.0
 steps take it implicitly."""
 
 GROUND_POINTS = {'sphere': 1, 'capsule': 2, 'box': 8, 'cylinder': 10}
-"""Points of each kind that may touch the ground, see kernels/contact/gaps.py."""
-
-Law = tuple[float, float, float]
-"""Friction, rolling friction (m), restitution."""
+"""Points of each kind of shape that may touch the ground; see ground_point() of the kernels."""
 
 
 def build_system(scene: Scene) -> System:
-    """The system of a scene; its pairs are those within dolls."""
+    """The System of a scene; its pairs are those within dolls."""
     tree = _kinematic_tree(scene)
     layout = DofLayout([placement.doll for placement in scene.dolls])
     ground = scene.ground
@@ -80,7 +70,7 @@ def _kinematic_tree(scene: Scene) -> np.ndarray:
 
 
 def _enter_joint(body: np.ndarray, doll: Ragdoll, joint: Joint, at: dict[str, int]) -> None:
-    """Enter the joint to the parent; ``at``: the record of each bone so far."""
+    """Write the joint to the parent to ``body``; ``at``: index of each bone's body so far."""
     body['parent'] = at[joint.parent]
     body['has_quaternion'] = joint.is_free_ball
     body['dof_count'], body['joint_damping'] = joint.dof, joint.damping
@@ -90,12 +80,12 @@ def _enter_joint(body: np.ndarray, doll: Ragdoll, joint: Joint, at: dict[str, in
 
 
 def _energy_scale(tree: np.ndarray, geoms: np.ndarray, gravity: Sequence[float]) -> np.ndarray:
-    """M g L, J, of all bodies, L the largest reach of a geom."""
+    """Energy scale m g L (1,), J: m of all bodies, L the largest reach of a geom."""
     return np.array([tree['mass'].sum() * geoms['reach'].max() * math.hypot(*gravity)])
 
 
 def join_systems(systems: Sequence[System], pairs: np.ndarray) -> System:
-    """Several systems as one, with ``pairs`` between their geoms."""
+    """Concatenate systems, and add ``pairs`` (p,), GEOM_PAIR, between their geoms."""
     q = v = bodies = dolls = geoms = points = 0
     parts = []
     for one in systems:
@@ -129,7 +119,7 @@ def join_systems(systems: Sequence[System], pairs: np.ndarray) -> System:
 
 
 def pairs_between(scene: Scene, geom_pairs: np.ndarray) -> np.ndarray:
-    """Pairs of geoms (p, 2) with the law of their contact."""
+    """GEOM_PAIR records of pairs of geoms (p, 2), with the parameters of their contact."""
     laws = np.array([scene.material.on(bone) for bone in scene.bones
                      for _ in bone.shape.parts]).reshape(-1, 3)
     pairs = np.zeros(len(geom_pairs), GEOM_PAIR)
@@ -141,8 +131,8 @@ def pairs_between(scene: Scene, geom_pairs: np.ndarray) -> np.ndarray:
 
 
 def contact_law(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Laws (..., 3) between two materials (..., 3): geometric means of friction and restitution,
-    the mean of rolling friction; friction without limit leaves it to the other.
+    """Friction, rolling friction and restitution (..., 3) between two materials (..., 3): geometric
+    means, of rolling friction the mean; if one friction is unlimited, that of the other counts.
     """
     (friction_a, rolling_a, restitution_a), (friction_b, rolling_b, restitution_b) = (
         np.moveaxis(law, -1, 0) for law in (a, b))
@@ -154,7 +144,7 @@ def contact_law(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _dofs(tree: np.ndarray, count: int) -> dict[str, np.ndarray]:
-    """How degrees of freedom and bodies depend on each other; see System."""
+    """The fields of a System that say how degrees of freedom, bodies and dolls are connected."""
     dof_parent, dof_body = np.full(count, -1), np.zeros(count, np.int64)
     body_last_dof, body_root, body_doll = np.zeros((3, len(tree)), np.int64)
     dof_damping, doll = np.zeros(count), -1
@@ -174,7 +164,7 @@ def _dofs(tree: np.ndarray, count: int) -> dict[str, np.ndarray]:
 
 
 def _geoms(scene: Scene, tree: np.ndarray) -> np.ndarray:
-    """All parts of all bones' shapes, in the scene's order of bones."""
+    """GEOM records of all parts of all bones' shapes, in the scene's order of bones."""
     record = {int(bone): place for place, bone in enumerate(tree['bone'])}
     base = np.array(scene.material.on(None))
     parts = [(index, bone, part) for index, bone in enumerate(scene.bones)
@@ -196,13 +186,14 @@ def _geoms(scene: Scene, tree: np.ndarray) -> np.ndarray:
 
 
 def _size(shape: object) -> tuple[float, ...]:
+    """GEOM size of a shape; see kernels/collision/shapes.py."""
     if shape.kind == 'box':
         return shape.half_extents
     return (shape.radius, 0.0 if shape.kind == 'sphere' else shape.length / 2, 0.0)
 
 
 def _bounding_radius(shape: object) -> float:
-    """Of the sphere around a shape, m."""
+    """Radius, m, of the bounding sphere about the shape's center."""
     if shape.kind == 'sphere':
         return shape.radius
     if shape.kind == 'capsule':
@@ -212,7 +203,7 @@ def _bounding_radius(shape: object) -> float:
 
 
 def _within_dolls(scene: Scene) -> np.ndarray:
-    """Pairs (p, 2) of geoms of one doll whose bones are two that may collide."""
+    """Pairs (p, 2) of geoms of different bones of one doll that the doll does not exclude."""
     if not scene.self_collision:
         return np.zeros((0, 2), np.int64)
     owner = np.repeat(np.arange(len(scene.bones)), [len(b.shape.parts) for b in scene.bones])

@@ -22,16 +22,16 @@ from .broad_phase import NO_PAIRS
 from .build_system import build_system, join_systems, pairs_between
 from .doll_states import SNAPSHOT, DollStates, contact_capacity
 
-COUNTS = ('flight_steps', 'steps', 'impacts', 'sweeps', 'unsolved', 'contacts_dropped',
-          'toi_failures', 'restitution_reduced', 'energy_gains', 'work_pushes', 'work_grabs',
-          'work_position_correction')
+SUMMED_STATS = ('flight_steps', 'steps', 'impacts', 'sweeps', 'unsolved', 'contacts_dropped',
+                'toi_failures', 'restitution_reduced', 'energy_gains', 'work_pushes', 'work_grabs',
+                'work_position_correction')
 """Statistics that are summed over clusters."""
 
 CHECKPOINT = ('q', 'v', 'excluded', 'stats')
-"""What of the states is in a checkpoint: all else follows from it."""
+"""Fields of the states that a checkpoint stores; all others are computed from them."""
 
 PARTS_PER_THREAD = 4
-"""Parts of the work for each thread: one that is done early takes another."""
+"""Parts of the work for each thread; a thread that finishes early takes another part."""
 
 
 @dataclass
@@ -44,9 +44,9 @@ class Cluster:
     """(k, 2) of dolls that may touch."""
     bones: np.ndarray
     """(n,) indices in the scene."""
-    q: np.ndarray
-    v: np.ndarray
-    """Indices of their coordinates and velocities in the scene's."""
+    q_indices: np.ndarray
+    v_indices: np.ndarray
+    """(nq,), (nv,): indices of its coordinates and velocities in the scene's."""
     system: System
     state: ClusterState
     workspaces: list[Workspace]
@@ -54,19 +54,19 @@ class Cluster:
     """Rows that bind system, state, and a workspace for each thread; see compiling/bundle.py."""
 
     def job(self, worker: int) -> tuple[int, int, int]:
-        """JOB of the kernels on one of the threads."""
+        """Addresses of system, workspace and state for the kernels on one of the threads."""
         system, state, *workspaces = (rows[0].ctypes.data for rows in self.bundles)
         return system, workspaces[worker % len(workspaces)], state
 
     def set_loads(self, loads: np.ndarray, springs: np.ndarray) -> None:
-        """Let these act from now on; a step of flight that is under way ends."""
+        """Set the loads and springs; discard the dense step."""
         self.state = self.state._replace(loads=loads, springs=springs)
         self.bundles[1][0][:] = bind(self.state)[0]
         self.state.dense_step[:] = 0
 
 
 class Clusters:
-    """All dolls of a scene in clusters; states and sums of the whole scene."""
+    """All dolls of a scene in clusters; coordinates, states and sums of the whole scene."""
 
     def __init__(self, scene: Scene, layout: DofLayout, workers: int) -> None:
         self._scene = scene
@@ -82,7 +82,7 @@ class Clusters:
         self.q, self.v, self.bone_states = whole['q'], whole['v'], whole['bone_states'].reshape(
             -1, 13)
         self.sums, self.stats = whole['doll_sums'], whole['stats']
-        """The statistics of a cluster of several dolls are those of its first one."""
+        """The statistics of a cluster of several dolls are stored at its first doll."""
         first = STEP_STATS.fields['work_pushes'][1] // STEP_STATS.fields['work_grabs'][0].itemsize
         self._work = self.stats.view(float).reshape(len(self.stats), -1)[:, first:first + 2]
         """(d, 2) J, of pushes and of grabs."""
@@ -96,13 +96,13 @@ class Clusters:
         self.members = list(self._singles)
         self.of_doll = np.arange(len(scene.dolls))
         """(d,) index in ``members`` of the cluster of each doll."""
-        self._set(self.members)
+        self._set_clusters(self.members)
 
     def __iter__(self) -> object:
         return iter(self.members)
 
     def reach(self) -> np.ndarray:
-        """Reach (n,) m of each bone from its center of mass."""
+        """Distance (n,) m of each bone's farthest point from its center of mass."""
         reach = np.zeros(len(self._scene.bones))
         for system, bones in zip(self._systems, self._bones, strict=True):
             np.maximum.at(reach, bones[system.tree['bone'][system.geoms['body']]],
@@ -112,29 +112,29 @@ class Clusters:
     @property
     def all_alone(self) -> bool:
         """Whether each doll is a cluster by itself."""
-        return not self._several
+        return not self._multi_doll
 
     def covers(self, pairs: np.ndarray) -> bool:
         """Whether all these pairs (k, 2) of dolls are pairs of the clusters."""
-        return not len(pairs) or bool(np.isin(self._numbers(pairs), self._pair_numbers).all())
+        return not len(pairs) or bool(np.isin(self._pair_keys(pairs), self._keys_of_pairs).all())
 
     def form(self, pairs: np.ndarray) -> None:
-        """Form clusters of dolls that ``pairs`` (k, 2) connect, and of every other by itself."""
+        """Form clusters of dolls that ``pairs`` (k, 2) connect; every other doll stays alone."""
         label = np.arange(len(self._singles))
         for one, other in pairs:
             low, high = sorted((label[one], label[other]))
             label[label == high] = low
-        old = {self._key(cluster.dolls, cluster.pairs): cluster for cluster in self.members}
+        old = {self._cluster_key(cluster.dolls, cluster.pairs): cluster for cluster in self.members}
         made = []
         for first in np.unique(label):
             dolls = np.flatnonzero(label == first)
             own = pairs[label[pairs[:, 0]] == first] if len(pairs) else NO_PAIRS
-            cluster = old.pop(self._key(dolls, own), None)
+            cluster = old.pop(self._cluster_key(dolls, own), None)
             made.append(cluster or (self._join(dolls, own) if len(dolls) > 1
                                     else self._singles[dolls[0]]))
             if cluster is None:
                 _invalidate(made[-1])
-        self._set(made)
+        self._set_clusters(made)
 
     def advance(self, duration: float, accuracy: Accuracy, sleeping: np.ndarray) -> None:
         """Advance all clusters by ``duration`` s, except those of ``sleeping`` dolls (d,)."""
@@ -145,7 +145,7 @@ class Clusters:
             kernels.advance(jobs[0], duration, accuracy.step, accuracy.flight_error)
         else:
             self._advance_parallel(jobs, duration, accuracy, sleeping)
-        for cluster in self._several:
+        for cluster in self._multi_doll:
             if not sleeping[cluster.dolls[0]]:
                 self._scatter_state(cluster)
 
@@ -153,28 +153,29 @@ class Clusters:
         """Set the velocities of ``dolls`` (d,), whole clusters, to zero."""
         self.v[dolls[self._doll_of_v]] = 0.0
         self._states.arrays['dense_step'][dolls] = 0
-        for cluster in self._several:
+        for cluster in self._multi_doll:
             if dolls[cluster.dolls[0]]:
                 cluster.state.v[:] = 0.0
                 cluster.state.dense_step[:] = 0
 
     def gather_state(self) -> None:
         """Copy the scene's q and v into the clusters of several dolls."""
-        for cluster in self._several:
-            cluster.state.q[:], cluster.state.v[:] = self.q[cluster.q], self.v[cluster.v]
+        for cluster in self._multi_doll:
+            cluster.state.q[:] = self.q[cluster.q_indices]
+            cluster.state.v[:] = self.v[cluster.v_indices]
 
     def exclude(self, flags: list[np.ndarray]) -> None:
-        """Exclude pairs of geoms from collision for now: flags (p,) of each doll."""
+        """Set the exclusion flags (p,) of each doll's pairs of geoms; see kernels/system.py."""
         for cluster, own in zip(self._singles, flags, strict=True):
             cluster.state.excluded[:] = own
 
     def excluded(self, kind: int) -> list[np.ndarray]:
-        """Flags (p,) of each doll's pairs, of one kind: OVERLAPPING or JOINT_OUTSIDE_LIMITS."""
+        """Flags (p,) of each doll's pairs: of ``kind``, OVERLAPPING or JOINT_OUTSIDE_LIMITS."""
         return [cluster.state.excluded & kind for cluster in self._singles]
 
     def separate(self) -> None:
-        """Let each doll be a cluster by itself, and invalidate what is known."""
-        self._set(list(self._singles))
+        """Make each doll a cluster by itself, and invalidate their contacts, gaps and steps."""
+        self._set_clusters(list(self._singles))
         self.invalidate()
 
     def invalidate(self) -> None:
@@ -194,33 +195,31 @@ class Clusters:
 
     def totals(self) -> dict[str, float]:
         """Statistics since the start, summed over clusters."""
-        return {name: self.stats[name].sum() for name in COUNTS}
+        return {name: self.stats[name].sum() for name in SUMMED_STATS}
 
     def contacts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Contacts (c,) of all last steps, none in flight; the bones (c, 2) of the scene that
-        touch, or GROUND; the length (c,) s of the step.
+        """Contacts (c,) of each cluster's last step; clusters in flight have none. With the bones
+        (c, 2) of the scene that touch, or GROUND, and the length (c,) s of the step.
         """
         if len(self._singles) == 1:
             found, dt = self._contacts_of_one(), self._singles[0].state.stats['last_dt'][0]
-            return _points(found, self._bone_of_body, np.zeros(len(found), np.int64),
-                           np.full(len(found), dt))
+            return _contact_points(found, self._bone_of_body, np.zeros(len(found), np.int64),
+                                   np.full(len(found), dt))
         arrays, single = self._states.arrays, np.bincount(self.of_doll)[self.of_doll] == 1
         known, dolls = self._states.contacts_of(single & (arrays['dense_step']['valid'] == 0))
-        found = [_points(arrays['contacts'][known], self._bone_of_body, self._first[dolls],
-                         self.stats['last_dt'][dolls])]
-        for cluster in self._several:
+        found = [_contact_points(arrays['contacts'][known], self._bone_of_body, self._first[dolls],
+                                 self.stats['last_dt'][dolls])]
+        for cluster in self._multi_doll:
             stats = cluster.state.stats[0]
             if not cluster.state.dense_step['valid'][0]:
                 known = cluster.state.contacts[:stats['contact_count']]
-                found.append(_points(known, cluster.bones[cluster.system.tree['bone']],
-                                     np.zeros(len(known), np.int64),
-                                     np.full(len(known), stats['last_dt'])))
+                found.append(_contact_points(known, cluster.bones[cluster.system.tree['bone']],
+                                             np.zeros(len(known), np.int64),
+                                             np.full(len(known), stats['last_dt'])))
         return tuple(map(np.concatenate, zip(*found, strict=True)))
 
     def on_ground(self) -> np.ndarray:
-        """Which bones (n,) of the scene touch the ground; of one doll in a tenth of the time that
-        contacts() takes.
-        """
+        """Which bones (n,) have a ground contact; of one doll ten times as fast as contacts()."""
         on = np.zeros(len(self._bone_of_body), bool)
         if len(self._singles) == 1:
             known = self._contacts_of_one()
@@ -240,21 +239,21 @@ class Clusters:
     def save(self) -> object:
         """A snapshot that restore() brings back to the bit."""
         return (self._states.save(), self.members,
-                [(cluster, _copied(cluster.state)) for cluster in self._several])
+                [(cluster, _copied(cluster.state)) for cluster in self._multi_doll])
 
     def restore(self, snapshot: tuple) -> None:
         """Restore a snapshot."""
         states, members, several = snapshot
         self._states.restore(states)
         if members is not self.members:
-            self._set(members)
+            self._set_clusters(members)
         for cluster, state in several:
             for name in SNAPSHOT:
                 getattr(cluster.state, name)[:] = getattr(state, name)
             cluster.state.contacts[:len(state.contacts)] = state.contacts
 
     def checkpoint(self) -> dict[str, np.ndarray]:
-        """The state without what follows from it; as bytes, as numpy copies records slowly."""
+        """The fields CHECKPOINT of all states; as bytes, as numpy copies records slowly."""
         return {name: self._states.arrays[name].view(np.uint8).copy() for name in CHECKPOINT}
 
     def restore_checkpoint(self, checkpoint: dict[str, np.ndarray]) -> None:
@@ -263,25 +262,25 @@ class Clusters:
             self._states.arrays[name].view(np.uint8)[:] = values
         self.separate()
 
-    def _numbers(self, pairs: np.ndarray) -> np.ndarray:
-        """A number for each pair (k, 2)."""
+    def _pair_keys(self, pairs: np.ndarray) -> np.ndarray:
+        """A unique number of each pair (k, 2)."""
         return pairs[:, 0] * len(self._singles) + pairs[:, 1]
 
-    def _key(self, dolls: np.ndarray, pairs: np.ndarray) -> tuple:
+    def _cluster_key(self, dolls: np.ndarray, pairs: np.ndarray) -> tuple:
         return dolls.tobytes(), pairs.tobytes()
 
-    def _set(self, clusters: list[Cluster]) -> None:
+    def _set_clusters(self, clusters: list[Cluster]) -> None:
         self.members = clusters
         for place, cluster in enumerate(clusters):
             self.of_doll[cluster.dolls] = place
-        self._several = [cluster for cluster in clusters if len(cluster.dolls) > 1]
+        self._multi_doll = [cluster for cluster in clusters if len(cluster.dolls) > 1]
         self._firsts = np.array([cluster.dolls[0] for cluster in clusters])
-        self.pairs = np.concatenate([NO_PAIRS, *(cluster.pairs for cluster in self._several)])
+        self.pairs = np.concatenate([NO_PAIRS, *(cluster.pairs for cluster in self._multi_doll)])
         """(k, 2) of dolls that may touch, of all clusters."""
-        self._pair_numbers = self._numbers(self.pairs)
+        self._keys_of_pairs = self._pair_keys(self.pairs)
         self._jobs = np.array([[cluster.job(worker) for cluster in clusters]
-                               for worker in range(self._workers)], kernels.JOB)
-        """(workers, k)"""
+                               for worker in range(self._workers)], np.int64)
+        """(workers, k, 3)"""
 
     def _advance_parallel(self, jobs: np.ndarray, duration: float, accuracy: Accuracy,
                           sleeping: np.ndarray) -> None:
@@ -304,8 +303,8 @@ class Clusters:
             other.result()
 
     def _scatter_state(self, cluster: Cluster) -> None:
-        """Copy the state of a cluster of several dolls into the scene's."""
-        self.q[cluster.q], self.v[cluster.v] = cluster.state.q, cluster.state.v
+        """Copy the state of a cluster of several dolls into the scene's arrays."""
+        self.q[cluster.q_indices], self.v[cluster.v_indices] = cluster.state.q, cluster.state.v
         self.bone_states[cluster.bones] = cluster.state.bone_states
         self.sums[cluster.dolls] = cluster.state.doll_sums
         at = 0
@@ -315,7 +314,7 @@ class Clusters:
             at += len(excluded)
 
     def _single(self, doll: int) -> Cluster:
-        """A doll by itself. Its state is a view of the scene's; equal dolls share workspaces."""
+        """The cluster of one doll, a view of the scene's state; equal dolls share workspaces."""
         system, state = self._systems[doll], self._states[doll]
         bones, q, v = self._bones[doll], self._q[doll], self._v[doll]
         if id(system) not in self._workspaces:
@@ -323,10 +322,10 @@ class Clusters:
                 make_workspace(system, state) for _ in range(self._workers)]
         workspaces = [one._replace(stats=state.stats, excluded=state.excluded, gaps=state.gaps)
                       for one in self._workspaces[id(system)]]
-        return _bound(np.array([doll]), NO_PAIRS, bones, q, v, system, state, workspaces)
+        return _bind_cluster(np.array([doll]), NO_PAIRS, bones, q, v, system, state, workspaces)
 
     def _join(self, dolls: np.ndarray, pairs: np.ndarray) -> Cluster:
-        """A cluster of several dolls, in their present state."""
+        """A cluster of several dolls, with their present coordinates and velocities."""
         systems = [self._systems[doll] for doll in dolls]
         bones, q, v = (np.concatenate([parts[doll] for doll in dolls])
                        for parts in (self._bones, self._q, self._v))
@@ -344,18 +343,19 @@ class Clusters:
         state = make_cluster_state(system, contact_capacity(system))._replace(
             q=self.q[q], v=self.v[v], stats=self.stats[dolls[0]:dolls[0] + 1],
             excluded=np.concatenate([single.excluded for single in singles]))
-        return _bound(dolls, pairs, bones, q, v, system, state, [make_workspace(system, state)])
+        return _bind_cluster(dolls, pairs, bones, q, v, system, state,
+                             [make_workspace(system, state)])
 
 
 def _invalidate(cluster: Cluster) -> None:
-    """Discard what is known of its contacts, its gaps and its next step."""
+    """Discard a cluster's dense step, contacts, gaps and step lengths: q or v has been set."""
     cluster.state.dense_step[:] = cluster.state.contact_accelerations[:] = 0
     for name in ('contact_count', 'ended_without_impact', 'last_dt', 'next_dt', 'gaps_current'):
         cluster.state.stats[name] = 0
 
 
-def _bound(*parts: object) -> Cluster:
-    """A cluster of these, its system, state and workspaces bound; they live as long as it."""
+def _bind_cluster(*parts: object) -> Cluster:
+    """A Cluster of these parts, with the bundles of its system, state and workspaces."""
     system, state, workspaces = parts[-3:]
     return Cluster(*parts, [bind(part) for part in (system, state, *workspaces)])
 
@@ -370,11 +370,11 @@ def _systems(scene: Scene) -> list[System]:
     return [made[id(placement.doll)] for placement in scene.dolls]
 
 
-def _points(contacts: np.ndarray, bone_of_body: np.ndarray, first: np.ndarray,
-            dt: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Contact points among ``contacts``, with bones and times as Clusters.contacts() returns them.
+def _contact_points(contacts: np.ndarray, bone_of_body: np.ndarray, first: np.ndarray,
+                    dt: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Contacts that are no limits, with bones and times as Clusters.contacts() returns them.
 
-    Their bodies count from ``first`` (c,) in ``bone_of_body``, bones of the scene.
+    Their bodies count from ``first`` (c,) in ``bone_of_body``, which gives bones of the scene.
     """
     found = np.flatnonzero(contacts['kind'] != LIMIT)
     # take: an index in brackets copies such wide records field by field

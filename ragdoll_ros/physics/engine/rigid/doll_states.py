@@ -10,14 +10,14 @@ from ...kernels.system import System
 
 SNAPSHOT = ('dense_output', 'end_rates', 'dense_step', 'excluded', 'gaps', 'contact_accelerations',
             'q', 'v', 'bone_states', 'doll_sums', 'stats')
-"""What a snapshot holds beside the contacts."""
+"""Fields that a snapshot stores beside the contacts."""
 
 CONTACTS_PER_GEOM = 12
-"""Contacts for which there is room."""
+"""Capacity for contacts, for each geom; limits have their own."""
 
 
 class DollStates(Sequence):
-    """The ClusterState of each doll by itself; ``arrays`` hold those of all dolls, flat."""
+    """The ClusterState of each doll alone; ``arrays`` hold those of all dolls, flat."""
 
     def __init__(self, systems: Sequence[System]) -> None:
         blank = {id(system): make_cluster_state(system, contact_capacity(system))
@@ -44,14 +44,16 @@ class DollStates(Sequence):
         return len(self._each)
 
     def contacts_of(self, dolls: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Indices (c,) of the contacts of these dolls (d,), true or false, and whose they are."""
+        """Indices (c,) of the contacts in arrays['contacts'] of the dolls for which ``dolls`` (d,)
+        is true, and the doll (c,) of each.
+        """
         # the first doll of a larger cluster holds its statistics, with more contacts than it has
         counts = np.where(dolls, np.minimum(self.arrays['stats']['contact_count'], self._room), 0)
         begin = np.repeat(self._first - np.cumsum(counts) + counts, counts)
         return begin + np.arange(len(begin)), np.repeat(np.arange(len(counts)), counts)
 
     def save(self) -> object:
-        """A snapshot of all."""
+        """A snapshot of all states."""
         known, _ = self.contacts_of(np.ones(len(self), bool))
         return {name: self.arrays[name].copy() for name in SNAPSHOT}, self.arrays['contacts'][known]
 
@@ -64,5 +66,5 @@ class DollStates(Sequence):
 
 
 def contact_capacity(system: System) -> int:
-    """Contacts for which a state of this system has room."""
+    """Number of contacts that a state of this system can store."""
     return CONTACTS_PER_GEOM * len(system.geoms) + len(system.joint_limits)

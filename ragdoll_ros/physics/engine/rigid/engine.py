@@ -1,7 +1,6 @@
-"""RigidEngine: the package's own engine for rigid bodies, in compiled code.
+"""RigidEngine connects broad phase, clusters and kernels, and provides state and statistics.
 
-The algorithm is in kernels/: advance.py. Here are the broad phase, the clusters, and the state and
-the measures that it hands out.
+The algorithm of a tick is in kernels/advance.py.
 """
 from __future__ import annotations
 
@@ -22,11 +21,11 @@ from .broad_phase import BroadPhase
 from .clusters import Cluster, Clusters
 from .loads import NO_LOADS, NO_SPRINGS, load_records, spring_records
 
-FINER = 0.25
-"""Share of the step with which the last interval is repeated to estimate its error."""
+ERROR_STEP_RATIO = 0.25
+"""Ratio of step lengths with which the last interval is repeated to estimate its error."""
 
 LOOK_AHEAD = 0.05
-"""s: dolls that may touch so soon form a cluster."""
+"""s: dolls that may touch within this time form a cluster."""
 
 MAX_AGE = 10
 """Intervals for which clusters are kept, unless other dolls come near."""
@@ -49,7 +48,7 @@ class RigidEngine:
         self._initial_overlaps = [np.full(len(own), OVERLAPPING)
                                   for own in self._clusters.excluded(OVERLAPPING)]
         """Pairs that overlap at the start: they are excluded until they separate."""
-        self.set_coordinates(self._placed())
+        self.set_coordinates(self._placed_coordinates())
         self._initial_overlaps = self._clusters.excluded(OVERLAPPING)
 
     @property
@@ -71,7 +70,7 @@ class RigidEngine:
 
     @property
     def joint_rates(self) -> np.ndarray:
-        """What they change by (k,), rad/s."""
+        """Joint rates (k,), rad/s."""
         # The roots' spins, which v has along the roots' own axes, are none of the joints'.
         return self.layout.joint_rates(GeneralizedState(self._clusters.q, self._clusters.v))
 
@@ -82,11 +81,11 @@ class RigidEngine:
 
     @property
     def cluster_of_doll(self) -> np.ndarray:
-        """Number (d,) of what each doll goes on with: dolls of one number fall asleep together."""
+        """Cluster index (d,) of each doll: dolls of one cluster fall asleep together."""
         return self._clusters.of_doll
 
     def set_coordinates(self, coordinates: GeneralizedState) -> None:
-        """Put all dolls there and begin; see Engine."""
+        """Set the state of all dolls and restart; see Engine."""
         clusters, q, v = self._clusters, self._clusters.q, self._clusters.v
         q[:], v[:] = coordinates.q, coordinates.v
         orientations = rotation.inverse(q[self.layout.root_orientations])
@@ -95,7 +94,7 @@ class RigidEngine:
         clusters.separate()
         self.sleeping[:] = False
         self._refresh()
-        self._lift_out()
+        self._lift_out_of_ground()
         clusters.exclude([own | JOINT_OUTSIDE_LIMITS for own in self._initial_overlaps])
         self._refresh()
         self._age = MAX_AGE
@@ -104,7 +103,7 @@ class RigidEngine:
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
                 drives: Drives = ()) -> None:
-        """Go on by ``duration`` s; see Engine."""
+        """Advance by ``duration`` s; wakes dolls that are acted on or may be touched."""
         clusters, actions = self._clusters, (wrenches, springs, drives)
         self._last_start = clusters.q.copy(), clusters.v.copy(), duration, actions
         of_doll = self.cluster_of_doll
@@ -114,14 +113,14 @@ class RigidEngine:
         self._advance(duration, actions, self.accuracy)
 
     def put_to_sleep(self, dolls: np.ndarray) -> None:
-        """Bring dolls (d,) to rest where they are; the energy that is left is lost for good."""
+        """Stop dolls (d,) where they are, until they are woken; their kinetic energy is lost."""
         self._clusters.stop(dolls)
         self.sleeping[dolls] = True
         self._last_start = None
         self._refresh()
 
     def dolls_on_ground(self) -> np.ndarray:
-        """Which dolls (d,) rest on the ground."""
+        """Which dolls (d,) the ground bears: a contact's normal impulse is positive."""
         contacts, bones, _ = self._clusters.contacts()
         found = np.zeros(len(self.scene.dolls), bool)
         on = (bones[:, 1] == GROUND) & (contacts['impulse'][:, 0] > 0)
@@ -129,23 +128,23 @@ class RigidEngine:
         return found
 
     def contacts(self) -> Contacts:
-        """What touches now."""
+        """Contacts of the last step, with mean normal forces."""
         found, bones, dt = self._clusters.contacts()
         return Contacts(bones[:, 0], bones[:, 1], found['point'], found['normal'], -found['gap'],
                         found['impulse'][:, 0] / dt)
 
     def bones_on_ground(self) -> np.ndarray:
-        """Which bones (n,) touch the ground now."""
+        """Which bones (n,) have a contact with the ground, with or without an impulse."""
         return self._clusters.on_ground()
 
     @property
     def energy_excess(self) -> float:
-        """Energy, J, above that at the start and all work since."""
+        """Total energy, J, less that at the start and all work since."""
         return (float(self._doll_totals.energy.sum()) - self._start_energy
                 - self._clusters.work())
 
     def measures(self) -> dict[str, float]:
-        """What went wrong since the start, and what was done: names end in their units."""
+        """Error measures and counts of work since the start; names end in their units."""
         stats = self._clusters.totals()
         return {
             'energy_excess_J': self.energy_excess,
@@ -157,11 +156,11 @@ class RigidEngine:
             'impacts': int(stats['impacts']), 'unsolved_total': int(stats['unsolved'])}
 
     def save(self) -> object:
-        """A snapshot that restore brings back to the bit."""
+        """A snapshot that restore() brings back bit-identically."""
         return self._clusters.save(), self.sleeping.copy(), self._age, self._start_energy
 
     def restore(self, snapshot: tuple) -> None:
-        """Go back to a snapshot."""
+        """Restore a snapshot."""
         saved, self.sleeping[:], self._age, self._start_energy = snapshot
         self._clusters.restore(saved)
         self._last_start = None
@@ -171,11 +170,11 @@ class RigidEngine:
         """Nothing to release: the memory goes with the object."""
 
     def checkpoint(self) -> object:
-        """Where all is and what the accounts say: far cheaper than save()."""
+        """Coordinates, velocities and work; contacts are recomputed: cheaper than save()."""
         return self._clusters.checkpoint(), self.sleeping.copy(), self._start_energy
 
     def restore_checkpoint(self, checkpoint: tuple) -> None:
-        """Go on from a checkpoint; see Engine."""
+        """Continue from a checkpoint; see Engine."""
         saved, self.sleeping[:], self._start_energy = checkpoint
         self._clusters.restore_checkpoint(saved)
         self._age = MAX_AGE
@@ -183,7 +182,7 @@ class RigidEngine:
         self._refresh()
 
     def close(self) -> None:
-        """End the threads."""
+        """Stop the threads."""
         self._clusters.close()
 
     def _update_clusters(self, duration: float) -> None:
@@ -193,13 +192,13 @@ class RigidEngine:
         if len(self.scene.dolls) == 1:
             return
         clusters = self._clusters
-        near = self._near(duration)
+        near = self._near_pairs(duration)
         self._age += 1
         if (clusters.covers(near) and not self.sleeping[near].any()
                 and (self._age <= MAX_AGE or clusters.all_alone)):
             return
         while True:
-            near = self._near(max(duration, LOOK_AHEAD))
+            near = self._near_pairs(max(duration, LOOK_AHEAD))
             if not self.sleeping[near].any():
                 break
             self.sleeping[near] = False
@@ -208,15 +207,15 @@ class RigidEngine:
         clusters.form(np.unique(np.concatenate([near, asleep]), axis=0))
         self._age = 0
 
-    def _near(self, ahead: float) -> np.ndarray:
+    def _near_pairs(self, ahead: float) -> np.ndarray:
         """Pairs (k, 2) of dolls that may touch within ``ahead`` s, one of each awake."""
         return self._broad_phase.pairs(self._clusters.bone_states, ahead, ~self.sleeping,
                                        self.cluster_of_doll)
 
     def _advance(self, duration: float, actions: tuple[Wrenches, Springs, Drives],
                  accuracy: Accuracy) -> None:
-        """Advance all clusters that do not rest."""
-        acted = self._act(actions) if any(actions) else ()
+        """Advance all clusters that are awake under ``actions``, then remove these."""
+        acted = self._apply_actions(actions) if any(actions) else ()
         self._clusters.advance(duration, accuracy, self.sleeping)
         for cluster in acted:
             cluster.set_loads(NO_LOADS, NO_SPRINGS)
@@ -227,8 +226,8 @@ class RigidEngine:
         self._state = State.of(self._clusters.bone_states.copy())
         self._doll_totals = DollTotals.of(self._clusters.sums.view(float).reshape(-1, 20).copy())
 
-    def _act(self, actions: tuple[Wrenches, Springs, Drives]) -> list[Cluster]:
-        """Let loads and springs act on their clusters, which are returned."""
+    def _apply_actions(self, actions: tuple[Wrenches, Springs, Drives]) -> list[Cluster]:
+        """Set loads and springs of the clusters that ``actions`` act on; returns these clusters."""
         acts: dict[int, tuple[list, list, list]] = {}
         for kind, given in enumerate(actions):
             for one in given:
@@ -245,12 +244,12 @@ class RigidEngine:
         return acted
 
     def _refresh(self) -> None:
-        """Compute state and gaps from q and v."""
+        """Recompute bone states, sums and gaps from q and v."""
         self._clusters.advance(0.0, self.accuracy, np.zeros(len(self.sleeping), bool))
         self._update_state()
 
-    def _lift_out(self) -> None:
-        """Move dolls that penetrate the ground onto it."""
+    def _lift_out_of_ground(self) -> None:
+        """Move dolls that penetrate the ground by more than is allowed onto it."""
         if self.scene.ground is None:
             return
         depths = -np.minimum.reduceat(self._heights(self.state),
@@ -259,12 +258,12 @@ class RigidEngine:
             at = self.layout.root_positions[doll]
             self._clusters.q[at] += depths[doll] * np.array(self.scene.ground.normal)
 
-    def _placed(self) -> GeneralizedState:
-        """Coordinates of the scene's placements."""
+    def _placed_coordinates(self) -> GeneralizedState:
+        """Coordinates of the scene's placements, joints in the bind pose."""
         q, v = np.zeros(self.layout.sizes[0]), np.zeros(self.layout.sizes[1])
         for cluster in self._clusters:
             balls = cluster.system.tree[cluster.system.tree['has_quaternion'] > 0]
-            q[cluster.q[balls['q_start'][balls['parent'] >= 0] + 3]] = 1.0
+            q[cluster.q_indices[balls['q_start'][balls['parent'] >= 0] + 3]] = 1.0
         for doll, placement in enumerate(self.scene.dolls):
             pose = placement.bone_pose(placement.doll.root)
             q[self.layout.root_positions[doll]] = pose.position
@@ -282,7 +281,7 @@ class RigidEngine:
         if self._last_start is None:
             return 0.0
         q, v, duration, actions = self._last_start
-        finer = dataclasses.replace(self.accuracy, step=FINER * self.accuracy.step,
+        finer = dataclasses.replace(self.accuracy, step=ERROR_STEP_RATIO * self.accuracy.step,
                                     flight_error=self.accuracy.flight_error / 100)
         here, there = self.save(), self.state.positions
         clusters = self._clusters
@@ -294,4 +293,4 @@ class RigidEngine:
         start = self._last_start
         self.restore(here)
         self._last_start = start
-        return float(missed / (1 - FINER ** 2))
+        return float(missed / (1 - ERROR_STEP_RATIO ** 2))

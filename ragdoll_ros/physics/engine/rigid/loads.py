@@ -6,14 +6,8 @@ import math
 import numpy as np
 
 from ....model.scene import Scene
-from ...kernels.dynamics.loads import (
-    ANGULAR_DRIVE,
-    GRAB,
-    JOINT_SPRING,
-    LINEAR_DRIVE,
-    LOAD,
-    SPRING,
-)
+from ...kernels.dynamics.loads import (ANGULAR_DRIVE, GRAB, JOINT_SPRING, LINEAR_DRIVE, LOAD,
+                                       SPRING)
 from ..protocol import AppliedDrive, AppliedJointSpring, Drives, Spring, Springs, Wrenches
 
 NO_LOADS = np.zeros(0, LOAD)
@@ -21,7 +15,7 @@ NO_SPRINGS = np.zeros(0, SPRING)
 
 
 def load_records(wrenches: Wrenches, bones: list[int]) -> np.ndarray:
-    """Wrenches as records (m,), on ``bones`` of a cluster."""
+    """LOAD records (m,) of wrenches; ``bones``: indices in the scene of a cluster's bones."""
     loads = np.zeros(len(wrenches), LOAD)
     for load, wrench in zip(loads, wrenches, strict=True):
         load['bone'], load['local'] = bones.index(wrench.bone), wrench.local
@@ -31,7 +25,9 @@ def load_records(wrenches: Wrenches, bones: list[int]) -> np.ndarray:
 
 def spring_records(springs: Springs, drives: Drives, scene: Scene, bones: list[int],
                    bodies: list[int]) -> np.ndarray:
-    """Springs and drives as records (k,); ``bones`` of a cluster are those of its ``bodies``."""
+    """SPRING records (k,) of springs and drives; ``bones``: indices in the scene of a cluster's
+    bones; ``bodies``: the index in ``bones`` of each body of its tree.
+    """
     records = []
     for spring in springs:
         body = bodies.index(bones.index(spring.bone))
@@ -53,7 +49,7 @@ def _grab(body: int, spring: Spring) -> np.ndarray:
 
 
 def _joint_spring(body: int, hold: AppliedJointSpring, scene: Scene) -> np.ndarray:
-    """The mobility is that of the bone alone about its thinnest axis, the most that it can be."""
+    """Its mobility is that of the bone alone about its thinnest axis, an upper bound."""
     record = _record(JOINT_SPRING, body, hold.stiffness, hold.damping, math.inf)
     record['axis'], record['target_angle'] = hold.axis, hold.target
     record['mobility'] = 1 / min(scene.bones[hold.bone].inertia)
@@ -61,10 +57,8 @@ def _joint_spring(body: int, hold: AppliedJointSpring, scene: Scene) -> np.ndarr
 
 
 def _drive(body: int, drive: AppliedDrive, scene: Scene) -> list[np.ndarray]:
-    """Up to two springs without stiffness, at the bone's center of mass.
-
-    The mobility is that of the bone alone, the most that it can be: a drive that is taken for
-    stiffer than it is is evaluated nearer to the step's end.
+    """Up to two springs without stiffness, at the bone's center of mass. Their mobility is the
+    bone's own, an upper bound: overestimated stiffness moves the evaluation towards the step's end.
     """
     bone, records = scene.bones[drive.bone], []
     mobilities = 1 / bone.mass, 1 / min(bone.inertia)
@@ -79,7 +73,7 @@ def _drive(body: int, drive: AppliedDrive, scene: Scene) -> list[np.ndarray]:
 
 
 def _record(kind: int, body: int, stiffness: float, damping: float, most: float) -> np.ndarray:
-    """A spring with these; its target stands at the origin for ever."""
+    """A spring record with these values; its target is the origin, at rest, for ever."""
     record = np.zeros((), SPRING)
     record['kind'], record['body'], record['time_left'] = kind, body, math.inf
     record['stiffness'], record['damping'], record['max_force'] = stiffness, damping, most

@@ -31,7 +31,7 @@ MIN_DISTANCE_RATIO = 0.1
 
 @compiled
 def closest_parameter(shape: Shape, p: Vec3, u: Vec3, half: float) -> float:
-    """Where on the segment p + t u, |t| <= half, of the shape's frame its distance is least."""
+    """Parameter t of the point of p + t u, |t| <= ``half``, nearest to the shape, in its frame."""
     if half <= 0:
         return 0.0
     if shape.kind >= BOX:
@@ -48,7 +48,7 @@ def closest_parameter(shape: Shape, p: Vec3, u: Vec3, half: float) -> float:
 
 @compiled
 def _find_minimum(shape: Shape, p: Vec3, u: Vec3, half: float) -> float:
-    """Root of the distance's slope, which increases along the axis.
+    """Parameter t of the least signed distance: the root of its slope, which increases with t.
 
     The Illinois method, with bisection at every third step: deep in a shape the slope jumps.
     """
@@ -80,6 +80,7 @@ def _find_minimum(shape: Shape, p: Vec3, u: Vec3, half: float) -> float:
 
 @compiled
 def _slope(shape: Shape, p: Vec3, u: Vec3, t: float) -> float:
+    """Slope of the signed distance at p + t u."""
     _, n = signed_distance(shape, add_scaled(p, t, u), u)
     return dot(n, u)
 
@@ -87,7 +88,7 @@ def _slope(shape: Shape, p: Vec3, u: Vec3, t: float) -> float:
 @compiled
 def _clip_to_slab(interval: tuple[float, float], p: float, u: float,
                   width: float) -> tuple[float, float]:
-    """The part of an interval where |p + t u| <= width; empty if its end is before its start."""
+    """The part of an interval of t where |p + t u| <= ``width``; end < start if empty."""
     lo, hi = interval
     if abs(u) < 1e-12:
         return (lo, hi) if abs(p) <= width else (1.0, 0.0)
@@ -97,7 +98,7 @@ def _clip_to_slab(interval: tuple[float, float], p: float, u: float,
 
 @compiled
 def _clip_to_face(shape: Shape, p: Vec3, u: Vec3, half: float, n: Vec3) -> tuple[float, float]:
-    """The interval of a segment above the shape's face or line with the normal n."""
+    """Interval of t where p + t u is above the shape's face of normal n; end < start if empty."""
     size, interval = shape.size, (-half, half)
     if shape.kind == BOX:
         if abs(n[0]) < FACE_SINE:
@@ -135,9 +136,9 @@ def capsule_separation(a: Shape, b: Shape) -> float:
 @compiled
 def capsule_manifold(a: Shape, b: Shape, margin: float, sign: float,
                      manifold: np.ndarray) -> int:
-    """Store the manifold of a sphere or capsule a with any shape b; ``sign`` -1 flips the normals.
-
-    Points: the deepest, and where the axis enters and leaves the space above the face below it.
+    """Write the manifold of a sphere or capsule a with any shape b to ``manifold``, as collide().
+    ``sign``: factor of the normals, -1 if the caller has swapped the shapes. Points: the deepest,
+    and where the axis enters and leaves the space above the face below it.
     """
     c, radius, half = sub(a.position, b.position), a.size[0], a.size[1]
     p, u = to_local(b.rotation, c), to_local(b.rotation, column(a.rotation, 2))
@@ -175,7 +176,7 @@ def capsule_manifold(a: Shape, b: Shape, margin: float, sign: float,
 @compiled
 def _put_ball(contact: np.record, b: Shape, center: Vec3, n: Vec3, distance: float, radius: float,
               sign: float) -> None:
-    """Store the contact of a ball in b's frame whose centre has this distance from b's surface."""
+    """Write the contact of a ball with ``center`` (b's frame) ``distance`` m from b's surface."""
     point = to_world(b.rotation, add_scaled(center, -((distance + radius) / 2), n))
     put(contact.point, add(b.position, point))
     put(contact.normal, scale(sign, to_world(b.rotation, n)))

@@ -30,8 +30,8 @@ FACE_TIE = 1e-10
 """Faces whose cosines differ by less are equal: the reference is a, unless only b is a box."""
 
 DEPTH_TOLERANCE = 1e-10
-"""m: by how much the deepest point may differ from the shapes' penetration where the axis is not
-that of a face; where it is, by as much as the bias of faces."""
+"""m: tolerance of the deepest point's gap against the shapes' separation where the axis is no face
+normal; where it is one, the bias of faces."""
 
 CLOSEST_POINTS_ID = 2 * MAX_CORNERS * 2 * MAX_CORNERS - 1
 """Feature id of the contact at the closest points, which no two sides of faces have."""
@@ -39,7 +39,7 @@ CLOSEST_POINTS_ID = 2 * MAX_CORNERS * 2 * MAX_CORNERS - 1
 
 @compiled
 def _contact_axis(a: Shape, b: Shape, c: Vec3, margin: float) -> Axis:
-    """The axis of the contact: a face's unless another one is clearly better."""
+    """The best face normal, unless another axis is clearly better; c: from b's center to a's."""
     sat = face_or_edge_axis(a, b, c, 1.0, margin)
     if sat[0] <= margin and (a.kind == CYLINDER or b.kind == CYLINDER):
         refined = refine_axis(a, b, c, sat)
@@ -50,7 +50,7 @@ def _contact_axis(a: Shape, b: Shape, c: Vec3, margin: float) -> Axis:
 
 @compiled
 def convex_manifold(a: Shape, b: Shape, margin: float, manifold: np.ndarray) -> int:
-    """Store the contact manifold of two shapes that are boxes or cylinders."""
+    """Write the manifold of two boxes or cylinders; arguments and return value as collide()."""
     origin = b.position
     a = Shape(a.kind, a.size, sub(a.position, origin), a.rotation)
     b = Shape(b.kind, b.size, (0.0, 0.0, 0.0), b.rotation)
@@ -95,9 +95,9 @@ def convex_manifold(a: Shape, b: Shape, margin: float, manifold: np.ndarray) -> 
 @compiled
 def _clip_faces(incident: Shape, reference: Shape, n: Vec3, sign: float,
                 scratch: np.ndarray) -> int:
-    """Clip the incident face by the reference face; ``sign`` is 1 if n leaves the reference.
-
-    Stores the points after the first MAX_CLIPPED of ``scratch`` and returns their number.
+    """Clip the incident face by the reference face, seen along n. Writes the points to ``scratch``
+    from MAX_CLIPPED on; returns their number. ``sign``: 1 if n points out of the reference, else
+    -1.
     """
     polygon, points = scratch[:MAX_CLIPPED], scratch[MAX_CLIPPED:2 * MAX_CLIPPED]
     corners = scratch[2 * MAX_CLIPPED:]
@@ -126,7 +126,7 @@ def _clip_faces(incident: Shape, reference: Shape, n: Vec3, sign: float,
 
 @compiled
 def _clip_edges(a: Shape, b: Shape, n: Vec3, points: np.ndarray) -> int:
-    """The ends of the overlap of two parallel edges, seen along n; none if they cross."""
+    """Write the ends of the overlap of parallel supporting edges, seen along n; 2, or 0 if none."""
     middle, u = supporting_edge(a, neg(n))
     other, v = supporting_edge(b, n)
     offset = sub(add(middle, a.position), other)
@@ -154,7 +154,7 @@ def _clip_edges(a: Shape, b: Shape, n: Vec3, points: np.ndarray) -> int:
 
 @compiled
 def _closest_on_edges(a: Shape, b: Shape, n: Vec3, s: float) -> Vec3:
-    """Midpoint, m, between the closest points of two crossing edges, or a vertex or rim and one."""
+    """Midpoint, m, from b's center, of the closest points of the supporting edges or vertices."""
     middle, u = supporting_edge(a, neg(n))
     other, v = supporting_edge(b, n)
     middle = add(middle, a.position)

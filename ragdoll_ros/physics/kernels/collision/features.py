@@ -24,11 +24,10 @@ MAX_CORNERS = len(OCTAGON)
 
 @compiled
 def supporting_face(shape: Shape, n: Vec3, t: Vec3, corners: np.ndarray) -> tuple[int, int]:
-    """Store the corners of the supporting face along a unit vector, from the centre, world.
-
-    Returns their number (4: face, 8: cap, 2: line of a side) and the face's id. A cap has the
-    corners of a regular octagon, except that the one closest to the support point is put there; if
-    all of the cap supports, the one closest to the direction ``t``.
+    """Write the corners of the face that supports along the unit vector n (world) to ``corners``,
+    from the shape's center, m, world axes. Returns their number (4: face, 8: cap, 2: line of a
+    side) and the face's id. A cap has the corners of a regular octagon, except that the one closest
+    to the support point is put there; if all of the cap supports, that closest to direction ``t``.
     """
     size, (x, y, z) = shape.size, to_local(shape.rotation, n)
     if shape.kind == BOX:
@@ -57,7 +56,7 @@ def supporting_face(shape: Shape, n: Vec3, t: Vec3, corners: np.ndarray) -> tupl
 
 @compiled
 def _box_face(shape: Shape, n: Vec3, corners: np.ndarray) -> int:
-    """Corners of the box's face most parallel to a vector of its frame; returns its id."""
+    """Write the corners of the face that supports along n (box frame); returns its id."""
     size, axis, most = shape.size, 2, n[2]
     if abs(n[0]) > abs(most):
         axis, most = 0, n[0]
@@ -74,16 +73,16 @@ def _box_face(shape: Shape, n: Vec3, corners: np.ndarray) -> int:
 
 @compiled
 def face_cosine(shape: Shape, n: Vec3) -> float:
-    """Cosine between a unit vector and the closest normal of a box's face or a cylinder's cap."""
+    """Cosine between n (world) and the closest normal of a box's face or a cylinder's cap."""
     x, y, z = to_local(shape.rotation, n)
     return max(abs(x), abs(y), abs(z)) if shape.kind == BOX else abs(z)
 
 
 @compiled
 def supporting_edge(shape: Shape, n: Vec3) -> tuple[Vec3, Vec3]:
-    """The supporting edge, or line of a side, along a unit vector: midpoint and half of it, world.
-
-    The midpoint is from the centre; of a vertex or a point of a rim the half is 0.
+    """The edge, or line of a side, that supports along the unit vector n (world): its midpoint from
+    the shape's center, and half of it as a vector, m, world axes; of a vertex or rim point the half
+    is 0.
     """
     size, (x, y, z) = shape.size, to_local(shape.rotation, n)
     a, b, c, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

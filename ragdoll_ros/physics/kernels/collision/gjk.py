@@ -19,7 +19,7 @@ MAX_ITERATIONS = 60
 
 SIMPLEX_VERTEX = np.dtype([('point', float, 3), ('support', float, 3)], align=True)
 """A vertex of a simplex: point of the Minkowski difference, and the sum of the support points that
-it is made of, which holds for any offset and scale."""
+it is made of, which is independent of offset and scale."""
 
 Direction = tuple[int, Vec3]
 """Number of vertices of the last simplex, and the unit vector from b to a."""
@@ -31,10 +31,11 @@ Nearest = tuple[float, Vec3, int]
 @compiled
 def closest_direction(a: Shape, b: Shape, c: Vec3, ratio: float, tolerance: float,
                       simplex: np.ndarray, count: int, n: Vec3) -> Direction:
-    """Unit vector from b to a between their closest points; both are scaled by ``ratio``.
+    """Unit vector from b to a between their closest points; both, scaled by ``ratio``, are
+    disjoint. Returns the number of vertices of the last simplex, and the vector.
 
-    c is the offset of a's centre from b's, ``tolerance`` the relative error of the distance. The
-    iteration starts with n and the first ``count`` vertices of an earlier ``simplex`` (4,).
+    c: offset of a's center from b's, m; ``tolerance``: relative error of the distance. It starts
+    with n and the first ``count`` vertices of an earlier ``simplex`` (4,), which is overwritten.
     """
     square, v = math.inf, n
     for k in range(count):
@@ -59,10 +60,11 @@ def closest_direction(a: Shape, b: Shape, c: Vec3, ratio: float, tolerance: floa
 
 @compiled
 def _nearest(simplex: np.ndarray, count: int) -> tuple[int, Vec3]:
-    """The point of a simplex nearest to the origin; reduces it to the vertices it is made of.
+    """Reduce a simplex to the vertices of its point nearest to the origin. Returns their number and
+    the point.
 
-    In a tetrahedron it is on a face, as the origin is outside, and not on that without the last
-    vertex, which came because it was nearer.
+    In a tetrahedron that point is on a face, as the origin is outside, and not on that without the
+    last vertex, which came because it was nearer.
     """
     if count == 1:
         return 1, vec(simplex[0].point)
@@ -86,6 +88,7 @@ def _nearest(simplex: np.ndarray, count: int) -> tuple[int, Vec3]:
 
 @compiled
 def _nearest_on_segment(simplex: np.ndarray, i: int, j: int) -> Nearest:
+    """Nearest to the origin on the edge i j: squared distance, point, bits of the vertices used."""
     a = vec(simplex[i].point)
     edge = sub(vec(simplex[j].point), a)
     t, square = -dot(a, edge), dot(edge, edge)
@@ -102,7 +105,7 @@ def _nearest_on_segment(simplex: np.ndarray, i: int, j: int) -> Nearest:
 
 @compiled
 def _nearest_on_triangle(simplex: np.ndarray, i: int, j: int, m: int) -> Nearest:
-    """Inside, it is along the normal, which from differences is accurate in slivers too."""
+    """The same on a triangle; inside along its normal, which is accurate in slivers too."""
     a, b, c = vec(simplex[i].point), vec(simplex[j].point), vec(simplex[m].point)
     n = cross(sub(b, a), sub(c, a))
     square = dot(n, n)

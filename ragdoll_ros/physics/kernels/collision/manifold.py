@@ -18,7 +18,9 @@ CLIP_VERTEX = np.dtype([('point', float, 3), ('gap', float), ('feature_id', np.i
 
 @compiled
 def merge_points(points: np.ndarray, count: int, margin: float, distance: float) -> int:
-    """Drop points whose gap exceeds the margin, and of two within ``distance`` the shallower."""
+    """Drop points whose gap exceeds ``margin``, m, and of two within ``distance``, m, the
+    shallower, in place. Returns the number left.
+    """
     kept = 0
     for i in range(count):
         if points[i].gap > margin:
@@ -37,7 +39,9 @@ def merge_points(points: np.ndarray, count: int, margin: float, distance: float)
 
 @compiled
 def reduce_points(points: np.ndarray, count: int) -> int:
-    """Move to the front the deepest point, then repeatedly the farthest from all before it."""
+    """Keep at most MAX_MANIFOLD_POINTS: move to the front the deepest point, then repeatedly the
+    farthest from all before it; fewer are left as they are. Returns the number kept.
+    """
     if count <= MAX_MANIFOLD_POINTS:
         return count
     best = 0

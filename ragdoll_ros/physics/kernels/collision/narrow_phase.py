@@ -17,9 +17,9 @@ from .shapes import CAPSULE, Shape, bounding_radius
 
 @compiled
 def collide(a: Shape, b: Shape, margin: float, manifold: np.ndarray) -> int:
-    """Store the contact manifold of two shapes: points with a gap of at most ``margin``, m.
-
-    ``manifold`` has room for MAX_MANIFOLD_POINTS of CONTACT_POINT; returns their number.
+    """Write the contact manifold of two shapes to ``manifold``: points with a gap of at most
+    ``margin``, m, and normals from b to a, world. ``manifold`` has room for MAX_MANIFOLD_POINTS of
+    CONTACT_POINT. Returns the number of points.
     """
     c = sub(a.position, b.position)
     reach = bounding_radius(a) + bounding_radius(b) + margin

@@ -1,15 +1,15 @@
 """Separating axes of boxes and cylinders (and of capsules' axes with them).
 
 Along a unit vector n from b to a two convex shapes are separated by s(n) = c n - h_a(n) - h_b(n),
-c the offset of their centres and h their support functions; the largest s over all n is positive
+c the offset of a's centre from b's, h their support functions. The largest s over all n is positive
 if and only if they are disjoint, and else minus their penetration depth.
 
 Two boxes: it is along one of 15 axes, face normals and cross products of edges (SAT: Gottschalk,
 Lin, Manocha, OBBTree, 1996). With a cylinder it may also be where a rim meets an edge or a rim.
 Then these axes are the start of two searches, both with GJK on disjoint shapes (gjk.py):
 
-- of overlapping shapes the growth distance (Gilbert, Ong, 1994): scaled about their centres until
-  they touch, which tells the side to separate them to;
+- of overlapping shapes the growth distance (Gilbert, Ong, 1994): the scale about their centres at
+  which they touch; the axis there is the side to separate them to;
 - separated along n by a small gap, their closest points give a better n. s never decreases, and a
   few of these steps end at a maximum.
 """
@@ -47,7 +47,7 @@ Axis = tuple[float, Vec3]
 
 @compiled
 def separation_along(a: Shape, b: Shape, c: Vec3, n: Vec3) -> float:
-    """Separation s(n), m."""
+    """Separation s(n), m; of a capsule that of its axis."""
     return dot(c, n) - core_extent(a, n) - core_extent(b, n)
 
 
@@ -95,7 +95,7 @@ def _towards(c: Vec3, n: Vec3) -> Vec3:
 
 @compiled
 def refine_axis(a: Shape, b: Shape, c: Vec3, start: Axis) -> Axis:
-    """The axis of largest separation of all, from the best face or edge axis."""
+    """The axis of largest separation of all; ``start``: the best face or edge axis."""
     # a bare 0 is a type of its own to numba, for which it would compile all once more
     simplex, count = np.empty(4, SIMPLEX_VERTEX), np.int64(0)
     gap = GAP_RATIO * (bounding_radius(a) + bounding_radius(b))
@@ -119,7 +119,7 @@ def refine_axis(a: Shape, b: Shape, c: Vec3, start: Axis) -> Axis:
 
 @compiled
 def max_separation_axis(a: Shape, b: Shape, c: Vec3, cutoff: float) -> Axis:
-    """The axis of largest separation of all, or one with a separation above ``cutoff``."""
+    """The axis of largest separation of all, or one with a separation above ``cutoff``, m."""
     start = face_or_edge_axis(a, b, c, 0.0, cutoff)
     if start[0] <= cutoff and (a.kind == CYLINDER or b.kind == CYLINDER):
         return refine_axis(a, b, c, start)
@@ -128,7 +128,9 @@ def max_separation_axis(a: Shape, b: Shape, c: Vec3, cutoff: float) -> Axis:
 
 @compiled
 def _growth_axis(a: Shape, b: Shape, c: Vec3, n: Vec3, simplex: np.ndarray) -> Direction:
-    """The axis along which shapes that grow about their centres touch: Dinkelbach's iteration."""
+    """Axis along which overlapping shapes touch when scaled: Dinkelbach's iteration from the guess
+    n. Returns the number of vertices of ``simplex`` (4,), which is overwritten, and the axis.
+    """
     largest, count, best = 0.0, np.int64(0), n
     for _ in range(6):
         offset = dot(c, n)

@@ -32,7 +32,7 @@ class Shape(NamedTuple):
 
 @compiled
 def shape_at(geom: np.record, position: np.ndarray, rotation: np.ndarray) -> Shape:
-    """The shape of a geom whose centre (3,) and rotation (3, 3) are given."""
+    """The shape of a geom whose centre (3,), m, and rotation (3, 3) in the world are given."""
     return Shape(geom.kind, vec(geom.size), vec(position), rotation)
 
 
@@ -49,9 +49,8 @@ def bounding_radius(shape: Shape) -> float:
 
 @compiled
 def core_extent(shape: Shape, n: Vec3) -> float:
-    """Support function, m, about the centre along a unit vector of the world; no spheres.
-
-    Of a capsule that of its axis, without the radius, which is the same along all vectors.
+    """Half-width, m, of a shape's core along the unit vector n (world): its support function about
+    the centre, of a capsule that of its axis, without the radius. No spheres.
     """
     size, (x, y, z) = shape.size, to_local(shape.rotation, n)
     if shape.kind == BOX:
@@ -63,7 +62,7 @@ def core_extent(shape: Shape, n: Vec3) -> float:
 
 @compiled
 def extent(shape: Shape, n: Vec3) -> float:
-    """Support function, m, about the centre along a unit vector of the world."""
+    """Half-width, m, of a shape along the unit vector n (world): its support function."""
     if shape.kind == SPHERE:
         return shape.size[0]
     reach = core_extent(shape, n)
@@ -72,7 +71,7 @@ def extent(shape: Shape, n: Vec3) -> float:
 
 @compiled
 def support_point(shape: Shape, n: Vec3) -> Vec3:
-    """Support point from the centre, world, m: farthest along n; of a capsule's axis as above."""
+    """Point of a shape's core farthest along n, from the centre, m, world axes; no spheres."""
     size, (x, y, z) = shape.size, to_local(shape.rotation, n)
     if shape.kind == BOX:
         return to_world(shape.rotation, (

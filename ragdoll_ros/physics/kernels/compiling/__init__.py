@@ -1,1 +1,1 @@
-"""How a function becomes machine code, and where that is kept for the next process."""
+"""Compiling functions to machine code, and keeping it on disk for the next process."""

@@ -1,9 +1,9 @@
-"""A tuple of arrays that compiled code hands on as one pointer.
+"""Bundles: named tuples of arrays that compiled code passes on as one pointer.
 
-Numba hands an array on as ten numbers: sixty of them make up most of what a call costs, and most of
-what compiling it costs. Here the pointer is to a row of numbers that stays as it is: of each array
-its address and its shape, of a tuple in the tuple the address of its own row. Nothing is counted,
-so whoever has made the row keeps the arrays as long as it is used.
+Numba passes an array as ten numbers: sixty arrays make up most of what a call costs, and most of
+what compiling it costs. A bundle is a pointer to a constant row of numbers: of each array its
+address and its shape, of a nested tuple the address of its own row. There is no reference counting:
+whoever made the row keeps the arrays as long as it is used.
 """
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WORD = ir.IntType(64)
 
 
 class Bundle(types.Type):
-    """The type of such a pointer: of each field its place in the row and its type."""
+    """Numba type of a bundle; ``fields``: place in the row and type of each field."""
 
     def __init__(self, name: str, fields: dict[str, tuple[int, types.Type]]) -> None:
         self.fields = fields
@@ -33,7 +33,7 @@ register_model(Bundle)(models.OpaqueModel)
 
 
 def bundle_type(parts: tuple) -> Bundle:
-    """The type for named tuples like this one."""
+    """The Bundle of named tuples with fields like those of ``parts``."""
     place, fields = 0, {}
     for name, part in zip(parts._fields, parts, strict=True):
         inner = isinstance(part, tuple)
@@ -43,7 +43,9 @@ def bundle_type(parts: tuple) -> Bundle:
 
 
 def bind(parts: tuple) -> list[np.ndarray]:
-    """The row of a named tuple, first, and those of the tuples in it: to be kept with it."""
+    """Rows of a named tuple of C-contiguous arrays: its own first, then those of nested tuples.
+    Keep all of them, and the tuple, as long as the bundle is used.
+    """
     row, rows = [], []
     for part in parts:
         if isinstance(part, tuple):
@@ -57,7 +59,7 @@ def bind(parts: tuple) -> list[np.ndarray]:
 
 
 def bundle_at(kind: Bundle) -> Callable[[int], object]:
-    """What gives compiled code the bundle of a row's address."""
+    """A function for compiled code that returns the bundle at the address of a row."""
     @intrinsic
     def at(context: object, address: types.Type) -> tuple:
         def generate(context: object, builder: ir.IRBuilder, signature: object,
@@ -69,7 +71,7 @@ def bundle_at(kind: Bundle) -> Callable[[int], object]:
 
 @infer_getattr
 class _Fields(AttributeTemplate):
-    """Tells numba what a bundle has."""
+    """Tells numba the types of a bundle's fields."""
 
     key = Bundle
 
@@ -80,7 +82,7 @@ class _Fields(AttributeTemplate):
 @lower_getattr_generic(Bundle)
 def _take(context: object, builder: ir.IRBuilder, kind: Bundle, value: ir.Value,
           name: str) -> ir.Value:
-    """Read a field."""
+    """Generate the code that reads a field."""
     place, field = kind.fields[name]
     row = builder.bitcast(value, WORD.as_pointer())
 

@@ -1,8 +1,8 @@
-"""Where machine code is kept for the next process, one file for each function that Python calls.
+"""Cache of machine code on disk, one file for each function that Python calls.
 
-Numba's own cache notices a change of the file of the function that is called, but not of the files
-of those that this one calls, and fails where it cannot write. Here a file's name has a digest of
-all kernels; where they cannot be kept, all is compiled at every start.
+Numba's own cache notices changes of the file of the called function, but not of the files of those
+that it calls, and fails where it cannot write. Here a file's name has a digest of all kernels;
+without a folder to write to, all is compiled at every start.
 """
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ from numba.misc.appdirs import AppDirs
 from . import notices
 
 PATIENCE = 1.0
-"""s to wait for another process without a word: it may just be loading what was kept."""
+"""s to wait for another process without a message: it may only be loading its cache."""
 
 KERNELS, SOURCES = __package__.rpartition('.')[0], Path(__file__).parent.parent
 """The package of all kernels, and its folder."""
 
-OURS = re.compile(r'[\w.]+-[0-9a-f]{16}-[0-9a-f]{8}\.nbc(\.\d+)?'  # begun by a process of a number
+OURS = re.compile(r'[\w.]+-[0-9a-f]{16}-[0-9a-f]{8}\.nbc(\.\d+)?'  # path.pid while written
                   r'|[\w.]+-\d+\.py\d+\w*(\.\d+)?\.nb[ic]')  # as numba itself names them
 
 
 def digest(folder: Path) -> str:
-    """Digest of all Python files of a folder and those in it, with their names."""
+    """Digest, 16 hex digits, of the names and contents of all Python files below a folder."""
     found = hashlib.sha256()
     for path in sorted(folder.rglob('*.py')):
         content = path.read_bytes()
@@ -47,7 +47,7 @@ def digest(folder: Path) -> str:
 
 
 def _machine() -> str:
-    """Digest of what else the code depends on: versions, and the processor and what it can."""
+    """Digest, 8 hex digits, of what else the code depends on: versions and the processor."""
     processor = registry.cpu_target.target_context.codegen().magic_tuple()
     known = sysconfig.get_config_var('SOABI'), numba.__version__, np.__version__, processor
     return hashlib.sha256(repr(known).encode()).hexdigest()[:8]
@@ -58,7 +58,7 @@ KEY = f'{DIGEST}-{_machine()}'
 
 
 def _places() -> list[Path]:
-    """Folders to keep code in, the better one first: those that numba would choose from."""
+    """Folders for the cache, the preferred one first: those that numba would choose from."""
     if not any(SOURCES.glob('*.py')):  # in an archive: no telling when the sources change
         return []
     own = caching._CacheLocator.get_suitable_cache_subpath(__file__)
@@ -68,7 +68,7 @@ def _places() -> list[Path]:
 
 
 def _serves(place: Path) -> bool:
-    """Whether our code is there already, be the folder read-only or not, or can be kept there."""
+    """Whether a folder has this version's code already, even if read-only, or can be written to."""
     try:
         if any(place.glob(f'*-{KEY}.nbc')):
             return True
@@ -81,14 +81,14 @@ def _serves(place: Path) -> bool:
 
 FOLDER = next(filter(_serves, _places()), None)
 KEPT = FOLDER is not None
-"""Whether there is a folder to keep code in."""
+"""Whether there is a folder for the cache."""
 
 
 class KernelCache(caching._Cache):
-    """What numba asks for the code of one function of a module, compiled for one signature."""
+    """Numba's cache interface, for one function of a module, compiled for one signature."""
 
     failure: ClassVar[OSError | None] = None
-    """Why something could not be kept: the rest is not tried then."""
+    """The first error of saving; nothing is saved after it."""
 
     def __init__(self, function: Callable) -> None:
         module = function.__module__.removeprefix(f'{KERNELS}.')
@@ -96,11 +96,11 @@ class KernelCache(caching._Cache):
 
     @property
     def cache_path(self) -> str:
-        """The folder."""
+        """The cache's folder."""
         return str(FOLDER)
 
     def load_overload(self, sig: tuple, target_context: object) -> compiler.CompileResult | None:
-        """The function as it was kept; None if it was not, or the file is not whole."""
+        """The compiled function from the cache; None if it is missing or damaged."""
         target_context.refresh()
         try:
             kept = pickle.loads(self._path.read_bytes())
@@ -109,7 +109,7 @@ class KernelCache(caching._Cache):
             return None
 
     def save_overload(self, sig: tuple, data: compiler.CompileResult) -> None:
-        """Keep the function that was compiled, unless addresses of this process are in it."""
+        """Save the compiled function, unless it contains addresses of this process."""
         if KernelCache.failure is None and not data.library.has_dynamic_globals:
             try:
                 _keep(self._path, serialize.dumps(data._reduce()))
@@ -118,7 +118,7 @@ class KernelCache(caching._Cache):
                 notices.say(notices.NOT_KEPT.format(error))
 
     def enable(self) -> None:
-        """Nothing to do, nor below: it is always used, and never emptied."""
+        """Do nothing, as disable() and flush(): the cache is always used, and never emptied."""
 
     def disable(self) -> None:
         """See enable."""
@@ -128,29 +128,29 @@ class KernelCache(caching._Cache):
 
 
 def _keep(path: Path, content: bytes) -> None:
-    """Write a file that is there as a whole or not at all, in the place of what is out of date."""
+    """Write a file atomically, after deleting this package's files of other digests beside it."""
     path.parent.mkdir(parents=True, exist_ok=True)
     for other in path.parent.iterdir():
         if OURS.fullmatch(other.name) and f'-{DIGEST}-' not in other.name:
             other.unlink(missing_ok=True)
-    begun = path.with_name(f'{path.name}.{os.getpid()}')
+    temporary = path.with_name(f'{path.name}.{os.getpid()}')
     try:
-        begun.write_bytes(content)
-        begun.replace(path)
+        temporary.write_bytes(content)
+        temporary.replace(path)
     finally:
-        begun.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
 
 
 def keep(dispatcher: Dispatcher) -> None:
-    """Let numba look for a function's code among what is kept, and keep it there."""
+    """Make numba look for a function's code in the cache, and save it there."""
     if KEPT:
         dispatcher._cache = KernelCache(dispatcher.py_func)
 
 
 @contextlib.contextmanager
 def alone() -> Iterator[None]:
-    """Let processes compile one after another: the next one finds what the first has kept. No
-    garbage is looked for meanwhile, which takes a seventh of the time and finds little.
+    """Compile in one process at a time: the others wait and find what the first has saved. Garbage
+    collection is off meanwhile, which saves a seventh of the time.
     """
     with contextlib.ExitStack() as stack:
         if gc.isenabled():

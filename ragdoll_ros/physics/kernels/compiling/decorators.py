@@ -1,7 +1,7 @@
-"""How a function becomes machine code: three decorators, and short names of numba's types.
+"""Decorators that compile functions to machine code, and short names of numba's types.
 
-Without fastmath every sum, product, quotient and root is rounded by itself and in its order, which
-IEEE 754 leaves no processor a choice in: the same bits on all of them, for some 4 % of the speed.
+Without fastmath every sum, product, quotient and root is rounded by itself, in the order written,
+as IEEE 754 prescribes: the same bits on all processors, for some 4 % of the speed.
 """
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from .linking import PartCompiler
 
 compiled = numba.njit(error_model='numpy', no_cpython_wrapper=True, no_cfunc_wrapper=True,
                       pipeline_class=PartCompiler)
-"""Machine code, for what other compiled code calls."""
+"""Compile a function that only other compiled code calls."""
 
 inlined = numba.njit(inline='always', error_model='numpy')
-"""The same as a part of what calls it: twice as fast for what is called with many arrays."""
+"""Compile a function into its callers: twice as fast for one that is called with many arrays."""
 
-REAL = numba.float64
+REAL, ADDRESS = numba.float64, numba.int64
 
 
 def entry(*types: numba.types.Type) -> Callable[[Callable], Callable]:
-    """Compile what Python calls, for these types of its arguments, when its file is imported.
+    """Compile a function that Python calls, for these types of its arguments, when it is defined.
 
-    The code is kept for the next process, so that no simulation ever waits in its midst. It is
-    kept by the function's name, so the function must be one of a module and not of a function.
+    The code is kept for the next process, under the function's name, so the function must be at the
+    top level of a module.
     """
     def compile_at_once(function: Callable) -> Callable:
         dispatcher = numba.njit(error_model='numpy', nogil=True)(function)

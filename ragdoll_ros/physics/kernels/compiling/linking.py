@@ -1,8 +1,8 @@
-"""What compiled code calls is optimised and made machine code once, with what Python calls.
+"""Link-time optimization: compiled code is optimised and made machine code once, for each entry.
 
 Numba does so for each function with all that it calls, and again for each that calls it: a function
-at the bottom is compiled as many times as there are functions above it. Here functions stay as they
-were written until an entry links them, as a linker does that optimises the whole program.
+at the bottom is compiled as many times as there are functions above it. Here functions stay LLVM IR
+until an entry links them and optimises the whole program.
 """
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from numba.core.typed_passes import NativeLowering
 
 
 class CalledCode(JITCodeLibrary):
-    """The code of a function that only other compiled code calls."""
+    """The code of a function that only other compiled code calls: LLVM IR, not optimised."""
 
     _linked: ModuleRef | None = None
 
     def finalize(self) -> None:
-        """Leave it as it is."""
+        """Mark the code as complete without optimising it."""
         self._finalized = True
 
     def _get_module_for_linking(self) -> ModuleRef:
-        """The function with all that it calls: what calls first, then what is called, as what is
-        linked before anything calls it is left out.
+        """The function's IR linked with that of all functions it calls, callers first: a function
+        that is linked before its caller is dropped.
         """
         if self._linked is None:
             called: dict[CodeLibrary, None] = {}
@@ -40,7 +40,7 @@ class CalledCode(JITCodeLibrary):
         return super()._get_module_for_linking()
 
     def _enter_called(self, called: dict[CodeLibrary, None]) -> None:
-        """Enter all that is called, each after all that it calls itself."""
+        """Add all that this one calls to ``called``, each after what it calls itself."""
         for library in self._linking_libraries:
             if library not in called:
                 if isinstance(library, CalledCode):
@@ -48,21 +48,21 @@ class CalledCode(JITCodeLibrary):
                 called[library] = None
 
     def get_pointer_to_function(self, name: str) -> int:
-        """None: there is no machine code."""
+        """Return 0: there is no machine code."""
         return 0
 
     @property
     def codegen(self) -> CalledCode:
-        """Whom numba asks to set_env()."""
+        """The object of which numba calls set_env()."""
         return self
 
     def set_env(self, name: str, environment: object) -> None:
-        """Nothing to set: no function here has Python objects among its constants."""
+        """Do nothing: no function here has Python objects among its constants."""
 
 
 @register_pass(mutates_CFG=False, analysis_only=True)
 class _BeginPart(LoweringPass):
-    """Makes the library that a function's code is entered into."""
+    """Compiler pass that creates the library for a function's code."""
 
     _name = 'begin_part'
 
@@ -76,10 +76,10 @@ class _BeginPart(LoweringPass):
 
 
 class PartCompiler(CompilerBase):
-    """Numba's own, but for the library."""
+    """Numba's compiler, with CalledCode as the library."""
 
     def define_pipelines(self) -> list[PassManager]:
-        """The passes in their order."""
+        """Numba's passes, with _BeginPart before the code is generated."""
         manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
         place = [made for made, _ in manager.passes].index(NativeLowering)
         manager.passes.insert(place, (_BeginPart, 'begin a part'))

@@ -1,4 +1,4 @@
-"""What is said about compiling, on standard error: a program's own output is not for this."""
+"""Messages about compiling, on standard error: standard output is the program's own."""
 from __future__ import annotations
 
 import sys
@@ -14,23 +14,23 @@ WAITING = 'Another process compiles the dynamics: waiting for it'
 
 
 def say(words: str) -> None:
-    """Tell who started the program."""
+    """Print a message."""
     print(words, file=sys.stderr, flush=True)
 
 
 class Teller(event.Listener):
-    """Says once what takes so long; code that is loaded is no news."""
+    """Prints once that kernels are compiled; nothing for code from the cache."""
 
     def __init__(self, often: str) -> None:
         self._often = often
         self._told = False
 
     def on_start(self, event: event.Event) -> None:
-        """Numba begins to compile a function."""
+        """Print the message if numba begins to compile a kernel."""
         module = event.data['dispatcher'].py_func.__module__ or ''
         if not self._told and module.startswith(__package__.rpartition('.')[0]):
             self._told = True
             say(COMPILING.format(self._often))
 
     def on_end(self, event: event.Event) -> None:
-        """Nothing to say: others follow."""
+        """Do nothing: other functions follow."""

@@ -1,1 +1,1 @@
-"""What of a scene touches: gaps, contacts with whole patches, and their rows."""
+"""Gaps, contact points of whole patches, and the rows of contacts."""

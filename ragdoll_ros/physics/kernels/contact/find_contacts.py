@@ -17,14 +17,14 @@ from .gaps import TOUCHING, ground_point, placed_shape
 from .patch import contract_friction_points
 
 IDS_PER_PAIR = 4096
-"""Numbers that the points of one pair have for their ids."""
+"""Range of ids that the points of one pair have."""
 
 
 @compiled
 def find_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, gaps: np.ndarray,
                   margin: float) -> int:
-    """Enter the contacts at q whose gap in ``gaps`` says that they touch; of a pair the points that
-    are nearer than ``margin`` m. Returns their number. ``kin`` is that of q, with its geoms.
+    """Write to contacts.found the contacts at q whose gap in ``gaps`` is at most TOUCHING; of a
+    pair the points nearer than ``margin`` m. Returns their number. ``kin``: of q, with its geoms.
     """
     m, n, contacts = 0, 0, ws.contacts.found
     for k in range(len(s.geoms)):
@@ -51,7 +51,7 @@ def find_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, gaps
 @compiled
 def enter_ground_contact(s: System, kin: Kinematics, k: int, point: int, id_: int,
                          c: np.record) -> None:
-    """Enter the contact of a point of geom k with the ground."""
+    """Write to ``c`` the contact of ground point ``point`` of geom k; ``id_``: index of its gap."""
     geom, normal = s.geoms[k], vec(s.ground_normal)
     c.kind = ROLLING if geom.rolling_friction > 0 else FRICTIONAL
     c.body_a, c.body_b, c.id, c.patch = geom.body, -1, id_, k
@@ -67,7 +67,7 @@ def enter_ground_contact(s: System, kin: Kinematics, k: int, point: int, id_: in
 
 @compiled
 def enter_limit(s: System, q: np.ndarray, k: int, side: int, id_: int, c: np.record) -> None:
-    """Enter a joint at its lower (0) or upper (1) limit."""
+    """Write to ``c`` joint limit k, lower (``side`` 0) or upper (1); ``id_``: index of its gap."""
     limit = s.joint_limits[k]
     c.kind, c.id, c.patch = LIMIT, id_, -1
     c.body_a, c.body_b, c.dof = s.dof_body[limit.dof], -1, limit.dof
@@ -79,7 +79,7 @@ def enter_limit(s: System, q: np.ndarray, k: int, side: int, id_: int, c: np.rec
 @compiled
 def add_pair_contacts(s: System, contacts: Contacts, kin: Kinematics, k: int, m: int,
                       margin: float, first_id: int) -> int:
-    """Add the points of the patch of pair k to m contacts; returns their number then."""
+    """Append the points of pair k to m contacts in contacts.found. Returns their number then."""
     pair = s.pairs[k]
     a, b = s.geoms[pair.a], s.geoms[pair.b]
     found = collide(placed_shape(s, kin, pair.a), placed_shape(s, kin, pair.b), margin,
@@ -101,12 +101,12 @@ def add_pair_contacts(s: System, contacts: Contacts, kin: Kinematics, k: int, m:
 
 @compiled
 def set_friction_points(s: System, contacts: Contacts, kin: Kinematics, m: int) -> None:
-    """Enter tangents and friction points of m contacts. In a patch, friction acts nearer to its
-    center than the normal forces.
+    """Write tangents and friction points of m contacts, limits excepted, to contacts.found. Those
+    of a patch must be adjacent; friction acts nearer to its center than the normal forces.
 
     Under a uniform pressure p, friction against turning about the center has the moment mu times
     the integral of p times the distance: its lever arm is the mean distance over the patch, not
-    that of its corners.
+    over its corners.
     """
     found, begin = contacts.found, 0
     while begin < m:
@@ -130,8 +130,8 @@ def set_friction_points(s: System, contacts: Contacts, kin: Kinematics, m: int) 
 @compiled
 def contract_to_disc(geom: np.record, k: int, kin: Kinematics, contacts: np.ndarray, begin: int,
                      end: int) -> None:
-    """Set the friction points of the face of a cylinder, geom k, that stands on the ground to two
-    thirds of its radius, the mean distance of a disc's points from its center.
+    """Write friction points of contacts begin to end - 1, the face of cylinder k on the ground: at
+    two thirds of the radius, the mean distance of a disc's points from its center.
     """
     axis = column(kin.geom_rotations[k], 2)
     side = dot(axis, vec(contacts[begin].normal))
@@ -144,7 +144,7 @@ def contract_to_disc(geom: np.record, k: int, kin: Kinematics, contacts: np.ndar
 
 @compiled
 def set_tangents(c: np.record) -> None:
-    """Enter two directions across a contact's normal."""
+    """Write two unit vectors across a contact's normal, and each other, to c.tangents."""
     n = vec(c.normal)
     if abs(n[2]) > 0.7:
         t = 1 - n[0] * n[0], -n[0] * n[1], -n[0] * n[2]

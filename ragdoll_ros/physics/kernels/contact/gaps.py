@@ -1,7 +1,7 @@
-"""Gaps: how far apart is everything that may touch.
+"""Gaps (k,): how far apart is everything that may touch.
 
-In ``gaps``: heights of each geom's points above the ground, m; of each limited joint the distances
-from its lower and its upper limit, rad; of each pair of geoms the separation, m.
+In order: heights of each geom's ground points, m; distances of each limited joint from its lower
+and its upper limit, rad; separations of the pairs of geoms, m, where they are far a lower bound.
 """
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ STILL_OVERLAPPING = 1e-3
 """m: geoms that overlapped at the start collide from when their penetration is less."""
 
 BEYOND_LIMIT = 2e-3
-"""rad by which a joint is outside its limits."""
+"""rad: tolerance by which a joint may be outside its limits."""
 
 DEEP_PENETRATION = 1e-3
-"""m: what is deeper in the ground is corrected whatever the energy it takes."""
+"""m: deeper penetrations into the ground are corrected at whatever cost of energy."""
 
 EXCLUDED = 1e6
 """m: the gap of a pair that does not collide."""
@@ -43,7 +43,7 @@ EXCLUDED = 1e6
 def update_kinematics_and_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray,
                                v: np.ndarray, before: np.ndarray, h: float,
                                out: np.ndarray) -> None:
-    """Let ``kin`` be that of q and v, and enter all gaps into ``out``; see update_gaps()."""
+    """Make ``kin`` that of q and v, with its geoms, and write all gaps to ``out``."""
     forward_kinematics(s.tree, q, v, kin)
     update_gaps(s, ws, kin, q, before, h, out)
 
@@ -51,8 +51,9 @@ def update_kinematics_and_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.
 @compiled
 def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before: np.ndarray,
                 h: float, out: np.ndarray) -> None:
-    """Enter all gaps at q and place the geoms in ``kin``. ``before``: the gaps h s earlier, from
-    which pairs are known to be still apart; h infinite: unknown.
+    """Write all gaps at q to ``out`` (k,) and place the geoms in ``kin``, which is that of q and of
+    the current velocities. ``before``: the gaps h s earlier, from which pairs are known to be far
+    still (h infinite: unknown); may be ``out``. Reads ws.excluded and contacts.motion[].correction.
     """
     place_geoms(s.tree, s.body_root, s.geoms, q, kin)
     n = 0
@@ -82,7 +83,7 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
 
 @compiled
 def motion_bound(motion: np.record, reach: float, h: float) -> float:
-    """Distance, m, that no point of a body within ``reach`` m exceeds in h s."""
+    """Distance, m, that no point within ``reach`` m of a body's center of mass exceeds in h s."""
     return (h * (motion.speed + motion.angular_speed * reach) + motion.correction
             + motion.correction_angle * reach)
 
@@ -90,7 +91,9 @@ def motion_bound(motion: np.record, reach: float, h: float) -> float:
 @compiled
 def ground_gaps(geom: np.record, position: np.ndarray, r: np.ndarray, normal: Vec3, offset: float,
                 out: np.ndarray) -> None:
-    """Enter the heights of a geom's points above the ground; which they are: ground_point()."""
+    """Write the heights, m, of a geom's ground points to ``out`` from geom.first_point on, in the
+    order of ground_point(). ``position``, ``r``: the geom's pose; ``offset``: the ground's.
+    """
     high = dot(vec(position), normal) - offset
     first = geom.first_point
     if high > geom.bounding_radius + FAR:
@@ -127,9 +130,8 @@ def ground_gaps(geom: np.record, position: np.ndarray, r: np.ndarray, normal: Ve
 @compiled
 def ground_point(geom: np.record, k: int, position: np.ndarray, r: np.ndarray,
                  normal: Vec3) -> Vec3:
-    """Point k, m, of a geom that may touch the ground: of a sphere the lowest, of a capsule the
-    lowest of each end, of a box the corners, of each end of a cylinder the lowest and four of its
-    rim.
+    """Ground point k of a geom, world, m: of a sphere the lowest, of a capsule the lowest of each
+    end, of a box the corners, of each end of a cylinder the lowest and four of its rim.
     """
     size = geom.size
     x = y = z = 0.0
@@ -159,9 +161,9 @@ def ground_point(geom: np.record, k: int, position: np.ndarray, r: np.ndarray,
 @compiled
 def enable_separated_pairs(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray,
                            v: np.ndarray) -> bool:
-    """Let excluded pairs collide from now on whose reason is gone: geoms that overlapped have
-    separated, and joints between them are within their limits again. Returns whether there are
-    any; their gaps are not known yet.
+    """Clear flags of ws.excluded whose reason is gone: geoms that overlapped have separated, or
+    joints between them are within their limits again. Returns whether a pair may collide from now
+    on, whose gap is not known yet. ``kin`` becomes that of q and v.
     """
     excluded, some = ws.excluded, False
     for k in range(len(excluded)):
@@ -185,7 +187,7 @@ def enable_separated_pairs(s: System, ws: Workspace, kin: Kinematics, q: np.ndar
 
 @compiled
 def mark_joints_outside(s: System, q: np.ndarray, outside: np.ndarray) -> None:
-    """Enter for each body (n,) whether the joint to its parent is outside its limits."""
+    """Write to ``outside`` (n,) 1 for each body whose joint is outside its limits at q, else 0."""
     for i in range(len(s.tree)):
         outside[i] = 0
     for k in range(len(s.joint_limits)):
@@ -196,7 +198,7 @@ def mark_joints_outside(s: System, q: np.ndarray, outside: np.ndarray) -> None:
 
 @compiled
 def limit_violated_between(s: System, contacts: Contacts, i: int, j: int) -> bool:
-    """Whether a joint on the path between two bodies of a tree is outside its limits."""
+    """Whether a joint on the path between bodies i and j is marked in contacts.joint_outside."""
     while i != j:
         if i < j:
             i, j = j, i
@@ -208,14 +210,14 @@ def limit_violated_between(s: System, contacts: Contacts, i: int, j: int) -> boo
 
 @compiled
 def placed_shape(s: System, kin: Kinematics, k: int) -> Shape:
-    """Geom k where ``kin`` has placed it."""
+    """Geom k at its pose in ``kin``; after place_geoms()."""
     return shape_at(s.geoms[k], kin.geom_positions[k], kin.geom_rotations[k])
 
 
 @compiled
 def pair_gap(s: System, k: int, kin: Kinematics) -> float:
-    """Separation, m, of pair k; of geoms that are farther apart than NEAR a lower bound, by their
-    bounding spheres or their extents along the line of their centers.
+    """Separation, m, of pair k, whose geoms are placed in ``kin``; if farther apart than NEAR a
+    lower bound, by their bounding spheres or their extents along the line of their centers.
     """
     i, j = s.pairs[k].a, s.pairs[k].b
     direction = sub(vec(kin.geom_positions[i]), vec(kin.geom_positions[j]))
@@ -234,12 +236,12 @@ def pair_gap(s: System, k: int, kin: Kinematics) -> float:
 
 @compiled
 def first_joint_limit_gap(s: System, gaps: np.ndarray) -> int:
-    """Index of the first gap that is a joint's from a limit."""
+    """Index of the first gap that is the distance of a joint from a limit."""
     return len(gaps) - len(s.pairs) - 2 * len(s.joint_limits)
 
 
 @compiled
 def is_joint_limit_gap(s: System, gaps: np.ndarray, j: int) -> bool:
-    """Whether gap j is a joint's from a limit, in rad."""
+    """Whether gap j is the distance of a joint from a limit, rad (else m)."""
     first = first_joint_limit_gap(s, gaps)
     return first <= j < first + 2 * len(s.joint_limits)

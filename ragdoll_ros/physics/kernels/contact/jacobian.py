@@ -1,4 +1,4 @@
-"""Rows of contacts: their Jacobians, of normal, tangents and rolling."""
+"""Rows of contacts: the Jacobian J of their normal, tangents and rolling."""
 from __future__ import annotations
 
 import numpy as np
@@ -14,9 +14,9 @@ from ..workspace import Island
 @compiled
 def contact_jacobian(s: System, kin: Kinematics, q: np.ndarray, island: Island, c: np.record,
                      index: int, v: np.ndarray, v_free: np.ndarray) -> None:
-    """Enter the Jacobian of contact ``index`` into island.Y from row c.first_row on, and the
-    degrees of freedom that it depends on, descending, into island.support; its velocities under
-    ``v_free`` into island.rhs, under v into island.start_velocity.
+    """Write the Jacobian of contact c, found[index], to island.Y from row c.first_row on, the
+    degrees of freedom of its columns, descending, to island.support[index], their number to
+    c.dof_count; the velocities under ``v_free`` to island.rhs, under v to island.start_velocity.
     """
     row, Y, support = c.first_row, island.Y, island.support[index]
     b, was = island.rhs, island.start_velocity
@@ -61,8 +61,8 @@ def root_of(s: System, q: np.ndarray, body: int) -> Vec3:
 @compiled
 def add_jacobian_column(axis: np.ndarray, root: Vec3, c: np.record, sign: float, Y: np.ndarray,
                         j: int) -> None:
-    """Add what a degree of freedom with motion subspace ``axis``, about ``root``, contributes to
-    column j of a contact's rows.
+    """Add to column j of a contact's rows in Y, times ``sign``, their velocities per unit rate of
+    the degree of freedom with motion subspace ``axis`` about ``root``, m.
     """
     row, turn = c.first_row, vec(axis)
     n, t, w = vec(c.normal), vec(c.tangents[0]), vec(c.tangents[1])
@@ -79,7 +79,7 @@ def add_jacobian_column(axis: np.ndarray, root: Vec3, c: np.record, sign: float,
 @compiled
 def apply_inverse_factor(dof_parent: np.ndarray, L: np.ndarray, island: Island, index: int,
                          c: np.record) -> None:
-    """Replace the rows J of contact ``index`` by J L^-1, where L^T L is the mass matrix."""
+    """Replace the rows J of contact c, found[index], by J L^-1; mass matrix L^T L."""
     Y, place, support = island.Y, island.place, island.support[index]
     for n in range(c.dof_count):
         place[support[n]] = n
@@ -96,7 +96,7 @@ def apply_inverse_factor(dof_parent: np.ndarray, L: np.ndarray, island: Island, 
 @compiled
 def contact_velocities(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray,
                        c: np.record) -> None:
-    """Enter the velocities along a contact's rows into c.start_velocity; ``kin``: of q and v."""
+    """Write the velocities along a contact's rows to c.start_velocity; ``kin``: of q and v."""
     start = c.start_velocity
     if c.kind == LIMIT:
         start[0] = c.limit_sign * v[c.dof]

@@ -1,4 +1,4 @@
-"""Friction of a contact patch that acts as that of its whole area would."""
+"""Friction points of a contact patch, so that its friction acts as that of its whole area."""
 from __future__ import annotations
 
 import math
@@ -17,8 +17,8 @@ DEGENERATE = 1e-3
 
 @compiled
 def contract_friction_points(contacts: Contacts, begin: int, end: int) -> None:
-    """Move the friction points of one patch towards its center, by the mean distance of its area
-    over that of its corners.
+    """Move the friction points of contacts begin to end - 1, a patch, towards its center, by the
+    mean distance of its area over that of its corners.
     """
     found, count = contacts.found, end - begin
     center = 0.0, 0.0, 0.0
@@ -43,8 +43,8 @@ def contract_friction_points(contacts: Contacts, begin: int, end: int) -> None:
 @compiled
 def sort_corners(contacts: Contacts, begin: int, end: int,
                  center: tuple[float, float, float]) -> float:
-    """Enter the points of a patch along its tangents, in the order of their angles about its
-    center, into u and v; returns their mean distance from it, m.
+    """Write the points of a patch from its center along its tangents, m, to contacts.u and
+    contacts.v, sorted by angle. Returns their mean distance from the center, m.
     """
     found, angles, us, vs = contacts.found, contacts.angles, contacts.u, contacts.v
     t, w, corners = vec(found[begin].tangents[0]), vec(found[begin].tangents[1]), 0.0

@@ -1,1 +1,1 @@
-"""How trees of bodies move in the air: kinematics, mass matrices, accelerations."""
+"""Dynamics of kinematic trees without contacts: kinematics, mass matrices, accelerations."""

@@ -15,11 +15,10 @@ from .kinematics import Kinematics, inertia_times, linear, put_spatial, velocity
 @compiled
 def bias_forces(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, v: np.ndarray,
                 kin: Kinematics, dyn: Dynamics, out: np.ndarray) -> None:
-    """Enter the generalized forces (nv,) of gravity, loads and the velocity-dependent terms into
-    ``out``: H dv/dt where no joint is damped.
+    """Write to ``out`` (nv,) the generalized forces of gravity, loads and the velocity-dependent
+    terms: H dv/dt where no joint is damped.
 
-    The spatial velocities of ``kin`` (with inertias and the roots' motion subspaces) are those of
-    the motion; v (nv,) are the velocities at which the joints' axes turn.
+    ``kin``: of velocities v (nv,), with inertias and the roots' motion subspaces. ``dyn``: scratch.
     """
     for i in range(len(tree)):
         newton_euler_forward(tree, i, gravity, v, kin, dyn)
@@ -43,7 +42,7 @@ def bias_forces(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, v: np.
 @compiled
 def newton_euler_forward(tree: np.ndarray, i: int, gravity: np.ndarray, v: np.ndarray,
                          kin: Kinematics, dyn: Dynamics) -> None:
-    """Enter the spatial acceleration of body i at dv/dt = 0, and the force that it asks for."""
+    """Write dyn.accelerations[i] at dv/dt = 0, and the force it takes to dyn.bias_forces[i]."""
     body, velocity, acceleration = tree[i], kin.spatial_velocities[i], dyn.accelerations[i]
     w = vec(velocity)
     if body.parent < 0:
@@ -62,7 +61,7 @@ def newton_euler_forward(tree: np.ndarray, i: int, gravity: np.ndarray, v: np.nd
 @compiled
 def add_axis_accelerations(tree: np.ndarray, i: int, v: np.ndarray, kin: Kinematics,
                            dyn: Dynamics) -> None:
-    """Enter the spatial acceleration of body i: its parent's and that of its turning axes."""
+    """Write dyn.accelerations[i]: the parent's plus the rate-dependent terms of the joint."""
     body, acceleration = tree[i], dyn.accelerations[i]
     carrier = kin.spatial_velocities[body.parent]
     w, u = vec(carrier), linear(carrier)

@@ -11,27 +11,10 @@ import numpy as np
 
 from ..compiling.decorators import compiled, inlined
 from ..maths.cholesky import solve
-from ..maths.vectors import (
-    add,
-    add_scaled,
-    cross,
-    quat,
-    quat_mul,
-    quat_rotate_inverse,
-    quat_to_matrix,
-    scale,
-    sub,
-    vec,
-)
-from .kinematics import (
-    Kinematics,
-    forward_kinematics,
-    inertial_frame,
-    linear,
-    point_of_body,
-    put_spatial,
-    root_orientation,
-)
+from ..maths.vectors import (add, add_scaled, cross, quat, quat_mul, quat_rotate_inverse,
+                             quat_to_matrix, scale, sub, vec)
+from .kinematics import (Kinematics, forward_kinematics, inertial_frame, linear, point_of_body,
+                         put_spatial, root_orientation)
 from .loads import load_in_world
 
 COMPOSITE_INERTIA = np.dtype([('mass', float), ('moment', float, 3), ('inertia', float, 6)],
@@ -49,7 +32,7 @@ bias forces (n, 6); spatial accelerations (n, 6); bias accelerations (nv, 6) of 
 
 
 def make_dynamics(bodies: int, dofs: int) -> Dynamics:
-    """Arrays of these sizes."""
+    """Allocate zeroed scratch for so many bodies and degrees of freedom."""
     return Dynamics(np.zeros((bodies, 6, 6)), np.zeros((bodies, 6)), np.zeros((bodies, 6)),
                     np.zeros((dofs, 6)), np.zeros((dofs, 6)), np.zeros(dofs), np.zeros(dofs),
                     np.zeros(bodies, COMPOSITE_INERTIA), np.zeros((dofs, dofs)), np.zeros((3, 3)))
@@ -58,7 +41,7 @@ def make_dynamics(bodies: int, dofs: int) -> Dynamics:
 @compiled
 def forward_dynamics(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray,
                      v: np.ndarray, kin: Kinematics, dyn: Dynamics, out: np.ndarray) -> None:
-    """Enter dv/dt (nv,) at q and v under gravity (3,) m/s^2, loads and joint damping into ``out``.
+    """Write to ``out`` dv/dt (nv,) at q and v under gravity (3,) m/s^2, loads and joint damping.
     ``kin`` becomes that of q and v.
     """
     forward_kinematics(tree, q, v, kin)
@@ -85,7 +68,7 @@ def forward_dynamics(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q
 @inlined
 def begin_articulated_body(body: np.record, i: int, kin: Kinematics, loads: np.ndarray,
                            dyn: Dynamics) -> None:
-    """Enter a body's spatial inertia, and its bias force: v x* I v less the loads on it."""
+    """Write dyn.articulated_inertias[i], and dyn.bias_forces[i]: v x* I v less the loads."""
     matrix, inertia, bias = dyn.matrix, dyn.articulated_inertias[i], dyn.bias_forces[i]
     com, velocity = kin.positions[i], kin.spatial_velocities[i]
     quat_to_matrix(inertial_frame(body, kin, i), matrix)
@@ -122,7 +105,7 @@ def begin_articulated_body(body: np.record, i: int, kin: Kinematics, loads: np.n
 @compiled
 def subtract_load(body: np.record, i: int, kin: Kinematics, load: np.record,
                   bias: np.ndarray) -> None:
-    """Subtract a load on body i from its bias force (6,)."""
+    """Subtract a load on body i from its bias force ``bias`` (6,)."""
     force, torque = load_in_world(body, kin, i, load)
     moment = cross(point_of_body(body, kin, i, load.point), force)
     put_spatial(bias, sub(vec(bias), add(torque, moment)), sub(linear(bias), force))
@@ -130,7 +113,9 @@ def subtract_load(body: np.record, i: int, kin: Kinematics, load: np.record,
 
 @inlined
 def aba_backward(body: np.record, i: int, v: np.ndarray, kin: Kinematics, dyn: Dynamics) -> None:
-    """Add a body's articulated inertia and bias force to its parent's, across the joint's axes."""
+    """Second pass, after all children of body i: write U, D_inverse, u and bias accelerations of
+    its joint, and add the articulated inertia and bias force that it transmits to the parent's.
+    """
     inertia, bias = dyn.articulated_inertias[i], dyn.bias_forces[i]
     # an axis is carried by a body that moves as this one does less that axis and those after it
     carrier = kin.spatial_velocities[body.parent if body.has_quaternion else i]
@@ -170,7 +155,9 @@ def aba_backward(body: np.record, i: int, v: np.ndarray, kin: Kinematics, dyn: D
 
 @inlined
 def aba_forward(body: np.record, i: int, kin: Kinematics, dyn: Dynamics, out: np.ndarray) -> None:
-    """Replace a body's bias force by its spatial acceleration, and enter its joint's dv/dt."""
+    """Third pass, after the parent of body i: dyn.bias_forces[i] becomes its spatial acceleration;
+    write dv/dt of its joint to ``out`` (nv,).
+    """
     acceleration = dyn.bias_forces[i]
     for k in range(6):
         acceleration[k] = dyn.bias_forces[body.parent, k]
@@ -188,7 +175,7 @@ def aba_forward(body: np.record, i: int, kin: Kinematics, dyn: Dynamics, out: np
 @compiled
 def state_derivative(tree: np.ndarray, gravity: np.ndarray, loads: np.ndarray, q: np.ndarray,
                      v: np.ndarray, kin: Kinematics, dyn: Dynamics, out: np.ndarray) -> None:
-    """Enter dq/dt and dv/dt (nq + nv,); ``kin`` becomes that of q and v."""
+    """Write to ``out`` dq/dt and dv/dt (nq + nv,) at q and v; ``kin`` becomes that of q and v."""
     for i in range(len(tree)):
         body = tree[i]
         at, dof = body.q_start, body.v_start

@@ -14,18 +14,8 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..maths.transcendental import sine_and_cosine
-from ..maths.vectors import (
-    Quat,
-    Vec3,
-    add,
-    cross,
-    put,
-    quat,
-    quat_mul,
-    quat_rotate,
-    quat_to_matrix,
-    vec,
-)
+from ..maths.vectors import (Quat, Vec3, add, cross, put, quat, quat_mul, quat_rotate,
+                             quat_to_matrix, vec)
 
 Kinematics = collections.namedtuple(
     'Kinematics', 'orientations positions spatial_velocities motion_subspaces inertias '
@@ -39,7 +29,7 @@ are needed, by rotate_inertias() and place_geoms()."""
 
 
 def make_kinematics(bodies: int, dofs: int, geoms: int) -> Kinematics:
-    """Arrays of these sizes."""
+    """Allocate zeroed arrays for so many bodies, degrees of freedom and geoms."""
     return Kinematics(np.zeros((bodies, 4)), np.zeros((bodies, 3)), np.zeros((bodies, 6)),
                       np.zeros((dofs, 6)), np.zeros((bodies, 6)), np.zeros((geoms, 3)),
                       np.zeros((geoms, 3, 3)))
@@ -47,7 +37,7 @@ def make_kinematics(bodies: int, dofs: int, geoms: int) -> Kinematics:
 
 @compiled
 def put_spatial(row: np.ndarray, angular: Vec3, linear: Vec3) -> None:
-    """Store a spatial vector in a row (6,)."""
+    """Write a spatial vector to ``row`` (6,)."""
     row[0], row[1], row[2] = angular
     row[3], row[4], row[5] = linear
 
@@ -60,19 +50,19 @@ def linear(row: np.ndarray) -> Vec3:
 
 @compiled
 def root_orientation(q: np.ndarray, start: int) -> Quat:
-    """Orientation of a root whose coordinates begin at ``start``."""
+    """Orientation (x, y, z, w) of a root whose coordinates begin at ``start`` in q."""
     return q[start + 3], q[start + 4], q[start + 5], q[start + 6]
 
 
 @compiled
 def root_position(q: np.ndarray, start: int) -> Vec3:
-    """Position, m, of a root whose coordinates begin at ``start``."""
+    """Position, m, of a root whose coordinates begin at ``start`` in q."""
     return q[start], q[start + 1], q[start + 2]
 
 
 @compiled
 def combine_axes(axes: np.ndarray, a: Vec3) -> Vec3:
-    """Sum of the rows of ``axes`` (3, 3), each times a number."""
+    """Sum of the rows of ``axes`` (3, 3), each times an entry of a."""
     return (axes[0, 0] * a[0] + axes[1, 0] * a[1] + axes[2, 0] * a[2],
             axes[0, 1] * a[0] + axes[1, 1] * a[1] + axes[2, 1] * a[2],
             axes[0, 2] * a[0] + axes[1, 2] * a[1] + axes[2, 2] * a[2])
@@ -80,7 +70,7 @@ def combine_axes(axes: np.ndarray, a: Vec3) -> Vec3:
 
 @compiled
 def forward_kinematics(tree: np.ndarray, q: np.ndarray, v: np.ndarray, kin: Kinematics) -> None:
-    """Enter orientations, positions, spatial velocities and joints' motion subspaces at q, v."""
+    """Write ``kin`` at q and v: orientations, positions, velocities, joints' motion subspaces."""
     orientations, positions = kin.orientations, kin.positions
     velocities, subspaces = kin.spatial_velocities, kin.motion_subspaces
     for i in range(len(tree)):
@@ -118,13 +108,13 @@ def forward_kinematics(tree: np.ndarray, q: np.ndarray, v: np.ndarray, kin: Kine
 
 @compiled
 def put_quat(row: np.ndarray, q: Quat) -> None:
-    """Store a quaternion in a row (4,)."""
+    """Write a quaternion to ``row`` (4,): x, y, z, w."""
     row[0], row[1], row[2], row[3] = q
 
 
 @compiled
 def update_velocities(tree: np.ndarray, q: np.ndarray, v: np.ndarray, kin: Kinematics) -> None:
-    """Enter the spatial velocities at v, where the rest of ``kin`` is that of q already."""
+    """Write the spatial velocities at v to ``kin``, whose other fields are those of q."""
     velocities = kin.spatial_velocities
     for i in range(len(tree)):
         body, own = tree[i], velocities[i]
@@ -144,7 +134,7 @@ def update_velocities(tree: np.ndarray, q: np.ndarray, v: np.ndarray, kin: Kinem
 
 @compiled
 def root_motion_subspaces(tree: np.ndarray, q: np.ndarray, kin: Kinematics) -> None:
-    """Enter the motion subspaces of the roots' six degrees of freedom."""
+    """Write the motion subspaces of the roots' six degrees of freedom at q to ``kin``."""
     for i in range(len(tree)):
         if tree[i].parent < 0:
             turn, dof = root_orientation(q, tree[i].q_start), tree[i].v_start
@@ -157,13 +147,13 @@ def root_motion_subspaces(tree: np.ndarray, q: np.ndarray, kin: Kinematics) -> N
 
 @compiled
 def inertial_frame(body: np.record, kin: Kinematics, i: int) -> Quat:
-    """Orientation in the world of the principal axes of body i."""
+    """Orientation (x, y, z, w) in the world of the principal axes of body i."""
     return quat_mul(quat(kin.orientations[i]), quat(body.inertial_orientation))
 
 
 @compiled
 def rotate_inertias(tree: np.ndarray, kin: Kinematics, matrix: np.ndarray) -> None:
-    """Enter the bodies' inertias along the world's axes. ``matrix`` (3, 3): scratch."""
+    """Write kin.inertias; after forward_kinematics(). ``matrix`` (3, 3): scratch."""
     for i in range(len(tree)):
         body = tree[i]
         quat_to_matrix(inertial_frame(body, kin, i), matrix)
@@ -179,7 +169,7 @@ def rotate_inertias(tree: np.ndarray, kin: Kinematics, matrix: np.ndarray) -> No
 
 @compiled
 def point_of_body(body: np.record, kin: Kinematics, i: int, point: np.ndarray) -> Vec3:
-    """A point (3,) m of body i, along its own axes from its center of mass, from the root, m."""
+    """Position, m, from the root of a point (3,) m given along the principal axes of body i."""
     return add(vec(kin.positions[i]), quat_rotate(inertial_frame(body, kin, i), vec(point)))
 
 
@@ -200,7 +190,7 @@ def body_velocity(kin: Kinematics, i: int) -> tuple[Vec3, float]:
 
 @compiled
 def inertia_times(inertia: np.ndarray, w: Vec3) -> Vec3:
-    """Product of an inertia (6,) with a vector."""
+    """Product of an inertia (6,), xx, xy, xz, yy, yz, zz, with a vector."""
     return (inertia[0] * w[0] + inertia[1] * w[1] + inertia[2] * w[2],
             inertia[1] * w[0] + inertia[3] * w[1] + inertia[4] * w[2],
             inertia[2] * w[0] + inertia[4] * w[1] + inertia[5] * w[2])
@@ -209,7 +199,7 @@ def inertia_times(inertia: np.ndarray, w: Vec3) -> Vec3:
 @compiled
 def integrate_positions(tree: np.ndarray, q: np.ndarray, v: np.ndarray, h: float,
                         out: np.ndarray) -> None:
-    """Enter into ``out`` the coordinates that steady velocities v lead to in h s."""
+    """Write to ``out`` (nq,) the coordinates after h s at constant v; it may be q itself."""
     for i in range(len(tree)):
         body = tree[i]
         at, dof = body.q_start, body.v_start
@@ -244,7 +234,7 @@ def normalize(tree: np.ndarray, q: np.ndarray) -> None:
 @compiled
 def place_geoms(tree: np.ndarray, body_root: np.ndarray, geoms: np.ndarray, q: np.ndarray,
                 kin: Kinematics) -> None:
-    """Enter positions and rotations of all geoms in the world."""
+    """Write kin.geom_positions and kin.geom_rotations; after forward_kinematics() at q."""
     for k in range(len(geoms)):
         geom = geoms[k]
         i = geom.body

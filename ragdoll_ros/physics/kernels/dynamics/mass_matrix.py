@@ -18,7 +18,7 @@ from .kinematics import Kinematics, linear
 
 @compiled
 def composite_inertias(tree: np.ndarray, kin: Kinematics, composite: np.ndarray) -> None:
-    """Enter the inertias (n,) of all subtrees; ``kin`` has the bodies' own inertias."""
+    """Write the inertias of all subtrees to ``composite`` (n,); after rotate_inertias()."""
     for i in range(len(tree)):
         m, own, row = tree[i].mass, kin.inertias[i], composite[i]
         x, y, z = vec(kin.positions[i])
@@ -44,7 +44,9 @@ def composite_inertias(tree: np.ndarray, kin: Kinematics, composite: np.ndarray)
 @compiled
 def mass_matrix(tree: np.ndarray, dof_parent: np.ndarray, dof_body: np.ndarray, kin: Kinematics,
                 dyn: Dynamics) -> None:
-    """Enter the lower triangle of the mass matrix into dyn.H, where it is not zero by structure."""
+    """Write the mass matrix to the lower triangle of dyn.H, where it is not zero by structure, and
+    dyn.composite_inertias. ``kin`` has all motion subspaces, also the roots', and inertias.
+    """
     composite_inertias(tree, kin, dyn.composite_inertias)
     for d in range(len(dof_parent)):
         axis, subtree = kin.motion_subspaces[d], dyn.composite_inertias[dof_body[d]]
@@ -66,7 +68,7 @@ def mass_matrix(tree: np.ndarray, dof_parent: np.ndarray, dof_body: np.ndarray, 
 
 @compiled
 def factor_ltl(H: np.ndarray, dof_parent: np.ndarray) -> None:
-    """Replace H by its factor L, H = L^T L."""
+    """Replace the lower triangle of H (nv, nv) by its factor L, H = L^T L."""
     for k in range(len(dof_parent) - 1, -1, -1):
         H[k, k] = math.sqrt(H[k, k])
         inverse, i = 1 / H[k, k], dof_parent[k]
@@ -84,7 +86,7 @@ def factor_ltl(H: np.ndarray, dof_parent: np.ndarray) -> None:
 
 @compiled
 def solve_lower(L: np.ndarray, dof_parent: np.ndarray, x: np.ndarray) -> None:
-    """Solve L x = b in place."""
+    """Solve L x = b in place: x (nv,) holds b before."""
     for i in range(len(dof_parent)):
         s, j = x[i], dof_parent[i]
         while j >= 0:
@@ -95,7 +97,7 @@ def solve_lower(L: np.ndarray, dof_parent: np.ndarray, x: np.ndarray) -> None:
 
 @compiled
 def solve_upper(L: np.ndarray, dof_parent: np.ndarray, x: np.ndarray) -> None:
-    """Solve L^T x = b in place."""
+    """Solve L^T x = b in place: x (nv,) holds b before."""
     for i in range(len(dof_parent) - 1, -1, -1):
         x[i] /= L[i, i]
         s, j = x[i], dof_parent[i]

@@ -1,1 +1,1 @@
-"""Where nothing touches: steps of order 8 up to the located instant of the next touch."""
+"""Flight, where nothing touches: steps of order 8 up to the time of the next contact."""

@@ -32,7 +32,9 @@ ACCELERATION_FACTOR = 1.5
 
 @compiled
 def dop853_step(s: System, ws: Workspace, cluster: ClusterState, h: float) -> float:
-    """Enter the step of h s from cluster.q and cluster.v. Returns its error, m or rad."""
+    """Compute a step of h s from cluster.q and v: write its polynomial to cluster.dense_output and
+    the state derivatives at its ends to cluster.end_rates. Returns its error, m or rad.
+    """
     tree, flight = s.tree, ws.flight
     q, v, dense, rates, k, y = (cluster.q, cluster.v, cluster.dense_output, cluster.end_rates,
                                 flight.stages, flight.derivative)
@@ -72,7 +74,7 @@ def dop853_step(s: System, ws: Workspace, cluster: ClusterState, h: float) -> fl
 @compiled
 def evaluate_dense_step(tree: np.ndarray, cluster: ClusterState, time: float, q: np.ndarray,
                         v: np.ndarray) -> None:
-    """Enter coordinates and velocities at an instant of the step, s from its start."""
+    """Write coordinates and velocities ``time`` s after the step's start to q (nq,) and v (nv,)."""
     nq, dense = len(q), cluster.dense_output
     share = time / cluster.dense_step[0].length
     for j in range(nq + len(v)):
@@ -90,7 +92,7 @@ def evaluate_dense_step(tree: np.ndarray, cluster: ClusterState, time: float, q:
 @compiled
 def begin_dense_step(s: System, ws: Workspace, cluster: ClusterState, tolerance: float,
                      longest: float) -> bool:
-    """Make a step from cluster.q and cluster.v, as long as its error allows, at most ``longest`` s.
+    """Make a dense step from cluster.q and v, as long as its error allows, at most ``longest`` s.
     Returns whether one was found whose error is at most ``tolerance``, m or rad.
     """
     step = cluster.dense_step[0]
@@ -116,7 +118,7 @@ def begin_dense_step(s: System, ws: Workspace, cluster: ClusterState, tolerance:
 
 @compiled
 def first_length(s: System, ws: Workspace, cluster: ClusterState) -> float:
-    """Length, s, of the first step that is tried."""
+    """Length, s, of the first step that is tried, by the fastest body's angular speed."""
     kin, fast = ws.flight.kinematics, 1e-9
     forward_kinematics(s.tree, cluster.q, cluster.v, kin)
     for i in range(len(s.tree)):
@@ -127,8 +129,8 @@ def first_length(s: System, ws: Workspace, cluster: ClusterState) -> float:
 
 @compiled
 def acceleration_bounds(s: System, ws: Workspace, cluster: ClusterState) -> tuple[float, float]:
-    """Acceleration, m/s^2, that no point exceeds in the step, and that none exceeds relative to
-    free fall, from the velocities at its ends.
+    """Bounds, m/s^2, on the acceleration of all points in the step, and on that relative to free
+    fall, estimated from the velocities at its ends. Overwrites ws.flight.
     """
     flight, h, motion = ws.flight, cluster.dense_step[0].length, ws.flight.motion
     kin, gravity = flight.kinematics, vec(s.gravity)

@@ -72,9 +72,8 @@ _ERRORS = (
 )
 
 
-
 def _filled(rows: tuple, wide: int) -> np.ndarray:
-    """Rows of (place, number), as a matrix."""
+    """Matrix whose rows have these numbers in these places, else zero."""
     filled = np.zeros((len(rows), wide))
     for row, numbers in enumerate(rows):
         for place, number in numbers:
@@ -83,22 +82,22 @@ def _filled(rows: tuple, wide: int) -> np.ndarray:
 
 
 STAGES = _filled(((), *_STAGES), 16)
-"""(16, 16): what of the rates of all stages leads from the start to each stage, times the step.
+"""(16, 16): weights of the derivatives of all stages, times the step, for the state at each stage.
 Stage 12 is the end of the step, where the next one begins; the last three only serve CONTINUED."""
 
 CONTINUED = _filled(_CONTINUED, 16)
-"""(4, 16): the upper terms of the polynomial between start and end."""
+"""(4, 16): weights for the upper terms of the polynomial between start and end."""
 
 ERRORS = _filled(_ERRORS, 16)
-"""(2, 16): from the rates of all stages to the differences from methods of order 5 and 3."""
+"""(2, 16): weights for the differences from methods of order 5 and 3."""
 
 SLOWEST = 0.1
-"""s: an error of 1 in a velocity counts as much as one of this in its coordinate."""
+"""s: weight of the error of a velocity relative to that of its coordinate."""
 
 
 @compiled
 def weighted_sum(weights: np.ndarray, count: int, k: np.ndarray, h: float, out: np.ndarray) -> None:
-    """Enter the weighted sum of the derivatives of ``count`` stages, times h."""
+    """Write the weighted sum of the derivatives k of ``count`` stages, times h, to ``out``."""
     for j in range(len(out)):
         out[j] = 0.0
     for stage in range(count):
@@ -110,8 +109,8 @@ def weighted_sum(weights: np.ndarray, count: int, k: np.ndarray, h: float, out: 
 
 @compiled
 def step_error(k: np.ndarray, h: float, nq: int, room: np.ndarray) -> float:
-    """DOP853's estimate of the error of its order 8 (Hairer, Norsett, Wanner, II.10); infinity if a
-    number is not finite. ``room`` (nq + nv,): scratch.
+    """DOP853's estimate of the error of its order 8 (Hairer, Norsett, Wanner, II.10), m or rad;
+    infinity if a number is not finite. ``room`` (nq + nv,): scratch.
     """
     fifth, third, all_of_it = 0.0, 0.0, 0.0
     weighted_sum(ERRORS[0], 16, k, h, room)

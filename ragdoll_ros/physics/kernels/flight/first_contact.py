@@ -1,4 +1,4 @@
-"""The first contact along a step of flight: its time is sought once, when the step is made."""
+"""Time of impact in flight: the first contact along a step, sought once, when the step is made."""
 from __future__ import annotations
 
 import math
@@ -8,14 +8,8 @@ import numpy as np
 from ..cluster_state import ClusterState
 from ..collision.narrow_phase import collide
 from ..compiling.decorators import compiled
-from ..contact.gaps import (
-    FAR,
-    NEAR,
-    TOUCHING,
-    ground_point,
-    placed_shape,
-    update_kinematics_and_gaps,
-)
+from ..contact.gaps import (FAR, NEAR, TOUCHING, ground_point, placed_shape,
+                            update_kinematics_and_gaps)
 from ..contact.jacobian import root_of
 from ..dynamics.kinematics import Kinematics, body_velocity, velocity_at
 from ..maths.vectors import Vec3, dot, norm, sub, vec
@@ -30,7 +24,7 @@ MAX_SAMPLES = 400
 """Instants of one step at which gaps are computed."""
 
 MAX_ITERATIONS = 62
-"""Of regula falsi."""
+"""Iterations of regula falsi."""
 
 LEAST_CHANGE = 1e-3
 """rad/s^2 that a joint's acceleration may reach, however small it is at the ends of a step."""
@@ -38,7 +32,7 @@ LEAST_CHANGE = 1e-3
 
 @compiled
 def time_to_close(gap: float, closing: float, acceleration: float) -> float:
-    """Least time, s, in which a gap that closes at a speed may close entirely."""
+    """Least time, s, for a gap that closes at a speed to close, by a bound on acceleration."""
     if gap <= 0.0:
         return 0.0 if closing > 0 else -2 * closing / acceleration
     root = math.sqrt(closing * closing + 2 * acceleration * gap)
@@ -47,17 +41,17 @@ def time_to_close(gap: float, closing: float, acceleration: float) -> float:
 
 @compiled
 def gap_to_contact(gaps: np.ndarray, armed: np.ndarray, j: int) -> float:
-    """Gap that is left until contact; what touched at the start must penetrate first."""
+    """Gap j left until contact: unarmed, it touched at the start and must penetrate first."""
     return gaps[j] if armed[j] > 0 else gaps[j] + 2 * TOUCHING
 
 
 @compiled
 def time_without_contact(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, v: np.ndarray,
-                         gaps: np.ndarray, acceleration: float, relative: float,
-                         end_rates: np.ndarray) -> float:
-    """Least time, s, until a gap may close; ``kin`` is that of q and v, with its geoms.
-
-    No point exceeds ``acceleration``, m/s^2, nor ``relative`` relative to free fall. ``end_rates``
+                         gaps: np.ndarray, acceleration: float,
+                         acceleration_in_free_fall: float, end_rates: np.ndarray) -> float:
+    """Least time, s, until a gap may close; ``kin`` is that of q and v, with its geoms. Reads
+    flight.armed, overwrites contacts.manifold. No point exceeds ``acceleration``, m/s^2, nor
+    ``acceleration_in_free_fall``, relative to free fall, which a pair counts twice. ``end_rates``
     (2, nq + nv): state derivatives at the ends of the step, for those of the limited joints.
     """
     least, n, armed = math.inf, 0, ws.flight.armed
@@ -88,14 +82,14 @@ def time_without_contact(s: System, ws: Workspace, kin: Kinematics, q: np.ndarra
     for k in range(len(s.pairs)):
         closing = pair_closing_speed(s, ws, kin, q, k, gaps[n + k])
         least = min(least, time_to_close(gap_to_contact(gaps, armed, n + k), closing,
-                                         2 * relative))
+                                         2 * acceleration_in_free_fall))
     return least
 
 
 @compiled
 def normal_velocity(s: System, kin: Kinematics, q: np.ndarray, body: int, point: Vec3,
                     normal: Vec3) -> float:
-    """Velocity, m/s, of a body's point in the world along ``normal``."""
+    """Velocity, m/s, along ``normal`` of a body's point that is at ``point``, m, world."""
     return dot(normal, velocity_at(kin, body, sub(point, root_of(s, q, body))))
 
 
@@ -123,7 +117,8 @@ def pair_closing_speed(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray,
 
 @compiled
 def find_first_contact(s: System, ws: Workspace, cluster: ClusterState) -> None:
-    """Enter the time of the first contact along the step.
+    """Write the time of the first contact along the step to dense_step.event_time, s; if there is
+    none, it stays infinite.
 
     By conservative advancement (Mirtich 1996): no gap closes before its speed and the largest
     acceleration allow, and near a contact these steps converge as Newton's. Where a gap is found
@@ -159,14 +154,14 @@ def find_first_contact(s: System, ws: Workspace, cluster: ClusterState) -> None:
 
 @compiled
 def arm_gaps(ws: Workspace) -> None:
-    """Let gaps count as contacts when they close, of what does not touch already."""
+    """Write flight.armed: 1 for gaps that do not touch, whose closing is a contact, else 0."""
     for j in range(len(ws.gaps)):
         ws.flight.armed[j] = 1.0 if ws.gaps[j] > TOUCHING else 0.0
 
 
 @compiled
 def least_gap(gaps: np.ndarray, armed: np.ndarray) -> float:
-    """Least gap, m or rad, of those that count; what has separated counts from now on."""
+    """Least gap, m or rad, by gap_to_contact(); arms gaps that have separated."""
     least = math.inf
     for j in range(len(gaps)):
         if armed[j] > 0:
@@ -181,7 +176,7 @@ def least_gap(gaps: np.ndarray, armed: np.ndarray) -> float:
 @compiled
 def regula_falsi(s: System, ws: Workspace, cluster: ClusterState, early: float,
                  late: float) -> float:
-    """Time, s, between two at which the least gap closes."""
+    """Time, s, between ``early`` and ``late`` at which the least gap closes."""
     flight, gaps = ws.flight, ws.contacts.gaps_end
     above = below = 0.0
     time = early

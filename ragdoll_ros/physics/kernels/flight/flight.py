@@ -1,6 +1,4 @@
-"""Flight: whether everything that touches separates, and the motion along a step with dense output
-to its end or its first contact.
-"""
+"""Flight: whether everything that touches separates, and the motion along a dense step."""
 from __future__ import annotations
 
 import math
@@ -43,8 +41,8 @@ GAUSS_LEGENDRE = (
 
 @compiled
 def can_fly(s: System, ws: Workspace, cluster: ClusterState, nominal: float) -> bool:
-    """Whether everything that touches separates, and for long enough; ws.gaps are those of now.
-    ``nominal``: length of a contact step, s.
+    """Whether everything that touches separates, and for long enough; ws.gaps are current.
+    ``nominal``: length of a contact step, s. Overwrites contacts.found and ws.flight.
     """
     q, v, stats, flight = cluster.q, cluster.v, ws.stats[0], ws.flight
     kin, g = flight.kinematics, norm(vec(s.gravity))
@@ -72,7 +70,7 @@ def can_fly(s: System, ws: Workspace, cluster: ClusterState, nominal: float) -> 
 
 @compiled
 def contacts_separate(s: System, ws: Workspace, cluster: ClusterState, m: int) -> bool:
-    """Whether all of m contacts separate, and no joint presses on a limit that it leans on."""
+    """Whether all m contacts found separate, and no joint presses on a limit it leans on."""
     q, v, flight = cluster.q, cluster.v, ws.flight
     kin, leaning = flight.kinematics, False
     for i in range(m):
@@ -102,8 +100,8 @@ def contacts_separate(s: System, ws: Workspace, cluster: ClusterState, m: int) -
 @compiled
 def follow_dense_step(s: System, ws: Workspace, cluster: ClusterState,
                       left: float) -> tuple[float, bool]:
-    """Advance along the step by ``left`` s, or to its end or its first contact. Returns the time
-    advanced, and whether something touches.
+    """Advance cluster.q and v along the step by ``left`` s, or to its end or its first contact.
+    Returns the time advanced, s, and whether something touches.
     """
     step, flight, loads = cluster.dense_step[0], ws.flight, cluster.loads
     end = min(step.length, step.event_time)

@@ -1,5 +1,5 @@
-"""Active set method for all rows of an island at once, where the problem is convex: friction none,
-or without limit.
+"""Active set method for all rows of an island at once, where the problem is convex: friction is
+zero or unlimited.
 
 Then impulses minimize p W p / 2 + b p with normal ones non-negative. The active set method (Nocedal
 and Wright, Numerical Optimization, 16.5; Lawson and Hanson's non-negative least squares) goes
@@ -17,7 +17,7 @@ from ..workspace import Island
 from .gauss_seidel import velocities
 
 TURNS = 4
-"""Changes of the active set, for each contact, after which the search is taken not to end."""
+"""Changes of the active set, for each contact, after which the search is given up."""
 
 
 @compiled
@@ -34,7 +34,7 @@ def is_convex(members: np.ndarray, m: int) -> bool:
 @compiled
 def solve_active_set(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray,
                      tolerance: float) -> bool:
-    """Solve a convex island of m contacts and n rows for p (n,), from where it stands. Returns
+    """Solve a convex island of m contacts and n rows for p (n,) in place, starting from p. Returns
     whether a solution was found.
 
     ``tolerance``: m/s at which a contact without impulse may approach. The Cholesky factor of W at
@@ -76,8 +76,8 @@ def solve_active_set(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarra
 
 @compiled
 def initial_active_set(island: Island, m: int, p: np.ndarray) -> int:
-    """Enter the rows that stick and the normals that press into island.places, and which rows are
-    normals into island.is_normal. Returns the number of active rows; other impulses become zero.
+    """Write the rows that stick and the normals with an impulse to island.places, and which rows
+    are normals to island.is_normal. Returns the active rows' number; p of all others becomes 0.
     """
     count, members, places = 0, island.members, island.places
     for k in range(m):
@@ -103,7 +103,9 @@ def initial_active_set(island: Island, m: int, p: np.ndarray) -> int:
 @compiled
 def factor_rows(W: np.ndarray, n: int, places: np.ndarray, start: int, count: int,
                 U: np.ndarray) -> bool:
-    """Factor W at ``places``, U^T U, from row ``start`` on. Returns whether it is positive."""
+    """Write rows ``start`` to ``count`` - 1 of the factor U^T U of W at ``places`` to U. Returns
+    whether it is positive definite.
+    """
     for i in range(start, count):
         at = places[i] * n
         for j in range(i, count):
@@ -115,7 +117,9 @@ def factor_rows(W: np.ndarray, n: int, places: np.ndarray, start: int, count: in
 
 @compiled
 def append_column(W: np.ndarray, U: np.ndarray, n: int, places: np.ndarray, end: int) -> None:
-    """Enter the column of the last row into the rows of the factor above it."""
+    """Write the column of row places[end] to rows 0 to end - 1 of the factor U; its diagonal entry
+    is left to factor_rows().
+    """
     at = places[end] * n
     for k in range(end):
         s = W[at + places[k]]
@@ -126,7 +130,7 @@ def append_column(W: np.ndarray, U: np.ndarray, n: int, places: np.ndarray, end:
 
 @compiled
 def remove_column(U: np.ndarray, n: int, places: np.ndarray, drop: int, count: int) -> None:
-    """Remove a row from ``places`` and its column from the rows of the factor above it."""
+    """Remove ``places[drop]``, leaving ``count``, and its column from the rows of U above."""
     for j in range(drop, count):
         places[j] = places[j + 1]
     for k in range(drop):
@@ -137,7 +141,7 @@ def remove_column(U: np.ndarray, n: int, places: np.ndarray, drop: int, count: i
 @compiled
 def most_approaching(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray,
                      tolerance: float) -> int:
-    """Normal row of the contact without impulse that approaches fastest, -1 if none does."""
+    """Normal row without impulse that approaches fastest, or -1; u to island.velocity."""
     u = island.velocity
     velocities(island.W, b, p, n, u)
     worst, found = -tolerance, -1

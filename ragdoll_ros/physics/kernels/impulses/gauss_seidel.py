@@ -1,4 +1,4 @@
-"""One Gauss-Seidel sweep over the contacts of a small island, by its W.
+"""One Gauss-Seidel sweep over the contacts of a small island, by its W; symbols as in solver.py.
 
 Non-smooth contact dynamics (Moreau 1988; Jean, CMAME 177, 1999).
 """
@@ -16,7 +16,7 @@ from .one_contact import project_to_disc, solve_one_contact
 
 @compiled
 def velocities(W: np.ndarray, b: np.ndarray, p: np.ndarray, n: int, u: np.ndarray) -> None:
-    """Enter u = W p + b, column by column, so that the processor does several rows at once."""
+    """Write W p + b to u (n,), column by column, for vector instructions."""
     for i in range(n):
         u[i] = b[i]
     for j in range(n):
@@ -25,7 +25,7 @@ def velocities(W: np.ndarray, b: np.ndarray, p: np.ndarray, n: int, u: np.ndarra
 
 @compiled
 def add_velocity_change(W: np.ndarray, n: int, j: int, change: float, u: np.ndarray) -> None:
-    """Add to the velocities u (n,) what a change of the impulse of row j does to them."""
+    """Add to the velocities u (n,) the effect of a ``change`` of the impulse of row j."""
     if change != 0.0:
         own = W[j * n:j * n + n]
         for i in range(n):
@@ -35,8 +35,8 @@ def add_velocity_change(W: np.ndarray, n: int, j: int, change: float, u: np.ndar
 @compiled
 def gauss_seidel_sweep(members: np.ndarray, m: int, n: int, W: np.ndarray, b: np.ndarray,
                        p: np.ndarray, u: np.ndarray) -> float:
-    """Solve for the impulses p of each of m contacts in turn. Returns the largest change of a
-    velocity, m/s or rad/s. u (n,): scratch.
+    """Solve each of m contacts in turn for its impulses, in place in p (n,). Returns the largest
+    change of a velocity, m/s or rad/s. u (n,) becomes W p + b.
     """
     worst = 0.0
     velocities(W, b, p, n, u)
@@ -74,8 +74,8 @@ def gauss_seidel_sweep(members: np.ndarray, m: int, n: int, W: np.ndarray, b: np
 @compiled
 def solve_rolling(W: np.ndarray, n: int, a: int, p: np.ndarray, u: np.ndarray,
                   most: float) -> float:
-    """Solve for the rolling impulse of rows a and a + 1, at most ``most`` N m s. Returns the
-    largest change of an angular velocity, rad/s.
+    """Solve for the rolling impulse of rows a and a + 1, at most ``most`` N m s; p and u follow.
+    Returns the largest change of an angular velocity, rad/s.
     """
     w11, w12, w22 = W[a * n + a], W[a * n + a + 1], W[(a + 1) * n + a + 1]
     rho = 1 / (0.5 * (w11 + w22) + math.sqrt(0.25 * (w11 - w22) ** 2 + w12 * w12))

@@ -1,9 +1,9 @@
 """A large island: its contacts by Gauss-Seidel sweeps through their rows, without W.
 
-W of hundreds of rows costs more to form and to factor than to do without: a sweep through
-z = Y^T p costs what the rows have of entries. Between the sweeps goes a step along the direction
-of Fletcher and Reeves, which makes them converge ten times as fast (Silcowitz-Hansen, Niebe and
-Erleben, The Visual Computer 26, 2010).
+To form and factor W of hundreds of rows costs more than to do without it: a sweep through z = Y^T p
+costs as many operations as the rows have entries. Between sweeps, a step along the direction of
+Fletcher and Reeves makes them converge ten times as fast (Silcowitz-Hansen, Niebe and Erleben, The
+Visual Computer 26, 2010).
 """
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .one_contact import project_to_disc, solve_one_contact
 from .solver import OPENING, scale_to_no_work
 
 MAX_SWEEPS = 100
-"""Of a large island."""
+"""Sweeps in one solve."""
 
 TOLERANCE = 1e-6
 """m/s to which a large island is solved, if that many sweeps suffice."""
@@ -64,7 +64,7 @@ def solve_large(ws: Workspace, m: int, n: int, has_restitution: bool,
 
 @compiled
 def diagonal_blocks(ws: Workspace, m: int, compliance: float) -> None:
-    """Enter W of each contact by itself into island.blocks, its diagonal with the compliance."""
+    """Write W's diagonal blocks to island.blocks, their diagonals times 1 + ``compliance``."""
     island = ws.island
     for k in range(m):
         c, block = ws.contacts.found[island.members[k].contact], island.blocks[k]
@@ -81,7 +81,7 @@ def diagonal_blocks(ws: Workspace, m: int, compliance: float) -> None:
 
 @compiled
 def keep_normals_only(island: Island, m: int) -> None:
-    """Keep of each contact its normal row alone, with the compliance of position correction."""
+    """Reduce each contact to its normal row, with the compliance of position correction."""
     for k in range(m):
         member, block = island.members[k], island.blocks[k]
         block[0, 0] *= (1 + member.correction_compliance) / (1 + member.compliance)
@@ -90,7 +90,7 @@ def keep_normals_only(island: Island, m: int) -> None:
 
 @compiled
 def row_velocity(ws: Workspace, k: int, e: int, b: np.ndarray, p: np.ndarray) -> float:
-    """Velocity along row e of contact k."""
+    """Velocity, m/s or rad/s, along row e of member k; island.z is Y^T p."""
     island, member = ws.island, ws.island.members[k]
     row, soft, support = member.row + e, member.compliance, island.support[member.contact]
     total = b[row] + p[row] * island.blocks[k, e, e] * soft / (1 + soft)
@@ -101,7 +101,7 @@ def row_velocity(ws: Workspace, k: int, e: int, b: np.ndarray, p: np.ndarray) ->
 
 @compiled
 def change_impulse(ws: Workspace, k: int, e: int, change: float, p: np.ndarray) -> float:
-    """Change the impulse of row e of contact k. Returns by how much its velocity changes."""
+    """Change an impulse in p, and island.z. Returns the row's change of velocity, m/s or rad/s."""
     island, member = ws.island, ws.island.members[k]
     row, support = member.row + e, island.support[member.contact]
     p[row] += change
@@ -112,8 +112,8 @@ def change_impulse(ws: Workspace, k: int, e: int, change: float, p: np.ndarray) 
 
 @compiled
 def sweep_large_island(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray) -> float:
-    """Solve for the impulses of each contact in turn. Returns the largest change of a velocity,
-    m/s or rad/s.
+    """Solve each of m contacts in turn for its impulses, in place in p; island.z stays Y^T p.
+    Returns the largest change of a velocity, m/s or rad/s.
     """
     worst = 0.0
     for k in range(m):
@@ -147,8 +147,8 @@ def sweep_large_island(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray) -> f
 @compiled
 def sweep_to_tolerance(ws: Workspace, m: int, n: int, b: np.ndarray,
                        p: np.ndarray) -> tuple[float, int]:
-    """Solve for p (n,), from where it stands. Returns the last change of a velocity, m/s, and the
-    sweeps. island.z is Y^T p at the end.
+    """Solve for p (n,) in place, starting from p. Returns the last sweep's largest change of a
+    velocity, m/s or rad/s, and the number of sweeps. island.z becomes Y^T p.
     """
     island = ws.island
     z, z_previous, z_direction = island.z, island.z_previous, island.z_direction
@@ -195,7 +195,9 @@ def sweep_to_tolerance(ws: Workspace, m: int, n: int, b: np.ndarray,
 
 @compiled
 def release_opening_contacts(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray) -> bool:
-    """Release contacts without friction's limit that open. Returns whether there are any."""
+    """Make contacts that cannot slip (friction >= NO_SLIP) frictionless, with zero impulse, if they
+    open while held sideways. Returns whether there are any.
+    """
     some = False
     for k in range(m):
         member = ws.island.members[k]
@@ -210,7 +212,7 @@ def release_opening_contacts(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray
 
 @compiled
 def work_terms(island: Island, n: int, u: np.ndarray, p: np.ndarray) -> tuple[float, float]:
-    """P u and p W p, J, of impulses p, of which island.z is Y^T p, on row velocities u."""
+    """The terms p u and p W p, J, of impulses p on row velocities u; island.z is Y^T p."""
     work = spent = 0.0
     for i in range(n):
         work += p[i] * u[i]

@@ -1,4 +1,4 @@
-"""Semi-smooth Newton method on all rows of an island at once.
+"""Semi-smooth Newton method on all rows of an island at once; symbols as in solver.py.
 
 The function is Alart and Curnier's (CMAME 92, 1991). Impulses that several contacts of one face
 bear together are nearly undetermined, and a full step along them leaves every friction cone. So
@@ -19,8 +19,8 @@ from .gauss_seidel import velocities
 from .one_contact import project_to_disc
 
 MAX_STEPS = 40
-"""From the end of the sweeps some three are needed. All are taken in full: the residual may grow on
-the way, as contacts change between sticking and sliding. The best is kept."""
+"""After the sweeps some three are needed. All are taken in full: the residual may grow on the way,
+as contacts change between sticking and sliding. The best is kept."""
 
 PATIENCE = 8
 """Steps that do not halve the residual, after which the method cycles."""
@@ -28,8 +28,8 @@ PATIENCE = 8
 
 @compiled
 def alart_curnier(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray) -> float:
-    """Enter u = W p + b into island.velocity, and Alart and Curnier's function, scaled to
-    velocities and zero at the solution, into island.residual. Returns its largest entry.
+    """Write u = W p + b to island.velocity, and Alart and Curnier's function, scaled to velocities
+    and zero at the solution, to island.residual. Returns its largest entry.
     """
     W, u, phi, worst = island.W, island.velocity, island.residual, 0.0
     velocities(W, b, p, n, u)
@@ -56,8 +56,8 @@ def alart_curnier(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray) 
 
 @compiled
 def linearize(island: Island, m: int, n: int, p: np.ndarray, proximal: float) -> None:
-    """Enter the Jacobian of alart_curnier(), with the share ``proximal`` of W's diagonal added to
-    W, into island.G, flat (n * n), and the right-hand side of a step into island.direction.
+    """Write the Jacobian of alart_curnier() at p, with the share ``proximal`` of W's diagonal added
+    to W, to island.G, flat (n * n), and the right-hand side of a step to island.direction.
     """
     W, G, u, direction = island.W, island.G, island.velocity, island.direction
     for i in range(n):
@@ -102,7 +102,9 @@ def linearize(island: Island, m: int, n: int, p: np.ndarray, proximal: float) ->
 @compiled
 def write_velocity_row(W: np.ndarray, G: np.ndarray, n: int, i: int, active: bool,
                        proximal: float) -> None:
-    """Let the step zero the velocity of row i, or, if it is not ``active``, its impulse."""
+    """Write row i of the Jacobian G: W's, its diagonal times 1 + ``proximal``, so that the step
+    zeroes the row's velocity; the identity's if not ``active``, so that it zeroes its impulse.
+    """
     at = i * n
     for j in range(n):
         G[at + j] = W[at + j] if active else 0.0
@@ -142,7 +144,7 @@ def gaussian_elimination(G: np.ndarray, n: int, x: np.ndarray) -> bool:
 def solve_reduced(G: np.ndarray, n: int, x: np.ndarray, places: np.ndarray,
                   reduced: np.ndarray) -> bool:
     """Solve G x = b, flat (n * n), in place; returns whether G is regular. Rows of open contacts
-    have but their diagonal: they are eliminated first. places, reduced (n,): scratch.
+    have only their diagonal: they are eliminated first. places, reduced (n,): scratch.
     """
     m = 0
     for i in range(n):
@@ -181,7 +183,7 @@ def solve_reduced(G: np.ndarray, n: int, x: np.ndarray, places: np.ndarray,
 @compiled
 def newton(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray, tolerance: float,
            proximal: float) -> float:
-    """Take Newton steps from p on. p becomes the best found; returns its largest residual, m/s."""
+    """Take Newton steps from p, which becomes the best found. Returns its residual, m/s."""
     direction, keep = island.direction, island.best
     best, late = math.inf, 0
     for turn in range(MAX_STEPS + 1):

@@ -10,13 +10,13 @@ from ..maths.vectors import Vec3
 from ..system import NO_SLIP
 
 MAX_ITERATIONS = 50
-"""Of the search for the drag of a sliding contact; some four are needed."""
+"""Iterations for the drag of a sliding contact; some four are needed."""
 
 
 @compiled
 def solve_one_contact(W: np.ndarray, n: int, a: int, c: Vec3, guess: Vec3, mu: float) -> Vec3:
     """Impulse of the contact whose rows of W (flat, n a row) begin at a, and whose velocity without
-    it is c. ``guess``: an impulse to start from.
+    it is c; friction coefficient mu. ``guess``: an impulse to start from.
 
     A sliding contact has u_t = -d p_t with a drag d > 0, and u_n = 0: linear for given d. Sought
     is the d at which |p_t| = mu p_n. It exists, as d = 0 gives more (else the contact would stick)
@@ -79,7 +79,7 @@ def solve_one_contact(W: np.ndarray, n: int, a: int, c: Vec3, guess: Vec3, mu: f
 
 @compiled
 def project_to_disc(y: float, z: float, radius: float) -> tuple[float, float]:
-    """The point of a disc nearest to (y, z)."""
+    """The point nearest to (y, z) of the disc of this radius about the origin."""
     size = math.sqrt(y * y + z * z)
     if size > radius:
         share = radius / size

@@ -18,21 +18,20 @@ UNSOLVED = 1e-5
 """m/s: islands with a larger residual are counted, and their impulses kept from adding energy."""
 
 SINGULAR = 1e-13
-"""Share of the largest diagonal entry of W up to which a row cannot move."""
+"""Share of the largest diagonal entry of W up to which a row counts as immovable."""
 
 CURVATURE_COMPLIANCE = 1e-4
 """Share of W's diagonal up to which a curvature bias is no motion of the bodies."""
 
 STRAIGHT = 1e-11
-"""m/s or rad/s: a smaller curvature bias is taken as it is."""
+"""m/s or rad/s: a smaller curvature bias is added unfiltered."""
 
 
 @compiled
 def solve_small(ws: Workspace, m: int, n: int, h: float, tolerance: float, has_restitution: bool,
                 has_penetration: bool) -> None:
-    """Solve an island of m contacts and n rows over h s, or at an impact, h = 0, for its impulses;
-    if ``has_penetration``, also for those of position correction.
-
+    """Solve an island of m contacts and n rows over h s, or at an impact, h = 0, for
+    island.impulses; if ``has_penetration``, also for island.correction. After assemble_rhs().
     ``has_restitution``: the right-hand side asks for restitution, which may add energy.
     """
     island, b, p, u, soft = (ws.island, ws.island.rhs, ws.island.impulses, ws.island.free_velocity,
@@ -60,8 +59,8 @@ def solve_small(ws: Workspace, m: int, n: int, h: float, tolerance: float, has_r
 
 @compiled
 def form_contact_matrix(ws: Workspace, m: int, n: int, compliance: float) -> None:
-    """Enter W = Y Y^T, flat (n * n), its diagonal with the compliance; row by row of Y^T, so that
-    the processor does several columns at once.
+    """Write W = Y Y^T to island.W, flat (n * n), its diagonal times 1 + ``compliance``; row by row
+    of Y^T, for vector instructions.
     """
     island = ws.island
     Y, W, YT, members = island.Y, island.W, island.YT, island.members
@@ -100,9 +99,8 @@ def form_contact_matrix(ws: Workspace, m: int, n: int, compliance: float) -> Non
 
 @compiled
 def add_curvature_bias(island: Island, m: int, n: int) -> None:
-    """Add the curvature bias to the right-hand side, as far as it is a motion of the bodies: the
-    points of a patch that turns have more than any impulses could answer. What separates has its
-    own.
+    """Add the curvature bias to island.rhs, as far as it is a motion of the bodies: in a patch that
+    turns it is more than any impulses could answer. Contacts that separate get all of theirs.
 
     That motion is W x, where (W + R) x is the bias, and R a little of W's diagonal.
     """
@@ -136,7 +134,7 @@ def add_curvature_bias(island: Island, m: int, n: int) -> None:
 
 @compiled
 def mask_singular_rows(W: np.ndarray, n: int, b: np.ndarray) -> None:
-    """Mask rows along which no body can move, as joints do not let it: their W is zero, and would
+    """Decouple rows in which joints let no body move, and zero their b: their W is zero, and would
     be divided by.
     """
     most = 0.0
@@ -152,8 +150,8 @@ def mask_singular_rows(W: np.ndarray, n: int, b: np.ndarray) -> None:
 
 @compiled
 def energy_gain(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> float:
-    """Kinetic energy, J, that impulses p add to a motion with row velocities u: p (u + W p / 2);
-    0 if that is rounding.
+    """Kinetic energy, J, that impulses p add to a motion with row velocities u: p (u + W p / 2); 0
+    if it is a loss or rounding.
     """
     total = size = 0.0
     for i in range(n):
@@ -167,7 +165,7 @@ def energy_gain(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> float:
 
 @compiled
 def scale_to_energy_bound(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -> None:
-    """Scale impulses that are no solution so that they add no energy."""
+    """Scale impulses p (n,) that are no solution down so that they add no energy."""
     work = spent = 0.0
     for i in range(n):
         w = 0.0
@@ -180,11 +178,12 @@ def scale_to_energy_bound(W: np.ndarray, u: np.ndarray, p: np.ndarray, n: int) -
 
 @compiled
 def bound_energy(W: np.ndarray, u: np.ndarray, soft: np.ndarray, p: np.ndarray, n: int) -> None:
-    """Move p towards the impulses ``soft`` without restitution, until it adds no energy.
+    """Move p (n,) towards ``soft``, the impulses without restitution, until it adds no more energy
+    to row velocities u than these, which add none.
 
-    Newton's law with friction can add energy (Kane and Levinson 1985). Soft impulses never do:
-    p u+ <= 0 and so p (u + W p / 2) = p u+ - p W p / 2 < 0. Between both, all impulses are within
-    their cones and nothing penetrates, as cones and half-spaces are convex.
+    Newton's law with friction can add energy (Kane and Levinson 1985). Soft impulses never do: p u+
+    <= 0 and so p (u + W p / 2) = p u+ - p W p / 2 < 0. Between both, all impulses are within their
+    cones and nothing penetrates, as cones and half-spaces are convex.
     """
     a = b = 0.0
     for i in range(n):

@@ -1,4 +1,4 @@
-"""Impulses of all contacts and limits, at an impact or over a step, island by island.
+"""Contact solve: impulses of all contacts and limits, at an impact or over a step, by islands.
 
 An island is a set of dolls that contacts join. Islands do not act on each other and are solved one
 by one.
@@ -41,7 +41,7 @@ resting face differ by as much, and the impulses to level them would be determin
 
 @compiled
 def label_islands(s: System, ws: Workspace, m: int) -> None:
-    """Enter the island of each of m contacts: the least of the numbers of its dolls."""
+    """Write the island of each of m contacts, the least index of its dolls, to found[].island."""
     label, contacts = ws.island.label, ws.contacts.found
     for d in range(len(label)):
         label[d] = d
@@ -61,11 +61,13 @@ def label_islands(s: System, ws: Workspace, m: int) -> None:
 @compiled
 def solve_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, v: np.ndarray,
                    v_free: np.ndarray, m: int, h: float, tolerance: float) -> None:
-    """Enter into ws.step the change of velocity by m contacts, v_change (nv,), where v becomes
-    ``v_free`` without them in h s, and the displacement of position correction, correction (nv,).
+    """Solve m contacts over h s in which v becomes ``v_free`` without them. Writes to ws.step their
+    change of velocity, v_change (nv,), and the displacement of position correction, correction
+    (nv,). Contacts are read from ws.contacts.found; impulses start from there and are written
+    there.
 
-    h = 0: an impact. ``kin`` is that of q, dynamics.H the factor of the mass matrix there.
-    ``tolerance``: m/s of the residual of small islands.
+    h = 0: an impact. ``kin``: of q, with the roots' motion subspaces; dynamics.H: factor of the
+    mass matrix. ``tolerance``: m/s of the residual of small islands.
     """
     contacts, island, L = ws.contacts.found, ws.island, ws.step.dynamics.H
     change, correction = ws.step.v_change, ws.step.correction
@@ -89,8 +91,8 @@ def solve_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, v: 
 
 @compiled
 def collect_island(ws: Workspace, begin: int, m: int, number: int) -> tuple[int, int]:
-    """Enter the contacts of an island as its members, and number their rows. Returns how many there
-    are of each. Contacts for which there is no room are counted and left out.
+    """Write the contacts of island ``number`` from found[begin] on to island.members, and number
+    their rows. Returns how many there are of each; those without room are counted and left out.
     """
     count = rows = 0
     for i in range(begin, m):
@@ -112,9 +114,10 @@ def collect_island(ws: Workspace, begin: int, m: int, number: int) -> tuple[int,
 
 @compiled
 def assemble_rhs(s: System, ws: Workspace, m: int, n: int, h: float) -> tuple[bool, bool]:
-    """Enter the right-hand side of an island: its rows' velocities without impulses, and what of
-    these impulses are to answer; the curvature bias; the impulses to start from; the penetration to
-    be corrected. Returns whether a contact has restitution, and whether one has penetration.
+    """Write the right-hand side of an island: its rows' velocities without impulses to
+    island.free_velocity, the same with restitution and gaps to island.rhs, the curvature bias, the
+    initial impulses, and in its members the penetrations to correct. Returns whether a contact has
+    restitution, and whether one has penetration. After contact_jacobian().
     """
     island = ws.island
     b, was, curve = island.rhs, island.start_velocity, island.curvature
@@ -152,7 +155,7 @@ def assemble_rhs(s: System, ws: Workspace, m: int, n: int, h: float) -> tuple[bo
 
 @compiled
 def set_correction(ws: Workspace, member: np.record, c: np.record, h: float) -> None:
-    """Enter how much of the penetration of a contact is corrected in h s."""
+    """Write to ``member`` how much of a penetration to correct in h s, and its compliance."""
     fastest = MAX_LIMIT_SPEED if c.kind == LIMIT else MAX_SEPARATION_SPEED
     member.correction = min(CORRECTED_SHARE * max(0.0, -c.gap - SLOP), fastest * h)
     if not ws.step.scalars[0].seeks_impacts and not c.persistent:
@@ -164,8 +167,8 @@ def set_correction(ws: Workspace, member: np.record, c: np.record, h: float) -> 
 
 @compiled
 def solve_island(s: System, ws: Workspace, m: int, n: int, h: float, tolerance: float) -> None:
-    """Solve one island for its impulses, and add what they do to v_change and correction, both
-    still to be multiplied by L^-1.
+    """Solve one island. Writes its impulses to found[].impulse; adds their effects to v_change and
+    correction, both still to be multiplied by L^-1.
     """
     island, change, correction = ws.island, ws.step.v_change, ws.step.correction
     has_restitution, has_penetration = assemble_rhs(s, ws, m, n, h)

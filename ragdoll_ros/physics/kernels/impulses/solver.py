@@ -1,11 +1,12 @@
 """Impulses of a small island of contacts and limits, by Signorini's and Coulomb's laws exactly.
 
-Unknown are the impulses p, rows of 1 (a limit), 3 (a contact: normal and two tangents) or 5 (the
-same and two of rolling). The velocities after are u = W p + b. The complementarity problem:
+Unknown are the impulses p of m contacts, n rows: 1 (a limit), 3 (a contact: normal, two tangents)
+or 5 (also two of rolling). The velocities after are u = W p + b, with W flat (n * n), b those
+without impulses. The complementarity problem:
 u_n >= 0, p_n >= 0, u_n p_n = 0; |p_t| <= mu p_n, and where u_t is not zero p_t = -mu p_n u_t/|u_t|.
 
-Without friction, or where it has no limit, the active set method solves it. Else Gauss-Seidel
-sweeps come near, and where they stall, as with mass ratios of 1:1000, Newton's method finishes.
+Where friction is zero or unlimited, the active set method solves it. Else Gauss-Seidel sweeps come
+near, and where they stall, as with mass ratios of 1:1000, Newton's method finishes.
 """
 from __future__ import annotations
 
@@ -31,12 +32,12 @@ PROXIMAL = 1e-5
 compliance, 1e-8 of W, decides, and far less than what decides the motion of bodies."""
 
 OPENING = 1e-4
-"""m/s from which a contact without friction's limit is released as open."""
+"""m/s: contacts of unlimited friction that open faster are released."""
 
 
 @compiled
 def project_to_cones(members: np.ndarray, m: int, p: np.ndarray) -> None:
-    """Project all impulses to their friction cones: no contact ever pulls."""
+    """Project impulses p to their friction cones: no normal one is negative."""
     for c in range(m):
         member = members[c]
         a = member.row
@@ -51,8 +52,8 @@ def project_to_cones(members: np.ndarray, m: int, p: np.ndarray) -> None:
 @compiled
 def solve_cones(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray, tolerance: float,
                 sweeps: int) -> tuple[float, int]:
-    """Solve for p (n,), from where it stands. Returns the largest residual left, m/s, and the
-    sweeps.
+    """Solve for p (n,) in place, starting from p. Returns the largest residual left, m/s, and the
+    number of sweeps. ``sweeps``: how many precede Newton's method at first.
     """
     done, left, proximal = 0, math.inf, PROXIMAL
     convex = is_convex(island.members, m)
@@ -78,7 +79,7 @@ def solve_cones(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray, to
 
 @compiled
 def is_opening(W: np.ndarray, n: int, a: int, b: np.ndarray, p: np.ndarray) -> bool:
-    """Whether the contact with normal row a opens."""
+    """Whether the contact with normal row a opens faster than OPENING."""
     u = b[a]
     for j in range(n):
         u += W[a * n + j] * p[j]
@@ -88,12 +89,11 @@ def is_opening(W: np.ndarray, n: int, a: int, b: np.ndarray, p: np.ndarray) -> b
 @compiled
 def solve_impulses(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray, tolerance: float,
                    sweeps: int) -> tuple[float, int]:
-    """Solve for p (n,), from where it stands. Returns the largest residual left, m/s, and the
-    sweeps.
+    """Solve for p (n,); arguments and return values as solve_cones().
 
-    Friction without limit makes the problem convex, but holds a contact sideways even as it opens.
-    So contacts that turn out to open are released, and all is solved once more. Those that then
-    close after all are held: between the two there is no solution (Painleve's paradox).
+    Unlimited friction makes the problem convex, but holds a contact sideways even as it opens. So
+    contacts that turn out to open are released, and all is solved once more. Those that then close
+    after all are held: between the two there is no solution (Painleve's paradox).
     """
     left, done = solve_cones(island, m, n, b, p, tolerance, sweeps)
     for turn in range(2):
@@ -120,8 +120,8 @@ def solve_impulses(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray,
 
 @compiled
 def solve_position_correction(island: Island, m: int, n: int) -> None:
-    """Enter into island.correction the least normal impulses (n,) that give each contact the
-    velocity ``correction`` of its member or more, but for its ``correction_compliance``.
+    """Write to island.correction (n,) the least normal impulses that give each contact the velocity
+    ``correction`` of its member or more, except for its ``correction_compliance``.
 
     W and the members are overwritten: only the normal rows remain.
     """
@@ -145,8 +145,8 @@ def solve_position_correction(island: Island, m: int, n: int) -> None:
 
 @compiled
 def scale_to_no_work(p: np.ndarray, n: int, work: float, spent: float) -> None:
-    """Scale impulses p (n,) whose energy is ``work`` + ``spent`` / 2, J, so that it is none;
-    impulses that are not finite become zero.
+    """Scale impulses p (n,) down so that their energy, J, work + spent / 2 is not positive; never
+    up. work = p u, spent = p W p. Impulses that are not finite become zero.
     """
     share = min(1.0, max(0.0, -2 * work / spent)) if spent > 0 else 0.0
     if not math.isfinite(share) or not math.isfinite(work):

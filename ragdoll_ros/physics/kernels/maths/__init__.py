@@ -1,1 +1,1 @@
-"""Vectors, rotations, sines and small systems of equations, number by number."""
+"""Vectors, rotations, sines and small systems of equations, in scalar operations."""

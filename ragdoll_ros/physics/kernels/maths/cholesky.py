@@ -1,4 +1,4 @@
-"""Small symmetric systems of equations."""
+"""Cholesky factorization of small symmetric matrices."""
 from __future__ import annotations
 
 import math
@@ -10,7 +10,7 @@ from ..compiling.decorators import compiled
 
 @compiled
 def solve(a: np.ndarray, b: np.ndarray) -> None:
-    """Put the x of a x = b in b's place, by Cholesky; a is symmetric and positive, and is lost."""
+    """Solve a x = b in place, b becomes x, by Cholesky; a (n, n) > 0 is overwritten."""
     n = len(b)
     for j in range(n):
         for k in range(j):
@@ -32,9 +32,9 @@ def solve(a: np.ndarray, b: np.ndarray) -> None:
 
 @compiled
 def factor_row(U: np.ndarray, n: int, i: int, count: int) -> bool:
-    """Make row i of a symmetric matrix, flat, n a row, that of its factor U^T U, up to column
-    ``count``, from those above it; whether it has one. A processor does several columns at once,
-    and of four rows while it has them at hand, each in its turn.
+    """Replace row i of a symmetric matrix, flat in U, n a row, by that of its factor, U^T U, up to
+    column ``count``, from the rows above it. Returns whether its pivot is positive. Loops over
+    columns, and takes four rows at once, for vector instructions.
     """
     own, width, k = U[i * n + i:i * n + count], count - i, 0
     while k + 4 <= i:
@@ -63,7 +63,7 @@ def factor_row(U: np.ndarray, n: int, i: int, count: int) -> bool:
 
 @compiled
 def substitute(U: np.ndarray, n: int, count: int, z: np.ndarray) -> None:
-    """Put the x of U^T U x = z in z's place, (count,)."""
+    """Solve U^T U x = z in place: z (count,) becomes x. U: flat, n a row."""
     for k in range(count):
         own = U[k * n:k * n + count]
         z[k] /= own[k]

@@ -1,8 +1,7 @@
 """Sine, cosine and inverse hyperbolic sine, of sums, products and roots alone.
 
-Those of a C library differ in the last bit between libraries, and within one between processors: it
-takes what multiplies and adds at once where there is such an instruction. These are the same bits
-everywhere.
+Those of a C library differ in the last bit between libraries, and within one between processors,
+where it uses fused multiply-add. These are the same bits everywhere.
 """
 from __future__ import annotations
 
@@ -16,29 +15,29 @@ QUARTER, REST = 1.5707963267341256, 6.077100506506192e-11
 S3, S5, S7, S9, S11, S13, S15, S17 = (
     (-1) ** k / math.factorial(2 * k + 1) for k in range(1, 9))
 C4, C6, C8, C10, C12, C14, C16, C18 = ((-1) ** k / math.factorial(2 * k) for k in range(2, 10))
-"""Taylor's coefficients: within pi / 4 the next ones are nothing."""
+"""Taylor coefficients: within pi / 4 the next ones are below rounding."""
 
 
 @compiled
 def sine_and_cosine(angle: float) -> tuple[float, float]:
-    """Of an angle in rad; they err by 3e-16, past a million turns by as much as the angle does."""
+    """Sine and cosine of an angle, rad; error 3e-16, past a million turns the angle's own."""
     if abs(angle) < math.pi / 4:
         return series(angle)
     quarters = math.floor(angle * (2 / math.pi) + 0.5)
     s, c = series((angle - quarters * QUARTER) - quarters * REST)
-    turned = quarters - 4 * math.floor(quarters / 4)
-    if turned == 1:
+    quadrant = quarters - 4 * math.floor(quarters / 4)
+    if quadrant == 1:
         return c, -s
-    if turned == 2:
+    if quadrant == 2:
         return -s, -c
-    if turned == 3:
+    if quadrant == 3:
         return -c, s
     return s, c
 
 
 @compiled
 def series(x: float) -> tuple[float, float]:
-    """Sine and cosine of x rad, at most a little more than pi / 4, in two halves at a time."""
+    """Sine and cosine of x rad, at most a little more than pi / 4, by Taylor's series."""
     z = x * x
     u = z * z
     s = (S3 + u * (S7 + u * (S11 + u * S15))) + z * (S5 + u * (S9 + u * (S13 + u * S17)))

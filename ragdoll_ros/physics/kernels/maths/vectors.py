@@ -34,7 +34,7 @@ def column(m: np.ndarray, k: int) -> Vec3:
 
 @compiled
 def put(row: np.ndarray, a: Vec3) -> None:
-    """Store a vector in the first three entries of an array."""
+    """Write a vector to the first three entries of ``row``."""
     row[0], row[1], row[2] = a
 
 
@@ -139,7 +139,7 @@ def quat_rotate_inverse(q: Quat, a: Vec3) -> Vec3:
 
 @compiled
 def quat_to_matrix(q: Quat, out: np.ndarray) -> None:
-    """Store the rotation matrix (3, 3) of a unit quaternion."""
+    """Write the rotation matrix of a unit quaternion to ``out`` (3, 3)."""
     x, y, z, w = q
     out[0, 0] = x * x - y * y - z * z + w * w
     out[1, 1] = y * y - x * x - z * z + w * w

@@ -1,1 +1,1 @@
-"""Where something touches: steps, impacts, and what both keep."""
+"""Steps with contacts, impacts, and what both conserve."""

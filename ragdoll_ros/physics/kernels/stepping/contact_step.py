@@ -2,9 +2,9 @@
 
 Forces, contacts and their rows are those at the middle of the step, so that it is of order 2 where
 no contact begins or ends (Moreau 1988; Studer, Numerics of Unilateral Contacts and Friction, 2009).
-Half of what contacts change is a part of the velocities there: what they changed in the step before
-stands in for it. Joint damping, springs and drives are taken implicitly at the middle as well. Then
-penetrations are corrected, and momentum is conserved where the ground bears nothing.
+The velocities there include half of the change by contacts, for which that of the step before
+stands in. Joint damping, springs and drives are taken implicitly at the middle as well. Then
+penetrations are corrected, and the momentum of dolls that are not on the ground is conserved.
 """
 from __future__ import annotations
 
@@ -17,25 +17,15 @@ from ..contact.gaps import TOUCHING, update_kinematics_and_gaps
 from ..contact.jacobian import contact_velocities
 from ..contact_kind import LIMIT
 from ..dynamics.bias_forces import bias_forces
-from ..dynamics.kinematics import (
-    forward_kinematics,
-    integrate_positions,
-    place_geoms,
-    root_motion_subspaces,
-    rotate_inertias,
-    update_velocities,
-)
+from ..dynamics.kinematics import (forward_kinematics, integrate_positions, place_geoms,
+                                   root_motion_subspaces, rotate_inertias, update_velocities)
 from ..dynamics.mass_matrix import factor_ltl, mass_matrix, solve_lower, solve_upper
 from ..impulses.solve_contacts import solve_contacts
 from ..system import NO_SLIP, System
 from ..workspace import Workspace
 from .momentum import add_contact_impulses, conserve_momentum, sum_dolls
-from .position_correction import (
-    clip_to_joint_limits,
-    correction_energy,
-    enter_correction_bounds,
-    limit_correction_energy,
-)
+from .position_correction import (clip_to_joint_limits, correction_energy, enter_correction_bounds,
+                                  limit_correction_energy)
 from .springs import add_implicit_stiffness, add_spring_force, saturate_springs, theta_weight
 from .warm_start import warm_start
 from .work import account_work, load_potential
@@ -50,7 +40,7 @@ restitution; their time of impact is not sought."""
 SLOW_TURN = 0.1
 
 MAX_PENETRATION = 5e-4
-"""m into the ground or a body to which a step may press."""
+"""m by which a step may penetrate the ground or a body."""
 
 STEADY = 1.0
 """m/s^2 or rad/s^2, over a step: contacts that close faster do not persist as they are."""
@@ -58,7 +48,9 @@ STEADY = 1.0
 
 @compiled
 def begin_contact_step(s: System, ws: Workspace, cluster: ClusterState) -> None:
-    """Note the contacts and their velocities as a step begins, and the sums over the dolls."""
+    """Write the contacts that touch by ws.gaps, with their velocities, to contacts.start, their
+    number and the load potential to step.scalars, and step.sums_before. Overwrites step.start.
+    """
     q, v, kin, scalars = cluster.q, cluster.v, ws.step.start, ws.step.scalars[0]
     forward_kinematics(s.tree, q, v, kin)
     sum_dolls(s, ws, kin, q, ws.step.sums_before)
@@ -73,11 +65,11 @@ def begin_contact_step(s: System, ws: Workspace, cluster: ClusterState) -> None:
 
 @compiled
 def contact_step(s: System, ws: Workspace, cluster: ClusterState, h: float, since: float) -> int:
-    """Take a step of h s to step.q_end and step.v_end. Returns the number of contacts. The position
-    correction is still to be applied.
+    """Compute a step of h s, after begin_contact_step(): write step.q_end, without position
+    correction, step.v_end, step.correction, and contacts.found with impulses. Returns their number.
 
     Rows at the middle contain the curvature term h/2 dJ/dt v of J v; the target row velocity is
-    minus that term, for J v to be zero at the end. ``since``: s since the springs' targets were at
+    minus that term, for J v to be 0 at the end. ``since``: s since springs' targets were at
     spring.target.
     """
     q, v, step, kin = cluster.q, cluster.v, ws.step, ws.step.middle
@@ -108,7 +100,7 @@ def contact_step(s: System, ws: Workspace, cluster: ClusterState, h: float, sinc
 
 @compiled
 def all_persist(ws: Workspace, m: int, h: float) -> bool:
-    """Whether all contacts of a step of h s existed before, and neither close nor open."""
+    """Whether all m contacts of a step of h s existed before, and neither closed nor opened."""
     for i in range(m):
         c = ws.contacts.found[i]
         if not c.persistent or abs(c.start_velocity[0]) > STEADY * h:
@@ -122,7 +114,7 @@ def all_persist(ws: Workspace, m: int, h: float) -> bool:
 @compiled
 def unconstrained_velocity(s: System, ws: Workspace, cluster: ClusterState, h: float,
                            time: float) -> None:
-    """Enter into step.v_free the velocities after h s without contacts, and into dynamics.H the
+    """Write to step.v_free (nv,) the velocities after h s without contacts, and to dynamics.H the
     factor of the mass matrix with implicit terms. step.middle is that of step.q_middle and v.
 
     Forces are evaluated twice: at v, and at the velocities of the step's middle that this leads to,
@@ -159,8 +151,8 @@ def unconstrained_velocity(s: System, ws: Workspace, cluster: ClusterState, h: f
 
 @compiled
 def implicit_mass_matrix(s: System, ws: Workspace, springs: np.ndarray, h: float) -> None:
-    """Enter into dynamics.H the factor of the mass matrix at the middle, with what joint damping
-    and springs add to it in a step of h s.
+    """Write to dynamics.H the factor of the mass matrix at step.middle with the implicit terms of
+    joint damping and springs in a step of h s.
     """
     dyn, kin = ws.step.dynamics, ws.step.middle
     mass_matrix(s.tree, s.dof_parent, s.dof_body, kin, dyn)
@@ -174,8 +166,9 @@ def implicit_mass_matrix(s: System, ws: Workspace, springs: np.ndarray, h: float
 @compiled
 def finish_step(s: System, ws: Workspace, cluster: ClusterState, h: float, since: float,
                 m: int) -> None:
-    """Book the work of a step of h s with m contacts, apply the position correction, and conserve
-    the momentum of dolls that are not on the ground; then enter gaps and sums at the end.
+    """After contact_step(): account for the work of a step of h s with m contacts, apply the
+    position correction to step.q_end, and conserve the momentum of dolls that are not on the
+    ground; write contacts.gaps_end and step.sums_after. step.end becomes the kinematics of the end.
     """
     step, kin, q, v = ws.step, ws.step.end, ws.step.q_end, ws.step.v_end
     clear_external(step.external)
@@ -204,7 +197,7 @@ def finish_step(s: System, ws: Workspace, cluster: ClusterState, h: float, since
 
 @compiled
 def clear_external(external: np.ndarray) -> None:
-    """Let nothing act on any doll (d,) from outside."""
+    """Set impulses, moments and flags of all dolls (d,) to zero."""
     for d in range(len(external)):
         own = external[d]
         own.on_ground = own.touches_other = 0

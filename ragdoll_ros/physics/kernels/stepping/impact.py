@@ -6,25 +6,21 @@ import numpy as np
 from ..compiling.decorators import compiled
 from ..contact.find_contacts import find_contacts
 from ..contact.gaps import TOUCHING
-from ..dynamics.kinematics import (
-    forward_kinematics,
-    place_geoms,
-    root_motion_subspaces,
-    rotate_inertias,
-)
+from ..dynamics.kinematics import (forward_kinematics, place_geoms, root_motion_subspaces,
+                                   rotate_inertias)
 from ..dynamics.mass_matrix import factor_ltl, mass_matrix
 from ..impulses.solve_contacts import solve_contacts
 from ..system import System
 from ..workspace import Workspace
 
 TOLERANCE = 1e-10
-"""m/s to which contacts are solved."""
+"""m/s: tolerance of the contact solve."""
 
 
 @compiled
 def impact(s: System, ws: Workspace, q: np.ndarray, v: np.ndarray, bounces: bool) -> int:
-    """Change v by the impulses of everything that touches at q by ws.gaps. Returns the number of
-    contacts. ``bounces``: whether there is restitution.
+    """Add to v the change by the impulses of everything that touches at q by ws.gaps. Returns the
+    number of contacts. ``bounces``: whether there is restitution.
     """
     kin, dyn, contacts = ws.step.start, ws.step.dynamics, ws.contacts.found
     forward_kinematics(s.tree, q, v, kin)

@@ -1,7 +1,7 @@
 """Conservation of momentum in a step, of each doll that does not touch the ground, to rounding.
 
 A centered step in generalized coordinates conserves the momentum at its middle pose, that at its
-end only to third order. What it has missed is given back as a rigid motion of the whole doll.
+end only to third order. The difference is added as a rigid motion of the whole doll.
 With the impulses J of everything that acts from outside at points x, over h s:
 P' = P + m g h + J, C' = C + h (P + P') / (2 m), L' = L + (x - (C + C') / 2) x J about the center of
 mass C. So the sums over dolls that touch each other are conserved as well.
@@ -14,28 +14,11 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..contact_kind import LIMIT, ROLLING
-from ..dynamics.kinematics import (
-    Kinematics,
-    inertia_times,
-    root_orientation,
-    root_position,
-    rotate_inertias,
-    velocity_at,
-)
+from ..dynamics.kinematics import (Kinematics, inertia_times, root_orientation, root_position,
+                                   rotate_inertias, velocity_at)
 from ..maths.cholesky import solve
-from ..maths.vectors import (
-    Vec3,
-    add,
-    add_scaled,
-    cross,
-    divide,
-    dot,
-    put,
-    quat_rotate_inverse,
-    scale,
-    sub,
-    vec,
-)
+from ..maths.vectors import (Vec3, add, add_scaled, cross, divide, dot, put, quat_rotate_inverse,
+                             scale, sub, vec)
 from ..system import System
 from ..workspace import Workspace
 
@@ -45,7 +28,7 @@ REMOVABLE = 0.01
 
 @compiled
 def sum_dolls(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, out: np.ndarray) -> None:
-    """Enter the sums (d,) over each doll; ``kin`` is that of q."""
+    """Write the sums over each doll to ``out`` (d,); ``kin``: of q, its inertias are updated."""
     rotate_inertias(s.tree, kin, ws.step.dynamics.matrix)
     for d in range(len(out)):
         doll = out[d]
@@ -69,7 +52,7 @@ def sum_dolls(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, out: np.
 
 @compiled
 def add_body(doll: np.record, mass: float, kin: Kinematics, i: int, root: Vec3) -> None:
-    """Add body i, whose doll's root is at ``root``, m, to the sums of its doll."""
+    """Add body i, whose root is at ``root``, m, to the sums of a doll whose center is known."""
     x, y, z = sub(add(root, vec(kin.positions[i])), vec(doll.center))
     w, I = vec(kin.spatial_velocities[i]), kin.inertias[i]
     u, spin = velocity_at(kin, i, vec(kin.positions[i])), inertia_times(I, w)
@@ -90,7 +73,7 @@ def add_body(doll: np.record, mass: float, kin: Kinematics, i: int, root: Vec3) 
 
 @compiled
 def total_energy(dolls: np.ndarray) -> tuple[float, float]:
-    """Energy of all dolls, J, and its kinetic part."""
+    """Total and kinetic energy, J, of all dolls (d,)."""
     energy = kinetic = 0.0
     for d in range(len(dolls)):
         energy += dolls[d].energy
@@ -100,7 +83,7 @@ def total_energy(dolls: np.ndarray) -> tuple[float, float]:
 
 @compiled
 def add_impulse(external: np.record, share: float, at: Vec3, impulse: Vec3) -> None:
-    """Add ``share`` times an impulse, N s, that acts at a point of the world, m."""
+    """Add ``share`` times an impulse, N s, at the point ``at``, m, world, to impulse and moment."""
     moment = cross(at, impulse)
     put(external.impulse, add_scaled(vec(external.impulse), share, impulse))
     put(external.moment, add_scaled(vec(external.moment), share, moment))
@@ -108,8 +91,8 @@ def add_impulse(external: np.record, share: float, at: Vec3, impulse: Vec3) -> N
 
 @compiled
 def add_contact_impulses(s: System, ws: Workspace, m: int) -> None:
-    """Enter the impulses of m contacts between dolls into step.external, and which dolls are on the
-    ground or touch each other.
+    """Add the impulses of m contacts between dolls to step.external, and set its flags: which dolls
+    are on the ground or touch each other.
     """
     external = ws.step.external
     for n in range(m):
@@ -137,8 +120,9 @@ def add_contact_impulses(s: System, ws: Workspace, m: int) -> None:
 
 @compiled
 def conserve_momentum(s: System, ws: Workspace, h: float, q: np.ndarray, v: np.ndarray) -> None:
-    """Change q and v at the end of a step of h s, where the sums are sums_after, so that each doll
-    that is not on the ground has the momentum and the center of mass that are due.
+    """Change q and v at the end of a step of h s, where the sums are step.sums_after, so that each
+    doll that is not on the ground has the momentum and center of mass that its external impulses
+    give it.
 
     Position correction may have moved dolls apart that touch each other: their spins make up for
     what that changes of their angular momentum about the world's origin.
@@ -174,8 +158,8 @@ def conserve_momentum(s: System, ws: Workspace, h: float, q: np.ndarray, v: np.n
 
 @compiled
 def internal_kinetic_energy(s: System, ws: Workspace) -> float:
-    """Kinetic energy, J, of the motion that remove_energy() may scale, by sums_after: that of all
-    dolls, without the rigid motion of those that are not on the ground.
+    """Kinetic energy, J, of the motion that remove_energy() may scale, by step.sums_after: that of
+    all dolls, without the rigid motion of those that are not on the ground.
     """
     after, inner = ws.step.sums_after, 0.0
     for d in range(len(after)):
@@ -188,12 +172,12 @@ def internal_kinetic_energy(s: System, ws: Workspace) -> float:
 
 @compiled
 def remove_energy(s: System, ws: Workspace, gained: float, q: np.ndarray, v: np.ndarray) -> None:
-    """Remove energy, J, that came from nothing from the motion v at q, where the sums are
-    sums_after, as far as there is any.
+    """Remove the spurious energy ``gained``, J, from the motion v at q, where the sums are
+    step.sums_after, as far as there is any.
 
-    v becomes w + s (v - w). Of dolls on the ground w is zero, of others their rigid motion, so that
-    their momenta stay. What is at rest relative to w stays so, and what slides or separates goes on
-    in the same direction.
+    v becomes w + share (v - w). Of dolls on the ground w is zero, of others their rigid motion, so
+    that their momenta stay. What is at rest relative to w stays so, and what slides or separates
+    goes on in the same direction.
     """
     inner = internal_kinetic_energy(s, ws)
     share = math.sqrt(max(0.0, 1 - gained / inner)) if inner > 0 else 1.0
@@ -228,7 +212,7 @@ def locked_angular_velocity(ws: Workspace, doll: np.record, angular_momentum: Ve
 
 @compiled
 def rigid_energy(doll: np.record, mass: float, spin: Vec3) -> float:
-    """Kinetic energy, J, of that rigid motion."""
+    """Kinetic energy, J, of a doll's rigid motion with angular velocity ``spin``, rad/s."""
     p, l = doll.momentum, doll.angular_momentum
     return ((p[0] ** 2 + p[1] ** 2 + p[2] ** 2) / mass + spin[0] * l[0] + spin[1] * l[1]
             + spin[2] * l[2]) / 2

@@ -1,7 +1,7 @@
-"""Position correction: penetrations are removed by a displacement, without velocity.
-
-It raises the potential energy. The motion pays for that, so it goes no further than a share of the
-kinetic energy allows; nor does it take a joint past a limit.
+"""Position correction: bounds on the energy and the joint motion of the displacement that removes
+penetrations. Its target: solve_contacts.set_correction(); solved by
+solver.solve_position_correction() and large_island.solve_large(); applied in
+contact_step.finish_step().
 """
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from ..workspace import Workspace
 from .momentum import internal_kinetic_energy
 
 PAID_SHARE = 0.005
-"""Share of the internal kinetic energy that position correction may cost in a step."""
+"""Share of the internal kinetic energy that position correction may add in a step."""
 
 
 @compiled
 def correction_energy(s: System, ws: Workspace, kin: Kinematics, correction: np.ndarray) -> float:
-    """Potential energy, J, that a displacement ``correction`` (nv,) adds; composite inertias and
-    motion subspaces are those of ``kin``.
+    """Potential energy, J, that a displacement ``correction`` (nv,) adds. ``kin`` has all motion
+    subspaces; dynamics.composite_inertias are those of its pose.
     """
     total, g = 0.0, vec(s.gravity)
     for j in range(len(correction)):
@@ -37,9 +37,9 @@ def correction_energy(s: System, ws: Workspace, kin: Kinematics, correction: np.
 
 @compiled
 def limit_correction_energy(s: System, ws: Workspace, m: int, correction: np.ndarray) -> None:
-    """Scale a displacement ``correction`` (nv,) so that the potential energy it adds stays below a
-    share of the internal kinetic energy. Deep penetrations into the ground or past a limit are
-    corrected whatever the energy; what the motion does not pay is booked.
+    """Scale a displacement ``correction`` (nv,), and its scalars.correction_energy, so that this
+    stays below a share of the internal kinetic energy. Deep penetrations into the ground or past a
+    limit are corrected at any cost; the excess is added to stats.work_position_correction.
     """
     is_deep, scalars = False, ws.step.scalars[0]
     for i in range(m):
@@ -60,8 +60,8 @@ def limit_correction_energy(s: System, ws: Workspace, m: int, correction: np.nda
 @compiled
 def enter_correction_bounds(s: System, kin: Kinematics, q: np.ndarray, correction: np.ndarray,
                             motion: np.ndarray) -> None:
-    """Enter by how much a displacement ``correction`` (nv,) moves, m, and turns, rad, each body
-    into ``motion``. ``kin`` is that of q; its velocities are overwritten.
+    """Write by how much a displacement ``correction`` (nv,) moves, m, and turns, rad, each body to
+    motion[].correction and correction_angle. ``kin`` is that of q; its velocities are overwritten.
     """
     some = False
     for j in range(len(correction)):
@@ -95,7 +95,7 @@ def clip_to_joint_limits(s: System, q: np.ndarray, correction: np.ndarray) -> No
 
 @compiled
 def scale_doll(s: System, doll: int, share: float, correction: np.ndarray) -> None:
-    """Scale the part of a displacement (nv,) that is one doll's."""
+    """Scale the part of a displacement (nv,) that is one doll's by ``share``, if below 1."""
     if share < 1:
         for j in range(len(correction)):
             if s.body_doll[s.dof_body[j]] == doll:

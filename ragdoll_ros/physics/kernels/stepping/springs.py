@@ -1,5 +1,5 @@
-"""Springs of grabs, drives and joints: their forces, and what they add to the mass matrix when a
-step takes them implicitly. A drive is a spring without stiffness.
+"""Springs of grabs, drives and joints: their forces, and their implicit terms in the mass matrix. A
+drive is a spring without stiffness.
 """
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def theta_weight(rate: float) -> float:
 
 @compiled
 def implicit_damping(spring: np.record, h: float) -> float:
-    """How much less a spring's mean force over a step of h s is for each m/s that its velocity
-    gains, N s/m.
+    """Decrease of a spring's mean force over a step of h s per gain of its velocity, N s/m; of
+    torques N m s/rad.
     """
     if spring.saturated:
         return 0.0
@@ -48,8 +48,8 @@ def spring_jacobian(axis: np.ndarray, spring: np.record, arm: Vec3) -> Vec3:
 @compiled
 def add_implicit_stiffness(s: System, kin: Kinematics, H: np.ndarray, spring: np.record,
                            h: float) -> None:
-    """Add to H what a spring resists at the end of a step, for a grab h (k h / 4 + c / 2) J^T J.
-    The degrees of freedom of a body are on one path to the root, so H keeps its sparsity.
+    """Add the implicit term of a spring in a step of h s to H, for a grab h (k h / 4 + c / 2) J^T
+    J. The degrees of freedom of a body are on one path to the root, so H keeps its sparsity.
     """
     i = spring.body
     share = h * implicit_damping(spring, h)
@@ -103,7 +103,7 @@ def spring_force(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray, sprin
 @compiled
 def add_spring_force(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray, spring: np.record,
                      time: float, out: np.ndarray) -> None:
-    """Add a spring's generalized forces to ``out`` (nv,)."""
+    """Add a spring's generalized forces to ``out`` (nv,); arguments as spring_force()."""
     force, _ = spring_force(s, kin, q, v, spring, time)
     i = spring.body
     if spring.kind == JOINT_SPRING:
@@ -119,8 +119,8 @@ def add_spring_force(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray, s
 @compiled
 def mean_spring_force(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray, v_end: np.ndarray,
                       spring: np.record, time: float, h: float) -> tuple[Vec3, Vec3]:
-    """Mean force, N, of a spring in a step of h s from v to ``v_end``, and its point's mean
-    velocity, m/s. ``kin``, q and ``time``: of the step's middle.
+    """Mean force and mean velocity of a spring, as spring_force(), in a step of h s from v to
+    ``v_end``. ``kin``, q and ``time`` are of the step's middle.
     """
     force, start = spring_force(s, kin, q, v, spring, time)
     _, end = spring_force(s, kin, q, v_end, spring, time)
@@ -132,8 +132,8 @@ def mean_spring_force(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray, 
 @compiled
 def saturate_springs(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray, v_free: np.ndarray,
                      springs: np.ndarray, time: float, h: float) -> bool:
-    """Let springs whose mean force would exceed their max_force exert that instead. Returns whether
-    there are any.
+    """Write saturated_force, and ``saturated`` 1, to springs whose mean force from v to ``v_free``
+    would exceed max_force. Returns whether there are any. ``kin``, q, ``time``: of the middle.
     """
     some = False
     for k in range(len(springs)):

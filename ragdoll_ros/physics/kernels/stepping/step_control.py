@@ -1,5 +1,5 @@
-"""Step control: how long a contact step is, to the time of impact and within bounds on the energy
-and the penetrations that it may add.
+"""Step control: the length of a contact step, to the time of impact and within bounds on the energy
+and the penetrations that it adds.
 """
 from __future__ import annotations
 
@@ -10,36 +10,24 @@ from ..compiling.decorators import compiled
 from ..contact.gaps import BEYOND_LIMIT, TOUCHING, is_joint_limit_gap
 from ..system import System
 from ..workspace import Workspace
-from .contact_step import (
-    MAX_PENETRATION,
-    STEP_TOLERANCE,
-    begin_contact_step,
-    contact_step,
-    finish_step,
-)
+from .contact_step import (MAX_PENETRATION, STEP_TOLERANCE, begin_contact_step, contact_step,
+                           finish_step)
 from .momentum import REMOVABLE, internal_kinetic_energy, remove_energy, total_energy
 from .position_correction import PAID_SHARE
-from .time_of_impact import (
-    OVERSHOT,
-    impacts_at_end,
-    is_fast_impact,
-    next_trial_step,
-    open_bracket,
-    step_to_joint_limit,
-    update_bracket,
-)
+from .time_of_impact import (OVERSHOT, impacts_at_end, is_fast_impact, next_trial_step,
+                             open_bracket, step_to_joint_limit, update_bracket)
 from .warm_start import jam_threshold
 
 MAX_TRIES = 20
-"""Of a step that is to end at an impact and to add no energy."""
+"""Trials of a step that is to end at an impact and to add no energy."""
 
 FINEST = 0.01
 """Share of the nominal step below which it is not shortened to add no energy; steps that add some
 all the same are counted."""
 
 RESTING_GAIN = 1e-6
-"""Share of the energy scale that a step may add where the motion can pay for it: near rest, the
-energy of a step says little about its error."""
+"""Share of the energy scale that a step may add, up to a share of the kinetic energy: near rest,
+the energy of a step says little about its error."""
 
 SOLVER_GAIN = 1e-10
 """Share of the energy scale that solving to a tolerance may add in a step."""
@@ -60,10 +48,10 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
     """Advance by at most h s, stopping at the first fast impact. Returns the time advanced and
     whether an impact was reached.
 
-    ws.gaps are those at cluster.q before and after. A step that adds much energy, or presses one
-    thing deep into another, is too long for what turns: it is repeated at half the length. The
-    little energy that others add is removed from the motion. Where impacts are not to be sought,
-    what meets in the step is a contact of it, with restitution: it is repeated with that.
+    ws.gaps are those at cluster.q before and after. A step that adds much energy or penetration is
+    repeated at half the length; the little energy that others add is removed from the motion. Where
+    impacts are not to ``seek``, gaps that close in the step become contacts, with restitution, and
+    it is repeated.
 
     ``nominal``: s of a step where nothing shortens it; ``since``: see contact_step().
     """
@@ -115,7 +103,7 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
 
 @compiled
 def begin_trials(ws: Workspace) -> None:
-    """Begin with the gaps at the start, and with nothing known of a time of impact."""
+    """Copy ws.gaps to contacts.gaps_active and open the bracket of the time of impact."""
     copy_into(ws.contacts.gaps_active, ws.gaps)
     open_bracket(ws)
 
@@ -123,7 +111,9 @@ def begin_trials(ws: Workspace) -> None:
 @compiled
 def accept_step(ws: Workspace, cluster: ClusterState, m: int, length: float,
                 warm: bool) -> None:
-    """Let the cluster be at the end of the step. ``warm``: its contacts are known to the next."""
+    """Copy the step's end to the cluster, and if ``warm`` its m contacts and its ``length``, s, for
+    the warm start of the next step.
+    """
     if warm:
         for i in range(m):
             cluster.contacts[i] = ws.contacts.found[i]
@@ -135,14 +125,14 @@ def accept_step(ws: Workspace, cluster: ClusterState, m: int, length: float,
 
 @compiled
 def clear_contact_accelerations(cluster: ClusterState) -> None:
-    """Let nothing be known of what contacts will do."""
+    """Set cluster.contact_accelerations to zero."""
     for j in range(len(cluster.contact_accelerations)):
         cluster.contact_accelerations[j] = 0.0
 
 
 @compiled
 def penetrates_unseen(s: System, ws: Workspace) -> bool:
-    """Whether something met in the step just taken that ends deep within the other."""
+    """Whether a gap that was open in the step just taken ends below minus UNSEEN or UNSEEN_TURN."""
     max_depth = min(UNSEEN, UNSEEN_EACH * len(ws.step.external))
     for j in range(len(ws.gaps)):
         most = UNSEEN_TURN if is_joint_limit_gap(s, ws.gaps, j) else max_depth
@@ -153,8 +143,8 @@ def penetrates_unseen(s: System, ws: Workspace) -> bool:
 
 @compiled
 def activate_contacts(s: System, ws: Workspace, h: float) -> bool:
-    """Let what met in the step of h s just taken, deep or fast, touch in it. Returns whether there
-    is any.
+    """Make gaps that closed in the step of h s just taken, overshot or fast, contacts of it, in
+    contacts.gaps_active. Returns whether there are any.
     """
     active, end, some = ws.contacts.gaps_active, ws.contacts.gaps_end, False
     for j in range(len(active)):
@@ -166,7 +156,7 @@ def activate_contacts(s: System, ws: Workspace, h: float) -> bool:
 
 @compiled
 def copy_into(to: np.ndarray, values: np.ndarray) -> None:
-    """Copy values (k,)."""
+    """Copy ``values`` (k,) to ``to``."""
     for j in range(len(to)):
         to[j] = values[j]
 
@@ -175,8 +165,8 @@ def copy_into(to: np.ndarray, values: np.ndarray) -> None:
 def tolerated_energy_gain(s: System, ws: Workspace, m: int, h: float, kinetic: float,
                           work: float) -> float:
     """Energy gain, J, tolerated in a step of h s with m contacts: a fraction of the kinetic energy,
-    or, near rest, of m g L, both as far as the motion can pay for it; and what the tolerances of
-    solving add, that of contacts times the sum of all impulses.
+    or, near rest, of m g L, both up to a share of the internal kinetic energy; and the effect of
+    solver tolerances, that of contacts times the sum of all impulses.
     """
     total = 0.0
     for i in range(m):
@@ -191,8 +181,8 @@ def tolerated_energy_gain(s: System, ws: Workspace, m: int, h: float, kinetic: f
 
 @compiled
 def penetrates_further(s: System, ws: Workspace) -> bool:
-    """Whether something that touched is deep at the step's end, and deeper by a tenth of that than
-    at its start.
+    """Whether something that touched ends deeper than MAX_PENETRATION or BEYOND_LIMIT, and by a
+    tenth of it deeper than at the start.
     """
     for j in range(len(ws.gaps)):
         most = BEYOND_LIMIT if is_joint_limit_gap(s, ws.gaps, j) else MAX_PENETRATION

@@ -4,7 +4,8 @@ Geoms that are apart when a step begins may meet before it ends. A length at whi
 and one at which something has bracket the time of impact, which is approached by regula falsi with
 Anderson and Bjoerck's weights (BIT 13, 1973), and by bisection where that lags, as between two gaps
 of which one is not straight. A joint's rate is known: the first length ends where the joint is at
-its limit at that rate, the next is along a parabola that begins with it.
+its limit at that rate, the next is along a parabola that begins with it. The loop that tries the
+lengths is step_control.step_to_impact(); in flight, flight/first_contact.py.
 """
 from __future__ import annotations
 
@@ -30,7 +31,7 @@ MAX_CHORDS = 2
 
 @compiled
 def is_fast_impact(s: System, ws: Workspace, j: int, h: float) -> bool:
-    """Whether gap j closed in the step of h s just taken, too fast for the next one to begin it."""
+    """Whether gap j closed in the step of h s just taken, faster than SLOW or SLOW_TURN."""
     slow = SLOW_TURN if is_joint_limit_gap(s, ws.gaps, j) else SLOW
     end = ws.contacts.gaps_end[j]
     return ws.gaps[j] > TOUCHING and end <= TOUCHING and ws.gaps[j] - end > slow * h
@@ -53,7 +54,7 @@ def impacts_at_end(s: System, ws: Workspace, h: float) -> tuple[bool, bool, bool
 
 @compiled
 def open_bracket(ws: Workspace) -> None:
-    """Begin to seek a time of impact: all that is known is that it is after the start."""
+    """Reset step.bracket: an impact is only known to be after the start."""
     bracket = ws.step.bracket[0]
     bracket.low, bracket.high, bracket.moved = 0.0, math.inf, 0
     bracket.halved_width, bracket.chords = math.inf, 0
@@ -63,8 +64,8 @@ def open_bracket(ws: Workspace) -> None:
 
 @compiled
 def update_bracket(s: System, ws: Workspace, h: float, overshot: bool, landed: bool) -> bool:
-    """Let a step of h s, at whose end something is ``overshot`` or not, be an end of the bracket.
-    Returns whether the time of impact is still to be sought between its ends.
+    """Make a step of h s the high end of the bracket, if something is ``overshot`` at its end, or
+    its low end, unless something has ``landed``. Returns whether to try another length.
 
     The gaps at an end that stays twice are weighted: anderson_bjorck_weight().
     """
@@ -92,8 +93,8 @@ def update_bracket(s: System, ws: Workspace, h: float, overshot: bool, landed: b
 
 @compiled
 def anderson_bjorck_weight(before: float, now: float) -> float:
-    """Weight of the far end of a chord when the near end moves from a value to one of the same
-    sign; a half where that says nothing.
+    """Weight of the far end of a chord when the near end moves from ``before`` to ``now``, of the
+    same sign; one half where that is not positive.
     """
     share = 1 - now / before if before != 0.0 and (now < 0) == (before < 0) else 0.5
     return share if share > 0 else 0.5
@@ -101,8 +102,8 @@ def anderson_bjorck_weight(before: float, now: float) -> float:
 
 @compiled
 def next_trial_step(s: System, ws: Workspace, v: np.ndarray) -> float:
-    """Length of a step, s, at whose end the first of the gaps closes that the bracket contains;
-    ``v`` are the velocities at its start.
+    """Next step length to try, s: where the first of the bracketed gaps closes, by regula falsi or
+    bisection. ``v``: velocities at the start.
     """
     bracket, high, share = ws.step.bracket[0], ws.step.gaps_high, 1.0
     low, width = bracket.low, bracket.high - bracket.low
@@ -126,8 +127,8 @@ def next_trial_step(s: System, ws: Workspace, v: np.ndarray) -> float:
 
 @compiled
 def parabola_root(start: float, slope: float, end: float) -> float:
-    """Where in 0 to 1 a parabola is zero that is ``start`` > 0 at 0, with this slope there, and
-    ``end`` < 0 at 1.
+    """Zero in 0 to 1 of a parabola with value ``start`` > 0 and this slope at 0, and ``end`` < 0 at
+    1.
     """
     bend = end - start - slope
     return 2 * start / (math.sqrt(slope * slope - 4 * bend * start) - slope)
@@ -135,7 +136,7 @@ def parabola_root(start: float, slope: float, end: float) -> float:
 
 @compiled
 def limit_gap_rate(s: System, ws: Workspace, v: np.ndarray, j: int) -> float:
-    """Rate, rad/s, at which gap j, a joint's from a limit, opens."""
+    """Rate, rad/s, at which gap j, the distance of a joint from a limit, grows at velocities v."""
     k = j - first_joint_limit_gap(s, ws.gaps)
     rate = v[s.joint_limits[k // 2].dof]
     return -rate if k % 2 else rate
@@ -143,8 +144,8 @@ def limit_gap_rate(s: System, ws: Workspace, v: np.ndarray, j: int) -> float:
 
 @compiled
 def step_to_joint_limit(s: System, ws: Workspace, v: np.ndarray, h: float) -> float:
-    """Length of a step, at most h s, at whose end the first joint that approaches a limit fast is
-    there, at its present rate.
+    """Length of a step, at most h s, at whose end the first joint that approaches a limit fast
+    reaches it at its present rate.
     """
     first = first_joint_limit_gap(s, ws.gaps)
     for j in range(first, first + 2 * len(s.joint_limits)):

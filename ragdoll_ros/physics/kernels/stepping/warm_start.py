@@ -13,7 +13,7 @@ from ..system import System
 from ..workspace import Workspace
 
 JAMMED = 10.0
-"""Times all momenta and weights from which on impulses are those of a jam."""
+"""Factor on all momenta and weights above which impulses are those of a jam."""
 
 
 @compiled
@@ -28,11 +28,11 @@ def jam_threshold(s: System, ws: Workspace, h: float) -> float:
 
 @compiled
 def warm_start(s: System, ws: Workspace, m: int, known: np.ndarray, h: float) -> None:
-    """Let m contacts begin with the impulses that the ``known`` contacts of the last step had, and
-    enter which of them are persistent.
+    """Write to m found contacts the impulses of the ``known`` contacts of the last step with the
+    same ids, as initial ones, and whether they are persistent, with take_start().
 
-    What jammed contacts press against each other is determined by nothing and would grow from step
-    to step: above the threshold they begin without impulses.
+    Impulses between jammed contacts are undetermined and would grow from step to step: above the
+    threshold they begin at zero.
     """
     stats, pressed = ws.stats[0], 0.0
     share = h / stats.last_dt if stats.last_dt > 0 else 0.0
@@ -58,8 +58,8 @@ def warm_start(s: System, ws: Workspace, m: int, known: np.ndarray, h: float) ->
 
 @compiled
 def take_start(c: np.record, start: np.record) -> None:
-    """Enter gap and velocities of a persistent contact as the step began; what separates then has
-    no friction.
+    """Copy gap and velocities of a persistent contact at the step's start to ``c``; if it separates
+    there, remove its friction.
     """
     c.gap = start.gap
     for e in range(5):
@@ -72,8 +72,8 @@ def take_start(c: np.record, start: np.record) -> None:
 
 @compiled
 def find_id(contacts: np.ndarray, count: int, id_: int, near: int) -> int:
-    """Index of the contact with this id among so many, searched from ``near`` on, as most are in
-    the same order; ``count`` if there is none.
+    """Index of the contact with this id among ``count``, searched from ``near`` on, as most keep
+    their order; ``count`` if there is none.
     """
     for n in range(count):
         j = near + n

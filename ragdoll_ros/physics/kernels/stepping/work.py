@@ -1,17 +1,11 @@
-"""Work, impulse and moment that pushes, grabs and drives do in a step."""
+"""Work, impulse and moment of pushes, grabs and drives in a step."""
 from __future__ import annotations
 
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..dynamics.kinematics import (
-    Kinematics,
-    forward_kinematics,
-    point_of_body,
-    root_motion_subspaces,
-    root_position,
-    velocity_at,
-)
+from ..dynamics.kinematics import (Kinematics, forward_kinematics, point_of_body,
+                                   root_motion_subspaces, root_position, velocity_at)
 from ..dynamics.loads import ANGULAR_DRIVE, GRAB, JOINT_SPRING, load_in_world
 from ..maths.vectors import add, dot, put, scale, vec
 from ..system import System
@@ -23,8 +17,9 @@ from .springs import mean_spring_force
 @compiled
 def account_work(s: System, ws: Workspace, v: np.ndarray, v_end: np.ndarray, h: float,
                  loads: np.ndarray, springs: np.ndarray, since: float) -> None:
-    """Book the work, J, of loads, grabs and drives in a step of h s, and enter their impulses into
-    step.external. The work of forces along the world's axes is that of load_potential() alone.
+    """Add the work, J, of loads, grabs and drives in a step of h s to stats.work_pushes and
+    work_grabs, their impulses to step.external. Forces along the world's axes work in
+    load_potential(). step.middle and step.v_middle become those of the mean of v and ``v_end``.
     """
     kin, q, mean, stats = ws.step.middle, ws.step.q_middle, ws.step.v_middle, ws.stats[0]
     for j in range(len(v)):
@@ -55,7 +50,7 @@ def account_work(s: System, ws: Workspace, v: np.ndarray, v_end: np.ndarray, h: 
 
 @compiled
 def body_of_bone(tree: np.ndarray, bone: int) -> int:
-    """Record of a bone of the scene."""
+    """Index in ``tree`` of the body of a bone; 0 if there is none."""
     for i in range(len(tree)):
         if tree[i].bone == bone:
             return i
@@ -65,7 +60,7 @@ def body_of_bone(tree: np.ndarray, bone: int) -> int:
 @compiled
 def add_load_impulse(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, load: np.record,
                      h: float) -> None:
-    """Enter the impulse of a load in h s into step.external."""
+    """Add the impulse of a load in h s to step.external; ``kin`` is that of q."""
     i = body_of_bone(s.tree, load.bone)
     arm = point_of_body(s.tree[i], kin, i, load.point)
     force, torque = load_in_world(s.tree[i], kin, i, load)

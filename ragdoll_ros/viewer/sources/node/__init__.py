@@ -1,1 +1,1 @@
-"""The source that listens to a running node."""
+"""A running node `ragdoll` as a source, over ROS 2."""

@@ -1,4 +1,4 @@
-"""Hands that reach over ROS: what RViz would send if a bone's interactive marker were dragged."""
+"""Hands over ROS: the same feedback that RViz sends when an interactive marker is dragged."""
 from __future__ import annotations
 
 import os
@@ -15,23 +15,23 @@ from ....model import rotation
 from ....model.scene import Scene
 from ....model.state import State
 from ....ros.messages.convert import to_point, to_quaternion
-from ..source import Frame, Held
+from ..source import Frame, GrabbedPoint
 
 
 @dataclass
 class _Hand:
     bone: str
     local: np.ndarray
-    """(3,) m: the grabbed point from the bone's centre, its axes."""
-    begin: np.ndarray
-    """(3,) m, world: where that was when it was grabbed."""
+    """(3,) m: the grabbed point in the bone's frame."""
+    start: np.ndarray
+    """(3,) m, world: the grabbed point when it was grabbed."""
     pose: np.ndarray
-    """(7,) the bone's then."""
+    """(7,) of the bone when it was grabbed."""
     target: np.ndarray
 
 
-class RemoteHands:
-    """Grabs as feedback of the bones' markers: the pointer's displacement is the marker's."""
+class NodeHands:
+    """Sends grabs as feedback of the bones' markers, displaced as the pointer is."""
 
     def __init__(self, node: Node, name: str) -> None:
         self._node = node
@@ -41,58 +41,58 @@ class RemoteHands:
         self._hands: dict[str, _Hand] = {}
         self.frame_id = 'world'
         self.moves = 0
-        """How often a hand was moved so far."""
+        """Count of hand moves."""
 
     def grab(self, hand: str, bone: str, local: np.ndarray, target: np.ndarray,
              frame: Frame) -> None:
-        """Take a bone of the frame that is shown at a point of its own axes."""
+        """Grab a bone of the shown frame at a point of the bone's frame."""
         self.let_go(hand)
         index = frame.scene.bone_index(bone)
         position, orientation = frame.state.positions[index], frame.state.orientations[index]
         point = position + rotation.rotate(orientation, local)
         pose = np.concatenate([position, orientation])
-        self._hands[hand] = held = _Hand(bone, local, point, pose, point)
-        self._send(hand, held, InteractiveMarkerFeedback.MOUSE_DOWN)
+        self._hands[hand] = grab = _Hand(bone, local, point, pose, point)
+        self._send(hand, grab, InteractiveMarkerFeedback.MOUSE_DOWN)
         self.drag(hand, target)
 
     def drag(self, hand: str, target: np.ndarray) -> None:
-        """Move a hand that holds something."""
-        held = self._hands.get(hand)
-        if held is not None:
-            held.target = target
-            self._send(hand, held, InteractiveMarkerFeedback.POSE_UPDATE)
+        """Move the target of a hand that holds something."""
+        grab = self._hands.get(hand)
+        if grab is not None:
+            grab.target = target
+            self._send(hand, grab, InteractiveMarkerFeedback.POSE_UPDATE)
 
     def let_go(self, hand: str) -> None:
-        """Open a hand."""
-        held = self._hands.pop(hand, None)
-        if held is not None:
-            self._send(hand, held, InteractiveMarkerFeedback.MOUSE_UP)
+        """Release what a hand holds."""
+        grab = self._hands.pop(hand, None)
+        if grab is not None:
+            self._send(hand, grab, InteractiveMarkerFeedback.MOUSE_UP)
 
-    def forget(self) -> None:
-        """Hold nothing any more: the node has let go, or is another one."""
+    def clear(self) -> None:
+        """Drop all grabs without feedback: the node has released them, or is another one."""
         self._hands.clear()
         self.moves += 1
 
-    def keep(self) -> None:
-        """Tell that hands which rest still hold; to be called about once a second."""
-        for hand, held in list(self._hands.items()):
-            self._send(hand, held, InteractiveMarkerFeedback.KEEP_ALIVE)
+    def keep_alive(self) -> None:
+        """Confirm the grabs of resting hands; call about once a second."""
+        for hand, grab in list(self._hands.items()):
+            self._send(hand, grab, InteractiveMarkerFeedback.KEEP_ALIVE)
 
-    def held(self, scene: Scene, state: State) -> tuple[Held, ...]:
-        """What the hands hold now."""
+    def grabs(self, scene: Scene, state: State) -> tuple[GrabbedPoint, ...]:
+        """The points that are held now."""
         names = scene.bone_names
-        return tuple(Held(
+        return tuple(GrabbedPoint(
             hand.bone, state.positions[bone] + rotation.rotate(
                 state.orientations[bone], hand.local), hand.target)
             for hand in list(self._hands.values()) if hand.bone in names
             for bone in (names.index(hand.bone),))
 
-    def _send(self, hand: str, held: _Hand, event: int) -> None:
+    def _send(self, hand: str, grab: _Hand, event: int) -> None:
         self.moves += 1
-        place = held.pose[:3] + held.target - held.begin
-        orientation = to_quaternion(held.pose[3:])
+        position = grab.pose[:3] + grab.target - grab.start
+        orientation = to_quaternion(grab.pose[3:])
         self._publisher.publish(InteractiveMarkerFeedback(
             header=Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self.frame_id),
-            client_id=f'{self._client} {hand}', marker_name=held.bone, control_name=held.bone,
-            event_type=event, pose=Pose(position=to_point(place), orientation=orientation),
-            mouse_point=to_point(held.target), mouse_point_valid=True))
+            client_id=f'{self._client} {hand}', marker_name=grab.bone, control_name=grab.bone,
+            event_type=event, pose=Pose(position=to_point(position), orientation=orientation),
+            mouse_point=to_point(grab.target), mouse_point_valid=True))

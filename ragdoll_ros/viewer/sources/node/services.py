@@ -1,4 +1,4 @@
-"""Asks a node: its parameters and services, without waiting where nobody has to."""
+"""Client of a node's services and parameters, mostly without waiting."""
 from __future__ import annotations
 
 import queue
@@ -12,16 +12,16 @@ from std_srvs.srv import SetBool, Trigger
 
 from ....model import errors
 
-PATIENCE = 20.0
-"""s that an answer may take: a large scene is built before the node gives it."""
+RESPONSE_TIMEOUT = 20.0
+"""s: the node builds a scene before it responds."""
 
 
 class Refused(errors.RagdollError):
-    """What the node will not do, with its reason; or there is no answer."""
+    """The node refused a request, with its reason, or did not respond."""
 
 
-class Ask:
-    """The services of the node ``name``. Answers come in the thread that spins ``node``."""
+class NodeServices:
+    """The services of the node ``name``. Callbacks run in the thread that spins ``node``."""
 
     def __init__(self, node: Node, name: str) -> None:
         self._name = name
@@ -35,44 +35,45 @@ class Ask:
         """Call ``reset`` or ``step``."""
         self._send(self._triggers[service], Trigger.Request())
 
-    def pause(self, wanted: bool) -> bool:
-        """Hold the node's time, or let it go on; False if there is no node that could."""
-        return self._send(self._pause, SetBool.Request(data=wanted))
+    def pause(self, paused: bool) -> bool:
+        """Pause or resume; False if there is no node."""
+        return self._send(self._pause, SetBool.Request(data=paused))
 
-    def parameters(self, names: Sequence[str], take: Callable[[dict], None]) -> None:
-        """Ask for parameters by name; no answer if there is no node."""
-        def answered(answer: GetParameters.Response) -> None:
-            if len(answer.values) == len(names):
-                take({name: parameter_value_to_python(value)
-                      for name, value in zip(names, answer.values, strict=True)})
-        self._send(self._get, GetParameters.Request(names=list(names)), answered)
+    def get_parameters(self, names: Sequence[str], on_values: Callable[[dict], None]) -> None:
+        """Get parameters by name; no callback if there is no node."""
+        def on_response(response: GetParameters.Response) -> None:
+            if len(response.values) == len(names):
+                on_values({name: parameter_value_to_python(value)
+                           for name, value in zip(names, response.values, strict=True)})
+        self._send(self._get, GetParameters.Request(names=list(names)), on_response)
 
-    def set(self, name: str, value: object, take: Callable[[object], None] | None = None) -> bool:
-        """Set a parameter without waiting; a refusal is in the node's diagnostics, too."""
+    def set_parameter(self, name: str, value: object,
+                      on_response: Callable[[object], None] | None = None) -> bool:
+        """Set a parameter without waiting; the node's diagnostics report a refusal, too."""
         return self._send(self._set, SetParametersAtomically.Request(
-            parameters=[Parameter(name, value=value).to_parameter_msg()]), take)
+            parameters=[Parameter(name, value=value).to_parameter_msg()]), on_response)
 
-    def set_and_wait(self, name: str, value: object) -> None:
-        """Set a parameter; Refused, with the node's reason, if it will not. Not for callbacks."""
-        answers: queue.SimpleQueue[SetParametersAtomically.Response] = queue.SimpleQueue()
-        if not self.set(name, value, answers.put):
-            raise Refused(f'there is no node `{self._name}` to ask')
+    def set_parameter_and_wait(self, name: str, value: object) -> None:
+        """Set a parameter; Refused with the node's reason. Must not be called in a callback."""
+        responses: queue.SimpleQueue[SetParametersAtomically.Response] = queue.SimpleQueue()
+        if not self.set_parameter(name, value, responses.put):
+            raise Refused(f'there is no node `{self._name}`')
         try:
-            result = answers.get(timeout=PATIENCE).result
+            result = responses.get(timeout=RESPONSE_TIMEOUT).result
         except queue.Empty:
-            raise Refused(f'the node `{self._name}` does not answer') from None
+            raise Refused(f'the node `{self._name}` does not respond') from None
         if not result.successful:
             raise Refused(result.reason)
 
     def _send(self, client: Client, request: object,
-              take: Callable[[object], None] | None = None) -> bool:
-        """Ask; False if there is no node that could answer."""
+              on_response: Callable[[object], None] | None = None) -> bool:
+        """Send a request; False if there is no node."""
         if not client.service_is_ready():
             return False
         future = client.call_async(request)
-        if take is not None:
-            def answered(done: object) -> None:
+        if on_response is not None:
+            def on_done(done: object) -> None:
                 if done.result() is not None:
-                    take(done.result())
-            future.add_done_callback(answered)
+                    on_response(done.result())
+            future.add_done_callback(on_done)
         return True

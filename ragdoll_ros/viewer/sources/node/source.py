@@ -1,6 +1,6 @@
-"""A source over ROS: shows what the node `ragdoll` publishes and sends it what the page asks for.
+"""A source over ROS: shows what the node `ragdoll` publishes and sends it the page's commands.
 
-The node may be on another machine, may come later, end, and come again with another scene.
+The node may run on another machine, start later, end, and restart with another scene.
 """
 from __future__ import annotations
 
@@ -29,36 +29,36 @@ from ....model.vectors import Vector
 from ....ros.diagnostics import status_name
 from ....ros.inputs.subscriptions import PushSubscriptions
 from ....ros.outputs import LATCHED
-from ..source import Frame, Report, Source, Wanted
-from .force import RemoteForce
-from .frames import RemoteFrames
-from .hands import RemoteHands
-from .pushes import HeardPushes, Silent
-from .scene import RemoteScene
-from .services import Ask, Refused
+from ..source import Frame, RequestedData, Source, SourceStatus
+from .force_publisher import ForcePublisher
+from .frames import NodeFrames
+from .hands import NodeHands
+from .observed_pushes import NoInputCounts, ObservedPushes
+from .scene import NodeScene
+from .services import NodeServices, Refused
 
 NAME = 'ragdoll'
 
 MISSING = ('no node `{}` yet: start it with `ros2 run ragdoll_ros ragdoll_node` (same '
-           'ROS_DOMAIN_ID); this page goes on by itself')
+           'ROS_DOMAIN_ID); this page will connect by itself')
 SILENT = ('the node `{}` has been silent for {:.0f} s: if it has ended, start it again; this page '
-          'goes on by itself')
+          'will reconnect by itself')
 
-TWINS = ('Several nodes are called `{}`, and the page shows now one, now another: end all but one, '
-         'or start each in a namespace of its own.')
+DUPLICATES = ('Several nodes are called `{}`, and the page mixes their messages: end all but one, '
+              'or start each in a namespace of its own.')
 
 SILENCE = 3.0
-"""s without a word after which a node counts as gone: it reports once a second."""
+"""s without a message after which a node counts as gone: it reports once a second."""
 
 RETRY = 0.5
-"""s between two tries to learn what the node simulates."""
+"""s between two requests for the scene and between two confirmations of grabs."""
 
 KEYS = ('work_of_pushes_J', 'work_of_grabs_J', 'energy_excess_J')
-"""Measures that the page needs, of those that the diagnostics tell."""
+"""Measures in the diagnostics that the page needs."""
 
 
-class Remote(Source):
-    """Listens to the node in its own namespace, in a thread of its own, while a page is open."""
+class NodeSource(Source):
+    """Subscribes to the node in its own namespace, in a thread of its own, while a page is open."""
 
     def __init__(self, arguments: list[str]) -> None:
         self._context = rclpy.Context()
@@ -68,20 +68,20 @@ class Remote(Source):
         except RuntimeError as error:  # arguments, or a log that can not be written
             raise Refused(f'ROS does not start: {error}') from None
         self._node = Node('ragdoll_viewer', context=self._context)
-        self._full = f'{self._node.get_namespace().rstrip("/")}/{NAME}'
-        self._status = status_name(self._node.get_namespace(), NAME)
-        self._ask = Ask(self._node, NAME)
-        self._hands = RemoteHands(self._node, NAME)
-        self._frames = RemoteFrames(self._node, NAME, self._hands)
-        self._known = RemoteScene(self._ask, self._full, self._go_on)
-        self._pushes: HeardPushes | None = None
+        self._full_name = f'{self._node.get_namespace().rstrip("/")}/{NAME}'
+        self._diagnostics_name = status_name(self._node.get_namespace(), NAME)
+        self._services = NodeServices(self._node, NAME)
+        self._hands = NodeHands(self._node, NAME)
+        self._frames = NodeFrames(self._node, NAME, self._hands)
+        self._scene = NodeScene(self._services, self._full_name, self._use_scene)
+        self._pushes: ObservedPushes | None = None
         self._inputs: PushSubscriptions | None = None
-        self._force = RemoteForce(self._node, NAME)
-        self._wanted = Wanted()
-        self._told = Report()
-        self._simulated = 0.0
+        self._force = ForcePublisher(self._node, NAME)
+        self._requested = RequestedData()
+        self._reported = SourceStatus()
+        self._simulated_time = 0.0
         self._subscriptions: list[Subscription] = []
-        self._heard = 0.0
+        self._last_report = 0.0
         self._opened = time.monotonic()
         self._folder: Path | None = None
         self._ended = threading.Event()
@@ -92,60 +92,60 @@ class Remote(Source):
 
     @property
     def frame(self) -> Frame | None:
-        """Where the node's last message says that all is; the last one that fitted the scene."""
+        """Frame of the last messages that fitted the scene."""
         return self._frames.newest
 
     @property
-    def report(self) -> Report:
-        """What the node said last, and whether it says anything."""
-        heard = self._last_word()
-        silence = time.monotonic() - max(heard, self._opened)
-        problem = self._known.problem
-        if heard < self._opened:
-            problem = MISSING.format(self._full) if silence > 1.0 else ''
+    def status(self) -> SourceStatus:
+        """What the node reported last, and whether it is silent."""
+        last = self._last_message()
+        silence = time.monotonic() - max(last, self._opened)
+        problem = self._scene.problem
+        if last < self._opened:
+            problem = MISSING.format(self._full_name) if silence > 1.0 else ''
         elif silence > SILENCE:
-            problem = SILENT.format(self._full, silence)
-        note = ' '.join(filter(None, (self._told.note, self._known.note)))
-        return dataclasses.replace(self._told, problem=problem, note=note,
-                                   engine=self._known.settings.engine,
-                                   accuracy=self._known.settings.accuracy)
+            problem = SILENT.format(self._full_name, silence)
+        note = ' '.join(filter(None, (self._reported.note, self._scene.note)))
+        return dataclasses.replace(self._reported, problem=problem, note=note,
+                                   engine=self._scene.settings.engine,
+                                   accuracy=self._scene.settings.accuracy)
 
-    def want(self, wanted: Wanted) -> None:
-        if wanted != self._wanted:
-            self._wanted = wanted
-            self._executor.create_task(self._listen)
+    def request(self, requested: RequestedData) -> None:
+        if requested != self._requested:
+            self._requested = requested
+            self._executor.create_task(self._update_subscriptions)
 
     def push(self, force: Vector, duration: float) -> None:
-        self._force.send(force, duration / self._told.pace)
+        self._force.send(force, duration / self._reported.real_time_factor)
 
-    def pause(self, wanted: bool) -> bool:
-        return self._ask.pause(wanted)
+    def pause(self, paused: bool) -> bool:
+        return self._services.pause(paused)
 
     def step(self) -> None:
-        self._ask.trigger('step')
+        self._services.trigger('step')
 
     def reset(self) -> None:
-        self._ask.trigger('reset')
+        self._services.trigger('reset')
 
-    def set_pace(self, pace: float) -> None:
-        self._ask.set('real_time_factor', float(pace))
+    def set_real_time_factor(self, factor: float) -> None:
+        self._services.set_parameter('real_time_factor', float(factor))
 
     def load(self, name: str) -> None:
-        """Set the parameter `scene`; Refused if the node will not take it."""
-        self._ask.set_and_wait('scene', name)
+        """Set the parameter `scene`; Refused."""
+        self._services.set_parameter_and_wait('scene', name)
 
-    def take_engine(self, name: str) -> None:
-        """Set the parameter `engine`; Refused if the node will not take it."""
-        self._ask.set_and_wait('engine', name)
+    def set_engine(self, name: str) -> None:
+        """Set the parameter `engine`; Refused."""
+        self._services.set_parameter_and_wait('engine', name)
 
-    def take_accuracy(self, name: str) -> None:
-        """Set the parameter `accuracy`; Refused if the node will not take it."""
-        self._ask.set_and_wait('accuracy', name)
+    def set_accuracy(self, name: str) -> None:
+        """Set the parameter `accuracy`; Refused."""
+        self._services.set_parameter_and_wait('accuracy', name)
 
-    def use(self, scene: Scene) -> None:
-        """Write a scene to a file and have the node take that, if it can read it."""
+    def set_scene(self, scene: Scene) -> None:
+        """Write the scene to a temporary file and let the node load that; Refused."""
         if self._folder is None:
-            # It stays: the node reads it again whenever the parameter is set again.
+            # Kept: the node reads the file again whenever the parameter is set again.
             self._folder = Path(tempfile.mkdtemp(prefix='ragdoll_viewer_'))
         stem = ''.join(c if c.isalnum() or c in '-_' else '_' for c in scene.name)[:60]
         path = self._folder / f'{stem or "scene"}.yaml'
@@ -156,7 +156,7 @@ class Remote(Source):
             if errors.Unreadable.__name__ not in str(error):
                 raise
             raise Refused(f'the scene was written to {path} on the machine of this page; the node '
-                          f'seems to be on another one, as it cannot read that: {error}') from None
+                          f'seems to run on another one, as it cannot read it: {error}') from None
 
     def grab(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
         frame = self.frame
@@ -179,40 +179,41 @@ class Remote(Source):
         self._context.try_shutdown()
 
     def _spin(self) -> None:
-        # ROS time may stand, and hands rest on all the same.
-        self._node.create_timer(RETRY, self._stay_in_touch,
+        # A steady clock: ROS time may stop while hands still hold something.
+        self._node.create_timer(RETRY, self._keep_in_touch,
                                 clock=Clock(clock_type=ClockType.STEADY_TIME))
         while not self._ended.is_set():
             self._executor.spin_once(timeout_sec=1.0)
 
-    def _last_word(self) -> float:
-        """Instant at which the node was heard last, s of the steady clock; 0 for never."""
-        return max(self._heard, self._frames.heard)
+    def _last_message(self) -> float:
+        """When the node's last message came, s of the steady clock; 0 for never."""
+        return max(self._last_report, self._frames.last_poses)
 
-    def _listen(self) -> None:
-        """Bring the subscriptions in line with what is wanted."""
-        wanted = self._wanted
-        if wanted.frames and not self._subscriptions:
+    def _update_subscriptions(self) -> None:
+        """Subscribe to the requested data, and end other subscriptions."""
+        requested = self._requested
+        if requested.frames and not self._subscriptions:
             self._opened = time.monotonic()
             create = self._node.create_subscription
             self._subscriptions = [
-                create(String, 'robot_description', self._known.take_description, LATCHED),
+                create(String, 'robot_description', self._scene.take_description, LATCHED),
                 create(DiagnosticArray, '/diagnostics', self._take_diagnostics, 10),
-                create(ParameterEvent, '/parameter_events', self._known.take_event, 10)]
-        elif not wanted.frames:
+                create(ParameterEvent, '/parameter_events', self._scene.take_event, 10)]
+        elif not requested.frames:
             self._end(self._subscriptions)
             self._subscriptions = []
-            self._known.forget_description()
-        self._listen_to_pushes(wanted.frames and self._pushes is not None)
-        self._frames.listen(wanted)
+            self._scene.forget_description()
+        self._update_inputs(requested.frames and self._pushes is not None)
+        self._frames.subscribe(requested)
 
-    def _listen_to_pushes(self, wanted: bool) -> None:
-        if not wanted and self._inputs is not None:
+    def _update_inputs(self, requested: bool) -> None:
+        """Subscribe to the topics that push, or end these subscriptions."""
+        if not requested and self._inputs is not None:
             self._end(self._inputs.subscriptions)
             self._inputs = None
-        elif wanted:
-            self._inputs = self._inputs or PushSubscriptions(self._node, Silent(), NAME)
-            self._inputs.simulation, self._inputs.settings = self._pushes, self._known.settings
+        elif requested:
+            self._inputs = self._inputs or PushSubscriptions(self._node, NoInputCounts(), NAME)
+            self._inputs.simulation, self._inputs.settings = self._pushes, self._scene.settings
 
     def _end(self, subscriptions: list[Subscription]) -> None:
         for subscription in subscriptions:
@@ -220,38 +221,39 @@ class Remote(Source):
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            if status.name == self._status:
-                self._heard = time.monotonic()
+            if status.name == self._diagnostics_name:
+                self._last_report = time.monotonic()
                 values = {pair.key: pair.value for pair in status.values}
-                # What cannot be read stays as it was.
+                # Values that cannot be read stay as they were.
                 with contextlib.suppress(KeyError, ValueError):
                     is_alone = values.get('namesakes', '0') == '0'
-                    self._told = dataclasses.replace(
-                        self._told, paused=values['paused'] == 'true',
-                        note='' if is_alone else TWINS.format(self._full),
-                        pace=float(values['real_time_factor']),
-                        engine_name=values['engine'], reached=float(values['pace']),
+                    self._reported = dataclasses.replace(
+                        self._reported, paused=values['paused'] == 'true',
+                        note='' if is_alone else DUPLICATES.format(self._full_name),
+                        real_time_factor=float(values['real_time_factor']),
+                        engine_name=values['engine'],
+                        measured_real_time_factor=float(values['pace']),
                         tick_cost=float(values['tick_cost_ms']) / 1e3,
                         measures={key: float(values[key]) for key in KEYS if key in values})
                 with contextlib.suppress(KeyError, ValueError):
                     zero = int(values['stamp_of_zero']), float(values['stamp_pace'])
                     simulated = float(values['simulated_time'])
-                    if simulated < self._simulated:
-                        self._hands.forget()
-                    self._frames.zero, self._simulated = zero, simulated
+                    if simulated < self._simulated_time:
+                        self._hands.clear()
+                    self._frames.zero, self._simulated_time = zero, simulated
 
-    def _stay_in_touch(self) -> None:
-        """Hold on with the hands, and learn what is not known; called again and again."""
-        if time.monotonic() - self._last_word() > SILENCE:
-            self._hands.forget()
-        self._hands.keep()
-        self._known.ask()
+    def _keep_in_touch(self) -> None:
+        """Timer callback: confirm grabs, and request what is unknown."""
+        if time.monotonic() - self._last_message() > SILENCE:
+            self._hands.clear()
+        self._hands.keep_alive()
+        self._scene.request()
 
-    def _go_on(self) -> None:
-        """Go on with what the node is known to simulate now."""
-        self._hands.frame_id = self._known.settings.frame_id
-        if self._pushes is None or self._pushes.scene != self._known.scene:
-            self._hands.forget()
-            self._pushes = HeardPushes(self._known.scene)
-            self._frames.begin(self._pushes)
-        self._listen()
+    def _use_scene(self) -> None:
+        """Use the scene and parameters that the node is known to have now."""
+        self._hands.frame_id = self._scene.settings.frame_id
+        if self._pushes is None or self._pushes.scene != self._scene.scene:
+            self._hands.clear()
+            self._pushes = ObservedPushes(self._scene.scene)
+            self._frames.set_scene(self._pushes)
+        self._update_subscriptions()

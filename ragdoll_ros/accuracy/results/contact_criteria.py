@@ -1,0 +1,125 @@
+"""Acceptance criteria of impacts and contacts."""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from .figures import Figures, Row, by_setting, criterion, number, sound
+
+CLOSED_FORMS = ('bounce', 'bounce_0.1', 'bounce_0.9', 'bounce_1', 'rod_frictionless', 'rod_sticks',
+                'rod_slides', 'two_balls', 'three_balls')
+"""Motions whose contact impulses have a closed form."""
+
+APEX, FORMULA, PEAK = 1e-6, 1e-6, 0.01
+"""Largest errors: of apexes, relative; of closed forms, m; of Housner's ninth peak, relative."""
+
+SEGMENTS = {'draft': (1.0, 7.0, 0.6), 'normal': (0.4, 3.0, 1.0), 'exact': (0.05, 1.0, 3.0)}
+"""Largest median and 90th percentile of segment errors, mm; CPU over PyBullet's at N = 10."""
+
+MOMENTUM_DRIFT, PENETRATION = 1e-9, 1.0
+"""In a collision in the air: relative drift of the momenta; penetration of bones, mm."""
+
+STANDARD_ERRORS = 2.0
+"""Largest difference of mean energies of drops from the reference's."""
+
+
+def contact_criteria(figures: Figures) -> Iterator[Row]:
+    """One row for each criterion that the run has figures for."""
+    for check in (_restitution, _closed_forms, _rocking, _segments, _not_dominated, _drops,
+                  _collisions, _rest):
+        yield from check(figures)
+
+
+def _restitution(figures: Figures) -> Iterator[Row]:
+    for accuracy, rows in by_setting(figures, 'restitution'):
+        worst = float(np.max([number(row['worst']) for row in rows]))
+        apexes = sum(row['seen'] for row in rows)
+        yield criterion(f'apexes of single bodies, {_span(rows)}, {accuracy}',
+                        f'relative error at most {APEX:g}', f'{apexes} apexes, largest {worst:.1e}',
+                        worst <= APEX)
+
+
+def _span(rows: list[Row]) -> str:
+    found = [row['restitution'] for row in rows]
+    return f'e = {min(found):g} to {max(found):g}'
+
+
+def _closed_forms(figures: Figures) -> Iterator[Row]:
+    for accuracy, rows in by_setting(figures, 'precision',
+                                     lambda row: row['motion'] in CLOSED_FORMS):
+        errors = {row['motion']: number(row['position_worst_m']) for row in rows}
+        name = max(errors, key=lambda motion: np.nan_to_num(errors[motion], nan=math.inf))
+        yield criterion(f'impacts with a closed form, {accuracy}', f'within {FORMULA:g} m',
+                        f'{len(errors)} motions, largest {errors[name]:.1e} m ({name})',
+                        errors[name] <= FORMULA)
+
+
+def _rocking(figures: Figures) -> Iterator[Row]:
+    for accuracy, rows in by_setting(figures, 'precision', lambda row: 'peak_9_error' in row):
+        error = number(rows[0]['peak_9_error'])
+        yield criterion(f'ninth peak of a rocking block, {accuracy}',
+                        f'within {PEAK:.0%} of Housner', f'{error:.1%} off', error <= PEAK)
+
+
+def _segments(figures: Figures) -> Iterator[Row]:
+    base = _cpu(figures, 'bullet-10')
+    for accuracy, rows in by_setting(figures, 'pieces', lambda row: 'reference' in row):
+        median, most, ratio = SEGMENTS[accuracy]
+        found = 1e3 * number(rows[0]['position_median_m']), 1e3 * number(rows[0]['position_p90_m'])
+        yield criterion(f'short segments through contacts, {accuracy}',
+                        f'median at most {median:g} mm, 90 % at most {most:g} mm',
+                        f'{found[0]:.2f} mm, {found[1]:.2f} mm',
+                        found[0] <= median and found[1] <= most)
+        if base:
+            over = number(rows[0]['cpu_s_per_s']) / base
+            yield criterion(f'CPU of segments over PyBullet N = 10, {accuracy}',
+                            f'at most {ratio:g}', f'{over:.2f}', over <= ratio)
+
+
+def _cpu(figures: Figures, method: str) -> float | None:
+    return next((number(row['cpu_s_per_s']) for row in figures.get('pieces', ())
+                 if row.get('method') == method), None)
+
+
+def _not_dominated(figures: Figures) -> Iterator[Row]:
+    """Errors against each engine's own limit, which favours the others."""
+    others = [row for row in sound(figures.get('pieces', ()))
+              if row['family'] != 'ours' and 'own_median_m' in row]
+    for accuracy, rows in by_setting(figures, 'pieces', lambda row: 'own_median_m' in row):
+        ours = [number(rows[0][key]) for key in ('cpu_s_per_s', 'own_median_m')]
+        better = [row['label'] for row in others if number(row['cpu_s_per_s']) < ours[0]
+                  and number(row['own_median_m']) < ours[1]]
+        yield criterion(f'no engine is faster and closer to its own limit, {accuracy}', 'none',
+                        ', '.join(better) or 'none', not better)
+
+
+def _drops(figures: Figures) -> Iterator[Row]:
+    for accuracy, rows in by_setting(figures, 'drops',
+                                     lambda row: row['population'].startswith('default')):
+        off = {key.removesuffix('_off'): number(rows[0][key]) for key in rows[0]
+               if key.startswith('energy') and key.endswith('_off')}
+        measured = ', '.join(f'{value:.1f} at {key.removeprefix("energy_")}'
+                         for key, value in off.items())
+        yield criterion(f'energies of {rows[0]["drops"]} default drops, {accuracy}',
+                        f'within {STANDARD_ERRORS:g} standard errors of the reference', measured,
+                        max(off.values()) <= STANDARD_ERRORS)
+
+
+def _collisions(figures: Figures) -> Iterator[Row]:
+    for accuracy, rows in by_setting(figures, 'collisions'):
+        lost = float(np.max([number(row[key]) for row in rows
+                             for key in ('momentum_drift', 'angular_momentum_drift')]))
+        depth = 1e3 * float(np.max([number(row['depth_m']) for row in rows]))
+        yield criterion(
+            f'dolls that collide in the air, {accuracy}',
+            f'momentum drift at most {MOMENTUM_DRIFT:g}, penetration {PENETRATION:g} mm',
+            f'{lost:.0e}, {depth:.2f} mm', lost <= MOMENTUM_DRIFT and depth <= PENETRATION)
+
+
+def _rest(figures: Figures) -> Iterator[Row]:
+    for accuracy, rows in by_setting(figures, 'classes', lambda row: 'restless' in row):
+        restless, starts = (sum(row[key] for row in rows) for key in ('restless', 'starts'))
+        yield criterion(f'asleep 15 s after every start, {accuracy}', 'all',
+                        f'{starts - restless} of {starts}', not restless)

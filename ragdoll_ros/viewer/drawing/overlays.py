@@ -1,0 +1,101 @@
+"""Lines, arrows and points for swings, pushes, hands and contacts."""
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import viser
+
+from ...model import rotation
+from ...model.push import Push
+from ...model.ragdoll import Bone
+from ..sources.source import Frame
+
+WEIGHT_LENGTH, MAX_LENGTH = 1.0, 2.0
+"""m: line of a force equal to the first doll's weight at 9.8 m/s^2; longest line of a force."""
+
+BROWN, RED, BLUE, YELLOW = (90, 50, 25), (230, 50, 25), (30, 110, 230), (245, 190, 0)
+ROD_THICKNESS = 0.012
+"""m: of a swing's rods."""
+
+MIN_PUSH_DISPLAY = 0.3
+"""s of wall time that a push is drawn at least: a tap is too short to be seen."""
+
+
+class Overlays:
+    """Draws what is not a body or skin; each kind gets its node when it is first needed."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        add = server.scene
+        self._makers: dict[str, Callable[[str, np.ndarray], viser.SceneNodeHandle]] = {
+            'rods': lambda name, points: add.add_line_segments(
+                name, points, BROWN, thickness=ROD_THICKNESS),
+            'pushes': lambda name, points: add.add_arrows(
+                name, points, RED, shaft_radius=0.02, head_radius=0.05, head_length=0.12),
+            'hands': lambda name, points: add.add_line_segments(
+                name, points, BLUE, thickness=3.0, thickness_units='screen'),
+            'pointers': lambda name, points: add.add_point_cloud(
+                name, points, BLUE, point_size=0.05, point_shape='circle'),
+            'contacts': lambda name, points: add.add_point_cloud(
+                name, points, YELLOW, point_size=0.04, point_shape='circle'),
+            'forces': lambda name, points: add.add_line_segments(
+                name, points, YELLOW, thickness=4.0, thickness_units='screen')}
+        self._handles: dict[str, viser.SceneNodeHandle] = {}
+        self._pushes: tuple[Push, ...] = ()
+        self._last_push = 0.0
+
+    def show(self, frame: Frame) -> None:
+        """Draw what a frame has, and hide the rest."""
+        scene, state = frame.scene, frame.state
+        now = time.monotonic()
+        pushes = tuple(push for push in frame.pushes if any(push.force))
+        if pushes or now - self._last_push > MIN_PUSH_DISPLAY:
+            self._pushes, self._last_push = pushes, now
+        arrows = [arrow_to_surface(scene.bones[bone], push, state.positions[bone],
+                                   state.orientations[bone])
+                  for push in self._pushes
+                  for bone in (scene.bone_index(push.bone),)]
+        lines = [np.stack([grab.point, grab.target]) for grab in frame.grabs]
+        self._set('rods', frame.rods)
+        self._set('pushes', arrows)
+        self._set('hands', lines)
+        self._set('pointers', [grab.target for grab in frame.grabs])
+        self._set('contacts', frame.contacts)
+        self._set('forces', force_lines(frame))
+
+    def _set(self, kind: str, points: object) -> None:
+        handle = self._handles.get(kind)
+        if points is None or not len(points):
+            if handle is not None:
+                handle.visible = False
+            return
+        points = np.asarray(points, np.float32)
+        if handle is None:
+            self._handles[kind] = self._makers[kind](f'/scene/{kind}', points)
+            return
+        handle.points = points
+        handle.visible = True
+
+
+def force_lines(frame: Frame) -> np.ndarray | None:
+    """Ends (c, 2, 3) m of a line for the force at each contact; None if forces are unknown."""
+    if frame.forces is None:
+        return None
+    lines = frame.forces * WEIGHT_LENGTH / (9.8 * frame.scene.dolls[0].doll.mass)
+    lengths = np.linalg.norm(lines, axis=1, keepdims=True)
+    lines = lines * np.minimum(1.0, MAX_LENGTH / np.maximum(lengths, 1e-9))
+    return np.stack([frame.contacts, frame.contacts + lines], axis=1)
+
+
+def arrow_to_surface(bone: Bone, push: Push, position: np.ndarray,
+                     orientation: np.ndarray) -> np.ndarray:
+    """Tail and tip (2, 3) m, world frame, of a push's arrow that ends at the bone's surface.
+
+    ``position`` (3,) m and ``orientation`` (4,) are the bone's.
+    """
+    arrow = push.arrow(position, orientation)
+    direction = rotation.normalized(arrow[1] - arrow[0])
+    local = rotation.rotate(rotation.inverse(orientation), direction)
+    depth = (arrow[1] - position) @ direction + bone.shape.support(local)
+    return arrow - direction * depth
