@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import signal
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,8 @@ FILES_THAT_NEED = {'rclpy': ['test_ros_*.py'],
                    'mcap': ['test_replay*.py', 'test_ros_replay.py', 'test_viewer_recording.py',
                             'test_recordings_formats.py'],
                    'rosbags': ['test_replay*.py', 'test_ros_replay.py', 'test_viewer_recording.py'],
-                   'viser': ['test_viewer*.py', 'test_editor*.py', 'test_ros_browser.py']}
+                   'viser': ['test_viewer*.py', 'test_editor*.py', 'test_ros_browser.py'],
+                   'trimesh': ['test_viewer_paint.py'], 'rtree': ['test_viewer_paint.py']}
 
 collect_ignore_glob = [file for package, files in FILES_THAT_NEED.items()
                        if importlib.util.find_spec(package) is None for file in files]
@@ -28,8 +30,14 @@ LONGEST = ('test_ros_viewer.py', 'test_ros_programs.py', 'test_viewer_command.py
 
 
 def pytest_configure(config):
-    """By itself pytest-xdist begins with the files of the most tests, which are not the longest."""
+    """By itself pytest-xdist begins with the files of the most tests, which are not the longest.
+
+    A shell starts what runs in the background, as CI may, with SIGINT ignored, and so would all
+    programs that tests start: those that Ctrl-C should end would run on.
+    """
     config.option.loadscopereorder = False
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(items):

@@ -1,8 +1,8 @@
 """The kernels of flight as Python sees them: what engines call only within a whole tick."""
 from __future__ import annotations
 
-import numba
 import numpy as np
+from kept_code import kept
 
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.coordinates import DofLayout, GeneralizedState
@@ -22,31 +22,31 @@ SYSTEM_AT, WORKSPACE_AT, CLUSTER_STATE_AT = (bundle_at(SYSTEM), bundle_at(WORKSP
                                              bundle_at(CLUSTER_STATE))
 
 
-@numba.njit
+@kept
 def _bone_states(s, ws, cluster, states):
     cluster = CLUSTER_STATE_AT(cluster)
     write_bone_states(SYSTEM_AT(s), WORKSPACE_AT(ws).step.end, cluster.q, cluster.v, states)
 
 
-@numba.njit
+@kept
 def _accelerate(s, ws, cluster, out):
     s, ws, cluster = SYSTEM_AT(s), WORKSPACE_AT(ws), CLUSTER_STATE_AT(cluster)
     forward_dynamics(s.tree, s.gravity, cluster.loads, cluster.q, cluster.v, ws.flight.kinematics,
                      ws.step.dynamics, out)
 
 
-@numba.njit
+@kept
 def _integrate(s, ws, cluster, h, out):
     cluster = CLUSTER_STATE_AT(cluster)
     integrate_positions(SYSTEM_AT(s).tree, cluster.q, cluster.v, h, out)
 
 
-@numba.njit
+@kept
 def _step(s, ws, cluster, h):
     dop853_step(SYSTEM_AT(s), WORKSPACE_AT(ws), CLUSTER_STATE_AT(cluster), h)
 
 
-@numba.njit
+@kept
 def _evaluate(s, ws, cluster, time, q, v):
     evaluate_dense_step(SYSTEM_AT(s).tree, CLUSTER_STATE_AT(cluster), time, q, v)
 

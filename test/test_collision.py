@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 pytest.importorskip('numba')
-import numba
+from kept_code import kept
 
 from ragdoll_ros.physics.kernels.collision.narrow_phase import collide, separation
 from ragdoll_ros.physics.kernels.collision.shapes import (
@@ -29,12 +29,12 @@ NAMES = {kind: name for name, kind in SHAPE_KIND.items()}
 TURNED = Rotation.from_rotvec([.3, -.5, .7])
 
 
-@numba.njit
+@kept
 def _collide(a, b, margin, out):
     return collide(a, b, margin, out)
 
 
-@numba.njit
+@kept
 def _separation(a, b):
     return separation(a, b, math.inf)
 

@@ -24,13 +24,17 @@ from ragdoll_ros.model.errors import OutOfRange, WrongForm
 from ragdoll_ros.physics.sensors.imu import ImuMount, imu_samples
 
 parquet = pytest.importorskip('pyarrow.parquet')
-pandas = pytest.importorskip('pandas')
 COUNT = 3
 IMU = {'name': 'low_back', 'bone': 'torso', 'position': [-0.05, 0, -0.15]}
 
 
 def here(job, shards):
     return (make_shard(job, shard) for shard in shards)
+
+
+@pytest.fixture(scope='module')
+def pandas():
+    return pytest.importorskip('pandas')
 
 
 @pytest.fixture(scope='module')
@@ -55,7 +59,7 @@ def frames_of(rows, name):
     return np.array(rows[f'observation.{name}'].tolist())
 
 
-def test_lerobot_by_pandas(shoved, written):
+def test_lerobot_by_pandas(pandas, shoved, written):
     _, falls = shoved
     folder = written('lerobot')
     info = json.loads((folder / 'meta/info.json').read_text())
@@ -114,7 +118,7 @@ def test_bytes_name_pyarrows_version_and_nothing_of_the_machine(written):
     assert set(metadata.metadata) == {b'ARROW:schema', b'names'}
 
 
-def test_kfall_by_pandas(shoved, written):
+def test_kfall_by_pandas(pandas, shoved, written):
     _, falls = shoved
     folder = written('kfall')
     labels = pandas.read_csv(folder / 'label_data/SA000000_label.csv')
@@ -331,7 +335,7 @@ def test_mcap_tells_a_sensors_noise(tmp_path):
     assert not any(message.linear_acceleration_covariance)
 
 
-def test_a_fast_sensor_has_several_samples_a_frame(tmp_path):
+def test_a_fast_sensor_has_several_samples_a_frame(pandas, tmp_path):
     """A ball that falls for 0.247 s, frames at 100 Hz, the sensor at 1 kHz."""
     made = recipe({**DROP, 'duration': 0.6, 'start': {'clearance': 0.3}}, record={
         'rate': 100, 'imu_rate': 1000, 'imus': [{'name': 'a', 'bone': 'ball'}]})

@@ -48,13 +48,19 @@ def command(tmp_path):
     """Call the command for these falls; keywords as those of Popen."""
     path = tmp_path / 'drops.yaml'
     path.write_text(yaml.safe_dump(SHORT))
+    started = []
 
     def call(*words, before=(), **options):
-        return subprocess.Popen(
+        started.append(subprocess.Popen(
             [*before, sys.executable, '-m', 'ragdoll_ros.falls.command', str(path), '--count',
              str(COUNT), *map(str, words)], cwd=ROOT, text=True, stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE, start_new_session=True, **options)
-    return call
+            stderr=subprocess.PIPE, start_new_session=True, **options))
+        return started[-1]
+    yield call
+    for process in started:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
 
 
 def here(job, shards):

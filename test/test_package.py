@@ -1,6 +1,7 @@
 """The package as built: what lies where, and that it agrees with itself."""
 import ast
 import email
+import functools
 import importlib
 import os
 import re
@@ -104,7 +105,13 @@ def prefix(wheel, tmp_path_factory):
 
 def imported(*rooms: str) -> set[str]:
     """Top-level modules that rooms import, but for Python's own and this package's."""
-    nodes = [node for room in rooms for path in (ROOT / 'ragdoll_ros' / room).rglob('*.py')
+    return set().union(*map(imported_by_room, rooms))
+
+
+@functools.cache
+def imported_by_room(room: str) -> set[str]:
+    """What one room imports."""
+    nodes = [node for path in (ROOT / 'ragdoll_ros' / room).rglob('*.py')
              for node in ast.walk(ast.parse(path.read_text()))]
     plain = {name.name for node in nodes if isinstance(node, ast.Import) for name in node.names}
     froms = {node.module for node in nodes if isinstance(node, ast.ImportFrom) and not node.level}

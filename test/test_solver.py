@@ -6,22 +6,24 @@ import collections
 import numpy as np
 import pytest
 
-numba = pytest.importorskip('numba')
+pytest.importorskip('numba')
 
-from ragdoll_ros.physics.kernels.impulses.active_set import solve_active_set  # noqa: E402
-from ragdoll_ros.physics.kernels.impulses.one_contact import solve_one_contact  # noqa: E402
-from ragdoll_ros.physics.kernels.workspace import MEMBER  # noqa: E402
+from kept_code import kept
+
+from ragdoll_ros.physics.kernels.impulses.active_set import solve_active_set
+from ragdoll_ros.physics.kernels.impulses.one_contact import solve_one_contact
+from ragdoll_ros.physics.kernels.workspace import MEMBER
 
 Island = collections.namedtuple('Island', 'members W G velocity active places is_normal')
 """What of an island the active set method reads and writes."""
 
 
-@numba.njit
+@kept
 def _one_contact(ease, c, last, mu):
     return solve_one_contact(ease, 3, 0, (c[0], c[1], c[2]), (last[0], last[1], last[2]), mu)
 
 
-@numba.njit
+@kept
 def _solve(island, b, p, tolerance):
     return solve_active_set(island, len(island.members), len(b), b, p, tolerance)
 

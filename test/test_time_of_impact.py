@@ -6,17 +6,19 @@ import collections
 import numpy as np
 import pytest
 
-numba = pytest.importorskip('numba')
+pytest.importorskip('numba')
 
-from ragdoll_ros.physics.kernels.contact.gaps import TOUCHING  # noqa: E402
-from ragdoll_ros.physics.kernels.stepping.position_correction import (  # noqa: E402
+from kept_code import kept
+
+from ragdoll_ros.physics.kernels.contact.gaps import TOUCHING
+from ragdoll_ros.physics.kernels.stepping.position_correction import (
     clip_to_joint_limits,
 )
-from ragdoll_ros.physics.kernels.stepping.step_control import (  # noqa: E402
+from ragdoll_ros.physics.kernels.stepping.step_control import (
     MAX_TRIES,
     activate_contacts,
 )
-from ragdoll_ros.physics.kernels.stepping.time_of_impact import (  # noqa: E402
+from ragdoll_ros.physics.kernels.stepping.time_of_impact import (
     OVERSHOT,
     impacts_at_end,
     next_trial_step,
@@ -24,8 +26,8 @@ from ragdoll_ros.physics.kernels.stepping.time_of_impact import (  # noqa: E402
     step_to_joint_limit,
     update_bracket,
 )
-from ragdoll_ros.physics.kernels.system import JOINT_LIMIT  # noqa: E402
-from ragdoll_ros.physics.kernels.workspace import BRACKET  # noqa: E402
+from ragdoll_ros.physics.kernels.system import JOINT_LIMIT
+from ragdoll_ros.physics.kernels.workspace import BRACKET
 
 Scene = collections.namedtuple('Scene', 'pairs joint_limits body_doll dof_body')
 Gaps = collections.namedtuple('Gaps', 'gaps contacts step')
@@ -47,7 +49,7 @@ def gaps(start):
                 Step(np.zeros(1, BRACKET), np.zeros(count), np.zeros(count)))
 
 
-@numba.njit
+@kept
 def _tries(scene, ws, v, length, step, starts, falls, powers):
     """Lengths of a step of ``step`` s tried, this one first, until one ends at the touch. Gap k at
     the end of h s is starts[k] - falls[k] (h / step) ** powers[k], and coordinate k moves by v[k] h
@@ -68,17 +70,17 @@ def _tries(scene, ws, v, length, step, starts, falls, powers):
     return tries
 
 
-@numba.njit
+@kept
 def _step_to_joint_limit(scene, ws, v, step):
     return step_to_joint_limit(scene, ws, v, step)
 
 
-@numba.njit
+@kept
 def _activate_contacts(scene, ws, h):
     return activate_contacts(scene, ws, h)
 
 
-@numba.njit
+@kept
 def _clip_to_joint_limits(scene, q, correction):
     clip_to_joint_limits(scene, q, correction)
 

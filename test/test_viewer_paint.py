@@ -9,12 +9,8 @@ import fit_rigs
 import imageio.v3 as iio
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
 pytest.importorskip('viser')
-pytest.importorskip('trimesh')
-pytest.importorskip('rtree')
-import trimesh
 from browser import SHARPNESS, View, chromium
 from page_client import served
 
@@ -120,6 +116,8 @@ def colors_of(content, corners):
     """SRGB (f, 3) that trimesh reads of the triangles with these corners (f, 3, 3) in the file's
     bind pose, Y up.
     """
+    import trimesh
+    from scipy.spatial import cKDTree
     scene = trimesh.load(io.BytesIO(content), file_type='glb', process=False)
     keys, colors = [], []
     for mesh in scene.geometry.values():
@@ -136,6 +134,7 @@ def test_limbs_have_their_colours_on_the_page(run):
     """As a fall goes on: what the page draws where trimesh, which reads the recording's glTF and
     casts a ray at each triangle, sees one of a limb. Means of each limb within 10 %.
     """
+    import trimesh
     recording, skin = run
     pose = recording.pose(40)
     content = gltf_bytes(recording, {0: skin})

@@ -1,5 +1,6 @@
 """The code speaks the field's language: fields have names, a name has one meaning."""
 import ast
+import functools
 import io
 import re
 import tokenize
@@ -10,7 +11,6 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parent.parent / 'ragdoll_ros'
 FILES = sorted(PACKAGE.rglob('*.py'))
-TREES = {path: ast.parse(path.read_text()) for path in FILES}
 CORE = [path for path in FILES if path.relative_to(PACKAGE).parts[:2] in (
     ('physics', 'kernels'), ('physics', 'engine'))]
 
@@ -54,6 +54,12 @@ TERMS = {
 """Terms of the field, and where what they name is done."""
 
 
+@functools.cache
+def trees():
+    """Syntax tree of each file."""
+    return {path: ast.parse(path.read_text()) for path in FILES}
+
+
 def numbered_slots(tree):
     """Accesses like name[k, 7], by the name."""
     for node in ast.walk(tree):
@@ -80,7 +86,7 @@ def identifiers(text):
 
 def test_records_of_the_core_have_names_for_fields():
     found = {(str(path.relative_to(PACKAGE)), name) for path in CORE
-             for name in numbered_slots(TREES[path])
+             for name in numbered_slots(trees()[path])
              if name not in MATRICES and not name.startswith('np.')}
     assert found == set()
 
@@ -90,14 +96,14 @@ def test_a_numbered_slot_is_found():
 
 
 def test_functions_take_few_parameters():
-    found = [(str(path.relative_to(PACKAGE)), name, count) for path, tree in TREES.items()
+    found = [(str(path.relative_to(PACKAGE)), name, count) for path, tree in trees().items()
              for name, count in parameters(tree)
              if count > MOST_PARAMETERS['core' if path in CORE else 'elsewhere']]
     assert found == []
 
 
 def test_no_class_has_the_name_of_another():
-    names = Counter(node.name for tree in TREES.values() for node in ast.walk(tree)
+    names = Counter(node.name for tree in trees().values() for node in ast.walk(tree)
                     if isinstance(node, ast.ClassDef))
     assert {name for name, count in names.items() if count > 1} == set()
 

@@ -47,6 +47,15 @@ def one_skin(bones, sharp, cell=CELL):
 
     Weights fall off by ``sharp`` m beyond the nearest bone; 0 gives the nearest one all.
     """
+    points, faces = surface(frozenset(
+        (tuple(bone.head), tuple(bone.tail), bone.radius) for bone in bones), cell)
+    return points, faces, *weights_of(segment_distances(points, bones), sharp)
+
+
+@functools.lru_cache(maxsize=8)
+def surface(shapes, cell):
+    """Vertices and triangles of that skin: the same for all trees of bones of these shapes."""
+    bones = [Bone('', -1, *shape) for shape in shapes]
     reach = max(bone.radius for bone in bones) + cell
     ends = np.array([end for bone in bones for end in (bone.head, bone.tail)])
     # Symmetric about x = 0, as the bodies are.
@@ -71,7 +80,7 @@ def one_skin(bones, sharp, cell=CELL):
     index = index.reshape(-1, 4)
     points = (corners + low) * cell
     faces = np.concatenate([index[:, [0, 1, 2]], index[:, [0, 2, 3]]])
-    return points, faces, *weights_of(segment_distances(points, bones), sharp)
+    return points, faces
 
 
 def weights_of(distances, sharp):
