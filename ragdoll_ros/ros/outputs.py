@@ -97,7 +97,7 @@ class Outputs:
         self._publish_markers(simulation, stamp)
 
     def _publish_poses(self, simulation: Simulation, stamp: int) -> None:
-        """Publish the PoseArray of all bones on ~/poses."""
+        """Publish the PoseArray of all bones on ~/poses; SceneTemplates.poses makes it."""
         self._poses_pending = False
         self._poses.publish(self._templates.poses.serialize(stamp, poses_of(simulation.state)))
 

@@ -1,4 +1,4 @@
-"""Parameter values of the node: names, defaults, descriptions, ranges and validation."""
+"""Parameter table of the node: names, defaults, descriptions, ranges and validation."""
 from __future__ import annotations
 
 import dataclasses

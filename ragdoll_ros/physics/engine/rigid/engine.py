@@ -98,7 +98,7 @@ class RigidEngine:
         self._last_start = clusters.q.copy(), clusters.v.copy(), duration, actions
         of_doll = self.cluster_of_doll
         for acts in (*wrenches, *springs, *drives):
-            self.sleeping[of_doll == of_doll[self.scene.doll_of_bone[acts.bone]]] = False
+            self._wake(of_doll == of_doll[self.scene.doll_of_bone[acts.bone]])
         self._update_clusters(duration)
         self._advance(duration, actions, self.accuracy)
 
@@ -179,11 +179,15 @@ class RigidEngine:
             near = self._near_pairs(max(duration, LOOK_AHEAD))
             if not self.sleeping[near].any():
                 break
-            self.sleeping[near] = False
+            self._wake(near)
         asleep = clusters.pairs
         asleep = asleep[self.sleeping[asleep].all(axis=1)]
         clusters.form(np.unique(np.concatenate([near, asleep]), axis=0))
         self._age = 0
+
+    def _wake(self, dolls: np.ndarray) -> None:
+        """Wake dolls, indices or a mask (d,)."""
+        self.sleeping[dolls] = False
 
     def _near_pairs(self, ahead: float) -> np.ndarray:
         """Pairs (k, 2) of dolls that may touch within ``ahead`` s, one of each awake."""

@@ -31,13 +31,13 @@ def find_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, gaps
         if s.ground_offset[0] > -math.inf:
             for j in range(s.geoms[k].point_count):
                 if gaps[n + j] <= TOUCHING and m < len(contacts):
-                    enter_ground_contact(s, kin, k, j, n + j, contacts[m])
+                    write_ground_contact(s, kin, k, j, n + j, contacts[m])
                     m += 1
         n += s.geoms[k].point_count
     for k in range(len(s.joint_limits)):
         for side in range(2):
             if gaps[n + side] <= TOUCHING and m < len(contacts):
-                enter_limit(s, q, k, side, n + side, contacts[m])
+                write_limit(s, q, k, side, n + side, contacts[m])
                 m += 1
         n += 2
     for k in range(len(s.pairs)):
@@ -49,9 +49,11 @@ def find_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, gaps
 
 
 @compiled
-def enter_ground_contact(s: System, kin: Kinematics, k: int, point: int, id_: int,
+def write_ground_contact(s: System, kin: Kinematics, k: int, point: int, id_: int,
                          c: np.record) -> None:
-    """Write to ``c`` the contact of ground point ``point`` of geom k; ``id_``: index of its gap."""
+    """Write to ``c`` the contact of geom k's ``point`` with the ground, see gaps.ground_point(),
+    but for what set_friction_points() writes; ``id_``: index of its gap.
+    """
     geom, normal = s.geoms[k], vec(s.ground_normal)
     c.kind = ROLLING if geom.rolling_friction > 0 else FRICTIONAL
     c.body_a, c.body_b, c.id, c.patch = geom.body, -1, id_, k
@@ -66,7 +68,7 @@ def enter_ground_contact(s: System, kin: Kinematics, k: int, point: int, id_: in
 
 
 @compiled
-def enter_limit(s: System, q: np.ndarray, k: int, side: int, id_: int, c: np.record) -> None:
+def write_limit(s: System, q: np.ndarray, k: int, side: int, id_: int, c: np.record) -> None:
     """Write to ``c`` joint limit k, lower (``side`` 0) or upper (1); ``id_``: index of its gap."""
     limit = s.joint_limits[k]
     c.kind, c.id, c.patch = LIMIT, id_, -1

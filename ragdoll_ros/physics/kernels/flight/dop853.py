@@ -108,19 +108,20 @@ def weighted_sum(weights: np.ndarray, count: int, k: np.ndarray, h: float, out: 
 
 
 @compiled
-def step_error(k: np.ndarray, h: float, nq: int, room: np.ndarray) -> float:
-    """DOP853's estimate of the error of its order 8 (Hairer, Norsett, Wanner, II.10), m or rad;
-    infinity if a number is not finite. ``room`` (nq + nv,): scratch.
+def step_error(k: np.ndarray, h: float, nq: int, scratch: np.ndarray) -> float:
+    """DOP853's estimate of the error of a step of h s (Hairer, Norsett, Wanner, II.10): the largest
+    over coordinates, m or rad, and velocities times SLOWEST; infinity if a number is not finite.
+    ``k`` (16, nq + nv): derivatives at the stages. ``scratch`` (nq + nv,).
     """
     fifth, third, all_of_it = 0.0, 0.0, 0.0
-    weighted_sum(ERRORS[0], 16, k, h, room)
-    for j in range(len(room)):
-        fifth = max(fifth, abs(room[j]) * (1.0 if j < nq else SLOWEST))
-        all_of_it += room[j]
-    weighted_sum(ERRORS[1], 16, k, h, room)
-    for j in range(len(room)):
-        third = max(third, abs(room[j]) * (1.0 if j < nq else SLOWEST))
-        all_of_it += room[j]
+    weighted_sum(ERRORS[0], 16, k, h, scratch)
+    for j in range(len(scratch)):
+        fifth = max(fifth, abs(scratch[j]) * (1.0 if j < nq else SLOWEST))
+        all_of_it += scratch[j]
+    weighted_sum(ERRORS[1], 16, k, h, scratch)
+    for j in range(len(scratch)):
+        third = max(third, abs(scratch[j]) * (1.0 if j < nq else SLOWEST))
+        all_of_it += scratch[j]
     if not math.isfinite(all_of_it):
         return math.inf
     if fifth == 0.0:

@@ -101,7 +101,9 @@ def row_velocity(ws: Workspace, k: int, e: int, b: np.ndarray, p: np.ndarray) ->
 
 @compiled
 def change_impulse(ws: Workspace, k: int, e: int, change: float, p: np.ndarray) -> float:
-    """Change an impulse in p, and island.z. Returns the row's change of velocity, m/s or rad/s."""
+    """Add ``change`` to the impulse of row e of member k in p, and its effect to island.z. Returns
+    the size of the row's change of velocity, m/s or rad/s.
+    """
     island, member = ws.island, ws.island.members[k]
     row, support = member.row + e, island.support[member.contact]
     p[row] += change

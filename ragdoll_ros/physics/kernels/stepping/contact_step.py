@@ -24,7 +24,7 @@ from ..impulses.solve_contacts import solve_contacts
 from ..system import NO_SLIP, System
 from ..workspace import Workspace
 from .momentum import add_contact_impulses, conserve_momentum, sum_dolls
-from .position_correction import (clip_to_joint_limits, correction_energy, enter_correction_bounds,
+from .position_correction import (clip_to_joint_limits, correction_energy, write_correction_bounds,
                                   limit_correction_energy)
 from .springs import add_implicit_stiffness, add_spring_force, saturate_springs, theta_weight
 from .warm_start import warm_start
@@ -188,7 +188,7 @@ def finish_step(s: System, ws: Workspace, cluster: ClusterState, h: float, since
         forward_kinematics(s.tree, q, v, kin)
         sum_dolls(s, ws, kin, q, step.sums_after)
         conserve_momentum(s, ws, h, q, v)
-    enter_correction_bounds(s, kin, q, step.correction, ws.contacts.motion)
+    write_correction_bounds(s, kin, q, step.correction, ws.contacts.motion)
     update_kinematics_and_gaps(s, ws, kin, q, v, ws.gaps, h, ws.contacts.gaps_end)
     sum_dolls(s, ws, kin, q, step.sums_after)
     ws.stats[0].work_pushes += (load_potential(s, kin, q, cluster.loads)

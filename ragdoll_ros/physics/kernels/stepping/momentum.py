@@ -91,8 +91,9 @@ def add_impulse(external: np.record, share: float, at: Vec3, impulse: Vec3) -> N
 
 @compiled
 def add_contact_impulses(s: System, ws: Workspace, m: int) -> None:
-    """Add the impulses of m contacts between dolls to step.external, and set its flags: which dolls
-    are on the ground or touch each other.
+    """Of m contacts, add the impulses of those between dolls to step.external, moments about the
+    world's origin, and set its flags: which dolls the ground bears (a contact with an impulse), and
+    which touch another.
     """
     external = ws.step.external
     for n in range(m):

@@ -58,7 +58,7 @@ def limit_correction_energy(s: System, ws: Workspace, m: int, correction: np.nda
 
 
 @compiled
-def enter_correction_bounds(s: System, kin: Kinematics, q: np.ndarray, correction: np.ndarray,
+def write_correction_bounds(s: System, kin: Kinematics, q: np.ndarray, correction: np.ndarray,
                             motion: np.ndarray) -> None:
     """Write by how much a displacement ``correction`` (nv,) moves, m, and turns, rad, each body to
     motion[].correction and correction_angle. ``kin`` is that of q; its velocities are overwritten.

@@ -48,8 +48,9 @@ def spring_jacobian(axis: np.ndarray, spring: np.record, arm: Vec3) -> Vec3:
 @compiled
 def add_implicit_stiffness(s: System, kin: Kinematics, H: np.ndarray, spring: np.record,
                            h: float) -> None:
-    """Add the implicit term of a spring in a step of h s to H, for a grab h (k h / 4 + c / 2) J^T
-    J. The degrees of freedom of a body are on one path to the root, so H keeps its sparsity.
+    """Add the implicit stiffness and damping of a spring in a step of h s to H, h
+    implicit_damping() J^T J: for a grab h (k h / 4 + c / 2) J^T J, nothing where it is saturated.
+    The degrees of freedom of a body are on one path to the root, so H keeps its sparsity.
     """
     i = spring.body
     share = h * implicit_damping(spring, h)

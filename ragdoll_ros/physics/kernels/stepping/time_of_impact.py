@@ -31,7 +31,9 @@ MAX_CHORDS = 2
 
 @compiled
 def is_fast_impact(s: System, ws: Workspace, j: int, h: float) -> bool:
-    """Whether gap j closed in the step of h s just taken, faster than SLOW or SLOW_TURN."""
+    """Whether gap j, open as the step of h s just taken began, is at most TOUCHING at its end, and
+    closed at a mean rate above SLOW or SLOW_TURN.
+    """
     slow = SLOW_TURN if is_joint_limit_gap(s, ws.gaps, j) else SLOW
     end = ws.contacts.gaps_end[j]
     return ws.gaps[j] > TOUCHING and end <= TOUCHING and ws.gaps[j] - end > slow * h
