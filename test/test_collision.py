@@ -69,7 +69,7 @@ def contacts(a, b, margin=1e-3):
     out = np.zeros(MAX_MANIFOLD_POINTS, CONTACT_POINT)
     out['point'] = out['normal'] = out['gap'] = np.nan
     out['feature_id'] = -1
-    found = out[:_collide(a.shape, b.shape, margin, out)]
+    found = out[:_collide(a.shape, b.shape, float(margin), out)]
     assert all(np.isfinite(found[name]).all() for name in ('point', 'normal', 'gap'))
     assert (np.abs(np.linalg.norm(found['normal'], axis=1) - 1) <= 1e-12).all()
     assert len(set(found['feature_id'])) == len(found) and (found['feature_id'] >= 0).all()
