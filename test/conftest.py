@@ -21,12 +21,18 @@ collect_ignore_glob = [file for package, files in FILES_THAT_NEED.items()
                        if importlib.util.find_spec(package) is None for file in files]
 
 
-LONGEST = ('test_ros_viewer.py', 'test_ros_programs.py', 'test_viewer_command.py',
-           'test_viewer_browser.py', 'test_ros_browser.py', 'test_ros_process.py',
-           'test_references.py', 'test_contact.py', 'test_grab.py', 'test_swing.py',
-           'test_pushes.py', 'test_dynamics.py', 'test_package.py', 'test_simulation.py',
-           'test_viewer_network.py', 'test_ros_node.py', 'test_compiled_cache.py',
-           'test_ros_replay.py', 'test_replay.py', 'test_falls_run.py', 'test_falls_formats.py')
+LONGEST = ('test_ros_teleop.py', 'test_ros_viewer.py', 'test_viewer_browser.py',
+           'test_falls_run.py', 'test_kernel_cache.py', 'test_package.py', 'test_planar_rods.py',
+           'test_ros_process.py',
+           'test_ros_programs.py', 'test_collision.py', 'test_fit_wild.py', 'test_ros_browser.py',
+           'test_swing.py', 'test_fit_split_characters.py', 'test_viewer_crowd.py',
+           'test_contact.py', 'test_grab.py', 'test_dynamics.py', 'test_fit_rigs.py',
+           'test_fit_saved.py', 'test_guard.py', 'test_fit_wrists.py', 'test_viewer_paint.py',
+           'test_viewer_walks.py', 'test_viewer_typed.py', 'test_report.py', 'test_security.py',
+           'test_ros_stamps.py', 'test_ros_inputs.py', 'test_ros_parameters.py',
+           'test_viewer_amiss.py', 'test_tutorial.py', 'test_without_numba.py',
+           'test_viewer_command.py', 'test_ros_signals.py', 'test_ros_full_disk.py',
+           'test_ros_replay.py', 'test_simulation.py', 'test_compiled_cache.py')
 
 
 def pytest_configure(config):

@@ -61,7 +61,8 @@ class PageClient:
 
     def press(self, page, label):
         """Press the hotkey of a page's command."""
-        commands = page.server.gui._command_handle_from_uuid.values()
+        # A copy: the page's thread adds to it.
+        commands = list(page.server.gui._command_handle_from_uuid.values())
         command, = (command for command in commands if command.label == label)
         self.send(_messages.CommandTriggerMessage(command._impl.uuid))
 

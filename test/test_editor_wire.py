@@ -1,10 +1,12 @@
 """The editor as an open page speaks to it: clicks, drags, typed values and files over the wire."""
+import time
+
 import fit_rigs
 import pytest
 
 viser = pytest.importorskip('viser')
 
-from page_client import PageClient, batch_of, served, wait  # noqa: E402
+from page_client import PATIENCE, PageClient, batch_of, served, wait  # noqa: E402
 from test_editor import RUBBISH, errors_in  # noqa: E402
 from test_fit_broken import BROKEN  # noqa: E402
 from viser import _messages  # noqa: E402
@@ -163,6 +165,13 @@ def test_rubbish_leaves_the_page_as_it_was(page, browser):
     browser.click_body(page, 'head')
     wait(lambda: page.editor.bone == 'head')
     settled(page.editor)
-    browser.update(page.editor.panel.body['mass'], 2)
-    browser.press_button(page.editor.panel.update)
-    wait(lambda: changes.find(page.editor.scene, 'head')[1].mass == 2)
+    # A busy machine may only now get to what was sent before, and fill in the fields once more.
+    for _ in range(100):
+        browser.update(page.editor.panel.body['mass'], 2)
+        browser.press_button(page.editor.panel.update)
+        end = time.monotonic() + PATIENCE / 100
+        wait(lambda end=end: changes.find(page.editor.scene, 'head')[1].mass == 2
+             or time.monotonic() > end)
+        if changes.find(page.editor.scene, 'head')[1].mass == 2:
+            break
+    assert changes.find(page.editor.scene, 'head')[1].mass == 2

@@ -9,6 +9,8 @@ import pytest
 
 pytest.importorskip('numba')
 
+from numba.core import caching
+
 from ragdoll_ros.physics.kernels.compiling import cache, notices
 
 FRAME = Path(cache.__file__).parent
@@ -57,7 +59,28 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 @pytest.fixture
 def tiny(tmp_path):
     """A package of two kernels, one of which calls the other, in two files."""
-    package = tmp_path / 'tiny'
+    return made(tmp_path)
+
+
+@pytest.fixture(scope='module')
+def compiled(tmp_path_factory):
+    """Such a package that has run."""
+    package = made(tmp_path_factory.mktemp('compiled'))
+    run(package)
+    return package
+
+
+@pytest.fixture
+def ran(tiny, compiled):
+    """Such a package with the code that the other has kept, as if it had run itself."""
+    own = caching._CacheLocator.get_suitable_cache_subpath(str(tiny / FRAME.name / 'cache.py'))
+    shutil.copytree(folder(compiled), tiny.parent / 'kept' / own)
+    return tiny
+
+
+def made(place):
+    """Write the package."""
+    package = place / 'tiny'
     shutil.copytree(FRAME, package / FRAME.name, ignore=shutil.ignore_patterns('__pycache__'))
     (package / '__init__.py').touch()
     (package / 'inner.py').write_text(INNER)
@@ -92,8 +115,8 @@ def test_code_is_compiled_once(tiny):
     assert [path.name.partition('-')[0] for path in kept(tiny)] == ['outer.more', 'outer.yet_more']
 
 
-def test_a_change_of_any_file_is_noticed(tiny):
-    run(tiny)
+def test_a_change_of_any_file_is_noticed(ran):
+    tiny = ran
     before = kept(tiny)
     (tiny / 'inner.py').write_text(INNER.replace('2 * x', '5 * x'))
     assert run(tiny) == ('16.0 26.0', [ONCE])
@@ -103,8 +126,8 @@ def test_a_change_of_any_file_is_noticed(tiny):
     assert run(tiny) == ('16.0 26.0', [ONCE])
 
 
-def test_what_others_keep_there_stays(tiny):
-    run(tiny)
+def test_what_others_keep_there_stays(ran):
+    tiny = ran
     notes, old, foreign = (folder(tiny) / name for name in (
         'notes.txt', 'kernels.step-413.py311.1.nbc', 'kernels.nbc'))
     for path in (notes, old, foreign):
@@ -114,8 +137,8 @@ def test_what_others_keep_there_stays(tiny):
     assert notes.exists() and foreign.exists() and not old.exists()
 
 
-def test_what_is_missing_or_damaged_is_compiled_again(tiny):
-    run(tiny)
+def test_what_is_missing_or_damaged_is_compiled_again(ran):
+    tiny = ran
     first, second = kept(tiny)
     whole = second.read_bytes()
     second.write_bytes(whole[:len(whole) // 2])
@@ -132,9 +155,9 @@ def test_a_folder_that_is_read_only_is_done_without(tiny):
     assert not list(empty.iterdir())
 
 
-def test_what_is_kept_in_a_read_only_folder_is_used(tiny):
+def test_what_is_kept_in_a_read_only_folder_is_used(ran):
     """As in an image that was made with other rights than those it is run with."""
-    run(tiny)
+    tiny = ran
     folder(tiny).chmod(0o555)
     assert run(tiny, NO_RIGHTS + USE) == ('7.0 17.0', [])
     kept(tiny)[0].chmod(0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseArray
-from peer import end, kill, start
+from peer import PATIENCE, end, kill, start
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
@@ -83,14 +83,21 @@ def test_stamps_begin_with_ros_time_also_where_it_begins_later(first):
 
 
 def stamp_of(message):
-    return message.header.stamp.sec * SECOND + message.header.stamp.nanosec
+    stamp = message.clock if isinstance(message, Clock) else message.header.stamp
+    return stamp.sec * SECOND + stamp.nanosec
+
+
+def lateness(got, begun):
+    """How late messages came, ns, whose clock has been 504 s at ``begun`` ns."""
+    return np.array([504 * SECOND + int(arrival * 1e9) - begun - stamp_of(message)
+                     for arrival, message in got if stamp_of(message) >= 504 * SECOND])
 
 
 def test_stamps_are_those_of_a_clock_that_another_tells(make_node, peer):
     """A /clock is heard after the node has begun, as it can not be before."""
     node = make_node(use_sim_time=True)
     got = peer.collect(PoseArray, 'ragdoll/poses')
-    clock = peer.sender(Clock, '/clock')
+    clock, echoes = peer.sender(Clock, '/clock'), peer.collect(Clock, '/clock')
     peer.wait_heard(node, '/ragdoll/poses')
     peer.executor_.add_node(node)
     begun = time.monotonic_ns()
@@ -102,25 +109,40 @@ def test_stamps_are_those_of_a_clock_that_another_tells(make_node, peer):
     peer.wait(lambda: sum(stamp_of(message) >= 504 * SECOND for _, message in got) > 100)
     stamps = [stamp_of(message) for _, message in got if stamp_of(message) >= 504 * SECOND]
     assert min(np.diff(stamps)) > 0
-    arrivals = 504 * SECOND + np.array([int(arrival * 1e9) for arrival, _ in got]) - begun
-    late = arrivals[-len(stamps):] - stamps
-    assert abs(np.median(late)) < 3 * TICK
+    # As late as what this process tells itself, where that is later than three ticks.
+    late, echoed = lateness(got, begun), lateness(echoes, begun)
+    assert abs(np.median(late[-100:])) < max(3 * TICK, 3 * np.median(echoed[-100:]))
     reports = peer.collect(DiagnosticArray, '/diagnostics')
     peer.wait(lambda: reports)
     assert 504 * SECOND <= stamp_of(reports[0][1]) <= told()
 
 
 class Heard:
-    """The stamps of a node's poses, and how late each came, ns; WARN messages of /diagnostics."""
+    """The stamps of a node's poses, and how late each came, ns; WARN messages of /diagnostics.
+
+    Beside them how late an empty timer of this process is, ns: what a busy machine does to it, it
+    does to each of the four threads on a pose's way, the node's two and this process' two.
+    """
 
     def __init__(self, peer):
         self.peer, self.stamps, self.late, self.warnings = peer, [], [], []
+        self.timer_late, self._timer_at = [], time.monotonic_ns()
+        peer.create_timer(TICK / SECOND, self._time)
         peer.create_subscription(PoseArray, 'ragdoll/poses', self._take, 1000)
         peer.create_subscription(DiagnosticArray, '/diagnostics', self._judge, 10)
 
     def _take(self, message):
         self.stamps.append(stamp_of(message))
         self.late.append(time.time_ns() - self.stamps[-1])
+
+    def _time(self):
+        now = time.monotonic_ns()
+        self.timer_late.append(max(now - self._timer_at - TICK, 0))
+        self._timer_at = now
+
+    def bound(self, spacing, share):
+        """How late that share of poses may be, ns: a spacing, or what the last timers were late."""
+        return max(spacing, 4 * np.quantile(self.timer_late[-100:], share))
 
     def _judge(self, message):
         self.warnings += [status.message for status in message.status
@@ -133,14 +155,15 @@ class Heard:
         return np.array(self.stamps[begin:]), np.array(self.late[begin:])
 
     def are_on_time(self, spacing, count=100):
-        """Whether stamps come that are equally spaced and due within a tick, in one of ten tries.
+        """Whether stamps come in time that are equally spaced and due within a tick.
 
         Others may take the machine's time away.
         """
-        for _ in range(10):
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end:
             stamps, late = self.next(count)
             if (np.mean(np.diff(stamps) == spacing) > 0.95
-                    and np.mean(np.abs(late) < spacing) > 0.8):
+                    and np.mean(np.abs(late) < self.bound(spacing, 0.95)) > 0.8):
                 return True
         return False
 
@@ -174,7 +197,7 @@ def test_stamps_are_ros_time_over_stalls_paces_pauses_and_resets(heard, peer):
     first = np.argmax(np.diff(heard.stamps[count - 10:])) + count - 9
     caught_up = np.array(heard.late[first:])[
         np.array(heard.stamps[first:]) > heard.stamps[first] + SECOND]
-    assert np.median(caught_up) < TICK
+    assert np.median(caught_up) < heard.bound(TICK, 0.95)
     assert heard.are_on_time(TICK)
 
     for pace in (0.5, 2.0):
@@ -200,18 +223,34 @@ def test_stamps_are_ros_time_over_stalls_paces_pauses_and_resets(heard, peer):
 
 
 def test_a_change_of_the_pace_is_no_stall(make_node, peer):
-    """No report compares a mean over the time before with what is wanted now."""
+    """No report compares a mean over the time before with what is wanted now.
+
+    It would each time; a machine that is too busy for that pace falls below it now and then.
+    """
     node = make_node(scene='flight', rate=20.0)
     reports = peer.collect(DiagnosticArray, '/diagnostics')
     peer.executor_.add_node(node)
-    for change in (lambda: node.set_parameters([Parameter('real_time_factor', value=4)]),
-                   lambda: node.pause(True), lambda: node.pause(False)):
+
+    def pace(value):
+        node.set_parameters([Parameter('real_time_factor', value=value)])
+
+    def no_stall_by(change):
         peer.wait(lambda: reports)
         change()
         reports.clear()
         peer.wait(lambda: len(reports) > 2)
-        assert not any('below the requested 4' in report.status[0].message
+        return not any('below the requested 4' in report.status[0].message
                        for _, report in reports[:2])
+
+    for before, change in ((lambda: pace(1), lambda: pace(4)),
+                           (lambda: node.pause(False), lambda: node.pause(True)),
+                           (lambda: node.pause(True), lambda: node.pause(False))):
+        for _ in range(10):
+            if no_stall_by(change):
+                break
+            before()
+        else:
+            pytest.fail('a change is taken for a stall')
 
 
 def test_overload_lowers_the_pace_and_stamps_stay_ros_time(make_node, peer):

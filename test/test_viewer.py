@@ -189,6 +189,8 @@ def test_a_recording_offers_nothing_that_it_cannot_do():
     changes = {'Push', 'Strength, N', 'Scene', 'Engine'}
     pushes = {'Push up', 'Push down', 'Push left', 'Push right'}
     with served(SimulationSource(DROP)) as page:
+        page.open()
+        wait(lambda: page.editor)
         shown, keys = buttons_and_keys(page)
         assert changes < shown and pushes < keys and 'Reset' in shown
     with served(PlaybackSource(run)) as page:

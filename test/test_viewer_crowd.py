@@ -54,7 +54,7 @@ def page(recording):
     source.pause(True)
     with served(source) as page:
         page.open(look_at=(20.0, 20.0, 0.8))
-        wait(lambda: page.editor)
+        wait(lambda: page.editor and page.frame is not None)
         yield page
 
 
