@@ -47,8 +47,8 @@ def places_of(port):
 
 @pytest.mark.parametrize('sign', [signal.SIGINT, signal.SIGTERM])
 def test_says_where_it_is_serves_and_ends_within_two_seconds(sign):
-    """In one of five ends: a busy machine may delay one."""
-    assert any(time_to_end(sign) < 2 for _ in range(5))
+    """In one of three ends, as a busy machine may delay one; none may take 10 s."""
+    assert any(time_to_end(sign) < 2 for _ in range(3))
 
 
 def time_to_end(sign):
