@@ -86,7 +86,7 @@ def test_lerobot_by_pandas(pandas, shoved, written):
     assert set(info['features']) == set(data.columns)
 
 
-def test_lerobots_episodes_tasks_and_statistics(shoved, written):
+def test_lerobots_episodes_tasks_and_statistics(pandas, shoved, written):
     _, falls = shoved
     folder = written('lerobot')
     data = parquet.read_table(folder / 'data/chunk-000/file-000.parquet')
