@@ -15,7 +15,7 @@ import numpy as np
 from ..compiling.decorators import compiled
 from ..maths.transcendental import sine_and_cosine
 from ..maths.vectors import (Quat, Vec3, add, cross, put, quat, quat_mul, quat_rotate,
-                             quat_to_matrix, vec)
+                             quat_to_matrix, to_local, vec)
 
 Kinematics = collections.namedtuple(
     'Kinematics', 'orientations positions spatial_velocities motion_subspaces inertias '
@@ -61,14 +61,6 @@ def root_position(q: np.ndarray, start: int) -> Vec3:
 
 
 @compiled
-def combine_axes(axes: np.ndarray, a: Vec3) -> Vec3:
-    """Sum of the rows of ``axes`` (3, 3), each times an entry of a."""
-    return (axes[0, 0] * a[0] + axes[1, 0] * a[1] + axes[2, 0] * a[2],
-            axes[0, 1] * a[0] + axes[1, 1] * a[1] + axes[2, 1] * a[2],
-            axes[0, 2] * a[0] + axes[1, 2] * a[1] + axes[2, 2] * a[2])
-
-
-@compiled
 def forward_kinematics(tree: np.ndarray, q: np.ndarray, v: np.ndarray, kin: Kinematics) -> None:
     """Write ``kin`` at q and v: orientations, positions, velocities, joints' motion subspaces."""
     orientations, positions = kin.orientations, kin.positions
@@ -89,7 +81,7 @@ def forward_kinematics(tree: np.ndarray, q: np.ndarray, v: np.ndarray, kin: Kine
             velocities[i, k] = velocities[parent, k]
         if body.has_quaternion:
             # frame * q * frame^-1: the joint's frame is not that of the doll
-            x, y, z = combine_axes(body.joint_axes, (q[at], q[at + 1], q[at + 2]))
+            x, y, z = to_local(body.joint_axes, (q[at], q[at + 1], q[at + 2]))
             turn = quat_mul(turn, (x, y, z, q[at + 3]))
         for k in range(body.dof_count):
             local = vec(body.joint_axes[k])
