@@ -11,8 +11,8 @@ One tick of a cluster, and what its stages read and write:
         find_first_contact       dense_step -> event_time         conservative advancement
         follow_dense_step        dense_step -> q, v               to the event or the time's end
       or
+        begin_contact_step       q, v -> start contacts, sums_before
         step_to_impact           q, v, gaps -> q, v, gaps         step control, time of impact
-          begin_contact_step     q, v -> start contacts, sums_before
           contact_step           -> q_end, v_end                  Moreau's centered scheme
             unconstrained_velocity  middle, loads, springs -> v_free, factor of the mass matrix
             find_contacts           middle, gaps_active -> contacts
@@ -44,6 +44,7 @@ from .flight.dense_step import begin_dense_step
 from .flight.first_contact import find_first_contact
 from .flight.flight import can_fly, follow_dense_step
 from .maths.vectors import add, put, vec
+from .stepping.contact_step import approaches_fast, begin_contact_step
 from .stepping.impact import impact
 from .stepping.momentum import sum_dolls
 from .stepping.step_control import step_to_impact
@@ -53,9 +54,10 @@ from .workspace import WORKSPACE, Workspace
 LONGEST_FLIGHT = 0.05
 """s: the longest step of flight that is tried."""
 
-MAX_IMPACTS = 200
-"""Impacts of one doll in one tick, over the cube of the number of dolls in the cluster: from then
-on no time of impact is sought, so that many dolls do not cost their square."""
+MAX_IMPACTS, IMPACT_WORK = 200, 80_000
+"""Times of impact that are sought in a tick, at most and over the square of the number of bodies, so
+that many bodies do not cost their square. From then on what meets within a step is a contact of it,
+with restitution."""
 
 system_at, workspace_at, cluster_state_at = (bundle_at(SYSTEM), bundle_at(WORKSPACE),
                                              bundle_at(CLUSTER_STATE))
@@ -110,8 +112,8 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
                     nominal: float, tolerance: float) -> None:
     """Advance one cluster by ``duration`` s; see advance(), whose ``step`` is ``nominal``."""
     q, v, dense, stats = cluster.q, cluster.v, cluster.dense_step[0], ws.stats[0]
-    time, impacts = 0.0, 0
-    max_impacts = MAX_IMPACTS // len(ws.step.external) ** 3
+    time, impacts, impact_due = 0.0, 0, True
+    max_impacts = min(MAX_IMPACTS, IMPACT_WORK // len(s.tree) ** 2)
     flight_possible = s.flight_enabled[0] > 0 and len(cluster.springs) == 0
     separated = enable_separated_pairs(s, ws, ws.step.end, q, v)
     if separated:
@@ -134,12 +136,16 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
             if not flight_possible or not seek:
                 refresh_gaps(s, ws, cluster)
             h = left / max(1, math.ceil(left / nominal - 1e-9))
-            gone, touched = step_to_impact(s, ws, cluster, h, time, nominal, seek)
+            begin_contact_step(s, ws, cluster)
+            gone, touched = 0.0, impact_due and approaches_fast(ws)
+            if not touched:
+                gone, touched = step_to_impact(s, ws, cluster, h, time, nominal, seek)
             dense.first_rate_known, dense.next_length = 0, 0.0
         time += gone
         stats.ended_without_impact = 0 if touched else 1
+        impact_due = True
         if touched:
-            impact(s, ws, q, v, seek)
+            impact_due = impact(s, ws, q, v) > 0 and seek
             impacts += 1
     write_bone_states(s, ws.step.end, q, v, cluster.bone_states)
     sum_dolls(s, ws, ws.step.end, q, cluster.doll_sums)

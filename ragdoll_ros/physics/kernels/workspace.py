@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import collections
+import math
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from .cluster_state import CONTACT, DOLL_SUMS, ClusterState, make_cluster_state
 from .compiling.bundle import bundle_type
 from .dynamics.forward_dynamics import make_dynamics
 from .dynamics.kinematics import make_kinematics
-from .system import (CONTACT_POINT, MAX_DENSE_ROWS, MAX_MANIFOLD_POINTS, System, blank_system,
+from .system import (CONTACT_POINT, MAX_BAND_WORK, MAX_DENSE_ROWS, MAX_MANIFOLD_POINTS, System, blank_system,
                      coordinate_count, tree_depth)
 
 MOTION = np.dtype([('speed', float), ('angular_speed', float), ('correction', float),
@@ -62,7 +63,7 @@ Island = collections.namedtuple(
     'Island', 'members label Y YT support place W G blocks rhs impulses free_velocity '
     'start_velocity curvature correction soft velocity residual direction best active places '
     'is_normal normal_rhs normal_impulses normal_row row_impulses row_direction z z_previous '
-    'z_direction')
+    'z_direction order dof_place A B phi local band')
 """An island of m contacts (``members``) and their rows, and scratch to solve it.
 
 ``label`` (d,): island of each doll. Rows ``Y`` = J L^-1 have entries for the degrees of freedom
@@ -71,7 +72,8 @@ where a degree of freedom stands in a row. ``W`` = Y Y^T and ``G``, flat (rows *
 island; ``blocks`` (m, 5, 5): diagonal blocks of W of a large one. Of each row: ``rhs`` b of
 u = W p + b; ``impulses`` p; ``free_velocity`` without impulses; ``start_velocity`` at the step's
 start; ``curvature`` bias; ``correction`` impulses; ``soft`` impulses without restitution. The
-others are scratch of the solvers that use them; ``z`` (nv,) = Y^T p."""
+others are scratch of the solvers that use them; ``z`` (nv,) = Y^T p; ``order`` (d,) of elimination
+of the dolls, ``dof_place`` (nv,) and ``band``: see sparse_newton.py."""
 
 Step = collections.namedtuple(
     'Step', 'scalars start middle end dynamics q_middle q_end v_end v_free v_middle v_change '
@@ -144,7 +146,10 @@ def _make_island(system: System, contacts: int, rows: int) -> Island:
         is_normal=np.zeros(max(rows, 8), np.int64), normal_rhs=each_row(),
         normal_impulses=each_row(), normal_row=np.zeros(max(rows, 8), np.int64),
         row_impulses=each_row(), row_direction=each_row(), z=np.zeros(nv), z_previous=np.zeros(nv),
-        z_direction=np.zeros(nv))
+        z_direction=np.zeros(nv), order=np.zeros(len(system.doll_masses), np.int64),
+        dof_place=np.zeros(nv, np.int64), A=np.zeros((5, 5)), B=np.zeros((contacts, 5, 5)),
+        phi=np.zeros((contacts, 5)), local=np.zeros(5),
+        band=np.zeros(nv + 3 * int(math.sqrt(nv * MAX_BAND_WORK))))
 
 
 WORKSPACE = bundle_type(make_workspace(blank_system(), make_cluster_state(blank_system())))

@@ -24,7 +24,8 @@ IDS_PER_PAIR = 4096
 def find_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, gaps: np.ndarray,
                   margin: float) -> int:
     """Write to contacts.found the contacts at q whose gap in ``gaps`` is at most TOUCHING; of a
-    pair the points nearer than ``margin`` m. Returns their number. ``kin``: of q, with its geoms.
+    pair the points nearer than ``margin`` m, or than the pair has closed since ws.gaps, if that is
+    more. Returns their number. ``kin``: of q, with its geoms.
     """
     m, n, contacts = 0, 0, ws.contacts.found
     for k in range(len(s.geoms)):
@@ -42,7 +43,7 @@ def find_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, gaps
         n += 2
     for k in range(len(s.pairs)):
         if gaps[n + k] <= TOUCHING:
-            m = add_pair_contacts(s, ws.contacts, kin, k, m, margin,
+            m = add_pair_contacts(s, ws.contacts, kin, k, m, max(margin, ws.gaps[n + k] - gaps[n + k]),
                                   n + len(s.pairs) + IDS_PER_PAIR * k)
     set_friction_points(s, ws.contacts, kin, m)
     return m

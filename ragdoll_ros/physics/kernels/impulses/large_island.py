@@ -1,57 +1,68 @@
-"""A large island: its contacts by Gauss-Seidel sweeps through their rows, without W.
+"""A large island: its contacts by Gauss-Seidel sweeps through their rows, without W, and by Newton's
+method where contacts join dolls so that it costs less.
 
 To form and factor W of hundreds of rows costs more than to do without it: a sweep through z = Y^T p
 costs as many operations as the rows have entries. Between sweeps, a step along the direction of
 Fletcher and Reeves makes them converge ten times as fast (Silcowitz-Hansen, Niebe and Erleben, The
-Visual Computer 26, 2010).
+Visual Computer 26, 2010). In a stack an impulse gets on by one body in a sweep: sparse_newton.py.
 """
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
 from ..compiling.decorators import compiled
 from ..contact_kind import LIMIT, ROLLING
-from ..system import COMPLIANCE, NO_SLIP
+from ..system import COMPLIANCE, MAX_BAND_WORK, NO_SLIP, System
 from ..workspace import Island, Workspace
 from .one_contact import project_to_disc, solve_one_contact
-from .solver import OPENING, scale_to_no_work
+from .solver import OPENING, PROXIMAL, UNSOLVED, energy_bound_share, scale_to_no_work
+from .sparse_newton import order_dofs, sparse_newton, write_velocities
 
 MAX_SWEEPS = 100
-"""Sweeps in one solve."""
+"""Sweeps in one solve where Newton's method would cost more."""
 
-TOLERANCE = 1e-6
+SWEEPS = 8
+"""Sweeps before Newton's method."""
+
+TOLERANCE = 1e-8
 """m/s to which a large island is solved, if that many sweeps suffice."""
+
+ROUNDS = 4
+"""Rounds of Newton's method, each against ten times the proximal share of the one before, from
+PROXIMAL on."""
+
+SWEEP_WORK = 100.0
+"""Work of Newton's method, as MAX_BAND_WORK counts it, that takes as long as it takes to sweep
+MAX_SWEEPS times through a matrix of one entry."""
 
 IMMOVABLE = 1e30
 """Takes the place of W's diagonal entry for a row along which nothing can move."""
 
-UNSOLVED = 1e-2
-"""m/s: islands with a larger residual are counted, and their impulses kept from adding energy."""
-
 
 @compiled
-def solve_large(ws: Workspace, m: int, n: int, has_restitution: bool,
+def solve_large(s: System, ws: Workspace, m: int, n: int, has_restitution: bool,
                 has_penetration: bool) -> None:
-    """Solve an island as solve_small() does, except that restitution that would add energy is left
-    out altogether, and that curvature is neglected.
-    """
+    """Solve an island as solve_small() does, except that curvature is neglected."""
     island, b, p, u = (ws.island, ws.island.rhs, ws.island.impulses, ws.island.free_velocity)
+    dofs, width = order_dofs(s, ws, m)
+    if not newton_is_cheaper(ws, m, dofs, width):
+        width = 0
     diagonal_blocks(ws, m, COMPLIANCE)
-    left, sweeps = sweep_to_tolerance(ws, m, n, b, p)
+    left, sweeps = solve_rows(ws, m, n, b, p, dofs, width)
     if release_opening_contacts(ws, m, b, p):
-        left, more = sweep_to_tolerance(ws, m, n, b, p)
+        left, more = solve_rows(ws, m, n, b, p, dofs, width)
         sweeps += more
     work, spent = work_terms(island, n, u, p)
     if has_restitution and work + spent / 2 > 0:
-        left, more = sweep_to_tolerance(ws, m, n, u, p)
-        sweeps += more
-        ws.stats[0].restitution_reduced += 1
+        reduce_restitution(ws, m, n, dofs, width)
         work, spent = work_terms(island, n, u, p)
     ws.stats[0].sweeps += sweeps
     if not left <= UNSOLVED:
         ws.stats[0].unsolved += 1
-        if not work + spent / 2 <= 0:
-            scale_to_no_work(p, n, work, spent)
+    if not work + spent / 2 <= 0:
+        scale_to_no_work(p, n, work, spent)
     ws.step.scalars[0].residual = max(ws.step.scalars[0].residual, left)
     if has_penetration:
         keep_normals_only(island, m)
@@ -59,7 +70,74 @@ def solve_large(ws: Workspace, m: int, n: int, has_restitution: bool,
             b[i] = island.correction[i] = 0.0
         for k in range(m):
             b[island.members[k].row] = -island.members[k].correction
-        sweep_to_tolerance(ws, m, n, b, island.correction)
+        solve_rows(ws, m, n, b, island.correction, dofs, width)
+
+
+@compiled
+def newton_is_cheaper(ws: Workspace, m: int, dofs: int, width: int) -> bool:
+    """Whether Newton's method on a band of this ``width`` costs less than MAX_SWEEPS sweeps."""
+    entries = 0
+    for k in range(m):
+        member = ws.island.members[k]
+        entries += member.kind * ws.contacts.found[member.contact].dof_count
+    work = dofs * width * width
+    return work <= SWEEP_WORK * entries and work <= MAX_BAND_WORK
+
+
+@compiled
+def solve_rows(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, dofs: int,
+               width: int) -> tuple[float, int]:
+    """Solve for p (n,) in place, starting from p: by sweeps, and where these stall by Newton's
+    method, unless ``width`` is 0. Returns the residual, m/s, and the number of sweeps. island.z
+    becomes Y^T p.
+    """
+    if not width:
+        return sweep_to_tolerance(ws, m, n, b, p, MAX_SWEEPS)
+    left, done, proximal = math.inf, 0, PROXIMAL
+    for _ in range(ROUNDS):
+        left, sweeps = sweep_to_tolerance(ws, m, n, b, p, SWEEPS)
+        done += sweeps
+        if left <= TOLERANCE:
+            break
+        left = sparse_newton(ws, m, n, b, p, TOLERANCE, proximal, dofs, width)
+        if left <= TOLERANCE:
+            break
+        proximal *= 10
+    return left, done
+
+
+@compiled
+def reduce_restitution(ws: Workspace, m: int, n: int, dofs: int, width: int) -> None:
+    """Move island.impulses towards those without restitution until they add no energy; see
+    small_island.bound_energy(). island.z becomes Y^T p.
+    """
+    island = ws.island
+    p, soft, u, z, bounced = (island.impulses, island.soft, island.free_velocity, island.z,
+                              island.z_previous)
+    for i in range(n):
+        soft[i] = p[i]
+    solve_rows(ws, m, n, u, soft, dofs, width)
+    work, spent = work_terms(island, n, u, soft)
+    if not work + spent / 2 <= 0:
+        scale_to_no_work(soft, n, work, spent)
+    write_velocities(ws, m, u, p)
+    for j in range(len(z)):
+        bounced[j] = z[j]
+    write_velocities(ws, m, u, soft)
+    a = b = c = 0.0
+    for i in range(n):
+        b += (p[i] - soft[i]) * u[i]
+        c += soft[i] * u[i]
+    for j in range(len(z)):
+        step = bounced[j] - z[j]
+        a += step * step / 2
+        b += step * z[j]
+        c += z[j] * z[j] / 2
+    share = energy_bound_share(a, b, c)
+    for i in range(n):
+        p[i] = soft[i] + share * (p[i] - soft[i])
+    write_velocities(ws, m, u, p)
+    ws.stats[0].restitution_reduced += 1
 
 
 @compiled
@@ -147,10 +225,10 @@ def sweep_large_island(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray) -> f
 
 
 @compiled
-def sweep_to_tolerance(ws: Workspace, m: int, n: int, b: np.ndarray,
-                       p: np.ndarray) -> tuple[float, int]:
-    """Solve for p (n,) in place, starting from p. Returns the last sweep's largest change of a
-    velocity, m/s or rad/s, and the number of sweeps. island.z becomes Y^T p.
+def sweep_to_tolerance(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray,
+                       most: int) -> tuple[float, int]:
+    """Solve for p (n,) in place, starting from p, in at most so many sweeps. Returns the last one's
+    largest change of a velocity, m/s or rad/s, and their number. island.z becomes Y^T p.
     """
     island = ws.island
     z, z_previous, z_direction = island.z, island.z_previous, island.z_direction
@@ -165,14 +243,14 @@ def sweep_to_tolerance(ws: Workspace, m: int, n: int, b: np.ndarray,
             impulse, p[member.row + e] = p[member.row + e], 0.0
             change_impulse(ws, k, e, impulse, p)
     worst, done, before = 0.0, 0, 0.0
-    for _ in range(MAX_SWEEPS):
+    for _ in range(most):
         for i in range(n):
             previous[i] = p[i]
         for j in range(len(z)):
             z_previous[j] = z[j]
         worst = sweep_large_island(ws, m, b, p)
         done += 1
-        if worst <= TOLERANCE or done == MAX_SWEEPS:
+        if worst <= TOLERANCE or done == most:
             break
         square = 0.0
         for k in range(m):

@@ -1,21 +1,17 @@
 """A small island: its contacts by W = Y Y^T, the Delassus operator."""
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ..compiling.decorators import compiled
 from ..maths.cholesky import factor_row, substitute
 from ..system import COMPLIANCE, IMPACT_COMPLIANCE
 from ..workspace import Island, Workspace
-from .solver import scale_to_no_work, solve_impulses, solve_position_correction
+from .solver import (UNSOLVED, energy_bound_share, scale_to_no_work, solve_impulses,
+                     solve_position_correction)
 
 SWEEPS = 8
 """Gauss-Seidel sweeps before the first Newton step."""
-
-UNSOLVED = 1e-5
-"""m/s: islands with a larger residual are counted, and their impulses kept from adding energy."""
 
 SINGULAR = 1e-13
 """Share of the largest diagonal entry of W up to which a row counts as immovable."""
@@ -52,6 +48,7 @@ def solve_small(ws: Workspace, m: int, n: int, h: float, tolerance: float, has_r
     ws.stats[0].sweeps += sweeps
     if not left <= UNSOLVED:
         ws.stats[0].unsolved += 1
+    if h == 0.0 or not left <= UNSOLVED:
         scale_to_energy_bound(island.W, u, p, n)
     if has_penetration:
         solve_position_correction(island, m, n)
@@ -185,7 +182,7 @@ def bound_energy(W: np.ndarray, u: np.ndarray, soft: np.ndarray, p: np.ndarray, 
     <= 0 and so p (u + W p / 2) = p u+ - p W p / 2 < 0. Between both, all impulses are within their
     cones and nothing penetrates, as cones and half-spaces are convex.
     """
-    a = b = 0.0
+    a = b = c = 0.0
     for i in range(n):
         w = ws = 0.0
         for j in range(n):
@@ -193,9 +190,7 @@ def bound_energy(W: np.ndarray, u: np.ndarray, soft: np.ndarray, p: np.ndarray, 
             ws += W[i * n + j] * soft[j]
         a += (p[i] - soft[i]) * w / 2
         b += (p[i] - soft[i]) * (u[i] + ws)
-    c = min(0.0, energy_gain(W, u, soft, n))
-    root = math.sqrt(max(0.0, b * b - 4 * a * c))
-    share = (-2 * c / (b + root) if b > 0 else (root - b) / (2 * a)) if a > 0 else 1.0
-    share = min(1.0, max(0.0, share))
+        c += soft[i] * (u[i] + ws / 2)
+    share = energy_bound_share(a, b, c)
     for i in range(n):
         p[i] = soft[i] + share * (p[i] - soft[i])

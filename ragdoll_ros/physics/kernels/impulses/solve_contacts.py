@@ -141,7 +141,8 @@ def assemble_rhs(s: System, ws: Workspace, m: int, n: int, h: float) -> tuple[bo
             for e in range(c.kind):
                 curve[row + e] = was[row + e] - c.start_velocity[e]
             b[row] += max(0.0, c.gap - SLOP) / h
-        elif bounces and not ws.step.scalars[0].seeks_impacts:
+        elif bounces and not ws.step.scalars[0].seeks_impacts and (
+                c.gap + h / 2 * c.normal_velocity <= 0):
             b[row] += c.restitution * c.normal_velocity
         elif c.gap > 0:
             b[row] += c.gap / h
@@ -173,7 +174,7 @@ def solve_island(s: System, ws: Workspace, m: int, n: int, h: float, tolerance: 
     island, change, correction = ws.island, ws.step.v_change, ws.step.correction
     has_restitution, has_penetration = assemble_rhs(s, ws, m, n, h)
     if n > MAX_DENSE_ROWS:
-        solve_large(ws, m, n, has_restitution, has_penetration)
+        solve_large(s, ws, m, n, has_restitution, has_penetration)
     else:
         solve_small(ws, m, n, h, tolerance, has_restitution, has_penetration)
     for k in range(m):

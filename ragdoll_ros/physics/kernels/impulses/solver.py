@@ -31,6 +31,9 @@ PROXIMAL = 1e-5
 """Share of W's diagonal that resists the first round's Newton steps: enough for impulses that the
 compliance, 1e-8 of W, decides, and far less than what decides the motion of bodies."""
 
+UNSOLVED = 1e-5
+"""m/s: islands with a larger residual are counted, and their impulses kept from adding energy."""
+
 OPENING = 1e-4
 """m/s: contacts of unlimited friction that open faster are released."""
 
@@ -153,3 +156,12 @@ def scale_to_no_work(p: np.ndarray, n: int, work: float, spent: float) -> None:
         share = 0.0
     for i in range(n):
         p[i] = share * p[i] if share > 0 else 0.0
+
+
+@compiled
+def energy_bound_share(a: float, b: float, c: float) -> float:
+    """Share x, from 0 to 1, up to which a x^2 + b x + c, J, is not positive; c is not."""
+    c = min(0.0, c)
+    root = math.sqrt(max(0.0, b * b - 4 * a * c))
+    share = (-2 * c / (b + root) if b > 0 else (root - b) / (2 * a)) if a > 0 else 1.0
+    return min(1.0, max(0.0, share))

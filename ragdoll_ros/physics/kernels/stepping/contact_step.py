@@ -64,6 +64,18 @@ def begin_contact_step(s: System, ws: Workspace, cluster: ClusterState) -> None:
 
 
 @compiled
+def approaches_fast(ws: Workspace) -> bool:
+    """Whether a contact at the start of a step closes so fast that it is an impact: geoms that met
+    as the last step ended, or points of a patch that it made penetrate.
+    """
+    for i in range(ws.step.scalars[0].start_contact_count):
+        c = ws.contacts.start[i]
+        if c.start_velocity[0] < -(SLOW_TURN if c.kind == LIMIT else SLOW):
+            return True
+    return False
+
+
+@compiled
 def contact_step(s: System, ws: Workspace, cluster: ClusterState, h: float, since: float) -> int:
     """Compute a step of h s, after begin_contact_step(): write step.q_end, without position
     correction, step.v_end, step.correction, and contacts.found with impulses. Returns their number.

@@ -6,26 +6,51 @@ import numpy as np
 from ..compiling.decorators import compiled
 from ..contact.find_contacts import find_contacts
 from ..contact.gaps import TOUCHING
-from ..dynamics.kinematics import (forward_kinematics, place_geoms, root_motion_subspaces,
-                                   rotate_inertias)
+from ..contact.jacobian import contact_velocities
+from ..dynamics.kinematics import (Kinematics, forward_kinematics, place_geoms,
+                                   root_motion_subspaces, rotate_inertias)
 from ..dynamics.mass_matrix import factor_ltl, mass_matrix
 from ..impulses.solve_contacts import solve_contacts
 from ..system import System
 from ..workspace import Workspace
+from .contact_step import SLOW
+from .momentum import sum_dolls, total_energy
 
 TOLERANCE = 1e-10
 """m/s: tolerance of the contact solve."""
 
+MET = 1e-7
+"""m or rad: geoms that are farther apart than this have no part in an impact, unless they approach:
+balls in a row that almost touch hit one after the other."""
+
 
 @compiled
-def impact(s: System, ws: Workspace, q: np.ndarray, v: np.ndarray, bounces: bool) -> int:
-    """Add to v the change by the impulses of everything that touches at q by ws.gaps. Returns the
-    number of contacts. ``bounces``: whether there is restitution.
+def keep_met(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, v: np.ndarray,
+             m: int) -> int:
+    """Drop those of m contacts found that have not met and do not approach. Returns how many stay.
+    """
+    contacts, count = ws.contacts.found, 0
+    for i in range(m):
+        if contacts[i].gap > MET:
+            contact_velocities(s, kin, q, v, contacts[i])
+            if contacts[i].start_velocity[0] > -SLOW:
+                continue
+        contacts[count] = contacts[i]
+        count += 1
+    return count
+
+
+@compiled
+def impact(s: System, ws: Workspace, q: np.ndarray, v: np.ndarray) -> int:
+    """Add to v the change by the impulses of everything that has met at q by ws.gaps. Returns how
+    many contacts that touch were left out.
     """
     kin, dyn, contacts = ws.step.start, ws.step.dynamics, ws.contacts.found
     forward_kinematics(s.tree, q, v, kin)
     place_geoms(s.tree, s.body_root, s.geoms, q, kin)
-    m = find_contacts(s, ws, kin, q, ws.gaps, TOUCHING)
+    touching = find_contacts(s, ws, kin, q, ws.gaps, TOUCHING)
+    m = keep_met(s, ws, kin, q, v, touching)
+    left_out = touching - m
     if m == 0:
         return 0
     root_motion_subspaces(s.tree, q, kin)
@@ -35,10 +60,14 @@ def impact(s: System, ws: Workspace, q: np.ndarray, v: np.ndarray, bounces: bool
     for i in range(m):
         for e in range(5):
             contacts[i].impulse[e] = 0.0
-        if not bounces:
-            contacts[i].restitution = 0.0
     solve_contacts(s, ws, kin, q, v, v, m, 0.0, TOLERANCE)
+    sum_dolls(s, ws, kin, q, ws.step.sums_after)
+    e0, k0 = total_energy(ws.step.sums_after)
     for j in range(len(v)):
         v[j] += ws.step.v_change[j]
+    forward_kinematics(s.tree, q, v, kin)
+    sum_dolls(s, ws, kin, q, ws.step.sums_after)
+    e1, k1 = total_energy(ws.step.sums_after)
+    ws.stats[0].debug_a += max(0.0, e1 - e0)
     ws.stats[0].impacts += 1
-    return m
+    return left_out

@@ -10,8 +10,7 @@ from ..compiling.decorators import compiled
 from ..contact.gaps import BEYOND_LIMIT, TOUCHING, is_joint_limit_gap
 from ..system import System
 from ..workspace import Workspace
-from .contact_step import (MAX_PENETRATION, STEP_TOLERANCE, begin_contact_step, contact_step,
-                           finish_step)
+from .contact_step import MAX_PENETRATION, STEP_TOLERANCE, contact_step, finish_step
 from .momentum import REMOVABLE, internal_kinetic_energy, remove_energy, total_energy
 from .position_correction import PAID_SHARE
 from .time_of_impact import (OVERSHOT, impacts_at_end, is_fast_impact, next_trial_step,
@@ -30,7 +29,7 @@ RESTING_GAIN = 1e-6
 the energy of a step says little about its error."""
 
 SOLVER_GAIN = 1e-10
-"""Share of the energy scale that solving to a tolerance may add in a step."""
+"""Share of the energy scale that rounding may add in a step."""
 
 KINETIC_GAIN = 1e-4
 """Share of the kinetic energy that a step may add."""
@@ -45,8 +44,8 @@ COARSEST = 0.03
 @compiled
 def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, since: float,
                    nominal: float, seek: bool) -> tuple[float, bool]:
-    """Advance by at most h s, stopping at the first fast impact. Returns the time advanced and
-    whether an impact was reached.
+    """Advance by at most h s after begin_contact_step(), stopping at the first fast impact. Returns
+    the time advanced and whether an impact was reached.
 
     ws.gaps are those at cluster.q before and after. A step that adds much energy or penetration is
     repeated at half the length; the little energy that others add is removed from the motion. Where
@@ -60,7 +59,6 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
     stats.next_dt = 2 * length if 2 * length < nominal else 0.0
     if seek:
         length = step_to_joint_limit(s, ws, cluster.v, length)
-    begin_contact_step(s, ws, cluster)
     begin_trials(ws)
     step.scalars[0].seeks_impacts = 1 if seek else 0
     held, moving = total_energy(step.sums_before)
@@ -74,7 +72,8 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
         now, speed = total_energy(step.sums_after)
         work = stats.work_pushes - pushes + stats.work_grabs - grabs
         gained = now - held - work
-        tolerated = tolerated_energy_gain(s, ws, m, length, max(moving, speed), work)
+        share = tolerated_energy_gain(s, ws, max(moving, speed), work)
+        tolerated = share + solver_energy(s, ws, m, length)
         if turn < MAX_TRIES - 1 and length > FINEST * nominal and (
                 not gained - step.scalars[0].correction_energy <= tolerated
                 or penetrates_further(s, ws)
@@ -94,8 +93,12 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
         gained -= stats.work_position_correction - corrections
         if not gained <= tolerated:
             stats.energy_gains += 1
-        if gained > tolerated or 0 < gained < REMOVABLE * internal_kinetic_energy(s, ws):
+        if gained > share or 0 < gained < REMOVABLE * internal_kinetic_energy(s, ws):
+            stats.energy_removed += gained
+            stats.energy_unremoved += max(0.0, gained - internal_kinetic_energy(s, ws))
             remove_energy(s, ws, gained, step.q_end, step.v_end)
+        elif gained > 0:
+            stats.debug_b += gained
         break
     accept_step(ws, cluster, m, length, length > 0.1 * h)
     return length, hit
@@ -162,21 +165,27 @@ def copy_into(to: np.ndarray, values: np.ndarray) -> None:
 
 
 @compiled
-def tolerated_energy_gain(s: System, ws: Workspace, m: int, h: float, kinetic: float,
-                          work: float) -> float:
-    """Energy gain, J, tolerated in a step of h s with m contacts: a fraction of the kinetic energy,
-    or, near rest, of m g L, both up to a share of the internal kinetic energy; and the effect of
-    solver tolerances, that of contacts times the sum of all impulses.
+def tolerated_energy_gain(s: System, ws: Workspace, kinetic: float, work: float) -> float:
+    """Energy gain, J, tolerated in a step: a fraction of the kinetic energy, or, near rest, of
+    m g L, both up to a share of the internal kinetic energy.
+    """
+    share = max(KINETIC_GAIN * (kinetic + abs(work)),
+                min(PAID_SHARE * kinetic, RESTING_GAIN * s.energy_scale[0]))
+    return min(share, (REMOVABLE - PAID_SHARE) * internal_kinetic_energy(s, ws)) + (
+        SOLVER_GAIN * s.energy_scale[0])
+
+
+@compiled
+def solver_energy(s: System, ws: Workspace, m: int, h: float) -> float:
+    """Energy, J, that the residual of the contact solve may add in a step of h s with m contacts,
+    which no shorter step would avoid: the residual times the sum of all impulses.
     """
     total = 0.0
     for i in range(m):
         for e in range(ws.contacts.found[i].kind):
             total += abs(ws.contacts.found[i].impulse[e])
-    share = max(KINETIC_GAIN * (kinetic + abs(work)),
-                min(PAID_SHARE * kinetic, RESTING_GAIN * s.energy_scale[0]))
-    return min(share, (REMOVABLE - PAID_SHARE) * internal_kinetic_energy(s, ws)) + (
-        SOLVER_GAIN * s.energy_scale[0] + max(10 * STEP_TOLERANCE, ws.step.scalars[0].residual)
-        * min(total, jam_threshold(s, ws, h)))
+    return max(10 * STEP_TOLERANCE, ws.step.scalars[0].residual) * min(
+        total, jam_threshold(s, ws, h))
 
 
 @compiled

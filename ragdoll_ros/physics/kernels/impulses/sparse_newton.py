@@ -1,0 +1,266 @@
+"""Newton's method on a large island, in the space of its degrees of freedom.
+
+The function is that of newton.py, with the same proximal share. Of each contact, linearized, it is
+A dp + B du = -phi with du = Y dz + D dp: z = Y^T p, and D the compliance and the proximal share of
+W's diagonal. So dp = -C^-1 (phi + B Y dz) with C = A + B D, a matrix of each contact by itself, and
+
+    (I + sum of Y^T C^-1 B Y) dz = -Y^T C^-1 phi.
+
+That matrix has entries where contacts join dolls. In the order of Cuthill and McKee (Proceedings of
+the 24th ACM National Conference, 1969) it is banded: narrowly for stacks, rows and walls.
+"""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..compiling.decorators import compiled
+from ..maths.banded import solve_banded
+from ..system import NO_SLIP, System
+from ..workspace import Island, Workspace
+from .newton import MAX_STEPS, PATIENCE
+from .one_contact import project_to_disc
+
+
+@compiled
+def order_dofs(s: System, ws: Workspace, m: int) -> tuple[int, int]:
+    """Write to island.dof_place the places of the degrees of freedom of an island's dolls in the order
+    of Cuthill and McKee. Returns how many there are, and the width of the band.
+    """
+    island, contacts = ws.island, ws.contacts.found
+    first = s.body_doll[contacts[island.members[0].contact].body_a]
+    count = order_dolls(s, ws, m, first)
+    count = order_dolls(s, ws, m, island.order[count - 1])
+    place, start, dofs = island.dof_place, island.label, 0
+    for d in range(len(start)):
+        start[d] = 0
+    for j in range(len(place)):
+        start[s.body_doll[s.dof_body[j]]] += 1
+    for k in range(count):
+        doll = island.order[k]
+        dofs, start[doll] = dofs + start[doll], dofs
+    for j in range(len(place)):
+        doll = s.body_doll[s.dof_body[j]]
+        place[j] = start[doll]
+        start[doll] += 1
+    width = 1
+    for k in range(m):
+        i = island.members[k].contact
+        low, high = dofs, 0
+        for x in range(contacts[i].dof_count):
+            at = place[island.support[i, x]]
+            low, high = min(low, at), max(high, at)
+        width = max(width, high - low)
+    return dofs, width
+
+
+@compiled
+def order_dolls(s: System, ws: Workspace, m: int, first: int) -> int:
+    """Write the dolls of an island of m contacts to island.order, by their distance from the doll
+    ``first`` along contacts. Returns their number.
+    """
+    order, seen, contacts = ws.island.order, ws.island.label, ws.contacts.found
+    for d in range(len(seen)):
+        seen[d] = 0
+    order[0], seen[first], count, done = first, 1, 1, 0
+    while done < count:
+        doll = order[done]
+        done += 1
+        for k in range(m):
+            c = contacts[ws.island.members[k].contact]
+            if c.body_b < 0:
+                continue
+            a, b = s.body_doll[c.body_a], s.body_doll[c.body_b]
+            other = b if a == doll else a
+            if (a == doll or b == doll) and not seen[other]:
+                order[count], seen[other] = other, 1
+                count += 1
+    return count
+
+
+@compiled
+def write_velocities(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray) -> None:
+    """Write z = Y^T p to island.z and the velocities W p + b to island.velocity."""
+    island = ws.island
+    Y, z, u = island.Y, island.z, island.velocity
+    for j in range(len(z)):
+        z[j] = 0.0
+    for k in range(m):
+        member = island.members[k]
+        support = island.support[member.contact]
+        for row in range(member.row, member.row + member.kind):
+            if p[row] != 0.0:
+                for x in range(ws.contacts.found[member.contact].dof_count):
+                    z[support[x]] += Y[row, x] * p[row]
+    for k in range(m):
+        member = island.members[k]
+        support, soft = island.support[member.contact], member.compliance
+        for e in range(member.kind):
+            row = member.row + e
+            total = b[row] + p[row] * island.blocks[k, e, e] * soft / (1 + soft)
+            for x in range(ws.contacts.found[member.contact].dof_count):
+                total += Y[row, x] * z[support[x]]
+            u[row] = total
+
+
+@compiled
+def linearize_contact(island: Island, k: int, p: np.ndarray, proximal: float) -> float:
+    """Write phi of member k, scaled to velocities, to island.phi[k], and A and B of its
+    linearization to island.A and island.B. Returns the largest entry of phi.
+    """
+    member, block, u = island.members[k], island.blocks[k], island.velocity
+    A, B, phi, a = island.A, island.B[k], island.phi[k], member.row
+    for e in range(member.kind):
+        for g in range(member.kind):
+            A[e, g] = B[e, g] = 0.0
+    own, worst = block[0, 0], 0.0
+    push = p[a] - u[a] / own
+    active = push > 0
+    phi[0] = u[a] if active else own * p[a]
+    A[0, 0], B[0, 0] = (0.0, 1.0) if active else (own, 0.0)
+    worst = abs(phi[0])
+    for e in range(1, member.kind, 2):
+        law = member.friction if e == 1 else member.rolling_friction
+        sticks = e == 1 and law >= NO_SLIP
+        own_t = max(block[e, e], block[e + 1, e + 1])
+        most = max(0.0, law) * max(0.0, push)
+        y, z = p[a + e] - u[a + e] / own_t, p[a + e + 1] - u[a + e + 1] / own_t
+        size = math.sqrt(y * y + z * z)
+        if sticks or (active and size <= most):
+            phi[e], phi[e + 1] = u[a + e], u[a + e + 1]
+            B[e, e] = B[e + 1, e + 1] = 1.0
+        elif not active:
+            phi[e], phi[e + 1] = own_t * p[a + e], own_t * p[a + e + 1]
+            A[e, e] = A[e + 1, e + 1] = own_t
+        else:
+            y, z, share = y / size, z / size, most / size
+            phi[e], phi[e + 1] = own_t * (p[a + e] - most * y), own_t * (p[a + e + 1] - most * z)
+            A[e, 0], A[e + 1, 0] = -own_t * law * y, -own_t * law * z
+            B[e, 0], B[e + 1, 0] = own_t * law * y / own, own_t * law * z / own
+            B[e, e], B[e + 1, e + 1] = share * (1 - y * y), share * (1 - z * z)
+            B[e, e + 1] = B[e + 1, e] = -share * y * z
+            for f in range(2):
+                for g in range(2):
+                    A[e + f, e + g] = own_t * ((1.0 if f == g else 0.0) - B[e + f, e + g])
+        worst = max(worst, abs(phi[e]), abs(phi[e + 1]))
+    for g in range(member.kind):
+        softness = block[g, g] * (member.compliance / (1 + member.compliance) + proximal)
+        for e in range(member.kind):
+            A[e, g] += B[e, g] * softness
+    return worst
+
+
+@compiled
+def eliminate_contact(island: Island, k: int) -> None:
+    """Replace B of member k by C^-1 B and phi by C^-1 phi; C, in island.A, has its pivots on the
+    diagonal: entries right of it are between the two rows of a sliding direction alone.
+    """
+    A, B, phi, kind = island.A, island.B[k], island.phi[k], island.members[k].kind
+    for e in range(kind):
+        for i in range(e + 1, kind):
+            f = A[i, e] / A[e, e]
+            if f != 0.0:
+                for g in range(kind):
+                    A[i, g] -= f * A[e, g]
+                    B[i, g] -= f * B[e, g]
+                phi[i] -= f * phi[e]
+    for e in range(kind - 1, -1, -1):
+        for i in range(e + 1, kind):
+            if A[e, i] != 0.0:
+                for g in range(kind):
+                    B[e, g] -= A[e, i] * B[i, g]
+                phi[e] -= A[e, i] * phi[i]
+        for g in range(kind):
+            B[e, g] /= A[e, e]
+        phi[e] /= A[e, e]
+
+
+@compiled
+def add_contact(ws: Workspace, k: int, width: int) -> None:
+    """Add the terms of member k to the banded matrix and its right-hand side."""
+    island = ws.island
+    member, Y, B, phi = island.members[k], island.Y, island.B[k], island.phi[k]
+    support, places, stride = island.support[member.contact], island.dof_place, 3 * width + 1
+    count = ws.contacts.found[member.contact].dof_count
+    for e in range(member.kind):
+        row = member.row + e
+        if phi[e] != 0.0:
+            for x in range(count):
+                island.z_direction[places[support[x]]] -= Y[row, x] * phi[e]
+        for g in range(member.kind):
+            share, other = B[e, g], member.row + g
+            if share == 0.0:
+                continue
+            for x in range(count):
+                i = places[support[x]]
+                at, part = i * stride + width - i, share * Y[row, x]
+                for y in range(count):
+                    island.band[at + places[support[y]]] += part * Y[other, y]
+
+
+@compiled
+def take_step(ws: Workspace, m: int, p: np.ndarray) -> None:
+    """Add dp = -C^-1 (phi + B Y dz) to p (n,); dz: island.z_direction, by places."""
+    island = ws.island
+    for k in range(m):
+        member, B, phi = island.members[k], island.B[k], island.phi[k]
+        support, slide = island.support[member.contact], island.local
+        for g in range(member.kind):
+            slide[g] = 0.0
+            for x in range(ws.contacts.found[member.contact].dof_count):
+                slide[g] += island.Y[member.row + g, x] * (
+                    island.z_direction[island.dof_place[support[x]]])
+        for e in range(member.kind):
+            change = phi[e]
+            for g in range(member.kind):
+                change += B[e, g] * slide[g]
+            p[member.row + e] -= change
+
+
+@compiled
+def sparse_newton(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, tolerance: float,
+                  proximal: float, dofs: int, width: int) -> float:
+    """Take Newton steps from p, which becomes the best found. Returns its residual, m/s; island.z
+    becomes Y^T p. ``dofs``, ``width``: from order_dofs(), whose places are in island.dof_place.
+    """
+    island, keep = ws.island, ws.island.best
+    best, late, stride = math.inf, 0, 3 * width + 1
+    for turn in range(MAX_STEPS + 1):
+        write_velocities(ws, m, b, p)
+        for i in range(dofs * stride):
+            island.band[i] = 0.0
+        for i in range(dofs):
+            island.band[i * stride + width], island.z_direction[i] = 1.0, 0.0
+        worst = 0.0
+        for k in range(m):
+            worst = max(worst, linearize_contact(island, k, p, proximal))
+            eliminate_contact(island, k)
+            add_contact(ws, k, width)
+        late = 0 if worst < best / 2 else late + 1
+        if worst < best:
+            best = worst
+            for i in range(n):
+                keep[i] = p[i]
+        if best <= tolerance or late > PATIENCE or turn == MAX_STEPS or not (
+                solve_banded(island.band, dofs, width, island.z_direction)):
+            break
+        take_step(ws, m, p)
+    for i in range(n):
+        p[i] = keep[i]
+    for k in range(m):
+        project_member(island, k, p)
+    write_velocities(ws, m, b, p)
+    return best
+
+
+@compiled
+def project_member(island: Island, k: int, p: np.ndarray) -> None:
+    """Project the impulses of member k to its friction cone."""
+    member = island.members[k]
+    a = member.row
+    p[a] = max(0.0, p[a])
+    for e in range(1, member.kind, 2):
+        if e > 1 or member.friction < NO_SLIP:
+            law = member.friction if e == 1 else member.rolling_friction
+            p[a + e], p[a + e + 1] = project_to_disc(p[a + e], p[a + e + 1], p[a] * max(0.0, law))
