@@ -1,8 +1,9 @@
 """One law in a heap as for one body: restitution, energy and rest, however many are near.
 
 Each law at 1 to 40 bodies that the broad phase takes for one cluster, at all settings. What is due
-is known without an engine: free balls are followed from impact to impact (loose_bodies.py), dominoes
-by an event-driven integrator in a plane (planar_dominoes.py), the rest are conservation laws.
+is known without an engine: free balls are followed from impact to impact (loose_bodies.py),
+dominoes by an event-driven integrator in a plane (planar_dominoes.py), the rest are conservation
+laws.
 """
 from __future__ import annotations
 
@@ -20,14 +21,16 @@ pytest.importorskip('numba', reason='numba is not installed: there is no rigid e
 
 import loose_bodies
 from conserved import conserved
-from loose_bodies import G, RADIUS, Balls, ball, box, event_driven, line_of_balls
+from loose_bodies import RADIUS, Balls, G, ball, event_driven, line_of_balls
 from planar_dominoes import PlanarDominoes
+from samples import layout_of
 
 from ragdoll_ros import Ground, Placement, Push, Scene, Simulation, load_scene
 from ragdoll_ros.accuracy.cases.fuzzed import fuzzed
 from ragdoll_ros.accuracy.references import event_driven as planar_events
 from ragdoll_ros.model.scene import Material
 from ragdoll_ros.physics.accuracy import ACCURACIES
+from ragdoll_ros.physics.rigid_body import GroundHeights
 
 COUNTS = (1, 2, 3, 5, 6, 8, 12, 40)
 SETTINGS = list(ACCURACIES)
@@ -229,6 +232,23 @@ def total(scene, state):
     return Total(sum(doll.energy for doll in dolls), sum(doll.momentum for doll in dolls))
 
 
+class Account:
+    """Sums over ticks, J: energy that ``risen`` without work, and work done, by its size."""
+
+    def __init__(self, simulation):
+        self._simulation = simulation
+        self.first = total(simulation.scene, simulation.state).energy
+        self.risen = self.worked = self._excess = self._work = 0.0
+
+    def add(self, state, given=0.0):
+        """Account for a tick that ended in ``state``; ``given``: a rise that has its reason."""
+        excess = self._simulation.energy_excess
+        work = total(self._simulation.scene, state).energy - self.first - excess
+        self.risen += max(0.0, excess - self._excess - given)
+        self.worked += abs(work - self._work)
+        self._excess, self._work = excess, work
+
+
 # 4. Dominoes
 
 FIVE_DEGREES = math.radians(5)
@@ -319,20 +339,13 @@ def jam(seed, ticks, accuracy):
     rises of energy without work over the ticks, and what they are measured by, J.
     """
     rng, scene, held = random.Random(seed), load_scene('crowd'), set()
-    risen = worked = 0.0
     with Simulation(scene, accuracy=accuracy) as simulation:
-        first = total(scene, simulation.state).energy
-        excess, work = 0.0, 0.0
+        account = Account(simulation)
         for tick in range(ticks):
             if tick % 5 == 0:
                 handle(rng, simulation, held)
-            simulation.advance()
-            now = simulation.measures()
-            done = now['work_of_pushes_J'] + now['work_of_grabs_J']
-            risen += max(0.0, now['energy_excess_J'] - excess)
-            worked += abs(done - work)
-            excess, work = now['energy_excess_J'], done
-    return risen, first + worked
+            account.add(simulation.advance())
+    return account.risen, account.first + account.worked
 
 
 def handle(rng, simulation, held):
@@ -340,8 +353,9 @@ def handle(rng, simulation, held):
     simulation.push(Push('doll_1/torso', force=(rng.uniform(-2000, 2000), 0, 0)), 'force')
     simulation.push(Push(f'doll_{rng.randint(1, 10)}/head', force=(0, 0, rng.uniform(-500, 500))),
                     'p')
-    bone = f'doll_{rng.randint(1, 10)}/torso'
-    hand = f'c{rng.randint(0, 3)} {bone}'
+    number, doll = rng.randint(0, 3), rng.randint(1, 10)
+    bone = f'doll_{doll}/torso'
+    hand = f'c{number} {bone}'
     act, target = rng.choice(['grab', 'drag', 'drag', 'let go', '']), (0, 0, rng.uniform(0, 2))
     if act == 'grab' and (len(held) < 20 or hand in held):
         simulation.grab(hand, bone, (0, 0, 0), target)
@@ -353,8 +367,9 @@ def handle(rng, simulation, held):
         simulation.drag(hand, target, 0.05)
 
 
-@pytest.mark.parametrize(('accuracy', 'ticks'), [('draft', 300), ('normal', 300), ('exact', 60)])
-@pytest.mark.parametrize('seed', [1, 2, 3])
+@pytest.mark.parametrize(('seed', 'accuracy', 'ticks'), [
+    (1, 'normal', 260), (2, 'normal', 60), (3, 'normal', 60), (1, 'draft', 60), (2, 'draft', 60),
+    (3, 'draft', 60), (1, 'exact', 30)])
 def test_dolls_jammed_by_hands_get_no_energy_from_nothing(seed, accuracy, ticks):
     risen, scale = jam(seed, ticks, accuracy)
     assert risen <= EXCESS * scale
@@ -417,39 +432,50 @@ def test_a_stack_stands_for_a_minute_and_sleeps(pile, accuracy, record_property)
 
 # 8. Fuzz
 
+CLEAN = 1e-4
+"""m or rad: a start with no more in each other, or past limits, has nothing to be taken out."""
+
+MOST_STEPS = 1e5
+"""Steps a second of a scene that does not hang: 100 times those of the setting `normal`."""
+
 
 def assert_lawful(number, accuracy='normal'):
     """Random scene: no energy from nothing, limits and depths kept from clean starts, no hang."""
     from ragdoll_ros.accuracy.crowds.depth import BoneDepth
     trial = fuzzed(number)
-    scene, push = trial.scene, trial.pushes[0]
-    scales, depth, overshoot = BoneDepth(scene), 0.0, 0.0
+    scene, scales, layout = trial.scene, BoneDepth(trial.scene), layout_of(trial.scene)
+    heights = GroundHeights(scene) if scene.ground else None
+    every = max(1, round(0.01 / scene.step))
+
+    def faults(state):
+        """Depth in bones and ground, m, and angle past limits, rad."""
+        sunk = -float(heights(state).min()) if heights else 0.0
+        return (max(sunk, scales.depths(state.positions, state.orientations).max(initial=0.0)),
+                layout.limit_violations(simulation.coordinates.q).max(initial=0.0))
+
     with Simulation(scene, accuracy=accuracy) as simulation:
-        simulation.push(push)
-        state, start = simulation.state, simulation.measures()
-        clean = (scales.depths(state.positions, state.orientations).max(initial=0.0) < 1e-4
-                 and start['limit_overshoot_rad'] < 1e-6 and start['sinking_m'] < 1e-4)
-        excess = lifted = risen = worked = work = 0.0
-        kinetic = simulation.kinetic_energy
-        for _ in range(round(trial.duration / scene.step)):
+        simulation.push(trial.pushes[0])
+        depth, overshoot = faults(simulation.state)
+        clean = depth < CLEAN and overshoot < CLEAN
+        account, kinetic, lifted = Account(simulation), simulation.kinetic_energy, 0.0
+        for tick in range(round(trial.duration / scene.step)):
             state = simulation.advance()
-            now = simulation.measures()
-            # Energy that position correction adds from an overlapping start is in the measures.
-            given = max(0.0, now['energy_lifted_J'] - lifted) * (not clean)
-            risen += max(0.0, now['energy_excess_J'] - excess - given)
-            worked += abs(now['work_of_pushes_J'] - work)
+            given = 0.0
+            if clean and tick % every == 0:
+                depth, overshoot = np.maximum((depth, overshoot), faults(state))
+            elif not clean:
+                # Energy that position correction adds from such a start is in the measures.
+                now = simulation.measures()['energy_lifted_J']
+                given, lifted = max(0.0, now - lifted), now
+            account.add(state, given)
             kinetic = max(kinetic, simulation.kinetic_energy)
-            excess, lifted, work = (now['energy_excess_J'], now['energy_lifted_J'],
-                                    now['work_of_pushes_J'])
-            if clean:
-                overshoot = max(overshoot, now['limit_overshoot_rad'])
-                depth = max(depth, now['sinking_m'], scales.depths(
-                    state.positions, state.orientations).max(initial=0.0))
-            assert now['substeps'] + now['flights'] < 1e6, 'it hangs'
+        measures = simulation.measures()
+    assert measures['substeps'] + measures['flights'] < MOST_STEPS * trial.duration, 'it hangs'
     assert np.isfinite(state.rows).all()
-    assert risen <= EXCESS * (kinetic + worked)
-    assert overshoot <= math.radians(0.2)
-    assert depth <= 1e-3
+    assert account.risen <= EXCESS * (kinetic + account.worked)
+    if clean:
+        assert overshoot <= math.radians(0.2)
+        assert depth <= 1e-3
 
 
 FEW = ()
