@@ -54,9 +54,9 @@ from .workspace import WORKSPACE, Workspace
 LONGEST_FLIGHT = 0.05
 """s: the longest step of flight that is tried."""
 
-MAX_IMPACTS, IMPACT_WORK = 200, 80_000
-"""Times of impact that are sought in a tick, at most and over the square of the number of bodies, so
-that many bodies do not cost their square. From then on what meets within a step is a contact of it,
+MAX_IMPACTS, IMPACT_WORK = 200, 2_000_000
+"""Times of impact that are sought in a tick, at most and over the cube of the number of bodies, so
+that many bodies do not cost their cube. From then on what meets within a step is a contact of it,
 with restitution."""
 
 system_at, workspace_at, cluster_state_at = (bundle_at(SYSTEM), bundle_at(WORKSPACE),
@@ -113,7 +113,7 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
     """Advance one cluster by ``duration`` s; see advance(), whose ``step`` is ``nominal``."""
     q, v, dense, stats = cluster.q, cluster.v, cluster.dense_step[0], ws.stats[0]
     time, impacts, impact_due = 0.0, 0, True
-    max_impacts = min(MAX_IMPACTS, IMPACT_WORK // len(s.tree) ** 2)
+    max_impacts = min(MAX_IMPACTS, IMPACT_WORK // len(s.tree) ** 3)
     flight_possible = s.flight_enabled[0] > 0 and len(cluster.springs) == 0
     separated = enable_separated_pairs(s, ws, ws.step.end, q, v)
     if separated:
@@ -137,7 +137,7 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
                 refresh_gaps(s, ws, cluster)
             h = left / max(1, math.ceil(left / nominal - 1e-9))
             begin_contact_step(s, ws, cluster)
-            gone, touched = 0.0, impact_due and approaches_fast(ws)
+            gone, touched = 0.0, seek and impact_due and approaches_fast(ws)
             if not touched:
                 gone, touched = step_to_impact(s, ws, cluster, h, time, nominal, seek)
             dense.first_rate_known, dense.next_length = 0, 0.0
@@ -145,7 +145,7 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
         stats.ended_without_impact = 0 if touched else 1
         impact_due = True
         if touched:
-            impact_due = impact(s, ws, q, v) > 0 and seek
+            impact_due = impact(s, ws, q, v) > 0
             impacts += 1
     write_bone_states(s, ws.step.end, q, v, cluster.bone_states)
     sum_dolls(s, ws, ws.step.end, q, cluster.doll_sums)

@@ -46,8 +46,7 @@ STEP_STATS = np.dtype([
     ('restitution_reduced', np.int64), ('energy_gains', np.int64), ('contact_count', np.int64),
     ('ended_without_impact', np.int64), ('last_dt', float), ('next_dt', float),
     ('work_pushes', float), ('work_grabs', float), ('work_position_correction', float),
-    ('energy_removed', float), ('energy_unremoved', float), ('debug_a', float), ('debug_b', float), ('debug_c', float),
-    ('gaps_current', np.int64)], align=True)
+    ('energy_removed', float), ('energy_unremoved', float),    ('gaps_current', np.int64)], align=True)
 """Since the start: flight steps, contact steps, impacts, Gauss-Seidel sweeps; islands that stayed
 unsolved, contacts dropped for want of space, searches for a time of impact that failed, impacts
 whose restitution was reduced to gain no energy, steps that gained some all the same. Of the last

@@ -135,7 +135,8 @@ class RigidEngine:
             'work_of_pushes_J': float(stats['work_pushes']),
             'work_of_grabs_J': float(stats['work_grabs']),
             'error_estimate_m': self._estimate_error(), 'error_trusted': True,
-            'removed': stats['energy_removed'], 'unremoved': stats['energy_unremoved'], 'da': stats['debug_a'], 'db': stats['debug_b'], 'dc': stats['debug_c'], 'gains': stats['energy_gains'],
+            'energy_removed_J': float(stats['energy_removed']),
+            'energy_unremoved_J': float(stats['energy_unremoved']),
             'flights': int(stats['flight_steps']), 'substeps': int(stats['steps']),
             'impacts': int(stats['impacts']), 'unsolved_total': int(stats['unsolved'])}
 

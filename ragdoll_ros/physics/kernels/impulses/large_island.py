@@ -17,23 +17,17 @@ from ..contact_kind import LIMIT, ROLLING
 from ..system import COMPLIANCE, MAX_BAND_WORK, NO_SLIP, System
 from ..workspace import Island, Workspace
 from .one_contact import project_to_disc, solve_one_contact
-from .solver import OPENING, PROXIMAL, UNSOLVED, energy_bound_share, scale_to_no_work
+from .solver import (OPENING, PROXIMAL, RESTITUTION_ROUNDS, ROUNDS, SWEEPS, UNSOLVED,
+                     energy_bound_share, scale_to_no_work)
 from .sparse_newton import order_dofs, sparse_newton, write_velocities
 
 MAX_SWEEPS = 100
 """Sweeps in one solve where Newton's method would cost more."""
 
-SWEEPS = 8
-"""Sweeps before Newton's method."""
+TOLERANCE, SWEPT_TOLERANCE = 1e-8, 1e-6
+"""m/s to which a large island is solved, by Newton's method and by sweeps alone."""
 
-TOLERANCE = 1e-8
-"""m/s to which a large island is solved, if that many sweeps suffice."""
-
-ROUNDS = 4
-"""Rounds of Newton's method, each against ten times the proximal share of the one before, from
-PROXIMAL on."""
-
-SWEEP_WORK = 100.0
+SWEEP_WORK = 200.0
 """Work of Newton's method, as MAX_BAND_WORK counts it, that takes as long as it takes to sweep
 MAX_SWEEPS times through a matrix of one entry."""
 
@@ -42,21 +36,26 @@ IMMOVABLE = 1e30
 
 
 @compiled
-def solve_large(s: System, ws: Workspace, m: int, n: int, has_restitution: bool,
+def solve_large(s: System, ws: Workspace, m: int, n: int, h: float, has_restitution: bool,
                 has_penetration: bool) -> None:
-    """Solve an island as solve_small() does, except that curvature is neglected."""
+    """Solve an island over h s as solve_small() does, except that curvature is neglected."""
     island, b, p, u = (ws.island, ws.island.rhs, ws.island.impulses, ws.island.free_velocity)
     dofs, width = order_dofs(s, ws, m)
     if not newton_is_cheaper(ws, m, dofs, width):
         width = 0
     diagonal_blocks(ws, m, COMPLIANCE)
-    left, sweeps = solve_rows(ws, m, n, b, p, dofs, width)
+    rounds = RESTITUTION_ROUNDS if has_restitution and h > 0 else ROUNDS
+    left, sweeps = solve_rows(ws, m, n, b, p, dofs, width, rounds)
     if release_opening_contacts(ws, m, b, p):
-        left, more = solve_rows(ws, m, n, b, p, dofs, width)
+        left, more = solve_rows(ws, m, n, b, p, dofs, width, rounds)
         sweeps += more
     work, spent = work_terms(island, n, u, p)
-    if has_restitution and work + spent / 2 > 0:
-        reduce_restitution(ws, m, n, dofs, width)
+    failed = rounds < ROUNDS and not left <= UNSOLVED
+    if failed or (has_restitution and work + spent / 2 > 0):
+        if failed:
+            for i in range(n):
+                p[i] = 0.0
+        left = reduce_restitution(ws, m, n, dofs, width)
         work, spent = work_terms(island, n, u, p)
     ws.stats[0].sweeps += sweeps
     if not left <= UNSOLVED:
@@ -70,7 +69,7 @@ def solve_large(s: System, ws: Workspace, m: int, n: int, has_restitution: bool,
             b[i] = island.correction[i] = 0.0
         for k in range(m):
             b[island.members[k].row] = -island.members[k].correction
-        solve_rows(ws, m, n, b, island.correction, dofs, width)
+        solve_rows(ws, m, n, b, island.correction, dofs, width, ROUNDS)
 
 
 @compiled
@@ -86,16 +85,16 @@ def newton_is_cheaper(ws: Workspace, m: int, dofs: int, width: int) -> bool:
 
 @compiled
 def solve_rows(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, dofs: int,
-               width: int) -> tuple[float, int]:
+               width: int, rounds: int) -> tuple[float, int]:
     """Solve for p (n,) in place, starting from p: by sweeps, and where these stall by Newton's
-    method, unless ``width`` is 0. Returns the residual, m/s, and the number of sweeps. island.z
-    becomes Y^T p.
+    method, in so many rounds, unless ``width`` is 0. Returns the residual, m/s, and the number of
+    sweeps. island.z becomes Y^T p.
     """
     if not width:
-        return sweep_to_tolerance(ws, m, n, b, p, MAX_SWEEPS)
+        return sweep_to_tolerance(ws, m, n, b, p, MAX_SWEEPS, SWEPT_TOLERANCE)
     left, done, proximal = math.inf, 0, PROXIMAL
-    for _ in range(ROUNDS):
-        left, sweeps = sweep_to_tolerance(ws, m, n, b, p, SWEEPS)
+    for _ in range(rounds):
+        left, sweeps = sweep_to_tolerance(ws, m, n, b, p, SWEEPS, TOLERANCE)
         done += sweeps
         if left <= TOLERANCE:
             break
@@ -107,16 +106,17 @@ def solve_rows(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, dofs
 
 
 @compiled
-def reduce_restitution(ws: Workspace, m: int, n: int, dofs: int, width: int) -> None:
+def reduce_restitution(ws: Workspace, m: int, n: int, dofs: int, width: int) -> float:
     """Move island.impulses towards those without restitution until they add no energy; see
-    small_island.bound_energy(). island.z becomes Y^T p.
+    small_island.bound_energy(); zero impulses become those. Returns the residual of those, m/s;
+    island.z becomes Y^T p.
     """
     island = ws.island
     p, soft, u, z, bounced = (island.impulses, island.soft, island.free_velocity, island.z,
                               island.z_previous)
     for i in range(n):
         soft[i] = p[i]
-    solve_rows(ws, m, n, u, soft, dofs, width)
+    left, _ = solve_rows(ws, m, n, u, soft, dofs, width, ROUNDS)
     work, spent = work_terms(island, n, u, soft)
     if not work + spent / 2 <= 0:
         scale_to_no_work(soft, n, work, spent)
@@ -124,8 +124,9 @@ def reduce_restitution(ws: Workspace, m: int, n: int, dofs: int, width: int) -> 
     for j in range(len(z)):
         bounced[j] = z[j]
     write_velocities(ws, m, u, soft)
-    a = b = c = 0.0
+    a = b = c = size = 0.0
     for i in range(n):
+        size += p[i] * p[i]
         b += (p[i] - soft[i]) * u[i]
         c += soft[i] * u[i]
     for j in range(len(z)):
@@ -133,11 +134,12 @@ def reduce_restitution(ws: Workspace, m: int, n: int, dofs: int, width: int) -> 
         a += step * step / 2
         b += step * z[j]
         c += z[j] * z[j] / 2
-    share = energy_bound_share(a, b, c)
+    share = energy_bound_share(a, b, c) if size > 0 else 0.0
     for i in range(n):
         p[i] = soft[i] + share * (p[i] - soft[i])
     write_velocities(ws, m, u, p)
     ws.stats[0].restitution_reduced += 1
+    return left
 
 
 @compiled
@@ -226,7 +228,7 @@ def sweep_large_island(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray) -> f
 
 @compiled
 def sweep_to_tolerance(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray,
-                       most: int) -> tuple[float, int]:
+                       most: int, tolerance: float) -> tuple[float, int]:
     """Solve for p (n,) in place, starting from p, in at most so many sweeps. Returns the last one's
     largest change of a velocity, m/s or rad/s, and their number. island.z becomes Y^T p.
     """
@@ -250,7 +252,7 @@ def sweep_to_tolerance(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarr
             z_previous[j] = z[j]
         worst = sweep_large_island(ws, m, b, p)
         done += 1
-        if worst <= TOLERANCE or done == most:
+        if worst <= tolerance or done == most:
             break
         square = 0.0
         for k in range(m):

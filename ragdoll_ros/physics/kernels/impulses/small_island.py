@@ -7,11 +7,8 @@ from ..compiling.decorators import compiled
 from ..maths.cholesky import factor_row, substitute
 from ..system import COMPLIANCE, IMPACT_COMPLIANCE
 from ..workspace import Island, Workspace
-from .solver import (UNSOLVED, energy_bound_share, scale_to_no_work, solve_impulses,
-                     solve_position_correction)
-
-SWEEPS = 8
-"""Gauss-Seidel sweeps before the first Newton step."""
+from .solver import (RESTITUTION_ROUNDS, ROUNDS, UNSOLVED, energy_bound_share, scale_to_no_work,
+                     solve_impulses, solve_position_correction)
 
 SINGULAR = 1e-13
 """Share of the largest diagonal entry of W up to which a row counts as immovable."""
@@ -36,14 +33,22 @@ def solve_small(ws: Workspace, m: int, n: int, h: float, tolerance: float, has_r
     if h > 0:
         add_curvature_bias(island, m, n)
     mask_singular_rows(island.W, n, b)
-    left, sweeps = solve_impulses(island, m, n, b, p, tolerance, SWEEPS)
-    if has_restitution and energy_gain(island.W, u, p, n) > 0:
+    rounds = RESTITUTION_ROUNDS if has_restitution and h > 0 else ROUNDS
+    left, sweeps = solve_impulses(island, m, n, b, p, tolerance, rounds)
+    failed = rounds < ROUNDS and not left <= UNSOLVED
+    if failed or (has_restitution and energy_gain(island.W, u, p, n) > 0):
         for j in range(n):
-            soft[j] = p[j]
-        solve_impulses(island, m, n, u, soft, tolerance, SWEEPS)
+            soft[j] = 0.0 if failed else p[j]
+        soft_left, more = solve_impulses(island, m, n, u, soft, tolerance, ROUNDS)
+        sweeps += more
         if energy_gain(island.W, u, soft, n) > 0:
             scale_to_energy_bound(island.W, u, soft, n)
-        bound_energy(island.W, u, soft, p, n)
+        if failed:
+            left = soft_left
+            for j in range(n):
+                p[j] = soft[j]
+        else:
+            bound_energy(island.W, u, soft, p, n)
         ws.stats[0].restitution_reduced += 1
     ws.stats[0].sweeps += sweeps
     if not left <= UNSOLVED:

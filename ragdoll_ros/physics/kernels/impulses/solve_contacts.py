@@ -144,6 +144,7 @@ def assemble_rhs(s: System, ws: Workspace, m: int, n: int, h: float) -> tuple[bo
         elif bounces and not ws.step.scalars[0].seeks_impacts and (
                 c.gap + h / 2 * c.normal_velocity <= 0):
             b[row] += c.restitution * c.normal_velocity
+            has_restitution = True
         elif c.gap > 0:
             b[row] += c.gap / h
         if h > 0 and c.gap < 0:
@@ -174,7 +175,7 @@ def solve_island(s: System, ws: Workspace, m: int, n: int, h: float, tolerance: 
     island, change, correction = ws.island, ws.step.v_change, ws.step.correction
     has_restitution, has_penetration = assemble_rhs(s, ws, m, n, h)
     if n > MAX_DENSE_ROWS:
-        solve_large(s, ws, m, n, has_restitution, has_penetration)
+        solve_large(s, ws, m, n, h, has_restitution, has_penetration)
     else:
         solve_small(ws, m, n, h, tolerance, has_restitution, has_penetration)
     for k in range(m):

@@ -27,6 +27,13 @@ ROUNDS, LOOSER = 6, 3
 """Rounds of sweeps, twice as many each time, and of Newton's method, against ten times the proximal
 share; the first LOOSER rounds that fail are followed by ten times the tolerance."""
 
+RESTITUTION_ROUNDS = 1
+"""Rounds for what meets within a step with restitution. Bodies that are jammed cannot separate on
+all sides, so that there may be no solution, and what meets there has no restitution."""
+
+SWEEPS = 8
+"""Gauss-Seidel sweeps before the first Newton step."""
+
 PROXIMAL = 1e-5
 """Share of W's diagonal that resists the first round's Newton steps: enough for impulses that the
 compliance, 1e-8 of W, decides, and far less than what decides the motion of bodies."""
@@ -54,15 +61,15 @@ def project_to_cones(members: np.ndarray, m: int, p: np.ndarray) -> None:
 
 @compiled
 def solve_cones(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray, tolerance: float,
-                sweeps: int) -> tuple[float, int]:
-    """Solve for p (n,) in place, starting from p. Returns the largest residual left, m/s, and the
-    number of sweeps. ``sweeps``: how many precede Newton's method at first.
+                rounds: int) -> tuple[float, int]:
+    """Solve for p (n,) in place, starting from p, in at most so many rounds. Returns the largest
+    residual left, m/s, and the number of sweeps.
     """
-    done, left, proximal = 0, math.inf, PROXIMAL
+    done, left, proximal, sweeps = 0, math.inf, PROXIMAL, SWEEPS
     convex = is_convex(island.members, m)
     if convex:
         sweeps = 1
-    for turn in range(ROUNDS):
+    for turn in range(rounds):
         for _ in range(sweeps):
             done += 1
             worst = gauss_seidel_sweep(island.members, m, n, island.W, b, p, island.velocity)
@@ -91,14 +98,14 @@ def is_opening(W: np.ndarray, n: int, a: int, b: np.ndarray, p: np.ndarray) -> b
 
 @compiled
 def solve_impulses(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray, tolerance: float,
-                   sweeps: int) -> tuple[float, int]:
+                   rounds: int) -> tuple[float, int]:
     """Solve for p (n,); arguments and return values as solve_cones().
 
     Unlimited friction makes the problem convex, but holds a contact sideways even as it opens. So
     contacts that turn out to open are released, and all is solved once more. Those that then close
     after all are held: between the two there is no solution (Painleve's paradox).
     """
-    left, done = solve_cones(island, m, n, b, p, tolerance, sweeps)
+    left, done = solve_cones(island, m, n, b, p, tolerance, rounds)
     for turn in range(2):
         some = False
         for c in range(m):
@@ -116,7 +123,7 @@ def solve_impulses(island: Island, m: int, n: int, b: np.ndarray, p: np.ndarray,
                 some = True
         if not some:
             break
-        left, more = solve_cones(island, m, n, b, p, tolerance, sweeps)
+        left, more = solve_cones(island, m, n, b, p, tolerance, rounds)
         done += more
     return left, done
 
@@ -141,7 +148,7 @@ def solve_position_correction(island: Island, m: int, n: int) -> None:
         W[c * m + c] *= 1 + member.correction_compliance
         b[c], own[c] = -member.correction, 0.0
         member.kind, member.row, member.friction, member.rolling_friction = LIMIT, c, 0.0, 0.0
-    solve_cones(island, m, m, b, own, 1e-9, 4)
+    solve_cones(island, m, m, b, own, 1e-9, ROUNDS)
     for c in range(m):
         island.correction[normal_row[c]] = max(0.0, own[c])
 

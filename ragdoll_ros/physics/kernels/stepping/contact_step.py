@@ -24,6 +24,7 @@ from ..impulses.solve_contacts import solve_contacts
 from ..system import NO_SLIP, System
 from ..workspace import Workspace
 from .momentum import add_contact_impulses, conserve_momentum, sum_dolls
+from .impact import SLOW, is_approaching
 from .position_correction import (clip_to_joint_limits, correction_energy, write_correction_bounds,
                                   limit_correction_energy)
 from .springs import add_implicit_stiffness, add_spring_force, saturate_springs, theta_weight
@@ -32,12 +33,6 @@ from .work import account_work, load_potential
 
 STEP_TOLERANCE = 1e-8
 """m/s to which contacts are solved."""
-
-SLOW = 0.02
-"""m/s, and SLOW_TURN rad/s: contacts that close more slowly begin with the next step, without
-restitution; their time of impact is not sought."""
-
-SLOW_TURN = 0.1
 
 MAX_PENETRATION = 5e-4
 """m by which a step may penetrate the ground or a body."""
@@ -69,8 +64,7 @@ def approaches_fast(ws: Workspace) -> bool:
     as the last step ended, or points of a patch that it made penetrate.
     """
     for i in range(ws.step.scalars[0].start_contact_count):
-        c = ws.contacts.start[i]
-        if c.start_velocity[0] < -(SLOW_TURN if c.kind == LIMIT else SLOW):
+        if is_approaching(ws.contacts.start[i]):
             return True
     return False
 

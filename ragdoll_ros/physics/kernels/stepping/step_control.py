@@ -36,7 +36,10 @@ KINETIC_GAIN = 1e-4
 
 UNSEEN, UNSEEN_EACH, UNSEEN_TURN = 5e-3, 5e-5, 0.05
 """m, at most and for each doll of the cluster, and rad: where times of impact are not sought, steps
-are halved, down to the share COARSEST, to keep what meets from penetrating deeper."""
+are shortened, down to the share COARSEST, to keep what meets from penetrating deeper."""
+
+SAFETY = 0.9
+"""Factor on the length of a step that is shortened in proportion."""
 
 COARSEST = 0.03
 
@@ -76,9 +79,15 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
         tolerated = share + solver_energy(s, ws, m, length)
         if turn < MAX_TRIES - 1 and length > FINEST * nominal and (
                 not gained - step.scalars[0].correction_energy <= tolerated
-                or penetrates_further(s, ws)
-                or (not seek and length > COARSEST * nominal and penetrates_unseen(s, ws))):
+                or penetrates_further(s, ws)):
             length, hit = length / 2, False
+            stats.next_dt = length
+            begin_trials(ws)
+            clear_contact_accelerations(cluster)
+            continue
+        shorter = 1.0 if seek or turn == MAX_TRIES - 1 else unseen_share(s, ws)
+        if shorter < 1 and length > COARSEST * nominal:
+            length = max(shorter * length, COARSEST * nominal)
             stats.next_dt = length
             begin_trials(ws)
             clear_contact_accelerations(cluster)
@@ -94,11 +103,10 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
         if not gained <= tolerated:
             stats.energy_gains += 1
         if gained > share or 0 < gained < REMOVABLE * internal_kinetic_energy(s, ws):
-            stats.energy_removed += gained
-            stats.energy_unremoved += max(0.0, gained - internal_kinetic_energy(s, ws))
+            removed = min(gained, internal_kinetic_energy(s, ws))
+            stats.energy_removed += removed
+            stats.energy_unremoved += gained - removed
             remove_energy(s, ws, gained, step.q_end, step.v_end)
-        elif gained > 0:
-            stats.debug_b += gained
         break
     accept_step(ws, cluster, m, length, length > 0.1 * h)
     return length, hit
@@ -134,14 +142,17 @@ def clear_contact_accelerations(cluster: ClusterState) -> None:
 
 
 @compiled
-def penetrates_unseen(s: System, ws: Workspace) -> bool:
-    """Whether a gap that was open in the step just taken ends below minus UNSEEN or UNSEEN_TURN."""
-    max_depth = min(UNSEEN, UNSEEN_EACH * len(ws.step.external))
+def unseen_share(s: System, ws: Workspace) -> float:
+    """Share of the step just taken after which no gap that was open as it began is below minus
+    UNSEEN or UNSEEN_TURN, if all close evenly; 1 if none is at its end.
+    """
+    max_depth, share = min(UNSEEN, UNSEEN_EACH * len(ws.step.external)), 1.0
     for j in range(len(ws.gaps)):
         most = UNSEEN_TURN if is_joint_limit_gap(s, ws.gaps, j) else max_depth
-        if ws.contacts.gaps_active[j] > TOUCHING and ws.contacts.gaps_end[j] < -most:
-            return True
-    return False
+        start, end = ws.contacts.gaps_active[j], ws.contacts.gaps_end[j]
+        if start > TOUCHING and end < -most:
+            share = min(share, SAFETY * (start + most) / (start - end))
+    return share
 
 
 @compiled

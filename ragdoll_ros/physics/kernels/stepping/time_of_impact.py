@@ -17,7 +17,7 @@ from ..compiling.decorators import compiled
 from ..contact.gaps import EXCLUDED, TOUCHING, first_joint_limit_gap, is_joint_limit_gap
 from ..system import System
 from ..workspace import Workspace
-from .contact_step import SLOW, SLOW_TURN
+from .impact import SLOW, SLOW_TURN
 
 OVERSHOT = -1e-7
 """m or rad: a gap that is less at a step's end has closed on the way."""

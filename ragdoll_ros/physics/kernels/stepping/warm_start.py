@@ -11,6 +11,7 @@ from ..impulses.solve_contacts import SEPARATING
 from ..maths.vectors import norm, vec
 from ..system import System
 from ..workspace import Workspace
+from .impact import is_approaching
 
 JAMMED = 10.0
 """Factor on all momenta and weights above which impulses are those of a jam."""
@@ -51,7 +52,8 @@ def warm_start(s: System, ws: Workspace, m: int, known: np.ndarray, h: float) ->
             for e in range(5):
                 c.impulse[e] = share * known[j].impulse[e]
         k = find_id(ws.contacts.start, start_count, c.id, k)
-        c.persistent = 1 if k < start_count else 0
+        c.persistent = 1 if k < start_count and not (
+            is_approaching(ws.contacts.start[k]) and not ws.step.scalars[0].seeks_impacts) else 0
         if c.persistent:
             take_start(c, ws.contacts.start[k])
 
