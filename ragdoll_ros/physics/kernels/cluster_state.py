@@ -46,13 +46,15 @@ STEP_STATS = np.dtype([
     ('restitution_reduced', np.int64), ('energy_gains', np.int64), ('contact_count', np.int64),
     ('ended_without_impact', np.int64), ('last_dt', float), ('next_dt', float),
     ('work_pushes', float), ('work_grabs', float), ('work_position_correction', float),
-    ('energy_removed', float), ('energy_unremoved', float),    ('gaps_current', np.int64)], align=True)
+    ('energy_removed', float), ('energy_unremoved', float), ('gaps_current', np.int64)],
+    align=True)
 """Since the start: flight steps, contact steps, impacts, Gauss-Seidel sweeps; islands that stayed
 unsolved, contacts dropped for want of space, searches for a time of impact that failed, impacts
 whose restitution was reduced to gain no energy, steps that gained some all the same. Of the last
 step: its contacts, whether it ended without an impact, its length and the longest that the next may
 have, s (0: any). Work of pushes, of grabs, and of position correction beyond its share of the
-kinetic energy, J. ``gaps_current``: whether the gaps are those at q."""
+kinetic energy, J. Energy, J, that steps made from nothing: removed from the motion, and not, for
+want of motion. ``gaps_current``: whether the gaps are those at q."""
 
 ClusterState = collections.namedtuple(
     'ClusterState', 'q v dense_output end_rates dense_step stats excluded contacts gaps '

@@ -10,8 +10,8 @@ from .cluster_state import CONTACT, DOLL_SUMS, ClusterState, make_cluster_state
 from .compiling.bundle import bundle_type
 from .dynamics.forward_dynamics import make_dynamics
 from .dynamics.kinematics import make_kinematics
-from .system import (CONTACT_POINT, MAX_BAND_WORK, MAX_DENSE_ROWS, MAX_MANIFOLD_POINTS, System, blank_system,
-                     coordinate_count, tree_depth)
+from .system import (CONTACT_POINT, MAX_BAND_WORK, MAX_DENSE_ROWS, MAX_MANIFOLD_POINTS, System,
+                     blank_system, coordinate_count, tree_depth)
 
 MOTION = np.dtype([('speed', float), ('angular_speed', float), ('correction', float),
                    ('correction_angle', float)], align=True)

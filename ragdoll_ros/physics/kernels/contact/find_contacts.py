@@ -43,7 +43,8 @@ def find_contacts(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, gaps
         n += 2
     for k in range(len(s.pairs)):
         if gaps[n + k] <= TOUCHING:
-            m = add_pair_contacts(s, ws.contacts, kin, k, m, max(margin, ws.gaps[n + k] - gaps[n + k]),
+            near = max(margin, ws.gaps[n + k] - gaps[n + k])
+            m = add_pair_contacts(s, ws.contacts, kin, k, m, near,
                                   n + len(s.pairs) + IDS_PER_PAIR * k)
     set_friction_points(s, ws.contacts, kin, m)
     return m

@@ -27,9 +27,10 @@ ROUNDS, LOOSER = 6, 3
 """Rounds of sweeps, twice as many each time, and of Newton's method, against ten times the proximal
 share; the first LOOSER rounds that fail are followed by ten times the tolerance."""
 
-RESTITUTION_ROUNDS = 1
-"""Rounds for what meets within a step with restitution. Bodies that are jammed cannot separate on
-all sides, so that there may be no solution, and what meets there has no restitution."""
+RESTITUTION_ROUNDS, JAMMED = 1, 1e-2
+"""Rounds for what meets within a step with restitution, and the residual, m/s, that they leave
+where there is no solution: jammed bodies cannot separate on all sides. Restitution is left out
+there."""
 
 SWEEPS = 8
 """Gauss-Seidel sweeps before the first Newton step."""

@@ -25,8 +25,8 @@ from .one_contact import project_to_disc
 
 @compiled
 def order_dofs(s: System, ws: Workspace, m: int) -> tuple[int, int]:
-    """Write to island.dof_place the places of the degrees of freedom of an island's dolls in the order
-    of Cuthill and McKee. Returns how many there are, and the width of the band.
+    """Write to island.dof_place the places of the degrees of freedom of an island's dolls in the
+    order of Cuthill and McKee. Returns how many there are, and the width of the band.
     """
     island, contacts = ws.island, ws.contacts.found
     first = s.body_doll[contacts[island.members[0].contact].body_a]

@@ -34,9 +34,9 @@ SOLVER_GAIN = 1e-10
 KINETIC_GAIN = 1e-4
 """Share of the kinetic energy that a step may add."""
 
-UNSEEN, UNSEEN_EACH, UNSEEN_TURN = 5e-3, 5e-5, 0.05
-"""m, at most and for each doll of the cluster, and rad: where times of impact are not sought, steps
-are shortened, down to the share COARSEST, to keep what meets from penetrating deeper."""
+UNSEEN_SPEED, UNSEEN_TURN = 0.5, 0.05
+"""m/s, and rad: where times of impact are not sought, steps are shortened, down to the share COARSEST,
+so that what meets in one does not penetrate by more than at this speed in a nominal step."""
 
 SAFETY = 0.9
 """Factor on the length of a step that is shortened in proportion."""
@@ -85,7 +85,7 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
             begin_trials(ws)
             clear_contact_accelerations(cluster)
             continue
-        shorter = 1.0 if seek or turn == MAX_TRIES - 1 else unseen_share(s, ws)
+        shorter = 1.0 if seek or turn == MAX_TRIES - 1 else unseen_share(s, ws, UNSEEN_SPEED * nominal)
         if shorter < 1 and length > COARSEST * nominal:
             length = max(shorter * length, COARSEST * nominal)
             stats.next_dt = length
@@ -142,11 +142,11 @@ def clear_contact_accelerations(cluster: ClusterState) -> None:
 
 
 @compiled
-def unseen_share(s: System, ws: Workspace) -> float:
+def unseen_share(s: System, ws: Workspace, max_depth: float) -> float:
     """Share of the step just taken after which no gap that was open as it began is below minus
-    UNSEEN or UNSEEN_TURN, if all close evenly; 1 if none is at its end.
+    ``max_depth``, m, or UNSEEN_TURN, if all close evenly; 1 if none is at its end.
     """
-    max_depth, share = min(UNSEEN, UNSEEN_EACH * len(ws.step.external)), 1.0
+    share = 1.0
     for j in range(len(ws.gaps)):
         most = UNSEEN_TURN if is_joint_limit_gap(s, ws.gaps, j) else max_depth
         start, end = ws.contacts.gaps_active[j], ws.contacts.gaps_end[j]
