@@ -16,9 +16,9 @@ def solve_banded(band: np.ndarray, n: int, width: int, x: np.ndarray) -> bool:
     """
     stride = 3 * width + 1
     for k in range(n):
-        last = min(n - 1, k + width)
+        bottom = min(n - 1, k + width)
         best, most = k, 0.0
-        for i in range(k, last + 1):
+        for i in range(k, bottom + 1):
             size = abs(band[i * stride + k - i + width])
             if size > most:
                 best, most = i, size
@@ -33,7 +33,7 @@ def solve_banded(band: np.ndarray, n: int, width: int, x: np.ndarray) -> bool:
                 band[at + j], band[other + j] = band[other + j], band[at + j]
             x[k], x[best] = x[best], x[k]
         inverse = 1 / pivot[0]
-        for i in range(k + 1, last + 1):
+        for i in range(k + 1, bottom + 1):
             at = i * stride + k - i + width
             row = band[at:at + columns]
             f = row[0] * inverse

@@ -38,7 +38,8 @@ def is_approaching(c: np.record) -> bool:
 @compiled
 def keep_met(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, v: np.ndarray,
              m: int) -> int:
-    """Drop those of m contacts found that have not met, unless they approach. Returns how many stay.
+    """Drop those of m contacts found that have not met, unless they approach. Returns how many are
+    kept.
     """
     contacts, count = ws.contacts.found, 0
     for i in range(m):

@@ -35,8 +35,8 @@ KINETIC_GAIN = 1e-4
 """Share of the kinetic energy that a step may add."""
 
 UNSEEN_SPEED, UNSEEN_TURN = 0.5, 0.05
-"""m/s, and rad: where times of impact are not sought, steps are shortened, down to the share COARSEST,
-so that what meets in one does not penetrate by more than at this speed in a nominal step."""
+"""m/s, and rad: where times of impact are not sought, steps are shortened, down to the share
+COARSEST, so that what meets in one penetrates by no more than at this speed in a nominal step."""
 
 SAFETY = 0.9
 """Factor on the length of a step that is shortened in proportion."""
@@ -85,8 +85,10 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
             begin_trials(ws)
             clear_contact_accelerations(cluster)
             continue
-        shorter = 1.0 if seek or turn == MAX_TRIES - 1 else unseen_share(s, ws, UNSEEN_SPEED * nominal)
-        if shorter < 1 and length > COARSEST * nominal:
+        shorter = 1.0
+        if not seek and turn < MAX_TRIES - 1 and length > COARSEST * nominal:
+            shorter = unseen_share(s, ws, UNSEEN_SPEED * nominal)
+        if shorter < 1:
             length = max(shorter * length, COARSEST * nominal)
             stats.next_dt = length
             begin_trials(ws)
