@@ -53,6 +53,10 @@ from .workspace import WORKSPACE, Workspace
 LONGEST_FLIGHT = 0.05
 """s: the longest step of flight that is tried."""
 
+MAX_FLIGHT_STEPS = 150
+"""Steps of flight that are tried in one tick, or in its part between two changes of the pushes. From
+then on it is advanced by contact steps, whose number is bounded; that is counted."""
+
 MAX_IMPACTS = 200
 """Impacts of one doll in one tick, over the cube of the number of dolls in the cluster: from then
 on no time of impact is sought, so that many dolls do not cost their square."""
@@ -110,7 +114,7 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
                     nominal: float, tolerance: float) -> None:
     """Advance one cluster by ``duration`` s; see advance(), whose ``step`` is ``nominal``."""
     q, v, dense, stats = cluster.q, cluster.v, cluster.dense_step[0], ws.stats[0]
-    time, impacts = 0.0, 0
+    time, impacts, flights = 0.0, 0, stats.flight_steps
     max_impacts = MAX_IMPACTS // len(ws.step.external) ** 3
     flight_possible = s.flight_enabled[0] > 0 and len(cluster.springs) == 0
     separated = enable_separated_pairs(s, ws, ws.step.end, q, v)
@@ -124,7 +128,11 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
         if not dense.valid and not stats.gaps_current:
             refresh_gaps(s, ws, cluster)
         if not dense.valid and flight_possible and seek:
-            try_flight(s, ws, cluster, left, nominal, tolerance)
+            if stats.flight_steps - flights < MAX_FLIGHT_STEPS:
+                try_flight(s, ws, cluster, left, nominal, tolerance)
+            else:
+                flight_possible = False
+                stats.flights_cut += 1
         if dense.valid:
             gone, touched = follow_dense_step(s, ws, cluster, left)
             stats.gaps_current = 0

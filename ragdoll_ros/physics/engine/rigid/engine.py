@@ -136,6 +136,7 @@ class RigidEngine:
             'work_of_grabs_J': float(stats['work_grabs']),
             'error_estimate_m': self._estimate_error(), 'error_trusted': True,
             'flights': int(stats['flight_steps']), 'substeps': int(stats['steps']),
+            'flights_cut_total': int(stats['flights_cut']),
             'impacts': int(stats['impacts']), 'unsolved_total': int(stats['unsolved'])}
 
     def save(self) -> object:

@@ -12,13 +12,19 @@ from ..dynamics.kinematics import body_velocity, forward_kinematics, normalize
 from ..maths.vectors import divide, dot, norm, put, sub, vec
 from ..system import System
 from ..workspace import Workspace
-from .dop853 import CONTINUED, STAGES, step_error, weighted_sum
+from .dop853 import CONTINUED, SLOWEST, STAGES, step_error, weighted_sum
 
 SAFETY, MIN_GROWTH, MAX_GROWTH = 0.8, 0.2, 2.0
 """Share of the longest step that the tolerance allows, and bounds of a step over the last."""
 
-IMPROVED = 0.5
-"""Share of a step's error that a shorter one must come below; else what is left is rounding."""
+ROUNDING_MARGIN = 4.0
+"""Times the error by rounding of one sample that a step may err."""
+
+PERTURBATION = 2.0 ** -50
+"""Of coordinates, m or rad, and share of velocities: a few of their last digits."""
+
+ROUNDED_GROWTH = 1.2
+"""Growth of a step whose error is by rounding: to where the error of the method is as large."""
 
 FIRST_ANGLE = 0.2
 """rad that the fastest body turns in the first step that is tried."""
@@ -93,27 +99,56 @@ def evaluate_dense_step(tree: np.ndarray, cluster: ClusterState, time: float, q:
 def begin_dense_step(s: System, ws: Workspace, cluster: ClusterState, tolerance: float,
                      longest: float) -> bool:
     """Make a dense step from cluster.q and v, as long as its error allows, at most ``longest`` s.
-    Returns whether one was found whose error is at most ``tolerance``, m or rad.
+    Returns whether one was found whose error is at most ``tolerance``, m or rad, or what rounding
+    of the dynamics leaves: no shorter step has less of that over the same time.
     """
     step = cluster.dense_step[0]
     if step.next_length <= 0:
         step.next_length = first_length(s, ws, cluster)
-    h, before = min(longest, step.next_length), math.inf
-    for _ in range(MAX_TRIES):
+    h = min(longest, step.next_length)
+    for turn in range(MAX_TRIES):
         error = dop853_step(s, ws, cluster, h)
         ws.stats[0].flight_steps += 1
-        ratio = error / tolerance
+        if tolerance < error < math.inf and (turn == 1 or step.rounding > 0.0):
+            step.rounding = ROUNDING_MARGIN * rounding_error(s, ws, cluster)
+            if step.rounding * h <= tolerance:
+                step.rounding = 0.0
+        ratio = error / max(tolerance, step.rounding * h)
         growth = SAFETY / math.sqrt(math.sqrt(math.sqrt(ratio))) if ratio > 0 else MAX_GROWTH
-        good = ratio <= 1 or (IMPROVED * before < error < math.inf)
+        if ratio <= 1 and error > tolerance:
+            growth = ROUNDED_GROWTH if ratio < 0.5 else 1.0
         step.length, step.error = h, error
         step.next_length = h * min(MAX_GROWTH, max(MIN_GROWTH, growth))
-        if good:
+        if ratio <= 1:
             step.valid, step.elapsed, step.event_time = 1, 0.0, math.inf
             return True
-        before, h = error, min(h * MIN_GROWTH if error == math.inf else step.next_length, longest)
+        h = min(h * MIN_GROWTH if error == math.inf else step.next_length, longest)
         step.first_rate_known = 1 if math.isfinite(cluster.end_rates[0, 0]) else 0
     step.valid = 0
     return False
+
+
+@compiled
+def rounding_error(s: System, ws: Workspace, cluster: ClusterState) -> float:
+    """Error by rounding that a step adds in each second, m or rad: how much the state derivative
+    at its end changes where the last digits of the state do. After dop853_step(); overwrites a
+    stage. At a start from rest much that is rounded elsewhere is exactly zero.
+
+    A light root with a heavy tip loses as many digits as their masses are apart: articulated
+    inertias are differences of large numbers.
+    """
+    flight, dense, rates = ws.flight, cluster.dense_output, cluster.end_rates[1]
+    nq, y, k, sign, most = len(cluster.q), flight.derivative, flight.stages[15], 1.0, 0.0
+    for j in range(len(y)):
+        y[j] = dense[0, j] + dense[1, j]
+        y[j] += sign * PERTURBATION * (1.0 if j < nq else max(1.0, abs(y[j])))
+        sign = -sign
+    normalize(s.tree, y[:nq])
+    state_derivative(s.tree, s.gravity, cluster.loads, y[:nq], y[nq:], flight.kinematics,
+                     ws.step.dynamics, k)
+    for j in range(len(y)):
+        most = max(most, abs(k[j] - rates[j]) * (1.0 if j < nq else SLOWEST))
+    return most
 
 
 @compiled
