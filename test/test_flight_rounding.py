@@ -31,9 +31,15 @@ DURATION = 0.4
 ENERGY = 1e-5
 """Error of the energy relative to that at hand, which the report allows."""
 
-MOST_STEPS = 200
-"""Steps of a tick, of flight and of contact together: 150 and 30 tries of flight, 4 steps in
-contact and their halves."""
+MOST_CONTACT_STEPS = 500
+"""Trials of contact steps of a tick of 10 ms: of 2.5 ms, none shorter than a hundredth of that."""
+
+
+def most_steps(bodies):
+    """Bound on the steps of a tick: two budgets of flight, of which the last step may be tried 30
+    times, and contact steps.
+    """
+    return 2 * max(100, 4500 // bodies) + 2 * 30 + MOST_CONTACT_STEPS
 
 
 def chain(count, masses, spacing=0.1):
@@ -82,7 +88,8 @@ class Flight:
         scene = in_space(doll)
         root = doll.root.name
         place = scene.bone_index(root)
-        self.work, self.most_steps, self.kinetic, self.error = 0.0, 0, 0.0, 0.0
+        self.work = self.kinetic = self.error = self.gain = 0.0
+        self.most_steps = 0
         with Simulation(scene, accuracy=accuracy) as simulation:
             simulation.push(Push(root, force=tuple(force), duration=PUSHED))
             state, before = simulation.state, 0
@@ -94,6 +101,7 @@ class Flight:
                 now = conserved(scene, state)
                 self.kinetic = max(self.kinetic, now.kinetic)
                 self.error = max(self.error, abs(now.energy - self.work))
+                self.gain = max(self.gain, now.energy - self.work)
                 stats = simulation._engine._clusters.totals()
                 steps = int(stats['flight_steps'] + stats['steps'])
                 self.most_steps, before = max(self.most_steps, steps - before), steps
@@ -109,10 +117,11 @@ def test_a_light_root_with_a_heavy_tip_flies_in_few_steps(count, ratio, light, a
     masses = light * np.array([1.0] * (count - 1) + [ratio])
     force = np.array((5.0, 20.0, 3.0))
     flight = Flight(chain(count, masses), force, accuracy, 0.5)
-    assert flight.most_steps <= MOST_STEPS
+    assert flight.most_steps <= 60
     assert flight.cut == 0
     assert flight.error <= ENERGY * flight.kinetic
-    assert flight.momentum == pytest.approx(PUSHED * force, rel=1e-6)
+    # The tip moves by as much as rounding makes of the root's velocity, of some 5 m/s.
+    assert flight.momentum == pytest.approx(PUSHED * force, abs=1e-8 * masses.sum() * 5)
 
 
 def test_a_light_root_with_a_heavy_tip_goes_where_the_equations_of_motion_say():
@@ -131,15 +140,17 @@ def test_a_light_root_with_a_heavy_tip_goes_where_the_equations_of_motion_say():
 
 
 def assert_bounded(number):
-    """Fly a random tree: bounded ticks, and energy, but of gains alone where they were cut."""
+    """Fly a random tree in bounded ticks, with its energy; returns how many were cut short. Those
+    may lose some of it, of whips at thousands of rad/s, but gain none.
+    """
     rng = np.random.default_rng([33, 4, number])
     doll = random_tree(rng)
     away = rotation.normalized(rng.normal(size=3))
     flight = Flight(doll, away * doll.root.mass * 10 ** rng.uniform(0.5, 2.5))
-    assert flight.most_steps <= MOST_STEPS
+    assert flight.most_steps <= most_steps(len(doll.bones))
     assert math.isfinite(flight.error)
-    if not flight.cut:
-        assert flight.error <= ENERGY * flight.kinetic
+    assert flight.gain <= ENERGY * flight.kinetic
+    assert flight.cut or flight.error <= ENERGY * flight.kinetic
     return flight.cut
 
 

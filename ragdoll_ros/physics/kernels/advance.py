@@ -53,9 +53,13 @@ from .workspace import WORKSPACE, Workspace
 LONGEST_FLIGHT = 0.05
 """s: the longest step of flight that is tried."""
 
-MAX_FLIGHT_STEPS = 150
-"""Steps of flight that are tried in one tick, or in its part between two changes of the pushes. From
-then on it is advanced by contact steps, whose number is bounded; that is counted."""
+FLIGHT_WORK, MIN_FLIGHT_STEPS = 4500, 100
+"""Steps of flight that may be tried in one tick, or in its part between two changes of the pushes,
+times the number of bodies, and their least number. Then, which is counted, as many more may with
+the tolerance times CUT_TOLERANCE, and after those contact steps, of which there are never many."""
+
+CUT_TOLERANCE = 1e6
+"""Steps of order 8 are 5.6 times as long; what needs so many turns at 1000 rad/s and more."""
 
 MAX_IMPACTS = 200
 """Impacts of one doll in one tick, over the cube of the number of dolls in the cluster: from then
@@ -114,8 +118,10 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
                     nominal: float, tolerance: float) -> None:
     """Advance one cluster by ``duration`` s; see advance(), whose ``step`` is ``nominal``."""
     q, v, dense, stats = cluster.q, cluster.v, cluster.dense_step[0], ws.stats[0]
-    time, impacts, flights = 0.0, 0, stats.flight_steps
+    time, impacts = 0.0, 0
     max_impacts = MAX_IMPACTS // len(ws.step.external) ** 3
+    flight_steps, flights_cut = max(MIN_FLIGHT_STEPS, FLIGHT_WORK // len(s.tree)), False
+    max_flight_steps = stats.flight_steps + flight_steps
     flight_possible = s.flight_enabled[0] > 0 and len(cluster.springs) == 0
     separated = enable_separated_pairs(s, ws, ws.step.end, q, v)
     if separated:
@@ -128,11 +134,13 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
         if not dense.valid and not stats.gaps_current:
             refresh_gaps(s, ws, cluster)
         if not dense.valid and flight_possible and seek:
-            if stats.flight_steps - flights < MAX_FLIGHT_STEPS:
+            if stats.flight_steps >= max_flight_steps:
+                stats.flights_cut += 0 if flights_cut else 1
+                flight_possible, flights_cut = not flights_cut, True
+                max_flight_steps += flight_steps
+                tolerance *= CUT_TOLERANCE
+            if flight_possible:
                 try_flight(s, ws, cluster, left, nominal, tolerance)
-            else:
-                flight_possible = False
-                stats.flights_cut += 1
         if dense.valid:
             gone, touched = follow_dense_step(s, ws, cluster, left)
             stats.gaps_current = 0

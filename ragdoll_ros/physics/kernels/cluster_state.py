@@ -39,8 +39,8 @@ DENSE_STEP = np.dtype([
     align=True)
 """A step of flight with dense output: whether there is one; whether the state derivative at its
 start is known; time advanced along it, s; its length, s; the length of the next one, by its error;
-the time of its first contact, or infinity; its estimated error, m or rad; the error by rounding that
-each second of it may add, m or rad, or 0 where it is less than the tolerance."""
+the time of its first contact, or infinity; its estimated error, m or rad; the error by rounding, m
+or rad, that was found of late for each second of a step, 0: none."""
 
 STEP_STATS = np.dtype([
     ('flight_steps', np.int64), ('steps', np.int64), ('impacts', np.int64), ('sweeps', np.int64),
@@ -55,7 +55,7 @@ whose restitution was reduced to gain no energy, steps that gained some all the 
 step: its contacts, whether it ended without an impact, its length and the longest that the next may
 have, s (0: any). Work of pushes, of grabs, and of position correction beyond its share of the
 kinetic energy, J. ``gaps_current``: whether the gaps are those at q. ``flights_cut``: since the
-start, intervals in which the number of flight steps reached its bound."""
+start, ticks, or parts of them, in which flight steps reached their bound."""
 
 ClusterState = collections.namedtuple(
     'ClusterState', 'q v dense_output end_rates dense_step stats excluded contacts gaps '

@@ -17,11 +17,15 @@ from .dop853 import CONTINUED, SLOWEST, STAGES, step_error, weighted_sum
 SAFETY, MIN_GROWTH, MAX_GROWTH = 0.8, 0.2, 2.0
 """Share of the longest step that the tolerance allows, and bounds of a step over the last."""
 
-ROUNDING_MARGIN = 4.0
-"""Times the error by rounding of one sample that a step may err."""
+ROUNDING_ORDER = 3
+"""Of a step's length: where the error falls more slowly with it, it is by rounding. The method's
+falls with order 8, that of rounding with 1."""
 
-PERTURBATION = 2.0 ** -50
-"""Of coordinates, m or rad, and share of velocities: a few of their last digits."""
+MAX_ROUNDING = 1e-6
+"""Error by rounding as a share of what the state changes: more is that of a step far too long."""
+
+ROUNDING_MARGIN, ROUNDING_DECAY = 3.0, 0.9
+"""Times the error by rounding found that a step may err; its share that the next step assumes."""
 
 ROUNDED_GROWTH = 1.2
 """Growth of a step whose error is by rounding: to where the error of the method is as large."""
@@ -100,19 +104,21 @@ def begin_dense_step(s: System, ws: Workspace, cluster: ClusterState, tolerance:
                      longest: float) -> bool:
     """Make a dense step from cluster.q and v, as long as its error allows, at most ``longest`` s.
     Returns whether one was found whose error is at most ``tolerance``, m or rad, or what rounding
-    of the dynamics leaves: no shorter step has less of that over the same time.
+    leaves: a light root with a heavy tip loses as many digits as their masses are apart, and
+    shorter steps have no less of that error over the same time.
     """
     step = cluster.dense_step[0]
     if step.next_length <= 0:
         step.next_length = first_length(s, ws, cluster)
-    h = min(longest, step.next_length)
-    for turn in range(MAX_TRIES):
+    h, before = min(longest, step.next_length), math.inf
+    tried = h
+    step.rounding *= ROUNDING_DECAY
+    for _ in range(MAX_TRIES):
         error = dop853_step(s, ws, cluster, h)
         ws.stats[0].flight_steps += 1
-        if tolerance < error < math.inf and (turn == 1 or step.rounding > 0.0):
-            step.rounding = ROUNDING_MARGIN * rounding_error(s, ws, cluster)
-            if step.rounding * h <= tolerance:
-                step.rounding = 0.0
+        if tolerance < error < math.inf and error > before * (h / tried) ** ROUNDING_ORDER and (
+                error < MAX_ROUNDING * h * largest_rate(cluster)):
+            step.rounding = max(step.rounding, ROUNDING_MARGIN * error / h)
         ratio = error / max(tolerance, step.rounding * h)
         growth = SAFETY / math.sqrt(math.sqrt(math.sqrt(ratio))) if ratio > 0 else MAX_GROWTH
         if ratio <= 1 and error > tolerance:
@@ -122,6 +128,7 @@ def begin_dense_step(s: System, ws: Workspace, cluster: ClusterState, tolerance:
         if ratio <= 1:
             step.valid, step.elapsed, step.event_time = 1, 0.0, math.inf
             return True
+        before, tried = error, h
         h = min(h * MIN_GROWTH if error == math.inf else step.next_length, longest)
         step.first_rate_known = 1 if math.isfinite(cluster.end_rates[0, 0]) else 0
     step.valid = 0
@@ -129,25 +136,13 @@ def begin_dense_step(s: System, ws: Workspace, cluster: ClusterState, tolerance:
 
 
 @compiled
-def rounding_error(s: System, ws: Workspace, cluster: ClusterState) -> float:
-    """Error by rounding that a step adds in each second, m or rad: how much the state derivative
-    at its end changes where the last digits of the state do. After dop853_step(); overwrites a
-    stage. At a start from rest much that is rounded elsewhere is exactly zero.
-
-    A light root with a heavy tip loses as many digits as their masses are apart: articulated
-    inertias are differences of large numbers.
-    """
-    flight, dense, rates = ws.flight, cluster.dense_output, cluster.end_rates[1]
-    nq, y, k, sign, most = len(cluster.q), flight.derivative, flight.stages[15], 1.0, 0.0
-    for j in range(len(y)):
-        y[j] = dense[0, j] + dense[1, j]
-        y[j] += sign * PERTURBATION * (1.0 if j < nq else max(1.0, abs(y[j])))
-        sign = -sign
-    normalize(s.tree, y[:nq])
-    state_derivative(s.tree, s.gravity, cluster.loads, y[:nq], y[nq:], flight.kinematics,
-                     ws.step.dynamics, k)
-    for j in range(len(y)):
-        most = max(most, abs(k[j] - rates[j]) * (1.0 if j < nq else SLOWEST))
+def largest_rate(cluster: ClusterState) -> float:
+    """Largest rate of change at the ends of a step, m/s or rad/s, as step_error() weighs errors."""
+    most = 0.0
+    for end in range(2):
+        for j in range(cluster.end_rates.shape[1]):
+            weight = 1.0 if j < len(cluster.q) else SLOWEST
+            most = max(most, abs(cluster.end_rates[end, j]) * weight)
     return most
 
 
