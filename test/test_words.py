@@ -15,8 +15,8 @@ CORE = [path for path in FILES if path.relative_to(PACKAGE).parts[:2] in (
     ('physics', 'kernels'), ('physics', 'engine'))]
 
 MATRICES = {
-    'r', 'm', 'A', 'B', 'out', 'matrix', 'inertia', 'own', 'axes', 'block', 'self._model.geom_solref',
-    'self._model.jnt_solref',  # entries of small matrices and vectors
+    'r', 'm', 'A', 'B', 'out', 'matrix', 'inertia', 'own', 'axes', 'block',
+    'self._model.geom_solref', 'self._model.jnt_solref',  # entries of small matrices and vectors
     'k', 'dense', 'rates', 'end_rates', 'cluster.end_rates',  # stages of a Runge-Kutta method
     'OCTAGON', 'centers', 'found', 'geom_pairs', 'bones', 'pairs', 'table',  # pairs, triples
     "contacts['impulse']", "found['impulse']",  # along the rows of a contact, the normal first

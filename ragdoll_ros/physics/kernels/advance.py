@@ -54,6 +54,14 @@ from .workspace import WORKSPACE, Workspace
 LONGEST_FLIGHT = 0.05
 """s: the longest step of flight that is tried."""
 
+FLIGHT_WORK, MIN_FLIGHT_STEPS = 4500, 100
+"""Steps of flight that may be tried in one tick, or in its part between two changes of the pushes,
+times the number of bodies, and their least number. Then, which is counted, as many more may with
+the tolerance times CUT_TOLERANCE, and after those contact steps, of which there are never many."""
+
+CUT_TOLERANCE = 1e6
+"""Steps of order 8 are 5.6 times as long; what needs so many turns at 1000 rad/s and more."""
+
 MAX_IMPACTS, IMPACT_WORK = 200, 2_000_000
 """Times of impact that are sought in a tick, at most and over the cube of the number of bodies, so
 that many bodies do not cost their cube. From then on what meets within a step is a contact of it,
@@ -114,6 +122,8 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
     q, v, dense, stats = cluster.q, cluster.v, cluster.dense_step[0], ws.stats[0]
     time, impacts, impact_due = 0.0, 0, True
     max_impacts = min(MAX_IMPACTS, IMPACT_WORK // len(s.tree) ** 3)
+    flight_steps, flights_cut = max(MIN_FLIGHT_STEPS, FLIGHT_WORK // len(s.tree)), False
+    max_flight_steps = stats.flight_steps + flight_steps
     flight_possible = s.flight_enabled[0] > 0 and len(cluster.springs) == 0
     separated = enable_separated_pairs(s, ws, ws.step.end, q, v)
     if separated:
@@ -126,7 +136,13 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
         if not dense.valid and not stats.gaps_current:
             refresh_gaps(s, ws, cluster)
         if not dense.valid and flight_possible and seek:
-            try_flight(s, ws, cluster, left, nominal, tolerance)
+            if stats.flight_steps >= max_flight_steps:
+                stats.flights_cut += 0 if flights_cut else 1
+                flight_possible, flights_cut = not flights_cut, True
+                max_flight_steps += flight_steps
+                tolerance *= CUT_TOLERANCE
+            if flight_possible:
+                try_flight(s, ws, cluster, left, nominal, tolerance)
         if dense.valid:
             gone, touched = follow_dense_step(s, ws, cluster, left)
             stats.gaps_current = 0

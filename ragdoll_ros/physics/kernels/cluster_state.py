@@ -35,10 +35,12 @@ joints locked."""
 
 DENSE_STEP = np.dtype([
     ('valid', np.int64), ('first_rate_known', np.int64), ('elapsed', float), ('length', float),
-    ('next_length', float), ('event_time', float), ('error', float)], align=True)
+    ('next_length', float), ('event_time', float), ('error', float), ('rounding', float)],
+    align=True)
 """A step of flight with dense output: whether there is one; whether the state derivative at its
 start is known; time advanced along it, s; its length, s; the length of the next one, by its error;
-the time of its first contact, or infinity; its estimated error, m or rad."""
+the time of its first contact, or infinity; its estimated error, m or rad; the error by rounding, m
+or rad, that was found of late for each second of a step, 0: none."""
 
 STEP_STATS = np.dtype([
     ('flight_steps', np.int64), ('steps', np.int64), ('impacts', np.int64), ('sweeps', np.int64),
@@ -46,15 +48,16 @@ STEP_STATS = np.dtype([
     ('restitution_reduced', np.int64), ('energy_gains', np.int64), ('contact_count', np.int64),
     ('ended_without_impact', np.int64), ('last_dt', float), ('next_dt', float),
     ('work_pushes', float), ('work_grabs', float), ('work_position_correction', float),
-    ('energy_removed', float), ('energy_unremoved', float), ('gaps_current', np.int64)],
-    align=True)
+    ('energy_removed', float), ('energy_unremoved', float), ('gaps_current', np.int64),
+    ('flights_cut', np.int64)], align=True)
 """Since the start: flight steps, contact steps, impacts, Gauss-Seidel sweeps; islands that stayed
 unsolved, contacts dropped for want of space, searches for a time of impact that failed, impacts
 whose restitution was reduced to gain no energy, steps that gained some all the same. Of the last
 step: its contacts, whether it ended without an impact, its length and the longest that the next may
 have, s (0: any). Work of pushes, of grabs, and of position correction beyond its share of the
 kinetic energy, J. Energy, J, that steps made from nothing: removed from the motion, and not, for
-want of motion. ``gaps_current``: whether the gaps are those at q."""
+want of motion. ``gaps_current``: whether the gaps are those at q. ``flights_cut``: ticks, or parts
+of them, in which flight steps reached their bound."""
 
 ClusterState = collections.namedtuple(
     'ClusterState', 'q v dense_output end_rates dense_step stats excluded contacts gaps '

@@ -22,7 +22,8 @@ from .doll_states import SNAPSHOT, DollStates, contact_capacity
 
 SUMMED_STATS = ('flight_steps', 'steps', 'impacts', 'sweeps', 'unsolved', 'contacts_dropped',
                 'toi_failures', 'restitution_reduced', 'energy_gains', 'work_pushes', 'work_grabs',
-                'work_position_correction', 'energy_removed', 'energy_unremoved')
+                'work_position_correction', 'energy_removed', 'energy_unremoved',
+                'flights_cut')
 """Statistics that are summed over clusters."""
 
 CHECKPOINT = ('q', 'v', 'excluded', 'stats')

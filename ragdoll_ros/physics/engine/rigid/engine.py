@@ -138,6 +138,7 @@ class RigidEngine:
             'energy_removed_J': float(stats['energy_removed']),
             'energy_unremoved_J': float(stats['energy_unremoved']),
             'flights': int(stats['flight_steps']), 'substeps': int(stats['steps']),
+            'flights_cut_total': int(stats['flights_cut']),
             'impacts': int(stats['impacts']), 'unsolved_total': int(stats['unsolved'])}
 
     def save(self) -> object:

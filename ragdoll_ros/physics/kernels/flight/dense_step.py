@@ -12,13 +12,23 @@ from ..dynamics.kinematics import body_velocity, forward_kinematics, normalize
 from ..maths.vectors import divide, dot, norm, put, sub, vec
 from ..system import System
 from ..workspace import Workspace
-from .dop853 import CONTINUED, STAGES, step_error, weighted_sum
+from .dop853 import CONTINUED, SLOWEST, STAGES, step_error, weighted_sum
 
 SAFETY, MIN_GROWTH, MAX_GROWTH = 0.8, 0.2, 2.0
 """Share of the longest step that the tolerance allows, and bounds of a step over the last."""
 
-IMPROVED = 0.5
-"""Share of a step's error that a shorter one must come below; else what is left is rounding."""
+ROUNDING_ORDER = 3
+"""Of a step's length: where the error falls more slowly with it, it is by rounding. The method's
+falls with order 8, that of rounding with 1."""
+
+MAX_ROUNDING = 1e-6
+"""Error by rounding as a share of what the state changes: more is that of a step far too long."""
+
+ROUNDING_MARGIN, ROUNDING_DECAY = 3.0, 0.9
+"""Times the error by rounding found that a step may err; its share that the next step assumes."""
+
+ROUNDED_GROWTH = 1.2
+"""Growth of a step whose error is by rounding: to where the error of the method is as large."""
 
 FIRST_ANGLE = 0.2
 """rad that the fastest body turns in the first step that is tried."""
@@ -93,27 +103,47 @@ def evaluate_dense_step(tree: np.ndarray, cluster: ClusterState, time: float, q:
 def begin_dense_step(s: System, ws: Workspace, cluster: ClusterState, tolerance: float,
                      longest: float) -> bool:
     """Make a dense step from cluster.q and v, as long as its error allows, at most ``longest`` s.
-    Returns whether one was found whose error is at most ``tolerance``, m or rad.
+    Returns whether one was found whose error is at most ``tolerance``, m or rad, or what rounding
+    leaves: a light root with a heavy tip loses as many digits as their masses are apart, and
+    shorter steps have no less of that error over the same time.
     """
     step = cluster.dense_step[0]
     if step.next_length <= 0:
         step.next_length = first_length(s, ws, cluster)
     h, before = min(longest, step.next_length), math.inf
+    tried = h
+    step.rounding *= ROUNDING_DECAY
     for _ in range(MAX_TRIES):
         error = dop853_step(s, ws, cluster, h)
         ws.stats[0].flight_steps += 1
-        ratio = error / tolerance
+        if tolerance < error < math.inf and error > before * (h / tried) ** ROUNDING_ORDER and (
+                error < MAX_ROUNDING * h * largest_rate(cluster)):
+            step.rounding = max(step.rounding, ROUNDING_MARGIN * error / h)
+        ratio = error / max(tolerance, step.rounding * h)
         growth = SAFETY / math.sqrt(math.sqrt(math.sqrt(ratio))) if ratio > 0 else MAX_GROWTH
-        good = ratio <= 1 or (IMPROVED * before < error < math.inf)
+        if ratio <= 1 and error > tolerance:
+            growth = ROUNDED_GROWTH if ratio < 0.5 else 1.0
         step.length, step.error = h, error
         step.next_length = h * min(MAX_GROWTH, max(MIN_GROWTH, growth))
-        if good:
+        if ratio <= 1:
             step.valid, step.elapsed, step.event_time = 1, 0.0, math.inf
             return True
-        before, h = error, min(h * MIN_GROWTH if error == math.inf else step.next_length, longest)
+        before, tried = error, h
+        h = min(h * MIN_GROWTH if error == math.inf else step.next_length, longest)
         step.first_rate_known = 1 if math.isfinite(cluster.end_rates[0, 0]) else 0
     step.valid = 0
     return False
+
+
+@compiled
+def largest_rate(cluster: ClusterState) -> float:
+    """Largest rate of change at the ends of a step, m/s or rad/s, as step_error() weighs errors."""
+    most = 0.0
+    for end in range(2):
+        for j in range(cluster.end_rates.shape[1]):
+            weight = 1.0 if j < len(cluster.q) else SLOWEST
+            most = max(most, abs(cluster.end_rates[end, j]) * weight)
+    return most
 
 
 @compiled
