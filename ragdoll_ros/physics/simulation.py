@@ -23,6 +23,7 @@ from .engine.protocol import Contacts, Engine, Springs
 from .engine.registry import resolve_engine
 from .rigid_body import GroundHeights, JointGap
 from .sleeping import SleepDetector
+from .stability import StabilityTest
 from .swing.pose import SwingState
 from .swing.swings import SwingSimulation
 
@@ -89,7 +90,7 @@ class Simulation:
         self._engine: Engine = self._make(resolve_accuracy(accuracy))
         self._placed: GeneralizedState | None = None
         self._start = self._engine.save()
-        self._sleep_detector = SleepDetector(scene)
+        self._sleep_detector, self._stability_test = SleepDetector(scene), StabilityTest(scene)
         self._swings = SwingSimulation(scene) if any(
             placement.doll.swings for placement in scene.dolls) else None
         self.reset()
@@ -407,14 +408,23 @@ class Simulation:
         self.time = end
 
     def _put_to_sleep(self) -> None:
-        """Put clusters to sleep that have been still for long enough and rest on the ground."""
+        """Put clusters to sleep that have been still for long enough and rest on the ground, in a
+        stable equilibrium; disturb those in an unstable one.
+        """
         if self.asleep or not self.accuracy.sleep:
             return
         loaded = (*self._pushes.bones(self.time), *(spring.bone for spring in self._springs))
-        dolls = self._sleep_detector.find_ready(self._engine, self.tick, loaded)
-        if np.count_nonzero(dolls):  # a tenth of what any() costs
-            self._engine.put_to_sleep(dolls)
-            self.asleep = bool(self._engine.sleeping.all())
+        detector, engine = self._sleep_detector, self._engine
+        dolls = detector.find_ready(engine, self.tick, loaded)
+        if not np.count_nonzero(dolls):  # a tenth of what any() costs
+            return
+        verdict = self._stability_test.judge(engine, dolls, detector.max_kinetic)
+        detector.postpone(dolls & ~verdict.stable)
+        if verdict.departing.any():
+            engine.set_velocities(verdict.departing, verdict.velocities)
+        if verdict.stable.any():
+            engine.put_to_sleep(verdict.stable)
+            self.asleep = bool(engine.sleeping.all())
 
     @cached_property
     def _gap(self) -> JointGap:

@@ -52,15 +52,25 @@ class SleepDetector:
         # A still bone has at most m v^2 / 2 of linear and less than 3 times that of rotational
         # energy, as its radius of gyration is at most its largest half extent.
         masses = np.array([placement.doll.mass for placement in scene.dolls])
-        self._max_kinetic = 2 * masses * (2 * self._speed) ** 2
+        self.max_kinetic = 2 * masses * (2 * self._speed) ** 2
+        """(d,) J: bound on the kinetic energy of dolls that are still."""
         self._still = np.zeros(len(scene.dolls), np.int64)
         """ns for which each doll has been still."""
+        self._wait = np.full(len(scene.dolls), self._time)
+        """ns for which each doll must be still."""
         self._since = np.zeros((len(scene.bones), 7))
         """(n, 7): poses of the bones when their doll became still."""
 
     def restart(self, dolls: np.ndarray | slice = slice(None)) -> None:
         """Reset the timers of these dolls (d,), or of all."""
         self._still[dolls] = 0
+
+    def postpone(self, dolls: np.ndarray) -> None:
+        """Reset the timers of dolls (d,) that are still but do not rest, and ask for twice the time
+        from now on, until they move: tests of their stability then take a bounded share of it.
+        """
+        self.restart(dolls)
+        self._wait[dolls] *= 2
 
     def find_ready(self, engine: Engine, tick: int, loaded: Iterable[int]) -> np.ndarray:
         """Which dolls (d,) to put to sleep, after one more tick (ns): whole clusters that are
@@ -80,7 +90,7 @@ class SleepDetector:
 
     def _update(self, state: State, kinetic: np.ndarray, tick: int) -> np.ndarray:
         """Which dolls (d,) have been still for long enough; ``kinetic`` (d,) J."""
-        slow = kinetic <= self._max_kinetic
+        slow = kinetic <= self.max_kinetic
         if not self._has_gravity or not np.count_nonzero(slow):
             self.restart()
             return np.zeros(len(slow), bool)
@@ -89,7 +99,8 @@ class SleepDetector:
         begun = (slow & (self._still == 0))[self._doll]
         self._since[begun] = state.rows[begun, :7]
         self._still = np.where(slow, self._still + tick, 0)
-        ready = self._still >= self._time
+        self._wait[~slow] = self._time
+        ready = self._still >= self._wait
         if not ready.any():
             return ready
         moved = np.maximum(
