@@ -418,12 +418,17 @@ class Simulation:
         dolls = detector.find_ready(engine, self.tick, loaded)
         if not np.count_nonzero(dolls):  # a tenth of what any() costs
             return
-        verdict = self._stability_test.judge(engine, dolls, detector.max_kinetic)
-        detector.postpone(dolls & ~verdict.stable)
-        if verdict.departing.any():
-            engine.set_velocities(verdict.departing, verdict.velocities)
-        if verdict.stable.any():
-            engine.put_to_sleep(verdict.stable)
+        clusters = engine.cluster_of_doll
+        untested = dolls & (np.bincount(clusters, ~detector.watched) > 0)[clusters]
+        if untested.any():
+            verdict = self._stability_test.judge(engine, untested, detector.max_kinetic)
+            unstable = untested & ~verdict.stable
+            detector.watch(unstable, self._stability_test.duration)
+            if verdict.departing.any():
+                engine.set_velocities(verdict.departing, verdict.velocities)
+            dolls &= ~unstable
+        if dolls.any():
+            engine.put_to_sleep(dolls)
             self.asleep = bool(engine.sleeping.all())
 
     @cached_property

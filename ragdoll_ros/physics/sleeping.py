@@ -58,19 +58,21 @@ class SleepDetector:
         """ns for which each doll has been still."""
         self._wait = np.full(len(scene.dolls), self._time)
         """ns for which each doll must be still."""
+        self.watched = np.zeros(len(scene.dolls), bool)
+        """(d,): which watch() has chosen, and have been still since."""
         self._since = np.zeros((len(scene.bones), 7))
         """(n, 7): poses of the bones when their doll became still."""
 
     def restart(self, dolls: np.ndarray | slice = slice(None)) -> None:
         """Reset the timers of these dolls (d,), or of all."""
-        self._still[dolls] = 0
+        self._still[dolls], self._wait[dolls], self.watched[dolls] = 0, self._time, False
 
-    def postpone(self, dolls: np.ndarray) -> None:
-        """Reset the timers of dolls (d,) that are still but do not rest, and ask for twice the time
-        from now on, until they move: tests of their stability then take a bounded share of it.
+    def watch(self, dolls: np.ndarray, duration: float) -> None:
+        """Restart the timers of dolls (d,) that seem not to rest: if they are still for
+        ``duration`` s, they do.
         """
-        self.restart(dolls)
-        self._wait[dolls] *= 2
+        self._still[dolls], self.watched[dolls] = 0, True
+        self._wait[dolls] = max(self._time, duration * SECOND)
 
     def find_ready(self, engine: Engine, tick: int, loaded: Iterable[int]) -> np.ndarray:
         """Which dolls (d,) to put to sleep, after one more tick (ns): whole clusters that are
@@ -99,7 +101,7 @@ class SleepDetector:
         begun = (slow & (self._still == 0))[self._doll]
         self._since[begun] = state.rows[begun, :7]
         self._still = np.where(slow, self._still + tick, 0)
-        self._wait[~slow] = self._time
+        self._wait[~slow], self.watched[~slow] = self._time, False
         ready = self._still >= self._wait
         if not ready.any():
             return ready
@@ -107,5 +109,5 @@ class SleepDetector:
             np.abs(state.positions - self._since[:, :3]).max(axis=1),
             rotation.angle_between(state.orientations, self._since[:, 3:]) * self._sizes)
         crept = np.maximum.reduceat(moved, self._first) >= self._displacement
-        self.restart(crept)
+        self._still[crept] = 0
         return ready & ~crept

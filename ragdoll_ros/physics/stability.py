@@ -58,8 +58,10 @@ class StabilityTest:
     """Tests clusters of a scene's dolls by copies in simulation, at rest and disturbed."""
 
     def __init__(self, scene: Scene) -> None:
-        self._extent = max(placement.doll.extent for placement in scene.dolls)
-        self._gravity = math.hypot(*scene.gravity)
+        extent = max(placement.doll.extent for placement in scene.dolls)
+        gravity = math.hypot(*scene.gravity)
+        self.duration = DURATION * math.sqrt(2 * extent / (3 * gravity)) if gravity else math.inf
+        """s of simulated time in which what is not stable departs."""
         self._masses = np.array([placement.doll.mass for placement in scene.dolls])
         layout = DofLayout([placement.doll for placement in scene.dolls])
         self._disturbance = np.zeros(layout.sizes[1])
@@ -92,16 +94,19 @@ class StabilityTest:
     def _simulate(self, engine: Engine, dolls: np.ndarray, velocities: np.ndarray,
                   base: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """|v| (SAMPLES + 1, c) of the clusters of copies that start with ``velocities``, and which
-        (c,) exceed GROWTH (``base`` + |d|), |d| that of the start. Ends as soon as all do.
+        (c,) exceed GROWTH (``base`` + |d|), |d| that of the start, and still grow. Ends as soon as
+        all do. The first interval does not count: gaps of some um close there, in a small impact.
         """
-        interval = DURATION / SAMPLES * math.sqrt(2 * self._extent / (3 * self._gravity))
+        interval = self.duration / SAMPLES
         clusters = engine.cluster_of_doll
         tested = np.bincount(clusters, dolls) > 0
         speeds, exceeded = np.zeros_like(base), np.zeros_like(tested)
         with contextlib.closing(engine.simulate_copy(dolls, velocities, interval)) as energies:
             for k, kinetic in zip(range(SAMPLES + 1), energies, strict=False):
                 speeds[k] = np.sqrt(2 * np.bincount(clusters, kinetic * dolls))
-                exceeded |= speeds[k] > GROWTH * (base[k] + speeds[0])
+                if k > 1:
+                    exceeded |= (speeds[k] > GROWTH * (base[k] + speeds[0])) & (
+                        speeds[k] > speeds[k - 1])
                 if exceeded[tested].all():
                     break
         return speeds, exceeded
