@@ -35,6 +35,10 @@ velocities of a rod grow by 1.4 in each, as they should, with an error of 1 %.""
 GROWTH = 2.0
 """Factor by which |v| must exceed |v at rest| + |d|: 1 by theory, for a linear system."""
 
+QUIET, QUIET_AFTER = 1e-3, 6
+"""A copy that is slower than this share of DISTURBANCE and does not grow, after so many intervals,
+has come to rest: what contacts left of an unstable motion had grown eightfold until then."""
+
 ACCELERATION = math.sqrt(2.0)
 """Factor by which speeds of what creeps grow as time doubles: 2 under a constant force, 1 for what
 sags against damping, which is stopped."""
@@ -95,19 +99,21 @@ class StabilityTest:
                   base: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """|v| (SAMPLES + 1, c) of the clusters of copies that start with ``velocities``, and which
         (c,) exceed GROWTH (``base`` + |d|), |d| that of the start, and still grow. Ends as soon as
-        all do. The first interval does not count: gaps of some um close there, in a small impact.
+        each does or is at rest. The first interval does not count: gaps of some um close in it.
         """
         interval = self.duration / SAMPLES
         clusters = engine.cluster_of_doll
         tested = np.bincount(clusters, dolls) > 0
-        speeds, exceeded = np.zeros_like(base), np.zeros_like(tested)
+        slow = QUIET * DISTURBANCE * np.sqrt(np.bincount(clusters, self._masses))
+        speeds, exceeded, ended = np.zeros_like(base), np.zeros_like(tested), ~tested
         with contextlib.closing(engine.simulate_copy(dolls, velocities, interval)) as energies:
             for k, kinetic in zip(range(SAMPLES + 1), energies, strict=False):
-                speeds[k] = np.sqrt(2 * np.bincount(clusters, kinetic * dolls))
+                now = speeds[k:] = np.sqrt(2 * np.bincount(clusters, kinetic * dolls))
                 if k > 1:
-                    exceeded |= (speeds[k] > GROWTH * (base[k] + speeds[0])) & (
-                        speeds[k] > speeds[k - 1])
-                if exceeded[tested].all():
+                    exceeded |= (now > GROWTH * (base[k] + speeds[0])) & (now > speeds[k - 1])
+                if k > QUIET_AFTER:
+                    ended |= (now < slow) & (now < 1.05 * speeds[k - 2])
+                if (exceeded | ended).all():
                     break
         return speeds, exceeded
 
