@@ -208,8 +208,9 @@ class Engine(Protocol):
     def simulate_copy(self, dolls: np.ndarray, velocities: np.ndarray,
                       interval: float) -> Generator[np.ndarray, None, None]:
         """Kinetic energies (d,) J of a copy of ``dolls`` (d,), whole clusters, without loads and by
-        themselves: as it starts with ``velocities`` (nv,), and after each interval, s, in coarse
-        steps. The dolls stay as they are, to the bit, once the generator is closed.
+        themselves: as it starts with ``velocities`` (nv,), and after each ``interval``, s, in
+        coarse steps. The first interval is shorter, in finer ones. The dolls stay as they are, to
+        the bit, once the generator is closed.
         """
 
     def dolls_on_ground(self) -> np.ndarray:
