@@ -422,10 +422,10 @@ class Simulation:
         untested = dolls & (np.bincount(clusters, ~detector.watched) > 0)[clusters]
         if untested.any():
             verdict = self._stability_test.judge(engine, untested, detector.max_kinetic)
-            unstable = untested & ~verdict.stable
-            detector.watch(unstable, self._stability_test.duration)
             if verdict.departing.any():
                 engine.set_velocities(verdict.departing, verdict.velocities)
+            unstable = untested & ~verdict.stable
+            detector.watch(unstable, self._stability_test.duration, engine.doll_totals.kinetic)
             dolls &= ~unstable
         if dolls.any():
             engine.put_to_sleep(dolls)
