@@ -141,8 +141,9 @@ def stack():
                                 for k in range(5)), Ground(), Material(0.6, 0.0, 0.0))
 
 
-def tent(name, doll, x, z, lean=math.radians(20)):
+def tent(name, doll, x, z, degrees=20):
     """Two cards of 0.4 x 0.3 x 0.02 m on z that lean on each other above x."""
+    lean = math.radians(degrees)
     up, out = ((a * math.sin(lean) + b * math.cos(lean)) for a, b in ((0.01, 0.2), (0.2, 0.01)))
     return [Placement(doll, f'{name}_{side}', (x - side * (out + 1e-5), 0, z + up),
                       (0, side * math.sin(lean / 2), 0, math.cos(lean / 2))) for side in (1, -1)]

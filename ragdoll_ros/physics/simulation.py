@@ -408,28 +408,34 @@ class Simulation:
         self.time = end
 
     def _put_to_sleep(self) -> None:
-        """Put clusters to sleep that have been still for long enough and rest on the ground, in a
-        stable equilibrium; disturb those in an unstable one.
-        """
+        """Put clusters to sleep that have been still for long enough and rest on the ground."""
         if self.asleep or not self.accuracy.sleep:
             return
         loaded = (*self._pushes.bones(self.time), *(spring.bone for spring in self._springs))
-        detector, engine = self._sleep_detector, self._engine
-        dolls = detector.find_ready(engine, self.tick, loaded)
+        dolls = self._sleep_detector.find_ready(self._engine, self.tick, loaded)
         if not np.count_nonzero(dolls):  # a tenth of what any() costs
             return
+        if self._engine.simulates_copies:
+            dolls &= ~self._disturb_unstable(dolls)
+        if dolls.any():
+            self._engine.put_to_sleep(dolls)
+            self.asleep = bool(self._engine.sleeping.all())
+
+    def _disturb_unstable(self, dolls: np.ndarray) -> np.ndarray:
+        """Which of ``dolls`` (d,) that are about to sleep do not rest in a stable equilibrium; if
+        it is an unstable one, disturb them. Those watched since an earlier test do rest.
+        """
+        engine, detector = self._engine, self._sleep_detector
         clusters = engine.cluster_of_doll
         untested = dolls & (np.bincount(clusters, ~detector.watched) > 0)[clusters]
-        if untested.any():
-            verdict = self._stability_test.judge(engine, untested, detector.max_kinetic)
-            if verdict.departing.any():
-                engine.set_velocities(verdict.departing, verdict.velocities)
-            unstable = untested & ~verdict.stable
-            detector.watch(unstable, self._stability_test.duration, engine.doll_totals.kinetic)
-            dolls &= ~unstable
-        if dolls.any():
-            engine.put_to_sleep(dolls)
-            self.asleep = bool(engine.sleeping.all())
+        if not untested.any():
+            return untested
+        verdict = self._stability_test.judge(engine, untested, detector.max_kinetic)
+        if verdict.departing.any():
+            engine.set_velocities(verdict.departing, verdict.velocities)
+        unstable = untested & ~verdict.stable
+        detector.watch(unstable, self._stability_test.duration, engine.doll_totals.kinetic)
+        return unstable
 
     @cached_property
     def _gap(self) -> JointGap:

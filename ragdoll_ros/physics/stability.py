@@ -48,7 +48,7 @@ SOLVED = 1e-5
 
 
 @dataclass(frozen=True)
-class Verdict:
+class RestVerdict:
     """Which dolls (d,) of those tested are to sleep, and which depart from an equilibrium."""
 
     stable: np.ndarray
@@ -74,46 +74,49 @@ class StabilityTest:
             self._disturbance[own] = disturbance(scene.dolls[doll], own.stop - own.start)
             self._doll_of_v[own] = doll
 
-    def judge(self, engine: Engine, dolls: np.ndarray, still: np.ndarray) -> Verdict:
-        """Test ``dolls`` (d,), whole clusters, which stay as they are. A cluster is in motion if
-        the kinetic energy of its copy at rest exceeds ``still`` (d,) J. There must be gravity.
+    def judge(self, engine: Engine, dolls: np.ndarray, still: np.ndarray) -> RestVerdict:
+        """Test ``dolls`` (d,), whole clusters, which stay as they are. A copy whose cluster exceeds
+        its kinetic energy ``still`` (d,) J is in motion, and ends. There must be gravity.
         """
         clusters = engine.cluster_of_doll
-        velocities = np.zeros_like(self._disturbance)
-        limit = np.sqrt(2 * np.bincount(clusters, still)) / GROWTH
-        at_rest, moving = self._simulate(engine, dolls, velocities, np.tile(limit, (SAMPLES + 1, 1)))
-        departing = np.zeros(len(dolls), bool)
+        velocities, departing = np.zeros_like(self._disturbance), np.zeros_like(dolls)
+        limit = np.sqrt(2 * np.bincount(clusters, still))
+        never = np.full((SAMPLES + 1, len(limit)), math.inf)
+        at_rest, _ = self._simulate(engine, dolls, velocities, never, limit)
         for sign in (1.0, -1.0):
-            left = dolls & ~departing & ~moving[clusters]
+            left = dolls & ~departing
             if not left.any():
                 break
             disturbed = sign * self._disturbance
-            _, grown = self._simulate(engine, left, disturbed, at_rest)
+            _, grown = self._simulate(engine, left, disturbed, at_rest, limit)
             found = left & grown[clusters]
             velocities[found[self._doll_of_v]] = disturbed[found[self._doll_of_v]]
             departing |= found
-        moving |= self._accelerates(at_rest, np.bincount(clusters, self._masses))
-        return Verdict(dolls & ~departing & ~moving[clusters], departing, velocities)
+        moving = (at_rest > limit).any(axis=0) | self._accelerates(
+            at_rest, np.bincount(clusters, self._masses))
+        return RestVerdict(dolls & ~departing & ~moving[clusters], departing, velocities)
 
     def _simulate(self, engine: Engine, dolls: np.ndarray, velocities: np.ndarray,
-                  base: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+                  at_rest: np.ndarray, limit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """|v| (SAMPLES + 1, c) of the clusters of copies that start with ``velocities``, and which
-        (c,) exceed GROWTH (``base`` + |d|), |d| that of the start, and still grow. Ends as soon as
-        each does or is at rest. In the first two intervals gaps of some um close, which counts not.
+        (c,) exceed GROWTH (``at_rest`` + |d|), |d| that of the start, and still grow. Ends as soon
+        as each does, exceeds ``limit`` (c,), or is at rest. The first interval, in which gaps of
+        some um close, does not count.
         """
         interval = self.duration / SAMPLES
         clusters = engine.cluster_of_doll
-        tested = np.bincount(clusters, dolls) > 0
         slow = QUIET * DISTURBANCE * np.sqrt(np.bincount(clusters, self._masses))
-        speeds, exceeded, ended = np.zeros_like(base), np.zeros_like(tested), ~tested
+        ended = np.bincount(clusters, dolls) == 0
+        speeds, exceeded = np.zeros_like(at_rest), np.zeros_like(ended)
         with contextlib.closing(engine.simulate_copy(dolls, velocities, interval)) as energies:
             for k, kinetic in zip(range(SAMPLES + 1), energies, strict=False):
                 now = speeds[k:] = np.sqrt(2 * np.bincount(clusters, kinetic * dolls))
                 if k > 1:
-                    exceeded |= (now > GROWTH * (base[k] + speeds[0])) & (now > speeds[k - 1])
+                    exceeded |= (now > GROWTH * (at_rest[k] + speeds[0])) & (now > speeds[k - 1])
                 if k > QUIET_AFTER:
                     ended |= (now < slow) & (now < 1.05 * speeds[k - 2])
-                if (exceeded | ended).all():
+                ended |= exceeded | (now > limit)
+                if ended.all():
                     break
         return speeds, exceeded
 

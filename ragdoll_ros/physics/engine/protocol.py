@@ -155,6 +155,8 @@ class Engine(Protocol):
     """Relative energy gain in a tick above which the state counts as diverged; see Guard."""
     supports_joint_springs: bool
     """Whether advance() takes AppliedJointSpring."""
+    simulates_copies: bool
+    """Whether there are set_velocities() and simulate_copy(), for StabilityTest."""
     sleeping: np.ndarray
     """(d,) bool: dolls that are not integrated until a load or another doll wakes them."""
 

@@ -148,7 +148,7 @@ class Clusters:
                 self._scatter_state(cluster)
 
     def set_velocities(self, dolls: np.ndarray, velocities: np.ndarray) -> None:
-        """Set the velocities of ``dolls`` (d,), whole clusters, to theirs in ``velocities`` (nv,)."""
+        """Set the velocities of ``dolls`` (d,), whole clusters, to those in ``velocities``."""
         own = dolls[self._doll_of_v]
         self.v[own] = velocities[own]
         self._states.arrays['dense_step'][dolls] = 0

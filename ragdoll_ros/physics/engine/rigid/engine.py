@@ -39,6 +39,7 @@ class RigidEngine:
 
     energy_error = 1e-2
     supports_joint_springs = True
+    simulates_copies = True
 
     def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
         self.scene, self.accuracy = scene, accuracy
