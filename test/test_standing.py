@@ -81,6 +81,18 @@ def test_no_shipped_doll_sleeps_balanced(name):
     assert asleep and not balanced
 
 
+@pytest.mark.parametrize('name', ['article', 'ponytail'])
+def test_what_leans_back_falls_backwards(name):
+    """It lies on its back, its head against x, which it faced; its legs fold below it."""
+    with Simulation(load_scene(name), engine='rigid') as simulation:
+        start = simulation.state.positions[1]
+        assert advance_until_asleep(simulation)
+        state = simulation.state
+    back, side, _ = state.positions[1] - start
+    assert back < -0.4 and abs(side) < 0.1
+    assert rotation.rotate(state.orientations[0], np.array((1.0, 0.0, 0.0)))[2] > 0.9
+
+
 def random_tower(seed):
     """One to five bones on top of each other, on joints of a random kind, dropped upright."""
     rng, bones, joints, z = np.random.default_rng(seed), [], [], 0.0
