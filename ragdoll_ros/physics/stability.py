@@ -4,7 +4,7 @@ In a stable equilibrium potential energy has a minimum, so that a disturbance ne
 norm of the kinetic energy, |v| = sqrt(2 T), the velocities v of a copy that starts with velocities
 d stay within those of a copy that starts at rest, by at most |d| (Lagrange and Dirichlet). Friction
 and impacts, which only take energy, do not change that. In an unstable one the difference grows as
-exp(t / tau), for a rod of length l on its end tau = sqrt(2 l / 3 g), for all else of that height
+exp(t / tau), for a rod of length l on its end tau = sqrt(2 l / 3 g), for most of that height
 faster. The copy at rest also tells what creeps: it sets itself in motion, ever faster.
 """
 from __future__ import annotations
