@@ -23,6 +23,7 @@ from .engine.protocol import Contacts, Engine, Springs
 from .engine.registry import resolve_engine
 from .rigid_body import GroundHeights, JointGap
 from .sleeping import SleepDetector
+from .stability import StabilityTest
 from .swing.pose import SwingState
 from .swing.swings import SwingSimulation
 
@@ -89,7 +90,7 @@ class Simulation:
         self._engine: Engine = self._make(resolve_accuracy(accuracy))
         self._placed: GeneralizedState | None = None
         self._start = self._engine.save()
-        self._sleep_detector = SleepDetector(scene)
+        self._sleep_detector, self._stability_test = SleepDetector(scene), StabilityTest(scene)
         self._swings = SwingSimulation(scene) if any(
             placement.doll.swings for placement in scene.dolls) else None
         self.reset()
@@ -412,9 +413,29 @@ class Simulation:
             return
         loaded = (*self._pushes.bones(self.time), *(spring.bone for spring in self._springs))
         dolls = self._sleep_detector.find_ready(self._engine, self.tick, loaded)
-        if np.count_nonzero(dolls):  # a tenth of what any() costs
+        if not np.count_nonzero(dolls):  # a tenth of what any() costs
+            return
+        if self._engine.simulates_copies:
+            dolls &= ~self._disturb_unstable(dolls)
+        if dolls.any():
             self._engine.put_to_sleep(dolls)
             self.asleep = bool(self._engine.sleeping.all())
+
+    def _disturb_unstable(self, dolls: np.ndarray) -> np.ndarray:
+        """Which of ``dolls`` (d,) that are about to sleep do not rest in a stable equilibrium; if
+        it is an unstable one, disturb them. Those watched since an earlier test do rest.
+        """
+        engine, detector = self._engine, self._sleep_detector
+        clusters = engine.cluster_of_doll
+        untested = dolls & (np.bincount(clusters, ~detector.watched) > 0)[clusters]
+        if not untested.any():
+            return untested
+        verdict = self._stability_test.judge(engine, untested, detector.max_kinetic)
+        if verdict.departing.any():
+            engine.set_velocities(verdict.departing, verdict.velocities)
+        unstable = untested & ~verdict.stable
+        detector.watch(unstable, self._stability_test.duration, engine.doll_totals.kinetic)
+        return unstable
 
     @cached_property
     def _gap(self) -> JointGap:

@@ -10,6 +10,7 @@ from ..model import rotation
 from ..model.scene import SECOND, Scene
 from ..model.state import State
 from .engine.protocol import Engine
+from .stability import ACCELERATION, SOLVED
 
 REFERENCE_EXTENT = 1.4
 """m: extent of the default doll, for which REST_SPEED and REST_DISPLACEMENT were measured."""
@@ -49,18 +50,34 @@ class SleepDetector:
         self._speed = math.sqrt(size) / slower * REST_SPEED
         self._displacement = size * REST_DISPLACEMENT
         self._time = slower * REST_TIME
+        self._masses = np.array([placement.doll.mass for placement in scene.dolls])
         # A still bone has at most m v^2 / 2 of linear and less than 3 times that of rotational
         # energy, as its radius of gyration is at most its largest half extent.
-        masses = np.array([placement.doll.mass for placement in scene.dolls])
-        self._max_kinetic = 2 * masses * (2 * self._speed) ** 2
+        self.max_kinetic = 2 * self._masses * (2 * self._speed) ** 2
+        """(d,) J: bound on the kinetic energy of dolls that are still."""
         self._still = np.zeros(len(scene.dolls), np.int64)
         """ns for which each doll has been still."""
+        self._wait = np.full(len(scene.dolls), self._time)
+        """ns for which each doll must be still."""
+        self.watched = np.zeros(len(scene.dolls), bool)
+        """(d,): which watch() has chosen, and have been still since."""
+        self._bound = np.full(len(scene.dolls), math.inf)
+        """(d,) J: kinetic energies that those do not reach."""
         self._since = np.zeros((len(scene.bones), 7))
         """(n, 7): poses of the bones when their doll became still."""
 
     def restart(self, dolls: np.ndarray | slice = slice(None)) -> None:
         """Reset the timers of these dolls (d,), or of all."""
-        self._still[dolls] = 0
+        self._still[dolls], self._wait[dolls] = 0, self._time
+        self.watched[dolls], self._bound[dolls] = False, math.inf
+
+    def watch(self, dolls: np.ndarray, duration: float, kinetic: np.ndarray) -> None:
+        """Restart the timers of dolls (d,) that seem not to rest. If they are still for
+        ``duration`` s and then not faster than now, by ``kinetic`` (d,) J, they do.
+        """
+        self._still[dolls], self.watched[dolls] = 0, True
+        self._wait[dolls] = max(self._time, duration * SECOND)
+        self._bound[dolls] = self._grown(kinetic)[dolls]
 
     def find_ready(self, engine: Engine, tick: int, loaded: Iterable[int]) -> np.ndarray:
         """Which dolls (d,) to put to sleep, after one more tick (ns): whole clusters that are
@@ -80,7 +97,7 @@ class SleepDetector:
 
     def _update(self, state: State, kinetic: np.ndarray, tick: int) -> np.ndarray:
         """Which dolls (d,) have been still for long enough; ``kinetic`` (d,) J."""
-        slow = kinetic <= self._max_kinetic
+        slow = kinetic <= self.max_kinetic
         if not self._has_gravity or not np.count_nonzero(slow):
             self.restart()
             return np.zeros(len(slow), bool)
@@ -89,12 +106,20 @@ class SleepDetector:
         begun = (slow & (self._still == 0))[self._doll]
         self._since[begun] = state.rows[begun, :7]
         self._still = np.where(slow, self._still + tick, 0)
-        ready = self._still >= self._time
+        self.restart(~slow)
+        ready = self._still >= self._wait
         if not ready.any():
             return ready
         moved = np.maximum(
             np.abs(state.positions - self._since[:, :3]).max(axis=1),
             rotation.angle_between(state.orientations, self._since[:, 3:]) * self._sizes)
-        crept = np.maximum.reduceat(moved, self._first) >= self._displacement
-        self.restart(crept)
-        return ready & ~crept
+        crept = np.maximum.reduceat(moved, self._first) >= (
+            self._displacement * self._wait / self._time)
+        faster = ready & (kinetic > self._bound)
+        self._bound[faster] = self._grown(kinetic)[faster]
+        self._still[crept | faster] = 0
+        return ready & ~crept & ~faster
+
+    def _grown(self, kinetic: np.ndarray) -> np.ndarray:
+        """Kinetic energies (d,) J of dolls that have become faster, from ``kinetic`` (d,)."""
+        return ACCELERATION ** 2 * np.maximum(kinetic, self._masses * SOLVED ** 2 / 2)

@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -155,6 +155,8 @@ class Engine(Protocol):
     """Relative energy gain in a tick above which the state counts as diverged; see Guard."""
     supports_joint_springs: bool
     """Whether advance() takes AppliedJointSpring."""
+    simulates_copies: bool
+    """Whether there are set_velocities() and simulate_copy(), for StabilityTest."""
     sleeping: np.ndarray
     """(d,) bool: dolls that are not integrated until a load or another doll wakes them."""
 
@@ -199,6 +201,19 @@ class Engine(Protocol):
 
     def put_to_sleep(self, dolls: np.ndarray) -> None:
         """Set the velocities of dolls (d,), whole clusters, to zero; their energy is removed."""
+
+    def set_velocities(self, dolls: np.ndarray, velocities: np.ndarray) -> None:
+        """Set the generalized velocities of dolls (d,), whole clusters, to theirs in ``velocities``
+        (nv,). The change of energy counts as work of pushes.
+        """
+
+    def simulate_copy(self, dolls: np.ndarray, velocities: np.ndarray,
+                      interval: float) -> Generator[np.ndarray, None, None]:
+        """Kinetic energies (d,) J of a copy of ``dolls`` (d,), whole clusters, without loads and by
+        themselves: as it starts with ``velocities`` (nv,), and after each ``interval``, s, in
+        coarse steps. The first interval is shorter, in finer ones. The dolls stay as they are, to
+        the bit, once the generator is closed.
+        """
 
     def dolls_on_ground(self) -> np.ndarray:
         """Which dolls (d,) rest on the ground."""

@@ -148,14 +148,19 @@ class Clusters:
             if not sleeping[cluster.dolls[0]]:
                 self._scatter_state(cluster)
 
-    def stop(self, dolls: np.ndarray) -> None:
-        """Set the velocities of ``dolls`` (d,), whole clusters, to zero."""
-        self.v[dolls[self._doll_of_v]] = 0.0
+    def set_velocities(self, dolls: np.ndarray, velocities: np.ndarray) -> None:
+        """Set the velocities of ``dolls`` (d,), whole clusters, to those in ``velocities``."""
+        own = dolls[self._doll_of_v]
+        self.v[own] = velocities[own]
         self._states.arrays['dense_step'][dolls] = 0
         for cluster in self._multi_doll:
             if dolls[cluster.dolls[0]]:
-                cluster.state.v[:] = 0.0
+                cluster.state.v[:] = velocities[cluster.v_indices]
                 cluster.state.dense_step[:] = 0
+
+    def add_work(self, energies: np.ndarray) -> None:
+        """Add energies (d,) J to the work of pushes of the dolls' clusters."""
+        np.add.at(self.stats['work_pushes'], self._firsts[self.of_doll], energies)
 
     def gather_state(self) -> None:
         """Copy the scene's q and v into the clusters of several dolls."""
@@ -247,9 +252,19 @@ class Clusters:
         if members is not self.members:
             self._set_clusters(members)
         for cluster, state in several:
-            for name in SNAPSHOT:
-                getattr(cluster.state, name)[:] = getattr(state, name)
-            cluster.state.contacts[:len(state.contacts)] = state.contacts
+            _restore_state(cluster, state)
+
+    def save_states(self, dolls: np.ndarray) -> list[tuple[Cluster, ClusterState]]:
+        """Copy the states of ``dolls`` (d,), whole clusters."""
+        return [(cluster, _copied(cluster.state)) for cluster in self.members
+                if dolls[cluster.dolls[0]]]
+
+    def restore_states(self, saved: list[tuple[Cluster, ClusterState]]) -> None:
+        """Restore states of clusters to the bit; the clusters must still be the same."""
+        for cluster, state in saved:
+            _restore_state(cluster, state)
+            if len(cluster.dolls) > 1:
+                self._scatter_state(cluster)
 
     def checkpoint(self) -> dict[str, np.ndarray]:
         """The fields CHECKPOINT of all states; as bytes, as numpy copies records slowly."""
@@ -351,6 +366,13 @@ def _invalidate(cluster: Cluster) -> None:
     cluster.state.dense_step[:] = cluster.state.contact_accelerations[:] = 0
     for name in ('contact_count', 'ended_without_impact', 'last_dt', 'next_dt', 'gaps_current'):
         cluster.state.stats[name] = 0
+
+
+def _restore_state(cluster: Cluster, state: ClusterState) -> None:
+    """Write a copy of its state back to a cluster."""
+    for name in SNAPSHOT:
+        getattr(cluster.state, name)[:] = getattr(state, name)
+    cluster.state.contacts[:len(state.contacts)] = state.contacts
 
 
 def _bind_cluster(*parts: object) -> Cluster:

@@ -3,6 +3,7 @@
 The algorithm of a tick is in kernels/advance.py.
 """
 import dataclasses
+from collections.abc import Generator
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from ....model import rotation
 from ....model.coordinates import DofLayout, GeneralizedState
 from ....model.scene import Scene
 from ....model.state import State
-from ...accuracy import Accuracy
+from ...accuracy import DRAFT, Accuracy
 from ...rigid_body import GroundHeights
 from ...kernels.system import JOINT_OUTSIDE_LIMITS, OVERLAPPING
 from ..doll_totals import DollTotals
@@ -25,6 +26,10 @@ ERROR_STEP_RATIO = 0.25
 LOOK_AHEAD = 0.05
 """s: dolls that may touch within this time form a cluster."""
 
+COPY_STEPS, COPY_START = 2, 0.1
+"""Contact steps in an interval of simulate_copy(), and the share of its first one, of twice as many
+steps: in a long step contacts take all of a disturbance, also what would make a doll depart."""
+
 MAX_AGE = 10
 """Intervals for which clusters are kept, unless other dolls come near."""
 
@@ -34,6 +39,7 @@ class RigidEngine:
 
     energy_error = 1e-2
     supports_joint_springs = True
+    simulates_copies = True
 
     def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
         self.scene, self.accuracy = scene, accuracy
@@ -78,9 +84,8 @@ class RigidEngine:
 
     def set_coordinates(self, coordinates: GeneralizedState) -> None:
         clusters, q, v = self._clusters, self._clusters.q, self._clusters.v
-        q[:], v[:] = coordinates.q, coordinates.v
-        orientations = rotation.inverse(q[self.layout.root_orientations])
-        v[self._spins] = rotation.rotate(orientations, v[self._spins])
+        q[:] = coordinates.q
+        v[:] = self._in_root_axes(coordinates.v)
         clusters.stats[:] = 0
         clusters.separate()
         self.sleeping[:] = False
@@ -103,10 +108,34 @@ class RigidEngine:
         self._advance(duration, actions, self.accuracy)
 
     def put_to_sleep(self, dolls: np.ndarray) -> None:
-        self._clusters.stop(dolls)
+        self._clusters.set_velocities(dolls, np.zeros_like(self._clusters.v))
         self.sleeping[dolls] = True
         self._last_start = None
         self._refresh()
+
+    def set_velocities(self, dolls: np.ndarray, velocities: np.ndarray) -> None:
+        before = self.doll_totals.energy
+        self._clusters.set_velocities(dolls, self._in_root_axes(velocities))
+        self._last_start = None
+        self._refresh()
+        self._clusters.add_work(self.doll_totals.energy - before)
+
+    def simulate_copy(self, dolls: np.ndarray, velocities: np.ndarray,
+                      interval: float) -> Generator[np.ndarray, None, None]:
+        clusters = self._clusters
+        coarse = dataclasses.replace(DRAFT, step=interval / COPY_STEPS)
+        fine = dataclasses.replace(coarse, step=COPY_START * coarse.step / 2)
+        saved = clusters.save_states(dolls)
+        try:
+            clusters.set_velocities(dolls, self._in_root_axes(velocities))
+            clusters.advance(0.0, fine, ~dolls)
+            yield clusters.sums['kinetic'].copy()
+            clusters.advance(COPY_START * interval, fine, ~dolls)
+            while True:
+                yield clusters.sums['kinetic'].copy()
+                clusters.advance(interval, coarse, ~dolls)
+        finally:
+            clusters.restore_states(saved)
 
     def dolls_on_ground(self) -> np.ndarray:
         contacts, bones, _ = self._clusters.contacts()
@@ -232,6 +261,13 @@ class RigidEngine:
         """Recompute bone states, sums and gaps from q and v."""
         self._clusters.advance(0.0, self.accuracy, np.zeros(len(self.sleeping), bool))
         self._update_state()
+
+    def _in_root_axes(self, velocities: np.ndarray) -> np.ndarray:
+        """Generalized velocities (nv,) with those of the roots' rotation along the roots' axes."""
+        v = velocities.copy()
+        orientations = rotation.inverse(self._clusters.q[self.layout.root_orientations])
+        v[self._spins] = rotation.rotate(orientations, v[self._spins])
+        return v
 
     def _lift_out_of_ground(self) -> None:
         """Move dolls that penetrate the ground by more than is allowed onto it."""

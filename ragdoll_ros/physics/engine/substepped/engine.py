@@ -31,6 +31,7 @@ class SubsteppedEngine(ABC):
     """
 
     supports_joint_springs = False
+    simulates_copies = False
 
     lags = True
     """Whether substeps are semi-implicit Euler: positions advance by the velocity at the end."""
