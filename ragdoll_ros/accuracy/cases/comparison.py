@@ -1,0 +1,29 @@
+"""The contact parameters at which engines are compared: values that all of them represent."""
+import dataclasses
+
+from ...files.scene import load_scene
+from ...model.scene import Scene
+from .trial import Trial
+
+FRICTION = 0.7
+"""Of all bodies in comparisons. PyBullet and MuJoCo cannot represent the unlimited friction of the
+default scene; see model/scene.py."""
+
+RESTITUTIONS = (0.5, 0.0)
+"""Compared: that of the default scene, and none, which every engine can represent."""
+
+
+def drop_scene(restitution: float = RESTITUTIONS[0]) -> Scene:
+    """The default scene with the friction of comparisons."""
+    return with_law(load_scene('drop'), restitution)
+
+
+def compared(trial: Trial, restitution: float = RESTITUTIONS[0]) -> Trial:
+    """The same trial with the friction of comparisons."""
+    return dataclasses.replace(trial, scene=with_law(trial.scene, restitution))
+
+
+def with_law(scene: Scene, restitution: float) -> Scene:
+    """The same scene with the friction of comparisons and a restitution."""
+    return dataclasses.replace(scene, material=dataclasses.replace(
+        scene.material, friction=FRICTION, restitution=restitution))
