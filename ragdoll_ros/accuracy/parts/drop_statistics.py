@@ -32,8 +32,10 @@ OTHERS = ('bullet-4', 'bullet-10', 'mujoco-implicitfast-4', 'mujoco-implicitfast
 QUICK_OTHERS = ('bullet-10',)
 
 INELASTIC = ('mujoco-implicitfast-100', 'drake-10')
-"""Also without restitution: MuJoCo at steps of 0.1 ms, whose law is then ours; Drake has no other.
-"""
+"""Also without restitution: MuJoCo at steps of 0.1 ms, whose law is then ours, and Drake."""
+
+TILTED = ('dart-100',)
+"""Also of the default drop: DART at steps of 0.1 ms, whose law is ours but for the pyramid."""
 
 INSTANTS = (0.3, 0.5, 1.0)
 """s after release at which energies are compared; the first contact is at 0.286 s."""
@@ -72,13 +74,14 @@ def jobs(options: RunOptions) -> list[Job]:
               *(QUICK_OTHERS if options.quick else installed(OTHERS))]
     made = []
     for population, count in counts.items():
-        inelastic = population.endswith('e = 0') and not options.quick
-        for name in (*common, *(installed(INELASTIC) if inelastic else ())):
+        checks = [*(INELASTIC if population.endswith('e = 0') else ()),
+                  *(TILTED if population.startswith('default') else ())]
+        for name in (*common, *([] if options.quick else installed(checks))):
             for first in range(0, count, CHUNK):
                 end = min(first + CHUNK, count)
                 made.append(Job(NAME, f'{population} drops, {name}', functools.partial(
                     measure, population, name, first, end),
-                    (end - first) * (2.0 if name == common[0] else 0.15)))
+                    (end - first) * (2.0 if name in (common[0], *TILTED) else 0.15)))
     return made
 
 

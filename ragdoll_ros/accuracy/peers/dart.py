@@ -45,7 +45,8 @@ class Dart:
         rows = []
         for body in self._order:
             pose = body.getWorldTransform()
-            rows.append([*pose.translation(), *rotation.from_matrix(pose.rotation()),
+            turn = pose.quaternion()
+            rows.append([*pose.translation(), *turn.xyz(), turn.w(),
                          *body.getCOMLinearVelocity(), *body.getAngularVelocity()])
         return State.of(np.array(rows))
 

@@ -57,8 +57,9 @@ class Drake:
         for body in self._order:
             pose = self._plant.EvalBodyPoseInWorld(self._context, body)
             motion = self._plant.EvalBodySpatialVelocityInWorld(self._context, body)
-            rows.append([*pose.translation(), *rotation.from_matrix(pose.rotation().matrix()),
-                         *motion.translational(), *motion.rotational()])
+            turn = pose.rotation().ToQuaternion()
+            rows.append([*pose.translation(), *turn.xyz(), turn.w(), *motion.translational(),
+                         *motion.rotational()])
         return State.of(np.array(rows))
 
     def advance(self) -> None:

@@ -257,4 +257,4 @@ def _warn_of_friction(scene: Scene) -> None:
         text = (f'unlimited friction is a coefficient of {NO_SLIP:g}' if math.isinf(most) else
                 f'friction {most:g} is a coefficient of {LARGEST_FRICTION:g}')
         warnings.warn(f'scene {scene.name}: with PyBullet and MuJoCo {text}', FrictionWarning,
-                      stacklevel=4)
+                      stacklevel=5)
