@@ -5,13 +5,14 @@ Impacts are chaotic, so a long run says little about a method. After Erez, Tassa
 reference from the same state. They compared each engine with itself; here the error is against one
 reference for all, and self-convergence and joint gaps are given in addition.
 """
+import dataclasses
 import functools
 
 import numpy as np
 
 from ...model.coordinates import GeneralizedState
 from ...physics.accuracy import ACCURACIES
-from ..cases.comparison import FRICTION, RESTITUTIONS, drop_scene
+from ..cases.comparison import LAWS, Law, drop_scene
 from ..cases.trial import Trial
 from ..methods import (
     Method,
@@ -36,30 +37,35 @@ LENGTH = 0.1
 FINEST_SUBSTEPS, REFINEMENT = 128, 100
 """Substeps of the other engines at their finest; step of `normal` over the reference's."""
 
+SUBSTEPS, DEAR_SUBSTEPS = (1, 2, 4, 10, 16, 32, 100), (1, 4, 10, 32)
+"""Of other engines, and of Drake, whose steps take longest."""
+
 FIRST, LAST = 0.25, 1.3
 """s: segments begin between these, from before the first contact until the doll lies still."""
 
 
 def jobs(options: RunOptions) -> list[Job]:
-    """One timed job for each restitution and method."""
+    """One timed job for each law and method."""
     count = 6 if options.quick else 60
-    return [Job(NAME, f'pieces, e = {restitution:g}, {name}', functools.partial(
-        measure, name, count, restitution), weight=0.04 * count, timed=True)
-        for restitution in RESTITUTIONS for name in names(restitution, options.quick)]
+    return [Job(NAME, f'pieces, e = {law.restitution:g}, µ = {law.friction:g}, {name}',
+                functools.partial(measure, name, count, law), weight=0.1 * count, timed=True)
+            for law in LAWS for name in names(law, options.quick)]
 
 
-def names(restitution: float, quick: bool) -> list[str]:
+def names(law: Law, quick: bool) -> list[str]:
     """Methods that are compared; Drake has no restitution."""
-    fixed = (4, 10) if quick else (1, 2, 4, 10, 16, 32, 100)
-    families = ('bullet', 'mujoco-implicitfast', 'dart', *(() if restitution else ('drake',)))
+    counts = dict.fromkeys(('bullet', 'mujoco-implicitfast', 'dart'), SUBSTEPS)
+    if not law.restitution:
+        counts['drake'] = DEAR_SUBSTEPS
     return [*(f'ours-{accuracy}' for accuracy in ACCURACIES),
-            *installed(f'{family}-{n}' for family in families for n in fixed)]
+            *installed(f'{family}-{n}' for family, fixed in counts.items()
+                       for n in ((4, 10) if quick else fixed))]
 
 
 @functools.cache
-def segments(count: int, restitution: float) -> list[Trial]:
+def segments(count: int, law: Law) -> list[Trial]:
     """Segments of the drop from ``count`` instants of a run at `exact`."""
-    scene, found = drop_scene(restitution), []
+    scene, found = drop_scene(law.restitution, law.friction), []
     wanted = np.rint(np.linspace(FIRST, LAST, count) / scene.step).astype(int)
     states = {}
     with start_simulation(Trial(scene, LAST), 'exact') as simulation:
@@ -75,24 +81,23 @@ def segments(count: int, restitution: float) -> list[Trial]:
 def finest(family: str) -> Method:
     """The engine of a family at its finest; the reference for ours and all other names."""
     return {'PyBullet': bullet(FINEST_SUBSTEPS), 'DART': dart(FINEST_SUBSTEPS),
-            'Drake': drake(FINEST_SUBSTEPS),
+            'Drake': drake(DEAR_SUBSTEPS[-1]),
             'MuJoCo implicitfast': mujoco('implicitfast', FINEST_SUBSTEPS)}.get(
         family, reference(REFINEMENT))
 
 
 @functools.cache
-def truths(method: str, count: int, restitution: float) -> list[Trajectory]:
+def truths(method: str, count: int, law: Law) -> list[Trajectory]:
     """Trajectories of the segments by a method."""
-    return [run(by_name(method), trial).trajectory for trial in segments(count, restitution)]
+    return [run(by_name(method), trial).trajectory for trial in segments(count, law)]
 
 
-def measure(name: str, count: int, restitution: float) -> list[Row]:
+def measure(name: str, count: int, law: Law) -> list[Row]:
     """Largest error of each segment: median and 90th percentile over all segments."""
     method, found, cpu, reading = by_name(name), [], 0.0, 0.0
     for trial, truth, itself in zip(
-            segments(count, restitution),
-            truths(reference(REFINEMENT).name, count, restitution),
-            truths(finest(method.family).name, count, restitution), strict=True):
+            segments(count, law), truths(reference(REFINEMENT).name, count, law),
+            truths(finest(method.family).name, count, law), strict=True):
         result = run(method, trial)
         metrics, error = Metrics(trial.scene), compare(result.trajectory, truth)
         found.append((error['position_worst_m'], error['angle_worst_rad'],
@@ -102,7 +107,7 @@ def measure(name: str, count: int, restitution: float) -> list[Row]:
         reading += result.reading.sum()
     errors, angles, owns, gaps, sunk = np.array(found).T
     return [{'method': name, 'label': method.label, 'family': method.family,
-             'restitution': restitution, 'friction': FRICTION, 'pieces': count,
+             **dataclasses.asdict(law), 'pieces': count,
              'reference': reference(REFINEMENT).label, 'cpu_s_per_s': float(cpu / (count * LENGTH)),
              'reading_s_per_s': float(reading / (count * LENGTH)),
              'position_median_m': float(np.median(errors)),

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..results.criteria import EXCESS
 from ..results.figures import Figures, Row, number, sound
+from ..results.laws import law_name
 from .contact_plots import draw_convergence, draw_drops, draw_fainting_falls, draw_fall_directions
 
 if TYPE_CHECKING:
@@ -136,14 +137,12 @@ def draw_segments(figures: Figures, plt: object) -> object:
     rows = [row for row in sound(figures.get('pieces', ())) if 'reference' in row]
     if not rows:
         return None
-    laws = list(dict.fromkeys(row.get('restitution') for row in rows))
+    laws = list(dict.fromkeys(map(law_name, rows)))
     figure, grid = plt.subplots(1, len(laws), figsize=(7.5 * len(laws), 4.2), squeeze=False,
                                 sharey=True, layout='constrained')
-    for axes, restitution in zip(grid.flat, laws, strict=True):
-        _work_precision(axes, [row for row in rows if row.get('restitution') == restitution],
-                        'position_median_m')
-        law = '' if restitution is None else f', e = {restitution:g}'
-        axes.set_title(f'Segments of 0.1 s through contacts, against one reference{law}',
+    for axes, law in zip(grid.flat, laws, strict=True):
+        _work_precision(axes, [row for row in rows if law_name(row) == law], 'position_median_m')
+        axes.set_title(law or 'Segments of 0.1 s through contacts, against one reference',
                        loc='left')
         axes.legend(fontsize=9)
     return figure

@@ -70,9 +70,9 @@ def hard_table(rows: list[Row]) -> list[str]:
 
 
 def real_time_tables(rows: list[Row]) -> list[str]:
-    """Costs of a tick; one table for each restitution."""
+    """Costs of a tick; one table for each law."""
     blocks = []
-    for heading, own in contact_sections.by_restitution(rows):
+    for heading, own in contact_sections.by_law(rows):
         blocks += [*heading, table(own, present(own, (
             ('label', 'method', '{}'), ('cpu_s_per_s', 'CPU ms/s', 'ms'),
             ('reading_s_per_s', 'reading ms/s', 'ms'), ('p50_s', 'tick µs', 'us'),

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from .figures import Figures, Row, by_setting, criterion, number, sound
+from .laws import law_name
 
 CLOSED_FORMS = ('bounce', 'bounce_0.1', 'bounce_0.9', 'bounce_1', 'rod_frictionless', 'rod_sticks',
                 'rod_slides', 'two_balls', 'three_balls')
@@ -59,11 +60,11 @@ def _rocking(figures: Figures) -> Iterator[Row]:
 
 
 def _segments(figures: Figures) -> Iterator[Row]:
-    bases = {row.get('restitution'): number(row['cpu_s_per_s'])
+    bases = {law_name(row): number(row['cpu_s_per_s'])
              for row in sound(figures.get('pieces', ())) if row.get('method') == 'bullet-10'}
     for accuracy, rows in by_setting(figures, 'pieces', lambda row: 'reference' in row):
         for row in rows:
-            yield from _segment(row, accuracy, bases.get(row.get('restitution')))
+            yield from _segment(row, accuracy, bases.get(law_name(row)))
 
 
 def _segment(row: Row, accuracy: str, base: float | None) -> Iterator[Row]:
@@ -82,8 +83,9 @@ def _segment(row: Row, accuracy: str, base: float | None) -> Iterator[Row]:
 
 
 def _law(row: Row) -> str:
-    """Restitution of a row for a criterion's name; figures of older versions have none."""
-    return f', e = {row["restitution"]:g}' if 'restitution' in row else ''
+    """Contact parameters of a row in a criterion's name."""
+    name = law_name(row)
+    return f', {name}' if name else ''
 
 
 def _not_dominated(figures: Figures) -> Iterator[Row]:
@@ -94,7 +96,7 @@ def _not_dominated(figures: Figures) -> Iterator[Row]:
         for row in rows:
             ours = [number(row[key]) for key in ('cpu_s_per_s', 'own_median_m')]
             better = [other['label'] for other in others
-                      if other.get('restitution') == row.get('restitution')
+                      if law_name(other) == law_name(row)
                       and number(other['cpu_s_per_s']) < ours[0]
                       and number(other['own_median_m']) < ours[1]]
             yield criterion(f'no engine is faster and closer to its own limit{_law(row)}, '

@@ -24,6 +24,13 @@ UNLIMITED = ('Where friction is unlimited, as in the default scene, it is 0.7 in
              'MuJoCo, which have no unlimited friction.')
 
 
+def law_name(row: Row) -> str:
+    """Contact parameters of a row; empty for figures of older versions."""
+    if 'restitution' not in row:
+        return ''
+    return f'e = {row["restitution"]:g}, µ = {row["friction"]:g}'
+
+
 def law_note(rows: Iterable[Row]) -> str:
     """Friction of the methods of some rows, and what differs; empty for ours alone.
 
@@ -31,8 +38,9 @@ def law_note(rows: Iterable[Row]) -> str:
     """
     good = sound(rows)
     frictions = sorted({row['friction'] for row in good if 'friction' in row})
-    shared = (f'Friction is {", ".join(map(str, frictions))} for all methods.' if frictions
-              else UNLIMITED)
+    shared = UNLIMITED
+    if frictions:
+        shared = f'All methods have the same friction, {" or ".join(map(str, frictions))}.'
     differing = _differing(good)
     return f'{shared} {differing}' if differing else ''
 
