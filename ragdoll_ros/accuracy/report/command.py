@@ -71,7 +71,7 @@ def parser() -> argparse.ArgumentParser:
         epilog='example: ragdoll_report --quick --out /tmp/report; '
         'ragdoll_report --case classes --starts 300')
     made.add_argument('--quick', action='store_true',
-                      help='fewer motions, methods and starts: at most 90 s (else 40 min)')
+                      help='fewer motions, methods and starts: at most 90 s (else 60 min)')
     made.add_argument('--case', action='append', metavar='NAME', default=[],
                       help='only this part or motion; repeatable; "list" prints all names')
     made.add_argument('--starts', type=int, default=100, metavar='N',
