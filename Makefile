@@ -65,7 +65,7 @@ bench: $(COMPILED) ## cost of ticks and their parts, crowds, swings, people and 
 	@$(BIN)/python test/fit_cost.py
 	@$(BIN)/python test/page_cost.py
 
-report: $(COMPILED) ## accuracy report against independent references, into docs/; 40 min
+report: $(COMPILED) ## accuracy report against independent references, into docs/; 60 min
 	@$(BIN)/python -m ragdoll_ros.accuracy.report.command --out docs
 
 hard: $(COMPILED) ## hard cases, each with its rule, as a table

@@ -84,6 +84,8 @@ setup(
     extras_require={
         'ros': ['ros-jazzy-rclpy', 'ros-jazzy-rmw-fastrtps-cpp', 'ros-jazzy-common-interfaces'],
         'report': ['scipy', 'matplotlib', 'mujoco'],
+        # Compared in the report where they are installed.
+        'peers': ['dartpy', 'drake'],
         'fit': ['matplotlib', 'trimesh', 'pycollada', 'DracoPy'],
         # The page: 3D, panels and plots in a browser, served from Python, with no build of its own.
         # Its range is that of viewer/viser_internals.py, which uses private names of viser.

@@ -29,7 +29,7 @@ ROSDEP_KEYS = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml',
                'jsonschema': 'python3-jsonschema', 'numba': 'python3-numba',
                'pybullet': 'python3-pybullet-pip'}
 DISTRIBUTIONS = {'yaml': 'pyyaml', 'mpl_toolkits': 'matplotlib', 'DracoPy': 'dracopy',
-                 'mcap_ros2': 'mcap-ros2-support'}
+                 'mcap_ros2': 'mcap-ros2-support', 'pydrake': 'drake'}
 """Where a package on PyPI is called otherwise than its module."""
 
 ROBOT = ('model', 'files', 'physics', 'realtime', 'ros')
@@ -41,6 +41,8 @@ LAUNCHED = {'launch', 'launch_ros', 'launch_xml'}
 """What the files in launch/ are read by."""
 CLUSTER = {'ray'}
 """Wanted where there are several machines, by an extra of its name."""
+PEERS = {'dartpy', 'pydrake'}
+"""Compared in the report where they are installed, by an extra of their own."""
 CALLED = {'pycollada'}
 """What a library imports in our stead: trimesh, to read DAE."""
 EXTRAS = {'fit': 'fit', 'viewer': 'viewer', 'accuracy': 'report', 'replay': 'replay',
@@ -225,8 +227,9 @@ def test_pip_brings_what_the_core_imports_and_extras_what_their_rooms_do(wheel):
     rooms = {path.name for path in (ROOT / 'ragdoll_ros').iterdir() if any(path.glob('*.py'))}
     assert rooms == {*ROBOT, 'people', *EXTRAS}
     for room, extra in EXTRAS.items():
-        needed = distributions(imported(room) - imported(*ROBOT)) - CLUSTER
+        needed = distributions(imported(room) - imported(*ROBOT) - PEERS) - CLUSTER
         assert needed == required(wheel, extra) - OPTIONAL - CALLED, room
+    assert distributions(PEERS) == required(wheel, 'peers')
 
 
 def test_docs_say_how_to_get_what_rosdep_does_not_know(wheel):

@@ -108,10 +108,11 @@ def test_the_quickstart_owes_nothing_to_what_ran_before():
 
 def test_costs_are_medians_over_runs(monkeypatch):
     """Three runs whose ticks take 5, 1 and 3 ms by a clock of our own; 100 ticks make 1 s."""
-    readings = iter([time for run in (5e-3, 1e-3, 3e-3) for time in [0.0, run] * 100])
+    readings = iter([time for run in (5e-3, 1e-3, 3e-3) for time in [0.0, run, run + 1e-3] * 100])
     monkeypatch.setattr(methods, 'process_time', lambda: next(readings))
     result = median_run(bullet(1), free_fall().trial, 3)
     assert result.costs.tolist() == [3e-3] * 100
+    assert result.reading == pytest.approx(np.full(100, 1e-3))
     assert result.cpu_s_per_s == pytest.approx(.3)
 
 

@@ -31,7 +31,8 @@ ONLY = {'pybullet': 'physics/engine/substepped/bullet.py',
         'matplotlib': ('fit/', 'accuracy/', 'falls/pictures.py'),
         'trimesh': 'fit/robots/mesh_file.py', 'DracoPy': 'fit/reading/draco.py',
         'pyarrow': 'falls/formats/', 'ray': 'falls/cluster.py', 'mcap_ros2': 'falls/formats/',
-        'scipy': 'accuracy/', 'mcap': ('files/bag.py', 'recordings/mcap_file.py')}
+        'scipy': 'accuracy/', 'dartpy': 'accuracy/peers/dart.py',
+        'pydrake': 'accuracy/peers/drake.py', 'mcap': ('files/bag.py', 'recordings/mcap_file.py')}
 """Libraries, and the one place of each. The report's pendulum in three lines of PyBullet alone is
 what a user would write without this package: it shares no code with it."""
 
@@ -47,7 +48,7 @@ Edges = list[tuple[str, str]]
 
 MACHINE_CODE = {'numba', 'llvmlite', 'numpy', *sys.stdlib_module_names}
 
-REPORTS_OWN = {'accuracy/quickstart.py': {'pybullet'}, 'accuracy/crowds/depth.py': {'mujoco'}}
+REPORTS_OWN = {'accuracy/peers/quickstart.py': {'pybullet'}, 'accuracy/crowds/depth.py': {'mujoco'}}
 
 
 def modules(package: Path) -> dict[str, Path]:

@@ -17,7 +17,7 @@ OWN = 'physics/kernels/compiling/cache.py'
 WRITERS = {
     'accuracy/report/command.py': '--out', 'accuracy/results/figures.py': '--out',
     'accuracy/report/plots.py': '--out',
-    'accuracy/report/many_starts.py': '--out', 'accuracy/quickstart.py': 'a temporary file',
+    'accuracy/report/many_starts.py': '--out', 'accuracy/peers/quickstart.py': 'a temporary file',
     'falls/describe.py': '--out', 'falls/manifest.py': '--out', 'falls/pictures.py': '--out',
     'files/doll.py': 'save_doll(path)', 'files/scene.py': 'save_scene(path)',
     'fit/command.py': '--out, --urdf', 'fit/picture.py': '--picture',

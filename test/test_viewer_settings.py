@@ -62,7 +62,8 @@ def test_nothing_is_said_of_a_source_that_does_not_compute():
 def test_errors_are_those_of_the_report():
     """Rounded as they are shown: to 0.01 mm, and those of other engines to mm."""
     rows = json.loads((Path(__file__).parents[1] / 'docs/accuracy.json').read_text())
-    pieces = {row['method']: 1e3 * row['position_median_m'] for row in rows['figures']['pieces']}
+    pieces = {row['method']: 1e3 * row['position_median_m'] for row in rows['figures']['pieces']
+              if row.get('restitution', .5) == .5}
     for name, accuracy in ACCURACIES.items():
         substeps = min(round(accuracy.substeps), 32)
         assert round(pieces[f'ours-{name}'], 2) == ERRORS_MM['rigid'][name]

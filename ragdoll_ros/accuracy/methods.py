@@ -1,6 +1,7 @@
 """Methods that the report compares: engines with their settings."""
 import dataclasses
 import functools
+import importlib.util
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from time import process_time
@@ -12,14 +13,16 @@ from ..model import errors
 from ..model.state import State
 from ..physics import kernels
 from ..physics.accuracy import ACCURACIES, NORMAL, Accuracy
-from ..physics.engine.protocol import Engine
 from ..physics.engine.registry import resolve_engine
 from ..physics.engine.substepped.bullet import BulletEngine
 from ..physics.engine.substepped.mujoco import MujocoEngine
 from ..physics.simulation import Simulation
 from .cases.trial import Trial
-from .quickstart import STEP as QUICKSTART_STEP
-from .quickstart import Quickstart
+from .peers.dart import Dart
+from .peers.drake import Drake
+from .peers.fixed_steps import FixedSteps
+from .peers.quickstart import STEP as QUICKSTART_STEP
+from .peers.quickstart import Quickstart
 from .trajectory import Trajectory
 
 TICK = 0.01
@@ -31,6 +34,13 @@ RIGID = 'rigid'
 MIN_FLIGHT_ERROR = 1e-13
 """m or rad: smaller error estimates in flight are rounding."""
 
+PLAIN = dataclasses.replace(NORMAL, energy=False, sleep=False)
+"""Accuracy for plain steps: nothing is corrected."""
+
+
+OPTIONAL = {'dart': 'dartpy', 'drake': 'pydrake'}
+"""Peers that are compared only where they are installed (extra `peers`), and their modules."""
+
 
 class MethodRun(Protocol):
     """A running trial; implemented by Simulation."""
@@ -39,7 +49,7 @@ class MethodRun(Protocol):
     def state(self) -> State:
         """Current poses and velocities of all bones."""
 
-    def advance(self) -> State:
+    def advance(self) -> object:
         """Advance by one tick."""
 
     def close(self) -> None:
@@ -67,38 +77,21 @@ class Result:
 
     trajectory: Trajectory
     costs: np.ndarray
+    """Of stepping alone; ours are whole ticks of a Simulation, which include the poses."""
+    reading: np.ndarray
+    """Of reading the poses and velocities of all bones after the step."""
     measures: dict[str, float] = field(default_factory=dict)
     """Simulation.measures() at the end; empty for other engines."""
 
     @property
     def cpu_s_per_s(self) -> float:
-        """CPU seconds per simulated second."""
+        """CPU seconds of stepping per simulated second."""
         return float(self.costs.sum() / self.trajectory.times[-1])
 
-
-class _FixedSteps:
-    """An engine with a fixed number of substeps per tick."""
-
-    def __init__(self, trial: Trial, substeps: int, make: Callable[..., Engine]) -> None:
-        self._trial = trial
-        self._tick, self._count = trial.scene.step, 0
-        self._engine = make(trial.scene, fixed_steps(self._tick / substeps))
-        if trial.start is not None:
-            self._engine.set_coordinates(trial.start)
-
     @property
-    def state(self) -> State:
-        return self._engine.state
-
-    def advance(self) -> State:
-        begin = self._count * self._tick
-        loads = self._trial.loads(begin, begin + self._tick) if self._trial.pushes else ()
-        self._engine.advance(self._tick, loads)
-        self._count += 1
-        return self.state
-
-    def close(self) -> None:
-        self._engine.close()
+    def reading_s_per_s(self) -> float:
+        """CPU seconds of reading all poses once per tick, per simulated second."""
+        return float(self.reading.sum() / self.trajectory.times[-1])
 
 
 @functools.cache
@@ -133,28 +126,31 @@ def start_simulation(trial: Trial, accuracy: str | Accuracy, engine: str = 'auto
 
 
 def run(method: Method, trial: Trial) -> Result:
-    """Simulate a trial."""
+    """Simulate a trial; stepping and reading are timed apart."""
     tick = method.tick or trial.scene.step
     times = trial.times(tick)
     running = method.start(trial)
     try:
-        states, costs = [running.state], np.empty(len(times) - 1)
-        for index in range(len(costs)):
-            before = process_time()
-            state = running.advance()
-            costs[index] = process_time() - before
-            states.append(state)
+        states, stamps = [running.state], np.empty((len(times) - 1, 3))
+        for stamp in stamps:
+            stamp[0] = process_time()
+            running.advance()
+            stamp[1] = process_time()
+            states.append(running.state)
+            stamp[2] = process_time()
         measures = running.measures() if isinstance(running, Simulation) else {}
     finally:
         running.close()
-    return Result(Trajectory.of(times, states), costs, measures)
+    costs, reading = np.diff(stamps, axis=1).T
+    return Result(Trajectory.of(times, states), costs, reading, measures)
 
 
 def median_run(method: Method, trial: Trial, repeats: int) -> Result:
     """Simulate a trial several times; the cost of each tick is its median."""
     results = [run(method, trial) for _ in range(repeats)]
-    costs = np.median([result.costs for result in results], axis=0)
-    return dataclasses.replace(results[0], costs=costs)
+    costs, reading = (np.median([getattr(result, name) for result in results], axis=0)
+                      for name in ('costs', 'reading'))
+    return dataclasses.replace(results[0], costs=costs, reading=reading)
 
 
 def ours(accuracy: str | Accuracy, name: str | None = None) -> Method:
@@ -186,17 +182,42 @@ def quickstart() -> Method:
 
 def bullet(substeps: int) -> Method:
     """PyBullet on our scene with fixed substeps."""
+    make = functools.partial(BulletEngine, accuracy=PLAIN)
     return Method(f'bullet-{substeps}', f'PyBullet N = {substeps}', 'PyBullet', functools.partial(
-        _FixedSteps, substeps=substeps, make=BulletEngine), substeps, order=1)
+        FixedSteps, substeps=substeps, make=make), substeps, order=1)
 
 
 def mujoco(integrator: str, substeps: int) -> Method:
     """MuJoCo on our scene with fixed substeps."""
-    make = functools.partial(MujocoEngine, integrator=integrator)
+    make = functools.partial(MujocoEngine, accuracy=PLAIN, integrator=integrator)
     return Method(f'mujoco-{integrator}-{substeps}', f'MuJoCo {integrator} N = {substeps}',
                   f'MuJoCo {integrator}', functools.partial(
-                      _FixedSteps, substeps=substeps, make=make), substeps,
+                      FixedSteps, substeps=substeps, make=make), substeps,
                   order={'rk4': 4}.get(integrator, 1))
+
+
+def dart(substeps: int) -> Method:
+    """DART on our scene with fixed substeps."""
+    return Method(f'dart-{substeps}', f'DART N = {substeps}', 'DART', functools.partial(
+        Dart, substeps=substeps), substeps, order=1)
+
+
+def drake(substeps: int) -> Method:
+    """Drake on our scene with fixed substeps."""
+    return Method(f'drake-{substeps}', f'Drake N = {substeps}', 'Drake', functools.partial(
+        Drake, substeps=substeps), substeps, order=1)
+
+
+def installed(names: Iterable[str]) -> list[str]:
+    """Names of methods whose engine is installed."""
+    return [name for name in names if not missing_peers([name])]
+
+
+def missing_peers(names: Iterable[str] = OPTIONAL) -> list[str]:
+    """Modules of optional peers that are named, or begin a method's name, and not installed."""
+    families = {name.partition('-')[0] for name in names}
+    return [module for family, module in OPTIONAL.items()
+            if family in families and importlib.util.find_spec(module) is None]
 
 
 def all_methods(substeps: Iterable[int] = (1, 2, 4, 8, 16, 32)) -> list[Method]:
@@ -207,6 +228,9 @@ def all_methods(substeps: Iterable[int] = (1, 2, 4, 8, 16, 32)) -> list[Method]:
               for count in counts)]
 
 
+BY_SUBSTEPS = {'bullet': bullet, 'dart': dart, 'drake': drake}
+
+
 def by_name(name: str) -> Method:
     """Find a method by its name; OutOfRange lists the valid ones."""
     family, _, rest = name.partition('-')
@@ -215,12 +239,15 @@ def by_name(name: str) -> Method:
             return ours(rest)
         if name == 'quickstart':
             return quickstart()
-        if family in ('bullet', 'core'):
-            return bullet(int(rest)) if family == 'bullet' else core(float(rest))
+        if family == 'core':
+            return core(float(rest))
+        if family in BY_SUBSTEPS:
+            return BY_SUBSTEPS[family](int(rest))
         if family == 'mujoco':
             integrator, _, count = rest.partition('-')
             return mujoco(integrator, int(count))
     except ValueError:
         pass
     raise errors.OutOfRange('method', name,
-                            'ours-*, quickstart, core-SECONDS, bullet-N, mujoco-*-N')
+                            'ours-*, quickstart, core-SECONDS, bullet-N, mujoco-*-N, dart-N, '
+                            'drake-N')

@@ -3,6 +3,7 @@ import functools
 import math
 
 from ...physics.accuracy import ACCURACIES
+from ..cases.comparison import FRICTION, compared
 from ..cases.contact_cases import COLLISIONS, two_dolls
 from ..crowds.depth import BoneDepth
 from ..methods import by_name, run
@@ -26,9 +27,10 @@ def measure(name: str) -> list[Row]:
     """One row for each approach speed."""
     method, rows = by_name(name), []
     for speed in COLLISIONS:
-        trial = two_dolls(speed)
+        trial = compared(two_dolls(speed))
         moved, metrics = run(method, trial).trajectory, Metrics(trial.scene)
-        row: Row = {'method': name, 'label': method.label, 'speed_m_s': speed}
+        row: Row = {'method': name, 'label': method.label, 'friction': FRICTION,
+                    'speed_m_s': speed}
         rows.append(row | (dict.fromkeys(FIGURES, math.inf) if not moved.finite else {
             'momentum_drift': metrics.momentum_drift(trial, moved),
             'angular_momentum_drift': metrics.angular_momentum_drift(moved),

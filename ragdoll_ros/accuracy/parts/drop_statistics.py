@@ -1,6 +1,7 @@
 """Statistics of many drops: one drop is chaotic, but the distribution of many converges.
 
-Two populations: drops of random orientation and pose, and the default drop tilted by milliradians.
+Two populations: drops of random orientation and pose, and the default drop tilted by milliradians;
+each with restitution and without.
 Samples are compared with the reference's by the two-sample Kolmogorov-Smirnov test.
 """
 import dataclasses
@@ -9,12 +10,12 @@ import math
 
 import numpy as np
 
-from ...files.scene import load_scene
 from ...model import rotation
 from ...physics.accuracy import ACCURACIES
 from ..cases import starts
+from ..cases.comparison import FRICTION, RESTITUTIONS, compared, drop_scene
 from ..cases.trial import Trial
-from ..methods import by_name, reference, run
+from ..methods import by_name, installed, reference, run
 from ..metrics import Metrics
 from ..results.runner import Job, Row, RunOptions
 from ..trajectory import Trajectory
@@ -26,7 +27,16 @@ REFINEMENT = 50
 DURATION, CHUNK = 3.0, 10
 """s of each drop, and drops per job."""
 
-OTHERS = ('bullet-4', 'bullet-10', 'mujoco-implicitfast-4', 'mujoco-implicitfast-10')
+OTHERS = ('bullet-4', 'bullet-10', 'mujoco-implicitfast-4', 'mujoco-implicitfast-10', 'dart-4',
+          'dart-10')
+QUICK_OTHERS = ('bullet-10',)
+
+INELASTIC = ('mujoco-implicitfast-100', 'drake-10')
+"""Also without restitution: MuJoCo at steps of 0.1 ms, whose law is then ours, and Drake."""
+
+TILTED = ('dart-100',)
+"""Also of the default drop: DART at steps of 0.1 ms, whose law is ours but for the pyramid."""
+
 INSTANTS = (0.3, 0.5, 1.0)
 """s after release at which energies are compared; the first contact is at 0.286 s."""
 
@@ -35,38 +45,43 @@ TILT = 4e-3
 """Largest tilt about x and y, rad."""
 
 
-def random_drop(number: int) -> Trial:
+def random_drop(number: int, restitution: float) -> Trial:
     """The doll dropped from 0.4 m in a random orientation and pose."""
-    return dataclasses.replace(starts.trial('drop .4 m', number), duration=DURATION)
+    trial = compared(starts.trial('drop .4 m', number), restitution)
+    return dataclasses.replace(trial, duration=DURATION)
 
 
-def tilted_drop(number: int) -> Trial:
+def tilted_drop(number: int, restitution: float) -> Trial:
     """The default drop with a small random tilt."""
-    rng, scene = np.random.default_rng([20, number]), load_scene('drop')
+    rng, scene = np.random.default_rng([20, number]), drop_scene(restitution)
     tilt = (*rng.uniform(-TILT, TILT, 2), 0.0)
     placement = dataclasses.replace(scene.dolls[0], orientation=tuple(
         rotation.from_rotation_vector(np.array(tilt))))
     return Trial(dataclasses.replace(scene, dolls=(placement,)), DURATION)
 
 
-POPULATIONS = {'random': random_drop, 'default, tilted': tilted_drop}
-COUNTS = {'random': 300, 'default, tilted': 30}
-QUICK_COUNTS = {'random': 4}
+POPULATIONS = {f'{name}, e = {restitution:g}': functools.partial(make, restitution=restitution)
+               for restitution in RESTITUTIONS
+               for name, make in (('random', random_drop), ('default, tilted', tilted_drop))}
+COUNTS = dict(zip(POPULATIONS, (300, 30, 100, 30), strict=True))
+QUICK_COUNTS = dict.fromkeys([name for name in POPULATIONS if name.startswith('random')], 4)
 
 
 def jobs(options: RunOptions) -> list[Job]:
     """Jobs of CHUNK drops by each method; first the reference, which takes longest."""
     counts = QUICK_COUNTS if options.quick else COUNTS
-    names = [reference(REFINEMENT).name, *(f'ours-{accuracy}' for accuracy in ACCURACIES),
-             *(OTHERS[1:2] if options.quick else OTHERS)]
+    common = [reference(REFINEMENT).name, *(f'ours-{accuracy}' for accuracy in ACCURACIES),
+              *(QUICK_OTHERS if options.quick else installed(OTHERS))]
     made = []
-    for name in names:
-        for population, count in counts.items():
+    for population, count in counts.items():
+        checks = [*(INELASTIC if population.endswith('e = 0') else ()),
+                  *(TILTED if population.startswith('default') else ())]
+        for name in (*common, *([] if options.quick else installed(checks))):
             for first in range(0, count, CHUNK):
                 end = min(first + CHUNK, count)
                 made.append(Job(NAME, f'{population} drops, {name}', functools.partial(
                     measure, population, name, first, end),
-                    (end - first) * (2.0 if name == names[0] else 0.15)))
+                    (end - first) * (2.0 if name in (common[0], *TILTED) else 0.15)))
     return made
 
 
@@ -76,7 +91,8 @@ def measure(population: str, name: str, first: int, end: int) -> list[Row]:
     for number in range(first, end):
         trial = POPULATIONS[population](number)
         found.append(quantities(trial, run(method, trial).trajectory))
-    return [{'population': population, 'method': name, 'label': method.label, 'drops': end - first,
+    return [{'population': population, 'method': name, 'label': method.label,
+             'friction': FRICTION, 'drops': end - first,
              'values': {key: [row[key] for row in found] for key in QUANTITIES}}]
 
 

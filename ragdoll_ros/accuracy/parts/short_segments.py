@@ -1,19 +1,31 @@
-"""Short segments of the default drop, each restarted from an instant of a reference run.
+"""Short segments of drops of the default doll, each restarted from an instant of a reference run.
 
 Impacts are chaotic, so a long run says little about a method. After Erez, Tassa and Todorov (ICRA
 2015): take many instants of a trajectory, run each method for 0.1 s from there, and compare with a
 reference from the same state. They compared each engine with itself; here the error is against one
 reference for all, and self-convergence and joint gaps are given in addition.
 """
+import dataclasses
 import functools
 
 import numpy as np
 
-from ...files.scene import load_scene
 from ...model.coordinates import GeneralizedState
 from ...physics.accuracy import ACCURACIES
+from ..cases.comparison import LAWS, Law, drop_scene
 from ..cases.trial import Trial
-from ..methods import Method, bullet, by_name, mujoco, reference, run, start_simulation
+from ..methods import (
+    Method,
+    bullet,
+    by_name,
+    dart,
+    drake,
+    installed,
+    mujoco,
+    reference,
+    run,
+    start_simulation,
+)
 from ..metrics import Metrics, compare
 from ..results.runner import Job, Row, RunOptions
 from ..trajectory import Trajectory
@@ -23,26 +35,37 @@ LENGTH = 0.1
 """s"""
 
 FINEST_SUBSTEPS, REFINEMENT = 128, 100
-"""Substeps of PyBullet and MuJoCo at their finest; step of `normal` over the reference's."""
+"""Substeps of the other engines at their finest; step of `normal` over the reference's."""
+
+SUBSTEPS, DEAR_SUBSTEPS = (1, 2, 4, 10, 16, 32, 100), (1, 4, 10, 32)
+"""Of other engines, and of Drake, whose steps take longest."""
 
 FIRST, LAST = 0.25, 1.3
 """s: segments begin between these, from before the first contact until the doll lies still."""
 
 
 def jobs(options: RunOptions) -> list[Job]:
-    """One timed job for each method."""
+    """One timed job for each law and method."""
     count = 6 if options.quick else 60
-    fixed = (4, 10) if options.quick else (1, 2, 4, 10, 16, 32)
-    names = [f'ours-{accuracy}' for accuracy in ACCURACIES]
-    names += [f'bullet-{n}' for n in fixed] + [f'mujoco-implicitfast-{n}' for n in fixed]
-    return [Job(NAME, f'pieces, {name}', functools.partial(measure, name, count),
-                weight=0.04 * count, timed=True) for name in names]
+    return [Job(NAME, f'pieces, e = {law.restitution:g}, µ = {law.friction:g}, {name}',
+                functools.partial(measure, name, count, law), weight=0.1 * count, timed=True)
+            for law in LAWS for name in names(law, options.quick)]
+
+
+def names(law: Law, quick: bool) -> list[str]:
+    """Methods that are compared; Drake has no restitution."""
+    counts = dict.fromkeys(('bullet', 'mujoco-implicitfast', 'dart'), SUBSTEPS)
+    if not law.restitution:
+        counts['drake'] = DEAR_SUBSTEPS
+    return [*(f'ours-{accuracy}' for accuracy in ACCURACIES),
+            *installed(f'{family}-{n}' for family, fixed in counts.items()
+                       for n in ((4, 10) if quick else fixed))]
 
 
 @functools.cache
-def segments(count: int) -> list[Trial]:
-    """Segments of the default drop from ``count`` instants of a run at `exact`."""
-    scene, found = load_scene('drop'), []
+def segments(count: int, law: Law) -> list[Trial]:
+    """Segments of the drop from ``count`` instants of a run at `exact`."""
+    scene, found = drop_scene(law.restitution, law.friction), []
     wanted = np.rint(np.linspace(FIRST, LAST, count) / scene.step).astype(int)
     states = {}
     with start_simulation(Trial(scene, LAST), 'exact') as simulation:
@@ -57,32 +80,36 @@ def segments(count: int) -> list[Trial]:
 
 def finest(family: str) -> Method:
     """The engine of a family at its finest; the reference for ours and all other names."""
-    return {'PyBullet': bullet(FINEST_SUBSTEPS),
+    return {'PyBullet': bullet(FINEST_SUBSTEPS), 'DART': dart(FINEST_SUBSTEPS),
+            'Drake': drake(DEAR_SUBSTEPS[-1]),
             'MuJoCo implicitfast': mujoco('implicitfast', FINEST_SUBSTEPS)}.get(
         family, reference(REFINEMENT))
 
 
 @functools.cache
-def truths(method: str, count: int) -> list[Trajectory]:
+def truths(method: str, count: int, law: Law) -> list[Trajectory]:
     """Trajectories of the segments by a method."""
-    return [run(by_name(method), trial).trajectory for trial in segments(count)]
+    return [run(by_name(method), trial).trajectory for trial in segments(count, law)]
 
 
-def measure(name: str, count: int) -> list[Row]:
+def measure(name: str, count: int, law: Law) -> list[Row]:
     """Largest error of each segment: median and 90th percentile over all segments."""
-    method, found, cpu = by_name(name), [], 0.0
+    method, found, cpu, reading = by_name(name), [], 0.0, 0.0
     for trial, truth, itself in zip(
-            segments(count), truths(reference(REFINEMENT).name, count),
-            truths(finest(method.family).name, count), strict=True):
+            segments(count, law), truths(reference(REFINEMENT).name, count, law),
+            truths(finest(method.family).name, count, law), strict=True):
         result = run(method, trial)
         metrics, error = Metrics(trial.scene), compare(result.trajectory, truth)
         found.append((error['position_worst_m'], error['angle_worst_rad'],
                       compare(result.trajectory, itself)['position_worst_m'],
                       metrics.joint_gap(result.trajectory), metrics.penetration(result.trajectory)))
         cpu += result.costs.sum()
+        reading += result.reading.sum()
     errors, angles, owns, gaps, sunk = np.array(found).T
-    return [{'method': name, 'label': method.label, 'family': method.family, 'pieces': count,
+    return [{'method': name, 'label': method.label, 'family': method.family,
+             **dataclasses.asdict(law), 'pieces': count,
              'reference': reference(REFINEMENT).label, 'cpu_s_per_s': float(cpu / (count * LENGTH)),
+             'reading_s_per_s': float(reading / (count * LENGTH)),
              'position_median_m': float(np.median(errors)),
              'position_p90_m': float(np.percentile(errors, 90)),
              'angle_median_rad': float(np.median(angles)),

@@ -1,4 +1,8 @@
-"""The nine classes of random starts: energy gain, overshoot, penetration, and CPU time."""
+"""The nine classes of random starts: energy gain, overshoot, penetration, and CPU time.
+
+Our settings run many starts of the default scene, whose friction is unlimited, each to rest. In
+comparisons all methods run the same few starts at the friction of comparisons.
+"""
 import dataclasses
 import functools
 import math
@@ -6,35 +10,39 @@ import math
 import numpy as np
 
 from ...physics.accuracy import ACCURACIES
+from ..cases.comparison import FRICTION, compared
 from ..cases.starts import CLASSES, trial
 from ..cases.trial import Trial
 from ..crowds.depth import BoneDepth
-from ..methods import Result, bullet, by_name, ours, run
+from ..methods import Method, Result, by_name, installed, run
 from ..metrics import Metrics
 from ..results.criteria import EXCESS
 from ..results.runner import Job, Row, RunOptions
 from ..trajectory import Trajectory
 
 NAME = 'classes'
+COMPARED = 'compared'
 RATIOS = 'ratios'
 WORST = ('excess', 'overshoot_rad', 'sinking_m', 'depth_m', 'gap_m', 'speed_m_s')
 
 RESTING, REST_SPEED = 15.0, 1e-3
 """Our simulation must be asleep so many s after the trial's end, all bones slower than m/s."""
 
-BASELINE = 10
-"""PyBullet's substeps in the baseline of CPU times."""
+OURS = tuple(f'ours-{accuracy}' for accuracy in ACCURACIES)
 
-CHEAPER = 4
-"""PyBullet's substeps in a second baseline: half the cost, equal accuracy on the ground."""
+BASELINE = 'bullet-10'
+"""Whose CPU time the others' are divided by."""
 
-REPEATS = 3
+TIMED = (BASELINE, *OURS, 'bullet-4', 'mujoco-implicitfast-10', 'mujoco-implicitfast-4', 'dart-10',
+         'dart-4')
+
+REPEATS, COUNT = 3, 30
+"""Runs of each start that is timed; compared starts of each class."""
 
 CHUNK = 10
 """Starts per job."""
 
-OTHERS = ('quickstart', f'bullet-{BASELINE}', f'bullet-{CHEAPER}', 'bullet-20',
-          'mujoco-implicitfast-10')
+OTHERS = ('quickstart', BASELINE, 'bullet-4', 'bullet-20', 'mujoco-implicitfast-10', 'dart-10')
 
 QUICK_CLASSES = ('push .1 to 3 s', 'spin 20 rad/s', 'drop 2 m', 'start outside')
 
@@ -43,10 +51,11 @@ def jobs(options: RunOptions) -> list[Job]:
     """Jobs of our accuracies and the other methods on all classes, and of CPU ratios."""
     made = []
     for name in CLASSES:
-        for method in [f'ours-{accuracy}' for accuracy in ACCURACIES]:
+        for method in OURS:
             made += chunks(name, method, 2 if options.quick else options.starts)
-        for method in OTHERS[1:2] if options.quick else OTHERS:
-            made += chunks(name, method, 2 if options.quick else min(30, options.starts))
+        for method in (OURS[1], BASELINE) if options.quick else (*OURS, *installed(OTHERS)):
+            made += chunks(name, method, 2 if options.quick else min(COUNT, options.starts),
+                           COMPARED)
         if not options.quick or name in QUICK_CLASSES:
             made.append(Job(RATIOS, f'CPU, {name}', functools.partial(
                 time_class, name, 1 if options.quick else 5), 2 if options.quick else 16,
@@ -54,31 +63,44 @@ def jobs(options: RunOptions) -> list[Job]:
     return made
 
 
-def chunks(class_name: str, method: str, count: int) -> list[Job]:
+def chunks(class_name: str, method: str, count: int, part: str = NAME) -> list[Job]:
     """Jobs of CHUNK starts each."""
-    return [Job(NAME, f'{class_name}, {method}', functools.partial(
-        measure_class, class_name, method, first, min(count, first + CHUNK)),
+    measure = measure_class if part == NAME else compare_class
+    return [Job(part, f'{class_name}, {method}', functools.partial(
+        measure, class_name, method, first, min(count, first + CHUNK)),
         weight=0.2 * min(CHUNK, count - first)) for first in range(0, count, CHUNK)]
 
 
 def measure_class(class_name: str, method_name: str, first: int, end: int) -> list[Row]:
-    """Worst figures of starts first ... end - 1 of a class."""
+    """Worst figures of starts first ... end - 1 of a class, and whether they come to rest."""
     method, found = by_name(method_name), []
     for number in range(first, end):
         start = trial(class_name, number)
         ticks = len(start.times(method.tick)) - 1
-        whole = dataclasses.replace(start, duration=start.duration + RESTING)
-        result = run(method, whole if method.family == 'ours' else start)
-        found.append({'number': number, 'cpu_s': float(result.costs[:ticks].sum()),
-                      'simulated_s': start.duration, 'restless': restless(result),
-                      **worst(start, result.trajectory.part(slice(ticks + 1)))})
+        result = run(method, dataclasses.replace(start, duration=start.duration + RESTING))
+        found.append({'number': number, 'restless': restless(result),
+                      **figures(start, result, ticks)})
     return [gathered(class_name, method_name, found)]
+
+
+def compare_class(class_name: str, method_name: str, first: int, end: int) -> list[Row]:
+    """The same at the friction of comparisons, without the rest."""
+    method, found = by_name(method_name), []
+    for number in range(first, end):
+        start = compared(trial(class_name, number))
+        result = run(method, start)
+        found.append({'number': number, **figures(start, result, len(result.costs))})
+    return [{**gathered(class_name, method_name, found), 'friction': FRICTION}]
+
+
+def figures(start: Trial, result: Result, ticks: int) -> Row:
+    """CPU time and worst figures of the first ``ticks`` of a start."""
+    return {'cpu_s': float(result.costs[:ticks].sum()), 'simulated_s': start.duration,
+            **worst(start, result.trajectory.part(slice(ticks + 1)))}
 
 
 def restless(result: Result) -> bool:
     """Whether one of our simulations is not at rest and asleep at the end."""
-    if not result.measures:
-        return False
     speeds = np.linalg.norm(result.trajectory.linear_velocities[-1], axis=-1)
     return not (speeds.max() < REST_SPEED and result.measures['asleep'])
 
@@ -105,7 +127,7 @@ def gathered(class_name: str, method: str, found: list[Row]) -> Row:
             'bad': sum(not row['excess'] <= EXCESS for row in found),
             'worst_excess': worst['excess'], 'worst_start': worst['number'],
             **{f'worst_{key}': max(row[key] for row in found) for key in WORST[1:]},
-            'restless': sum(row['restless'] for row in found),
+            **({'restless': sum(row['restless'] for row in found)} if 'restless' in worst else {}),
             'settled': sum(row['settled_s'] < math.inf for row in found),
             'cpu_s': sum(row['cpu_s'] for row in found),
             'simulated_s': sum(row['simulated_s'] for row in found)}
@@ -126,25 +148,33 @@ def merged(rows: list[Row]) -> list[Row]:
         if row['worst_excess'] > old['worst_excess']:
             old['worst_start'] = row['worst_start']
         for name, value in row.items():
-            if name in ('class', 'method', 'worst_start'):
+            if name in ('class', 'method', 'friction', 'worst_start'):
                 continue
             old[name] = max(old[name], value) if name.startswith('worst') else old[name] + value
     return list(joined.values())
 
 
 def time_class(class_name: str, count: int) -> list[Row]:
-    """CPU time of our accuracies and of PyBullet at N = 4 over that of PyBullet at N = 10.
+    """CPU time of stepping by each method over that of the baseline.
 
     Methods alternate. Each tick counts with its least cost of REPEATS runs, which excludes the
     load of other processes.
     """
-    methods = [bullet(BASELINE), *map(ours, ACCURACIES), bullet(CHEAPER)]
-    sums = dict.fromkeys((method.name for method in methods), 0.0)
+    methods = [by_name(name) for name in installed(TIMED)]
+    sums = {method.name: np.zeros(2) for method in methods}
     for number in range(count):
-        start = trial(class_name, number)
-        rounds = [[run(method, start).costs for method in methods] for _ in range(REPEATS)]
-        for method, costs in zip(methods, zip(*rounds, strict=True), strict=True):
-            sums[method.name] += float(np.min(costs, axis=0).sum())
-    base = sums[f'bullet-{BASELINE}']
-    return [{'class': class_name, 'method': name, 'starts': count, 'cpu_s': value,
-             'ratio': value / base} for name, value in sums.items()]
+        start = compared(trial(class_name, number))
+        for method, costs in zip(methods, least_costs(methods, start), strict=True):
+            sums[method.name] += costs
+    base = sums[BASELINE][0]
+    return [{'class': class_name, 'method': method.name, 'label': method.label,
+             'friction': FRICTION, 'starts': count, 'cpu_s': float(stepping),
+             'reading_s': float(reading), 'ratio': float(stepping / base)}
+            for method in methods for stepping, reading in [sums[method.name]]]
+
+
+def least_costs(methods: list[Method], start: Trial) -> list[tuple[float, float]]:
+    """CPU time, s, of stepping and reading by each method; of each tick the least of all runs."""
+    rounds = [[run(method, start) for method in methods] for _ in range(REPEATS)]
+    return [tuple(float(np.min([getattr(result, name) for result in results], axis=0).sum())
+                  for name in ('costs', 'reading')) for results in zip(*rounds, strict=True)]

@@ -59,7 +59,7 @@ def figures(motion: ReferenceMotion, method: Method, result: Result, truth: Traj
     row: Row = {'motion': motion.name, 'title': motion.title, 'reference': motion.reference,
                 'yardstick': motion.error_key, 'method': method.name, 'label': method.label,
                 'family': method.family, 'substeps': method.substeps,
-                'cpu_s_per_s': result.cpu_s_per_s,
+                'cpu_s_per_s': result.cpu_s_per_s, 'reading_s_per_s': result.reading_s_per_s,
                 'tick_p99_s': float(np.percentile(result.costs, 99)),
                 'finite': trajectory.finite, **compare(trajectory, truth)}
     row['energy_excess'] = metrics.energy_excess(trial, trajectory)

@@ -6,6 +6,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from ..methods import missing_peers
 from ..parts import (
     collisions,
     convergence,
@@ -34,6 +35,10 @@ PARTS = {'precision': work_precision, 'orders': orders, 'restitution': restituti
          'faints': fainting_falls}
 """Modules by their names for --case; each has a function jobs()."""
 
+MERGED = {start_classes.NAME: start_classes.merged, start_classes.COMPARED: start_classes.merged,
+          drop_statistics.NAME: drop_statistics.merged}
+"""Parts whose jobs give rows of chunks, and what joins them."""
+
 NEEDED = ('scipy', 'matplotlib', 'mujoco')
 """Packages of the extra `report`, imported only where they are used."""
 
@@ -61,11 +66,12 @@ def parser() -> argparse.ArgumentParser:
     """Options of the command."""
     made = argparse.ArgumentParser(
         prog='ragdoll_report', description='Measure errors and CPU time of the simulation, '
-        'compared with PyBullet and MuJoCo. Writes accuracy.json, accuracy.md and pictures.',
+        'compared with PyBullet and MuJoCo, and with DART and Drake where they are installed. '
+        'Writes accuracy.json, accuracy.md and pictures.',
         epilog='example: ragdoll_report --quick --out /tmp/report; '
         'ragdoll_report --case classes --starts 300')
     made.add_argument('--quick', action='store_true',
-                      help='fewer motions, methods and starts: at most 90 s (else 40 min)')
+                      help='fewer motions, methods and starts: at most 90 s (else 60 min)')
     made.add_argument('--case', action='append', metavar='NAME', default=[],
                       help='only this part or motion; repeatable; "list" prints all names')
     made.add_argument('--starts', type=int, default=100, metavar='N',
@@ -101,16 +107,19 @@ def measured(options: argparse.Namespace) -> dict:
     """Run the jobs; returns the data of the JSON."""
     if options.starts < 1:
         raise WrongCall(f'--starts {options.starts}: expected 1 or more')
-    began = time.monotonic()
+    began, missing = time.monotonic(), missing_peers()
+    if missing:
+        sys.stderr.write(f'not compared, as not installed: {", ".join(missing)} '
+                         '(pip install "ragdoll_ros[peers]")\n')
     rows = run_jobs(chosen(options.case, RunOptions(options.quick, options.starts)))
-    for part in (start_classes, drop_statistics):
-        if part.NAME in rows:
-            rows[part.NAME] = part.merged(rows[part.NAME])
+    for part, merged in MERGED.items():
+        if part in rows:
+            rows[part] = merged(rows[part])
     words = ['ragdoll_report', *(['--quick'] if options.quick else []),
              *(f'--case {name}' for name in options.case),
              *([f'--starts {options.starts}'] if options.starts != 100 else [])]
-    return {'about': figures.about(' '.join(words), time.monotonic() - began, options.quick,
-                                   options.starts), 'figures': rows}
+    about = figures.about(' '.join(words), time.monotonic() - began, options.quick, options.starts)
+    return {'about': {**about, 'missing': missing}, 'figures': rows}
 
 
 def write(folder: Path) -> None:

@@ -48,9 +48,13 @@ QUANTITIES = (('energy_0.5s', 'relative energy at 0.5 s'), ('energy_1s', 'at 1 s
           ('slide_m', 'slide, m'), ('settled_s', 'settling time, s'))
 
 
+RANDOM = ('random', 'random, e = 0.5')
+"""Populations that are drawn; the first is that of older versions."""
+
+
 def draw_drops(figures: Figures, plt: object) -> object:
     """Cumulative distributions of random drops by each method; black: the reference."""
-    rows = [row for row in sound(figures.get('drops', ())) if row['population'] == 'random']
+    rows = [row for row in sound(figures.get('drops', ())) if row['population'] in RANDOM]
     if not rows:
         return None
     figure, grid = plt.subplots(1, len(QUANTITIES), figsize=(14, 3.4), layout='constrained')

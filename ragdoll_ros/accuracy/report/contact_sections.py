@@ -1,6 +1,9 @@
 """Sections about contacts: convergence, restitution, segments, drops, collisions."""
+from collections.abc import Iterator
+
 from ..results.figures import Row, number
-from ..results.markdown import Section, table
+from ..results.laws import law_name, law_note, motion_law_note
+from ..results.markdown import Section, present, table
 
 
 def convergence_tables(rows: list[Row]) -> list[str]:
@@ -42,37 +45,53 @@ def restitution_tables(rows: list[Row]) -> list[str]:
 RESTITUTION = Section(
     'restitution', 'Restitution of single bodies',
     'Released level at 1 m. The first table has the measured restitution of the first bounce.',
-    body=restitution_tables)
+    body=restitution_tables, law=motion_law_note)
 
 CONVERGENCE = Section(
     'convergence', 'Convergence of motions with contacts',
     'The references are closed forms and event-driven integrations that share no code with an '
     'engine. A slope near 0 means that an engine converges to another solution, however small '
     'its difference to its own finest run.', body=convergence_tables,
-    above=(('convergence', 'Error over step size, by motion'),))
+    above=(('convergence', 'Error over step size, by motion'),), law=motion_law_note)
 
 
-def segments_table(rows: list[Row]) -> list[str]:
+def by_law(rows: list[Row]) -> Iterator[tuple[list[str], list[Row]]]:
+    """Yield a heading, none for figures of older versions, and the rows of each law."""
+    for name in dict.fromkeys(map(law_name, rows)):
+        yield [f'### {name}'] if name else [], [row for row in rows if law_name(row) == name]
+
+
+def segments_tables(rows: list[Row]) -> list[str]:
+    """The reference, and a table for each law."""
+    names = ', '.join(dict.fromkeys(row['reference'] for row in rows if 'reference' in row))
+    blocks = [f'Reference: {names}.'] * bool(names)
+    for heading, own in by_law(rows):
+        blocks += [*heading, segments_table(own)]
+    return blocks
+
+
+def segments_table(rows: list[Row]) -> str:
     """Errors of short segments, and CPU time over that of PyBullet at N = 10."""
     base = next((number(row['cpu_s_per_s']) for row in rows if row['method'] == 'bullet-10'), None)
     lines = [{**row, 'ratio': base and number(row['cpu_s_per_s']) / base} for row in rows]
-    names = ', '.join(dict.fromkeys(row['reference'] for row in rows if 'reference' in row))
-    return [f'Reference: {names}.'] * bool(names) + [table(lines, (
+    return table(lines, present(lines, (
         ('label', 'method', '{}'), ('cpu_s_per_s', 'CPU ms/s', 'ms'),
-        ('ratio', 'over PyBullet N = 10', '{:.2f}'),
+        ('ratio', 'over PyBullet N = 10', '{:.2f}'), ('reading_s_per_s', 'reading ms/s', 'ms'),
         ('position_median_m', 'position mm, median', 'mm'), ('position_p90_m', '90 %', 'mm'),
         ('angle_median_rad', 'angle °, median', 'deg'),
         ('gap_worst_m', 'largest joint gap m', '{:.0e}'),
         ('sinking_worst_m', 'largest penetration mm', 'mm'),
         ('own_median_m', 'self-convergence: against its finest mm, median', 'mm'),
-        ('own_p90_m', '90 %', 'mm')))]
+        ('own_p90_m', '90 %', 'mm'))))
 
 
 SEGMENTS = Section(
     'pieces', 'Short segments through contacts',
     'Segments of 0.1 s from instants of the default drop, with self-collision (after Erez, Tassa '
     'and Todorov, ICRA 2015), against one reference. The last two columns are no errors: they '
-    'compare each engine with its own finest run.', body=segments_table,
+    'compare each engine with its own finest run. Without restitution and friction all engines '
+    'have the same law: there the finest steps of each are an independent check of the reference.',
+    body=segments_tables, law=law_note,
     below=(('pieces', 'Error over CPU time through contacts'),))
 
 DROP_HEADS = {'energy_0.3s': 'relative energy at 0.3 s', 'energy_0.5s': 'at 0.5 s',
@@ -99,7 +118,8 @@ DROPS = Section(
     'drops', 'Statistics of many drops',
     'A fall is chaotic, the distribution of many is not. Means with their standard errors; p is '
     'that of the two-sample Kolmogorov-Smirnov test against the reference: where it is small, the '
-    'distributions differ.', body=drop_tables,
+    'distributions differ. At e = 0 the laws of most engines agree: MuJoCo at N = 100, in steps of '
+    '0.1 ms, is an independent check of the reference.', body=drop_tables, law=law_note,
     below=(('drops', 'Distributions of random drops'),))
 
 COLLISIONS = Section(
@@ -109,4 +129,5 @@ COLLISIONS = Section(
         ('label', 'method', '{}'), ('speed_m_s', 'm/s', '{:g}'),
         ('momentum_drift', 'momentum drift', '{:.0e}'),
         ('angular_momentum_drift', 'angular m. drift', '{:.0e}'),
-        ('depth_m', 'bone penetration mm', 'mm'), ('energy_excess', 'energy excess', '{:.0e}')))
+        ('depth_m', 'bone penetration mm', 'mm'), ('energy_excess', 'energy excess', '{:.0e}')),
+    law=law_note)

@@ -1,6 +1,7 @@
 """Plots of the report, drawn from its JSON alone."""
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 
 from ..results.criteria import EXCESS
 from ..results.figures import Figures, Row, number, sound
+from ..results.laws import law_name
 from .contact_plots import draw_convergence, draw_drops, draw_fainting_falls, draw_fall_directions
 
 if TYPE_CHECKING:
@@ -17,9 +19,10 @@ if TYPE_CHECKING:
 
 BLUE, RED, ORANGE, GREY = '#1f5fbf', '#c8321e', '#e69f00', '#8a8a8a'
 COLOURS = {'ours': BLUE, 'quickstart': RED, 'PyBullet': ORANGE, 'MuJoCo euler': '#9ac7a4',
-           'MuJoCo implicitfast': '#4f9d69', 'MuJoCo rk4': '#12532c'}
+           'MuJoCo implicitfast': '#4f9d69', 'MuJoCo rk4': '#12532c', 'DART': '#8e5ea2',
+           'Drake': '#6b4f3a'}
 MARKS = {'ours': 'D', 'quickstart': 'X', 'PyBullet': 'o', 'MuJoCo euler': 'v',
-         'MuJoCo implicitfast': '^', 'MuJoCo rk4': 's'}
+         'MuJoCo implicitfast': '^', 'MuJoCo rk4': 's', 'DART': 'p', 'Drake': 'h'}
 SMALLEST = 1e-16
 """Where errors of zero are drawn."""
 
@@ -44,6 +47,7 @@ def draw_all(figures: Figures, folder: Path) -> dict[str, str]:
     made = {}
     for name, draw in (('energy', draw_energy), ('precision', draw_precision),
                        ('pieces', draw_segments), ('drop', draw_drop), ('classes', draw_classes),
+                       ('compared', functools.partial(draw_classes, part='compared')),
                        ('orders', draw_orders), ('estimate', draw_estimate),
                        ('convergence', draw_convergence), ('drops', draw_drops),
                        ('faints', draw_fainting_falls), ('faint_directions', draw_fall_directions)):
@@ -133,21 +137,27 @@ def draw_segments(figures: Figures, plt: object) -> object:
     rows = [row for row in sound(figures.get('pieces', ())) if 'reference' in row]
     if not rows:
         return None
-    figure, axes = plt.subplots(figsize=(7.5, 4.2))
-    _work_precision(axes, rows, 'position_median_m')
-    axes.set_title('Segments of 0.1 s through contacts, against one reference', loc='left')
-    axes.legend(fontsize=9)
+    laws = list(dict.fromkeys(map(law_name, rows)))
+    figure, grid = plt.subplots(1, len(laws), figsize=(7.5 * len(laws), 4.2), squeeze=False,
+                                sharey=True, layout='constrained')
+    for axes, law in zip(grid.flat, laws, strict=True):
+        _work_precision(axes, [row for row in rows if law_name(row) == law], 'position_median_m')
+        axes.set_title(law or 'Segments of 0.1 s through contacts, against one reference',
+                       loc='left')
+        axes.legend(fontsize=9)
     return figure
 
 
-def draw_classes(figures: Figures, plt: object) -> object:
-    """Largest energy gain in each class of starts."""
-    rows = sound(figures.get('classes', ()))
+def draw_classes(figures: Figures, plt: object, part: str = 'classes') -> object:
+    """Largest energy gain in each class of starts, by the methods of a part."""
+    rows = sound(figures.get(part, ()))
     classes = list(dict.fromkeys(row['class'] for row in rows))
     shown = (('ours-draft', '#9dbbe8', 'ours draft'), ('ours-normal', BLUE, 'ours normal'),
              ('ours-exact', '#0c2d66', 'ours exact'), ('bullet-10', ORANGE, 'PyBullet N = 10'),
              ('bullet-20', '#f3d38a', 'PyBullet N = 20'),
-             ('mujoco-implicitfast-10', '#4f9d69', 'MuJoCo implicitfast N = 10'))
+             ('mujoco-implicitfast-10', '#4f9d69', 'MuJoCo implicitfast N = 10'),
+             ('dart-10', '#8e5ea2', 'DART N = 10'))
+    shown = [entry for entry in shown if entry[0] in {row['method'] for row in rows}]
     if not rows:
         return None
     figure, axes = plt.subplots(figsize=(11, 4.2))

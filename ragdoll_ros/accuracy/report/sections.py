@@ -3,11 +3,14 @@ from ..cases.hard_cases import hard_cases
 from ..parts.fainting_falls import falls_tables
 from ..results.criteria import ROUNDING, criteria
 from ..results.figures import Row, number
-from ..results.markdown import Section, table
+from ..results.laws import law_note, motion_law_note
+from ..results.markdown import Section, present, table
 from . import contact_sections
+from .law_choices import LAW_CHOICES
 
 MOTION_COLUMNS = (
     ('label', 'method', '{}'), ('cpu_s_per_s', 'CPU ms/s', 'ms'),
+    ('reading_s_per_s', 'reading ms/s', 'ms'),
     ('position_worst_m', 'position m, largest', '{:.1e}'), ('position_rms_m', 'RMS', '{:.1e}'),
     ('angle_worst_rad', 'angle rad, largest', '{:.1e}'),
     ('energy_excess', 'energy excess', '{:.1e}'), ('momentum_drift', 'momentum drift', '{:.0e}'),
@@ -23,22 +26,29 @@ def motion_tables(rows: list[Row]) -> list[str]:
         sinking = (('sinking_m', 'penetration mm', 'mm'),) if 'sinking_m' in own[0] else ()
         apexes = ((key, key.replace('_', ' '), '%') for key in own[0] if key.startswith('apex'))
         blocks += [f'### {own[0]["title"]}', f'Reference: {own[0]["reference"]}.',
-                   table(own, (*MOTION_COLUMNS, *sinking, *apexes))]
+                   table(own, present(own, (*MOTION_COLUMNS, *sinking, *apexes)))]
     return blocks
 
 
 def ratio_table(rows: list[Row]) -> list[str]:
-    """CPU times over those of the first method, by class and in total."""
+    """CPU times over those of the first method, by class and in total, and the share of reading."""
     methods = list(dict.fromkeys(row['method'] for row in rows))
     lines = [{'class': name, **{row['method']: row['ratio'] for row in rows
                                 if row['class'] == name}}
              for name in dict.fromkeys(row['class'] for row in rows)]
-    sums = {method: sum(number(row['cpu_s']) for row in rows if row['method'] == method)
-            for method in methods}
-    lines.append({'class': 'all', **{method: sums[method] / sums[methods[0]]
-                                     for method in methods}})
+    lines.append({'class': 'all', **_over_first(rows, methods, 'cpu_s')})
+    if all('reading_s' in row for row in rows):
+        lines.append({'class': 'all, reading of poses',
+                      **_over_first(rows, methods, 'reading_s')})
     return [table(lines, (('class', 'class', '{}'),
                           *((method, method, '{:.2f}') for method in methods)))]
+
+
+def _over_first(rows: list[Row], methods: list[str], key: str) -> dict[str, float]:
+    """A time of each method, over the first method's CPU time of stepping."""
+    base = sum(number(row['cpu_s']) for row in rows if row['method'] == methods[0])
+    return {method: sum(number(row[key]) for row in rows if row['method'] == method) / base
+            for method in methods}
 
 
 def hard_table(rows: list[Row]) -> list[str]:
@@ -59,17 +69,37 @@ def hard_table(rows: list[Row]) -> list[str]:
         ('other', 'PyBullet N = 10', '{}'))), *filter(None, ['\n'.join(reasons)])]
 
 
-HARD = Section('hard', 'Hard cases, at normal', body=hard_table)
+def real_time_tables(rows: list[Row]) -> list[str]:
+    """Costs of a tick; one table for each law."""
+    blocks = []
+    for heading, own in contact_sections.by_law(rows):
+        blocks += [*heading, table(own, present(own, (
+            ('label', 'method', '{}'), ('cpu_s_per_s', 'CPU ms/s', 'ms'),
+            ('reading_s_per_s', 'reading ms/s', 'ms'), ('p50_s', 'tick µs', 'us'),
+            ('reading_p50_s', 'reading µs', 'us'), ('p99_s', 'p99', 'us'),
+            ('worst_s', 'worst', 'us'), ('over_budget', 'ticks over budget', '{:.1%}'))))]
+    return blocks
+
+
+CLASS_COLUMNS = (
+    ('class', 'class', '{}'), ('method', 'method', '{}'), ('starts', 'starts', '{}'),
+    ('bad', 'bad', '{}'), ('worst_excess', 'largest excess', '{:.1e}'),
+    ('worst_start', 'its start', '{}'), ('worst_overshoot_rad', 'overshoot °', 'deg'),
+    ('worst_sinking_m', 'penetration mm', 'mm'), ('worst_depth_m', 'bone penetration mm', 'mm'),
+    ('worst_gap_m', 'joint gap m', '{:.0e}'), ('worst_speed_m_s', 'top speed m/s', '{:.0f}'),
+    ('settled', 'settled in time', '{}'))
+
+HARD = Section('hard', 'Hard cases, at normal', body=hard_table, law=law_note)
 
 SECTIONS = (
     Section('energy', 'Energy over time',
             above=(('energy', 'A spinning doll: energy over time'),
-                   ('drop', 'The default drop: energy over time'))),
+                   ('drop', 'The default drop: energy over time')), law=law_note),
     Section('precision', 'Reference motions',
             'Lower left is better. Dashed: the Pareto front of CPU time and error, on which errors '
             f'below {ROUNDING:g} m or rad count as rounding.',
             body=motion_tables,
-            above=(('precision', 'Error over CPU time for every motion'),)),
+            above=(('precision', 'Error over CPU time for every motion'),), law=motion_law_note),
     Section('orders', 'Orders of convergence',
             'Slope of the error over the tick, by least squares on the logarithms; our simulation '
             'with one step per tick in flight.', (
@@ -81,28 +111,23 @@ SECTIONS = (
     contact_sections.RESTITUTION, contact_sections.CONVERGENCE, contact_sections.SEGMENTS,
     contact_sections.DROPS, contact_sections.COLLISIONS,
     Section('classes', 'Nine classes of starts',
-            'Energy excess is the largest rise of E - work above its running minimum, over '
-            'max(E0 + work); above 1e-5 a start counts as bad. Starts outside joint limits count '
-            'from the recovery of the joints. Restless: not asleep after 15 more s.', (
-                ('class', 'class', '{}'), ('method', 'method', '{}'), ('starts', 'starts', '{}'),
-                ('bad', 'bad', '{}'), ('worst_excess', 'largest excess', '{:.1e}'),
-                ('worst_start', 'its start', '{}'), ('worst_overshoot_rad', 'overshoot °', 'deg'),
-                ('worst_sinking_m', 'penetration mm', 'mm'),
-                ('worst_depth_m', 'bone penetration mm', 'mm'),
-                ('worst_gap_m', 'joint gap m', '{:.0e}'),
-                ('worst_speed_m_s', 'top speed m/s', '{:.0f}'),
-                ('settled', 'settled in time', '{}'), ('restless', 'restless', '{}')),
-            above=(('classes', 'Largest energy excess'),)),
+            'The default scene. Energy excess is the largest rise of E - work above its running '
+            'minimum, over max(E0 + work); above 1e-5 a start counts as bad. Starts outside joint '
+            'limits count from the recovery of the joints. Restless: not asleep after 15 more s.',
+            (*CLASS_COLUMNS, ('restless', 'restless', '{}')),
+            above=(('classes', 'Largest energy excess'),), law=law_note),
+    Section('compared', 'The same starts by all methods',
+            'The first starts of each class, the same for all methods.', CLASS_COLUMNS,
+            above=(('compared', 'Largest energy excess, the same starts'),), law=law_note),
     Section('ratios', 'CPU time over that of PyBullet at N = 10',
-            'Methods alternate on the same starts, in one process.', body=ratio_table),
+            'Methods alternate on the same starts, in one process.', body=ratio_table,
+            law=law_note),
     HARD,
     Section('costs', 'CPU time by scene', 'The default doll at normal.', (
         ('scene', 'scene', '{}'), ('tick_s', 'tick µs, median', 'us'),
         ('tick_p99_s', 'p99', 'us'))),
-    Section('real_time', 'The default drop in real time, 3 s', columns=(
-        ('label', 'method', '{}'), ('cpu_s_per_s', 'CPU ms/s', 'ms'), ('p50_s', 'tick µs', 'us'),
-        ('p99_s', 'p99', 'us'), ('worst_s', 'worst', 'us'),
-        ('over_budget', 'ticks over budget', '{:.1%}'))),
+    Section('real_time', 'The default drop in real time, 3 s', body=real_time_tables,
+            law=law_note),
     Section('estimate', 'Local error estimate',
             'Estimated over true local error of each tick in flight.', (
                 ('label', 'accuracy', '{}'), ('ticks', 'ticks', '{}'),
@@ -141,23 +166,36 @@ def markdown(data: dict, pictures: dict[str, str]) -> str:
         blocks += ['## Acceptance criteria', table(checked, (
             ('criterion', 'criterion', '{}'), ('required', 'required', '{}'),
             ('measured', 'measured', '{}'), ('met', 'met', '{}')))]
+    if any(figures.get(part) for part in ('pieces', 'drops', 'convergence')):
+        blocks.append(LAW_CHOICES)
     for section in SECTIONS:
         if figures.get(section.part):
             blocks += section.blocks(figures[section.part], pictures)
     return '\n\n'.join(blocks) + '\n'
 
 
+PLAIN = """\
+CPU times are those of one process. Ours are whole ticks in Python, with the poses of all bones. \
+Of other engines they are those of stepping alone, N calls of the library for a tick in a plain \
+loop; what it takes to read the poses of all bones is given beside them."""
+
+WHOLE = """\
+CPU times are those of whole ticks in Python, including the reading of all poses, in one process."""
+"""Of figures of older versions."""
+
+
 def head(about: dict) -> list[str]:
     """Title, conditions of the run, and how CPU time is measured."""
     versions = ', '.join(f'{name} {version}' for name, version in about['versions'].items())
+    missing = ', '.join(about.get('missing', ()))
     return ['# Speed against error', f"""\
 Written by `{about['command']}`{' (quick)' if about['quick'] else ''} on {about['date']} in \
 {about['seconds']:.0f} s; every figure is in `accuracy.json`.
 Machine: {about['machine']}, {about['cores']} cores, {about['system']}. Python {about['python']}; \
 {versions}.
-{f"Our accuracies are those of the engine {about['engine']}." if 'engine' in about else ''}""",
-            """\
-CPU times are those of whole ticks in Python, including the reading of all poses, in one \
-process. On reference motions each tick counts with the median of its runs; in comparisons with \
-PyBullet and of scenes with the least, which excludes the load of other processes. Compare ratios, \
-not times. N is the number of substeps in a tick of 10 ms."""]
+{f"Our accuracies are those of the engine {about['engine']}." if 'engine' in about else ''}\
+{f" Not compared, as not installed: {missing}." if missing else ''}""",
+            f"""\
+{PLAIN if 'missing' in about else WHOLE} On reference motions each tick counts with the median of \
+its runs; in comparisons with PyBullet and of scenes with the least, which excludes the load of \
+other processes. Compare ratios, not times. N is the number of substeps in a tick of 10 ms."""]

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from .figures import Figures, Row, by_setting, criterion, number, sound
+from .laws import law_name
 
 CLOSED_FORMS = ('bounce', 'bounce_0.1', 'bounce_0.9', 'bounce_1', 'rod_frictionless', 'rod_sticks',
                 'rod_slides', 'two_balls', 'three_balls')
@@ -59,19 +60,32 @@ def _rocking(figures: Figures) -> Iterator[Row]:
 
 
 def _segments(figures: Figures) -> Iterator[Row]:
-    base = next((number(row['cpu_s_per_s']) for row in figures.get('pieces', ())
-                 if row.get('method') == 'bullet-10'), None)
+    bases = {law_name(row): number(row['cpu_s_per_s'])
+             for row in sound(figures.get('pieces', ())) if row.get('method') == 'bullet-10'}
     for accuracy, rows in by_setting(figures, 'pieces', lambda row: 'reference' in row):
-        median, most, ratio = SEGMENTS[accuracy]
-        found = 1e3 * number(rows[0]['position_median_m']), 1e3 * number(rows[0]['position_p90_m'])
-        yield criterion(f'short segments through contacts, {accuracy}',
-                        f'median at most {median:g} mm, 90 % at most {most:g} mm',
-                        f'{found[0]:.2f} mm, {found[1]:.2f} mm',
-                        found[0] <= median and found[1] <= most)
-        if base:
-            over = number(rows[0]['cpu_s_per_s']) / base
-            yield criterion(f'CPU of segments over PyBullet N = 10, {accuracy}',
-                            f'at most {ratio:g}', f'{over:.2f}', over <= ratio)
+        for row in rows:
+            yield from _segment(row, accuracy, bases.get(law_name(row)))
+
+
+def _segment(row: Row, accuracy: str, base: float | None) -> Iterator[Row]:
+    """Errors, and CPU time over ``base``, s per s, if there is one."""
+    median, most, ratio = SEGMENTS[accuracy]
+    name = f'{_law(row)}, {accuracy}'
+    found = 1e3 * number(row['position_median_m']), 1e3 * number(row['position_p90_m'])
+    yield criterion(f'short segments through contacts{name}',
+                    f'median at most {median:g} mm, 90 % at most {most:g} mm',
+                    f'{found[0]:.2f} mm, {found[1]:.2f} mm',
+                    found[0] <= median and found[1] <= most)
+    if base:
+        over = number(row['cpu_s_per_s']) / base
+        yield criterion(f'CPU of segments over PyBullet N = 10{name}', f'at most {ratio:g}',
+                        f'{over:.2f}', over <= ratio)
+
+
+def _law(row: Row) -> str:
+    """Contact parameters of a row in a criterion's name."""
+    name = law_name(row)
+    return f', {name}' if name else ''
 
 
 def _not_dominated(figures: Figures) -> Iterator[Row]:
@@ -79,23 +93,28 @@ def _not_dominated(figures: Figures) -> Iterator[Row]:
     others = [row for row in sound(figures.get('pieces', ()))
               if row['family'] != 'ours' and 'own_median_m' in row]
     for accuracy, rows in by_setting(figures, 'pieces', lambda row: 'own_median_m' in row):
-        ours = [number(rows[0][key]) for key in ('cpu_s_per_s', 'own_median_m')]
-        better = [row['label'] for row in others if number(row['cpu_s_per_s']) < ours[0]
-                  and number(row['own_median_m']) < ours[1]]
-        yield criterion(f'no engine is faster and closer to its own limit, {accuracy}', 'none',
-                        ', '.join(better) or 'none', not better)
+        for row in rows:
+            ours = [number(row[key]) for key in ('cpu_s_per_s', 'own_median_m')]
+            better = [other['label'] for other in others
+                      if law_name(other) == law_name(row)
+                      and number(other['cpu_s_per_s']) < ours[0]
+                      and number(other['own_median_m']) < ours[1]]
+            yield criterion(f'no engine is faster and closer to its own limit{_law(row)}, '
+                            f'{accuracy}', 'none', ', '.join(better) or 'none', not better)
 
 
 def _drops(figures: Figures) -> Iterator[Row]:
     for accuracy, rows in by_setting(figures, 'drops',
                                      lambda row: row['population'].startswith('default')):
-        off = {key.removesuffix('_off'): number(rows[0][key]) for key in rows[0]
-               if key.startswith('energy') and key.endswith('_off')}
-        measured = ', '.join(f'{value:.1f} at {key.removeprefix("energy_")}'
-                         for key, value in off.items())
-        yield criterion(f'energies of {rows[0]["drops"]} default drops, {accuracy}',
-                        f'within {STANDARD_ERRORS:g} standard errors of the reference', measured,
-                        max(off.values()) <= STANDARD_ERRORS)
+        for row in rows:
+            law = row['population'].removeprefix('default, tilted')
+            off = {key.removesuffix('_off'): number(row[key]) for key in row
+                   if key.startswith('energy') and key.endswith('_off')}
+            measured = ', '.join(f'{value:.1f} at {key.removeprefix("energy_")}'
+                                 for key, value in off.items())
+            yield criterion(f'energies of {row["drops"]} default drops{law}, {accuracy}',
+                            f'within {STANDARD_ERRORS:g} standard errors of the reference',
+                            measured, max(off.values()) <= STANDARD_ERRORS)
 
 
 def _collisions(figures: Figures) -> Iterator[Row]:

@@ -13,6 +13,8 @@ from ...physics.accuracy import ACCURACIES
 
 FILE = 'accuracy.json'
 
+PACKAGE = 'ragdoll_ros'
+
 Row = dict[str, object]
 """One result: figures by their names, which end in their units."""
 
@@ -27,8 +29,7 @@ def about(command: str, seconds: float, quick: bool, starts: int) -> dict[str, o
             'machine': _processor(), 'cores': os.cpu_count(),
             'system': f'{platform.system()} {platform.machine()}',
             'python': platform.python_version(), 'engine': 'rigid' if kernels.ready() else 'bullet',
-            'versions': {name: _version(name) for name in
-                         ('ragdoll_ros', 'pybullet', 'mujoco', 'numpy', 'scipy', 'numba')}}
+            'versions': dict(_versions())}
 
 
 def save(data: dict, folder: Path) -> Path:
@@ -92,11 +93,14 @@ def _plain(value: object) -> object:
     return value
 
 
-def _version(name: str) -> str:
-    try:
-        return importlib.metadata.version(name)
-    except importlib.metadata.PackageNotFoundError:
-        return 'from the source tree'
+def _versions() -> Iterator[tuple[str, str]]:
+    """Versions of the package and of the installed ones that the figures depend on."""
+    for name in (PACKAGE, 'pybullet', 'mujoco', 'dartpy', 'drake', 'numpy', 'scipy', 'numba'):
+        try:
+            yield name, importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            if name == PACKAGE:
+                yield name, 'from the source tree'
 
 
 def _processor() -> str:

@@ -25,6 +25,11 @@ def table(rows: Iterable[Row], columns: Sequence[Column]) -> str:
     return '\n'.join(lines)
 
 
+def present(rows: Sequence[Row], columns: Iterable[Column]) -> list[Column]:
+    """Columns that some row has a figure for; those of older versions lack some."""
+    return [column for column in columns if any(column[0] in row for row in rows)]
+
+
 def formatted(value: object, form: str = '{:.2g}') -> str:
     """A figure as text; infinity, also as JSON's text 'inf', stands for a diverged run."""
     if value is None:
@@ -59,14 +64,16 @@ class Section:
     above: Sequence[tuple[str, str]] = ()
     """Pictures before the rows: name and description."""
     below: Sequence[tuple[str, str]] = ()
+    law: Callable[[list[Row]], str] = lambda rows: ''
+    """Returns a note on what differs between the methods of the rows."""
 
     def blocks(self, rows: list[Row], pictures: dict[str, str]) -> list[str]:
         """Markdown blocks, to be separated by empty lines; ``pictures`` are files by names."""
         shown = [[f'![{text}]({pictures[name]})' for name, text in group if name in pictures]
                  for group in (self.above, self.below)]
         title = self.title.format(starts=rows[0].get('starts', ''))
-        return [f'## {title}', *filter(None, [self.intro]), *shown[0], *self.tables(rows),
-                *shown[1]]
+        return [f'## {title}', *filter(None, [self.intro, self.law(rows)]), *shown[0],
+                *self.tables(rows), *shown[1]]
 
     def tables(self, rows: list[Row]) -> list[str]:
         """Blocks of the rows alone, with a table of failed jobs."""

@@ -6,9 +6,11 @@ import sys
 import tempfile
 import time
 import traceback
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from ...physics.engine.substepped.engine import FrictionWarning
 from ...physics.engine.substepped.mujoco import silence_warnings
 from .figures import Row
 
@@ -73,8 +75,9 @@ def attempt(job: Job) -> list[Row]:
 
 
 def prepare() -> None:
-    """Silence MuJoCo's warnings about diverging runs, which show in the figures."""
+    """Silence warnings about diverging runs and friction, which show in figures and notes."""
     silence_warnings()
+    warnings.simplefilter('ignore', FrictionWarning)
     os.chdir(tempfile.gettempdir())
 
 

@@ -1,12 +1,13 @@
 """SubsteppedEngine: loads, work and energy account of engines with equal substeps."""
 import math
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 
 import numpy as np
 
 from ....model.coordinates import DofLayout, GeneralizedState
-from ....model.scene import Scene
+from ....model.scene import LARGEST_FRICTION, NO_SLIP, Scene
 from ....model.state import State
 from ...accuracy import Accuracy
 from ...rigid_body import GroundHeights
@@ -21,6 +22,10 @@ longest between two corrections of energy and momentum."""
 
 LEAST_SHARE = 0.01
 """Shortest interval under loads, as a fraction of the duration, however fast the bone spins."""
+
+
+class FrictionWarning(UserWarning):
+    """A scene's friction is beyond what PyBullet and MuJoCo represent, and is replaced."""
 
 
 class SubsteppedEngine(ABC):
@@ -41,6 +46,7 @@ class SubsteppedEngine(ABC):
 
     def __init__(self, scene: Scene, accuracy: Accuracy, *, workers: int = 1) -> None:
         self.scene, self.accuracy = scene, accuracy
+        _warn_of_friction(scene)
         self.layout = DofLayout([placement.doll for placement in scene.dolls])
         self._sums, self._heights = DollSums(scene), GroundHeights(scene)
         self.sleeping = np.zeros(len(scene.dolls), bool)
@@ -100,6 +106,15 @@ class SubsteppedEngine(ABC):
                 *drive_wrenches(drives, self._sums, self.state, length)])
             springs = [spring.after(length) for spring in springs]
             left -= length
+
+    def take_substeps(self, duration: float, substeps: int, loads: Wrenches = ()) -> None:
+        """Take equal substeps under constant loads as a program that uses the library alone would.
+
+        No energy account, no correction and no reading of poses; the account is wrong afterwards.
+        There are more than ``substeps`` where explicit damping would be unstable.
+        """
+        self._run_substeps(duration, max(substeps, self._least_substeps(duration)), loads)
+        self._invalidate()
 
     def put_to_sleep(self, dolls: np.ndarray) -> None:
         """Set all velocities to zero; the energy account is lowered by what is lost."""
@@ -234,3 +249,13 @@ class SubsteppedEngine(ABC):
 
     @abstractmethod
     def _discard(self, held: object) -> None: ...
+
+
+def _warn_of_friction(scene: Scene) -> None:
+    """Warn where finite_friction() replaces a coefficient of the scene."""
+    most = max(scene.material.on(bone)[0] for bone in (None, *scene.bones))
+    if most > LARGEST_FRICTION:
+        text = (f'unlimited friction is a coefficient of {NO_SLIP:g}' if math.isinf(most) else
+                f'friction {most:g} is a coefficient of {LARGEST_FRICTION:g}')
+        warnings.warn(f'scene {scene.name}: with PyBullet and MuJoCo {text}', FrictionWarning,
+                      stacklevel=5)

@@ -70,6 +70,7 @@ class MujocoEngine(SubsteppedEngine):
 
     def _run_substeps(self, duration: float, substeps: int,
                       loads: Wrenches) -> set[tuple[int, int]]:
+        """Take equal substeps by one call to MuJoCo; no pairs, which only _conserve() needs."""
         step = duration / substeps
         if step != self._model.opt.timestep:
             self._model.opt.timestep = step
@@ -77,9 +78,10 @@ class MujocoEngine(SubsteppedEngine):
             self._model.jnt_solref[:, 0] = LIMIT_SUBSTEPS * step
         self._apply(loads)
         self._mujoco.mj_step(self._model, self._data, substeps)
-        self._data.xfrc_applied[:] = 0
+        if loads:
+            self._data.xfrc_applied[:] = 0
         self._stale = True
-        return self._touching_pairs()
+        return set()
 
     def _read_state(self) -> State:
         self._refresh()

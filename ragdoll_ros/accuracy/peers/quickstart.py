@@ -9,10 +9,11 @@ import tempfile
 import numpy as np
 import pybullet
 
-from ..files.urdf import to_urdf
-from ..model.state import State
-from ..physics.engine.substepped.bullet import BREAKING_DISTANCE
-from .cases.trial import Trial
+from ...files.urdf import to_urdf
+from ...model.scene import finite_friction
+from ...model.state import State
+from ...physics.engine.substepped.bullet import BREAKING_DISTANCE
+from ..cases.trial import Trial
 
 STEP = 1 / 240
 
@@ -43,7 +44,7 @@ class Quickstart:
         self._set_material()
         self._place()
 
-    def advance(self) -> State:
+    def advance(self) -> None:
         """Advance by one step."""
         for load in self._trial.loads(self._time, self._time + STEP):
             link = self._links[load.bone]
@@ -52,7 +53,6 @@ class Quickstart:
                                         pybullet.WORLD_FRAME, physicsClientId=self._client)
         pybullet.stepSimulation(physicsClientId=self._client)
         self._time += STEP
-        return self.state
 
     @property
     def state(self) -> State:
@@ -106,7 +106,7 @@ class Quickstart:
             bodies.append((self._plane, -1))
         for body, link in bodies:
             pybullet.changeDynamics(
-                body, link, lateralFriction=min(material.friction, 10.0) ** 0.5,
+                body, link, lateralFriction=finite_friction(material.friction) ** 0.5,
                 restitution=material.restitution ** 0.5, physicsClientId=self._client)
 
     def _place(self) -> None:

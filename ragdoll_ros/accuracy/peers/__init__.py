@@ -1,0 +1,1 @@
+"""Other engines as the report runs them: plain steps, without help from this package."""
