@@ -142,7 +142,7 @@ def kill(process):
         process.wait()
 
 
-def end(process, sign, timeout=10.0):
+def end(process, sign, timeout=PATIENCE):
     """Send a signal; give the exit code and the seconds it took."""
     before = time.monotonic()
     process.send_signal(sign)

@@ -1,23 +1,25 @@
 """`ragdoll_viewer` as a process: its address, its ends, and what it refuses."""
 from __future__ import annotations
 
+import atexit
 import os
 import re
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 import urllib.request
 from pathlib import Path
 
 import pytest
 
-pytest.importorskip('viser')
+viser = pytest.importorskip('viser')
 from conftest import ROOT, light
 from page_client import PATIENCE, PageClient
 
-from ragdoll_ros.viewer.command import folder_for_files, is_public, main, stop_on_signals
+from ragdoll_ros.viewer.command import folder_for_files, is_public, main, server_at, stop_on_signals
 
 COMMAND = [sys.executable, '-m', 'ragdoll_ros.viewer.command']
 
@@ -45,20 +47,61 @@ def places_of(port):
     return [place for place in listening if place.endswith(f':{port:04X}')]
 
 
-@pytest.mark.parametrize('sign', [signal.SIGINT, signal.SIGTERM])
-def test_says_where_it_is_serves_and_ends_within_two_seconds(sign):
+SIGNS = pytest.mark.parametrize('sign', [signal.SIGINT, signal.SIGTERM])
+
+
+@SIGNS
+def test_says_where_it_is_serves_and_ends(sign):
     process, port = start('--scene', 'drop', '--port', '0')
     assert places_of(port) == [f'0100007F:{port:04X}'], 'this machine alone'
-    with urllib.request.urlopen(f'http://127.0.0.1:{port}', timeout=5) as answer:
+    with urllib.request.urlopen(f'http://127.0.0.1:{port}', timeout=PATIENCE) as answer:
         assert answer.status == 200 and b'<html' in answer.read()
     PageClient(port)
-    # A browser connects once more than it needs to, in reserve.
+    end_beside_a_reserve(process, port, sign)
+
+
+def end_beside_a_reserve(process, port, sign):
+    """End it well; give the seconds it took. A browser connects once more than it needs to."""
     with socket.create_connection(('127.0.0.1', port)):
         begin = time.monotonic()
         process.send_signal(sign)
-        out, error = process.communicate(timeout=10)
-        assert time.monotonic() - begin < 2
+        out, error = process.communicate(timeout=PATIENCE)
+        took = time.monotonic() - begin
     assert process.returncode == 0 and not out and 'Traceback' not in error
+    return took
+
+
+@pytest.mark.slow
+@SIGNS
+def test_ends_within_two_seconds(sign):
+    process, port = start('--scene', 'drop', '--port', '0')
+    PageClient(port)
+    assert end_beside_a_reserve(process, port, sign) < 2
+
+
+def test_an_end_does_not_wait_for_what_viser_waits_for(monkeypatch):
+    """Viser's stop() takes 6 s for a connection without a request; this one has no end."""
+    begun, released = threading.Event(), threading.Event()
+    ended, unregistered = [], []
+
+    class Server:
+        def __init__(self, *arguments, **options):
+            pass
+
+        def stop(self):
+            begun.set()
+            released.wait(PATIENCE)
+            ended.append(self)
+
+    monkeypatch.setattr(viser, 'ViserServer', Server)
+    monkeypatch.setattr(atexit, 'unregister', unregistered.append)
+    try:
+        with server_at('127.0.0.1', 0) as server:
+            assert not begun.is_set()
+        assert begun.wait(PATIENCE) and not ended
+        assert unregistered == [server.stop], 'nor at the exit of the interpreter'
+    finally:
+        released.set()
 
 
 def test_a_port_that_was_asked_for_and_is_taken_is_an_error(signals, capsys):
