@@ -4,11 +4,17 @@ from __future__ import annotations
 import importlib.util
 import os
 import signal
+import sys
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
+
+# Tests start some three hundred processes. Without bytecode each would compile the package anew,
+# as each process of pytest would all tests.
+os.environ.pop('PYTHONDONTWRITEBYTECODE', None)
+sys.dont_write_bytecode = False
 
 FILES_THAT_NEED = {'rclpy': ['test_ros_*.py'],
                    'mcap': ['test_replay*.py', 'test_ros_replay.py', 'test_viewer_recording.py',

@@ -15,7 +15,8 @@ from pathlib import Path
 
 import pytest
 
-viser = pytest.importorskip('viser')
+pytest.importorskip('viser')
+import viser
 from conftest import ROOT, light
 from page_client import PATIENCE, PageClient
 
