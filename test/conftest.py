@@ -1,6 +1,7 @@
 """What all tests share: this tree on the path, and a ROS domain of their own."""
 from __future__ import annotations
 
+import gc
 import importlib.util
 import os
 import signal
@@ -47,6 +48,7 @@ def pytest_configure(config):
     A shell starts what runs in the background, as CI may, with SIGINT ignored, and so would all
     programs that tests start: those that Ctrl-C should end would run on.
     """
+    gc.disable()
     config.option.loadscopereorder = False
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -56,6 +58,12 @@ def pytest_collection_modifyitems(items):
     """Files that take longest go first, so that no process is left with one of them at the end."""
     items.sort(key=lambda item: LONGEST.index(item.path.name) if item.path.name in LONGEST
                else len(LONGEST))
+
+
+def pytest_collection_finish(session):
+    """What has been imported and collected stays: no collection of garbage walks it again."""
+    gc.freeze()
+    gc.enable()
 
 
 def light():
