@@ -31,7 +31,7 @@ run: $(COMPILED) ## start node and page; arrow keys push; SCENE=crowd for anothe
 
 # A file's tests stay together: those of one ROS domain, and those that time, go one by one.
 test: $(COMPILED) chromium ## all tests except the slow ones
-	@$(BIN)/python -m pytest -n 4 --dist loadfile
+	@$(BIN)/python -m pytest -n 3 --dist loadfile
 
 # For the tests of the page: of Playwright only the driver comes from PyPI. Where there is none to
 # be had, those tests are skipped and say so.

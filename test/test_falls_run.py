@@ -22,7 +22,7 @@ from ragdoll_ros.falls.shard import FALLS_PER_SHARD, DatasetJob, make_shard
 from ragdoll_ros.model.errors import Unreadable
 
 pytest.importorskip('pyarrow')
-PATIENCE = 60.0
+PATIENCE = 180.0
 """s that a process has for what takes some."""
 
 SHORT = {**DROP, 'duration': 0.2}
