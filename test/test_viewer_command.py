@@ -27,7 +27,7 @@ COMMAND = [sys.executable, '-m', 'ragdoll_ros.viewer.command']
 
 def run(*arguments):
     return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, cwd=ROOT,
-                          env=light(), timeout=30)
+                          env=light(), timeout=PATIENCE)
 
 
 def start(*arguments):
@@ -124,7 +124,7 @@ def test_a_port_of_the_system_is_for_root_alone():
          # Who is nobody may not read the library from which this codec comes.
          'import os\n"".encode("idna")\n'
          'if os.getuid() == 0: os.setuid(65534)\nfree_port("127.0.0.1", 80)'],
-        cwd=ROOT, capture_output=True, text=True, timeout=30)
+        cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE)
     said = done.stderr.splitlines()[-1]
     assert '--port 80' in said and 'root' in said and '1024' in said
 
@@ -223,7 +223,7 @@ def test_says_what_to_install(tmp_path, missing, word, arguments):
     (tmp_path / f'{missing}.py').write_text('raise ImportError("not here")\n')
     path = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', '')])
     done = subprocess.run([*COMMAND, *arguments, '--port', '0'], capture_output=True, text=True,
-                          cwd=ROOT, timeout=30, env={**os.environ, 'PYTHONPATH': path})
+                          cwd=ROOT, timeout=PATIENCE, env={**os.environ, 'PYTHONPATH': path})
     assert done.returncode == 2 and word in done.stderr and 'Traceback' not in done.stderr
 
 
@@ -234,7 +234,7 @@ def test_what_to_install_is_said_before_machine_code_is_made():
                            'from ragdoll_ros.viewer.command import main\n'
                            'assert main(["--scene", "drop"]) == 2\n'
                            'sys.exit("numba" in sys.modules)'],
-                          capture_output=True, text=True, cwd=ROOT, timeout=60)
+                          capture_output=True, text=True, cwd=ROOT, timeout=PATIENCE)
     assert done.returncode == 0 and 'ragdoll_ros[viewer]' in done.stderr, done.stderr
 
 
@@ -249,5 +249,5 @@ def test_a_page_of_a_recording_or_a_node_needs_no_engine():
                            'import ragdoll_ros.viewer.page, ragdoll_ros.viewer.sources.playback\n'
                            'try: import ragdoll_ros.viewer.sources.node.source\n'
                            'except ModuleNotFoundError as error: assert error.name == "rclpy"\n'
-                           'sys.exit("pybullet" in sys.modules)'], cwd=ROOT, timeout=60)
+                           'sys.exit("pybullet" in sys.modules)'], cwd=ROOT, timeout=PATIENCE)
     assert done.returncode == 0
