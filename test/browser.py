@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
-PATIENCE = 60.0
+PATIENCE = 180.0
 """s that the page may take for anything, on a busy machine without a GPU."""
 
 SIZE = {'width': 800, 'height': 520}

@@ -1,14 +1,21 @@
 """What all tests share: this tree on the path, and a ROS domain of their own."""
 from __future__ import annotations
 
+import gc
 import importlib.util
 import os
 import signal
+import sys
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
+
+# Tests start some three hundred processes. Without bytecode each would compile the package anew,
+# as each process of pytest would all tests.
+os.environ.pop('PYTHONDONTWRITEBYTECODE', None)
+sys.dont_write_bytecode = False
 
 FILES_THAT_NEED = {'rclpy': ['test_ros_*.py'],
                    'mcap': ['test_replay*.py', 'test_ros_replay.py', 'test_viewer_recording.py',
@@ -21,18 +28,19 @@ collect_ignore_glob = [file for package, files in FILES_THAT_NEED.items()
                        if importlib.util.find_spec(package) is None for file in files]
 
 
-LONGEST = ('test_ros_teleop.py', 'test_ros_viewer.py', 'test_viewer_browser.py',
-           'test_falls_run.py', 'test_kernel_cache.py', 'test_package.py', 'test_planar_rods.py',
-           'test_ros_process.py',
-           'test_ros_programs.py', 'test_collision.py', 'test_fit_wild.py', 'test_ros_browser.py',
-           'test_swing.py', 'test_fit_split_characters.py', 'test_viewer_crowd.py',
-           'test_contact.py', 'test_grab.py', 'test_dynamics.py', 'test_fit_rigs.py',
-           'test_fit_saved.py', 'test_guard.py', 'test_fit_wrists.py', 'test_viewer_paint.py',
-           'test_viewer_walks.py', 'test_viewer_typed.py', 'test_report.py', 'test_security.py',
-           'test_ros_stamps.py', 'test_ros_inputs.py', 'test_ros_parameters.py',
-           'test_viewer_amiss.py', 'test_tutorial.py', 'test_without_numba.py',
-           'test_viewer_command.py', 'test_ros_signals.py', 'test_ros_full_disk.py',
-           'test_ros_replay.py', 'test_simulation.py', 'test_compiled_cache.py')
+LONGEST = ('test_falls_run.py', 'test_ros_viewer.py', 'test_collision.py', 'test_viewer_browser.py',
+           'test_planar_rods.py', 'test_ros_teleop.py', 'test_swing.py', 'test_viewer_walks.py',
+           'test_fit_split_characters.py', 'test_ros_stamps.py', 'test_package.py',
+           'test_viewer_typed.py', 'test_fit_wild.py', 'test_viewer_crowd.py', 'test_editor.py',
+           'test_viewer_amiss.py', 'test_fit_rigs.py', 'test_ros_browser.py', 'test_guard.py',
+           'test_ros_programs.py', 'test_fit_wrists.py', 'test_ros_process.py', 'test_contact.py',
+           'test_viewer_paint.py', 'test_dynamics.py', 'test_tutorial.py', 'test_grab.py',
+           'test_viewer_command.py', 'test_drive.py', 'test_ros_parameters.py', 'test_report.py',
+           'test_ros_inputs.py', 'test_clusters.py', 'test_without_numba.py', 'test_fit_saved.py',
+           'test_ros_signals.py', 'test_security.py', 'test_ros_replay.py', 'test_kernel_cache.py',
+           'test_ros_full_disk.py', 'test_fainting_falls.py', 'test_simulation.py', 'test_falls.py',
+           'test_compiled_cache.py')
+"""Those that work and those that wait in turn, so that both keep the processors busy."""
 
 
 def pytest_configure(config):
@@ -40,7 +48,10 @@ def pytest_configure(config):
 
     A shell starts what runs in the background, as CI may, with SIGINT ignored, and so would all
     programs that tests start: those that Ctrl-C should end would run on.
+
+    No garbage is collected until all tests are: a third of that time would go into it.
     """
+    gc.disable()
     config.option.loadscopereorder = False
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -50,6 +61,12 @@ def pytest_collection_modifyitems(items):
     """Files that take longest go first, so that no process is left with one of them at the end."""
     items.sort(key=lambda item: LONGEST.index(item.path.name) if item.path.name in LONGEST
                else len(LONGEST))
+
+
+def pytest_collection_finish(session):
+    """What has been imported and collected stays: no collection of garbage walks it again."""
+    gc.freeze()
+    gc.enable()
 
 
 def light():

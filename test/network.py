@@ -4,7 +4,7 @@ from __future__ import annotations
 import asyncio
 import threading
 
-PATIENCE = 60.0
+PATIENCE = 180.0
 
 
 class Network:

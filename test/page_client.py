@@ -15,7 +15,7 @@ from viser import _messages
 from ragdoll_ros.viewer.command import free_port, server_at
 from ragdoll_ros.viewer.page import Page
 
-PATIENCE = 60.0
+PATIENCE = 180.0
 
 
 class PageClient:

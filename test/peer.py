@@ -19,7 +19,7 @@ from conftest import light
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-PATIENCE = 60.0
+PATIENCE = 180.0
 """s that a condition may take: discovery alone takes up to 3 s, up to 10 on a busy machine, where
 what comes 100 times a second on many topics is heard some 10 s late as well."""
 
@@ -142,7 +142,7 @@ def kill(process):
         process.wait()
 
 
-def end(process, sign, timeout=10.0):
+def end(process, sign, timeout=PATIENCE):
     """Send a signal; give the exit code and the seconds it took."""
     before = time.monotonic()
     process.send_signal(sign)

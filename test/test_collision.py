@@ -1,6 +1,7 @@
 """Shape against shape: distances as MuJoCo has them, patches as geometry has them."""
 from __future__ import annotations
 
+import copy
 import itertools
 import math
 
@@ -46,13 +47,25 @@ class Body:
         self.turn = turn or UPRIGHT
 
     @property
-    def shape(self):
-        return Shape(self.kind, tuple(self.size), tuple(map(float, self.centre)),
-                     np.ascontiguousarray(self.turn.as_matrix()))
+    def turn(self):
+        return self._turn
 
-    def moved(self, way, spin=(0, 0, 0)):
-        return Body(self.kind, self.size, self.centre + way,
-                    Rotation.from_rotvec(spin) * self.turn)
+    @turn.setter
+    def turn(self, turn):
+        # SciPy takes as long for a matrix as the kernels for a gap.
+        self._turn, self._matrix = turn, np.ascontiguousarray(turn.as_matrix())
+
+    @property
+    def shape(self):
+        return Shape(self.kind, tuple(self.size), tuple(map(float, self.centre)), self._matrix)
+
+    def moved(self, way, spin=None):
+        if spin is not None:
+            return Body(self.kind, self.size, self.centre + way,
+                        Rotation.from_rotvec(spin) * self.turn)
+        body = copy.copy(self)
+        body.centre = self.centre + way
+        return body
 
     def seen(self, turn, way):
         return Body(self.kind, self.size, turn.apply(self.centre) + way, turn * self.turn)

@@ -3,6 +3,7 @@ ended; what cannot be written ends it in one line.
 """
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -21,7 +22,7 @@ from ragdoll_ros.falls.shard import FALLS_PER_SHARD, DatasetJob, make_shard
 from ragdoll_ros.model.errors import Unreadable
 
 pytest.importorskip('pyarrow')
-PATIENCE = 60.0
+PATIENCE = 180.0
 """s that a process has for what takes some."""
 
 SHORT = {**DROP, 'duration': 0.2}
@@ -36,11 +37,17 @@ def job():
 
 
 @pytest.fixture(scope='module')
-def whole(job, tmp_path_factory):
-    """The data set as this process makes it, shard by shard."""
+def made(job, tmp_path_factory):
+    """Folder of the data set as this process makes it, shard by shard."""
     folder = tmp_path_factory.mktemp('whole') / 'falls'
     build_dataset(job, folder, here)
-    return file_bytes(folder)
+    return folder
+
+
+@pytest.fixture(scope='module')
+def whole(made):
+    """Its files."""
+    return file_bytes(made)
 
 
 @pytest.fixture
@@ -116,7 +123,7 @@ def test_a_run_that_is_killed_ends_with_the_same_bytes(command, tmp_path, times)
     (folder / 'data/chunk-000/file-002.parquet.part').write_bytes(b'torn')
     with (folder / FILE).open('a') as file:
         file.write('{"shard": 2, "fal')
-    process = command('-o', folder, *many)
+    process = command('-o', folder, *many, '--workers', 1)
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, errors
     build_dataset(DatasetJob(recipe(SHORT), shards * FALLS_PER_SHARD), tmp_path / 'whole', here)
@@ -148,17 +155,17 @@ def test_ctrl_c_ends_the_run_in_one_line(command, tmp_path):
     _wait_until_no_process_of(process)
 
 
-def test_what_is_torn_is_made_again(job, whole, tmp_path):
-    build_dataset(job, tmp_path, here)
-    made = []
-    (tmp_path / 'data/chunk-000/file-001.parquet').write_bytes(b'PAR1')
-    (tmp_path / 'meta/episodes/chunk-000/file-002.parquet').unlink()
+def test_what_is_torn_is_made_again(job, made, whole, tmp_path):
+    folder, again = tmp_path / 'falls', []
+    shutil.copytree(made, folder)
+    (folder / 'data/chunk-000/file-001.parquet').write_bytes(b'PAR1')
+    (folder / 'meta/episodes/chunk-000/file-002.parquet').unlink()
 
     def watched(job, shards):
-        made.extend(shards)
-        return here(job, made)
-    build_dataset(job, tmp_path, watched, resume=True)
-    assert made == [1, 2] and file_bytes(tmp_path) == whole
+        again.extend(shards)
+        return here(job, again)
+    build_dataset(job, folder, watched, resume=True)
+    assert again == [1, 2] and file_bytes(folder) == whole
 
 
 def test_more_falls_keep_those_that_are_there(job, tmp_path):
@@ -190,7 +197,7 @@ def test_a_worker_that_is_killed_costs_its_shards_time(job, whole, tmp_path):
     killed = []
 
     def killing(job, shards):
-        for shard in make_shards(job, shards, workers=2):
+        for shard in make_shards(job, shards, workers=1):
             if not killed:
                 killed.append(_workers()[0])
                 os.kill(killed[0], signal.SIGKILL)
@@ -238,7 +245,7 @@ def test_a_full_disk_ends_the_run_in_one_line_and_it_goes_on_when_there_is_room(
     folder = tmp_path / 'small'
     folder.mkdir()
     own = ['unshare', '--mount', 'sh', '-c', FULL, str(folder / 'x'), str(folder)]
-    process = command('-o', folder / 'falls', before=own)
+    process = command('-o', folder / 'falls', '--workers', 1, before=own)
     _, errors = process.communicate(timeout=PATIENCE)
     if process.returncode in (1, 77) and 'mount' in errors:
         pytest.skip('no file system can be mounted here')

@@ -1,5 +1,5 @@
 """Machine code of a small package is kept, found again, thrown away, and done without."""
-import os
+import json
 import shutil
 import subprocess
 import sys
@@ -56,6 +56,40 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 """Writing a kernel fails after 1000 bytes, as on a disk that is full by then."""
 
 
+FORKS = """
+import json, os, pathlib, sys, traceback
+import numba
+
+numba.njit('f8(f8)')(lambda x: x + 1)
+sys.dont_write_bytecode = True
+for line in sys.stdin:
+    piece = json.loads(line)
+    places = [pathlib.Path(piece['folder'], name) for name in ('printed', 'said')]
+    if not (child := os.fork()):
+        status = 1
+        try:
+            for number, place in enumerate(places, 1):
+                os.dup2(os.open(place, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+            sys.path[:] = piece['paths']
+            os.environ.update(piece['variables'])
+            numba.config.reload_config()
+            exec(piece['code'], {'__name__': '__main__'})
+            status = 0
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(status)
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    print(json.dumps([status, *(place.read_text() for place in places)]), flush=True)
+"""
+"""For each line on stdin one of a process's forks: what it ends with, prints and says."""
+
+PATIENCE = 60.0
+"""s that the end of a process may take."""
+
+
 @pytest.fixture
 def tiny(tmp_path):
     """A package of two kernels, one of which calls the other, in two files."""
@@ -88,14 +122,41 @@ def made(place):
     return package
 
 
+class Numba:
+    """A process that has imported numba and forks for each piece of Python.
+
+    What numba's import and the making of its first function take, each piece would take anew.
+    """
+
+    def __init__(self):
+        self._process = subprocess.Popen([sys.executable, '-c', FORKS], stdin=subprocess.PIPE,
+                                         stdout=subprocess.PIPE, cwd='/', text=True)
+
+    def run(self, **piece):
+        """Run code with paths and variables of its own; exit code, stdout, stderr."""
+        print(json.dumps(piece), file=self._process.stdin, flush=True)
+        return json.loads(self._process.stdout.readline())
+
+    def close(self):
+        self._process.stdin.close()
+        assert self._process.wait(PATIENCE) == 0
+        self._process.stdout.close()
+
+
+@pytest.fixture(scope='module', autouse=True)
+def numba_process():
+    Numba.only = Numba()
+    yield
+    Numba.only.close()
+
+
 def run(tiny, code=USE):
     """Run Python; give what it prints, and the lines it says beside that."""
-    done = subprocess.run(
-        [sys.executable, '-c', code], capture_output=True, text=True, cwd='/', timeout=120,
-        env={**os.environ, 'PYTHONPATH': os.pathsep.join([str(tiny.parent), *sys.path[1:]]),
-             'NUMBA_CACHE_DIR': str(tiny.parent / 'kept'), 'PYTHONDONTWRITEBYTECODE': '1'})
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip(), done.stderr.splitlines()
+    status, printed, said = Numba.only.run(
+        code=code, paths=[str(tiny.parent), *sys.path[1:]],
+        variables={'NUMBA_CACHE_DIR': str(tiny.parent / 'kept')}, folder=str(tiny.parent))
+    assert status == 0, said
+    return printed.strip(), said.splitlines()
 
 
 def folder(tiny):

@@ -2,6 +2,7 @@
 engine against it.
 """
 import dataclasses
+import functools
 import math
 
 import numpy as np
@@ -20,6 +21,13 @@ from ragdoll_ros.physics.simulation import Simulation
 
 G, LENGTH, MASS = 9.8, 1.0, 2.0
 MOMENT = MASS * LENGTH ** 2 / 12
+
+
+@functools.cache
+def motion_and_truth(name):
+    """A motion of the planar doll and what is true of it, which takes some 2 s, once for all."""
+    motion = next(motion for motion in planar_doll.planar_motions() if motion.name == name)
+    return motion, motion.truth(motion.trial.times())
 
 
 def rod(friction, restitution=0.0):
@@ -170,8 +178,7 @@ def test_pybullet_without_restitution_comes_to_the_same(name, bound):
     """
     from ragdoll_ros.accuracy.methods import bullet, run
     from ragdoll_ros.accuracy.metrics import compare
-    motion = next(motion for motion in planar_doll.planar_motions() if motion.name == name)
-    truth = motion.truth(motion.trial.times())
+    motion, truth = motion_and_truth(name)
     coarse, fine = (compare(run(bullet(count), motion.trial).trajectory, truth)['position_worst_m']
                     for count in (4, 64))
     assert fine < bound and fine < coarse / 5
@@ -182,9 +189,8 @@ def test_steps_with_lasting_contacts_are_of_order_two(name):
     """Against the event-driven truth: a quarter of the step errs by a sixteenth, of which half is
     left to what contacts that begin and end add.
     """
-    motion = next(motion for motion in planar_doll.planar_motions() if motion.name == name)
-    times = motion.trial.times()
-    truth, errors = motion.truth(times), []
+    motion, truth = motion_and_truth(name)
+    errors = []
     for step in (2.5e-3, 6.25e-4):
         fine = dataclasses.replace(NORMAL, step=step, sleep=False)
         with Simulation(motion.trial.scene, accuracy=fine) as simulation:

@@ -22,17 +22,29 @@ def peer(ros):
     peer.destroy_node()
 
 
-def test_a_signal_ends_the_node_with_0_within_2_s(peer):
+def ends(peer):
+    """Start a node for each sign and end it well; give the seconds that each end took."""
     signs = (signal.SIGINT, signal.SIGTERM)
     processes = [start('node', '--ros-args', '-r', f'__ns:=/signalled_{number}')
                  for number in range(len(signs))]
     got = [peer.collect(PoseArray, f'/signalled_{number}/ragdoll/poses')
            for number in range(len(signs))]
-    peer.wait(lambda: all(got), timeout=30)
+    peer.wait(lambda: all(got))
+    times = []
     for process, sign in zip(processes, signs, strict=True):
         code, took = end(process, sign)
         assert code == 0, process.stderr_text
-        assert took < 2
+        times.append(took)
+    return times
+
+
+def test_a_signal_ends_the_node_with_0(peer):
+    ends(peer)
+
+
+@pytest.mark.slow
+def test_a_signal_ends_the_node_within_2_s(peer):
+    assert max(ends(peer)) < 2
 
 
 def test_a_wrong_start_ends_with_2_and_a_reason(ros, broken_scene):

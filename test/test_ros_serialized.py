@@ -176,6 +176,21 @@ def test_a_contact_s_pose_has_x_along_its_normal():
         np.array([1.0, 0, 0]), normal) for normal in normals], atol=1e-15)
 
 
+def test_a_template_makes_no_messages():
+    """It is traced from what ``make`` gives, and from then on without it."""
+    made = []
+
+    def make(*values):
+        made.append(to_pose_array('world', *values))
+        return made[-1]
+
+    template = SerializedTemplate.trace(make, (4, 7))
+    del made[:]
+    template.serialize(1, np.random.default_rng(0).normal(size=(4, 7)))
+    assert not made
+
+
+@pytest.mark.slow
 def test_packing_is_worth_it():
     poses = np.random.default_rng(0).normal(size=(1000, 7))
     make = functools.partial(to_pose_array, 'world')

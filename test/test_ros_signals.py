@@ -37,6 +37,7 @@ def wait(condition):
     end = time.monotonic() + PATIENCE
     while not condition():
         assert time.monotonic() < end, 'not in time'
+        time.sleep(0.001)  # leaves the processor to the process that is waited for
 
 
 def outcome(process):

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import argparse
+import atexit
 import contextlib
 import errno
 import importlib.util
@@ -273,7 +274,7 @@ def server_at(host: str, port: int) -> Iterator[object]:
     """Viser's server, without its output.
 
     It would take 6 s to close each connection without a request, such as a browser keeps in
-    reserve, so it is not waited for longer than STOP_TIMEOUT.
+    reserve, so it is not waited for longer than STOP_TIMEOUT, and not at the interpreter's exit.
     """
     import viser
     with contextlib.redirect_stdout(io.StringIO()):
@@ -282,6 +283,7 @@ def server_at(host: str, port: int) -> Iterator[object]:
         yield server
     finally:
         with contextlib.redirect_stdout(io.StringIO()):
+            atexit.unregister(server.stop)
             ending = threading.Thread(target=server.stop, daemon=True)
             ending.start()
             ending.join(STOP_TIMEOUT)

@@ -11,6 +11,10 @@ COINCIDENT = 1e-5
 SAMPLES, MIN_SAMPLES = 4000, 24
 """Points sampled from all clusters together, and at least from each, to measure distances."""
 
+ROWS = 32
+"""Points whose distances to all others are computed at once: these numbers stay in the processor's
+cache, and their product is too small for threads, whose start would take longer."""
+
 
 @dataclass(frozen=True)
 class SkinAdjacency:
@@ -73,20 +77,32 @@ def cluster_distances(character: Character, clusters: list[np.ndarray]) -> np.nd
     chosen = [clusters[bone][::-(-len(clusters[bone]) // most)] for bone in held]
     starts = np.cumsum([0, *(len(part) for part in chosen[:-1])])
     points = character.vertices[np.concatenate(chosen)]
+    squares = (points ** 2).sum(axis=1)
     distances = np.full((count, count), np.inf)
-    for bone, part in zip(held, chosen, strict=True):
-        own = character.vertices[part]
-        squares = ((own ** 2).sum(axis=1)[:, None] + (points ** 2).sum(axis=1) - 2 * own @ points.T)
-        nearest = np.sqrt(np.maximum(squares.min(axis=0), 0))
-        distances[bone, held] = np.minimum.reduceat(nearest, starts)
+    for index, (first, part) in enumerate(zip(starts, chosen, strict=True)):
+        # To itself and to those after it: the matrix is symmetric.
+        others, lengths = points[first:], squares[first:]
+        nearest = np.full(len(others), np.inf)
+        for own in np.split(others[:len(part)], range(ROWS, len(part), ROWS)):
+            np.minimum(nearest, _squares(own, others, lengths).min(axis=0), out=nearest)
+        distances[held[index], held[index:]] = np.minimum.reduceat(
+            np.sqrt(np.maximum(nearest, 0)), starts[index:] - first)
     return np.minimum(distances, distances.T)
+
+
+def _squares(a: np.ndarray, b: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Squared distances (m, n) m^2 between points (m, 3) and (n, 3) of squared lengths (n,)."""
+    products = 2 * a @ b.T
+    return np.subtract((a ** 2).sum(axis=1)[:, None] + lengths, products, out=products)
 
 
 def nearest_midpoint(character: Character, first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Midpoint (3,) m between two clusters of vertices where they are nearest to each other."""
     a, b = (character.vertices[part[::-(-len(part) // 1000)]] for part in (first, second))
-    squares = (a ** 2).sum(axis=1)[:, None] + (b ** 2).sum(axis=1) - 2 * a @ b.T
+    lengths = (b ** 2).sum(axis=1)
+    blocks = [_squares(own, b, lengths) for own in np.split(a, range(ROWS, len(a), ROWS))]
     # Within 1 % of the extent of the nearest pair, so that a ring gives its centre.
-    near = squares <= (np.sqrt(max(squares.min(), 0)) + 0.01 * character.extent) ** 2
-    rows, columns = np.nonzero(near)
+    least = max(min(block.min() for block in blocks), 0)
+    near = [block <= (np.sqrt(least) + 0.01 * character.extent) ** 2 for block in blocks]
+    rows, columns = np.nonzero(np.concatenate(near))
     return (a[rows].mean(axis=0) + b[columns].mean(axis=0)) / 2
