@@ -111,6 +111,25 @@ def test_hard_pushes_and_grabs_are_no_bad_states(engine):
             assert guard.advance() is None
 
 
+def test_energy_is_judged_by_cluster():
+    """Of a hundred dolls that are apart, one gains 30 J: a fifth of its own scale, and less than a
+    hundredth of that of all.
+    """
+    scene = load_scene('drop')
+    scene = dataclasses.replace(scene, dolls=tuple(
+        dataclasses.replace(scene.dolls[0], name=f'doll_{k}', position=(2.5 * k, 0.0, 1.0))
+        for k in range(100)))
+    with Simulation(scene, engine='rigid') as simulation:
+        guard = Guard(simulation)
+        assert guard.advance() is None
+        engine = simulation._engine
+        engine._clusters.v[engine.layout.doll_v[7]][:3] += (1.0, 0.0, 0.0)
+        engine._clusters.gather_state()
+        engine._clusters.invalidate()
+        bad = guard.advance()
+        assert bad is not None and 'energy rose' in bad.reason
+
+
 def test_a_guard_leaves_the_simulation_its_bits():
     rows = []
     for guarded in (False, True):

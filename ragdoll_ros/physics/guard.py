@@ -28,14 +28,14 @@ class BadState:
 class Guard:
     """Advances a simulation, and undoes ticks that end in a diverged state.
 
-    A state has diverged if a number is not finite or exceeds BOUND, or if energy rose in the tick
-    by more than Engine.energy_error times the energy scale: kinetic energy before the gain, plus
-    that of dolls that fall by a third of their extent and move at SPEED.
+    A state has diverged if a number is not finite or exceeds BOUND, or if the energy of a cluster
+    rose in the tick by more than Engine.energy_error times its energy scale: kinetic energy before
+    the gain, plus that of dolls that fall by a third of their extent and move at SPEED.
     """
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
-        self._energy_scale = _energy_scale(simulation.scene)
+        self._energy_scales = _energy_scales(simulation.scene)
         self._accept()
 
     def advance(self) -> BadState | None:
@@ -62,7 +62,7 @@ class Guard:
         simulation = self._simulation
         self._reset_count = simulation.reset_count
         self._good = simulation.checkpoint()
-        self._excess = simulation.energy_excess
+        self._excesses = simulation.energy_excesses
 
     def _fault(self, state: State, before: State) -> str:
         """Why a state has diverged; empty if it has not."""
@@ -75,13 +75,17 @@ class Guard:
                 return f'{name} is ' + (f'farther than {BOUND:g}' if finite else 'not finite')
         if state is before:
             return ''
-        simulation, excess = self._simulation, self._simulation.energy_excess
-        gained, share = excess - self._excess, simulation.energy_error
+        simulation, clusters = self._simulation, self._simulation.cluster_of_doll
+        excesses, share = simulation.energy_excesses, simulation.energy_error
+        gains = np.bincount(clusters, excesses - self._excesses)
+        scales = np.bincount(clusters, self._energy_scales)
         # The kinetic energy is computed only where it matters.
-        if not gained <= share * self._energy_scale and not gained <= share * (
-                self._energy_scale + simulation.kinetic_energy - gained):
-            return f'energy rose by {gained:.4g} J without work of a load'
-        self._excess = excess
+        if not (gains <= share * scales).all():
+            scales += np.bincount(clusters, simulation.kinetic_energies) - gains
+            rises = gains[~(gains <= share * scales)]
+            if len(rises):
+                return f'energy rose by {rises.max():.4g} J without work of a load'
+        self._excesses = excesses
         return ''
 
 
@@ -91,8 +95,8 @@ def sum_of_squares(numbers: np.ndarray) -> float:
     return float(np.einsum('i,i', flat, flat))
 
 
-def _energy_scale(scene: Scene) -> float:
-    """Energy scale, J, of a scene's dolls at rest."""
+def _energy_scales(scene: Scene) -> np.ndarray:
+    """Energy scale of each of a scene's dolls (d,) at rest, J."""
     gravity = np.linalg.norm(scene.gravity)
-    return sum(placement.doll.mass * (gravity * placement.doll.extent / 3 + SPEED ** 2 / 2)
-               for placement in scene.dolls)
+    return np.array([placement.doll.mass * (gravity * placement.doll.extent / 3 + SPEED ** 2 / 2)
+                     for placement in scene.dolls])

@@ -156,7 +156,22 @@ class Simulation:
     @property
     def energy_excess(self) -> float:
         """Energy, J, minus that at the start and all work since; negative after losses."""
-        return self._engine.energy_excess
+        return float(self._engine.energy_excesses.sum())
+
+    @property
+    def kinetic_energies(self) -> np.ndarray:
+        """Kinetic energy of each doll (d,) J."""
+        return self._engine.doll_totals.kinetic
+
+    @property
+    def energy_excesses(self) -> np.ndarray:
+        """Energy excess of each doll (d,) J; changes, summed over a cluster, are meaningful."""
+        return self._engine.energy_excesses
+
+    @property
+    def cluster_of_doll(self) -> np.ndarray:
+        """Number (d,) of the cluster in which each doll was integrated in the last tick."""
+        return self._engine.cluster_of_doll
 
     @property
     def energy_error(self) -> float:

@@ -225,8 +225,10 @@ class Engine(Protocol):
         """Which bones (n,) touch the ground."""
 
     @property
-    def energy_excess(self) -> float:
-        """Energy, J, minus that at the start and all work since; negative after losses."""
+    def energy_excesses(self) -> np.ndarray:
+        """Energy of each doll (d,) J, minus that at the start and all work since; negative after
+        losses. Only changes, summed over a cluster, are meaningful: work is that of the cluster.
+        """
 
     def measures(self) -> dict[str, float]:
         """Error measures and counters since the start; keys end in units."""

@@ -193,9 +193,9 @@ class Clusters:
             self._threads.shutdown()
             self._threads = None
 
-    def work(self) -> float:
-        """Work of pushes and grabs since the start, J."""
-        return float(self._work.sum())
+    def work(self) -> np.ndarray:
+        """Work (d,) of pushes and grabs since the start, J; that of a cluster at its first doll."""
+        return self._work.sum(axis=1)
 
     def totals(self) -> dict[str, float]:
         """Statistics since the start, summed over clusters."""

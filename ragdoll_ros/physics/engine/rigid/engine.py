@@ -94,7 +94,7 @@ class RigidEngine:
         clusters.exclude([own | JOINT_OUTSIDE_LIMITS for own in self._initial_overlaps])
         self._refresh()
         self._age = MAX_AGE
-        self._start_energy = float(self.doll_totals.energy.sum())
+        self._start_energies = self.doll_totals.energy.copy()
         self._last_start = None
 
     def advance(self, duration: float, wrenches: Wrenches = (), springs: Springs = (),
@@ -153,13 +153,13 @@ class RigidEngine:
         return self._clusters.on_ground()
 
     @property
-    def energy_excess(self) -> float:
-        return (float(self._doll_totals.energy.sum()) - self._start_energy - self._clusters.work())
+    def energy_excesses(self) -> np.ndarray:
+        return self._doll_totals.energy - self._start_energies - self._clusters.work()
 
     def measures(self) -> dict[str, float]:
         stats = self._clusters.totals()
         return {
-            'energy_excess_J': self.energy_excess,
+            'energy_excess_J': float(self.energy_excesses.sum()),
             'energy_lifted_J': float(stats['work_position_correction']),
             'work_of_pushes_J': float(stats['work_pushes']),
             'work_of_grabs_J': float(stats['work_grabs']),
@@ -171,10 +171,10 @@ class RigidEngine:
             'impacts': int(stats['impacts']), 'unsolved_total': int(stats['unsolved'])}
 
     def save(self) -> object:
-        return self._clusters.save(), self.sleeping.copy(), self._age, self._start_energy
+        return self._clusters.save(), self.sleeping.copy(), self._age, self._start_energies
 
     def restore(self, snapshot: tuple) -> None:
-        saved, self.sleeping[:], self._age, self._start_energy = snapshot
+        saved, self.sleeping[:], self._age, self._start_energies = snapshot
         self._clusters.restore(saved)
         self._last_start = None
         self._update_state()
@@ -183,10 +183,10 @@ class RigidEngine:
         """Nothing to release: the memory goes with the object."""
 
     def checkpoint(self) -> object:
-        return self._clusters.checkpoint(), self.sleeping.copy(), self._start_energy
+        return self._clusters.checkpoint(), self.sleeping.copy(), self._start_energies
 
     def restore_checkpoint(self, checkpoint: tuple) -> None:
-        saved, self.sleeping[:], self._start_energy = checkpoint
+        saved, self.sleeping[:], self._start_energies = checkpoint
         self._clusters.restore_checkpoint(saved)
         self._age = MAX_AGE
         self._last_start = None

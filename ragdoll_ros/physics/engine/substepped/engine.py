@@ -134,8 +134,10 @@ class SubsteppedEngine(ABC):
         return on
 
     @property
-    def energy_excess(self) -> float:
-        return self._account.excess(self.doll_totals.energy)
+    def energy_excesses(self) -> np.ndarray:
+        excesses = np.zeros(len(self.sleeping))
+        excesses[0] = self._account.excess(self.doll_totals.energy)
+        return excesses
 
     def measures(self) -> dict[str, float]:
         """Measures of the energy account, and the substeps of the last advance()."""

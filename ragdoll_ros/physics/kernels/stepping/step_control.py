@@ -34,7 +34,7 @@ SOLVER_GAIN = 1e-10
 KINETIC_GAIN = 1e-4
 """Share of the kinetic energy that a step may add."""
 
-UNSEEN_SPEED, UNSEEN_TURN = 0.5, 0.05
+UNSEEN_SPEED, UNSEEN_TURN = 0.25, 0.05
 """m/s, and rad: where times of impact are not sought, steps are shortened, down to the share
 COARSEST, so that what meets in one penetrates by no more than at this speed in a nominal step."""
 
