@@ -240,7 +240,8 @@ def test_the_energy_of_the_disturbance_is_work():
         while not simulation.asleep:
             simulation.advance()
             excess.append(simulation.energy_excess)
-        assert np.diff(excess).max() < 1e-9
+        # Of a step's contact solve: 1e-10 of m g L, L = 2 m, of which there are four in a tick.
+        assert np.diff(excess).max() < 4 * 1e-10 * 55 * 9.8 * 2
         assert simulation.measures()['work_of_pushes_J'] == work, 'once, as it falls'
 
 

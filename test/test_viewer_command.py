@@ -183,7 +183,7 @@ def test_a_page_that_others_reach_says_so(host, others):
 
 
 def test_an_open_host_is_told_with_what_to_do():
-    process, port = start('--scene', 'drop', '--host', '0.0.0.0', '--port', '0')
+    process, port = start('--scene', 'man_faints', '--host', '0.0.0.0', '--port', '0')
     process.send_signal(signal.SIGTERM)
     _, error = process.communicate(timeout=PATIENCE)
     said, = error.splitlines()

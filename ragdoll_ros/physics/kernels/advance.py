@@ -161,7 +161,7 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
         stats.ended_without_impact = 0 if touched else 1
         impact_due = True
         if touched:
-            impact_due = impact(s, ws, q, v) > 0
+            impact_due = impact(s, ws, cluster) > 0
             impacts += 1
     write_bone_states(s, ws.step.end, q, v, cluster.bone_states)
     sum_dolls(s, ws, ws.step.end, q, cluster.doll_sums)

@@ -157,3 +157,17 @@ def set_tangents(c: np.record) -> None:
     t = divide(t, norm(t))
     put(c.tangents[0], t)
     put(c.tangents[1], cross(n, t))
+
+
+@compiled
+def find_id(contacts: np.ndarray, count: int, id_: int, near: int) -> int:
+    """Index of the contact with this id among ``count``, searched from ``near`` on, as most keep
+    their order; ``count`` if there is none.
+    """
+    for n in range(count):
+        j = near + n
+        if j >= count:
+            j -= count
+        if contacts[j].id == id_:
+            return j
+    return count

@@ -17,10 +17,6 @@ from .dop853 import CONTINUED, SLOWEST, STAGES, step_error, weighted_sum
 SAFETY, MIN_GROWTH, MAX_GROWTH = 0.8, 0.2, 2.0
 """Share of the longest step that the tolerance allows, and bounds of a step over the last."""
 
-ROUNDING_ORDER = 3
-"""Of a step's length: where the error falls more slowly with it, it is by rounding. The method's
-falls with order 8, that of rounding with 1."""
-
 MAX_ROUNDING = 1e-6
 """Error by rounding as a share of what the state changes: more is that of a step far too long."""
 
@@ -114,9 +110,10 @@ def begin_dense_step(s: System, ws: Workspace, cluster: ClusterState, tolerance:
     tried = h
     step.rounding *= ROUNDING_DECAY
     for _ in range(MAX_TRIES):
-        error = dop853_step(s, ws, cluster, h)
+        error, share = dop853_step(s, ws, cluster, h), h / tried
         ws.stats[0].flight_steps += 1
-        if tolerance < error < math.inf and error > before * (h / tried) ** ROUNDING_ORDER and (
+        # The method's error falls with order 8, that of rounding with 1.
+        if tolerance < error < math.inf and error > before * share * share * share and (
                 error < MAX_ROUNDING * h * largest_rate(cluster)):
             step.rounding = max(step.rounding, ROUNDING_MARGIN * error / h)
         ratio = error / max(tolerance, step.rounding * h)

@@ -3,8 +3,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..cluster_state import ClusterState
 from ..compiling.decorators import compiled
-from ..contact.find_contacts import find_contacts
+from ..contact.find_contacts import find_contacts, find_id
 from ..contact.gaps import TOUCHING
 from ..contact.jacobian import contact_velocities
 from ..contact_kind import LIMIT
@@ -25,8 +26,8 @@ restitution; their time of impact is not sought."""
 SLOW_TURN = 0.1
 
 MET = 1e-7
-"""m or rad: geoms that are farther apart than this have no part in an impact, unless they approach:
-balls in a row that almost touch hit one after the other."""
+"""m or rad: geoms that are farther apart than this have no part in an impact, unless they approach
+or pressed on each other in the last step: balls that almost touch hit one after the other."""
 
 
 @compiled
@@ -36,16 +37,17 @@ def is_approaching(c: np.record) -> bool:
 
 
 @compiled
-def keep_met(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, v: np.ndarray,
-             m: int) -> int:
-    """Drop those of m contacts found that have not met, unless they approach. Returns how many are
-    kept.
+def keep_met(s: System, ws: Workspace, cluster: ClusterState, kin: Kinematics, m: int) -> int:
+    """Drop those of m contacts found at cluster.q that take no part in an impact, see MET. Returns
+    how many are kept.
     """
-    contacts, count = ws.contacts.found, 0
+    contacts, known, count = ws.contacts.found, cluster.contacts, 0
     for i in range(m):
         if contacts[i].gap > MET:
-            contact_velocities(s, kin, q, v, contacts[i])
-            if not is_approaching(contacts[i]):
+            contact_velocities(s, kin, cluster.q, cluster.v, contacts[i])
+            j = find_id(known, ws.stats[0].contact_count, contacts[i].id, 0)
+            pressed = j < ws.stats[0].contact_count and known[j].impulse[0] > 0
+            if not pressed and not is_approaching(contacts[i]):
                 continue
         contacts[count] = contacts[i]
         count += 1
@@ -53,15 +55,16 @@ def keep_met(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, v: np.nda
 
 
 @compiled
-def impact(s: System, ws: Workspace, q: np.ndarray, v: np.ndarray) -> int:
-    """Add to v the change by the impulses of everything that has met at q by ws.gaps. Returns how
-    many contacts that touch were left out.
+def impact(s: System, ws: Workspace, cluster: ClusterState) -> int:
+    """Add to cluster.v the change by the impulses of everything that has met at q by ws.gaps.
+    Returns how many contacts that touch were left out.
     """
-    kin, dyn, contacts = ws.step.start, ws.step.dynamics, ws.contacts.found
+    q, v, kin, dyn, contacts = (cluster.q, cluster.v, ws.step.start, ws.step.dynamics,
+                                ws.contacts.found)
     forward_kinematics(s.tree, q, v, kin)
     place_geoms(s.tree, s.body_root, s.geoms, q, kin)
     touching = find_contacts(s, ws, kin, q, ws.gaps, TOUCHING)
-    m = keep_met(s, ws, kin, q, v, touching)
+    m = keep_met(s, ws, cluster, kin, touching)
     if m == 0:
         return 0
     root_motion_subspaces(s.tree, q, kin)

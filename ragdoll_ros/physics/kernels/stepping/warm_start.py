@@ -6,6 +6,7 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
+from ..contact.find_contacts import find_id
 from ..contact_kind import LIMIT
 from ..impulses.solve_contacts import SEPARATING
 from ..maths.vectors import norm, vec
@@ -70,17 +71,3 @@ def take_start(c: np.record, start: np.record) -> None:
         c.friction = c.rolling_friction = 0.0
         for e in range(1, 5):
             c.impulse[e] = 0.0
-
-
-@compiled
-def find_id(contacts: np.ndarray, count: int, id_: int, near: int) -> int:
-    """Index of the contact with this id among ``count``, searched from ``near`` on, as most keep
-    their order; ``count`` if there is none.
-    """
-    for n in range(count):
-        j = near + n
-        if j >= count:
-            j -= count
-        if contacts[j].id == id_:
-            return j
-    return count
