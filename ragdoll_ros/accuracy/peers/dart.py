@@ -9,8 +9,9 @@ from ...model.scene import Scene
 from ...model.state import State
 from ..cases.trial import Trial, posed
 
-GROUND_SIZE, GROUND_DEPTH = 200.0, 2.0
-"""m: the ground is a box, since DART's own collision detector has no planes."""
+GROUND_SIZE, GROUND_DEPTH = 2000.0, 2.0
+"""m: the ground is a box, since DART's own collision detector has no planes; dolls that are pushed
+go 300 m."""
 
 
 class Dart:
