@@ -24,6 +24,7 @@ from ragdoll_ros.falls.simulate import simulate
 from ragdoll_ros.falls.start import JointRelease, Start
 from ragdoll_ros.model import rotation
 from ragdoll_ros.model.scene import SECOND
+from ragdoll_ros.people.fall_phases import bone_impacts, part_impact
 from ragdoll_ros.people.real_falls import DESCENT, IMPACT_SPEEDS
 from ragdoll_ros.physics.simulation import Simulation
 
@@ -77,6 +78,10 @@ def test_the_table_tells_means_in_the_real_ones_deviations():
     assert '| head | 0.50 | 0.35 |' in text
 
 
+CHAOTIC = 2
+"""Number of a fall in which moving the start by 1e-14 m changes velocities by 1e-3 m/s at .96 s."""
+
+
 def test_a_data_set_of_falls_measures_the_same_as_the_report():
     made = recipe(who={'people': [{'sex': 'female', 'height': 1.6, 'bmi': 22}]}, duration=DURATION,
                   feet=list(FEET), record={'rate': 100})
@@ -96,7 +101,13 @@ def test_a_data_set_of_falls_measures_the_same_as_the_report():
             -fall.impact_velocities[None, :, 2], {})
         expected = fall_values(start)
         assert summary.descents == pytest.approx([expected['descent']], abs=1e-9)
+        frames, velocities = bone_impacts(fall.states, fall.touching)
         for part in IMPACT_SPEEDS:
-            # Positions differ by rounding at the start, which impacts amplify.
+            _, speed = part_impact(part, start.scene.bone_names, frames, -velocities[:, 2])
             assert summary.speeds_of(part) == pytest.approx(
-                [value for value in [expected[part]] if not math.isnan(value)], abs=1e-3)
+                [value for value in [float(speed)] if not math.isnan(value)], abs=1e-12)
+            # Positions differ by rounding at the start, which impacts amplify: in CHAOTIC by 1e11
+            # until the pelvis hits.
+            if number != CHAOTIC:
+                assert summary.speeds_of(part) == pytest.approx(
+                    [value for value in [expected[part]] if not math.isnan(value)], abs=1e-3)

@@ -161,6 +161,8 @@ def markdown(data: dict, pictures: dict[str, str]) -> str:
     """
     figures = data['figures']
     blocks = head(data['about'])
+    if 'missing' not in data['about'] and figures.get('pieces'):
+        blocks.append(UNLIKE)
     checked = criteria(figures)
     if checked:
         blocks += ['## Acceptance criteria', table(checked, (
@@ -182,6 +184,11 @@ loop; what it takes to read the poses of all bones is given beside them."""
 WHOLE = """\
 CPU times are those of whole ticks in Python, including the reading of all poses, in one process."""
 """Of figures of older versions."""
+
+UNLIKE = """\
+These figures are older than the comparison at one friction. Where a scene has unlimited friction, \
+that of PyBullet and MuJoCo was 0.7, which accounts for most of their errors in short segments and \
+drops. `make report` measures anew."""
 
 
 def head(about: dict) -> list[str]:

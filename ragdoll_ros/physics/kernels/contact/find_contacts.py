@@ -171,3 +171,10 @@ def find_id(contacts: np.ndarray, count: int, id_: int, near: int) -> int:
         if contacts[j].id == id_:
             return j
     return count
+
+
+@compiled
+def pressed(contacts: np.ndarray, count: int, id_: int) -> bool:
+    """Whether the contact with this id among ``count`` of the last step had a normal impulse."""
+    j = find_id(contacts, count, id_, 0)
+    return j < count and contacts[j].impulse[0] > 0

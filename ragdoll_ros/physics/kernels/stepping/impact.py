@@ -5,7 +5,7 @@ import numpy as np
 
 from ..cluster_state import ClusterState
 from ..compiling.decorators import compiled
-from ..contact.find_contacts import find_contacts, find_id
+from ..contact.find_contacts import find_contacts, pressed
 from ..contact.gaps import TOUCHING
 from ..contact.jacobian import contact_velocities
 from ..contact_kind import LIMIT
@@ -41,13 +41,12 @@ def keep_met(s: System, ws: Workspace, cluster: ClusterState, kin: Kinematics, m
     """Drop those of m contacts found at cluster.q that take no part in an impact, see MET. Returns
     how many are kept.
     """
-    contacts, known, count = ws.contacts.found, cluster.contacts, 0
+    contacts, known, count = ws.contacts.found, ws.stats[0].contact_count, 0
     for i in range(m):
         if contacts[i].gap > MET:
             contact_velocities(s, kin, cluster.q, cluster.v, contacts[i])
-            j = find_id(known, ws.stats[0].contact_count, contacts[i].id, 0)
-            pressed = j < ws.stats[0].contact_count and known[j].impulse[0] > 0
-            if not pressed and not is_approaching(contacts[i]):
+            if not is_approaching(contacts[i]) and not (
+                    pressed(cluster.contacts, known, contacts[i].id)):
                 continue
         contacts[count] = contacts[i]
         count += 1

@@ -49,12 +49,14 @@ def warm_start(s: System, ws: Workspace, m: int, known: np.ndarray, h: float) ->
         for e in range(5):
             c.impulse[e] = 0.0
         j = find_id(known, stats.contact_count, c.id, j)
+        is_new = not ws.step.scalars[0].seeks_impacts
         if j < stats.contact_count:
+            is_new &= known[j].impulse[0] <= 0
             for e in range(5):
                 c.impulse[e] = share * known[j].impulse[e]
         k = find_id(ws.contacts.start, start_count, c.id, k)
         c.persistent = 1 if k < start_count and not (
-            is_approaching(ws.contacts.start[k]) and not ws.step.scalars[0].seeks_impacts) else 0
+            is_new and is_approaching(ws.contacts.start[k])) else 0
         if c.persistent:
             take_start(c, ws.contacts.start[k])
 
