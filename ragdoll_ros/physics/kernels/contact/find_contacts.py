@@ -13,7 +13,7 @@ from ..dynamics.kinematics import Kinematics
 from ..maths.vectors import add_scaled, column, cross, divide, dot, norm, put, sub, vec
 from ..system import System
 from ..workspace import Contacts, Workspace
-from .gaps import TOUCHING, ground_point, placed_shape
+from .gaps import MET, TOUCHING, ground_point, placed_shape
 from .patch import contract_friction_points
 
 IDS_PER_PAIR = 4096
@@ -174,7 +174,9 @@ def find_id(contacts: np.ndarray, count: int, id_: int, near: int) -> int:
 
 
 @compiled
-def pressed(contacts: np.ndarray, count: int, id_: int) -> bool:
-    """Whether the contact with this id among ``count`` of the last step had a normal impulse."""
+def had_met(contacts: np.ndarray, count: int, id_: int) -> bool:
+    """Whether the contact with this id is among ``count`` of the last step, nearer than MET. Not
+    whether it pressed: of redundant contacts rounding decides that.
+    """
     j = find_id(contacts, count, id_, 0)
-    return j < count and contacts[j].impulse[0] > 0
+    return j < count and contacts[j].gap <= MET

@@ -20,6 +20,10 @@ from ..workspace import Contacts, Workspace
 TOUCHING = 1e-6
 """m or rad: what is nearer touches."""
 
+MET = 1e-7
+"""m or rad: geoms that are farther apart than this have no part in an impact, unless they approach
+or were nearer in the last step: balls that almost touch hit one after the other."""
+
 FAR = 0.02
 """m: of geoms that are farther from the ground, the gap of their bounding sphere will do."""
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..cluster_state import ClusterState
 from ..compiling.decorators import compiled
-from ..contact.find_contacts import find_contacts, pressed
+from ..contact.find_contacts import find_contacts, had_met
 from ..contact.gaps import TOUCHING, update_kinematics_and_gaps
 from ..contact.jacobian import contact_velocities
 from ..contact_kind import LIMIT
@@ -60,13 +60,13 @@ def begin_contact_step(s: System, ws: Workspace, cluster: ClusterState) -> None:
 
 @compiled
 def approaches_fast(ws: Workspace, cluster: ClusterState) -> bool:
-    """Whether a contact at the start of a step that did not press in the last one closes so fast
-    that it is an impact: geoms that met as that ended, or points of a patch that it made penetrate.
+    """Whether a contact at the start of a step that was open in the last one closes so fast that
+    it is an impact: geoms that met as that ended, or points of a patch that it made penetrate.
     """
     for i in range(ws.step.scalars[0].start_contact_count):
         c = ws.contacts.start[i]
         if is_approaching(c) and not (
-                pressed(cluster.contacts, ws.stats[0].contact_count, c.id)):
+                had_met(cluster.contacts, ws.stats[0].contact_count, c.id)):
             return True
     return False
 

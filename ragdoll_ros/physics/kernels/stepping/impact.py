@@ -5,8 +5,8 @@ import numpy as np
 
 from ..cluster_state import ClusterState
 from ..compiling.decorators import compiled
-from ..contact.find_contacts import find_contacts, pressed
-from ..contact.gaps import TOUCHING
+from ..contact.find_contacts import find_contacts, had_met
+from ..contact.gaps import MET, TOUCHING
 from ..contact.jacobian import contact_velocities
 from ..contact_kind import LIMIT
 from ..dynamics.kinematics import (Kinematics, forward_kinematics, place_geoms,
@@ -25,10 +25,6 @@ restitution; their time of impact is not sought."""
 
 SLOW_TURN = 0.1
 
-MET = 1e-7
-"""m or rad: geoms that are farther apart than this have no part in an impact, unless they approach
-or pressed on each other in the last step: balls that almost touch hit one after the other."""
-
 
 @compiled
 def is_approaching(c: np.record) -> bool:
@@ -46,7 +42,7 @@ def keep_met(s: System, ws: Workspace, cluster: ClusterState, kin: Kinematics, m
         if contacts[i].gap > MET:
             contact_velocities(s, kin, cluster.q, cluster.v, contacts[i])
             if not is_approaching(contacts[i]) and not (
-                    pressed(cluster.contacts, known, contacts[i].id)):
+                    had_met(cluster.contacts, known, contacts[i].id)):
                 continue
         contacts[count] = contacts[i]
         count += 1

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..contact.find_contacts import find_id
+from ..contact.gaps import MET
 from ..contact_kind import LIMIT
 from ..impulses.solve_contacts import SEPARATING
 from ..maths.vectors import norm, vec
@@ -51,7 +52,7 @@ def warm_start(s: System, ws: Workspace, m: int, known: np.ndarray, h: float) ->
         j = find_id(known, stats.contact_count, c.id, j)
         is_new = not ws.step.scalars[0].seeks_impacts
         if j < stats.contact_count:
-            is_new &= known[j].impulse[0] <= 0
+            is_new &= known[j].gap > MET
             for e in range(5):
                 c.impulse[e] = share * known[j].impulse[e]
         k = find_id(ws.contacts.start, start_count, c.id, k)
