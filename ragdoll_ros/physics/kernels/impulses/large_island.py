@@ -17,7 +17,7 @@ from ..contact_kind import LIMIT, ROLLING
 from ..system import COMPLIANCE, MAX_BAND_WORK, NO_SLIP, System
 from ..workspace import Island, Workspace
 from .one_contact import project_to_disc, solve_one_contact
-from .solver import (JAMMED, OPENING, PROXIMAL, RESTITUTION_ROUNDS, ROUNDS, SWEEPS, UNSOLVED,
+from .solver import (UNSOLVABLE, OPENING, PROXIMAL, RESTITUTION_ROUNDS, ROUNDS, SWEEPS, UNSOLVED,
                      energy_bound_share, scale_to_no_work)
 from .sparse_newton import order_dofs, sparse_newton, write_velocities
 
@@ -50,7 +50,7 @@ def solve_large(s: System, ws: Workspace, m: int, n: int, h: float, has_restitut
         left, more = solve_rows(ws, m, n, b, p, dofs, width, rounds)
         sweeps += more
     work, spent = work_terms(island, n, u, p)
-    failed = rounds < ROUNDS and not left <= JAMMED
+    failed = rounds < ROUNDS and not left <= UNSOLVABLE
     if failed or (has_restitution and work + spent / 2 > 0):
         if failed:
             for i in range(n):

@@ -7,7 +7,7 @@ from ..compiling.decorators import compiled
 from ..maths.cholesky import factor_row, substitute
 from ..system import COMPLIANCE, IMPACT_COMPLIANCE
 from ..workspace import Island, Workspace
-from .solver import (JAMMED, RESTITUTION_ROUNDS, ROUNDS, UNSOLVED, energy_bound_share,
+from .solver import (UNSOLVABLE, RESTITUTION_ROUNDS, ROUNDS, UNSOLVED, energy_bound_share,
                      scale_to_no_work, solve_impulses, solve_position_correction)
 
 SINGULAR = 1e-13
@@ -35,7 +35,7 @@ def solve_small(ws: Workspace, m: int, n: int, h: float, tolerance: float, has_r
     mask_singular_rows(island.W, n, b)
     rounds = RESTITUTION_ROUNDS if has_restitution and h > 0 else ROUNDS
     left, sweeps = solve_impulses(island, m, n, b, p, tolerance, rounds)
-    failed = rounds < ROUNDS and not left <= JAMMED
+    failed = rounds < ROUNDS and not left <= UNSOLVABLE
     if failed or (has_restitution and energy_gain(island.W, u, p, n) > 0):
         for j in range(n):
             soft[j] = 0.0 if failed else p[j]

@@ -27,7 +27,7 @@ ROUNDS, LOOSER = 6, 3
 """Rounds of sweeps, twice as many each time, and of Newton's method, against ten times the proximal
 share; the first LOOSER rounds that fail are followed by ten times the tolerance."""
 
-RESTITUTION_ROUNDS, JAMMED = 1, 1e-2
+RESTITUTION_ROUNDS, UNSOLVABLE = 1, 1e-2
 """Rounds for what meets within a step with restitution, and the residual, m/s, that they leave
 where there is no solution: jammed bodies cannot separate on all sides. Restitution is left out
 there."""
