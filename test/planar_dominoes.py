@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ragdoll_ros.accuracy.references.contact_modes import contact_forces, rows_and_forces
+from ragdoll_ros.accuracy.references.contact_modes import constrained_motion
 
 DIFFERENCE = 1e-6
 """s: over which the contacts' rows are differentiated; the error is about 1e-10 m/s^2."""
@@ -86,13 +86,7 @@ class PlanarDominoes:
 
     def forces(self, y, modes):
         """Accelerations (3 n,) with fixed modes, and forces (k, 2) N of all contacts."""
-        mass, force = self.dynamics(y)
-        jacobian, drift = self.contact(y)
-        rows, forces = rows_and_forces(jacobian, modes, self.friction)
-        held = rows_and_forces(drift[..., None], modes, self.friction)[0][:, 0]
-        free, mobile = np.linalg.solve(mass, force), np.linalg.solve(mass, forces.T)
-        multipliers = np.linalg.lstsq(rows @ mobile, -held - rows @ free, rcond=1e-12)[0]
-        return free + mobile @ multipliers, contact_forces(multipliers, modes, self.friction)
+        return constrained_motion(*self.dynamics(y), *self.contact(y), modes, self.friction)
 
     def _touching(self, q, one):
         """Upper front corner of a box, and the middle of the back of the next, (2,) m each."""

@@ -51,6 +51,19 @@ def contact_forces(multipliers: np.ndarray, modes: Sequence[str], friction: floa
     return found
 
 
+def constrained_motion(mass: np.ndarray, force: np.ndarray, jacobian: np.ndarray, drift: np.ndarray,
+                       modes: Sequence[str], friction: float) -> tuple[np.ndarray, np.ndarray]:
+    """Accelerations (nv,) with fixed modes, and forces (k, 2) of all contacts.
+
+    ``force`` (nv,): generalized; ``drift`` (k, 2): accelerations of the contacts at none of these.
+    """
+    rows, forces = rows_and_forces(jacobian, modes, friction)
+    held = rows_and_forces(drift[..., None], modes, friction)[0][:, 0]
+    free, mobile = np.linalg.solve(mass, force), np.linalg.solve(mass, forces.T)
+    multipliers = np.linalg.lstsq(rows @ mobile, -held - rows @ free, rcond=1e-12)[0]
+    return free + mobile @ multipliers, contact_forces(multipliers, modes, friction)
+
+
 def choices(friction: float) -> tuple[str, ...]:
     """Possible modes of a contact that does not slide yet; without friction one sliding mode."""
     return MODES if friction > 0 else (OPEN, FORWARD)

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .contact_modes import contact_forces, rows_and_forces
+from .contact_modes import constrained_motion
 
 
 def directions(phi: np.ndarray) -> np.ndarray:
@@ -119,10 +119,4 @@ class PlanarRods:
 
     def forces(self, y: np.ndarray, modes: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n + 2,) with fixed modes, and forces (k, 2) N of all feet."""
-        mass, force = self.dynamics(y)
-        jacobian, drift = self.contact(y)
-        rows, forces = rows_and_forces(jacobian, modes, self.friction)
-        held = rows_and_forces(drift[..., None], modes, self.friction)[0][:, 0]
-        free, mobile = np.linalg.solve(mass, force), np.linalg.solve(mass, forces.T)
-        multipliers = np.linalg.lstsq(rows @ mobile, -held - rows @ free, rcond=1e-12)[0]
-        return free + mobile @ multipliers, contact_forces(multipliers, modes, self.friction)
+        return constrained_motion(*self.dynamics(y), *self.contact(y), modes, self.friction)
