@@ -14,8 +14,6 @@ RESTITUTIONS = (0.5, 0.0)
 """Compared: that of the default scene, and none, which every engine can represent."""
 
 
-
-
 @dataclass(frozen=True)
 class Law:
     """Contact parameters of a comparison."""

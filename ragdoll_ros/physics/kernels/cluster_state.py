@@ -55,8 +55,8 @@ unsolved, contacts dropped for want of space, searches for a time of impact that
 whose restitution was reduced to gain no energy, steps that gained some all the same. Of the last
 step: its contacts, whether it ended without an impact, its length and the longest that the next may
 have, s (0: any). Work of pushes, of grabs, and of position correction beyond its share of the
-kinetic energy, J. Energy, J, that steps made from nothing: removed from the motion, and not, for
-want of motion. ``gaps_current``: whether the gaps are those at q. ``flights_cut``: ticks, or parts
+kinetic energy, J. Spurious energy gained in steps, J: removed from the motion, and left, where
+nothing moved. ``gaps_current``: whether the gaps are those at q. ``flights_cut``: ticks, or parts
 of them, in which flight steps reached their bound."""
 
 ClusterState = collections.namedtuple(

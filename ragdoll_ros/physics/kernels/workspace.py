@@ -149,7 +149,7 @@ def _make_island(system: System, contacts: int, rows: int) -> Island:
         z_direction=np.zeros(nv), order=np.zeros(len(system.doll_masses), np.int64),
         dof_place=np.zeros(nv, np.int64), A=np.zeros((5, 5)), B=np.zeros((contacts, 5, 5)),
         phi=np.zeros((contacts, 5)), local=np.zeros(5),
-        band=np.zeros(nv + 3 * int(math.sqrt(nv * MAX_BAND_WORK))))
+        band=np.zeros(nv + 3 * nv * min(nv, math.ceil(math.sqrt(MAX_BAND_WORK / nv)))))
 
 
 WORKSPACE = bundle_type(make_workspace(blank_system(), make_cluster_state(blank_system())))

@@ -4,7 +4,7 @@ Newton's method where contacts join dolls so that it costs less.
 To form and factor W of hundreds of rows costs more than to do without it: a sweep through z = Y^T p
 costs as many operations as the rows have entries. Between sweeps, a step along the direction of
 Fletcher and Reeves makes them converge ten times as fast (Silcowitz-Hansen, Niebe and Erleben, The
-Visual Computer 26, 2010). In a stack an impulse gets on by one body in a sweep: sparse_newton.py.
+Visual Computer 26, 2010). In a stack impulses travel by one body per sweep: sparse_newton.py.
 """
 from __future__ import annotations
 
@@ -52,10 +52,7 @@ def solve_large(s: System, ws: Workspace, m: int, n: int, h: float, has_restitut
     work, spent = work_terms(island, n, u, p)
     failed = rounds < ROUNDS and not left <= UNSOLVABLE
     if failed or (has_restitution and work + spent / 2 > 0):
-        if failed:
-            for i in range(n):
-                p[i] = 0.0
-        left = reduce_restitution(ws, m, n, dofs, width)
+        left = reduce_restitution(ws, m, n, dofs, width, failed)
         work, spent = work_terms(island, n, u, p)
     ws.stats[0].sweeps += sweeps
     if not left <= UNSOLVED:
@@ -106,16 +103,17 @@ def solve_rows(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, dofs
 
 
 @compiled
-def reduce_restitution(ws: Workspace, m: int, n: int, dofs: int, width: int) -> float:
+def reduce_restitution(ws: Workspace, m: int, n: int, dofs: int, width: int,
+                       failed: bool) -> float:
     """Move island.impulses towards those without restitution until they add no energy; see
-    small_island.bound_energy(); zero impulses become those. Returns the residual of those, m/s;
-    island.z becomes Y^T p.
+    small_island.bound_energy(); all the way if their solve has ``failed``. Returns the residual of
+    those without, m/s; island.z becomes Y^T p.
     """
     island = ws.island
     p, soft, u, z, bounced = (island.impulses, island.soft, island.free_velocity, island.z,
                               island.z_previous)
     for i in range(n):
-        soft[i] = p[i]
+        soft[i] = 0.0 if failed else p[i]
     left, _ = solve_rows(ws, m, n, u, soft, dofs, width, ROUNDS)
     work, spent = work_terms(island, n, u, soft)
     if not work + spent / 2 <= 0:
@@ -124,9 +122,8 @@ def reduce_restitution(ws: Workspace, m: int, n: int, dofs: int, width: int) -> 
     for j in range(len(z)):
         bounced[j] = z[j]
     write_velocities(ws, m, u, soft)
-    a = b = c = size = 0.0
+    a = b = c = 0.0
     for i in range(n):
-        size += p[i] * p[i]
         b += (p[i] - soft[i]) * u[i]
         c += soft[i] * u[i]
     for j in range(len(z)):
@@ -134,7 +131,7 @@ def reduce_restitution(ws: Workspace, m: int, n: int, dofs: int, width: int) -> 
         a += step * step / 2
         b += step * z[j]
         c += z[j] * z[j] / 2
-    share = energy_bound_share(a, b, c) if size > 0 else 0.0
+    share = 0.0 if failed else energy_bound_share(a, b, c)
     for i in range(n):
         p[i] = soft[i] + share * (p[i] - soft[i])
     write_velocities(ws, m, u, p)

@@ -172,9 +172,9 @@ def internal_kinetic_energy(s: System, ws: Workspace) -> float:
 
 
 @compiled
-def remove_energy(s: System, ws: Workspace, gained: float, q: np.ndarray, v: np.ndarray) -> None:
+def remove_energy(s: System, ws: Workspace, gained: float, q: np.ndarray, v: np.ndarray) -> float:
     """Remove the spurious energy ``gained``, J, from the motion v at q, where the sums are
-    step.sums_after, as far as there is any.
+    step.sums_after, as far as there is any. Returns how much was removed, J.
 
     v becomes w + share (v - w). Of dolls on the ground w is zero, of others their rigid motion, so
     that their momenta stay. What is at rest relative to w stays so, and what slides or separates
@@ -197,6 +197,7 @@ def remove_energy(s: System, ws: Workspace, gained: float, q: np.ndarray, v: np.
         for k in range(3):
             v[dof + k] = move[k] + share * (v[dof + k] - move[k])
             v[dof + 3 + k] = turn[k] + share * (v[dof + 3 + k] - turn[k])
+    return max(0.0, min(gained, inner))
 
 
 @compiled

@@ -75,8 +75,8 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
         now, speed = total_energy(step.sums_after)
         work = stats.work_pushes - pushes + stats.work_grabs - grabs
         gained = now - held - work
-        share = tolerated_energy_gain(s, ws, max(moving, speed), work)
-        tolerated = share + solver_energy(s, ws, m, length)
+        allowed = tolerated_energy_gain(s, ws, max(moving, speed), work)
+        tolerated = allowed + solver_energy(s, ws, m, length)
         if turn < MAX_TRIES - 1 and length > FINEST * nominal and (
                 not gained - step.scalars[0].correction_energy <= tolerated
                 or penetrates_further(s, ws)):
@@ -104,11 +104,10 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
         gained -= stats.work_position_correction - corrections
         if not gained <= tolerated:
             stats.energy_gains += 1
-        if gained > share or 0 < gained < REMOVABLE * internal_kinetic_energy(s, ws):
-            removed = min(gained, internal_kinetic_energy(s, ws))
+        if gained > allowed or 0 < gained < REMOVABLE * internal_kinetic_energy(s, ws):
+            removed = remove_energy(s, ws, gained, step.q_end, step.v_end)
             stats.energy_removed += removed
             stats.energy_unremoved += gained - removed
-            remove_energy(s, ws, gained, step.q_end, step.v_end)
         break
     accept_step(ws, cluster, m, length, length > 0.1 * h)
     return length, hit
