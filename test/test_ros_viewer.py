@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -215,9 +216,19 @@ def test_steers_the_node(node, remote):
     remote.set_real_time_factor(0.5)
     wait(lambda: remote.status.real_time_factor == 0.5)
     seen(remote)
-    remote.push((0.0, 2000.0, 1.0), 0.1)
-    wait(lambda: remote.frame.pushes)
-    assert remote.frame.pushes[0].force == pytest.approx((0, 2000, 1))
+    due, found = time.monotonic(), ()
+
+    def pushed():
+        """Sent once a second: a push may come before the node listens, or end between two looks."""
+        nonlocal due, found
+        if time.monotonic() >= due:
+            remote.push((0.0, 2000.0, 1.0), 0.1)
+            due += 1
+        found = remote.frame.pushes
+        return found
+
+    wait(pushed)
+    assert found[0].force == pytest.approx((0, 2000, 1))
     wait(lambda: not remote.frame.pushes)
     wait(lambda: remote.status.measures['work_of_pushes_J'] > 100)
     late = remote.frame.time
