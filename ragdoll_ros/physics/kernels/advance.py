@@ -62,10 +62,10 @@ the tolerance times CUT_TOLERANCE, and after those contact steps, of which there
 CUT_TOLERANCE = 1e6
 """Steps of order 8 are 5.6 times as long; what needs so many turns at 1000 rad/s and more."""
 
-MAX_IMPACTS, IMPACT_WORK = 200, 2_000_000
+MAX_IMPACTS, IMPACT_WORK, MIN_IMPACTS = 200, 2_000_000, 8
 """Times of impact that are sought in a tick, at most and over the cube of the number of bodies, so
-that many bodies do not cost their cube. From then on what meets within a step is a contact of it,
-with restitution."""
+that many bodies do not cost their cube; none where they would be fewer than the least number. From
+then on what meets within a step is a contact of it, with restitution."""
 
 system_at, workspace_at, cluster_state_at = (bundle_at(SYSTEM), bundle_at(WORKSPACE),
                                              bundle_at(CLUSTER_STATE))
@@ -122,6 +122,8 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
     q, v, dense, stats = cluster.q, cluster.v, cluster.dense_step[0], ws.stats[0]
     time, impacts, impact_due = 0.0, 0, True
     max_impacts = min(MAX_IMPACTS, IMPACT_WORK // len(s.tree) ** 3)
+    if max_impacts < MIN_IMPACTS:
+        max_impacts = 0
     flight_steps, flights_cut = max(MIN_FLIGHT_STEPS, FLIGHT_WORK // len(s.tree)), False
     max_flight_steps = stats.flight_steps + flight_steps
     flight_possible = s.flight_enabled[0] > 0 and len(cluster.springs) == 0
@@ -135,7 +137,7 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
         left, seek = duration - time, impacts < max_impacts
         if not dense.valid and not stats.gaps_current:
             refresh_gaps(s, ws, cluster)
-        if not dense.valid and flight_possible and seek:
+        if not dense.valid and flight_possible and impacts < MAX_IMPACTS:
             if stats.flight_steps >= max_flight_steps:
                 stats.flights_cut += 0 if flights_cut else 1
                 flight_possible, flights_cut = not flights_cut, True

@@ -64,10 +64,6 @@ Bodies at rest on slopes creep by some 1e-10 m/s; impacts miss their velocity by
 MAX_DENSE_ROWS = 96
 """Islands of more rows are solved without forming W; see impulses/large_island.py."""
 
-MAX_BAND_WORK = 4_000_000
-"""Degrees of freedom, times the square of the width of their band, up to which a large island is
-solved by sparse_newton.py."""
-
 NO_SLIP = 1e5
 """Friction coefficient from which on friction has no limit."""
 

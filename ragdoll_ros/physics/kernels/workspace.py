@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 import collections
-import math
 
 import numpy as np
 
@@ -10,7 +9,9 @@ from .cluster_state import CONTACT, DOLL_SUMS, ClusterState, make_cluster_state
 from .compiling.bundle import bundle_type
 from .dynamics.forward_dynamics import make_dynamics
 from .dynamics.kinematics import make_kinematics
-from .system import (CONTACT_POINT, MAX_BAND_WORK, MAX_DENSE_ROWS, MAX_MANIFOLD_POINTS, System,
+from .maths.anderson import make_anderson
+from .maths.sparse_lu import make_sparse_lu
+from .system import (CONTACT_POINT, MAX_DENSE_ROWS, MAX_MANIFOLD_POINTS, System,
                      blank_system, coordinate_count, tree_depth)
 
 MOTION = np.dtype([('speed', float), ('angular_speed', float), ('correction', float),
@@ -62,8 +63,8 @@ limits. ``angles``, ``u``, ``v`` (c,): the corners of a patch in order, see patc
 Island = collections.namedtuple(
     'Island', 'members label Y YT support place W G blocks rhs impulses free_velocity '
     'start_velocity curvature correction soft velocity residual direction best active places '
-    'is_normal normal_rhs normal_impulses normal_row row_impulses row_direction z z_previous '
-    'z_direction order dof_place A B phi local band')
+    'is_normal normal_rhs normal_impulses normal_row z z_direction anderson '
+    'order dof_place A B BY phi local lu occurrence_start occurrences')
 """An island of m contacts (``members``) and their rows, and scratch to solve it.
 
 ``label`` (d,): island of each doll. Rows ``Y`` = J L^-1 have entries for the degrees of freedom
@@ -73,7 +74,8 @@ island; ``blocks`` (m, 5, 5): diagonal blocks of W of a large one. Of each row: 
 u = W p + b; ``impulses`` p; ``free_velocity`` without impulses; ``start_velocity`` at the step's
 start; ``curvature`` bias; ``correction`` impulses; ``soft`` impulses without restitution. The
 others are scratch of the solvers that use them; ``z`` (nv,) = Y^T p; ``order`` (d,) of elimination
-of the dolls, ``dof_place`` (nv,) and ``band``: see sparse_newton.py."""
+of the dolls, ``dof_place`` (nv,), ``lu`` and ``occurrences``: see sparse_newton.py;
+``anderson``: of sweeps."""
 
 Step = collections.namedtuple(
     'Step', 'scalars start middle end dynamics q_middle q_end v_end v_free v_middle v_change '
@@ -145,11 +147,12 @@ def _make_island(system: System, contacts: int, rows: int) -> Island:
         active=np.zeros(2 * max(rows, 8)), places=np.zeros(max(rows, 8), np.int64),
         is_normal=np.zeros(max(rows, 8), np.int64), normal_rhs=each_row(),
         normal_impulses=each_row(), normal_row=np.zeros(max(rows, 8), np.int64),
-        row_impulses=each_row(), row_direction=each_row(), z=np.zeros(nv), z_previous=np.zeros(nv),
-        z_direction=np.zeros(nv), order=np.zeros(len(system.doll_masses), np.int64),
-        dof_place=np.zeros(nv, np.int64), A=np.zeros((5, 5)), B=np.zeros((contacts, 5, 5)),
-        phi=np.zeros((contacts, 5)), local=np.zeros(5),
-        band=np.zeros(nv + 3 * nv * min(nv, math.ceil(math.sqrt(MAX_BAND_WORK / nv)))))
+        z=np.zeros(nv), z_direction=np.zeros(nv), anderson=make_anderson(max(rows, 8), nv),
+        order=np.zeros(len(system.doll_masses), np.int64), dof_place=np.zeros(nv, np.int64),
+        A=np.zeros((contacts, 5, 5)), B=np.zeros((contacts, 5, 5)), BY=np.zeros((rows, wide)),
+        phi=np.zeros((contacts, 5)), local=np.zeros(5), lu=make_sparse_lu(nv, contacts, wide),
+        occurrence_start=np.zeros(nv + 1, np.int64),
+        occurrences=np.zeros(contacts * wide, np.int64))
 
 
 WORKSPACE = bundle_type(make_workspace(blank_system(), make_cluster_state(blank_system())))

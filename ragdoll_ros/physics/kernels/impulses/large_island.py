@@ -2,9 +2,8 @@
 Newton's method where contacts join dolls so that it costs less.
 
 To form and factor W of hundreds of rows costs more than to do without it: a sweep through z = Y^T p
-costs as many operations as the rows have entries. Between sweeps, a step along the direction of
-Fletcher and Reeves makes them converge ten times as fast (Silcowitz-Hansen, Niebe and Erleben, The
-Visual Computer 26, 2010). In a stack impulses travel by one body per sweep: sparse_newton.py.
+costs as many operations as the rows have entries, and anderson.py makes sweeps converge. In a stack
+impulses travel by one body per sweep: sparse_newton.py.
 """
 from __future__ import annotations
 
@@ -14,22 +13,26 @@ import numpy as np
 
 from ..compiling.decorators import compiled
 from ..contact_kind import LIMIT, ROLLING
-from ..system import COMPLIANCE, MAX_BAND_WORK, NO_SLIP, System
+from ..system import COMPLIANCE, NO_SLIP, System
 from ..workspace import Island, Workspace
+from ..maths.anderson import accelerate
 from .one_contact import project_to_disc, solve_one_contact
-from .solver import (UNSOLVABLE, OPENING, PROXIMAL, RESTITUTION_ROUNDS, ROUNDS, SWEEPS, UNSOLVED,
-                     energy_bound_share, scale_to_no_work)
-from .sparse_newton import order_dofs, sparse_newton, write_velocities
+from .solver import (UNSOLVABLE, OPENING, RESTITUTION_ROUNDS, ROUNDS, UNSOLVED, energy_bound_share,
+                     scale_to_no_work)
+from .sparse_newton import find_sparsity, sparse_newton, write_velocities
+
+LARGE_ROUNDS, LARGE_SWEEPS = 2, 40
+"""Rounds of sweeps and of Newton's method, and sweeps in each."""
 
 MAX_SWEEPS = 100
 """Sweeps in one solve where Newton's method would cost more."""
 
-TOLERANCE, SWEPT_TOLERANCE = 1e-8, 1e-6
-"""m/s to which a large island is solved, by Newton's method and by sweeps alone."""
+TOLERANCE = 1e-6
+"""m/s to which a large island is solved."""
 
 SWEEP_WORK = 200.0
-"""Work of Newton's method, as MAX_BAND_WORK counts it, that takes as long as it takes to sweep
-MAX_SWEEPS times through a matrix of one entry."""
+"""Work of an elimination, as find_pattern() counts it, up to which Newton's method takes no longer
+than MAX_SWEEPS sweeps through a matrix of one entry."""
 
 IMMOVABLE = 1e30
 """Takes the place of W's diagonal entry for a row along which nothing can move."""
@@ -40,19 +43,19 @@ def solve_large(s: System, ws: Workspace, m: int, n: int, h: float, has_restitut
                 has_penetration: bool) -> None:
     """Solve an island over h s as solve_small() does, except that curvature is neglected."""
     island, b, p, u = (ws.island, ws.island.rhs, ws.island.impulses, ws.island.free_velocity)
-    dofs, width = order_dofs(s, ws, m)
-    if not newton_is_cheaper(ws, m, dofs, width):
-        width = 0
+    dofs, work = find_sparsity(s, ws, m)
+    if not newton_is_cheaper(ws, m, work):
+        dofs = 0
     diagonal_blocks(ws, m, COMPLIANCE)
     rounds = RESTITUTION_ROUNDS if has_restitution and h > 0 else ROUNDS
-    left, sweeps = solve_rows(ws, m, n, b, p, dofs, width, rounds)
+    left, sweeps = solve_rows(ws, m, n, b, p, dofs, rounds)
     if release_opening_contacts(ws, m, b, p):
-        left, more = solve_rows(ws, m, n, b, p, dofs, width, rounds)
+        left, more = solve_rows(ws, m, n, b, p, dofs, rounds)
         sweeps += more
     work, spent = work_terms(island, n, u, p)
     failed = rounds < ROUNDS and not left <= UNSOLVABLE
     if failed or (has_restitution and work + spent / 2 > 0):
-        left = reduce_restitution(ws, m, n, dofs, width, failed)
+        left = reduce_restitution(ws, m, n, dofs, failed)
         work, spent = work_terms(island, n, u, p)
     ws.stats[0].sweeps += sweeps
     if not left <= UNSOLVED:
@@ -66,44 +69,44 @@ def solve_large(s: System, ws: Workspace, m: int, n: int, h: float, has_restitut
             b[i] = island.correction[i] = 0.0
         for k in range(m):
             b[island.members[k].row] = -island.members[k].correction
-        solve_rows(ws, m, n, b, island.correction, dofs, width, ROUNDS)
+        solve_rows(ws, m, n, b, island.correction, dofs, ROUNDS)
 
 
 @compiled
-def newton_is_cheaper(ws: Workspace, m: int, dofs: int, width: int) -> bool:
-    """Whether Newton's method on a band of this ``width`` costs less than MAX_SWEEPS sweeps."""
+def newton_is_cheaper(ws: Workspace, m: int, work: int) -> bool:
+    """Whether Newton's method with this ``work`` of an elimination costs less than MAX_SWEEPS
+    sweeps; not if there is no room for it, -1.
+    """
     entries = 0
     for k in range(m):
         member = ws.island.members[k]
         entries += member.kind * ws.contacts.found[member.contact].dof_count
-    work = dofs * width * width
-    return work <= SWEEP_WORK * entries and work <= MAX_BAND_WORK
+    return 0 <= work <= SWEEP_WORK * entries
 
 
 @compiled
 def solve_rows(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, dofs: int,
-               width: int, rounds: int) -> tuple[float, int]:
+               rounds: int) -> tuple[float, int]:
     """Solve for p (n,) in place, starting from p: by sweeps, and where these stall by Newton's
-    method, in so many rounds, unless ``width`` is 0. Returns the residual, m/s, and the number of
+    method, in so many rounds, unless ``dofs`` is 0. Returns the residual, m/s, and the number of
     sweeps. island.z becomes Y^T p.
     """
-    if not width:
-        return sweep_to_tolerance(ws, m, n, b, p, MAX_SWEEPS, SWEPT_TOLERANCE)
-    left, done, proximal = math.inf, 0, PROXIMAL
-    for _ in range(rounds):
-        left, sweeps = sweep_to_tolerance(ws, m, n, b, p, SWEEPS, TOLERANCE)
+    if not dofs:
+        return sweep_to_tolerance(ws, m, n, b, p, MAX_SWEEPS, TOLERANCE)
+    left, done = math.inf, 0
+    for _ in range(min(rounds, LARGE_ROUNDS)):
+        left, sweeps = sweep_to_tolerance(ws, m, n, b, p, LARGE_SWEEPS, TOLERANCE)
         done += sweeps
         if left <= TOLERANCE:
             break
-        left = sparse_newton(ws, m, n, b, p, TOLERANCE, proximal, dofs, width)
+        left = sparse_newton(ws, m, n, b, p, TOLERANCE, dofs)
         if left <= TOLERANCE:
             break
-        proximal *= 10
     return left, done
 
 
 @compiled
-def reduce_restitution(ws: Workspace, m: int, n: int, dofs: int, width: int,
+def reduce_restitution(ws: Workspace, m: int, n: int, dofs: int,
                        failed: bool) -> float:
     """Move island.impulses towards those without restitution until they add no energy; see
     small_island.bound_energy(); all the way if their solve has ``failed``. Returns the residual of
@@ -111,10 +114,10 @@ def reduce_restitution(ws: Workspace, m: int, n: int, dofs: int, width: int,
     """
     island = ws.island
     p, soft, u, z, bounced = (island.impulses, island.soft, island.free_velocity, island.z,
-                              island.z_previous)
+                              island.z_direction)
     for i in range(n):
         soft[i] = 0.0 if failed else p[i]
-    left, _ = solve_rows(ws, m, n, u, soft, dofs, width, ROUNDS)
+    left, _ = solve_rows(ws, m, n, u, soft, dofs, ROUNDS)
     work, spent = work_terms(island, n, u, soft)
     if not work + spent / 2 <= 0:
         scale_to_no_work(soft, n, work, spent)
@@ -229,46 +232,26 @@ def sweep_to_tolerance(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarr
     """Solve for p (n,) in place, starting from p, in at most so many sweeps. Returns the last one's
     largest change of a velocity, m/s or rad/s, and their number. island.z becomes Y^T p.
     """
-    island = ws.island
-    z, z_previous, z_direction = island.z, island.z_previous, island.z_direction
-    previous, direction = island.row_impulses, island.row_direction
+    island, weights = ws.island, ws.island.residual
+    start, z = island.anderson.start, island.z
     for j in range(len(z)):
-        z[j] = z_direction[j] = 0.0
-    for i in range(n):
-        direction[i] = 0.0
+        z[j] = 0.0
     for k in range(m):
         member = island.members[k]
         for e in range(member.kind):
-            impulse, p[member.row + e] = p[member.row + e], 0.0
+            row = member.row + e
+            weights[row] = math.sqrt(island.blocks[k, e, e])
+            impulse, p[row] = p[row], 0.0
             change_impulse(ws, k, e, impulse, p)
-    worst, done, before = 0.0, 0, 0.0
-    for _ in range(most):
+    worst, done = 0.0, 0
+    for turn in range(most):
         for i in range(n):
-            previous[i] = p[i]
-        for j in range(len(z)):
-            z_previous[j] = z[j]
+            start[i] = p[i]
         worst = sweep_large_island(ws, m, b, p)
         done += 1
         if worst <= tolerance or done == most:
             break
-        square = 0.0
-        for k in range(m):
-            member, block = island.members[k], island.blocks[k]
-            for e in range(member.kind):
-                row = member.row + e
-                square += (p[row] - previous[row]) ** 2 * block[e, e]
-        share = square / before if before > 0 else 0.0
-        before = square
-        if share > 1:
-            share = 0.0
-        for i in range(n):
-            step = p[i] - previous[i]
-            p[i] += share * direction[i]
-            direction[i] = share * direction[i] + step
-        for j in range(len(z)):
-            step = z[j] - z_previous[j]
-            z[j] += share * z_direction[j]
-            z_direction[j] = share * z_direction[j] + step
+        accelerate(island.anderson, weights, n, turn, p, z)
     return worst, done
 
 

@@ -6,8 +6,9 @@ W's diagonal. So dp = -C^-1 (phi + B Y dz) with C = A + B D, a matrix of each co
 
     (I + sum of Y^T C^-1 B Y) dz = -Y^T C^-1 phi.
 
-That matrix has entries where contacts join dolls. In the order of Cuthill and McKee (Proceedings of
-the 24th ACM National Conference, 1969) it is banded: narrowly for stacks, rows and walls.
+That matrix has entries between the degrees of freedom of one contact alone. They are eliminated
+from the leaves of each tree to its root, doll by doll in the order of Cuthill and McKee (24th ACM
+National Conference, 1969), so that few more entries arise, in stacks and in heaps of dolls.
 """
 from __future__ import annotations
 
@@ -16,19 +17,26 @@ import math
 import numpy as np
 
 from ..compiling.decorators import compiled
-from ..maths.banded import solve_banded
+from ..maths.sparse_lu import clear_row, eliminate_row, find_pattern, substitute_back
 from ..system import NO_SLIP, System
 from ..workspace import Island, Workspace
-from .newton import MAX_STEPS, PATIENCE
 from .one_contact import project_to_disc
+
+SPARSE_STEPS, SPARSE_PATIENCE = 12, 4
+"""Newton steps at most, and those that do not halve the residual. All are taken in full: it may
+grow on the way, as contacts change between sticking and sliding. The best is kept."""
+
+SPARSE_PROXIMAL = 1e-3
+"""Share of W's diagonal that resists the steps. In heaps a hundredth of it lets them cycle; ten
+times as much takes three times as many."""
 
 
 @compiled
-def order_dofs(s: System, ws: Workspace, m: int) -> tuple[int, int]:
-    """Write to island.dof_place the places of the degrees of freedom of an island's dolls in the
-    order of Cuthill and McKee. Returns how many there are, and the width of the band.
+def find_sparsity(s: System, ws: Workspace, m: int) -> tuple[int, int]:
+    """Order the degrees of freedom of an island's dolls and find the pattern of the matrix, in
+    island.lu. Returns how many there are, and the work of an elimination, -1 if there is no room.
     """
-    island, contacts = ws.island, ws.contacts.found
+    island, contacts, lu = ws.island, ws.contacts.found, ws.island.lu
     first = s.body_doll[contacts[island.members[0].contact].body_a]
     count = order_dolls(s, ws, m, first)
     count = order_dolls(s, ws, m, island.order[count - 1])
@@ -40,19 +48,41 @@ def order_dofs(s: System, ws: Workspace, m: int) -> tuple[int, int]:
     for k in range(count):
         doll = island.order[k]
         dofs, start[doll] = dofs + start[doll], dofs
-    for j in range(len(place)):
+    for j in range(len(place) - 1, -1, -1):
         doll = s.body_doll[s.dof_body[j]]
         place[j] = start[doll]
         start[doll] += 1
-    width = 1
     for k in range(m):
         i = island.members[k].contact
-        low, high = dofs, 0
-        for x in range(contacts[i].dof_count):
-            at = place[island.support[i, x]]
-            low, high = min(low, at), max(high, at)
-        width = max(width, high - low)
-    return dofs, width
+        lu.sizes[k] = contacts[i].dof_count
+        for x in range(lu.sizes[k]):
+            lu.sets[k, x] = place[island.support[i, x]]
+    list_occurrences(island, dofs, m)
+    return dofs, find_pattern(lu, dofs, m)
+
+
+@compiled
+def list_occurrences(island: Island, dofs: int, m: int) -> None:
+    """Write to island.occurrences the members whose support has each degree of freedom, and where,
+    as flat indices of lu.sets, by places.
+    """
+    begin, listed, sets, wide = (island.occurrence_start, island.occurrences, island.lu.sets,
+                                 island.lu.sets.shape[1])
+    for i in range(dofs + 1):
+        begin[i] = 0
+    for k in range(m):
+        for x in range(island.lu.sizes[k]):
+            begin[sets[k, x] + 1] += 1
+    for i in range(dofs):
+        begin[i + 1] += begin[i]
+    for k in range(m):
+        for x in range(island.lu.sizes[k]):
+            i = sets[k, x]
+            listed[begin[i]] = k * wide + x
+            begin[i] += 1
+    for i in range(dofs, 0, -1):
+        begin[i] = begin[i - 1]
+    begin[0] = 0
 
 
 @compiled
@@ -105,12 +135,12 @@ def write_velocities(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray) -> Non
 
 
 @compiled
-def linearize_contact(island: Island, k: int, p: np.ndarray, proximal: float) -> float:
+def linearize_contact(island: Island, k: int, p: np.ndarray) -> float:
     """Write phi of member k, scaled to velocities, to island.phi[k], and A and B of its
-    linearization to island.A and island.B. Returns the largest entry of phi.
+    linearization to island.A[k] and island.B[k]. Returns the largest entry of phi.
     """
     member, block, u = island.members[k], island.blocks[k], island.velocity
-    A, B, phi, a = island.A, island.B[k], island.phi[k], member.row
+    A, B, phi, a = island.A[k], island.B[k], island.phi[k], member.row
     for e in range(member.kind):
         for g in range(member.kind):
             A[e, g] = B[e, g] = 0.0
@@ -145,7 +175,7 @@ def linearize_contact(island: Island, k: int, p: np.ndarray, proximal: float) ->
                     A[e + f, e + g] = own_t * ((1.0 if f == g else 0.0) - B[e + f, e + g])
         worst = max(worst, abs(phi[e]), abs(phi[e + 1]))
     for g in range(member.kind):
-        softness = block[g, g] * (member.compliance / (1 + member.compliance) + proximal)
+        softness = block[g, g] * (member.compliance / (1 + member.compliance) + SPARSE_PROXIMAL)
         for e in range(member.kind):
             A[e, g] += B[e, g] * softness
     return worst
@@ -153,10 +183,10 @@ def linearize_contact(island: Island, k: int, p: np.ndarray, proximal: float) ->
 
 @compiled
 def eliminate_contact(island: Island, k: int) -> None:
-    """Replace B of member k by C^-1 B and phi by C^-1 phi; C, in island.A, has its pivots on the
+    """Replace B of member k by C^-1 B and phi by C^-1 phi; C, in island.A[k], has its pivots on the
     diagonal: entries right of it are between the two rows of a sliding direction alone.
     """
-    A, B, phi, kind = island.A, island.B[k], island.phi[k], island.members[k].kind
+    A, B, phi, kind = island.A[k], island.B[k], island.phi[k], island.members[k].kind
     for e in range(kind):
         for i in range(e + 1, kind):
             f = A[i, e] / A[e, e]
@@ -177,26 +207,43 @@ def eliminate_contact(island: Island, k: int) -> None:
 
 
 @compiled
-def add_contact(ws: Workspace, k: int, width: int) -> None:
-    """Add the terms of member k to the banded matrix and its right-hand side."""
-    island = ws.island
-    member, Y, B, phi = island.members[k], island.Y, island.B[k], island.phi[k]
-    support, places, stride = island.support[member.contact], island.dof_place, 3 * width + 1
-    count = ws.contacts.found[member.contact].dof_count
+def multiply_rows(island: Island, k: int) -> None:
+    """Write B Y of member k, after eliminate_contact(), to its rows of island.BY."""
+    member, B, Y, BY = island.members[k], island.B[k], island.Y, island.BY
     for e in range(member.kind):
         row = member.row + e
-        if phi[e] != 0.0:
-            for x in range(count):
-                island.z_direction[places[support[x]]] -= Y[row, x] * phi[e]
+        for x in range(island.lu.sizes[k]):
+            BY[row, x] = 0.0
         for g in range(member.kind):
             share, other = B[e, g], member.row + g
-            if share == 0.0:
-                continue
-            for x in range(count):
-                i = places[support[x]]
-                at, part = i * stride + width - i, share * Y[row, x]
-                for y in range(count):
-                    island.band[at + places[support[y]]] += part * Y[other, y]
+            if share != 0.0:
+                for x in range(island.lu.sizes[k]):
+                    BY[row, x] += share * Y[other, x]
+
+
+@compiled
+def solve_for_z(island: Island, dofs: int) -> bool:
+    """Solve for dz, into island.z_direction, by places, after multiply_rows() of all members.
+    Returns whether the matrix is regular.
+    """
+    lu, Y, BY, dz, wide = (island.lu, island.Y, island.BY, island.z_direction,
+                           island.lu.sets.shape[1])
+    for i in range(dofs):
+        clear_row(lu, i)
+        lu.row[i], dz[i] = 1.0, 0.0
+        for at in range(island.occurrence_start[i], island.occurrence_start[i + 1]):
+            k, x = island.occurrences[at] // wide, island.occurrences[at] % wide
+            member, phi = island.members[k], island.phi[k]
+            for e in range(member.kind):
+                entry = Y[member.row + e, x]
+                if entry != 0.0:
+                    dz[i] -= entry * phi[e]
+                    for y in range(lu.sizes[k]):
+                        lu.row[lu.sets[k, y]] += entry * BY[member.row + e, y]
+        if not eliminate_row(lu, i, dz):
+            return False
+    substitute_back(lu, dofs, dz)
+    return True
 
 
 @compiled
@@ -205,12 +252,11 @@ def take_step(ws: Workspace, m: int, p: np.ndarray) -> None:
     island = ws.island
     for k in range(m):
         member, B, phi = island.members[k], island.B[k], island.phi[k]
-        support, slide = island.support[member.contact], island.local
+        slide = island.local
         for g in range(member.kind):
             slide[g] = 0.0
-            for x in range(ws.contacts.found[member.contact].dof_count):
-                slide[g] += island.Y[member.row + g, x] * (
-                    island.z_direction[island.dof_place[support[x]]])
+            for x in range(island.lu.sizes[k]):
+                slide[g] += island.Y[member.row + g, x] * island.z_direction[island.lu.sets[k, x]]
         for e in range(member.kind):
             change = phi[e]
             for g in range(member.kind):
@@ -220,30 +266,28 @@ def take_step(ws: Workspace, m: int, p: np.ndarray) -> None:
 
 @compiled
 def sparse_newton(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, tolerance: float,
-                  proximal: float, dofs: int, width: int) -> float:
+                  dofs: int) -> float:
     """Take Newton steps from p, which becomes the best found. Returns its residual, m/s; island.z
-    becomes Y^T p. ``dofs``, ``width``: from order_dofs(), whose places are in island.dof_place.
+    becomes Y^T p. ``dofs``: from find_sparsity().
     """
     island, keep = ws.island, ws.island.best
-    best, late, stride = math.inf, 0, 3 * width + 1
-    for turn in range(MAX_STEPS + 1):
+    best, late = math.inf, 0
+    for turn in range(SPARSE_STEPS + 1):
         write_velocities(ws, m, b, p)
-        for i in range(dofs * stride):
-            island.band[i] = 0.0
-        for i in range(dofs):
-            island.band[i * stride + width], island.z_direction[i] = 1.0, 0.0
         worst = 0.0
         for k in range(m):
-            worst = max(worst, linearize_contact(island, k, p, proximal))
-            eliminate_contact(island, k)
-            add_contact(ws, k, width)
+            worst = max(worst, linearize_contact(island, k, p))
         late = 0 if worst < best / 2 else late + 1
         if worst < best:
             best = worst
             for i in range(n):
                 keep[i] = p[i]
-        if best <= tolerance or late > PATIENCE or turn == MAX_STEPS or not (
-                solve_banded(island.band, dofs, width, island.z_direction)):
+        if best <= tolerance or late > SPARSE_PATIENCE or turn == SPARSE_STEPS:
+            break
+        for k in range(m):
+            eliminate_contact(island, k)
+            multiply_rows(island, k)
+        if not solve_for_z(island, dofs):
             break
         take_step(ws, m, p)
     for i in range(n):

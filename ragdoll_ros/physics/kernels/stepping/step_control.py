@@ -43,6 +43,10 @@ SAFETY = 0.9
 
 COARSEST = 0.03
 
+SPECULATIVE = 1e-4
+"""m or rad: where times of impact are not sought, gaps that are narrower as a step begins are
+contacts of it from its first trial on. Those that do not close in it have no effect."""
+
 
 @compiled
 def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, since: float,
@@ -62,8 +66,8 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
     stats.next_dt = 2 * length if 2 * length < nominal else 0.0
     if seek:
         length = step_to_joint_limit(s, ws, cluster.v, length)
-    begin_trials(ws)
     step.scalars[0].seeks_impacts = 1 if seek else 0
+    begin_trials(ws)
     held, moving = total_energy(step.sums_before)
     pushes, grabs, corrections = (stats.work_pushes, stats.work_grabs,
                                   stats.work_position_correction)
@@ -115,8 +119,14 @@ def step_to_impact(s: System, ws: Workspace, cluster: ClusterState, h: float, si
 
 @compiled
 def begin_trials(ws: Workspace) -> None:
-    """Copy ws.gaps to contacts.gaps_active and open the bracket of the time of impact."""
-    copy_into(ws.contacts.gaps_active, ws.gaps)
+    """Copy ws.gaps to contacts.gaps_active, where impacts are not sought with the SPECULATIVE ones
+    as touching, and open the bracket of the time of impact.
+    """
+    active, seeks = ws.contacts.gaps_active, ws.step.scalars[0].seeks_impacts
+    for j in range(len(active)):
+        active[j] = ws.gaps[j]
+        if not seeks and active[j] < SPECULATIVE:
+            active[j] = min(active[j], TOUCHING)
     open_bracket(ws)
 
 
@@ -158,14 +168,18 @@ def unseen_share(s: System, ws: Workspace, max_depth: float) -> float:
 
 @compiled
 def activate_contacts(s: System, ws: Workspace, h: float) -> bool:
-    """Make gaps that closed in the step of h s just taken, overshot or fast, contacts of it, in
-    contacts.gaps_active. Returns whether there are any.
+    """If gaps closed in the step of h s just taken, overshot or fast, make them contacts of it, in
+    contacts.gaps_active, and those that at their mean rate would have closed in twice the time: the
+    impulses of the first will close some of them. Returns whether there are any.
     """
     active, end, some = ws.contacts.gaps_active, ws.contacts.gaps_end, False
     for j in range(len(active)):
         if active[j] > TOUCHING and (end[j] < OVERSHOT or is_fast_impact(s, ws, j, h)):
-            active[j] = end[j]
             some = True
+    if some:
+        for j in range(len(active)):
+            if active[j] > TOUCHING and end[j] < ws.gaps[j] - end[j]:
+                active[j] = min(end[j], TOUCHING)
     return some
 
 
