@@ -141,10 +141,12 @@ def assemble_rhs(s: System, ws: Workspace, m: int, n: int, h: float) -> tuple[bo
             for e in range(c.kind):
                 curve[row + e] = was[row + e] - c.start_velocity[e]
             b[row] += max(0.0, c.gap - SLOP) / h
-        elif bounces and not ws.step.scalars[0].seeks_impacts and (
-                c.gap + h / 2 * c.normal_velocity <= 0):
-            b[row] += c.restitution * c.normal_velocity
-            has_restitution = True
+        elif not ws.step.scalars[0].seeks_impacts:
+            if bounces and c.gap + h / 2 * c.normal_velocity <= 0:
+                b[row] += c.restitution * c.normal_velocity
+                has_restitution = True
+            elif c.gap > 0:
+                b[row] += c.gap / (h / 2)
         elif c.gap > 0:
             b[row] += c.gap / h
         if h > 0 and c.gap < 0:

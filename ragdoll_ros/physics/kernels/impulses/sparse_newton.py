@@ -26,9 +26,10 @@ SPARSE_STEPS, SPARSE_PATIENCE = 12, 4
 """Newton steps at most, and those that do not halve the residual. All are taken in full: it may
 grow on the way, as contacts change between sticking and sliding. The best is kept."""
 
-SPARSE_PROXIMAL = 1e-3
-"""Share of W's diagonal that resists the steps. In heaps a hundredth of it lets them cycle; ten
-times as much takes three times as many."""
+MOST_PROXIMAL, LEAST_PROXIMAL = 1e-3, 1e-6
+"""Share of W's diagonal that resists the steps: at first, and a tenth after each that halves the
+residual, as what is left is along what the impulses of several bodies decide together. In heaps less
+at first lets the steps cycle; ten times as much takes three times as many."""
 
 
 @compiled
@@ -135,7 +136,7 @@ def write_velocities(ws: Workspace, m: int, b: np.ndarray, p: np.ndarray) -> Non
 
 
 @compiled
-def linearize_contact(island: Island, k: int, p: np.ndarray) -> float:
+def linearize_contact(island: Island, k: int, p: np.ndarray, proximal: float) -> float:
     """Write phi of member k, scaled to velocities, to island.phi[k], and A and B of its
     linearization to island.A[k] and island.B[k]. Returns the largest entry of phi.
     """
@@ -175,7 +176,7 @@ def linearize_contact(island: Island, k: int, p: np.ndarray) -> float:
                     A[e + f, e + g] = own_t * ((1.0 if f == g else 0.0) - B[e + f, e + g])
         worst = max(worst, abs(phi[e]), abs(phi[e + 1]))
     for g in range(member.kind):
-        softness = block[g, g] * (member.compliance / (1 + member.compliance) + SPARSE_PROXIMAL)
+        softness = block[g, g] * (member.compliance / (1 + member.compliance) + proximal)
         for e in range(member.kind):
             A[e, g] += B[e, g] * softness
     return worst
@@ -271,13 +272,15 @@ def sparse_newton(ws: Workspace, m: int, n: int, b: np.ndarray, p: np.ndarray, t
     becomes Y^T p. ``dofs``: from find_sparsity().
     """
     island, keep = ws.island, ws.island.best
-    best, late = math.inf, 0
+    best, late, proximal, before = math.inf, 0, MOST_PROXIMAL, math.inf
     for turn in range(SPARSE_STEPS + 1):
         write_velocities(ws, m, b, p)
         worst = 0.0
         for k in range(m):
-            worst = max(worst, linearize_contact(island, k, p))
+            worst = max(worst, linearize_contact(island, k, p, proximal))
         late = 0 if worst < best / 2 else late + 1
+        proximal = max(LEAST_PROXIMAL, proximal / 10) if worst < before / 2 else MOST_PROXIMAL
+        before = worst
         if worst < best:
             best = worst
             for i in range(n):
