@@ -22,8 +22,8 @@ from .solver import (UNSOLVABLE, OPENING, RESTITUTION_ROUNDS, ROUNDS, UNSOLVED, 
 from .sparse_newton import find_sparsity, sparse_newton, write_velocities
 
 LARGE_ROUNDS, LARGE_SWEEPS = 2, 10
-"""Rounds of sweeps and of Newton's method, and sweeps in the first, an eighth of those in the second:
-at rest few will do."""
+"""Rounds of sweeps and of Newton's method, and sweeps in the first; in the second eight times as
+many. At rest few will do."""
 
 MAX_SWEEPS = 100
 """Sweeps in one solve where Newton's method would cost more."""

@@ -28,8 +28,8 @@ grow on the way, as contacts change between sticking and sliding. The best is ke
 
 MOST_PROXIMAL, LEAST_PROXIMAL = 1e-3, 1e-6
 """Share of W's diagonal that resists the steps: at first, and a tenth after each that halves the
-residual, as what is left is along what the impulses of several bodies decide together. In heaps less
-at first lets the steps cycle; ten times as much takes three times as many."""
+residual, as what is left is what the impulses of several bodies decide together. In heaps less at
+first lets the steps cycle; ten times as much takes three times as many."""
 
 
 @compiled
