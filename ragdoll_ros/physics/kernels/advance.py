@@ -37,7 +37,8 @@ import numpy as np
 from .cluster_state import CLUSTER_STATE, ClusterState
 from .compiling.bundle import bundle_at
 from .compiling.decorators import ADDRESS, REAL, compiled, entry
-from .contact.gaps import enable_separated_pairs, update_kinematics_and_gaps
+from .contact.gaps import (enable_separated_pairs, label_reachable,
+                           update_kinematics_and_gaps)
 from .dynamics.kinematics import (Kinematics, forward_kinematics, inertial_frame, put_quat,
                                   root_position, velocity_at)
 from .flight.dense_step import begin_dense_step
@@ -167,6 +168,19 @@ def advance_cluster(s: System, ws: Workspace, cluster: ClusterState, duration: f
             impacts += 1
     write_bone_states(s, ws.step.end, q, v, cluster.bone_states)
     sum_dolls(s, ws, ws.step.end, q, cluster.doll_sums)
+
+
+@entry(ADDRESS[::1], REAL, ADDRESS[::1])
+def find_islands(job: np.ndarray, window: float, label: np.ndarray) -> None:
+    """Write to ``label`` (d,) the dolls of a cluster that may meet within ``window`` s: the least
+    index of each island. ``job``: see advance().
+    """
+    system, workspace, cluster = vec(job)
+    s, ws, state = system_at(system), workspace_at(workspace), cluster_state_at(cluster)
+    current = ws.stats[0].gaps_current
+    refresh_gaps(s, ws, state)
+    ws.stats[0].gaps_current = current
+    label_reachable(s, ws, ws.step.end, ws.gaps, window, label)
 
 
 @entry(ADDRESS[:, ::1], REAL, REAL, REAL)

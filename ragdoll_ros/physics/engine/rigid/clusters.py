@@ -2,7 +2,7 @@
 import dataclasses
 import itertools
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from ..protocol import GROUND
 from .broad_phase import NO_PAIRS
 from .build_system import build_system, join_systems, pairs_between
 from .doll_states import SNAPSHOT, DollStates, contact_capacity
+from .islands import MOST_BODIES, next_window
 
 SUMMED_STATS = ('flight_steps', 'steps', 'impacts', 'sweeps', 'unsolved', 'contacts_dropped',
                 'toi_failures', 'restitution_reduced', 'energy_gains', 'work_pushes', 'work_grabs',
@@ -51,6 +52,8 @@ class Cluster:
     workspaces: list[Workspace]
     bundles: list[list[np.ndarray]]
     """Rows that bind system, state, and a workspace for each thread; see compiling/bundle.py."""
+    islands: list['Cluster'] = field(default_factory=list)
+    """Those that were advanced in its place in the last window of a tick; see islands.py."""
 
     def job(self, worker: int) -> tuple[int, int, int]:
         """Addresses of system, workspace and state for the kernels on one of the threads."""
@@ -137,15 +140,20 @@ class Clusters:
 
     def advance(self, duration: float, accuracy: Accuracy, sleeping: np.ndarray) -> None:
         """Advance all clusters by ``duration`` s, except those of ``sleeping`` dolls (d,)."""
-        jobs = self._jobs
-        if np.count_nonzero(sleeping):
-            jobs = jobs[:, ~sleeping[self._firsts]]
+        jobs, whole = self._jobs, ~sleeping[self._firsts]
+        for cluster in self._multi_doll if duration else ():
+            place = self.of_doll[cluster.dolls[0]]
+            if whole[place] and len(cluster.system.tree) > MOST_BODIES and (
+                    self._advance_by_islands(cluster, duration, accuracy)):
+                whole[place] = False
+        if not whole.all():
+            jobs = jobs[:, whole]
         if self._workers == 1 or jobs.shape[1] < 2:
             kernels.advance(jobs[0], duration, accuracy.step, accuracy.flight_error)
         else:
-            self._advance_parallel(jobs, duration, accuracy, sleeping)
+            self._advance_parallel(jobs, duration, accuracy, self._firsts[whole])
         for cluster in self._multi_doll:
-            if not sleeping[cluster.dolls[0]]:
+            if whole[self.of_doll[cluster.dolls[0]]]:
                 self._scatter_state(cluster)
 
     def set_velocities(self, dolls: np.ndarray, velocities: np.ndarray) -> None:
@@ -213,7 +221,8 @@ class Clusters:
         known, dolls = self._states.contacts_of(single & (arrays['dense_step']['valid'] == 0))
         found = [_contact_points(arrays['contacts'][known], self._bone_of_body, self._first[dolls],
                                  self.stats['last_dt'][dolls])]
-        for cluster in self._multi_doll:
+        for cluster in itertools.chain.from_iterable(
+                cluster.islands or [cluster] for cluster in self._multi_doll):
             stats = cluster.state.stats[0]
             if not cluster.state.dense_step['valid'][0]:
                 known = cluster.state.contacts[:stats['contact_count']]
@@ -243,7 +252,7 @@ class Clusters:
     def save(self) -> object:
         """A snapshot that restore() brings back to the bit."""
         return (self._states.save(), self.members,
-                [(cluster, _copied(cluster.state)) for cluster in self._multi_doll])
+                [_saved(cluster) for cluster in self._multi_doll])
 
     def restore(self, snapshot: tuple) -> None:
         """Restore a snapshot."""
@@ -251,18 +260,17 @@ class Clusters:
         self._states.restore(states)
         if members is not self.members:
             self._set_clusters(members)
-        for cluster, state in several:
-            _restore_state(cluster, state)
+        for saved in several:
+            _restore(*saved)
 
-    def save_states(self, dolls: np.ndarray) -> list[tuple[Cluster, ClusterState]]:
+    def save_states(self, dolls: np.ndarray) -> list[tuple]:
         """Copy the states of ``dolls`` (d,), whole clusters."""
-        return [(cluster, _copied(cluster.state)) for cluster in self.members
-                if dolls[cluster.dolls[0]]]
+        return [_saved(cluster) for cluster in self.members if dolls[cluster.dolls[0]]]
 
-    def restore_states(self, saved: list[tuple[Cluster, ClusterState]]) -> None:
+    def restore_states(self, saved: list[tuple]) -> None:
         """Restore states of clusters to the bit; the clusters must still be the same."""
-        for cluster, state in saved:
-            _restore_state(cluster, state)
+        for cluster, *rest in saved:
+            _restore(cluster, *rest)
             if len(cluster.dolls) > 1:
                 self._scatter_state(cluster)
 
@@ -297,12 +305,14 @@ class Clusters:
         """(workers, k, 3)"""
 
     def _advance_parallel(self, jobs: np.ndarray, duration: float, accuracy: Accuracy,
-                          sleeping: np.ndarray) -> None:
-        """Advance clusters on several threads, those first that took most steps the last time."""
+                          firsts: np.ndarray) -> None:
+        """Advance clusters on several threads, those first that took most steps the last time.
+        ``firsts`` (k,): the first doll of each.
+        """
         self._threads = self._threads or ThreadPoolExecutor(self._workers - 1, 'clusters')
         effort = self.stats['steps'] + self.stats['impacts'] + 6 * self.stats['flight_steps']
         spent, self._effort = effort - self._effort, effort
-        order = np.argsort(-spent[self._firsts[~sleeping[self._firsts]]], kind='stable')
+        order = np.argsort(-spent[firsts], kind='stable')
         shares = min(len(order), PARTS_PER_THREAD * self._workers)
         parts = itertools.count()
 
@@ -316,14 +326,60 @@ class Clusters:
         for other in others:
             other.result()
 
+    def _advance_by_islands(self, cluster: Cluster, duration: float, accuracy: Accuracy) -> bool:
+        """Advance a cluster by ``duration`` s in windows in which it falls into islands. Returns
+        whether it does, or is to be advanced as a whole instead.
+        """
+        if len(cluster.state.loads) or len(cluster.state.springs):
+            return False
+        body_counts = np.array([len(self._bones[doll]) for doll in cluster.dolls])
+        left, made = duration, {}
+        while left > 0:
+            window, label = next_window(np.array(cluster.job(0)), body_counts, left)
+            if not window and not made:
+                return False
+            made = self._form_islands(cluster, label if window else np.zeros_like(label), made)
+            window = window or left
+            kernels.advance(np.array([island.job(0) for island in made.values()]), window,
+                            accuracy.step, accuracy.flight_error)
+            for island in made.values():
+                if len(island.dolls) > 1:
+                    self._scatter_state(island)
+            cluster.state.q[:] = self.q[cluster.q_indices]
+            cluster.state.v[:] = self.v[cluster.v_indices]
+            left -= window
+        _invalidate(cluster)
+        cluster.state.bone_states[:] = self.bone_states[cluster.bones]
+        cluster.state.doll_sums[:] = self.sums[cluster.dolls]
+        cluster.state.excluded[:] = np.concatenate(self._excluded(cluster))
+        cluster.islands = list(made.values())
+        return True
+
+    def _form_islands(self, cluster: Cluster, label: np.ndarray,
+                      before: dict[bytes, Cluster]) -> dict[bytes, Cluster]:
+        """Islands of a cluster by ``label`` (d,); those of the window ``before`` remain."""
+        made = {}
+        for number in np.unique(label):
+            dolls = cluster.dolls[label == number]
+            key = dolls.tobytes()
+            made[key] = before.get(key)
+            if made[key] is None:
+                own = cluster.pairs[np.isin(cluster.pairs, dolls).all(axis=1)]
+                made[key] = (self._join(dolls, own) if len(dolls) > 1 else self._singles[dolls[0]])
+                _invalidate(made[key])
+        return made
+
+    def _excluded(self, cluster: Cluster) -> list[np.ndarray]:
+        """Exclusion flags of the pairs of each doll of a cluster."""
+        return [self._singles[doll].state.excluded for doll in cluster.dolls]
+
     def _scatter_state(self, cluster: Cluster) -> None:
         """Copy the state of a cluster of several dolls into the scene's arrays."""
         self.q[cluster.q_indices], self.v[cluster.v_indices] = cluster.state.q, cluster.state.v
         self.bone_states[cluster.bones] = cluster.state.bone_states
         self.sums[cluster.dolls] = cluster.state.doll_sums
         at = 0
-        for doll in cluster.dolls:
-            excluded = self._singles[doll].state.excluded
+        for excluded in self._excluded(cluster):
             excluded[:] = cluster.state.excluded[at:at + len(excluded)]
             at += len(excluded)
 
@@ -353,23 +409,31 @@ class Clusters:
         scene = dataclasses.replace(
             self._scene, dolls=tuple(self._scene.dolls[doll] for doll in dolls))
         system = join_systems(systems, pairs_between(scene, geoms))
-        singles = [self._singles[doll].state for doll in dolls]
         state = make_cluster_state(system, contact_capacity(system))._replace(
             q=self.q[q], v=self.v[v], stats=self.stats[dolls[0]:dolls[0] + 1],
-            excluded=np.concatenate([single.excluded for single in singles]))
+            excluded=np.concatenate([self._singles[doll].state.excluded for doll in dolls]))
         return _bind_cluster(dolls, pairs, bones, q, v, system, state,
                              [make_workspace(system, state)])
 
 
 def _invalidate(cluster: Cluster) -> None:
     """Discard a cluster's dense step, contacts, gaps and step lengths: q or v has been set."""
+    cluster.islands = []
     cluster.state.dense_step[:] = cluster.state.contact_accelerations[:] = 0
     for name in ('contact_count', 'ended_without_impact', 'last_dt', 'next_dt', 'gaps_current'):
         cluster.state.stats[name] = 0
 
 
-def _restore_state(cluster: Cluster, state: ClusterState) -> None:
-    """Write a copy of its state back to a cluster."""
+def _saved(cluster: Cluster) -> tuple[Cluster, ClusterState, list[tuple]]:
+    """A cluster with a copy of its state, and its islands with theirs."""
+    return cluster, _copied(cluster.state), [_saved(island) for island in cluster.islands]
+
+
+def _restore(cluster: Cluster, state: ClusterState, islands: list[tuple]) -> None:
+    """Write the copies of its state and of its islands' back to a cluster."""
+    cluster.islands = [island for island, *_ in islands]
+    for saved in islands:
+        _restore(*saved)
     for name in SNAPSHOT:
         getattr(cluster.state, name)[:] = getattr(state, name)
     cluster.state.contacts[:len(state.contacts)] = state.contacts

@@ -39,6 +39,9 @@ BEYOND_LIMIT = 2e-3
 DEEP_PENETRATION = 1e-3
 """m: deeper penetrations into the ground are corrected at whatever cost of energy."""
 
+MOST_SPEEDUP = 3.0
+"""Most by which impacts are taken to multiply a speed within a window of label_reachable()."""
+
 EXCLUDED = 1e6
 """m: the gap of a pair that does not collide."""
 
@@ -83,6 +86,31 @@ def update_gaps(s: System, ws: Workspace, kin: Kinematics, q: np.ndarray, before
         least = before[n + k] - 2 * (
             motion_bound(motion[a.body], a.reach, h) + motion_bound(motion[b.body], b.reach, h))
         out[n + k] = least if least > NEAR else pair_gap(s, k, kin)
+
+
+@compiled
+def label_reachable(s: System, ws: Workspace, kin: Kinematics, gaps: np.ndarray, h: float,
+                    label: np.ndarray) -> None:
+    """Write to ``label`` (d,) which dolls may meet within h s, directly or by others: the least
+    index of all that may. Speeds count MOST_SPEEDUP times. ``kin``, ``gaps``: current.
+    """
+    motion = ws.contacts.motion
+    for i in range(len(s.tree)):
+        velocity, motion[i].angular_speed = body_velocity(kin, i)
+        motion[i].speed = norm(velocity)
+        motion[i].correction = motion[i].correction_angle = 0.0
+    for d in range(len(label)):
+        label[d] = d
+    first = len(gaps) - len(s.pairs)
+    for k in range(len(s.pairs)):
+        a, b = s.geoms[s.pairs[k].a], s.geoms[s.pairs[k].b]
+        one, other = label[s.body_doll[a.body]], label[s.body_doll[b.body]]
+        reach = motion_bound(motion[a.body], a.reach, h) + motion_bound(motion[b.body], b.reach, h)
+        if one != other and gaps[first + k] <= TOUCHING + MOST_SPEEDUP * reach:
+            low, high = min(one, other), max(one, other)
+            for d in range(len(label)):
+                if label[d] == high:
+                    label[d] = low
 
 
 @compiled
