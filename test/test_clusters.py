@@ -10,11 +10,12 @@ import pytest
 
 pytest.importorskip('numba', reason='numba is not installed: there is no rigid engine')
 
+import loose_bodies
 from conserved import conserved
 
 from ragdoll_ros import Push, Simulation, load_scene
 from ragdoll_ros.accuracy.crowds import crowd_digests
-from ragdoll_ros.model.scene import Placement
+from ragdoll_ros.model.scene import Material, Placement
 
 APART = 2.5
 """m between dolls that never touch."""
@@ -61,6 +62,31 @@ def test_states_are_the_same_to_the_bit_for_any_number_of_workers():
     digests = {hashlib.sha256(rows(crowd, 200, workers, pushes).tobytes()).hexdigest()
                for workers in (1, 2, 3, 1)}
     assert len(digests) == 1
+
+
+def balls_in_a_box():
+    """A cluster that falls into islands all the time: 100 balls that meet, and their box."""
+    balls, side = loose_bodies.contained_balls(100)
+    return balls.scene(Material(0.0, 0.0, 1.0), others=(
+        Placement(loose_bodies.container(side), 'container'),))
+
+
+def test_islands_of_a_cluster_move_the_same_to_the_bit_for_any_workers_and_when_restored():
+    scene = balls_in_a_box()
+    runs = {rows(scene, 6, workers).tobytes() for workers in (1, 2)}
+    assert len(runs) == 1
+    with Simulation(scene, engine='rigid') as simulation:
+        engine, shown = simulation._engine, []
+        for _ in range(3):
+            simulation.advance()
+        assert max(np.bincount(engine.cluster_of_doll)) > 62
+        snapshot = engine.save()
+        for _ in range(2):
+            simulation.advance()
+            shown.append((engine.state.rows.tobytes(), engine.contacts().positions.tobytes()))
+            if len(shown) == 1:
+                engine.restore(snapshot)
+    assert shown[0] == shown[1]
 
 
 @pytest.mark.slow
