@@ -140,6 +140,7 @@ def find_first_contact(s: System, ws: Workspace, cluster: ClusterState) -> None:
         if least <= CLOSED:
             step.event_time = time
             return
+        arm_separated(gaps, flight.armed)
         safe = time_without_contact(s, ws, kin, q, v, gaps, acceleration, relative,
                                     cluster.end_rates)
         before = time
@@ -161,16 +162,19 @@ def arm_gaps(ws: Workspace) -> None:
 
 @compiled
 def least_gap(gaps: np.ndarray, armed: np.ndarray) -> float:
-    """Least gap, m or rad, by gap_to_contact(); arms gaps that have separated."""
+    """Least gap, m or rad, by gap_to_contact()."""
     least = math.inf
     for j in range(len(gaps)):
-        if armed[j] > 0:
-            least = min(least, gaps[j])
-        elif gaps[j] > TOUCHING:
-            armed[j] = 1.0
-        else:
-            least = min(least, gaps[j] + 2 * TOUCHING)
+        least = min(least, gap_to_contact(gaps, armed, j))
     return least
+
+
+@compiled
+def arm_separated(gaps: np.ndarray, armed: np.ndarray) -> None:
+    """Arm gaps that have separated, at an instant before which regula_falsi() will not look."""
+    for j in range(len(gaps)):
+        if gaps[j] > TOUCHING:
+            armed[j] = 1.0
 
 
 @compiled
