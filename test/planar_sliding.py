@@ -42,7 +42,7 @@ def box(size, cells=70):
                    (size[0] ** 2 + size[1] ** 2) / 12)
 
 
-def capsule(radius, length, cells=1000):
+def capsule(radius, length, cells=200):
     """On its side, by Steiner's law from its cylinder and its half balls."""
     x = length * ((np.arange(cells) + 0.5) / cells - 0.5)
     ball = 4 / 3 * radius / (length + 4 / 3 * radius)
@@ -64,7 +64,7 @@ def accelerations(body, friction, state):
     directions = slip / np.maximum(np.hypot(slip[:, 0], slip[:, 1]), 1e-12)[:, None]
     spread = np.linalg.pinv(body.points.T @ body.points / len(body.points))
     pressure = np.ones(len(body.points))
-    for _ in range(20):
+    for _ in range(6):
         force = -friction * G * (pressure[:, None] * directions).mean(axis=0)
         center = -body.height * force / G
         if body.rolls:

@@ -52,14 +52,14 @@ def edge_sums(ax: float, ay: float, bx: float, by: float) -> Sums:
     inverse = 2 * asinh(length / math.sqrt(wide)) if wide > 1e-20 * length * length else 0.0
     rise, product = far - near, end * far - start * near
     lying, upright = rise, height * inverse
-    along, both = (product - height * upright) / 2, height * rise
+    lengthwise, both = (product - height * upright) / 2, height * rise
     across, mean = height * upright, (product + height * upright) / 2
     third, high = (far * far * far - near * near * near) / 3, height * mean
     nx, ny = -ey, ex
     return (lying * ex + upright * nx, lying * ey + upright * ny,
-            along * ex * ex + 2 * both * ex * nx + across * nx * nx,
-            along * ex * ey + both * (ex * ny + ey * nx) + across * nx * ny,
-            along * ey * ey + 2 * both * ey * ny + across * ny * ny,
+            lengthwise * ex * ex + 2 * both * ex * nx + across * nx * nx,
+            lengthwise * ex * ey + both * (ex * ny + ey * nx) + across * nx * ny,
+            lengthwise * ey * ey + 2 * both * ey * ny + across * ny * ny,
             mean, third * ex + high * nx, third * ey + high * ny)
 
 
