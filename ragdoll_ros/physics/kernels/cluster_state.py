@@ -16,7 +16,7 @@ CONTACT = np.dtype([
     ('friction_point', float, 3), ('normal', float, 3), ('tangents', float, (2, 3)),
     ('gap', float), ('friction', float), ('rolling_friction', float), ('restitution', float),
     ('normal_velocity', float), ('impulse', float, 5), ('persistent', np.int64),
-    ('start_velocity', float, 5)], align=True)
+    ('start_velocity', float, 5), ('spin', float)], align=True)
 """A contact of two bodies (``body_b`` -1: the ground), or a joint at a limit.
 
 kind: see contact_kind.py. dof, limit_sign: of a limit, its degree of freedom and the direction back
@@ -24,7 +24,8 @@ inside. id: the same from step to step; patch: the same for all points of one co
 where the normal force acts, and friction_point, where friction acts: world, m. normal: from b to a;
 tangents: two directions across it. gap: m or rad. rolling_friction: m. normal_velocity: before the
 step, m/s. impulse: along the rows, N s or N m s. persistent: whether it existed as the step began,
-with the velocities start_velocity along its rows. island, first_row, dof_count: of the solver."""
+with the velocities start_velocity along its rows and ``spin`` about the normal. island, first_row,
+dof_count: of the solver."""
 
 DOLL_SUMS = np.dtype([
     ('energy', float), ('kinetic', float), ('center', float, 3), ('momentum', float, 3),

@@ -10,7 +10,7 @@ from ..collision.shapes import CYLINDER
 from ..compiling.decorators import compiled
 from ..contact_kind import FRICTIONAL, LIMIT, ROLLING
 from ..dynamics.kinematics import Kinematics
-from ..maths.vectors import add_scaled, column, cross, divide, dot, norm, put, sub, vec
+from ..maths.vectors import Vec3, add_scaled, column, cross, divide, dot, norm, put, sub, vec
 from ..system import System
 from ..workspace import Contacts, Workspace
 from .gaps import MET, TOUCHING, ground_point, placed_shape
@@ -114,9 +114,7 @@ def set_friction_points(s: System, contacts: Contacts, kin: Kinematics, m: int) 
     """
     found, begin = contacts.found, 0
     while begin < m:
-        patch, end = found[begin].patch, begin + 1
-        while end < m and found[end].patch == patch and patch >= 0:
-            end += 1
+        patch, end = found[begin].patch, patch_end(found, begin, m)
         if found[begin].kind == LIMIT:
             begin = end
             continue
@@ -132,15 +130,29 @@ def set_friction_points(s: System, contacts: Contacts, kin: Kinematics, m: int) 
 
 
 @compiled
+def patch_end(contacts: np.ndarray, begin: int, m: int) -> int:
+    """Index of the first of m contacts after ``begin`` that is not of the same patch."""
+    patch, end = contacts[begin].patch, begin + 1
+    while end < m and contacts[end].patch == patch and patch >= 0:
+        end += 1
+    return end
+
+
+@compiled
+def face_center(geom: np.record, k: int, kin: Kinematics, c: np.record) -> Vec3:
+    """Center, m, of the face of cylinder k that has contact c with the ground."""
+    axis = column(kin.geom_rotations[k], 2)
+    low = -geom.size[1] if dot(axis, vec(c.normal)) > 0 else geom.size[1]
+    return add_scaled(vec(kin.geom_positions[k]), low, axis)
+
+
+@compiled
 def contract_to_disc(geom: np.record, k: int, kin: Kinematics, contacts: np.ndarray, begin: int,
                      end: int) -> None:
     """Write friction points of contacts begin to end - 1, the face of cylinder k on the ground: at
     two thirds of the radius, the mean distance of a disc's points from its center.
     """
-    axis = column(kin.geom_rotations[k], 2)
-    side = dot(axis, vec(contacts[begin].normal))
-    low = -geom.size[1] if side > 0 else geom.size[1]
-    center = add_scaled(vec(kin.geom_positions[k]), low, axis)
+    center = face_center(geom, k, kin, contacts[begin])
     for e in range(begin, end):
         c = contacts[e]
         put(c.friction_point, add_scaled(center, 2 / 3, sub(vec(c.point), center)))

@@ -42,6 +42,10 @@ DEEP_PENETRATION = 1e-3
 MOST_SPEEDUP = 3.0
 """Most by which impacts are taken to multiply a speed within a window of label_reachable()."""
 
+LEVEL = 1e-6
+"""Sine of the tilt below which the end of a cylinder lies flat: which point of its rim is lowest
+says nothing, and would jump from step to step."""
+
 EXCLUDED = 1e6
 """m: the gap of a pair that does not collide."""
 
@@ -181,7 +185,7 @@ def ground_point(geom: np.record, k: int, position: np.ndarray, r: np.ndarray,
             a, b, _ = to_local(r, normal)
             x, y = -a, -b
             far = math.sqrt(x * x + y * y)
-            x, y = (x * size[0] / far, y * size[0] / far) if far > 1e-12 else (size[0], 0.0)
+            x, y = (x * size[0] / far, y * size[0] / far) if far > LEVEL else (size[0], 0.0)
         else:
             x = (0.0, size[0], -size[0], 0.0, 0.0)[k]
             y = (0.0, 0.0, 0.0, size[0], -size[0])[k]

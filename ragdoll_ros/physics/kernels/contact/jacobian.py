@@ -96,8 +96,11 @@ def apply_inverse_factor(dof_parent: np.ndarray, L: np.ndarray, island: Island, 
 @compiled
 def contact_velocities(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray,
                        c: np.record) -> None:
-    """Write the velocities along a contact's rows to c.start_velocity; ``kin``: of q and v."""
+    """Write the velocities along a contact's rows to c.start_velocity, that about its normal to
+    c.spin; ``kin``: of q and v.
+    """
     start = c.start_velocity
+    c.spin = 0.0
     if c.kind == LIMIT:
         start[0] = c.limit_sign * v[c.dof]
         return
@@ -113,3 +116,4 @@ def contact_velocities(s: System, kin: Kinematics, q: np.ndarray, v: np.ndarray,
         start[2] += sign * dot(w, at_friction)
         start[3] += sign * dot(t, turn)
         start[4] += sign * dot(w, turn)
+        c.spin += sign * dot(n, turn)

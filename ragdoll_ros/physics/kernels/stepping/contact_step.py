@@ -15,6 +15,7 @@ from ..compiling.decorators import compiled
 from ..contact.find_contacts import find_contacts, had_met
 from ..contact.gaps import TOUCHING, update_kinematics_and_gaps
 from ..contact.jacobian import contact_velocities
+from ..contact.patch_friction import set_slip_friction
 from ..contact_kind import LIMIT
 from ..dynamics.bias_forces import bias_forces
 from ..dynamics.kinematics import (forward_kinematics, integrate_positions, place_geoms,
@@ -89,6 +90,7 @@ def contact_step(s: System, ws: Workspace, cluster: ClusterState, h: float, sinc
     step.scalars[0].residual = 0.0
     if m:
         warm_start(s, ws, m, cluster.contacts, h)
+        set_slip_friction(s, ws, kin, step.q_middle, m, True)
         solve_contacts(s, ws, kin, step.q_middle, v, step.v_free, m, h, STEP_TOLERANCE)
         for j in range(len(v)):
             step.v_end[j] = step.v_free[j] + step.v_change[j]

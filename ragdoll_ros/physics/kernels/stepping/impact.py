@@ -8,6 +8,7 @@ from ..compiling.decorators import compiled
 from ..contact.find_contacts import find_contacts, had_met
 from ..contact.gaps import MET, TOUCHING
 from ..contact.jacobian import contact_velocities
+from ..contact.patch_friction import set_slip_friction
 from ..contact_kind import LIMIT
 from ..dynamics.kinematics import (Kinematics, forward_kinematics, place_geoms,
                                    root_motion_subspaces, rotate_inertias)
@@ -69,6 +70,7 @@ def impact(s: System, ws: Workspace, cluster: ClusterState) -> int:
     for i in range(m):
         for e in range(5):
             contacts[i].impulse[e] = 0.0
+    set_slip_friction(s, ws, kin, q, m, False)
     solve_contacts(s, ws, kin, q, v, v, m, 0.0, TOLERANCE)
     for j in range(len(v)):
         v[j] += ws.step.v_change[j]

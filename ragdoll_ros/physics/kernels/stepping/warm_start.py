@@ -67,7 +67,7 @@ def take_start(c: np.record, start: np.record) -> None:
     """Copy gap and velocities of a persistent contact at the step's start to ``c``; if it separates
     there, remove its friction.
     """
-    c.gap = start.gap
+    c.gap, c.spin = start.gap, start.spin
     for e in range(5):
         c.start_velocity[e] = start.start_velocity[e]
     if c.kind != LIMIT and start.start_velocity[0] > SEPARATING:
