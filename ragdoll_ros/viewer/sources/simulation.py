@@ -34,6 +34,9 @@ MEASURE_SHARE = 0.05
 ACCURACY = 'normal'
 """At the start."""
 
+MAX_NEW_FRAMES = 300
+"""That are kept for the page: 3 s of ticks, in which it may draw nothing."""
+
 JOIN_TIMEOUT = 1.0
 """s that the thread may take to end."""
 
@@ -48,6 +51,9 @@ class SimulationSource(Source):
         self._commands: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         self._requested = RequestedData()
         self._frame: Frame | None = None
+        self._new_frames: deque[Frame] = deque(maxlen=MAX_NEW_FRAMES)
+        self._runs = 0
+        """Number of runs of the simulations before this one."""
         self._statistics = TickStatistics()
         self._simulation = Simulation(scene, engine=engine, workers='auto')
         self._status = SourceStatus(
@@ -63,6 +69,9 @@ class SimulationSource(Source):
     @property
     def frame(self) -> Frame | None:
         return self._frame
+
+    def take_frames(self) -> list[Frame]:
+        return [self._new_frames.popleft() for _ in range(len(self._new_frames))]
 
     @property
     def status(self) -> SourceStatus:
@@ -185,6 +194,7 @@ class SimulationSource(Source):
                                 workers='auto')
         factor = (self._status.real_time_factor if scene is self._simulation.scene
                   else _real_time_factor(scene))
+        self._runs += self._simulation.reset_count
         self._simulation.close()
         self._simulation = simulation
         # The measures of the last simulation do not hold for this one.
@@ -211,13 +221,17 @@ class SimulationSource(Source):
         simulation, requested = self._simulation, self._requested
         swings = simulation.swings
         contacts = simulation.contacts if requested.contacts else None
+        work = sum(simulation.work)
         self._frame = Frame(
             simulation.scene, simulation.time / SECOND, simulation.state, simulation.pushes,
             grabs=tuple(self._grabs()),
             rods=None if swings is None else swings.rods,
             contacts=None if contacts is None else contacts.positions,
             angles=simulation.joint_angles if requested.angles else None,
-            forces=None if contacts is None else contacts.normals * contacts.forces[:, None])
+            forces=None if contacts is None else contacts.normals * contacts.forces[:, None],
+            run=self._runs + simulation.reset_count, energy=work + simulation.energy_excess,
+            work=work)
+        self._new_frames.append(self._frame)
         if time.monotonic() >= self._next_status:
             self._next_status = time.monotonic() + STATUS_PERIOD
             self._status = dataclasses.replace(

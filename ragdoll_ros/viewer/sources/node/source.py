@@ -94,6 +94,9 @@ class NodeSource(Source):
         """Frame of the last messages that fitted the scene."""
         return self._frames.newest
 
+    def take_frames(self) -> list[Frame]:
+        return self._frames.take()
+
     @property
     def status(self) -> SourceStatus:
         """What the node reported last, and whether it is silent."""
@@ -232,11 +235,10 @@ class NodeSource(Source):
                         tick_cost=float(values['tick_cost_ms']) / 1e3,
                         measures={key: float(values[key]) for key in KEYS if key in values})
                 with contextlib.suppress(KeyError, ValueError):
-                    zero = int(values['stamp_of_zero']), float(values['stamp_pace'])
                     simulated = float(values['simulated_time'])
                     if simulated < self._simulated_time:
                         self._hands.clear()
-                    self._frames.zero, self._simulated_time = zero, simulated
+                    self._simulated_time = simulated
 
     def _keep_in_touch(self) -> None:
         """Timer callback: confirm grabs, and request what is unknown."""
@@ -251,5 +253,5 @@ class NodeSource(Source):
         if self._pushes is None or self._pushes.scene != self._scene.scene:
             self._hands.clear()
             self._pushes = ObservedPushes(self._scene.scene)
-            self._frames.set_scene(self._pushes)
+        self._frames.set_scene(self._pushes, self._scene.urdf)
         self._update_subscriptions()
