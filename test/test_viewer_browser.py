@@ -477,4 +477,6 @@ def test_rubbish_is_refused_and_a_character_is_fitted(view):
     view.see('no_skin.glb: 1 error')
     upload(view, 'Fit a character', 'bird.glb', fit_rigs.document(fit_rigs.RIGS['bird']).glb())
     view.see('fitted bird.glb')
-    view.wait(lambda: view.has('/scene/skins/0'))
+    view.wait(lambda: view.page.evaluate(
+        'Object.keys(window.__viserMutable.nodeRefFromName).some('
+        'name => /^.scene.skins.[0-9]+$/.test(name))'))
