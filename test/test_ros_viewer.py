@@ -456,6 +456,7 @@ def test_an_open_page_follows_a_node_that_comes_back_with_another_scene(
     wait(lambda: page.frame.grabs)
     kill(node)
     wait(lambda: 'silent' in page.problem.content and 'start it again' in page.problem.content)
+    wait(lambda: 'No messages' in page.settings.health.dot.content)
     start('node', '--ros-args', '-p', 'scene:=crowd')
     wait(lambda: page.stage.scene == load_scene('crowd'))
     wait(lambda: not page.problem.content)

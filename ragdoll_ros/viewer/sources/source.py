@@ -65,6 +65,8 @@ class SourceStatus:
 
     problem: str = ''
     """What is wrong, as text for the page; empty if nothing is."""
+    silent: bool = False
+    """Whether it is a node of which no messages come."""
     note: str = ''
     """Information on what is shown; may be empty."""
     paused: bool = False
@@ -147,7 +149,9 @@ class Source(Protocol):
         """Restart with a scene; waits; RagdollError with the reason if refused."""
 
     def grab(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
-        """Hold a bone at ``point``, m, bone frame, and pull that to ``target``, m, world frame."""
+        """Hold a bone at ``point``, m, bone frame, and pull that to ``target``, m, world frame.
+        A point that is nowhere is ignored, as it is by `drag`.
+        """
 
     def drag(self, hand: str, target: Vector) -> None:
         """Move the target of a hand, m, world frame."""

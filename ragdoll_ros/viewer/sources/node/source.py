@@ -102,13 +102,14 @@ class NodeSource(Source):
         """What the node reported last, and whether it is silent."""
         last = self._last_message()
         silence = time.monotonic() - max(last, self._opened)
-        problem = self._scene.problem
+        problem, silent = self._scene.problem, silence > SILENCE
         if last < self._opened:
-            problem = MISSING.format(self._full_name) if silence > 1.0 else ''
-        elif silence > SILENCE:
+            silent = silence > 1.0
+            problem = MISSING.format(self._full_name) if silent else ''
+        elif silent:
             problem = SILENT.format(self._full_name, silence)
         note = ' '.join(filter(None, (self._reported.note, self._scene.note)))
-        return dataclasses.replace(self._reported, problem=problem, note=note,
+        return dataclasses.replace(self._reported, problem=problem, silent=silent, note=note,
                                    engine=self._scene.settings.engine,
                                    accuracy=self._scene.settings.accuracy)
 
