@@ -63,7 +63,7 @@ class Page:
                      style('disconnected_banner.css', message=DISCONNECTED),
                      script('null_node_guard.js'), script('materials.js'),
                      script('hide_drag_arrow.js'), script('handle_picking.js', ROOT=ROOT),
-                     script('upload_notices.js')):
+                     script('upload_notices.js'), script('decimal_comma.js')):
             server.gui.add_html(html)
         self.problem = server.gui.add_html('')
         self.tabs = server.gui.add_tab_group()

@@ -1,6 +1,7 @@
 """A simulation in this process as a source, in a thread of its own that alone uses it."""
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 import queue
@@ -111,11 +112,12 @@ class SimulationSource(Source):
         self._run_and_wait(lambda: self._replace(scene, self._status.engine))
 
     def grab(self, hand: str, bone: str, point: Vector, target: Vector) -> None:
-        self._commands.put(lambda: self._simulation.grab(hand, bone, point, target))
+        self._commands.put(lambda: self._move_hand(
+            lambda: self._simulation.grab(hand, bone, point, target)))
 
     def drag(self, hand: str, target: Vector) -> None:
-        self._commands.put(lambda: self._simulation.drag(
-            hand, target, DRAG_TIME * self._status.real_time_factor))
+        self._commands.put(lambda: self._move_hand(lambda: self._simulation.drag(
+            hand, target, DRAG_TIME * self._status.real_time_factor)))
 
     def let_go(self, hand: str) -> None:
         self._commands.put(lambda: self._simulation.let_go(hand))
@@ -180,6 +182,12 @@ class SimulationSource(Source):
         doll = scene.dolls[0]
         bone = scene.qualified(doll, doll.doll.root.name)
         self._simulation.push(Push(bone, force, duration=duration), 'page')
+
+    @staticmethod
+    def _move_hand(move: Callable[[], None]) -> None:
+        """Move a hand, unless the pointer points nowhere, or the bone is not there any more."""
+        with contextlib.suppress(errors.RagdollError):
+            move()
 
     def _set_accuracy(self, name: str) -> None:
         self._simulation.accuracy = name
