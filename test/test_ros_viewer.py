@@ -210,6 +210,21 @@ def test_a_node_that_is_paused_is_seen_as_it_stands(node, remote, peer):
     late.close()
 
 
+def test_swings_of_a_paused_node_are_seen_by_who_comes_late(node, remote, peer):
+    assert set_parameters(peer, scene='ponytail')
+    remote.request(OPEN)
+    seen(remote, 'ponytail')
+    wait(lambda: remote.frame.rods is not None and remote.frame.time > 0.2)
+    remote.pause(True)
+    wait(lambda: remote.status.paused)
+    late = NodeSource([])
+    late.request(OPEN)
+    seen(late, 'ponytail')
+    wait(lambda: late.frame.rods is not None and late.frame.time == remote.frame.time)
+    wait(lambda: np.array_equal(late.frame.rods, remote.frame.rods))
+    late.close()
+
+
 def test_steers_the_node(node, remote):
     remote.request(OPEN)
     seen(remote)

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -57,7 +58,8 @@ class Outputs:
         self._templates, self._frame = SceneTemplates(scene, frame), frame
         self._set_swings_publisher(count_masses(scene) > 0)
         self._next_markers = 0
-        self._poses_pending = self._measures_pending = False
+        self._pending: list[Callable[[Simulation, int], None]] = []
+        """What has not published the last tick, for want of subscribers."""
         self._tf.set_scene(scene, frame, publish_tf)
         description = scene_to_urdf(scene, frame)
         self._urdf = checksum(description)
@@ -76,43 +78,42 @@ class Outputs:
         most every MARKER_PERIOD by ``now``, ns of the steady clock; poses last, so that who has
         them has the rest of the tick, too.
 
-        ``paused``: publish measures, poses and markers without a subscriber, too, for late ones.
+        ``paused``: publish measures, swings, poses and markers without a subscriber, too, for late
+        ones.
         """
         self.publish_clock(stamp)
         self._tf.publish(simulation, stamp)
         templates = self._templates
-        self._measures_pending = not (paused or self._measures.get_subscription_count())
-        if not self._measures_pending:
-            self._publish_measures(simulation, stamp)
         if self._state.get_subscription_count():
             state = simulation.state
             self._state.publish(templates.state.serialize(stamp, poses_of(state), twists_of(state)))
         if self._joints.get_subscription_count():
             self._joints.publish(templates.joints.serialize(
                 stamp, simulation.joint_angles, simulation.joint_rates))
-        if self._swings is not None and self._swings.get_subscription_count():
-            self._swings.publish(templates.swings.serialize(stamp, poses_of(simulation.swings)))
         if self._contacts.get_subscription_count():
             self._contacts.publish(serialize_pose_array(self._frame, stamp,
                                                         contact_poses(simulation.contacts)))
         if paused or (now >= self._next_markers and self._markers.get_subscription_count()):
             self._next_markers = now + MARKER_PERIOD
             self._publish_markers(simulation, stamp)
-        self._poses_pending = not (paused or self._poses.get_subscription_count())
-        if not self._poses_pending:
-            self._publish_poses(simulation, stamp)
+        self._pending = []
+        for publisher, publish in ((self._measures, self._publish_measures),
+                                   (self._swings, self._publish_swings),
+                                   (self._poses, self._publish_poses)):
+            if publisher is not None and (paused or publisher.get_subscription_count()):
+                publish(simulation, stamp)
+            elif publisher is not None:
+                self._pending.append(publish)
 
     def publish_on_pause(self, simulation: Simulation, stamp: int) -> None:
         """On pause, publish the pending messages to the latched topics for late subscribers."""
-        if self._measures_pending:
-            self._publish_measures(simulation, stamp)
-        if self._poses_pending:
-            self._publish_poses(simulation, stamp)
+        for publish in self._pending:
+            publish(simulation, stamp)
+        self._pending = []
         self._publish_markers(simulation, stamp)
 
     def _publish_measures(self, simulation: Simulation, stamp: int) -> None:
         """Publish time, run and energy of the state with this stamp."""
-        self._measures_pending = False
         last, reset_count, run = self._run
         if last is not simulation or reset_count != simulation.reset_count:
             run = time.time_ns()
@@ -122,9 +123,11 @@ class Outputs:
         self._measures.publish(serialize_measures(self._node.get_fully_qualified_name(), stamp,
                                                   measures))
 
+    def _publish_swings(self, simulation: Simulation, stamp: int) -> None:
+        self._swings.publish(self._templates.swings.serialize(stamp, poses_of(simulation.swings)))
+
     def _publish_poses(self, simulation: Simulation, stamp: int) -> None:
         """Publish the PoseArray of all bones on ~/poses; SceneTemplates.poses makes it."""
-        self._poses_pending = False
         self._poses.publish(self._templates.poses.serialize(stamp, poses_of(simulation.state)))
 
     def _publish_markers(self, simulation: Simulation, stamp: int) -> None:
@@ -144,7 +147,7 @@ class Outputs:
     def _set_swings_publisher(self, enabled: bool) -> None:
         """Create or destroy the publisher of ~/swings: a scene without swings has no such topic."""
         if enabled and self._swings is None:
-            self._swings = self._node.create_publisher(PoseArray, '~/swings', 10)
+            self._swings = self._node.create_publisher(PoseArray, '~/swings', LATCHED_HISTORY)
         elif not enabled and self._swings is not None:
             self._node.destroy_publisher(self._swings)
             self._swings = None

@@ -63,7 +63,7 @@ TOPICS = {'poses': Topic(PoseArray, '{}/poses', lambda data, _: deserialize_pose
           'measures': Topic(DiagnosticArray, '{}/measures',
                             lambda data, _: deserialize_measures(data), LATCHED_QOS),
           'contacts': Topic(PoseArray, '{}/contacts', _positions),
-          'swings': Topic(PoseArray, '{}/swings', _positions),
+          'swings': Topic(PoseArray, '{}/swings', _positions, LATCHED_QOS),
           'angles': Topic(JointState, 'joint_states', _angles, raw=False)}
 """By content; {} stands for the node's name. The node publishes poses last."""
 
