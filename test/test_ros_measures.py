@@ -1,6 +1,9 @@
 """~/measures: its bytes are those of rclpy, and what it says of a tick is the simulation's."""
 from __future__ import annotations
 
+import re
+import time
+
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PoseArray, Vector3, Wrench
@@ -16,6 +19,7 @@ from ragdoll_ros.ros.messages.measures import (
     deserialize_measures,
     serialize_measures,
 )
+from ragdoll_ros.ros.teleop.status_line import StatusLine
 
 MEASURES = TickMeasures(12_030_000_000, 1_764_000_000_123_456_789, 'deadbeef', -503.125, 1e-9, 0.0)
 
@@ -94,3 +98,26 @@ def test_the_work_of_a_push_is_told(make_node, peer):
     assert measures.work_of_pushes == pytest.approx(
         node.simulation.measures()['work_of_pushes_J']) and measures.work_of_pushes > 0.1
     assert measures.work_of_grabs == 0
+
+
+def test_the_status_line_of_the_teleop_counts_no_pause(make_node, peer):
+    """A second on the wall is none on the line, also before the next report."""
+    node = make_node()
+    line = StatusLine(peer, '/ragdoll')
+    peer.executor_.add_node(node)
+
+    def shown():
+        found = re.search(r'  (\d+\.\d) s  ', line.text())
+        return float(found[1]) if found else -1.0
+
+    def is_true():
+        return abs(shown() - node.simulation.time / 1e9) < 0.1
+
+    peer.wait(lambda: shown() > 0.2 and is_true())
+    node.pause(True)
+    until = time.monotonic() + 1.5
+    peer.wait(lambda: time.monotonic() > until)
+    before = node.simulation.time
+    node.pause(False)
+    peer.wait(lambda: node.simulation.time > before + 50_000_000)
+    assert is_true()
