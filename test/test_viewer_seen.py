@@ -61,7 +61,7 @@ def scenes(tmp_path_factory):
         found[name] = dataclasses.replace(above_ground(doll), name=name)
     for name, dolls in (('paint first', (paint, plain)), ('plain first', (plain, paint))):
         found[name] = Scene(name, tuple(
-            Placement(doll, position=(0.0, 1.5 * k, 1.5), name=f'doll {k}')
+            Placement(doll, position=(0.0, 2.2 * k, 1.5), name=f'doll {k}')
             for k, doll in enumerate(dolls)), Ground())
     return found
 
